@@ -1,0 +1,2 @@
+//! The `tauscope` program.
+fn main() {}

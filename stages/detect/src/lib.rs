@@ -1,0 +1,1 @@
+//! Contacts and collisions from the residual, one file per detector.

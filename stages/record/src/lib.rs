@@ -1,0 +1,1 @@
+//! What stays: the MCAP archive and the Rerun picture.

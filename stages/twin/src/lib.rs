@@ -1,0 +1,1 @@
+//! What the effort should have been: expected effort and residual.
