@@ -1,1 +1,19 @@
-//! Contacts and collisions from the residual, one file per detector.
+//! Contacts and collisions from the residual. One detector, one file: it turns a twin's sample into a
+//! score, and the frame around all of them ([`Detect`]) does what they share: the threshold, the
+//! beginning and end of an alarm, which joints and which link.
+//!
+//! A new detector is a file with a type that implements [`Detector`] and a `Settings` for the
+//! pipeline file, and one line in [`config`].
+
+pub mod config;
+mod detector;
+mod events;
+mod isolation;
+pub mod naive_difference;
+mod stage;
+pub mod twin_regression;
+
+pub use config::{Config, ConfigError, Threshold};
+pub use detector::{Detector, Judgement};
+pub use isolation::{Contact, Isolation};
+pub use stage::{Detect, JointSetup, ScoreStatistics, Setup};

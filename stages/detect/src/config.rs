@@ -1,0 +1,126 @@
+//! The detector's part of the pipeline file, and the list of detectors.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::detector::Detector;
+use crate::stage::Setup;
+use crate::{naive_difference, twin_regression};
+
+/// The papers' k, where the file names no threshold.
+const DEFAULT_SIGMAS: f64 = 4.0;
+
+/// A detector: exactly one of the detectors' keys, and what all of them share.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    /// Squared length of the residual after the twin's regression (Tajiri and Iwamoto).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub twin_regression: Option<twin_regression::Settings>,
+    /// The same without the regression: gain 1, offset 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub naive_difference: Option<naive_difference::Settings>,
+    /// When the alarm is raised.
+    pub threshold: Threshold,
+    /// An alarm ends once the score has stayed below the threshold for this long \[s\].
+    #[schemars(range(min = 0.0, max = 3600.0))]
+    pub hold_s: f64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            twin_regression: None,
+            naive_difference: None,
+            threshold: Threshold::default(),
+            // Bridges the dip between two swings of one contact.
+            hold_s: 0.1,
+        }
+    }
+}
+
+impl Config {
+    /// The one detector that is configured.
+    ///
+    /// # Errors
+    /// If there is none, or more than one.
+    pub fn detector(&self, setup: &Setup) -> Result<Box<dyn Detector>, ConfigError> {
+        let mut configured = self.detectors(setup);
+        match (configured.pop(), configured.len()) {
+            (Some(detector), 0) => Ok(detector),
+            (None, _) => Err(ConfigError::OneDetector { found: 0 }),
+            (Some(_), others) => Err(ConfigError::OneDetector { found: others + 1 }),
+        }
+    }
+
+    /// A line a detector.
+    fn detectors(&self, setup: &Setup) -> Vec<Box<dyn Detector>> {
+        [
+            self.twin_regression.as_ref().map(twin_regression::Settings::build),
+            self.naive_difference.as_ref().map(|settings| settings.build(setup)),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+}
+
+/// From which score on the alarm is raised: at most one of the two.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Threshold {
+    /// This many standard deviations above the mean of the score on contact-free data, which
+    /// `twin.yaml` holds. By default 4.
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sigmas: Option<f64>,
+    /// This score.
+    #[schemars(range(min = 0.0))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub score: Option<f64>,
+}
+
+impl Threshold {
+    /// The score from which on `detector` raises the alarm (equation 7 of Tajiri and Iwamoto: mean +
+    /// k standard deviations).
+    ///
+    /// # Errors
+    /// If both kinds are given, or standard deviations are wanted and nobody has measured them.
+    pub fn resolve(&self, detector: &'static str, setup: &Setup) -> Result<f64, ConfigError> {
+        match (self.sigmas, self.score) {
+            (Some(_), Some(_)) => Err(ConfigError::TwoThresholds),
+            (None, Some(score)) => Ok(score),
+            (sigmas, None) => {
+                let sigmas = sigmas.unwrap_or(DEFAULT_SIGMAS);
+                match setup.scores.get(detector) {
+                    Some(score) => Ok(score.mean + sigmas * score.standard_deviation),
+                    None => Err(ConfigError::NoStatistics { detector, sigmas }),
+                }
+            }
+        }
+    }
+}
+
+/// What is wrong with a detector's configuration.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ConfigError {
+    /// Not exactly one detector.
+    #[error("a detect stage runs exactly one detector, found {found}")]
+    OneDetector {
+        /// How many were given.
+        found: usize,
+    },
+    /// Both kinds of threshold.
+    #[error("`threshold` takes either `sigmas` or `score`, not both")]
+    TwoThresholds,
+    /// The threshold is in standard deviations of a score that nobody has measured.
+    #[error(
+        "the threshold of {detector} is {sigmas} standard deviations above the mean score of contact-free data, but the twin holds none: run `tauscope calibrate` and give its file as the twin's `model`, or set `threshold: {{score: …}}`"
+    )]
+    NoStatistics {
+        /// The detector.
+        detector: &'static str,
+        /// The k that was asked for.
+        sigmas: f64,
+    },
+}

@@ -1,0 +1,119 @@
+//! From scores to events: the beginning and the end of an alarm.
+
+/// What happens at a sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Step {
+    /// No alarm.
+    Free,
+    /// The alarm is raised at this sample; the contact is taken to have begun at `contact_ns`.
+    Onset { contact_ns: i64 },
+    /// The alarm goes on.
+    Contact { contact_ns: i64 },
+    /// The alarm ends at this sample.
+    Offset,
+}
+
+/// The alarm's state.
+#[derive(Debug)]
+pub(crate) struct Alarm {
+    threshold: f64,
+    /// A score from here on may already belong to a contact: where the search for its beginning stops.
+    low: f64,
+    hold_ns: i64,
+    /// Beginning of the contact, while an alarm lasts.
+    contact_ns: Option<i64>,
+    /// Newest sample below `low`, and newest at or above the threshold.
+    newest_low_ns: Option<i64>,
+    newest_high_ns: i64,
+}
+
+impl Alarm {
+    /// An alarm at `threshold`; the beginning of a contact is where the score last left `low`.
+    pub fn new(threshold: f64, low: f64, hold_s: f64) -> Self {
+        Self {
+            threshold,
+            low: low.min(threshold),
+            hold_ns: (hold_s * 1e9) as i64,
+            contact_ns: None,
+            newest_low_ns: None,
+            newest_high_ns: 0,
+        }
+    }
+
+    pub fn threshold(&self) -> f64 {
+        self.threshold
+    }
+
+    /// Takes the score of the sample at `stamp_ns`; `None` where the detector is not ready, which
+    /// ends an alarm and forgets what was before.
+    pub fn step(&mut self, stamp_ns: i64, score: Option<f64>) -> Step {
+        let Some(score) = score else {
+            self.newest_low_ns = None;
+            return if self.contact_ns.take().is_some() { Step::Offset } else { Step::Free };
+        };
+        // Equation 7: True where the score is equal, too.
+        let high = score >= self.threshold;
+        if high {
+            self.newest_high_ns = stamp_ns;
+        }
+        let step = match self.contact_ns {
+            None if high => {
+                let contact_ns = self.newest_low_ns.unwrap_or(stamp_ns);
+                self.contact_ns = Some(contact_ns);
+                Step::Onset { contact_ns }
+            }
+            None => Step::Free,
+            Some(contact_ns) if high || stamp_ns - self.newest_high_ns < self.hold_ns => {
+                Step::Contact { contact_ns }
+            }
+            Some(_) => {
+                self.contact_ns = None;
+                Step::Offset
+            }
+        };
+        if score < self.low {
+            self.newest_low_ns = Some(stamp_ns);
+        } else if self.newest_low_ns.is_none() {
+            // Never low since it became ready: the earliest a contact can be known to have begun.
+            self.newest_low_ns = Some(stamp_ns);
+        }
+        step
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: i64 = 1_000_000;
+
+    fn steps(scores: &[f64]) -> Vec<Step> {
+        let mut alarm = Alarm::new(10.0, 2.0, 0.025);
+        (0..).zip(scores).map(|(i, &score)| alarm.step(i * 10 * MS, Some(score))).collect()
+    }
+
+    #[test]
+    fn a_contact_begins_where_the_score_left_its_usual_range() {
+        let steps = steps(&[1.0, 1.0, 4.0, 8.0, 10.0, 11.0]);
+        assert_eq!(steps[3], Step::Free);
+        assert_eq!(steps[4], Step::Onset { contact_ns: 10 * MS });
+        assert_eq!(steps[5], Step::Contact { contact_ns: 10 * MS });
+    }
+
+    #[test]
+    fn a_short_dip_does_not_end_the_alarm_and_a_long_one_does() {
+        let steps = steps(&[1.0, 12.0, 5.0, 12.0, 1.0, 1.0, 1.0, 1.0]);
+        assert_eq!(steps[2], Step::Contact { contact_ns: 0 });
+        assert_eq!(steps[5], Step::Contact { contact_ns: 0 });
+        assert_eq!(steps[6], Step::Offset);
+        assert_eq!(steps[7], Step::Free);
+    }
+
+    #[test]
+    fn becoming_unready_ends_the_alarm() {
+        let mut alarm = Alarm::new(10.0, 2.0, 1.0);
+        alarm.step(0, Some(20.0));
+        assert_eq!(alarm.step(MS, None), Step::Offset);
+        assert_eq!(alarm.step(2 * MS, None), Step::Free);
+    }
+}

@@ -1,0 +1,124 @@
+//! The detector as a stage: twin states in, a verdict for each out.
+
+use std::collections::BTreeMap;
+
+use tauscope_bus::{Detection, Emit, Name, Stage, StageError, TwinState, flags};
+use tauscope_dynamics::Model;
+
+use crate::config::{Config, ConfigError};
+use crate::detector::Detector;
+use crate::events::{Alarm, Step};
+use crate::isolation::Isolation;
+
+/// What a detector must know of its cell and its twin.
+#[derive(Debug, Clone, Default)]
+pub struct Setup {
+    /// By joint in URDF order.
+    pub joints: Vec<JointSetup>,
+    /// The robot, where there is one: for the touched link and the force.
+    pub model: Option<Model>,
+    /// By detector, what its score did on contact-free data.
+    pub scores: BTreeMap<String, ScoreStatistics>,
+}
+
+/// What a detector must know of a joint.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointSetup {
+    /// Gain that the twin applied \[effort unit per model unit\].
+    pub gain: f64,
+    /// Offset that the twin applied \[effort unit\].
+    pub offset: f64,
+    /// Standard deviation of the contact-free residual \[effort unit\], where known.
+    pub noise: Option<f64>,
+    /// How much the measured effort changes by 1 N m at the joint \[effort unit per N m\].
+    pub effort_per_nm: f64,
+}
+
+/// A detector's score on contact-free data.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScoreStatistics {
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation.
+    pub standard_deviation: f64,
+}
+
+/// The detect stage: one detector and what all of them share.
+pub struct Detect {
+    detector: Box<dyn Detector>,
+    name: Name,
+    alarm: Alarm,
+    isolation: Isolation,
+}
+
+impl Detect {
+    /// The detector that `config` names, for a cell.
+    ///
+    /// # Errors
+    /// If the configuration names no or several detectors, or no threshold can be had.
+    pub fn new(config: &Config, setup: Setup) -> Result<Self, ConfigError> {
+        let detector = config.detector(&setup)?;
+        let threshold = config.threshold.resolve(detector.name(), &setup)?;
+        // The usual range of the score: one standard deviation above its mean.
+        let low = setup
+            .scores
+            .get(detector.name())
+            .map_or(0.5 * threshold, |score| score.mean + score.standard_deviation);
+        Ok(Self {
+            name: Name::new(detector.name()),
+            detector,
+            alarm: Alarm::new(threshold, low, config.hold_s),
+            isolation: Isolation::new(setup),
+        })
+    }
+}
+
+impl Stage<TwinState, Detection> for Detect {
+    fn accept(
+        &mut self,
+        sample: &TwinState,
+        out: &mut dyn Emit<Detection>,
+    ) -> Result<(), StageError> {
+        let judgement = self.detector.judge(sample);
+        let step = self
+            .alarm
+            .step(sample.header.stamp_ns, judgement.ready.then_some(judgement.score));
+        let (state, event, contact_ns) = match step {
+            Step::Free if judgement.ready => ("free", 0, None),
+            Step::Free => ("not_ready", 0, None),
+            Step::Onset { contact_ns } => ("contact", Detection::ONSET, Some(contact_ns)),
+            Step::Contact { contact_ns } => ("contact", 0, Some(contact_ns)),
+            Step::Offset => ("free", Detection::OFFSET, None),
+        };
+        let mut joints = 0;
+        let mut contact = None;
+        if contact_ns.is_some() {
+            joints = self.isolation.loaded_joints(&sample.residual);
+            contact = self.isolation.locate(sample, joints);
+        }
+        out.emit(&mut |slot| {
+            slot.header = sample.header;
+            slot.header.flags = sample.header.flags & flags::RESET;
+            if judgement.ready {
+                slot.header.flags |= flags::READY;
+            }
+            slot.detector = self.name;
+            slot.state = Name::new(state);
+            slot.score = judgement.score;
+            slot.threshold = self.alarm.threshold();
+            slot.joints = joints;
+            slot.event = event;
+            if let Some(contact_ns) = contact_ns {
+                slot.header.flags |= flags::ALARM;
+                slot.contact_ns = contact_ns;
+            }
+            if let Some(contact) = contact {
+                slot.header.flags |= flags::FORCE;
+                slot.link = Name::new(self.isolation.link_name(contact.link));
+                slot.force_n = contact.force_n;
+                slot.point_m = contact.point_m;
+            }
+        })?;
+        Ok(())
+    }
+}

@@ -1,0 +1,149 @@
+//! Gain and offset per joint by linear regression (Tajiri and Iwamoto, equations 3 and 4), from the
+//! filtered efforts of an uncorrected twin over contact-free recordings.
+//!
+//! The joints do not interact in equation 3, so each is a straight-line fit, kept as running sums:
+//! memory does not grow with the recordings.
+
+use tauscope_bus::{TwinState, flags};
+
+/// One joint's fit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointFit {
+    /// Gain \[effort unit per model unit\].
+    pub gain: f64,
+    /// Offset \[effort unit\].
+    pub offset: f64,
+    /// Standard deviation of what the fit leaves \[effort unit\].
+    pub noise: f64,
+    /// Share of the measured effort's variance that the line explains, 0 to 1.
+    pub explained: f64,
+    /// Range of the model's effort over the recordings, as its standard deviation \[model unit\].
+    pub excitation: f64,
+}
+
+/// Running sums of one joint, about the first sample for numerical sanity (Welford).
+#[derive(Debug, Clone, Copy, Default)]
+struct Moments {
+    mean_x: f64,
+    mean_y: f64,
+    xx: f64,
+    xy: f64,
+    yy: f64,
+}
+
+/// The regression over any number of recordings.
+#[derive(Debug, Clone)]
+pub struct Calibration {
+    joints: Vec<Moments>,
+    samples: u64,
+}
+
+impl Calibration {
+    /// An empty regression for this many joints.
+    pub fn new(joint_count: usize) -> Self {
+        Self { joints: vec![Moments::default(); joint_count], samples: 0 }
+    }
+
+    /// How many samples were taken.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// Takes one sample of the uncorrected twin; one that is not [`flags::READY`] is passed over.
+    pub fn add(&mut self, sample: &TwinState) {
+        if !sample.header.has(flags::READY) {
+            return;
+        }
+        self.samples += 1;
+        let n = self.samples as f64;
+        for (j, m) in self.joints.iter_mut().enumerate() {
+            let (x, y) = (sample.filtered_expected_effort[j], sample.filtered_effort[j]);
+            let (dx, dy) = (x - m.mean_x, y - m.mean_y);
+            m.mean_x += dx / n;
+            m.mean_y += dy / n;
+            m.xx += dx * (x - m.mean_x);
+            m.xy += dx * (y - m.mean_y);
+            m.yy += dy * (y - m.mean_y);
+        }
+    }
+
+    /// The fit per joint, or nothing from fewer than two samples.
+    ///
+    /// A joint whose model effort does not vary keeps gain 1 and is only offset: no motion, no gain.
+    pub fn fit(&self) -> Option<Vec<JointFit>> {
+        if self.samples < 2 {
+            return None;
+        }
+        let n = self.samples as f64;
+        Some(
+            self.joints
+                .iter()
+                .map(|m| {
+                    let varies = m.xx > 1e-12 * n * (1.0 + m.mean_x * m.mean_x);
+                    let gain = if varies { m.xy / m.xx } else { 1.0 };
+                    let left = (m.yy - 2.0 * gain * m.xy + gain * gain * m.xx).max(0.0);
+                    JointFit {
+                        gain,
+                        offset: m.mean_y - gain * m.mean_x,
+                        noise: (left / n).sqrt(),
+                        explained: if varies && m.yy > 0.0 { 1.0 - left / m.yy } else { 0.0 },
+                        excitation: (m.xx / n).sqrt(),
+                    }
+                })
+                .collect(),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use tauscope_bus::Header;
+
+    fn sample(model: f64, measured: f64) -> TwinState {
+        let mut sample = TwinState {
+            header: Header { flags: flags::READY, joint_count: 1, ..Header::default() },
+            ..TwinState::default()
+        };
+        sample.filtered_expected_effort[0] = model;
+        sample.filtered_effort[0] = measured;
+        sample
+    }
+
+    proptest! {
+        #[test]
+        fn a_line_is_recovered(gain in -50.0..50.0f64, offset in -50.0..50.0f64, far in -1e3..1e3f64) {
+            let mut calibration = Calibration::new(1);
+            for i in 0..200 {
+                let model = far + (f64::from(i) * 0.1).sin() * 3.0;
+                calibration.add(&sample(model, gain * model + offset));
+            }
+            let fit = calibration.fit().unwrap()[0];
+            prop_assert!((fit.gain - gain).abs() < 1e-6);
+            prop_assert!((fit.offset - offset).abs() < 1e-3);
+            prop_assert!(fit.noise < 1e-3);
+        }
+    }
+
+    #[test]
+    fn a_joint_whose_model_effort_never_varies_keeps_its_gain() {
+        let mut calibration = Calibration::new(1);
+        for i in 0..100 {
+            calibration.add(&sample(2.0, 5.0 + f64::from(i % 2)));
+        }
+        let fit = calibration.fit().unwrap()[0];
+        assert_eq!(fit.gain, 1.0);
+        assert!((fit.offset - 3.5).abs() < 1e-9);
+        assert!((fit.noise - 0.5).abs() < 1e-9);
+        assert_eq!(fit.explained, 0.0);
+    }
+
+    #[test]
+    fn samples_before_the_filters_have_settled_are_passed_over() {
+        let mut calibration = Calibration::new(1);
+        calibration.add(&TwinState::default());
+        assert_eq!(calibration.samples(), 0);
+        assert!(calibration.fit().is_none());
+    }
+}

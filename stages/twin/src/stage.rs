@@ -1,0 +1,218 @@
+//! The twin as a stage: joint states in, expected effort and residual out.
+
+use tauscope_bus::{
+    Emit, Header, JointArray, JointState, MAX_JOINTS, Stage, StageError, TwinState, flags,
+};
+use tauscope_dynamics::{Data, Inertia, Model, lowpass::Butterworth2, rnea, terms};
+
+use crate::config::{Config, Expected};
+use crate::motion::MotionTracker;
+use crate::twin_file::Correction;
+
+/// What the twin must know of its cell.
+#[derive(Debug, Clone)]
+pub struct Setup {
+    /// The robot; may be absent where the expected effort comes from a topic.
+    pub model: Option<Model>,
+    /// The joints, in URDF order.
+    pub joint_names: Vec<String>,
+    /// Torque constants by joint \[N m/A\], where the effort is a current and they are known.
+    pub torque_constants_nm_per_a: Option<Vec<f64>>,
+    /// The link a tool is attached to, where the source tells of one.
+    pub tool_link: Option<usize>,
+}
+
+/// Why a twin cannot be built.
+#[derive(Debug, thiserror::Error)]
+pub enum TwinError {
+    /// There is no model to compute the effort from.
+    #[error(
+        "the cell has no robot: give `robot: <URDF>`, or `expected: topic` if another twin's effort is recorded"
+    )]
+    NoModel,
+    /// The sample type has no room for so many joints.
+    #[error("{found} joints, at most {MAX_JOINTS} are supported")]
+    TooManyJoints {
+        /// How many there are.
+        found: usize,
+    },
+}
+
+/// The twin stage. Pure: the same samples in give the same samples out.
+#[derive(Debug)]
+pub struct Twin {
+    expected: Expected,
+    max_gap_s: f64,
+    settling_time_s: f64,
+    model: Option<(Model, Data)>,
+    tool_link: Option<usize>,
+    tool: Option<[f64; 10]>,
+    correction: Correction,
+    /// Model unit per N m: 1, or 1/torque constant.
+    unit_per_nm: Vec<f64>,
+    motion: MotionTracker,
+    measured_filters: Vec<Butterworth2>,
+    expected_filters: Vec<Butterworth2>,
+    /// Stamp of the sample before, and of the last reset.
+    previous_ns: Option<i64>,
+    reset_ns: i64,
+}
+
+impl Twin {
+    /// A twin for a cell; `correction` in the cell's joint order.
+    ///
+    /// # Errors
+    /// If it needs a model and there is none, or there are too many joints.
+    pub fn new(config: &Config, setup: Setup, correction: Correction) -> Result<Self, TwinError> {
+        let joint_count = setup.joint_names.len();
+        if joint_count > MAX_JOINTS {
+            return Err(TwinError::TooManyJoints { found: joint_count });
+        }
+        if config.expected == Expected::Model && setup.model.is_none() {
+            return Err(TwinError::NoModel);
+        }
+        let motion = MotionTracker::new(config.motion, joint_count, config.velocity_cutoff_hz);
+        let effort_filter = Butterworth2::new(config.effort_cutoff_hz);
+        let unit_per_nm = match &setup.torque_constants_nm_per_a {
+            Some(constants) => constants.iter().map(|k| 1.0 / k).collect(),
+            None => vec![1.0; joint_count],
+        };
+        Ok(Self {
+            expected: config.expected,
+            max_gap_s: config.max_gap_s,
+            settling_time_s: motion.settling_time_s() + effort_filter.settling_time_s(),
+            model: setup.model.map(|model| {
+                let data = Data::new(&model);
+                (model, data)
+            }),
+            tool_link: setup.tool_link,
+            tool: None,
+            correction,
+            unit_per_nm,
+            motion,
+            measured_filters: vec![effort_filter.clone(); joint_count],
+            expected_filters: vec![effort_filter; joint_count],
+            previous_ns: None,
+            reset_ns: 0,
+        })
+    }
+
+    /// How long the filters take to settle after the start or a gap \[s\].
+    pub fn settling_time_s(&self) -> f64 {
+        self.settling_time_s
+    }
+
+    /// Attaches the tool that the sample tells of, if it is another than before.
+    fn follow_tool(&mut self, sample: &JointState) {
+        let (Some((model, _)), Some(link)) = (&mut self.model, self.tool_link) else { return };
+        let tool = sample.header.has(flags::TOOL).then(|| {
+            let mut all = [sample.tool_mass_kg; 10];
+            all[1..4].copy_from_slice(&sample.tool_com_m);
+            all[4..].copy_from_slice(&sample.tool_inertia_kgm2);
+            all
+        });
+        if tool == self.tool {
+            return;
+        }
+        self.tool = tool;
+        let inertia = tool.map_or_else(Inertia::zero, |_| {
+            Inertia::new(sample.tool_mass_kg, sample.tool_com_m, sample.tool_inertia_kgm2)
+        });
+        model.set_tool(link, inertia);
+    }
+
+    /// Expected effort of the motion as it stands, in the measured effort's unit; not filtered.
+    fn expected_effort(&mut self, dt_s: f64, sample: &JointState) -> JointArray {
+        let n = self.unit_per_nm.len();
+        let mut effort = [0.0; MAX_JOINTS];
+        match (&mut self.model, self.expected) {
+            (Some((model, data)), Expected::Model) => {
+                let (position, velocity, acceleration) = (
+                    &self.motion.position[..n],
+                    &self.motion.velocity[..n],
+                    &self.motion.acceleration[..n],
+                );
+                effort[..n].copy_from_slice(rnea(model, data, position, velocity, acceleration));
+                let at = terms::MotionSample { dt_s, position, velocity, acceleration };
+                for term in &mut self.correction.terms {
+                    term.add_effort(&at, &mut effort[..n]);
+                }
+                for (value, unit) in effort[..n].iter_mut().zip(&self.unit_per_nm) {
+                    *value *= unit;
+                }
+            }
+            _ => effort = sample.reference_effort,
+        }
+        for (value, joint) in effort[..n].iter_mut().zip(&self.correction.joints) {
+            *value = joint.gain * *value + joint.offset;
+        }
+        effort
+    }
+}
+
+impl Stage<JointState, TwinState> for Twin {
+    fn accept(
+        &mut self,
+        sample: &JointState,
+        out: &mut dyn Emit<TwinState>,
+    ) -> Result<(), StageError> {
+        let n = self.unit_per_nm.len();
+        let stamp_ns = sample.header.stamp_ns;
+        let dt_s = self.previous_ns.map(|before| (stamp_ns - before) as f64 * 1e-9);
+        // A time that runs backwards, a gap, or a source that says so: what the filters hold is void.
+        let go_on = matches!(dt_s, Some(dt) if (0.0..=self.max_gap_s).contains(&dt))
+            && !sample.header.has(flags::RESET);
+        let known = self.motion.knows(sample)
+            && sample.header.has(flags::EFFORT_MEASURED)
+            && (self.expected == Expected::Model || sample.header.has(flags::REFERENCE));
+
+        self.follow_tool(sample);
+        let dt_s = if go_on { dt_s.unwrap_or(0.0) } else { 0.0 };
+        if go_on {
+            self.motion.update(dt_s, sample);
+        } else {
+            self.motion.reset(sample);
+            self.reset_ns = stamp_ns;
+        }
+        let expected = self.expected_effort(dt_s, sample);
+        let (mut filtered, mut filtered_expected) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
+        for j in 0..n {
+            let (measured, model) = (&mut self.measured_filters[j], &mut self.expected_filters[j]);
+            if !go_on {
+                measured.reset(sample.effort[j]);
+                model.reset(expected[j]);
+            }
+            filtered[j] = measured.update(dt_s, sample.effort[j]);
+            filtered_expected[j] = model.update(dt_s, expected[j]);
+        }
+        if known {
+            self.previous_ns = Some(stamp_ns);
+        } else {
+            // The filters hold a void value now: begin anew at the next sample that is whole.
+            self.previous_ns = None;
+        }
+        let settled = (stamp_ns - self.reset_ns) as f64 * 1e-9 >= self.settling_time_s;
+        let mut header = Header { sequence: 0, ..sample.header };
+        header.flags &= !(flags::READY | flags::RESET);
+        if known && go_on && settled {
+            header.flags |= flags::READY;
+        }
+        if !go_on {
+            header.flags |= flags::RESET;
+        }
+        out.emit(&mut |slot| {
+            slot.header = header;
+            slot.position = self.motion.position;
+            slot.velocity = self.motion.velocity;
+            slot.acceleration = self.motion.acceleration;
+            slot.effort = sample.effort;
+            slot.expected_effort = expected;
+            slot.filtered_effort = filtered;
+            slot.filtered_expected_effort = filtered_expected;
+            for j in 0..n {
+                slot.residual[j] = filtered[j] - filtered_expected[j];
+            }
+        })?;
+        Ok(())
+    }
+}

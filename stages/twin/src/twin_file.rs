@@ -1,0 +1,171 @@
+//! `twin.yaml`: the corrected twin, as `tauscope calibrate` and `tauscope explain` write it and a
+//! pipeline's `twin` stage loads it.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tauscope_dynamics::terms::{Term, TermError, TermSpec};
+
+/// The only version of the format so far.
+pub const VERSION: u32 = 1;
+
+/// A corrected twin.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TwinFile {
+    /// Version of this format: 1.
+    #[schemars(range(min = 1, max = 1))]
+    pub version: u32,
+    /// The robot it was made for.
+    pub robot: Robot,
+    /// Unit of the measured effort that it predicts: `Nm` or `A`.
+    pub effort_unit: String,
+    /// How the residual was filtered when it was made; noise and scores hold for these filters only.
+    pub filters: Filters,
+    /// Correction by joint name. A joint that is not named keeps gain 1 and offset 0.
+    pub joints: BTreeMap<String, JointCorrection>,
+    /// Physics that the rigid-body model leaves out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub terms: Vec<TermSpec>,
+    /// By detector, what its score did on contact-free data: its threshold is mean + k standard
+    /// deviations of it.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub scores: BTreeMap<String, ScoreStatistics>,
+    /// What made this file: program version, recordings and their hashes.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub provenance: BTreeMap<String, String>,
+}
+
+/// The robot a twin was made for.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Robot {
+    /// The robot's name in its URDF; empty where the twin is a topic.
+    pub name: String,
+    /// SHA-256 of the URDF file; empty where the twin is a topic.
+    #[serde(default)]
+    pub urdf_sha256: String,
+}
+
+/// The filters of the twin stage, see its configuration.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Filters {
+    /// Low-pass on the velocity before it is differentiated \[Hz\].
+    pub velocity_cutoff_hz: f64,
+    /// Low-pass on measured and expected effort \[Hz\].
+    pub effort_cutoff_hz: f64,
+}
+
+/// How one joint's measured effort follows from the model's:
+/// `measured = gain * model + offset` (Tajiri and Iwamoto, equation 4).
+///
+/// The model's effort is in N m, or in A where the cell gives torque constants.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct JointCorrection {
+    /// Gain \[effort unit per model unit\].
+    pub gain: f64,
+    /// Offset \[effort unit\].
+    pub offset: f64,
+    /// Standard deviation of the filtered residual on the contact-free recordings \[effort unit\].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<f64>,
+    /// Share of the measured effort's variance that the corrected model explains, 0 to 1. Where it is
+    /// small, the gain is not identifiable from these motions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub explained: Option<f64>,
+}
+
+impl Default for JointCorrection {
+    fn default() -> Self {
+        Self { gain: 1.0, offset: 0.0, noise: None, explained: None }
+    }
+}
+
+/// A detector's score on contact-free data.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ScoreStatistics {
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation.
+    pub standard_deviation: f64,
+    /// How many samples.
+    pub samples: u64,
+}
+
+/// What is wrong with a `twin.yaml` for the robot at hand.
+#[derive(Debug, thiserror::Error)]
+pub enum TwinFileError {
+    /// It corrects a joint that the robot has not.
+    #[error("the twin corrects joint `{joint}`, which the robot does not have; its joints: {known}")]
+    UnknownJoint {
+        /// The joint in the file.
+        joint: String,
+        /// The robot's joints.
+        known: String,
+    },
+    /// It was made for another unit.
+    #[error("the twin predicts effort in {found}, but the cell's effort is in {expected}")]
+    Unit {
+        /// The file's unit.
+        found: String,
+        /// The cell's unit.
+        expected: String,
+    },
+    /// One of its terms cannot be built.
+    #[error(transparent)]
+    Term(#[from] TermError),
+}
+
+/// A [`TwinFile`] put into a robot's joint order, ready to apply.
+#[derive(Debug)]
+pub struct Correction {
+    /// By joint in URDF order.
+    pub joints: Vec<JointCorrection>,
+    /// The physics that the rigid-body model leaves out.
+    pub terms: Vec<Box<dyn Term>>,
+}
+
+impl Correction {
+    /// No correction: the rigid-body model as it is.
+    pub fn none(joint_count: usize) -> Self {
+        Self { joints: vec![JointCorrection::default(); joint_count], terms: Vec::new() }
+    }
+}
+
+impl TwinFile {
+    /// Puts the corrections into the order of `joint_names`.
+    ///
+    /// # Errors
+    /// If the file names a joint that is not there, was made for another effort unit, or holds a term
+    /// that cannot be built.
+    pub fn resolve(
+        &self,
+        joint_names: &[String],
+        effort_unit: &str,
+    ) -> Result<Correction, TwinFileError> {
+        if self.effort_unit != effort_unit {
+            return Err(TwinFileError::Unit {
+                found: self.effort_unit.clone(),
+                expected: effort_unit.to_owned(),
+            });
+        }
+        let mut correction = Correction::none(joint_names.len());
+        for (joint, values) in &self.joints {
+            let Some(index) = joint_names.iter().position(|name| name == joint) else {
+                return Err(TwinFileError::UnknownJoint {
+                    joint: joint.clone(),
+                    known: joint_names.join(", "),
+                });
+            };
+            correction.joints[index] = *values;
+        }
+        for spec in &self.terms {
+            correction.terms.push(spec.build(joint_names)?);
+        }
+        Ok(correction)
+    }
+}
