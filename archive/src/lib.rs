@@ -1,1 +1,19 @@
-//! Recordings at rest: MCAP, rosbag2 and CSV to joint states or Arrow columns, and back.
+//! Recordings at rest: MCAP files, rosbag2 bags and CSV tables to messages, and messages to MCAP.
+//!
+//! [`Recording::open`] finds out what lies at a path. Whatever it is, [`Recording::messages`] gives
+//! the messages of chosen topics in the order of their log times, as CDR bytes, with bounded memory:
+//! an archive larger than RAM can be read. [`ros`] decodes them. [`McapWriter`] writes what any
+//! ROS 2 or Foxglove tool opens.
+//!
+//! Nothing is lost in silence: what cannot be read is [`Damage`], known when the recording is opened
+//! (a torn tail) or told by the reader in its place (a broken chunk).
+
+mod damage;
+mod error;
+mod mcap_file;
+mod recording;
+pub mod ros;
+
+pub use damage::{Damage, DamageKind};
+pub use error::ArchiveError;
+pub use recording::{JointStates, Message, Messages, Recording, RecordingKind, Stamped, Topic};

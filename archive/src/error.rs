@@ -1,0 +1,137 @@
+//! Why a recording cannot be read or written.
+
+use std::path::{Path, PathBuf};
+
+use crate::damage::{Damage, seconds};
+use crate::ros::DecodeError;
+
+/// Why a recording cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum ArchiveError {
+    /// The operating system refuses.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What it says.
+        source: std::io::Error,
+    },
+    /// None of the formats that can be read.
+    #[error("{}: not a recording ({reason})", path.display())]
+    UnknownFormat {
+        /// The file or folder.
+        path: PathBuf,
+        /// What was found instead.
+        reason: String,
+    },
+    /// Broken from its first record on.
+    #[error("{}: cannot be read from its first record: {reason}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// There is a recording, but no message in it.
+    #[error("{}: the recording is empty{}", path.display(), topics_hint(known))]
+    Empty {
+        /// The recording.
+        path: PathBuf,
+        /// Topics it declares.
+        known: Vec<String>,
+    },
+    /// The topic is not in the recording.
+    #[error("{}: no topic {topic:?}{}", path.display(), topics_hint(known))]
+    NoSuchTopic {
+        /// The recording.
+        path: PathBuf,
+        /// What was asked for.
+        topic: String,
+        /// Topics it has.
+        known: Vec<String>,
+    },
+    /// The topic is there, but holds no message.
+    #[error("{}: no message on topic {topic:?}", path.display())]
+    NoMessages {
+        /// The recording.
+        path: PathBuf,
+        /// The topic.
+        topic: String,
+    },
+    /// The topic carries another type.
+    #[error("{}: topic {topic:?} carries {found}, expected {expected}", path.display())]
+    WrongType {
+        /// The recording.
+        path: PathBuf,
+        /// The topic.
+        topic: String,
+        /// Type and encoding it has.
+        found: String,
+        /// Type and encoding it should have.
+        expected: String,
+    },
+    /// A message is not what its topic says.
+    #[error("{}: topic {topic:?}, log time {} s, at {at}: {source}", path.display(), seconds(*log_time_ns))]
+    Decode {
+        /// The recording.
+        path: PathBuf,
+        /// The topic.
+        topic: String,
+        /// Log time of the message \[ns\].
+        log_time_ns: i64,
+        /// Where it lies: bytes from the start of the file (of its chunk, if it is in one), or row.
+        at: u64,
+        /// What is wrong with it.
+        source: DecodeError,
+    },
+    /// A part of the recording cannot be read. The reader goes on behind it if it is asked again.
+    #[error("{0}")]
+    Damaged(Damage),
+    /// Chunks overlap so much in time that they cannot be put in order within the memory allowed.
+    #[error(
+        "{}: {loaded} bytes of chunks that overlap in time at log time {} s; at most {limit} are held \
+         in memory: repair the recording to put it in order",
+        path.display(), seconds(*log_time_ns)
+    )]
+    TooMuchOverlap {
+        /// The recording.
+        path: PathBuf,
+        /// Log time that was reached \[ns\].
+        log_time_ns: i64,
+        /// Bytes that would be needed.
+        loaded: usize,
+        /// Bytes allowed.
+        limit: usize,
+    },
+    /// A database cannot be read.
+    #[error("{}: {source}", path.display())]
+    Sqlite {
+        /// The file.
+        path: PathBuf,
+        /// What SQLite says.
+        source: rusqlite::Error,
+    },
+}
+
+impl ArchiveError {
+    pub(crate) fn io(path: &Path) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self::Io { path, source }
+    }
+
+    /// The damage, if it is that and reading can go on behind it.
+    pub fn damage(&self) -> Option<&Damage> {
+        match self {
+            Self::Damaged(damage) => Some(damage),
+            _ => None,
+        }
+    }
+}
+
+fn topics_hint(known: &[String]) -> String {
+    if known.is_empty() {
+        "; it has no topics".to_owned()
+    } else {
+        format!("; it has {}", known.join(", "))
+    }
+}

@@ -1,0 +1,25 @@
+//! Reading MCAP files (<https://mcap.dev/spec>) chunk by chunk.
+//!
+//! [`Layout::read`] learns what the file holds and where: from the index at its end if that is
+//! sound, else by walking all of it. [`McapCursor`] then loads chunks as they are needed and gives
+//! their messages in order of log time. At no time is more in memory than the index and the chunks
+//! that overlap the current log time.
+
+mod chunk;
+mod cursor;
+mod index;
+mod layout;
+mod scan;
+mod walk;
+
+pub(crate) use cursor::{McapCursor, Order};
+pub(crate) use layout::Layout;
+
+/// Longest record other than a chunk or an attachment that is read \[bytes\].
+const MAX_RECORD_BYTES: u64 = 64 << 20;
+/// Longest chunk, packed or unpacked, and most unpacked chunks held at a time \[bytes\].
+const MAX_LOADED_BYTES: usize = 1 << 30;
+/// Opcode and length before each record \[bytes\].
+const RECORD_PREFIX_BYTES: u64 = 9;
+/// Channel, sequence, log and publish time before a message's body \[bytes\].
+const MESSAGE_HEADER_BYTES: usize = 22;

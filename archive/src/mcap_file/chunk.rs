@@ -1,0 +1,218 @@
+//! A chunk: its header, its content unpacked, and the records in that.
+
+use std::io::Read;
+
+use mcap::records::op;
+
+use super::{MAX_LOADED_BYTES, MESSAGE_HEADER_BYTES, RECORD_PREFIX_BYTES};
+
+/// What a chunk says of itself.
+pub(super) struct ChunkHeader<'a> {
+    pub(super) start_ns: u64,
+    pub(super) end_ns: u64,
+    unpacked_bytes: u64,
+    crc: u32,
+    compression: &'a str,
+    packed_bytes: u64,
+}
+
+/// Takes fixed-size fields off the front of a slice.
+struct Fields<'a>(&'a [u8]);
+
+impl<'a> Fields<'a> {
+    fn take(&mut self, len: usize) -> Option<&'a [u8]> {
+        let (field, rest) = self.0.split_at_checked(len)?;
+        self.0 = rest;
+        Some(field)
+    }
+
+    fn u16(&mut self) -> Option<u16> {
+        Some(u16::from_le_bytes(self.take(2)?.try_into().ok()?))
+    }
+
+    fn u32(&mut self) -> Option<u32> {
+        Some(u32::from_le_bytes(self.take(4)?.try_into().ok()?))
+    }
+
+    fn u64(&mut self) -> Option<u64> {
+        Some(u64::from_le_bytes(self.take(8)?.try_into().ok()?))
+    }
+}
+
+impl<'a> ChunkHeader<'a> {
+    /// The header at the front of a chunk record's body, and the packed records behind it. The body
+    /// may be cut short.
+    pub(super) fn parse(body: &'a [u8]) -> Option<(Self, &'a [u8])> {
+        let mut fields = Fields(body);
+        let header = Self {
+            start_ns: fields.u64()?,
+            end_ns: fields.u64()?,
+            unpacked_bytes: fields.u64()?,
+            crc: fields.u32()?,
+            compression: {
+                let len = fields.u32()? as usize;
+                std::str::from_utf8(fields.take(len)?).ok()?
+            },
+            packed_bytes: fields.u64()?,
+        };
+        Some((header, fields.0))
+    }
+}
+
+/// Unpacks chunks; keeps what the decompressor needs from one to the next.
+pub(super) struct Unpacker {
+    zstd: zstd::bulk::Decompressor<'static>,
+}
+
+impl Unpacker {
+    pub(super) fn new() -> std::io::Result<Self> {
+        Ok(Self {
+            zstd: zstd::bulk::Decompressor::new()?,
+        })
+    }
+
+    /// The records of the chunk whose record body is `body`, checked by length and CRC.
+    ///
+    /// # Errors
+    /// Why they cannot be trusted, in words; `records` is then void.
+    pub(super) fn unpack(&mut self, body: &[u8], records: &mut Vec<u8>) -> Result<(), String> {
+        records.clear();
+        let (header, packed) = ChunkHeader::parse(body).ok_or("its header is broken")?;
+        let packed = usize::try_from(header.packed_bytes)
+            .ok()
+            .and_then(|len| packed.get(..len))
+            .ok_or_else(|| {
+                format!(
+                    "its records should take {} bytes, its record leaves {}",
+                    header.packed_bytes,
+                    packed.len()
+                )
+            })?;
+        let unpacked_bytes = usize::try_from(header.unpacked_bytes)
+            .ok()
+            .filter(|&bytes| bytes <= MAX_LOADED_BYTES)
+            .ok_or_else(|| {
+                format!(
+                    "it unpacks to {} bytes, the limit is {MAX_LOADED_BYTES}",
+                    header.unpacked_bytes
+                )
+            })?;
+        match header.compression {
+            "" => records.extend_from_slice(packed),
+            "zstd" => {
+                // Only address space until it is written to.
+                records.reserve(unpacked_bytes);
+                self.zstd
+                    .decompress_to_buffer(packed, records)
+                    .map_err(|error| format!("zstd: {error}"))?;
+            }
+            "lz4" => {
+                lz4::Decoder::new(packed)
+                    .and_then(|decoder| {
+                        decoder.take(unpacked_bytes as u64 + 1).read_to_end(records)
+                    })
+                    .map_err(|error| format!("lz4: {error}"))?;
+            }
+            other => return Err(format!("compression {other:?} is not known")),
+        }
+        if records.len() != unpacked_bytes {
+            return Err(format!(
+                "it unpacks to {} bytes, its header says {unpacked_bytes}",
+                records.len()
+            ));
+        }
+        let crc = crc32fast::hash(records);
+        if header.crc != 0 && header.crc != crc {
+            return Err(format!(
+                "its CRC is {crc:08x}, its header says {:08x}",
+                header.crc
+            ));
+        }
+        Ok(())
+    }
+
+    /// What can be had of a chunk that is torn off within `body`: unchecked, as the checksum is over
+    /// the whole.
+    pub(super) fn unpack_torn(body: &[u8], records: &mut Vec<u8>) {
+        records.clear();
+        let Some((header, packed)) = ChunkHeader::parse(body) else {
+            return;
+        };
+        let limit = MAX_LOADED_BYTES as u64;
+        // Both decoders give all they have before they say that the rest is missing.
+        let _missing_rest = match header.compression {
+            "" => packed.take(limit).read_to_end(records),
+            "zstd" => zstd::stream::read::Decoder::with_buffer(packed)
+                .and_then(|decoder| decoder.take(limit).read_to_end(records)),
+            "lz4" => lz4::Decoder::new(packed)
+                .and_then(|decoder| decoder.take(limit).read_to_end(records)),
+            _ => Ok(0),
+        };
+    }
+}
+
+/// A record among unpacked ones.
+pub(super) struct Inner<'a> {
+    pub(super) opcode: u8,
+    /// Where its body begins.
+    pub(super) at: usize,
+    pub(super) body: &'a [u8],
+}
+
+/// The records in `records`; the last item is an `Err` with its place if one is cut short.
+pub(super) fn inner_records(records: &[u8]) -> impl Iterator<Item = Result<Inner<'_>, usize>> {
+    let mut at = 0;
+    std::iter::from_fn(move || {
+        let rest = records.get(at..).filter(|rest| !rest.is_empty())?;
+        let mut fields = Fields(rest);
+        let inner = fields
+            .take(1)
+            .and_then(|opcode| Some((opcode[0], usize::try_from(fields.u64()?).ok()?)))
+            .and_then(|(opcode, len)| {
+                Some(Inner {
+                    opcode,
+                    at: at + RECORD_PREFIX_BYTES as usize,
+                    body: fields.take(len)?,
+                })
+            });
+        match inner {
+            Some(inner) => {
+                at = inner.at + inner.body.len();
+                Some(Ok(inner))
+            }
+            None => Some(Err(std::mem::replace(&mut at, usize::MAX))),
+        }
+    })
+}
+
+/// What stands before a message's body.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MessageHeader {
+    pub(super) channel: u16,
+    pub(super) sequence: u32,
+    pub(super) log_time: u64,
+    pub(super) publish_time: u64,
+}
+
+impl MessageHeader {
+    /// The header at the front of a message record's body; the message follows after
+    /// [`MESSAGE_HEADER_BYTES`].
+    pub(super) fn parse(body: &[u8]) -> Option<Self> {
+        let mut fields = Fields(body.get(..MESSAGE_HEADER_BYTES)?);
+        Some(Self {
+            channel: fields.u16()?,
+            sequence: fields.u32()?,
+            log_time: fields.u64()?,
+            publish_time: fields.u64()?,
+        })
+    }
+}
+
+impl Inner<'_> {
+    /// The header, if this is a message.
+    pub(super) fn message(&self) -> Option<MessageHeader> {
+        (self.opcode == op::MESSAGE)
+            .then(|| MessageHeader::parse(self.body))
+            .flatten()
+    }
+}

@@ -1,0 +1,222 @@
+//! The layout of a file from the index at its end, with a look at what lies between the chunks.
+
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+
+use mcap::records::{ChunkIndex, Footer, Record, Statistics, op};
+
+use super::layout::{Extent, ExtentKind, Layout, words};
+use super::scan::{PlainRun, note_plain};
+use super::walk::{Step, Walk};
+use super::{MAX_RECORD_BYTES, RECORD_PREFIX_BYTES};
+
+/// Footer record and the magic behind it.
+const FOOTER_BODY_BYTES: u64 = 20;
+const FILE_END_BYTES: u64 = RECORD_PREFIX_BYTES + FOOTER_BODY_BYTES + mcap::MAGIC.len() as u64;
+
+pub(super) enum Outcome {
+    /// All that the layout should say, it says.
+    Complete,
+    /// The file has no index, or one that leaves things out.
+    Absent,
+    /// The index is broken.
+    Unsound { at: u64, reason: String },
+}
+
+/// Fills `layout` from the index of `file`. Unless that is complete, `layout` is void.
+pub(super) fn read(file: &File, layout: &mut Layout) -> io::Result<Outcome> {
+    let Some(footer) = read_footer(file, layout.file_bytes)? else {
+        return Ok(Outcome::Absent);
+    };
+    let start = footer.summary_start;
+    if start == 0 {
+        return Ok(Outcome::Absent);
+    }
+    let end = layout.file_bytes - FILE_END_BYTES;
+    let unsound = |at, reason: String| Ok(Outcome::Unsound { at, reason });
+    if start > end || start < mcap::MAGIC.len() as u64 {
+        return unsound(end, format!("it should begin at byte {start}"));
+    }
+    if let Some(reason) = check_crc(file, &footer, end)? {
+        return unsound(start, reason);
+    }
+    let mut summary = Summary::default();
+    if let Err((at, reason)) = summary.read(file, layout, start, end)? {
+        return unsound(at, reason);
+    }
+    let Some(statistics) = summary.statistics else {
+        return Ok(Outcome::Absent);
+    };
+    let known = |id| layout.channels.contains_key(id);
+    if !statistics.channel_message_counts.keys().all(known) {
+        return Ok(Outcome::Absent);
+    }
+    layout.counts = statistics.channel_message_counts;
+    if statistics.message_count > 0 {
+        layout.widen(statistics.message_start_time, statistics.message_end_time);
+    }
+    summary.chunks.sort_by_key(|chunk| chunk.chunk_start_offset);
+    match place(file, layout, &summary.chunks, start)? {
+        Ok(()) => Ok(Outcome::Complete),
+        Err((at, reason)) => unsound(at, reason),
+    }
+}
+
+fn read_footer(mut file: &File, file_bytes: u64) -> io::Result<Option<Footer>> {
+    if file_bytes < FILE_END_BYTES + mcap::MAGIC.len() as u64 {
+        return Ok(None);
+    }
+    let mut end = [0; FILE_END_BYTES as usize];
+    file.seek(SeekFrom::Start(file_bytes - FILE_END_BYTES))?;
+    file.read_exact(&mut end)?;
+    let Some(record) = end.strip_suffix(mcap::MAGIC) else {
+        return Ok(None);
+    };
+    let (prefix, body) = record.split_at(RECORD_PREFIX_BYTES as usize);
+    if prefix[0] != op::FOOTER || prefix[1..] != FOOTER_BODY_BYTES.to_le_bytes() {
+        return Ok(None);
+    }
+    Ok(match mcap::parse_record(op::FOOTER, body) {
+        Ok(Record::Footer(footer)) => Some(footer),
+        _ => None,
+    })
+}
+
+/// The CRC goes from the beginning of the summary to just before itself in the footer.
+fn check_crc(mut file: &File, footer: &Footer, footer_at: u64) -> io::Result<Option<String>> {
+    if footer.summary_crc == 0 {
+        return Ok(None);
+    }
+    file.seek(SeekFrom::Start(footer.summary_start))?;
+    let crc_at = footer_at + RECORD_PREFIX_BYTES + FOOTER_BODY_BYTES - 4;
+    let mut left = file.take(crc_at - footer.summary_start);
+    let mut hasher = crc32fast::Hasher::new();
+    let mut buffer = [0; 16 << 10];
+    loop {
+        let read = left.read(&mut buffer)?;
+        if read == 0 {
+            break;
+        }
+        hasher.update(&buffer[..read]);
+    }
+    let crc = hasher.finalize();
+    Ok((crc != footer.summary_crc).then(|| {
+        format!(
+            "its CRC is {crc:08x}, the footer says {:08x}",
+            footer.summary_crc
+        )
+    }))
+}
+
+/// A place in the file and what is wrong there.
+type Flaw = (u64, String);
+
+#[derive(Default)]
+struct Summary {
+    chunks: Vec<ChunkIndex>,
+    statistics: Option<Statistics>,
+}
+
+impl Summary {
+    fn read(
+        &mut self,
+        file: &File,
+        layout: &mut Layout,
+        start: u64,
+        end: u64,
+    ) -> io::Result<Result<(), Flaw>> {
+        let mut walk = Walk::new(file.try_clone()?, start, end)?;
+        let mut body = Vec::new();
+        loop {
+            let record = match walk.step()? {
+                Step::Record(record) if record.len <= MAX_RECORD_BYTES => record,
+                Step::End => return Ok(Ok(())),
+                Step::Record(record) | Step::Torn(record) => {
+                    return Ok(Err((record.at, format!("record of {} bytes", record.len))));
+                }
+                Step::TornPrefix(at) => return Ok(Err((at, "half a record".to_owned()))),
+            };
+            walk.read(record.len as usize, &mut body)?;
+            let taken = match record.opcode {
+                op::CHUNK_INDEX | op::STATISTICS => mcap::parse_record(record.opcode, &body)
+                    .map(|parsed| match parsed {
+                        Record::ChunkIndex(chunk) => self.chunks.push(chunk),
+                        Record::Statistics(statistics) => self.statistics = Some(statistics),
+                        _ => {}
+                    })
+                    .map_err(|error| words(&error)),
+                opcode => layout.take_in(opcode, &body),
+            };
+            if let Err(reason) = taken {
+                return Ok(Err((record.at, reason)));
+            }
+        }
+    }
+}
+
+/// Checks that chunks and what lies between them make up the whole data section, and notes both.
+fn place(
+    file: &File,
+    layout: &mut Layout,
+    chunks: &[ChunkIndex],
+    data_end: u64,
+) -> io::Result<Result<(), Flaw>> {
+    let mut at = mcap::MAGIC.len() as u64;
+    for chunk in chunks {
+        if chunk.chunk_start_offset < at {
+            let reason = "chunks that overlap in the file".to_owned();
+            return Ok(Err((chunk.chunk_start_offset, reason)));
+        }
+        if let Err(flaw) = between(file, layout, at, chunk.chunk_start_offset)? {
+            return Ok(Err(flaw));
+        }
+        let next = chunk
+            .chunk_start_offset
+            .checked_add(chunk.chunk_length)
+            .and_then(|end| end.checked_add(chunk.message_index_length))
+            .filter(|&end| end <= data_end);
+        let Some(next) = next else {
+            let reason = "a chunk that reaches beyond the data".to_owned();
+            return Ok(Err((chunk.chunk_start_offset, reason)));
+        };
+        layout.extents.push(Extent {
+            at: chunk.chunk_start_offset,
+            len: chunk.chunk_length,
+            start_ns: chunk.message_start_time,
+            end_ns: chunk.message_end_time,
+            channels: chunk.message_index_offsets.keys().copied().collect(),
+            kind: ExtentKind::Chunk,
+        });
+        at = next;
+    }
+    between(file, layout, at, data_end)
+}
+
+/// Records between chunks: the header, metadata, attachments, and messages without a chunk.
+fn between(file: &File, layout: &mut Layout, from: u64, end: u64) -> io::Result<Result<(), Flaw>> {
+    if from == end {
+        return Ok(Ok(()));
+    }
+    let mut walk = Walk::new(file.try_clone()?, from, end)?;
+    let mut plain = PlainRun::default();
+    let mut body = Vec::new();
+    loop {
+        let record = match walk.step()? {
+            Step::Record(record) if record.opcode == op::CHUNK => {
+                return Ok(Err((record.at, "a chunk that it does not list".to_owned())));
+            }
+            Step::Record(record) if record.opcode != op::DATA_END => record,
+            Step::End | Step::Record(_) => break,
+            Step::Torn(record) => {
+                return Ok(Err((record.at, format!("record of {} bytes", record.len))));
+            }
+            Step::TornPrefix(at) => return Ok(Err((at, "half a record".to_owned()))),
+        };
+        // The statistics have counted the messages already.
+        if let Err(reason) = note_plain(&mut walk, record, layout, &mut plain, &mut body)? {
+            return Ok(Err((record.at, reason)));
+        }
+    }
+    plain.close(layout);
+    Ok(Ok(()))
+}

@@ -1,0 +1,137 @@
+//! Messages as they come out of a recording, whatever its format.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::topic::{Topic, Topics};
+use crate::ArchiveError;
+use crate::ros;
+
+/// A format's way through its messages.
+pub(crate) trait Cursor: Send {
+    /// Goes to the next message; `false` at the end.
+    ///
+    /// # Errors
+    /// If a part cannot be read; asked again, it goes on behind that if it can.
+    fn advance(&mut self) -> Result<bool, ArchiveError>;
+
+    /// The message it stands on, if any.
+    fn current(&self) -> Option<RawMessage<'_>>;
+}
+
+/// A message as a [`Cursor`] gives it.
+pub(crate) struct RawMessage<'a> {
+    /// Its topic's place in the list of topics.
+    pub(crate) topic: usize,
+    pub(crate) log_time_ns: i64,
+    pub(crate) publish_time_ns: i64,
+    pub(crate) sequence: u32,
+    /// Where it lies in the file.
+    pub(crate) at: u64,
+    pub(crate) body: &'a [u8],
+}
+
+/// A message of a recording.
+#[derive(Debug, Clone, Copy)]
+pub struct Message<'a> {
+    /// Its topic.
+    pub topic: &'a Topic,
+    /// The topic's place in [`Recording::topics`](super::Recording::topics).
+    pub topic_index: usize,
+    /// When it was received \[ns since the epoch\].
+    pub log_time_ns: i64,
+    /// When it was sent \[ns since the epoch\]; the log time where the format does not say.
+    pub publish_time_ns: i64,
+    /// The publisher's number for it, 0 where the format has none.
+    pub sequence: u32,
+    /// Where it lies: byte of the file where it or its chunk begins, row, or line.
+    pub at: u64,
+    /// The message itself, in the topic's encoding.
+    pub body: &'a [u8],
+    path: &'a Path,
+}
+
+impl Message<'_> {
+    /// Decodes it.
+    ///
+    /// # Errors
+    /// [`ArchiveError::Decode`] if it is not an `M`.
+    pub fn decode<M: ros::Message>(&self) -> Result<M, ArchiveError> {
+        ros::decode(self.body).map_err(|source| self.error(source))
+    }
+
+    /// Decodes it over a message that is there already, whose memory is used again.
+    ///
+    /// # Errors
+    /// [`ArchiveError::Decode`] if it is not an `M`; `message` is then void.
+    pub fn decode_into<M: ros::Message>(&self, message: &mut M) -> Result<(), ArchiveError> {
+        ros::decode_into(self.body, message).map_err(|source| self.error(source))
+    }
+
+    fn error(&self, source: ros::DecodeError) -> ArchiveError {
+        ArchiveError::Decode {
+            path: self.path.to_owned(),
+            topic: self.topic.name.clone(),
+            log_time_ns: self.log_time_ns,
+            at: self.at,
+            source,
+        }
+    }
+}
+
+/// Messages of a recording in the order of their log times.
+///
+/// No `Iterator`, because a message borrows the reader's memory:
+/// `while let Some(message) = messages.next_message() { … }`.
+pub struct Messages {
+    path: PathBuf,
+    topics: Arc<Topics>,
+    cursor: Box<dyn Cursor>,
+    ended: bool,
+}
+
+impl Messages {
+    pub(super) fn new(path: &Path, topics: Arc<Topics>, cursor: Box<dyn Cursor>) -> Self {
+        Self {
+            path: path.to_owned(),
+            topics,
+            cursor,
+            ended: false,
+        }
+    }
+
+    /// The next message, `None` at the end.
+    ///
+    /// [`ArchiveError::Damaged`] stands in the place of what cannot be read: whoever asks again is
+    /// given what comes behind it. After any other error there is nothing more.
+    pub fn next_message(&mut self) -> Option<Result<Message<'_>, ArchiveError>> {
+        if self.ended {
+            return None;
+        }
+        match self.cursor.advance() {
+            Ok(true) => self.message().map(Ok),
+            Ok(false) => {
+                self.ended = true;
+                None
+            }
+            Err(error) => {
+                self.ended = error.damage().is_none();
+                Some(Err(error))
+            }
+        }
+    }
+
+    fn message(&self) -> Option<Message<'_>> {
+        let raw = self.cursor.current()?;
+        Some(Message {
+            topic: &self.topics.list[raw.topic],
+            topic_index: raw.topic,
+            log_time_ns: raw.log_time_ns,
+            publish_time_ns: raw.publish_time_ns,
+            sequence: raw.sequence,
+            at: raw.at,
+            body: raw.body,
+            path: &self.path,
+        })
+    }
+}

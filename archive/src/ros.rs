@@ -1,0 +1,82 @@
+//! ROS 2 messages: their types, their text, and their CDR bytes.
+//!
+//! Only the types that a recording of a robot arm needs. One file per message.
+
+mod cdr;
+mod diagnostic_array;
+mod header;
+mod inertia_stamped;
+mod joint_state;
+mod std_bool;
+mod wrench_stamped;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+pub use cdr::{DecodeError, EncodeError, decode, decode_into, encode};
+pub use diagnostic_array::{DiagnosticArray, DiagnosticStatus, KeyValue, Level};
+pub use header::{Header, Time};
+pub use inertia_stamped::{Inertia, InertiaStamped};
+pub use joint_state::JointState;
+pub use std_bool::Bool;
+pub use wrench_stamped::{Vector3, Wrench, WrenchStamped};
+
+/// A message type of ROS 2.
+pub trait Message: Serialize + DeserializeOwned + Default {
+    /// Its name, e.g. `sensor_msgs/msg/JointState`.
+    const TYPE: &'static str;
+    /// Its own `.msg` text, without the types it refers to.
+    const TEXT: &'static str;
+    /// Name (`std_msgs/Header`) and text of each type it refers to, directly or not.
+    const DEPENDENCIES: &'static [(&'static str, &'static str)];
+    /// Its type hash as ROS 2 computes it (REP-2016, `RIHS01`).
+    const TYPE_HASH: &'static str;
+
+    /// Its name on DDS, e.g. `sensor_msgs::msg::dds_::JointState_`.
+    fn dds_type() -> String {
+        dds_type(Self::TYPE)
+    }
+
+    /// Its full text as the `ros2msg` encoding of MCAP has it: the message, then each dependency
+    /// after a line of 80 `=` and a line with its name.
+    fn definition() -> String {
+        let mut text = String::from(Self::TEXT);
+        for (name, dependency) in Self::DEPENDENCIES {
+            text.push_str(&"=".repeat(80));
+            text.push_str("\nMSG: ");
+            text.push_str(name);
+            text.push('\n');
+            text.push_str(dependency);
+        }
+        text
+    }
+
+    /// What the type itself does not say: stamps are not negative, arrays fit together.
+    ///
+    /// # Errors
+    /// The first rule that is broken.
+    fn check(&self) -> Result<(), DecodeError> {
+        Ok(())
+    }
+
+    /// Reads the message over what is in `self`, so that a reader can use its memory again.
+    ///
+    /// # Errors
+    /// What the bytes lack; `self` is then half overwritten.
+    fn read<BO: byteorder::ByteOrder>(
+        &mut self,
+        from: &mut cdr_encoding::CdrDeserializer<'_, BO>,
+    ) -> Result<(), cdr_encoding::Error> {
+        *self = serde::Deserialize::deserialize(from)?;
+        Ok(())
+    }
+}
+
+/// The DDS name of a ROS 2 type, e.g. `sensor_msgs::msg::dds_::JointState_` of
+/// `sensor_msgs/msg/JointState`.
+pub fn dds_type(ros_type: &str) -> String {
+    match ros_type.rsplit_once('/') {
+        Some((package, name)) => format!("{}::dds_::{name}_", package.replace('/', "::")),
+        None => format!("dds_::{ros_type}_"),
+    }
+}

@@ -1,0 +1,133 @@
+//! Bytes of messages: OMG CDR (XCDR1) behind its four-byte encapsulation header, as every ROS 2
+//! middleware writes them. The header is `00 00` (big endian) or `00 01` (little endian) and two
+//! bytes of options; alignment counts from the byte after it (DDSI-RTPS 2.3, section 10.2).
+
+use byteorder::{BigEndian, ByteOrder, LittleEndian};
+use cdr_encoding::CdrDeserializer;
+
+use super::Message;
+
+const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
+/// Middlewares pad a payload to four or eight bytes.
+const MAX_PADDING: usize = 7;
+
+/// Why the bytes are not the message they should be.
+#[derive(Debug, thiserror::Error)]
+pub enum DecodeError {
+    /// Not even an encapsulation header.
+    #[error("{len} bytes are too short for a CDR message")]
+    TooShort {
+        /// Bytes there are.
+        len: usize,
+    },
+    /// Some other encoding than plain CDR.
+    #[error("encapsulation {0:02x} {1:02x} is not plain CDR (00 00 or 00 01)", .id[0], .id[1])]
+    Encapsulation {
+        /// The first two bytes.
+        id: [u8; 2],
+    },
+    /// The bytes do not hold the fields of the type.
+    #[error("byte {at} of {len}: {source}")]
+    Fields {
+        /// Where reading stopped.
+        at: usize,
+        /// Bytes there are.
+        len: usize,
+        /// What was wrong.
+        source: cdr_encoding::Error,
+    },
+    /// More bytes than the type has fields for.
+    #[error("{extra} bytes are left over after {type_name}")]
+    LeftOver {
+        /// How many.
+        extra: usize,
+        /// The type that was read.
+        type_name: &'static str,
+    },
+    /// A stamp before 1970, or with a second or more of nanoseconds.
+    #[error("stamp {sec} s {nanosec} ns is not a time since the epoch")]
+    Stamp {
+        /// Seconds.
+        sec: i32,
+        /// Nanoseconds.
+        nanosec: u32,
+    },
+    /// An array that does not fit the names.
+    #[error("{array} has {len} entries for {names} names")]
+    ArrayLength {
+        /// Which array.
+        array: &'static str,
+        /// Its entries.
+        len: usize,
+        /// The names there are.
+        names: usize,
+    },
+}
+
+/// Why a message cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot write {type_name}: {source}")]
+pub struct EncodeError {
+    type_name: &'static str,
+    source: cdr_encoding::Error,
+}
+
+/// The message of type `M` in `body`.
+///
+/// Memory is bounded by the length of `body`, whatever counts stand in it.
+///
+/// # Errors
+/// If `body` is not an `M`, or breaks its rules ([`Message::check`]).
+pub fn decode<M: Message>(body: &[u8]) -> Result<M, DecodeError> {
+    let mut message = M::default();
+    decode_into(body, &mut message)?;
+    Ok(message)
+}
+
+/// As [`decode`], over a message that is there already, whose memory is used again.
+///
+/// # Errors
+/// As [`decode`]; the message is then void.
+pub fn decode_into<M: Message>(body: &[u8], message: &mut M) -> Result<(), DecodeError> {
+    let Some((header, fields)) = body.split_first_chunk::<4>() else {
+        return Err(DecodeError::TooShort { len: body.len() });
+    };
+    match [header[0], header[1]] {
+        [0, 0] => read::<M, BigEndian>(fields, message)?,
+        [0, 1] => read::<M, LittleEndian>(fields, message)?,
+        id => return Err(DecodeError::Encapsulation { id }),
+    }
+    message.check()
+}
+
+fn read<M: Message, BO: ByteOrder>(fields: &[u8], message: &mut M) -> Result<(), DecodeError> {
+    let mut from = CdrDeserializer::<BO>::new(fields);
+    let result = message.read(&mut from);
+    let consumed = from.bytes_consumed();
+    result.map_err(|source| DecodeError::Fields {
+        at: consumed + ENCAPSULATION.len(),
+        len: fields.len() + ENCAPSULATION.len(),
+        source,
+    })?;
+    let extra = fields.len() - consumed;
+    if extra > MAX_PADDING {
+        return Err(DecodeError::LeftOver {
+            extra,
+            type_name: M::TYPE,
+        });
+    }
+    Ok(())
+}
+
+/// Writes `message` as little-endian CDR into `body`, whose former content is dropped.
+///
+/// # Errors
+/// If a string or array is longer than the format can say.
+pub fn encode<M: Message>(message: &M, body: &mut Vec<u8>) -> Result<(), EncodeError> {
+    body.clear();
+    body.extend_from_slice(&ENCAPSULATION);
+    cdr_encoding::to_writer::<M, LittleEndian, _>(body, message).map_err(|source| EncodeError {
+        type_name: M::TYPE,
+        source,
+    })
+}

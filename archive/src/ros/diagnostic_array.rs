@@ -1,0 +1,74 @@
+//! `diagnostic_msgs/msg/DiagnosticArray`.
+
+use serde::{Deserialize, Serialize};
+
+use super::header::{HEADER, Header, TIME};
+use super::{DecodeError, Message};
+
+/// How bad a [`DiagnosticStatus`] is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Level {
+    /// All is well.
+    Ok = 0,
+    /// To be looked at.
+    Warn = 1,
+    /// Wrong.
+    Error = 2,
+    /// Nothing was heard for too long.
+    Stale = 3,
+}
+
+/// `diagnostic_msgs/msg/KeyValue`.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct KeyValue {
+    /// What is told.
+    pub key: String,
+    /// Its value as text.
+    pub value: String,
+}
+
+/// `diagnostic_msgs/msg/DiagnosticStatus`.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct DiagnosticStatus {
+    /// A [`Level`] as its number.
+    pub level: u8,
+    /// Who reports.
+    pub name: String,
+    /// What, in words.
+    pub message: String,
+    /// The device or part it is about.
+    pub hardware_id: String,
+    /// Details.
+    pub values: Vec<KeyValue>,
+}
+
+/// `diagnostic_msgs/msg/DiagnosticArray`.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct DiagnosticArray {
+    /// Time.
+    pub header: Header,
+    /// What is reported.
+    pub status: Vec<DiagnosticStatus>,
+}
+
+impl Message for DiagnosticArray {
+    const TYPE: &'static str = "diagnostic_msgs/msg/DiagnosticArray";
+    const TEXT: &'static str = "std_msgs/Header header\nDiagnosticStatus[] status\n";
+    const DEPENDENCIES: &'static [(&'static str, &'static str)] = &[
+        HEADER,
+        TIME,
+        (
+            "diagnostic_msgs/DiagnosticStatus",
+            "byte OK=0\nbyte WARN=1\nbyte ERROR=2\nbyte STALE=3\nbyte level\nstring name\n\
+             string message\nstring hardware_id\nKeyValue[] values\n",
+        ),
+        ("diagnostic_msgs/KeyValue", "string key\nstring value\n"),
+    ];
+    const TYPE_HASH: &'static str =
+        "RIHS01_5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e";
+
+    fn check(&self) -> Result<(), DecodeError> {
+        self.header.stamp.check()
+    }
+}
