@@ -11,9 +11,13 @@
 mod damage;
 mod error;
 mod mcap_file;
+mod mcap_write;
 mod recording;
 pub mod ros;
 
 pub use damage::{Damage, DamageKind};
 pub use error::ArchiveError;
+pub use mcap_write::{
+    CHUNK_SPAN_NS, Compression, McapWriter, PROVENANCE, TopicWriter, WriteError, Written,
+};
 pub use recording::{JointStates, Message, Messages, Recording, RecordingKind, Stamped, Topic};

@@ -13,6 +13,7 @@ mod scan;
 mod walk;
 
 pub(crate) use cursor::{McapCursor, Order};
+pub(crate) use index::{CRC_FROM_END_BYTES, read_footer, summary_crc};
 pub(crate) use layout::Layout;
 
 /// Longest record other than a chunk or an attachment that is read \[bytes\].

@@ -14,6 +14,9 @@ use super::{MAX_RECORD_BYTES, RECORD_PREFIX_BYTES};
 const FOOTER_BODY_BYTES: u64 = 20;
 const FILE_END_BYTES: u64 = RECORD_PREFIX_BYTES + FOOTER_BODY_BYTES + mcap::MAGIC.len() as u64;
 
+/// The summary's CRC is the last field of the footer.
+pub(crate) const CRC_FROM_END_BYTES: u64 = 4 + mcap::MAGIC.len() as u64;
+
 pub(super) enum Outcome {
     /// All that the layout should say, it says.
     Complete,
@@ -37,7 +40,7 @@ pub(super) fn read(file: &File, layout: &mut Layout) -> io::Result<Outcome> {
     if start > end || start < mcap::MAGIC.len() as u64 {
         return unsound(end, format!("it should begin at byte {start}"));
     }
-    if let Some(reason) = check_crc(file, &footer, end)? {
+    if let Some(reason) = check_crc(file, &footer, layout.file_bytes)? {
         return unsound(start, reason);
     }
     let mut summary = Summary::default();
@@ -62,7 +65,8 @@ pub(super) fn read(file: &File, layout: &mut Layout) -> io::Result<Outcome> {
     }
 }
 
-fn read_footer(mut file: &File, file_bytes: u64) -> io::Result<Option<Footer>> {
+/// The footer, if the file ends in one.
+pub(crate) fn read_footer(mut file: &File, file_bytes: u64) -> io::Result<Option<Footer>> {
     if file_bytes < FILE_END_BYTES + mcap::MAGIC.len() as u64 {
         return Ok(None);
     }
@@ -82,30 +86,28 @@ fn read_footer(mut file: &File, file_bytes: u64) -> io::Result<Option<Footer>> {
     })
 }
 
-/// The CRC goes from the beginning of the summary to just before itself in the footer.
-fn check_crc(mut file: &File, footer: &Footer, footer_at: u64) -> io::Result<Option<String>> {
+fn check_crc(file: &File, footer: &Footer, file_bytes: u64) -> io::Result<Option<String>> {
     if footer.summary_crc == 0 {
         return Ok(None);
     }
-    file.seek(SeekFrom::Start(footer.summary_start))?;
-    let crc_at = footer_at + RECORD_PREFIX_BYTES + FOOTER_BODY_BYTES - 4;
-    let mut left = file.take(crc_at - footer.summary_start);
+    let crc = summary_crc(file, footer.summary_start, file_bytes)?;
+    let saved = footer.summary_crc;
+    Ok((crc != saved).then(|| format!("its CRC is {crc:08x}, the footer says {saved:08x}")))
+}
+
+/// The CRC of the summary: from its beginning to just before the CRC itself in the footer.
+pub(crate) fn summary_crc(mut file: &File, summary_start: u64, file_bytes: u64) -> io::Result<u32> {
+    file.seek(SeekFrom::Start(summary_start))?;
+    let mut left = file.take((file_bytes - CRC_FROM_END_BYTES).saturating_sub(summary_start));
     let mut hasher = crc32fast::Hasher::new();
     let mut buffer = [0; 16 << 10];
     loop {
         let read = left.read(&mut buffer)?;
         if read == 0 {
-            break;
+            return Ok(hasher.finalize());
         }
         hasher.update(&buffer[..read]);
     }
-    let crc = hasher.finalize();
-    Ok((crc != footer.summary_crc).then(|| {
-        format!(
-            "its CRC is {crc:08x}, the footer says {:08x}",
-            footer.summary_crc
-        )
-    }))
 }
 
 /// A place in the file and what is wrong there.

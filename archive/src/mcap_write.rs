@@ -1,0 +1,397 @@
+//! Writing MCAP files as ROS 2 does.
+
+mod rosbag2;
+mod summary_order;
+
+use std::collections::BTreeMap;
+use std::fs::{self, File, OpenOptions};
+use std::io::BufWriter;
+use std::marker::PhantomData;
+use std::path::{Path, PathBuf};
+
+use mcap::records::{MessageHeader, Metadata};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::ros;
+
+/// A chunk is closed, and handed to the operating system, when the next message would make it span
+/// this much log time: what a kill can cost at most \[ns\].
+pub const CHUNK_SPAN_NS: i64 = 100_000_000;
+/// A chunk is also closed at this size \[bytes\].
+const CHUNK_BYTES: usize = 1 << 20;
+/// Says who wrote the file; without a version, which stands in the provenance.
+const LIBRARY: &str = "tauscope";
+/// Name of the metadata record with the provenance.
+pub const PROVENANCE: &str = "tauscope";
+
+/// How chunks are packed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Compression {
+    /// Zstandard: smallest.
+    #[default]
+    Zstd,
+    /// LZ4: faster, larger.
+    Lz4,
+    /// Not at all.
+    None,
+}
+
+/// Why a recording cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// The operating system refuses.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What it says.
+        source: std::io::Error,
+    },
+    /// The file cannot be written on.
+    #[error("{}: {source}", path.display())]
+    Mcap {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: Box<mcap::McapError>,
+    },
+    /// A message cannot be encoded.
+    #[error("{}: topic {topic:?}: {source}", path.display())]
+    Encode {
+        /// The file.
+        path: PathBuf,
+        /// The topic.
+        topic: String,
+        /// What is wrong with the message.
+        source: ros::EncodeError,
+    },
+    /// The bag's metadata cannot be written as YAML.
+    #[error("{}: {source}", path.display())]
+    Metadata {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: Box<serde_saphyr::SerializeError>,
+    },
+    /// MCAP knows no time before the epoch.
+    #[error("{}: topic {topic:?}: a message at {ns} ns, before the epoch", path.display())]
+    BeforeEpoch {
+        /// The file.
+        path: PathBuf,
+        /// The topic.
+        topic: String,
+        /// The time \[ns\].
+        ns: i64,
+    },
+}
+
+/// Writes one MCAP file: profile `ros2`, CDR messages with their `ros2msg` text, and the metadata
+/// that rosbag2 looks for.
+///
+/// While it is written the file is called `<name>.mcap.part`; [`McapWriter::finish`] completes and
+/// renames it. So a file with its proper name is whole, and a writer that died leaves a `.part`
+/// that [`Recording::open`](crate::Recording::open) reads.
+///
+/// The same calls give the same bytes, on any machine. Memory is bounded by the open chunk, but for
+/// the index, which grows by about 300 bytes with each chunk (10 MB an hour).
+pub struct McapWriter {
+    writer: mcap::Writer<BufWriter<File>>,
+    path: PathBuf,
+    part: PathBuf,
+    set_aside: Option<PathBuf>,
+    topics: Vec<WrittenTopic>,
+    /// Log time of the first message in the open chunk.
+    chunk_start_ns: Option<i64>,
+    chunk_bytes: usize,
+    log_times_ns: Option<(i64, i64)>,
+    body: Vec<u8>,
+}
+
+/// A topic of a [`McapWriter`] that carries messages of type `M`.
+#[derive(Debug)]
+pub struct TopicWriter<M> {
+    index: usize,
+    of: PhantomData<fn(M)>,
+}
+
+impl<M> Clone for TopicWriter<M> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<M> Copy for TopicWriter<M> {}
+
+struct WrittenTopic {
+    name: String,
+    type_name: &'static str,
+    type_hash: &'static str,
+    channel: u16,
+    count: u64,
+}
+
+/// What [`McapWriter::finish`] has left.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Written {
+    /// The file.
+    pub path: PathBuf,
+    /// Messages in it.
+    pub messages: u64,
+    /// Its length \[bytes\].
+    pub bytes: u64,
+}
+
+impl McapWriter {
+    /// Begins the file `path`, with its folder if need be, as `<path>.part`. `provenance` says what
+    /// made it (versions, hashes of the files that went in); it is the first thing written.
+    ///
+    /// A `.part` that a writer before left behind may hold the only copy of a recording: it is moved
+    /// out of the way and kept, see [`McapWriter::set_aside`].
+    ///
+    /// # Errors
+    /// If the file cannot be made.
+    pub fn create(
+        path: impl AsRef<Path>,
+        compression: Compression,
+        provenance: &BTreeMap<String, String>,
+    ) -> Result<Self, WriteError> {
+        let path = path.as_ref().to_owned();
+        let mut part = path.clone().into_os_string();
+        part.push(".part");
+        let part = PathBuf::from(part);
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder).map_err(io(folder))?;
+        }
+        let set_aside = set_aside(&path, &part)?;
+        let file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create_new(true)
+            .open(&part)
+            .map_err(io(&part))?;
+        let writer = options(compression)
+            .profile("ros2")
+            .library(LIBRARY)
+            .create(BufWriter::new(file))
+            .map_err(mcap(&part))?;
+        let mut this = Self {
+            writer,
+            path,
+            part,
+            set_aside,
+            topics: Vec::new(),
+            chunk_start_ns: None,
+            chunk_bytes: 0,
+            log_times_ns: None,
+            body: Vec::new(),
+        };
+        this.write_metadata(PROVENANCE, provenance)?;
+        Ok(this)
+    }
+
+    /// Where a `.part` of a writer before was moved to.
+    pub fn set_aside(&self) -> Option<&Path> {
+        self.set_aside.as_deref()
+    }
+
+    /// Declares a topic with messages of type `M`.
+    ///
+    /// # Errors
+    /// [`WriteError::Mcap`] beyond 65 536 topics, or if an earlier write has failed.
+    pub fn add_topic<M: ros::Message>(&mut self, name: &str) -> Result<TopicWriter<M>, WriteError> {
+        let schema = self
+            .writer
+            .add_schema(M::TYPE, "ros2msg", M::definition().as_bytes())
+            .map_err(mcap(&self.part))?;
+        let metadata = BTreeMap::from([
+            (
+                "offered_qos_profiles".to_owned(),
+                rosbag2::offered_qos_profiles().map_err(yaml(&self.part))?,
+            ),
+            ("topic_type_hash".to_owned(), M::TYPE_HASH.to_owned()),
+        ]);
+        let channel = self
+            .writer
+            .add_channel(schema, name, "cdr", &metadata)
+            .map_err(mcap(&self.part))?;
+        self.topics.push(WrittenTopic {
+            name: name.to_owned(),
+            type_name: M::TYPE,
+            type_hash: M::TYPE_HASH,
+            channel,
+            count: 0,
+        });
+        Ok(TopicWriter {
+            index: self.topics.len() - 1,
+            of: PhantomData,
+        })
+    }
+
+    /// Writes a message that was received at `log_time_ns` and sent at `publish_time_ns` \[ns since
+    /// the epoch\].
+    ///
+    /// # Errors
+    /// If it cannot be encoded or written, or a time lies before the epoch.
+    ///
+    /// # Panics
+    /// If `topic` is of another writer.
+    pub fn write<M: ros::Message>(
+        &mut self,
+        topic: TopicWriter<M>,
+        log_time_ns: i64,
+        publish_time_ns: i64,
+        message: &M,
+    ) -> Result<(), WriteError> {
+        let topic = &mut self.topics[topic.index];
+        let time = |ns: i64| {
+            u64::try_from(ns).map_err(|_| WriteError::BeforeEpoch {
+                path: self.part.clone(),
+                topic: topic.name.clone(),
+                ns,
+            })
+        };
+        let (log_time, publish_time) = (time(log_time_ns)?, time(publish_time_ns)?);
+        ros::encode(message, &mut self.body).map_err(|source| WriteError::Encode {
+            path: self.part.clone(),
+            topic: topic.name.clone(),
+            source,
+        })?;
+        let header = MessageHeader {
+            channel_id: topic.channel,
+            sequence: topic.count as u32,
+            log_time,
+            publish_time,
+        };
+        topic.count += 1;
+
+        let late = |start_ns: i64| log_time_ns.abs_diff(start_ns) >= CHUNK_SPAN_NS as u64;
+        if self.chunk_start_ns.is_some_and(late) || self.chunk_bytes >= CHUNK_BYTES {
+            self.flush()?;
+        }
+        self.chunk_start_ns.get_or_insert(log_time_ns);
+        self.chunk_bytes += self.body.len();
+        let (start_ns, end_ns) = self.log_times_ns.unwrap_or((log_time_ns, log_time_ns));
+        self.log_times_ns = Some((start_ns.min(log_time_ns), end_ns.max(log_time_ns)));
+        self.writer
+            .write_to_known_channel(&header, &self.body)
+            .map_err(mcap(&self.part))
+    }
+
+    /// Closes the open chunk and hands all to the operating system. To be called about ten times a
+    /// second while a live stream is silent; else the last messages before the silence wait.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn flush(&mut self) -> Result<(), WriteError> {
+        if self.chunk_start_ns.take().is_none() {
+            return Ok(());
+        }
+        self.chunk_bytes = 0;
+        self.writer.flush().map_err(mcap(&self.part))
+    }
+
+    /// Completes the file and gives it its proper name, in place of an older one.
+    ///
+    /// # Errors
+    /// If it cannot be written; the `.part` stays.
+    pub fn finish(mut self) -> Result<Written, WriteError> {
+        let bag = rosbag2::serialized_metadata(&self.path, &self.topics, self.log_times_ns)
+            .map_err(yaml(&self.part))?;
+        self.write_metadata(
+            "rosbag2",
+            &BTreeMap::from([("serialized_metadata".to_owned(), bag)]),
+        )?;
+        let Self {
+            mut writer,
+            path,
+            part,
+            topics,
+            ..
+        } = self;
+        writer.finish().map_err(mcap(&part))?;
+        let file = writer
+            .into_inner()
+            .into_inner()
+            .map_err(|error| io(&part)(error.into_error()))?;
+        summary_order::sort(&file).map_err(io(&part))?;
+        file.sync_all().map_err(io(&part))?;
+        let bytes = file.metadata().map_err(io(&part))?.len();
+        fs::rename(&part, &path).map_err(io(&path))?;
+        Ok(Written {
+            messages: topics.iter().map(|topic| topic.count).sum(),
+            path,
+            bytes,
+        })
+    }
+
+    fn write_metadata(
+        &mut self,
+        name: &str,
+        metadata: &BTreeMap<String, String>,
+    ) -> Result<(), WriteError> {
+        let metadata = Metadata {
+            name: name.to_owned(),
+            metadata: metadata.clone(),
+        };
+        self.writer
+            .write_metadata(&metadata)
+            .map_err(mcap(&self.part))
+    }
+}
+
+/// Options that every file of ours shares.
+pub(crate) fn options(compression: Compression) -> mcap::WriteOptions {
+    mcap::WriteOptions::new()
+        .compression(match compression {
+            Compression::Zstd => Some(mcap::Compression::Zstd),
+            Compression::Lz4 => Some(mcap::Compression::Lz4),
+            Compression::None => None,
+        })
+        // One thread: else the bytes depend on the number of cores.
+        .compression_threads(0)
+        // Chunks are closed by time and size here.
+        .chunk_size(None)
+        // A chunk comes into the file whole: a torn one is never patched.
+        .disable_seeking(true)
+}
+
+/// Moves an old `.part` to `<stem>.<n>.mcap.part`, with the first `n` that is free.
+fn set_aside(path: &Path, part: &Path) -> Result<Option<PathBuf>, WriteError> {
+    if !part.try_exists().map_err(io(part))? {
+        return Ok(None);
+    }
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    let mut n = 1_u32;
+    loop {
+        let aside = path.with_file_name(format!("{stem}.{n}.{extension}.part"));
+        if !aside.try_exists().map_err(io(&aside))? {
+            fs::rename(part, &aside).map_err(io(part))?;
+            return Ok(Some(aside));
+        }
+        n += 1;
+    }
+}
+
+fn io(path: &Path) -> impl FnOnce(std::io::Error) -> WriteError {
+    let path = path.to_owned();
+    move |source| WriteError::Io { path, source }
+}
+
+fn mcap(path: &Path) -> impl FnOnce(mcap::McapError) -> WriteError {
+    let path = path.to_owned();
+    move |source| WriteError::Mcap {
+        path,
+        source: Box::new(source),
+    }
+}
+
+fn yaml(path: &Path) -> impl FnOnce(serde_saphyr::SerializeError) -> WriteError {
+    let path = path.to_owned();
+    move |source| WriteError::Metadata {
+        path,
+        source: Box::new(source),
+    }
+}

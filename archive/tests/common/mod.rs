@@ -1,0 +1,78 @@
+//! Small recordings made on the spot.
+#![allow(dead_code, reason = "not every test file uses every helper")]
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use tauscope_archive::ros::{Bool, Header, JointState};
+use tauscope_archive::{Compression, McapWriter, Messages, Recording};
+
+/// Where the recordings begin \[ns since the epoch\].
+pub const START_NS: i64 = 1_700_000_000_000_000_000;
+/// Time from one joint state to the next \[ns\].
+pub const PERIOD_NS: i64 = 10_000_000;
+
+/// The `i`-th joint state of a recording.
+pub fn state(i: i64) -> JointState {
+    let x = i as f64;
+    JointState {
+        header: Header::new(START_NS + i * PERIOD_NS, "base"),
+        name: vec!["a".into(), "b".into()],
+        position: vec![x, -x],
+        velocity: vec![],
+        effort: vec![0.5 * x, f64::NAN],
+    }
+}
+
+/// Writes `count` joint states at 100 Hz, and a contact flag with every tenth.
+pub fn write(path: &Path, compression: Compression, count: i64) -> PathBuf {
+    let provenance = BTreeMap::from([("version".to_owned(), "1".to_owned())]);
+    let mut writer = McapWriter::create(path, compression, &provenance).unwrap();
+    let states = writer.add_topic::<JointState>("/joint_states").unwrap();
+    let contacts = writer.add_topic::<Bool>("/contact").unwrap();
+    for i in 0..count {
+        let ns = START_NS + i * PERIOD_NS;
+        writer.write(states, ns + 5, ns, &state(i)).unwrap();
+        if i % 10 == 0 {
+            let data = i % 20 == 0;
+            writer.write(contacts, ns + 6, ns, &Bool { data }).unwrap();
+        }
+    }
+    writer.finish().unwrap().path
+}
+
+/// A message with its bytes copied.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Copied {
+    pub topic: String,
+    pub log_time_ns: i64,
+    pub publish_time_ns: i64,
+    pub sequence: u32,
+    pub body: Vec<u8>,
+}
+
+/// All that can be read, and how often something could not.
+pub fn read_all(recording: &Recording) -> (Vec<Copied>, usize) {
+    drain(recording.all_messages().unwrap())
+}
+
+pub fn drain(mut messages: Messages) -> (Vec<Copied>, usize) {
+    let mut copies = Vec::new();
+    let mut damaged = 0;
+    while let Some(message) = messages.next_message() {
+        match message {
+            Ok(message) => copies.push(Copied {
+                topic: message.topic.name.clone(),
+                log_time_ns: message.log_time_ns,
+                publish_time_ns: message.publish_time_ns,
+                sequence: message.sequence,
+                body: message.body.to_vec(),
+            }),
+            Err(error) => {
+                assert!(error.damage().is_some(), "{error}");
+                damaged += 1;
+            }
+        }
+    }
+    (copies, damaged)
+}
