@@ -1,0 +1,86 @@
+//! `tauscope check`.
+
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+use serde_json::json;
+
+use crate::exit::{Exit, Failure};
+use crate::pipeline::Pipeline;
+use crate::plan;
+
+/// Check a pipeline file, and print its stages, hosts and links.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The pipeline file.
+    #[arg(default_value = "pipeline.yaml")]
+    pipeline: PathBuf,
+    /// Look for recordings and programs for the stages of this host only.
+    #[arg(long, value_name = "NAME")]
+    host: Option<String>,
+    /// How to print it.
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+    /// The same as `--format json`.
+    #[arg(long, conflicts_with = "format")]
+    json: bool,
+}
+
+#[derive(Debug, Clone, Copy, Default, ValueEnum)]
+enum Format {
+    /// Tables.
+    #[default]
+    Table,
+    /// A Mermaid flowchart.
+    Mermaid,
+    /// A Graphviz digraph.
+    Dot,
+    /// Machine-readable.
+    Json,
+}
+
+/// Checks and prints.
+pub fn run(args: &Args) -> Result<Exit, Failure> {
+    let pipeline = Pipeline::load(&args.pipeline, args.host.as_deref())?;
+    let links = plan::links(&pipeline);
+    let format = if args.json { Format::Json } else { args.format };
+    let text = match format {
+        Format::Table => plan::table(&pipeline, &links),
+        Format::Mermaid => plan::mermaid(&pipeline, &links),
+        Format::Dot => plan::dot(&pipeline, &links),
+        Format::Json => {
+            let text = serde_json::to_string_pretty(&json(&pipeline, &links));
+            text.map_err(anyhow::Error::from)?
+        }
+    };
+    super::print(&text)?;
+    Ok(Exit::Done)
+}
+
+fn json(pipeline: &Pipeline, links: &[plan::Link]) -> serde_json::Value {
+    let name = |index: usize| &pipeline.stages[index].name;
+    let stages = pipeline.stages.iter().map(|stage| {
+        json!({
+            "name": stage.name,
+            "is": stage.role.key(),
+            "host": stage.host,
+            "cells": stage.cells,
+            "inputs": stage.inputs.iter().map(|&input| name(input)).collect::<Vec<_>>(),
+        })
+    });
+    let links = links.iter().map(|link| {
+        json!({
+            "from": name(link.from),
+            "to": name(link.to),
+            "stream": link.stream,
+            "type": link.carries.type_name(),
+            "over": link.over,
+            "keep": plan::keep_word(link.keep),
+        })
+    });
+    json!({
+        "stages": stages.collect::<Vec<_>>(),
+        "hosts": pipeline.hosts,
+        "links": links.collect::<Vec<_>>(),
+    })
+}

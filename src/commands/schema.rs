@@ -1,0 +1,35 @@
+//! `tauscope schema`.
+
+use serde_json::Value;
+
+use crate::exit::{Exit, Failure};
+use crate::pipeline::PipelineFile;
+
+/// Print the JSON Schema of the pipeline file, for editors that complete and check it.
+#[derive(Debug, clap::Args)]
+pub struct Args {}
+
+/// Prints it.
+pub fn run(_args: &Args) -> Result<Exit, Failure> {
+    let mut schema = schemars::schema_for!(PipelineFile).to_value();
+    plain_descriptions(&mut schema);
+    let text = serde_json::to_string_pretty(&schema).map_err(anyhow::Error::from)?;
+    super::print(&text)?;
+    Ok(Exit::Done)
+}
+
+/// Descriptions come from Rust documentation, where brackets are escaped.
+fn plain_descriptions(schema: &mut Value) {
+    match schema {
+        Value::Object(map) => {
+            for (key, value) in map {
+                match value {
+                    Value::String(text) if key == "description" => *text = text.replace('\\', ""),
+                    other => plain_descriptions(other),
+                }
+            }
+        }
+        Value::Array(items) => items.iter_mut().for_each(plain_descriptions),
+        _ => {}
+    }
+}

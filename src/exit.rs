@@ -1,0 +1,79 @@
+//! How a command ends.
+
+use std::process::ExitCode;
+
+use crate::report::{Problem, Report};
+
+/// How a command ended that did what was asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Exit {
+    /// Done, nothing lost.
+    Done,
+    /// Begun, but not brought to its end; the reason was said where it came up.
+    Failed,
+    /// Done, but data was lost. The summary says which and how much.
+    Lossy,
+}
+
+impl Exit {
+    /// [`Exit::Lossy`] if anything was lost.
+    pub fn from_loss(lost: bool) -> Self {
+        if lost { Self::Lossy } else { Self::Done }
+    }
+
+    /// The worse of two: failed, then lossy, then done.
+    pub fn and(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Failed, _) | (_, Self::Failed) => Self::Failed,
+            (Self::Lossy, _) | (_, Self::Lossy) => Self::Lossy,
+            (Self::Done, Self::Done) => Self::Done,
+        }
+    }
+}
+
+/// Why a command did not do what was asked.
+#[derive(Debug)]
+pub enum Failure {
+    /// Wrong arguments or files: nothing was started.
+    Rejected(Report),
+    /// Something failed on the way.
+    Failed(anyhow::Error),
+}
+
+impl Failure {
+    /// Wrong arguments or files, in one sentence.
+    pub fn rejected(title: impl Into<String>) -> Self {
+        Self::Rejected(Problem::new(title).into())
+    }
+}
+
+impl From<Report> for Failure {
+    fn from(report: Report) -> Self {
+        Self::Rejected(report)
+    }
+}
+
+impl From<anyhow::Error> for Failure {
+    fn from(error: anyhow::Error) -> Self {
+        Self::Failed(error)
+    }
+}
+
+/// The exit code, which is the same for every command; what went wrong is printed.
+///
+/// 0 done; 1 failed; 2 wrong arguments or files, nothing was started; 3 done, but data was lost.
+pub fn code(outcome: Result<Exit, Failure>) -> ExitCode {
+    ExitCode::from(match outcome {
+        Ok(Exit::Done) => 0,
+        Ok(Exit::Failed) => 1,
+        Ok(Exit::Lossy) => 3,
+        Err(Failure::Failed(error)) => {
+            eprintln!("error: {error:#}");
+            1
+        }
+        Err(Failure::Rejected(report)) => {
+            report.print();
+            2
+        }
+    })
+}

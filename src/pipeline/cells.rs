@@ -1,0 +1,232 @@
+//! What a cell's entry says, looked up in its URDF: the facts that its stages need.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+use tauscope_bus::MAX_JOINTS;
+use tauscope_dynamics::Model;
+
+use super::file::{CellEntry, EffortUnit, PipelineFile, ToolEntry};
+use crate::report::{Problem, Report};
+use crate::suggest;
+use crate::yaml::{Located, Place};
+
+/// A cell, its names looked up.
+#[derive(Debug, Clone)]
+pub struct Cell {
+    /// The facts as they can be handed to another process.
+    pub facts: CellFacts,
+    /// Where the URDF was read from.
+    pub urdf_path: Option<PathBuf>,
+    /// The robot.
+    pub model: Option<Model>,
+}
+
+/// What a stage must know of its cell.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct CellFacts {
+    /// The cell's name.
+    pub name: String,
+    /// The robot's URDF as text.
+    pub urdf: Option<String>,
+    /// The joints, in the order of the samples' arrays.
+    pub joint_names: Vec<String>,
+    /// Unit of the measured effort.
+    pub effort_unit: EffortUnit,
+    /// By joint \[N m/A\], where the effort is a current and they are known.
+    pub torque_constants_nm_per_a: Option<Vec<f64>>,
+    /// The tool.
+    pub tool: Option<ToolEntry>,
+}
+
+impl Cell {
+    /// The cell from its facts.
+    ///
+    /// # Errors
+    /// If the URDF is not one, which the check of the file had excluded.
+    pub fn from_facts(facts: CellFacts) -> Result<Self, tauscope_dynamics::ModelError> {
+        let model = facts.urdf.as_deref().map(Model::from_urdf).transpose()?;
+        Ok(Self {
+            facts,
+            urdf_path: None,
+            model,
+        })
+    }
+
+    /// The link the tool is attached to.
+    pub fn tool_link(&self) -> Option<usize> {
+        self.model
+            .as_ref()?
+            .link_index(&self.facts.tool.as_ref()?.link)
+    }
+}
+
+/// Looks up every cell; those in which something is wrong are left out and reported.
+pub fn resolve(file: &Located<PipelineFile>, report: &mut Report) -> BTreeMap<String, Cell> {
+    let mut cells = BTreeMap::new();
+    for (name, entry) in &file.value.cells {
+        let place = Place::root().key("cells").key(name);
+        match (Resolver { file, place, entry }).resolve(name) {
+            Ok(cell) => {
+                cells.insert(name.clone(), cell);
+            }
+            Err(problems) => report.append(problems),
+        }
+    }
+    cells
+}
+
+struct Resolver<'a> {
+    file: &'a Located<PipelineFile>,
+    place: Place,
+    entry: &'a CellEntry,
+}
+
+impl Resolver<'_> {
+    fn resolve(&self, name: &str) -> Result<Cell, Report> {
+        let mut report = Report::default();
+        let (urdf_path, urdf, model) = match self.robot() {
+            Ok(Some((path, text, model))) => (Some(path), Some(text), Some(model)),
+            Ok(None) => (None, None, None),
+            Err(problem) => return Err(problem.into()),
+        };
+        let joint_names = self.joint_names(model.as_ref(), &mut report);
+        let constants = self.torque_constants(&joint_names, &mut report);
+        self.check_tool(model.as_ref(), &mut report);
+        let facts = CellFacts {
+            name: name.to_owned(),
+            urdf,
+            joint_names,
+            effort_unit: self.entry.effort_unit,
+            torque_constants_nm_per_a: constants,
+            tool: self.entry.tool.clone(),
+        };
+        report.into_result(Cell {
+            facts,
+            urdf_path,
+            model,
+        })
+    }
+
+    fn robot(&self) -> Result<Option<(PathBuf, String, Model)>, Problem> {
+        let Some(robot) = &self.entry.robot else {
+            return Ok(None);
+        };
+        let place = self.place.key("robot");
+        let path = self.file.resolve(robot);
+        let text = std::fs::read_to_string(&path).map_err(|error| {
+            self.file
+                .at(&place, format!("cannot read the URDF: {error}"))
+        })?;
+        let model = Model::from_urdf(&text).map_err(|error| {
+            self.file
+                .at(&place, format!("cannot use the URDF: {error}"))
+        })?;
+        Ok(Some((path, text, model)))
+    }
+
+    fn joint_names(&self, model: Option<&Model>, report: &mut Report) -> Vec<String> {
+        let place = self.place.key("joints");
+        let names = match (model, &self.entry.joints) {
+            (Some(_), Some(_)) => {
+                let problem = self.file.at_key(&place, "the joints are those of the URDF");
+                report.push(problem.help("leave `joints` out, or `robot`"));
+                Vec::new()
+            }
+            (Some(model), None) => model.joint_names().map(str::to_owned).collect(),
+            (None, Some(names)) => {
+                for (index, name) in names.iter().enumerate() {
+                    if let Some(first) = names[..index].iter().position(|other| other == name) {
+                        let problem = self
+                            .file
+                            .at(
+                                &place.index(index),
+                                format!("joint `{name}` is named twice"),
+                            )
+                            .also(self.file.span(&place.index(first)), "the first time");
+                        report.push(problem);
+                    }
+                }
+                names.clone()
+            }
+            (None, None) => {
+                let cell = self.place.describe();
+                let problem = self.file.at_key(
+                    &self.place,
+                    format!("`{cell}` has neither a `robot` nor `joints`"),
+                );
+                report.push(problem.help(
+                    "give `robot: <URDF>`, or name the `joints` if another twin's effort is on a topic",
+                ));
+                return Vec::new();
+            }
+        };
+        if names.len() > MAX_JOINTS {
+            let key = if model.is_some() { "robot" } else { "joints" };
+            let title = format!("{} joints, at most {MAX_JOINTS} are supported", names.len());
+            report.push(self.file.at(&self.place.key(key), title));
+        }
+        names
+    }
+
+    fn torque_constants(&self, joints: &[String], report: &mut Report) -> Option<Vec<f64>> {
+        let constants = self.entry.torque_constants_nm_per_a.as_ref()?;
+        let place = self.place.key("torque_constants_nm_per_a");
+        if self.entry.effort_unit == EffortUnit::Nm {
+            let problem = self
+                .file
+                .at_key(&place, "torque constants, but the effort is in Nm");
+            report.push(problem.help("give `effort_unit: A`, or leave them out"));
+        }
+        for (joint, constant) in constants {
+            let place = place.key(joint);
+            if !joints.contains(joint) && !joints.is_empty() {
+                let names = joints.iter().map(String::as_str);
+                let help = suggest::help(joint, "the joints are", names);
+                let title = format!("the robot has no joint `{joint}`");
+                report.push(self.file.at_key(&place, title).maybe_help(help));
+            }
+            if *constant <= 0.0 {
+                let title = format!("a torque constant is more than 0, found {constant}");
+                report.push(self.file.at(&place, title));
+            }
+        }
+        let missing: Vec<&str> = joints
+            .iter()
+            .filter(|joint| !constants.contains_key(*joint))
+            .map(String::as_str)
+            .collect();
+        if !missing.is_empty() {
+            let title = format!("no torque constant for {}", suggest::list(missing));
+            let problem = self.file.at_key(&place, title);
+            report.push(problem.help("name all joints, or leave `torque_constants_nm_per_a` out"));
+        }
+        joints
+            .iter()
+            .map(|joint| constants.get(joint).copied())
+            .collect()
+    }
+
+    fn check_tool(&self, model: Option<&Model>, report: &mut Report) {
+        let Some(tool) = &self.entry.tool else { return };
+        let place = self.place.key("tool");
+        let Some(model) = model else {
+            let problem = self
+                .file
+                .at_key(&place, "a tool, but no robot that it is attached to");
+            report.push(problem.help("give `robot: <URDF>`, or leave `tool` out"));
+            return;
+        };
+        if model.link_index(&tool.link).is_none() {
+            let names: Vec<&str> = model
+                .links()
+                .iter()
+                .map(|link| link.name.as_str())
+                .collect();
+            let title = format!("the robot has no link `{}`", tool.link);
+            let help = suggest::help(&tool.link, "the links are", names);
+            report.push(self.file.at(&place.key("link"), title).maybe_help(help));
+        }
+    }
+}

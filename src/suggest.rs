@@ -1,0 +1,52 @@
+//! "Did you mean": the known word nearest to one that is not known.
+
+/// Words less alike than this (Jaro-Winkler, 0 to 1) are not worth suggesting.
+const LEAST_SIMILARITY: f64 = 0.85;
+
+/// The known word that `word` was probably meant to be.
+pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    known
+        .into_iter()
+        .map(|candidate| (strsim::jaro_winkler(word, candidate), candidate))
+        .filter(|(similarity, _)| *similarity >= LEAST_SIMILARITY)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, candidate)| candidate)
+}
+
+/// A help line: the nearest word if there is one, else all of them if they are few enough to read.
+pub fn help<'a>(
+    word: &str,
+    what: &str,
+    known: impl IntoIterator<Item = &'a str>,
+) -> Option<String> {
+    const MOST_LISTED: usize = 16;
+    let known: Vec<&str> = known.into_iter().collect();
+    if let Some(candidate) = nearest(word, known.iter().copied()) {
+        return Some(format!("did you mean `{candidate}`?"));
+    }
+    (1..=MOST_LISTED)
+        .contains(&known.len())
+        .then(|| format!("{what}: {}", list(known.iter().copied())))
+}
+
+/// `` `a`, `b`, `c` ``.
+pub fn list<'a>(words: impl IntoIterator<Item = &'a str>) -> String {
+    let quoted: Vec<String> = words.into_iter().map(|word| format!("`{word}`")).collect();
+    quoted.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_typo_finds_its_word_and_nonsense_finds_none() {
+        let known = ["record", "replay", "ingest"];
+        assert_eq!(nearest("recrod", known), Some("record"));
+        assert_eq!(nearest("xyz", known), None);
+        assert_eq!(
+            help("xyz", "known are", known),
+            Some("known are: `record`, `replay`, `ingest`".to_owned())
+        );
+    }
+}

@@ -1,0 +1,109 @@
+//! Places in a file: by the keys and indices that lead there, and by bytes.
+
+use std::collections::HashMap;
+use std::fmt::Write;
+use std::ops::Range;
+
+/// The way from the top of a file to a value, as a JSON pointer.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
+pub struct Place(String);
+
+impl Place {
+    /// The top of the file.
+    pub fn root() -> Self {
+        Self::default()
+    }
+
+    /// The value under `key` of the mapping at this place.
+    pub fn key(&self, key: &str) -> Self {
+        Self(format!(
+            "{}/{}",
+            self.0,
+            key.replace('~', "~0").replace('/', "~1")
+        ))
+    }
+
+    /// Item `index` of the sequence at this place.
+    pub fn index(&self, index: usize) -> Self {
+        Self(format!("{}/{index}", self.0))
+    }
+
+    /// From a JSON pointer.
+    pub(super) fn from_pointer(pointer: &str) -> Self {
+        Self(pointer.to_owned())
+    }
+
+    /// From where deserialising stopped.
+    pub(super) fn from_serde(path: &serde_path_to_error::Path) -> Self {
+        use serde_path_to_error::Segment;
+        path.iter()
+            .fold(Self::root(), |place, segment| match segment {
+                Segment::Seq { index } => place.index(*index),
+                Segment::Map { key } => place.key(key),
+                Segment::Enum { .. } | Segment::Unknown => place,
+            })
+    }
+
+    fn parent(&self) -> Option<Self> {
+        self.0.rfind('/').map(|at| Self(self.0[..at].to_owned()))
+    }
+
+    /// For people: `stages[2].input`; empty at the top.
+    pub fn describe(&self) -> String {
+        let mut text = String::new();
+        for segment in self.0.split('/').skip(1) {
+            if segment.bytes().all(|b| b.is_ascii_digit()) && !segment.is_empty() {
+                let _ = write!(text, "[{segment}]");
+            } else {
+                let separator = if text.is_empty() { "" } else { "." };
+                let _ = write!(
+                    text,
+                    "{separator}{}",
+                    segment.replace("~1", "/").replace("~0", "~")
+                );
+            }
+        }
+        text
+    }
+}
+
+#[derive(Debug)]
+struct Entry {
+    key: Option<Range<usize>>,
+    value: Range<usize>,
+}
+
+/// Where in a text each place stands \[bytes\].
+#[derive(Debug, Default)]
+pub struct Spans {
+    entries: HashMap<Place, Entry>,
+}
+
+impl Spans {
+    pub(super) fn insert(&mut self, place: Place, key: Option<Range<usize>>, value: Range<usize>) {
+        self.entries.insert(place, Entry { key, value });
+    }
+
+    /// The value at `place`, or else at the nearest place around it.
+    pub fn value(&self, place: &Place) -> Range<usize> {
+        self.nearest(place)
+            .map_or(0..0, |entry| entry.value.clone())
+    }
+
+    /// The key at `place`; the value where it has none.
+    pub fn key(&self, place: &Place) -> Range<usize> {
+        self.nearest(place).map_or(0..0, |entry| {
+            entry.key.clone().unwrap_or_else(|| entry.value.clone())
+        })
+    }
+
+    fn nearest(&self, place: &Place) -> Option<&Entry> {
+        let mut place = place.clone();
+        loop {
+            if let Some(entry) = self.entries.get(&place) {
+                return Some(entry);
+            }
+            place = place.parent()?;
+        }
+    }
+}
