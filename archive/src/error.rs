@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::csv_file::CsvError;
 use crate::damage::{Damage, seconds};
-use crate::ros::DecodeError;
+use crate::ros::{DecodeError, EncodeError};
 
 /// Why a recording cannot be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -102,6 +103,29 @@ pub enum ArchiveError {
         loaded: usize,
         /// Bytes allowed.
         limit: usize,
+    },
+    /// A line of a table is broken.
+    #[error(transparent)]
+    Csv(Box<CsvError>),
+    /// The mapping does not fit the table.
+    #[error("{}: {what}: {reason}", path.display())]
+    CsvMapping {
+        /// The table.
+        path: PathBuf,
+        /// The key of the mapping.
+        what: String,
+        /// Why it does not fit.
+        reason: String,
+    },
+    /// A row cannot be made into a message.
+    #[error("{}: topic {topic:?}: {source}", path.display())]
+    Encode {
+        /// The table.
+        path: PathBuf,
+        /// The topic it appears on.
+        topic: String,
+        /// Why.
+        source: EncodeError,
     },
     /// A database cannot be read.
     #[error("{}: {source}", path.display())]

@@ -8,15 +8,19 @@
 //! Nothing is lost in silence: what cannot be read is [`Damage`], known when the recording is opened
 //! (a torn tail) or told by the reader in its place (a broken chunk).
 
+mod csv_file;
 mod damage;
 mod error;
+mod joint_map;
 mod mcap_file;
 mod mcap_write;
 mod recording;
 pub mod ros;
 
+pub use csv_file::{Column, Columns, CsvError, CsvMapping, CsvProblem, limits as csv_limits};
 pub use damage::{Damage, DamageKind};
 pub use error::ArchiveError;
+pub use joint_map::{JointMap, JointMapError};
 pub use mcap_write::{
     CHUNK_SPAN_NS, Compression, McapWriter, PROVENANCE, TopicWriter, WriteError, Written,
 };

@@ -12,9 +12,10 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use crate::ArchiveError;
+use crate::csv_file::{self, CsvMapping, CsvTable};
 use crate::damage::Damage;
 use crate::mcap_file::{Layout, McapCursor, Order};
-use crate::ros;
+use crate::ros::{self, Message as _};
 
 pub use joint_states::{JointStates, Stamped};
 pub(crate) use messages::{Cursor, RawMessage};
@@ -28,12 +29,15 @@ use topic::Topics;
 pub enum RecordingKind {
     /// One MCAP file.
     Mcap,
+    /// A table of numbers.
+    Csv,
 }
 
 impl std::fmt::Display for RecordingKind {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::Mcap => "MCAP file",
+            Self::Csv => "CSV table",
         })
     }
 }
@@ -49,6 +53,7 @@ pub struct Recording {
 
 enum Store {
     Mcap(Arc<Layout>),
+    Csv(Box<CsvTable>),
 }
 
 impl Recording {
@@ -71,6 +76,38 @@ impl Recording {
         Err(ArchiveError::UnknownFormat {
             path: path.to_owned(),
             reason: "it begins as neither an MCAP file nor a SQLite database does".to_owned(),
+        })
+    }
+
+    /// Opens the table at `path`, with `joints` as the names that its columns stand for unless the
+    /// mapping has its own. Its rows appear as joint states on the topic `/joint_states`.
+    ///
+    /// All of it is read and checked, once.
+    ///
+    /// # Errors
+    /// [`ArchiveError::Io`]; [`ArchiveError::CsvMapping`] if the mapping does not fit the table;
+    /// [`ArchiveError::Csv`] with the first line that makes no sense.
+    pub fn open_csv(
+        path: impl AsRef<Path>,
+        mapping: &CsvMapping,
+        joints: &[String],
+    ) -> Result<Self, ArchiveError> {
+        let path = path.as_ref();
+        let table = CsvTable::check(path, mapping, joints)?;
+        let mut topics = Topics::default();
+        topics.add(Topic {
+            name: csv_file::TOPIC.to_owned(),
+            type_name: ros::JointState::TYPE.to_owned(),
+            message_encoding: "cdr".to_owned(),
+            type_hash: Some(ros::JointState::TYPE_HASH.to_owned()),
+            message_count: table.rows,
+        });
+        Ok(Self {
+            path: path.to_owned(),
+            topics: Arc::new(topics),
+            log_times_ns: table.times_ns,
+            damage: table.damage.clone(),
+            store: Store::Csv(Box::new(table)),
         })
     }
 
@@ -97,6 +134,7 @@ impl Recording {
     pub fn kind(&self) -> RecordingKind {
         match self.store {
             Store::Mcap(_) => RecordingKind::Mcap,
+            Store::Csv(_) => RecordingKind::Csv,
         }
     }
 
@@ -207,6 +245,7 @@ impl Recording {
                 let cursor = McapCursor::new(Arc::clone(layout), Order::LogTime, topic)?;
                 Ok(Box::new(cursor))
             }
+            Store::Csv(table) => Ok(Box::new(table.cursor()?)),
         }
     }
 

@@ -4,6 +4,7 @@
 
 mod cdr;
 mod diagnostic_array;
+mod float64;
 mod header;
 mod inertia_stamped;
 mod joint_state;
@@ -15,6 +16,7 @@ use serde::de::DeserializeOwned;
 
 pub use cdr::{DecodeError, EncodeError, decode, decode_into, encode};
 pub use diagnostic_array::{DiagnosticArray, DiagnosticStatus, KeyValue, Level};
+pub use float64::Float64;
 pub use header::{Header, Time};
 pub use inertia_stamped::{Inertia, InertiaStamped};
 pub use joint_state::JointState;

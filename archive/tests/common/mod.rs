@@ -1,5 +1,6 @@
 //! Small recordings made on the spot.
 #![allow(dead_code, reason = "not every test file uses every helper")]
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -75,4 +76,14 @@ pub fn drain(mut messages: Messages) -> (Vec<Copied>, usize) {
         }
     }
     (copies, damaged)
+}
+
+/// `../shared/<path>` beside the workspace, or `None` and a visible line.
+pub fn shared(test: &str, path: &str) -> Option<PathBuf> {
+    let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared");
+    if shared.is_dir() {
+        return Some(shared.join(path));
+    }
+    eprintln!("SKIPPED {test}: ../shared is absent");
+    None
 }

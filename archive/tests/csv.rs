@@ -1,0 +1,279 @@
+//! Tables of numbers, good and bad.
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+
+use common::shared;
+use tauscope_archive::{
+    ArchiveError, Column, Columns, CsvMapping, CsvProblem, DamageKind, Recording, RecordingKind,
+};
+
+fn number(number: usize) -> Column {
+    Column {
+        number: Some(number),
+        name: None,
+    }
+}
+
+fn first(first: usize) -> Columns {
+    Columns {
+        first: Some(first),
+        ..Columns::default()
+    }
+}
+
+/// Time, then positions, velocities and efforts, one for each of `joints` joints.
+fn mapping(joints: usize) -> CsvMapping {
+    CsvMapping {
+        time: number(1),
+        position: first(2),
+        velocity: Some(first(2 + joints)),
+        effort: Some(first(2 + 2 * joints)),
+        joints: Some((1..=joints).map(|i| format!("joint{i}")).collect()),
+        header: false,
+        skip_lines: 0,
+        delimiter: ',',
+    }
+}
+
+fn open(text: &str, mapping: &CsvMapping) -> Result<Recording, ArchiveError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.csv");
+    fs::write(&path, text).unwrap();
+    Recording::open_csv(path, mapping, &[])
+}
+
+fn error(text: &str, mapping: &CsvMapping) -> String {
+    match open(text, mapping) {
+        Ok(_) => panic!("{text:?} was read"),
+        Err(error) => {
+            let text = error.to_string();
+            text.split_once("a.csv").unwrap().1.to_owned()
+        }
+    }
+}
+
+#[test]
+fn rows_are_joint_states() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.csv");
+    fs::write(&path, "0.5,1,2,3\r\n\r\n0.5,\"4\",5,nan\r\n1.25, 7 ,,9").unwrap();
+    let recording = Recording::open_csv(&path, &mapping(1), &[]).unwrap();
+    assert_eq!(recording.kind(), RecordingKind::Csv);
+    assert_eq!(recording.start_ns(), Some(500_000_000));
+    assert_eq!(recording.end_ns(), Some(1_250_000_000));
+    assert_eq!(recording.topics()[0].message_count, 3);
+    let mut states = recording.joint_states("/joint_states").unwrap();
+    let mut rows = Vec::new();
+    while let Some(state) = states.next_state() {
+        let state = state.unwrap();
+        assert_eq!(state.message.name, ["joint1"]);
+        let m = state.message;
+        assert_eq!(m.header.stamp.ns(), state.log_time_ns);
+        rows.push((state.log_time_ns, m.position[0], m.velocity[0], m.effort[0]));
+    }
+    assert_eq!(rows[0], (500_000_000, 1.0, 2.0, 3.0));
+    assert_eq!(rows[1].1, 4.0);
+    // What is not there is NaN, for the reader to drop and to count.
+    assert!(rows[1].3.is_nan() && rows[2].2.is_nan());
+    assert_eq!(rows.len(), 3);
+}
+
+#[test]
+fn columns_are_found_by_name() {
+    let names = |names: &[&str]| Columns {
+        names: Some(names.iter().map(|&name| name.to_owned()).collect()),
+        ..Columns::default()
+    };
+    let mapping = CsvMapping {
+        time: Column {
+            number: None,
+            name: Some("t".to_owned()),
+        },
+        position: names(&["q2", "q1"]),
+        velocity: None,
+        effort: Some(names(&["i2", "i1"])),
+        joints: Some(vec!["two".to_owned(), "one".to_owned()]),
+        header: true,
+        skip_lines: 2,
+        delimiter: ';',
+    };
+    let text = "made by\na logger\nt; q1; q2; i1; \"i2\"\n0; 1; 2; 3; 4\n";
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.csv");
+    fs::write(&path, text).unwrap();
+    let recording = Recording::open_csv(&path, &mapping, &[]).unwrap();
+    let mut states = recording.joint_states("/joint_states").unwrap();
+    let state = states.next_state().unwrap().unwrap().message;
+    assert_eq!(state.position, [2.0, 1.0]);
+    assert_eq!(state.effort, [4.0, 3.0]);
+    assert!(state.velocity.is_empty());
+
+    let mut wrong = mapping.clone();
+    wrong.position = names(&["q2", "q3"]);
+    assert_eq!(
+        error(text, &wrong),
+        ": position: no column \"q3\"; there are t, q1, q2, i1, i2"
+    );
+    wrong.header = false;
+    wrong.skip_lines = 3;
+    assert_eq!(
+        error(text, &wrong),
+        ": time: column \"t\", but `header` is not true"
+    );
+    // Line numbers count what was skipped.
+    assert_eq!(
+        error(&text.replace("; 4", "; x"), &mapping),
+        ":4: column 5 (effort of two): \"x\" is not a number"
+    );
+}
+
+#[test]
+fn a_mapping_that_does_not_fit_is_refused() {
+    let mut wrong = mapping(2);
+    assert_eq!(
+        error("0,1,2,3\n", &wrong),
+        ": velocity: column 5, but the table has 4 columns"
+    );
+    wrong.position = first(0);
+    assert_eq!(
+        error("0,1,2,3\n", &wrong),
+        ": position: columns are counted from 1"
+    );
+    wrong.position = Columns {
+        numbers: Some(vec![2]),
+        ..Columns::default()
+    };
+    assert_eq!(
+        error("0,1,2,3\n", &wrong),
+        ": position: 1 columns for 2 joints"
+    );
+    wrong.position.first = Some(1);
+    assert_eq!(
+        error("0,1,2,3\n", &wrong),
+        ": position: give `first`, `numbers` or `names`, one of them"
+    );
+}
+
+#[test]
+fn a_line_that_makes_no_sense_is_told_with_its_number() {
+    let m = mapping(1);
+    for (text, expected) in [
+        (
+            "0,1,2,3\n0.1,1,2\n0.2,1,2,3\n",
+            ":2: 3 columns, the lines before have 4",
+        ),
+        (
+            "0,1,2,3\n0.1,1,2,3,4\n",
+            ":2: 5 columns, the lines before have 4",
+        ),
+        (
+            "0,1,2,3\n0.1,1,2,0x7\n",
+            ":2: column 4 (effort of joint1): \"0x7\" is not a number",
+        ),
+        (
+            "1,1,2,3\n0.9,1,2,3\n",
+            ":2: column 1 (time): 0.9 s comes after 1 s: time runs backwards",
+        ),
+        (
+            "nan,1,2,3\n",
+            ":1: column 1 (time): \"nan\" is not a time in seconds from 0 to 2.147483647e9",
+        ),
+    ] {
+        assert_eq!(error(text, &m), expected);
+    }
+    for garbage in ["1e170", "-1e7", "inf", "1e999"] {
+        let text = format!("0,1,2,3\n0.1,{garbage},2,3\n");
+        let expected = format!(":2: column 2 (position of joint1): {garbage:?} is beyond");
+        assert!(error(&text, &m).starts_with(&expected));
+    }
+    // No line end, and so no end of memory either.
+    let long = error(&"1".repeat(3 << 20), &m);
+    assert_eq!(
+        long,
+        ":1: a line of more than 1048576 bytes: this is not a table"
+    );
+}
+
+#[test]
+fn a_last_line_without_an_end_is_a_torn_tail() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.csv");
+    fs::write(&path, "0,1,2,3\n0.1,1,2,3\n0.2,1").unwrap();
+    let recording = Recording::open_csv(&path, &mapping(1), &[]).unwrap();
+    let [damage] = recording.damage() else {
+        panic!("{:?}", recording.damage());
+    };
+    assert_eq!((damage.at, &damage.kind), (3, &DamageKind::TornTail));
+    assert_eq!(damage.readable_until_ns, Some(100_000_000));
+    assert_eq!(common::read_all(&recording).0.len(), 2);
+}
+
+#[test]
+fn a_table_without_rows_is_empty() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.csv");
+    fs::write(&path, "").unwrap();
+    let recording = Recording::open_csv(&path, &mapping(1), &[]).unwrap();
+    assert!(matches!(
+        recording.joint_states("/joint_states"),
+        Err(ArchiveError::Empty { .. })
+    ));
+}
+
+#[test]
+fn a_real_table() {
+    let Some(path) = shared(
+        "a_real_table",
+        "recordings/ur10e/csv/20_02_05-20sec_8harm.csv",
+    ) else {
+        return;
+    };
+    let recording = Recording::open_csv(&path, &mapping(6), &[]).unwrap();
+    assert_eq!(recording.topics()[0].message_count, 2506);
+    // The MCAP file of that name was made from this table.
+    let other = path.with_file_name("../20_02_05-20sec_8harm.mcap");
+    let other = Recording::open(other).unwrap();
+    assert_eq!(other.topics()[0].message_count, 2506);
+    let mut a = recording.joint_states("/joint_states").unwrap();
+    let mut b = other.joint_states("/joint_states").unwrap();
+    while let Some(row) = a.next_state() {
+        let row = row.unwrap().message;
+        let message = b.next_state().unwrap().unwrap().message;
+        assert_eq!(row.position, message.position);
+        assert_eq!(row.velocity, message.velocity);
+        assert_eq!(row.effort, message.effort);
+    }
+}
+
+fn refused_at(path: &Path, mapping: &CsvMapping) -> Option<(u64, CsvProblem)> {
+    match Recording::open_csv(path, mapping, &[]) {
+        Err(ArchiveError::Csv(error)) => Some((error.line, error.problem)),
+        _ => None,
+    }
+}
+
+#[test]
+fn a_real_broken_table() {
+    let Some(path) = shared("a_real_broken_table", "recordings/ur10e/csv/dirty.csv") else {
+        return;
+    };
+    // As it is meant: 19 columns. Line 3 holds -1.6e181 for a position.
+    let (line, problem) = refused_at(&path, &mapping(6)).unwrap();
+    assert_eq!(line, 3);
+    assert!(matches!(problem, CsvProblem::Implausible { column: 3, .. }));
+    // Taken for a table with target currents and torques.
+    let mut wide = mapping(6);
+    wide.effort = Some(first(26));
+    let error = Recording::open_csv(&path, &wide, &[]).err().unwrap();
+    assert!(
+        error.to_string().contains("the table has 19 columns"),
+        "{error}"
+    );
+    // Time in the wrong column.
+    let mut wrong = mapping(5);
+    wrong.time = number(19);
+    assert!(refused_at(&path, &wrong).is_some());
+}
