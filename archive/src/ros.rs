@@ -9,6 +9,8 @@ mod header;
 mod inertia_stamped;
 mod joint_state;
 mod std_bool;
+#[cfg(test)]
+mod type_hash;
 mod wrench_stamped;
 
 use serde::Serialize;
