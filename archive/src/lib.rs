@@ -8,6 +8,7 @@
 //! Nothing is lost in silence: what cannot be read is [`Damage`], known when the recording is opened
 //! (a torn tail) or told by the reader in its place (a broken chunk).
 
+mod bag_folder;
 mod csv_file;
 mod damage;
 mod error;
@@ -16,6 +17,7 @@ mod mcap_file;
 mod mcap_write;
 mod recording;
 pub mod ros;
+mod sqlite_file;
 
 pub use csv_file::{Column, Columns, CsvError, CsvMapping, CsvProblem, limits as csv_limits};
 pub use damage::{Damage, DamageKind};

@@ -2,24 +2,28 @@
 
 mod joint_states;
 mod messages;
+mod open;
+mod several;
 mod topic;
 
-use std::fs::File;
-use std::io::Read;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde::Serialize;
 
 use crate::ArchiveError;
-use crate::csv_file::{self, CsvMapping, CsvTable};
+use crate::csv_file::CsvTable;
 use crate::damage::Damage;
 use crate::mcap_file::{Layout, McapCursor, Order};
-use crate::ros::{self, Message as _};
+use crate::mcap_write::PROVENANCE;
+use crate::ros;
+use crate::sqlite_file::SqliteFile;
 
 pub use joint_states::{JointStates, Stamped};
 pub(crate) use messages::{Cursor, RawMessage};
 pub use messages::{Message, Messages};
+use several::{Part, SeveralCursor};
 pub use topic::Topic;
 use topic::Topics;
 
@@ -29,6 +33,10 @@ use topic::Topics;
 pub enum RecordingKind {
     /// One MCAP file.
     Mcap,
+    /// One SQLite file of rosbag2.
+    Sqlite,
+    /// The folder of a rosbag2 bag.
+    Rosbag2,
     /// A table of numbers.
     Csv,
 }
@@ -37,6 +45,8 @@ impl std::fmt::Display for RecordingKind {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::Mcap => "MCAP file",
+            Self::Sqlite => "SQLite file of rosbag2",
+            Self::Rosbag2 => "rosbag2 bag",
             Self::Csv => "CSV table",
         })
     }
@@ -45,86 +55,27 @@ impl std::fmt::Display for RecordingKind {
 /// A recording that has been opened: what is in it is known, its messages are not read yet.
 pub struct Recording {
     path: PathBuf,
+    kind: RecordingKind,
     topics: Arc<Topics>,
     log_times_ns: Option<(i64, i64)>,
+    bytes: u64,
+    metadata: BTreeMap<String, BTreeMap<String, String>>,
     damage: Vec<Damage>,
     store: Store,
 }
 
 enum Store {
     Mcap(Arc<Layout>),
+    Sqlite {
+        file: Box<SqliteFile>,
+        /// The place in the list of topics of each topic's number in the database.
+        numbers: BTreeMap<i64, usize>,
+    },
+    Several(Arc<Vec<Part>>),
     Csv(Box<CsvTable>),
 }
 
 impl Recording {
-    /// Opens the recording at `path`: an MCAP file.
-    ///
-    /// Reads the index only, if the recording has a sound one; else all of it, once.
-    ///
-    /// # Errors
-    /// [`ArchiveError::Io`], [`ArchiveError::UnknownFormat`] and [`ArchiveError::Unreadable`]. A
-    /// recording that can be read in part is no error; see [`Recording::damage`].
-    pub fn open(path: impl AsRef<Path>) -> Result<Self, ArchiveError> {
-        let path = path.as_ref();
-        let mut beginning = Vec::new();
-        File::open(path)
-            .and_then(|file| file.take(16).read_to_end(&mut beginning))
-            .map_err(ArchiveError::io(path))?;
-        if beginning.starts_with(mcap::MAGIC) {
-            return Ok(Self::from_mcap(Layout::read(path)?));
-        }
-        Err(ArchiveError::UnknownFormat {
-            path: path.to_owned(),
-            reason: "it begins as neither an MCAP file nor a SQLite database does".to_owned(),
-        })
-    }
-
-    /// Opens the table at `path`, with `joints` as the names that its columns stand for unless the
-    /// mapping has its own. Its rows appear as joint states on the topic `/joint_states`.
-    ///
-    /// All of it is read and checked, once.
-    ///
-    /// # Errors
-    /// [`ArchiveError::Io`]; [`ArchiveError::CsvMapping`] if the mapping does not fit the table;
-    /// [`ArchiveError::Csv`] with the first line that makes no sense.
-    pub fn open_csv(
-        path: impl AsRef<Path>,
-        mapping: &CsvMapping,
-        joints: &[String],
-    ) -> Result<Self, ArchiveError> {
-        let path = path.as_ref();
-        let table = CsvTable::check(path, mapping, joints)?;
-        let mut topics = Topics::default();
-        topics.add(Topic {
-            name: csv_file::TOPIC.to_owned(),
-            type_name: ros::JointState::TYPE.to_owned(),
-            message_encoding: "cdr".to_owned(),
-            type_hash: Some(ros::JointState::TYPE_HASH.to_owned()),
-            message_count: table.rows,
-        });
-        Ok(Self {
-            path: path.to_owned(),
-            topics: Arc::new(topics),
-            log_times_ns: table.times_ns,
-            damage: table.damage.clone(),
-            store: Store::Csv(Box::new(table)),
-        })
-    }
-
-    fn from_mcap(layout: Layout) -> Self {
-        let topics = Topics::of_mcap(&layout);
-        let time = |ns: u64| i64::try_from(ns).unwrap_or(i64::MAX);
-        Self {
-            path: layout.path.clone(),
-            topics: Arc::new(topics),
-            log_times_ns: layout
-                .log_times
-                .map(|(start, end)| (time(start), time(end))),
-            damage: layout.damage.clone(),
-            store: Store::Mcap(Arc::new(layout)),
-        }
-    }
-
     /// Where it lies.
     pub fn path(&self) -> &Path {
         &self.path
@@ -132,10 +83,22 @@ impl Recording {
 
     /// What it is stored as.
     pub fn kind(&self) -> RecordingKind {
-        match self.store {
-            Store::Mcap(_) => RecordingKind::Mcap,
-            Store::Csv(_) => RecordingKind::Csv,
-        }
+        self.kind
+    }
+
+    /// Its size on disk \[bytes\].
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Its metadata records (MCAP only): keys and values by the name of the record.
+    pub fn metadata(&self) -> &BTreeMap<String, BTreeMap<String, String>> {
+        &self.metadata
+    }
+
+    /// What made it, if it was one of ours: versions, and hashes of what went in.
+    pub fn provenance(&self) -> Option<&BTreeMap<String, String>> {
+        self.metadata.get(PROVENANCE)
     }
 
     /// Its topics, with their types and message counts.
@@ -245,6 +208,11 @@ impl Recording {
                 let cursor = McapCursor::new(Arc::clone(layout), Order::LogTime, topic)?;
                 Ok(Box::new(cursor))
             }
+            Store::Sqlite { file, numbers } => {
+                let topic = |id| numbers.get(&id).copied().filter(|&topic| wanted[topic]);
+                Ok(Box::new(file.cursor(topic)?))
+            }
+            Store::Several(parts) => Ok(Box::new(SeveralCursor::new(Arc::clone(parts), wanted))),
             Store::Csv(table) => Ok(Box::new(table.cursor()?)),
         }
     }

@@ -1,0 +1,210 @@
+//! What lies at a path, and how it is opened.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::several::Part;
+use super::topic::{Topic, Topics};
+use super::{Recording, RecordingKind, Store};
+use crate::ArchiveError;
+use crate::bag_folder::BagFolder;
+use crate::csv_file::{self, CsvMapping, CsvTable};
+use crate::damage::{Damage, DamageKind};
+use crate::mcap_file::Layout;
+use crate::ros::{JointState, Message as _};
+use crate::sqlite_file::{self, SqliteFile};
+
+impl Recording {
+    /// Opens the recording at `path`: an MCAP file (also an unfinished `.part`), the folder of a
+    /// rosbag2 bag with MCAP or SQLite files, or one such SQLite file.
+    ///
+    /// Of an MCAP file, only the index is read if it has a sound one; else all of it, once. A
+    /// database is counted through once.
+    ///
+    /// # Errors
+    /// [`ArchiveError::Io`]; [`ArchiveError::UnknownFormat`]; [`ArchiveError::Unreadable`] if not
+    /// even its first record can be read. A recording that can be read in part is no error; see
+    /// [`Recording::damage`].
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, ArchiveError> {
+        let path = path.as_ref();
+        if path.is_dir() {
+            return Self::open_folder(path);
+        }
+        Self::open_file(path, false)
+    }
+
+    fn open_file(path: &Path, packed_messages: bool) -> Result<Self, ArchiveError> {
+        let mut beginning = Vec::new();
+        File::open(path)
+            .and_then(|file| file.take(16).read_to_end(&mut beginning))
+            .map_err(ArchiveError::io(path))?;
+        if beginning.starts_with(mcap::MAGIC) {
+            return Ok(Self::from_mcap(Layout::read(path)?));
+        }
+        if beginning.starts_with(sqlite_file::MAGIC) {
+            return Ok(Self::from_sqlite(
+                path,
+                SqliteFile::read(path, packed_messages)?,
+            ));
+        }
+        let reason = if beginning.is_empty() {
+            "the file is empty"
+        } else if beginning.starts_with(b"#ROSBAG V") {
+            "a bag of ROS 1: convert it first, for example with `rosbags-convert`"
+        } else if path.extension().is_some_and(|extension| extension == "csv") {
+            "a CSV table needs a column mapping"
+        } else {
+            "it begins as neither an MCAP file nor a SQLite database does"
+        };
+        Err(ArchiveError::UnknownFormat {
+            path: path.to_owned(),
+            reason: reason.to_owned(),
+        })
+    }
+
+    fn from_mcap(layout: Layout) -> Self {
+        let time = |ns: u64| i64::try_from(ns).unwrap_or(i64::MAX);
+        let mut metadata: BTreeMap<String, BTreeMap<String, String>> = BTreeMap::new();
+        for record in &layout.metadata {
+            let entries = metadata.entry(record.name.clone()).or_default();
+            entries.extend(record.metadata.clone());
+        }
+        Self {
+            path: layout.path.clone(),
+            kind: RecordingKind::Mcap,
+            topics: Arc::new(Topics::of_mcap(&layout)),
+            log_times_ns: layout
+                .log_times
+                .map(|(start, end)| (time(start), time(end))),
+            bytes: layout.file_bytes,
+            metadata,
+            damage: layout.damage.clone(),
+            store: Store::Mcap(Arc::new(layout)),
+        }
+    }
+
+    fn from_sqlite(path: &Path, file: SqliteFile) -> Self {
+        let mut topics = Topics::default();
+        let numbers = file.topics.iter().map(|(id, topic)| {
+            let index = topics.add(topic.clone());
+            (*id, index)
+        });
+        let numbers = numbers.collect();
+        Self {
+            path: path.to_owned(),
+            kind: RecordingKind::Sqlite,
+            topics: Arc::new(topics),
+            log_times_ns: file.log_times_ns,
+            bytes: length(path),
+            metadata: BTreeMap::new(),
+            damage: file.damage.clone(),
+            store: Store::Sqlite {
+                file: Box::new(file),
+                numbers,
+            },
+        }
+    }
+
+    fn open_folder(folder: &Path) -> Result<Self, ArchiveError> {
+        let bag = BagFolder::read(folder)?;
+        let mut damage = bag.damage;
+        let mut parts = Vec::new();
+        let mut topics = Topics::default();
+        for file in &bag.files {
+            let recording = match Self::open_file(file, bag.packed_messages) {
+                Ok(recording) => recording,
+                Err(error) => {
+                    damage.push(missing(file, &error));
+                    continue;
+                }
+            };
+            let numbers = recording.topics().iter();
+            let numbers = numbers.map(|topic| topics.add(topic.clone())).collect();
+            damage.extend_from_slice(recording.damage());
+            parts.push(Part {
+                recording,
+                topics: numbers,
+            });
+        }
+        if parts.is_empty() {
+            let first = damage.iter().find(|damage| damage.loses_data());
+            return Err(ArchiveError::Unreadable {
+                path: folder.to_owned(),
+                reason: first
+                    .map_or_else(|| "the bag lists no files".to_owned(), ToString::to_string),
+            });
+        }
+        let recordings = || parts.iter().map(|part| &part.recording);
+        let start_ns = recordings().filter_map(Recording::start_ns).min();
+        let end_ns = recordings().filter_map(Recording::end_ns).max();
+        let mut metadata = BTreeMap::new();
+        for recording in recordings() {
+            metadata.extend(recording.metadata().clone());
+        }
+        Ok(Self {
+            path: folder.to_owned(),
+            kind: RecordingKind::Rosbag2,
+            topics: Arc::new(topics),
+            log_times_ns: start_ns.zip(end_ns),
+            bytes: recordings().map(Recording::bytes).sum(),
+            metadata,
+            damage,
+            store: Store::Several(Arc::new(parts)),
+        })
+    }
+
+    /// Opens the table at `path`, with `joints` as the names that its columns stand for unless the
+    /// mapping has its own. Its rows appear as joint states on the topic `/joint_states`.
+    ///
+    /// All of it is read and checked, once.
+    ///
+    /// # Errors
+    /// [`ArchiveError::Io`]; [`ArchiveError::CsvMapping`] if the mapping does not fit the table;
+    /// [`ArchiveError::Csv`] with the first line that makes no sense.
+    pub fn open_csv(
+        path: impl AsRef<Path>,
+        mapping: &CsvMapping,
+        joints: &[String],
+    ) -> Result<Self, ArchiveError> {
+        let path = path.as_ref();
+        let table = CsvTable::check(path, mapping, joints)?;
+        let mut topics = Topics::default();
+        topics.add(Topic {
+            name: csv_file::TOPIC.to_owned(),
+            type_name: JointState::TYPE.to_owned(),
+            message_encoding: "cdr".to_owned(),
+            type_hash: Some(JointState::TYPE_HASH.to_owned()),
+            message_count: table.rows,
+        });
+        Ok(Self {
+            path: path.to_owned(),
+            kind: RecordingKind::Csv,
+            topics: Arc::new(topics),
+            log_times_ns: table.times_ns,
+            bytes: length(path),
+            metadata: BTreeMap::new(),
+            damage: table.damage.clone(),
+            store: Store::Csv(Box::new(table)),
+        })
+    }
+}
+
+/// A file of a bag that cannot be opened.
+fn missing(file: &Path, error: &ArchiveError) -> Damage {
+    Damage {
+        path: PathBuf::from(file),
+        at: 0,
+        kind: DamageKind::File {
+            reason: error.to_string(),
+        },
+        readable_until_ns: None,
+    }
+}
+
+/// The length of a file that has just been read; 0 if it has gone since.
+fn length(path: &Path) -> u64 {
+    std::fs::metadata(path).map_or(0, |metadata| metadata.len())
+}
