@@ -8,11 +8,16 @@
 
 pub mod link;
 pub mod sample;
+pub mod seat;
 pub mod stage;
 
-pub use link::{Keep, LinkError, Received, Receiver, ReceiverCounts, Sender, SenderCounts};
+pub use link::{
+    Audience, Domain, InProcess, Keep, LinkError, Position, Received, Receiver, ReceiverCounts,
+    Sender, SenderCounts, SharedMemory, Transport,
+};
 pub use sample::{
     Detection, EventKind, Header, Health, JointArray, JointState, MAX_JOINTS, Name, Sample,
     SampleKind, SampleRef, TwinState, flags,
 };
+pub use seat::{EffortUnit, Seat};
 pub use stage::{Emit, Progress, Sink, Source, Stage, StageError};

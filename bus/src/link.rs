@@ -7,15 +7,82 @@
 
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
+
 use crate::sample::Sample;
 
+mod fan_out;
+mod in_process;
+mod queue;
+mod sequence;
+mod shared_memory;
+
+pub use fan_out::FanOut;
+pub use in_process::InProcess;
+pub use shared_memory::{Domain, DomainError, SharedMemory};
+
+/// How long a sender waits for one keep-all receiver that takes nothing, before it counts the
+/// sample as undelivered and goes on. A receiver that has used this up is not waited for again until
+/// it has taken something.
+pub const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Most samples that a keep-all receiver may leave unread.
+pub const MAX_DEPTH: usize = 1024;
+
 /// What becomes of a sample that a receiver has no room for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Keep {
     /// The sender waits: nothing is lost.
+    #[default]
     All,
     /// The oldest unread sample gives way, and is counted as lost.
     Newest,
+}
+
+/// How many receivers of each kind a sender expects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Audience {
+    /// Receivers that keep all.
+    pub keep_all: usize,
+    /// Receivers that keep the newest.
+    pub keep_newest: usize,
+}
+
+impl Audience {
+    /// `count` receivers of one kind.
+    pub fn of(keep: Keep, count: usize) -> Self {
+        match keep {
+            Keep::All => Self {
+                keep_all: count,
+                keep_newest: 0,
+            },
+            Keep::Newest => Self {
+                keep_all: 0,
+                keep_newest: count,
+            },
+        }
+    }
+
+    /// How many expect this policy.
+    pub fn count(&self, keep: Keep) -> usize {
+        match keep {
+            Keep::All => self.keep_all,
+            Keep::Newest => self.keep_newest,
+        }
+    }
+}
+
+/// How far a receiver has come in a stream.
+///
+/// A sender that starts anew counts from 0 again under another `instance`, so that its restart is
+/// neither taken for a giant gap nor hides one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Position {
+    /// Which life of the sender.
+    pub instance: u64,
+    /// The sequence number expected next.
+    pub next: u64,
 }
 
 /// Why a link cannot do what was asked.
@@ -60,16 +127,17 @@ pub enum LinkError {
 }
 
 /// What a sending end has counted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct SenderCounts {
     /// Samples sent.
     pub sent: u64,
-    /// Samples that a keep-all receiver did not take within the sender's patience.
+    /// Samples that an expected keep-all receiver did not get, once per such receiver: it was not
+    /// there, or it took nothing within the sender's patience.
     pub undelivered: u64,
 }
 
 /// What a receiving end has counted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct ReceiverCounts {
     /// Samples received.
     pub received: u64,
@@ -88,6 +156,32 @@ pub enum Received {
     End,
 }
 
+/// One way of carrying streams.
+pub trait Transport {
+    /// Opens the sending end of `stream`. A stream has one sender at a time.
+    ///
+    /// # Errors
+    /// [`LinkError::Open`], or [`LinkError::TypeMismatch`] if the stream is already open with
+    /// another type.
+    fn sender<T: Sample>(
+        &self,
+        stream: &str,
+        audience: Audience,
+    ) -> Result<Box<dyn Sender<T>>, LinkError>;
+
+    /// Opens a receiving end of `stream` that leaves at most `depth` samples unread (1 to
+    /// [`MAX_DEPTH`]; what is outside is brought inside).
+    ///
+    /// # Errors
+    /// As [`Transport::sender`].
+    fn receiver<T: Sample>(
+        &self,
+        stream: &str,
+        keep: Keep,
+        depth: usize,
+    ) -> Result<Box<dyn Receiver<T>>, LinkError>;
+}
+
 /// The end of a link at the stage that makes a stream.
 pub trait Sender<T: Sample>: Send {
     /// Loans a slot (a default `T`), lets `write` fill it in place, numbers it and sends it.
@@ -101,6 +195,20 @@ pub trait Sender<T: Sample>: Send {
     /// # Errors
     /// As [`Sender::send_with`].
     fn end(&mut self) -> Result<(), LinkError>;
+
+    /// Waits until the expected receivers are connected and returns how many are missing.
+    ///
+    /// # Errors
+    /// [`LinkError::Send`] if the transport fails.
+    fn wait_for_receivers(&mut self, timeout: Duration) -> Result<usize, LinkError>;
+
+    /// After [`Sender::end`]: waits until every receiver that was told has taken the end (and with
+    /// it all that came before), and returns how many have not. A process that exits earlier may
+    /// take unread samples with it.
+    ///
+    /// # Errors
+    /// As [`Sender::send_with`].
+    fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError>;
 
     /// What it has counted.
     fn counts(&self) -> SenderCounts;
@@ -120,4 +228,29 @@ pub trait Receiver<T: Sample>: Send {
 
     /// What it has counted.
     fn counts(&self) -> ReceiverCounts;
+
+    /// How far it has come; `None` if it has heard nothing yet.
+    fn position(&self) -> Option<Position>;
+
+    /// Goes on where an earlier life of this receiver was: what was sent since then and is not heard
+    /// any more counts as lost.
+    fn resume(&mut self, position: Position);
+}
+
+impl<T: Sample, S: Sender<T> + ?Sized> Sender<T> for Box<S> {
+    fn send_with(&mut self, write: &mut dyn FnMut(&mut T)) -> Result<(), LinkError> {
+        (**self).send_with(write)
+    }
+    fn end(&mut self) -> Result<(), LinkError> {
+        (**self).end()
+    }
+    fn wait_for_receivers(&mut self, timeout: Duration) -> Result<usize, LinkError> {
+        (**self).wait_for_receivers(timeout)
+    }
+    fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError> {
+        (**self).wait_until_taken(timeout)
+    }
+    fn counts(&self) -> SenderCounts {
+        (**self).counts()
+    }
 }

@@ -7,6 +7,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
+use serde::{Deserialize, Serialize};
 
 /// The most joints one cell may have. Fixed, because a sample's size is.
 pub const MAX_JOINTS: usize = 16;
@@ -258,8 +259,9 @@ pub struct Health {
     pub restarts: u64,
 }
 
-/// Which of the sample types a stream carries.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+/// Which of the sample types a stream carries; in JSON `joint_state`, `twin_state` and so on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum SampleKind {
     /// [`JointState`].
     JointState,

@@ -1,0 +1,72 @@
+//! One stream over several links.
+
+use std::time::{Duration, Instant};
+
+use super::{LinkError, Sender, SenderCounts};
+use crate::sample::Sample;
+
+/// Sends every sample on all of its links: written in place on the first, copied to the others.
+/// Without a link samples are written and forgotten.
+pub struct FanOut<T> {
+    links: Vec<Box<dyn Sender<T>>>,
+    sent: u64,
+}
+
+impl<T: Sample> FanOut<T> {
+    /// Over `links`.
+    pub fn new(links: Vec<Box<dyn Sender<T>>>) -> Self {
+        Self { links, sent: 0 }
+    }
+}
+
+impl<T: Sample> Sender<T> for FanOut<T> {
+    fn send_with(&mut self, write: &mut dyn FnMut(&mut T)) -> Result<(), LinkError> {
+        self.sent += 1;
+        match self.links.as_mut_slice() {
+            [] => write(&mut T::default()),
+            [only] => only.send_with(write)?,
+            [first, others @ ..] => {
+                let mut copy = T::default();
+                first.send_with(&mut |slot| {
+                    write(slot);
+                    copy = *slot;
+                })?;
+                for link in others {
+                    link.send_with(&mut |slot| *slot = copy)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn end(&mut self) -> Result<(), LinkError> {
+        self.links.iter_mut().try_for_each(Sender::end)
+    }
+
+    fn wait_for_receivers(&mut self, timeout: Duration) -> Result<usize, LinkError> {
+        let deadline = Instant::now() + timeout;
+        self.links.iter_mut().try_fold(0, |missing, link| {
+            let left = deadline.saturating_duration_since(Instant::now());
+            Ok(missing + link.wait_for_receivers(left)?)
+        })
+    }
+
+    fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError> {
+        let deadline = Instant::now() + timeout;
+        self.links.iter_mut().try_fold(0, |missing, link| {
+            let left = deadline.saturating_duration_since(Instant::now());
+            Ok(missing + link.wait_until_taken(left)?)
+        })
+    }
+
+    fn counts(&self) -> SenderCounts {
+        SenderCounts {
+            sent: self.sent,
+            undelivered: self
+                .links
+                .iter()
+                .map(|link| link.counts().undelivered)
+                .sum(),
+        }
+    }
+}

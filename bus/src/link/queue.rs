@@ -1,0 +1,221 @@
+//! A bounded queue between threads that keeps all or keeps the newest.
+
+use std::collections::VecDeque;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use super::{Keep, Position};
+
+/// A sample on its way, or a reason why there is none.
+#[derive(Debug)]
+pub(crate) struct Message<P> {
+    /// Which life of the sender it is of.
+    pub(crate) instance: u64,
+    /// Its number in that life.
+    pub(crate) sequence: u64,
+    pub(crate) payload: P,
+}
+
+/// What became of an entry that was pushed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Pushed {
+    /// It is in the queue.
+    Taken,
+    /// The reader took nothing within the patience; the entry is gone.
+    GaveOut,
+    /// The reader has closed the queue.
+    Closed,
+}
+
+#[derive(Debug)]
+pub(crate) struct Queue<P> {
+    keep: Keep,
+    depth: usize,
+    state: Mutex<State<P>>,
+    filled: Condvar,
+    emptied: Condvar,
+}
+
+#[derive(Debug)]
+struct State<P> {
+    entries: VecDeque<Message<P>>,
+    /// Where this reader came in: the first entry that was offered, taken or not.
+    begin: Option<Position>,
+    closed: bool,
+    /// Patience has run out and the reader has taken nothing since.
+    stuck: bool,
+}
+
+impl<P> Queue<P> {
+    pub(crate) fn new(keep: Keep, depth: usize) -> Self {
+        Self {
+            keep,
+            depth,
+            state: Mutex::new(State {
+                entries: VecDeque::with_capacity(depth + 1),
+                begin: None,
+                closed: false,
+                stuck: false,
+            }),
+            filled: Condvar::new(),
+            emptied: Condvar::new(),
+        }
+    }
+
+    pub(crate) fn keep(&self) -> Keep {
+        self.keep
+    }
+
+    /// Appends `entry`, waiting at most `patience` for room if all are kept.
+    pub(crate) fn push(&self, entry: Message<P>, patience: Duration) -> Pushed {
+        let mut state = self.lock();
+        state.begin.get_or_insert(Position {
+            instance: entry.instance,
+            next: entry.sequence,
+        });
+        if self.keep == Keep::All && !state.stuck {
+            let full = |s: &mut State<P>| s.entries.len() >= self.depth && !s.closed;
+            state = self
+                .emptied
+                .wait_timeout_while(state, patience, full)
+                .unwrap_or_else(PoisonError::into_inner)
+                .0;
+        }
+        if state.closed {
+            return Pushed::Closed;
+        }
+        if state.entries.len() >= self.depth {
+            if self.keep == Keep::All {
+                state.stuck = true;
+                return Pushed::GaveOut;
+            }
+            state.entries.pop_front();
+        }
+        self.append(state, entry);
+        Pushed::Taken
+    }
+
+    /// Appends `entry` even if the queue is full: for the end of a stream, once.
+    pub(crate) fn push_over(&self, entry: Message<P>) {
+        let state = self.lock();
+        if !state.closed {
+            self.append(state, entry);
+        }
+    }
+
+    fn append(&self, mut state: MutexGuard<'_, State<P>>, entry: Message<P>) {
+        state.entries.push_back(entry);
+        drop(state);
+        self.filled.notify_one();
+    }
+
+    /// Takes the oldest entry, waiting at most `timeout` for one.
+    pub(crate) fn pop(&self, timeout: Duration) -> Option<Message<P>> {
+        let deadline = Instant::now() + timeout;
+        let mut state = self.lock();
+        loop {
+            if let Some(entry) = state.entries.pop_front() {
+                state.stuck = false;
+                drop(state);
+                self.emptied.notify_one();
+                return Some(entry);
+            }
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return None;
+            }
+            state = self
+                .filled
+                .wait_timeout(state, left)
+                .unwrap_or_else(PoisonError::into_inner)
+                .0;
+        }
+    }
+
+    /// Where this reader came in, if anything has been offered to it.
+    pub(crate) fn begin(&self) -> Option<Position> {
+        self.lock().begin
+    }
+
+    /// The reader leaves: nothing is taken any more and nobody waits for it.
+    pub(crate) fn close(&self) {
+        self.lock().closed = true;
+        self.emptied.notify_all();
+    }
+
+    pub(crate) fn is_closed(&self) -> bool {
+        self.lock().closed
+    }
+
+    // No code panics while it holds the lock, so a poisoned one still guards a whole state.
+    fn lock(&self) -> MutexGuard<'_, State<P>> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NOW: Duration = Duration::ZERO;
+
+    fn message(sequence: u64) -> Message<()> {
+        Message {
+            instance: 7,
+            sequence,
+            payload: (),
+        }
+    }
+
+    fn pop(queue: &Queue<()>) -> Option<u64> {
+        queue.pop(NOW).map(|message| message.sequence)
+    }
+
+    #[test]
+    fn the_oldest_gives_way_and_the_beginning_is_remembered() {
+        let queue = Queue::new(Keep::Newest, 2);
+        for sequence in 3..8 {
+            assert_eq!(queue.push(message(sequence), NOW), Pushed::Taken);
+        }
+        assert_eq!(
+            (pop(&queue), pop(&queue), pop(&queue)),
+            (Some(6), Some(7), None)
+        );
+        assert_eq!(queue.begin().unwrap().next, 3);
+    }
+
+    #[test]
+    fn a_stuck_reader_uses_up_the_patience_once() {
+        let patience = Duration::from_millis(20);
+        let queue = Queue::new(Keep::All, 1);
+        assert_eq!(queue.push(message(0), patience), Pushed::Taken);
+        let begin = Instant::now();
+        assert_eq!(queue.push(message(1), patience), Pushed::GaveOut);
+        assert!(begin.elapsed() >= patience);
+        let minute = Duration::from_mins(1);
+        assert_eq!(queue.push(message(2), minute), Pushed::GaveOut);
+        assert!(begin.elapsed() < minute, "it does not wait again");
+        assert_eq!(pop(&queue), Some(0));
+        assert_eq!(queue.push(message(3), patience), Pushed::Taken);
+        assert_eq!(pop(&queue), Some(3));
+    }
+
+    #[test]
+    fn the_end_has_room_in_a_full_queue() {
+        let queue = Queue::new(Keep::All, 1);
+        queue.push(message(0), NOW);
+        queue.push_over(message(1));
+        assert_eq!((pop(&queue), pop(&queue)), (Some(0), Some(1)));
+    }
+
+    #[test]
+    fn a_reader_that_leaves_lets_the_writer_go() {
+        let queue = Queue::new(Keep::All, 1);
+        queue.push(message(0), NOW);
+        std::thread::scope(|scope| {
+            let writer = scope.spawn(|| queue.push(message(1), Duration::from_mins(1)));
+            queue.close();
+            assert_eq!(writer.join().unwrap(), Pushed::Closed);
+        });
+    }
+}

@@ -1,0 +1,133 @@
+//! Holes in a stream, over the lives of its sender.
+
+use super::{Position, ReceiverCounts};
+
+/// Follows the sequence numbers that a receiver hears.
+///
+/// The life before the present one is remembered as well: what a sender that died left behind may
+/// be read when its successor has already spoken.
+#[derive(Debug, Default)]
+pub(crate) struct Tracker {
+    present: Option<Position>,
+    former: Option<Position>,
+    counts: ReceiverCounts,
+}
+
+impl Tracker {
+    /// Takes note of a sample. Returns false if it is older than one already heard and so must not
+    /// be handed on: it has been counted as lost.
+    pub(crate) fn note(&mut self, instance: u64, sequence: u64) -> bool {
+        let known = [&mut self.present, &mut self.former]
+            .into_iter()
+            .flatten()
+            .find(|position| position.instance == instance);
+        if let Some(position) = known {
+            if sequence < position.next {
+                return false;
+            }
+            self.counts.lost += sequence - position.next;
+            position.next = sequence + 1;
+            return true;
+        }
+        if self.present.is_some() {
+            // A new life counts from 0, and this receiver was there: what it did not hear is lost.
+            self.counts.lost += sequence;
+        }
+        self.former = self.present.replace(Position {
+            instance,
+            next: sequence + 1,
+        });
+        true
+    }
+
+    /// The receiver's place in the stream when it came in, if this is the first it hears: what it
+    /// did not hear from there on is lost.
+    pub(crate) fn came_in(&mut self, begin: Option<Position>) {
+        if self.present.is_none() {
+            self.present = begin;
+        }
+    }
+
+    pub(crate) fn received(&mut self) {
+        self.counts.received += 1;
+    }
+
+    pub(crate) fn counts(&self) -> ReceiverCounts {
+        self.counts
+    }
+
+    pub(crate) fn position(&self) -> Option<Position> {
+        self.present
+    }
+
+    pub(crate) fn resume(&mut self, position: Position) {
+        self.present = Some(position);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lost_after(heard: &[(u64, u64)]) -> u64 {
+        let mut tracker = Tracker::default();
+        for &(instance, sequence) in heard {
+            tracker.note(instance, sequence);
+        }
+        tracker.counts().lost
+    }
+
+    #[test]
+    fn a_late_joiner_has_lost_nothing() {
+        assert_eq!(lost_after(&[(1, 70), (1, 71)]), 0);
+    }
+
+    #[test]
+    fn what_is_missing_since_it_came_in_is_lost() {
+        let mut tracker = Tracker::default();
+        let begin = Position {
+            instance: 1,
+            next: 40,
+        };
+        tracker.came_in(Some(begin));
+        tracker.note(1, 70);
+        tracker.came_in(Some(begin));
+        tracker.note(1, 71);
+        assert_eq!(tracker.counts().lost, 30);
+    }
+
+    #[test]
+    fn holes_are_counted() {
+        assert_eq!(lost_after(&[(1, 0), (1, 3), (1, 4), (1, 10)]), 7);
+    }
+
+    #[test]
+    fn a_restart_is_no_gap_but_what_is_missing_after_it_is() {
+        assert_eq!(lost_after(&[(1, 1000), (2, 0), (2, 1)]), 0);
+        assert_eq!(lost_after(&[(1, 1000), (2, 5)]), 5);
+    }
+
+    #[test]
+    fn remains_of_the_former_life_are_followed() {
+        assert_eq!(lost_after(&[(1, 0), (2, 0), (1, 1), (2, 1), (1, 3)]), 1);
+    }
+
+    #[test]
+    fn what_comes_too_late_is_not_handed_on() {
+        let mut tracker = Tracker::default();
+        assert!(tracker.note(1, 4));
+        assert!(!tracker.note(1, 4));
+        assert!(!tracker.note(1, 2));
+    }
+
+    #[test]
+    fn a_resumed_receiver_counts_from_where_it_was() {
+        let mut tracker = Tracker::default();
+        tracker.resume(Position {
+            instance: 9,
+            next: 10,
+        });
+        tracker.note(9, 15);
+        assert_eq!(tracker.counts().lost, 5);
+    }
+}

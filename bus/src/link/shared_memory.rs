@@ -1,0 +1,311 @@
+//! Links between the processes of one host: iceoryx2.
+//!
+//! A stream is, per [`Keep`] that somebody listens with (an iceoryx2 service either overflows or does
+//! not), a publish-subscribe service and two event services:
+//!
+//! | service | kind | what for |
+//! | --- | --- | --- |
+//! | `<stream>/all` or `<stream>/newest` | publish-subscribe | samples, type name as in [`SampleKind::type_name`](crate::SampleKind::type_name), user header [`Joined`] |
+//! | the same | event | id 0: a sample was sent, or a sender is there: look |
+//! | the same and `/back` | event | id 0: a receiver has taken the end of the stream; id 1 + (publisher id mod 255): a receiver hears this publisher |
+//!
+//! A receiver must say that it hears a sender, since iceoryx2 itself counts a subscriber that has not
+//! mapped the publisher's memory yet as connected, and drops what does not fit into its buffer.
+//!
+//! All files of a run live under `/tmp/tauscope_<domain>` and as `/dev/shm/<domain>_*`; settings are
+//! in code alone, never in a configuration file that happens to lie about.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use iceoryx2::config::Config;
+use iceoryx2::node::{CleanupState, Node, NodeBuilder};
+use iceoryx2::port::listener::{Listener, ListenerWaitError};
+use iceoryx2::prelude::{
+    EventActivation, EventId, LogLevel, MessagingPattern, ServiceName, SignalHandlingMode,
+    ZeroCopySend, set_log_level,
+};
+use iceoryx2::service::Service as _;
+use iceoryx2::service::builder::event::{EventOpenError, EventOpenOrCreateError};
+use iceoryx2::service::builder::publish_subscribe::{
+    PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
+};
+use iceoryx2::service::ipc_threadsafe::Service;
+use iceoryx2::service::port_factory::{event, publish_subscribe};
+
+use super::{Audience, FanOut, Keep, LinkError, MAX_DEPTH, PATIENCE, Receiver, Sender, Transport};
+use crate::sample::Sample;
+
+mod backpressure;
+mod domain;
+mod receiver;
+mod sender;
+
+pub use domain::{Domain, DomainError};
+
+const TRANSPORT: &str = "iceoryx2";
+/// Most receivers of a stream per [`Keep`]. Shared memory is laid out for all of them, but only
+/// touched where it is used.
+const MAX_RECEIVERS: usize = 16;
+/// One sender, and those of its former lives that nobody has cleaned up yet.
+const MAX_SENDERS: usize = 4;
+/// A service's state is in flux while another process creates or removes it.
+const OPEN_WITHIN: Duration = Duration::from_secs(2);
+
+/// Event of the back channel: the end was taken.
+const END_TAKEN: EventId = EventId::new(0);
+/// Most events of the back channel.
+const MAX_EVENT: usize = 255;
+
+/// What travels beside each sample.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
+#[type_name("tauscope/Joined/1")]
+struct Joined {
+    /// The sequence number at which the newest of the receivers came in.
+    since: u64,
+}
+
+/// Event of the back channel: a receiver hears the publisher of that id.
+fn greeting(publisher: u128) -> EventId {
+    EventId::new(1 + (publisher % MAX_EVENT as u128) as usize)
+}
+
+/// Streams between the processes of one [`Domain`]. Clones share one iceoryx2 node.
+#[derive(Debug, Clone)]
+pub struct SharedMemory {
+    node: SharedNode,
+    patience: Duration,
+}
+
+/// A node may move between threads but not be used by two at once.
+#[derive(Debug, Clone)]
+struct SharedNode(Arc<Mutex<Node<Service>>>);
+
+impl SharedNode {
+    fn with<R>(&self, f: impl FnOnce(&Node<Service>) -> R) -> R {
+        f(&self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Frees what processes that died without a farewell still hold: places in services, and the
+    /// unread samples that a sender would wait for.
+    fn clean_dead(&self) -> CleanupState {
+        self.with(Node::try_cleanup_dead_nodes)
+    }
+}
+
+type Samples<T> = publish_subscribe::PortFactory<Service, T, Joined>;
+type Events = event::PortFactory<Service>;
+
+impl SharedMemory {
+    /// Joins `domain`.
+    ///
+    /// # Errors
+    /// [`LinkError::Open`] if iceoryx2 cannot create its files.
+    pub fn open(domain: &Domain) -> Result<Self, LinkError> {
+        set_log_level(LogLevel::Error);
+        let config = domain.config()?;
+        let node = NodeBuilder::new()
+            .config(&config)
+            // Signals belong to the program.
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<Service>()
+            .map_err(|error| open_error(domain.as_str(), &error))?;
+        Ok(Self {
+            node: SharedNode(Arc::new(Mutex::new(node))),
+            patience: PATIENCE,
+        })
+    }
+
+    /// The same with another patience than [`PATIENCE`].
+    #[must_use]
+    pub fn with_patience(mut self, patience: Duration) -> Self {
+        self.patience = patience;
+        self
+    }
+
+    /// Frees what dead processes of this domain still hold. A supervisor calls this once it has
+    /// waited for a dead child and before it starts the next one; senders that wait for the dead
+    /// one go on at once. Returns how many dead nodes were removed.
+    pub fn clean_dead_peers(&self) -> u64 {
+        self.node.clean_dead().cleanups
+    }
+
+    fn samples<T: Sample>(&self, stream: &str, keep: Keep) -> Result<Samples<T>, LinkError> {
+        let name = service_name(stream, keep, "")?;
+        let config = self.config();
+        retry(|| {
+            self.node.with(|node| {
+                node.service_builder(&name)
+                    .publish_subscribe::<T>()
+                    .user_header::<Joined>()
+                    .enable_safe_overflow(keep == Keep::Newest)
+                    .subscriber_max_buffer_size(MAX_DEPTH)
+                    .subscriber_max_borrowed_samples(2)
+                    .history_size(0)
+                    .max_publishers(MAX_SENDERS)
+                    .max_subscribers(MAX_RECEIVERS)
+                    .max_nodes(MAX_RECEIVERS + MAX_SENDERS)
+                    .open_or_create()
+                    .map_err(|error| {
+                        use PublishSubscribeOpenError as E;
+                        use PublishSubscribeOpenOrCreateError::{
+                            PublishSubscribeOpenError as Opening, SystemInFlux,
+                        };
+                        match error {
+                            Opening(E::IncompatibleTypes) => {
+                                Failure::Final(type_mismatch::<T>(stream, &name, &config))
+                            }
+                            SystemInFlux
+                            | Opening(E::IsMarkedForDestruction | E::HangsInCreation) => {
+                                Failure::Passing(open_error(stream, &error))
+                            }
+                            _ => Failure::Final(open_error(stream, &error)),
+                        }
+                    })
+            })
+        })
+    }
+
+    fn events(&self, stream: &str, keep: Keep, suffix: &str) -> Result<Events, LinkError> {
+        let name = service_name(stream, keep, suffix)?;
+        retry(|| {
+            self.node.with(|node| {
+                node.service_builder(&name)
+                    .event()
+                    .event_id_max_value(MAX_EVENT)
+                    .max_notifiers(MAX_RECEIVERS + MAX_SENDERS)
+                    .max_listeners(MAX_RECEIVERS + MAX_SENDERS)
+                    .max_nodes(MAX_RECEIVERS + MAX_SENDERS)
+                    .open_or_create()
+                    .map_err(|error| {
+                        use EventOpenError as E;
+                        use EventOpenOrCreateError::{EventOpenError as Opening, SystemInFlux};
+                        let link_error = open_error(stream, &error);
+                        match error {
+                            SystemInFlux
+                            | Opening(E::IsMarkedForDestruction | E::HangsInCreation) => {
+                                Failure::Passing(link_error)
+                            }
+                            _ => Failure::Final(link_error),
+                        }
+                    })
+            })
+        })
+    }
+
+    fn config(&self) -> Config {
+        self.node.with(|node| node.config().clone())
+    }
+}
+
+impl Transport for SharedMemory {
+    fn sender<T: Sample>(
+        &self,
+        stream: &str,
+        audience: Audience,
+    ) -> Result<Box<dyn Sender<T>>, LinkError> {
+        self.clean_dead_peers();
+        let mut links: Vec<Box<dyn Sender<T>>> = Vec::new();
+        for keep in [Keep::All, Keep::Newest] {
+            if audience.count(keep) > 0 {
+                let sender =
+                    sender::SharedMemorySender::open(self, stream, keep, audience.count(keep))?;
+                links.push(Box::new(sender));
+            }
+        }
+        match links.len() {
+            1 => Ok(links.remove(0)),
+            _ => Ok(Box::new(FanOut::new(links))),
+        }
+    }
+
+    fn receiver<T: Sample>(
+        &self,
+        stream: &str,
+        keep: Keep,
+        depth: usize,
+    ) -> Result<Box<dyn Receiver<T>>, LinkError> {
+        self.clean_dead_peers();
+        Ok(Box::new(receiver::SharedMemoryReceiver::open(
+            self, stream, keep, depth,
+        )?))
+    }
+}
+
+fn service_name(stream: &str, keep: Keep, suffix: &str) -> Result<ServiceName, LinkError> {
+    let policy = match keep {
+        Keep::All => "all",
+        Keep::Newest => "newest",
+    };
+    ServiceName::new(&format!("{stream}/{policy}{suffix}"))
+        .map_err(|error| open_error(stream, &error))
+}
+
+fn open_error(stream: &str, error: &dyn std::fmt::Display) -> LinkError {
+    LinkError::Open {
+        stream: stream.to_owned(),
+        transport: TRANSPORT,
+        reason: error.to_string(),
+    }
+}
+
+fn type_mismatch<T: Sample>(stream: &str, name: &ServiceName, config: &Config) -> LinkError {
+    let found = Service::details(name, config, MessagingPattern::PublishSubscribe)
+        .ok()
+        .flatten()
+        .map_or_else(
+            || "another type".to_owned(),
+            |details| {
+                let payload = details
+                    .static_details
+                    .publish_subscribe()
+                    .message_type_details()
+                    .payload;
+                format!("{} of {} bytes", payload.type_name(), payload.size())
+            },
+        );
+    LinkError::TypeMismatch {
+        stream: stream.to_owned(),
+        expected: format!("{} of {} bytes", T::KIND.type_name(), size_of::<T>()),
+        found,
+    }
+}
+
+enum Failure {
+    /// Worth another try.
+    Passing(LinkError),
+    Final(LinkError),
+}
+
+fn retry<R>(mut attempt: impl FnMut() -> Result<R, Failure>) -> Result<R, LinkError> {
+    let deadline = Instant::now() + OPEN_WITHIN;
+    loop {
+        match attempt() {
+            Ok(value) => return Ok(value),
+            Err(Failure::Passing(_)) if Instant::now() < deadline => {
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            Err(Failure::Passing(error) | Failure::Final(error)) => return Err(error),
+        }
+    }
+}
+
+/// Sleeps until a notification or the end of `timeout`, and hands on what came.
+fn wait(
+    listener: &Listener<Service>,
+    timeout: Duration,
+    mut heard: impl FnMut(EventActivation),
+) -> Result<(), String> {
+    let result = if timeout.is_zero() {
+        listener.try_wait(&mut heard)
+    } else {
+        // iceoryx2 hands whole microseconds to the socket, which takes none of them for ever.
+        listener.timed_wait(&mut heard, timeout.max(Duration::from_micros(1)))
+    };
+    match result {
+        // A signal may come in between; whoever it was for has been told.
+        Ok(_) | Err(ListenerWaitError::InterruptSignal) => Ok(()),
+        Err(error) => Err(error.to_string()),
+    }
+}

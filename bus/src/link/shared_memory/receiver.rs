@@ -1,0 +1,163 @@
+//! The receiving end over iceoryx2.
+
+use std::time::{Duration, Instant};
+
+use iceoryx2::port::listener::Listener;
+use iceoryx2::port::notifier::Notifier;
+use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::prelude::{CallbackProgression, EventId, PortFactory as _};
+use iceoryx2::service::ipc_threadsafe::Service;
+
+use super::{END_TAKEN, Joined, MAX_SENDERS, Samples, SharedMemory, greeting, open_error, wait};
+use crate::link::sequence::Tracker;
+use crate::link::{Keep, LinkError, MAX_DEPTH, Position, Received, Receiver, ReceiverCounts};
+use crate::sample::{Sample, flags};
+
+pub(super) struct SharedMemoryReceiver<T: Sample> {
+    stream: String,
+    subscriber: Subscriber<Service, T, Joined>,
+    samples: Samples<T>,
+    woken: Listener<Service>,
+    back: Notifier<Service>,
+    /// The senders that have been told that they are heard.
+    greeted: Vec<u128>,
+    tracker: Tracker,
+}
+
+impl<T: Sample> SharedMemoryReceiver<T> {
+    pub(super) fn open(
+        transport: &SharedMemory,
+        stream: &str,
+        keep: Keep,
+        depth: usize,
+    ) -> Result<Self, LinkError> {
+        let woken = transport
+            .events(stream, keep, "")?
+            .listener_builder()
+            .create()
+            .map_err(|error| open_error(stream, &error))?;
+        let back = transport
+            .events(stream, keep, "/back")?
+            .notifier_builder()
+            .create()
+            .map_err(|error| open_error(stream, &error))?;
+        let samples = transport.samples::<T>(stream, keep)?;
+        let subscriber = samples
+            .subscriber_builder()
+            .buffer_size(depth.clamp(1, MAX_DEPTH))
+            .create()
+            .map_err(|error| open_error(stream, &error))?;
+        let mut receiver = Self {
+            stream: stream.to_owned(),
+            subscriber,
+            samples,
+            woken,
+            back,
+            greeted: Vec::with_capacity(MAX_SENDERS),
+            tracker: Tracker::default(),
+        };
+        receiver.greet()?;
+        Ok(receiver)
+    }
+
+    /// What is there now; the sample is read where it lies in the sender's segment.
+    fn take(&mut self, read: &mut dyn FnMut(&T)) -> Result<Received, LinkError> {
+        while let Some(sample) = self.subscriber.receive().map_err(|e| self.error(&e))? {
+            let header = *sample.payload().header();
+            let publisher = sample.origin().value();
+            let instance = (publisher >> 64) as u64 ^ publisher as u64;
+            self.tracker.came_in(Some(Position {
+                instance,
+                next: sample.user_header().since.min(header.sequence),
+            }));
+            if !self.tracker.note(instance, header.sequence) {
+                continue;
+            }
+            if header.has(flags::END) {
+                drop(sample);
+                self.tell(END_TAKEN)?;
+                return Ok(Received::End);
+            }
+            self.tracker.received();
+            read(sample.payload());
+            return Ok(Received::Sample);
+        }
+        Ok(Received::Nothing)
+    }
+
+    /// Maps the memory of senders that are new, and tells them so.
+    fn greet(&mut self) -> Result<(), LinkError> {
+        let mut there = [None; MAX_SENDERS];
+        let mut slots = there.iter_mut();
+        self.samples.dynamic_config().list_publishers(|details| {
+            match slots.next() {
+                Some(slot) => *slot = Some(details.publisher_id.value()),
+                None => return CallbackProgression::Stop,
+            }
+            CallbackProgression::Continue
+        });
+        let there = || there.iter().flatten();
+        self.greeted.retain(|id| there().any(|other| other == id));
+        for &id in there() {
+            if !self.greeted.contains(&id) {
+                // Looks for new senders first.
+                self.subscriber.has_samples().map_err(|e| self.error(&e))?;
+                self.tell(greeting(id))?;
+                self.greeted.push(id);
+            }
+        }
+        Ok(())
+    }
+
+    fn tell(&self, event: EventId) -> Result<(), LinkError> {
+        self.back
+            .notify_with_custom_event_id(event)
+            .map_err(|error| self.error(&error))?;
+        Ok(())
+    }
+
+    fn error(&self, error: &dyn std::fmt::Display) -> LinkError {
+        LinkError::Receive {
+            stream: self.stream.clone(),
+            reason: error.to_string(),
+        }
+    }
+}
+
+impl<T: Sample> Receiver<T> for SharedMemoryReceiver<T> {
+    fn receive(
+        &mut self,
+        timeout: Duration,
+        read: &mut dyn FnMut(&T),
+    ) -> Result<Received, LinkError> {
+        let deadline = Instant::now() + timeout;
+        loop {
+            let received = self.take(read)?;
+            if received != Received::Nothing {
+                return Ok(received);
+            }
+            self.greet()?;
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Ok(Received::Nothing);
+            }
+            // A notification that came since the look above ends this wait at once.
+            wait(&self.woken, left, |_| {}).map_err(|reason| LinkError::Receive {
+                stream: self.stream.clone(),
+                reason,
+            })?;
+        }
+    }
+
+    fn counts(&self) -> ReceiverCounts {
+        self.tracker.counts()
+    }
+
+    fn position(&self) -> Option<Position> {
+        self.tracker.position()
+    }
+
+    fn resume(&mut self, position: Position) {
+        self.tracker.resume(position);
+    }
+}

@@ -1,0 +1,152 @@
+//! The promises that every link keeps, whatever carries it.
+
+// Helpers outside a test function; and numbers are compared that were only copied.
+#![allow(clippy::unwrap_used, clippy::float_cmp)]
+
+use std::time::{Duration, Instant};
+
+use tauscope_bus::{
+    Audience, Domain, Header, InProcess, JointState, Keep, LinkError, Received, Receiver, Sample,
+    Sender, SharedMemory, Transport, TwinState,
+};
+
+mod promises;
+
+/// Nothing here takes as long where all is well.
+const LONG: Duration = Duration::from_secs(20);
+const STREAM: &str = "cell/stage";
+
+/// Both sides of a transport, on their own as far as it goes.
+trait Sides: Sized {
+    type Transport: Transport;
+    /// Whether a sender learns what a receiver refuses (else only the receiver counts it).
+    const SENDER_SEES_REFUSALS: bool;
+    fn new(patience: Duration) -> Self;
+    fn sending(&self) -> &Self::Transport;
+    fn receiving(&self) -> &Self::Transport;
+}
+
+struct InProcessSides(InProcess);
+
+impl Sides for InProcessSides {
+    type Transport = InProcess;
+    const SENDER_SEES_REFUSALS: bool = true;
+    fn new(patience: Duration) -> Self {
+        Self(InProcess::new().with_patience(patience))
+    }
+    fn sending(&self) -> &InProcess {
+        &self.0
+    }
+    fn receiving(&self) -> &InProcess {
+        &self.0
+    }
+}
+
+struct SharedMemorySides {
+    domain: Domain,
+    sending: Option<SharedMemory>,
+    receiving: Option<SharedMemory>,
+}
+
+impl Sides for SharedMemorySides {
+    type Transport = SharedMemory;
+    const SENDER_SEES_REFUSALS: bool = true;
+    fn new(patience: Duration) -> Self {
+        let domain = Domain::unique();
+        let open = || Some(SharedMemory::open(&domain).unwrap().with_patience(patience));
+        Self {
+            sending: open(),
+            receiving: open(),
+            domain,
+        }
+    }
+    fn sending(&self) -> &SharedMemory {
+        self.sending.as_ref().unwrap()
+    }
+    fn receiving(&self) -> &SharedMemory {
+        self.receiving.as_ref().unwrap()
+    }
+}
+
+impl Drop for SharedMemorySides {
+    fn drop(&mut self) {
+        (self.sending, self.receiving) = (None, None);
+        self.domain.remove().unwrap();
+    }
+}
+
+/// Sends `count` samples that carry their number as stamp.
+fn send(sender: &mut dyn Sender<JointState>, first: i64, count: i64) {
+    for number in first..first + count {
+        sender
+            .send_with(&mut |sample| {
+                assert_eq!(sample.header, Header::default(), "a fresh slot");
+                sample.header.stamp_ns = number;
+                sample.position[3] = number as f64;
+            })
+            .unwrap();
+    }
+}
+
+/// The next sample's stamp; `None` at the end of the stream.
+fn next(receiver: &mut dyn Receiver<JointState>) -> Option<i64> {
+    let deadline = Instant::now() + LONG;
+    loop {
+        let mut stamp = None;
+        let received = receiver.receive(Duration::from_millis(100), &mut |sample| {
+            assert_eq!(sample.position[3], sample.header.stamp_ns as f64);
+            stamp = Some(sample.header.stamp_ns);
+        });
+        match received.unwrap() {
+            Received::Sample => return stamp,
+            Received::End => return None,
+            Received::Nothing => assert!(Instant::now() < deadline, "nothing came"),
+        }
+    }
+}
+
+fn take(receiver: &mut dyn Receiver<JointState>, count: usize) -> Vec<i64> {
+    (0..count)
+        .map(|_| next(receiver).expect("no end yet"))
+        .collect()
+}
+
+fn take_to_end(receiver: &mut dyn Receiver<JointState>) -> Vec<i64> {
+    std::iter::from_fn(|| next(receiver)).collect()
+}
+
+macro_rules! conforms {
+    ($module:ident, $sides:ty) => {
+        mod $module {
+            use super::*;
+            conforms!(@ $sides:
+                order_is_kept, late_joiner_hears_the_rest, slow_reader_that_keeps_all_loses_nothing,
+                slow_reader_that_keeps_the_newest_loses_the_oldest, stuck_reader_is_given_up_and_counted,
+                receiver_gone_and_back, sender_gone_and_back, end_comes_last_and_once, end_is_waited_for,
+                missing_receivers_are_told, another_type_is_refused, loss_over_a_restart_of_the_receiver_is_counted);
+        }
+    };
+    (@ $sides:ty: $($promise:ident),+) => {$(
+        #[test]
+        fn $promise() {
+            promises::$promise::<$sides>();
+        }
+    )+};
+}
+
+conforms!(in_process, InProcessSides);
+conforms!(shared_memory, SharedMemorySides);
+
+/// What a link that carries `T` says when it is opened or used for a stream that carries `JointState`.
+fn refusal<S: Sides, T: Sample>(sides: &S, sender: &mut dyn Sender<JointState>) -> LinkError {
+    let mut receiver = match sides.receiving().receiver::<T>(STREAM, Keep::All, 8) {
+        Ok(receiver) => receiver,
+        Err(error) => return error,
+    };
+    sender.wait_for_receivers(Duration::from_secs(1)).unwrap();
+    send(sender, 0, 1);
+    match receiver.receive(LONG, &mut |_| {}) {
+        Ok(received) => panic!("{received:?}"),
+        Err(error) => error,
+    }
+}
