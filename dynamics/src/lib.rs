@@ -1,1 +1,57 @@
 //! The robot as mathematics: URDF, kinematics, RNEA, regressor, and the physics a rigid twin lacks.
+//!
+//! A [`Model`] is what does not change from one call to the next, [`Data`] the memory that the
+//! algorithms work in and answer from; the algorithms are free functions over both. None of them
+//! allocates. SI units throughout; joints stand in the order of the URDF's movable joints, and the
+//! world frame is that of the URDF's root link.
+//!
+//! The algorithms follow R. Featherstone, *Rigid Body Dynamics Algorithms*, Springer 2008 ("RBDA"),
+//! written out in three dimensions.
+//!
+//! ```
+//! use tauscope_dynamics::{Data, Model, rnea};
+//!
+//! let model = Model::from_urdf(
+//!     r#"<robot name="pendulum">
+//!          <link name="base"/>
+//!          <link name="rod"><inertial>
+//!            <origin xyz="0 0 -0.5"/><mass value="2"/>
+//!            <inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>
+//!          </inertial></link>
+//!          <joint name="hinge" type="continuous">
+//!            <parent link="base"/><child link="rod"/><axis xyz="1 0 0"/>
+//!          </joint>
+//!        </robot>"#,
+//! )?;
+//! let mut data = Data::new(&model);
+//! // Held level at rest: m g l.
+//! let effort = rnea(&model, &mut data, &[std::f64::consts::FRAC_PI_2], &[0.0], &[0.0]);
+//! assert!((effort[0] - 2.0 * 9.81 * 0.5).abs() < 1e-12);
+//! # Ok::<(), tauscope_dynamics::ModelError>(())
+//! ```
+
+#![cfg_attr(
+    test,
+    allow(clippy::float_cmp, reason = "tests compare what must be the same bits")
+)]
+
+mod aba;
+mod crba;
+mod data;
+pub mod derivative;
+mod inertia;
+mod kinematics;
+pub mod lowpass;
+mod model;
+mod regressor;
+mod rnea;
+pub mod terms;
+
+pub use aba::{Wrench, forward_dynamics};
+pub use crba::mass_matrix;
+pub use data::Data;
+pub use inertia::Inertia;
+pub use kinematics::{forward_kinematics, link_jacobian, link_pose};
+pub use model::{Geometry, Joint, JointKind, Limits, Link, Model, ModelError, Shape};
+pub use regressor::{PARAMETERS_PER_BODY, regressor};
+pub use rnea::{gravity_effort, rnea};

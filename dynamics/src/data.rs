@@ -1,0 +1,97 @@
+//! The memory the algorithms work in.
+
+use nalgebra::{DMatrix, Matrix3, Matrix6, Matrix6xX, Vector3, Vector6};
+
+use crate::Model;
+use crate::regressor::PARAMETERS_PER_BODY;
+
+/// Working memory and results for one [`Model`] (or any other with the same tree). Each algorithm
+/// overwrites what it answers with; nothing is allocated after [`Data::new`].
+#[derive(Debug, Clone)]
+pub struct Data {
+    /// The base, then one slot per body in traversal order.
+    pub(crate) slots: Vec<Slot>,
+    pub(crate) articulated: Vec<Articulated>,
+    /// Per joint in document order.
+    pub(crate) effort: Vec<f64>,
+    pub(crate) acceleration: Vec<f64>,
+    pub(crate) mass_matrix: DMatrix<f64>,
+    pub(crate) regressor: DMatrix<f64>,
+    pub(crate) jacobian: Matrix6xX<f64>,
+}
+
+/// One body's place, motion and load, in its own frame unless said otherwise.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Slot {
+    /// Pose in the parent's frame.
+    pub rotation: Matrix3<f64>,
+    pub translation: Vector3<f64>,
+    /// Angular velocity and acceleration.
+    pub omega: Vector3<f64>,
+    pub alpha: Vector3<f64>,
+    /// \[α×\] + \[ω×\]²: takes a point of the body to its acceleration relative to the origin's.
+    pub spin: Matrix3<f64>,
+    /// Acceleration of the origin, gravity included as an acceleration of the base.
+    pub linear: Vector3<f64>,
+    /// What the parent must exert on this body: force, and moment about the origin.
+    pub force: Vector3<f64>,
+    pub moment: Vector3<f64>,
+    /// Pose in the world.
+    pub world_rotation: Matrix3<f64>,
+    pub world_translation: Vector3<f64>,
+    /// Inertia of the subtree from here on.
+    pub composite: crate::Inertia,
+}
+
+/// One body in the articulated-body algorithm; spatial vectors are (angular, linear).
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Articulated {
+    pub inertia: Matrix6<f64>,
+    pub bias: Vector6<f64>,
+    /// Takes the parent's acceleration to this body's frame.
+    pub transform: Matrix6<f64>,
+    /// The acceleration that the velocities alone bring.
+    pub velocity_product: Vector6<f64>,
+    /// Inertia times the joint's axis, its projection on the axis, and the joint's free effort.
+    pub column: Vector6<f64>,
+    pub pivot: f64,
+    pub free_effort: f64,
+    pub acceleration: Vector6<f64>,
+}
+
+impl Data {
+    /// Memory for `model`.
+    pub fn new(model: &Model) -> Self {
+        let n = model.dof();
+        let mut slots = vec![Slot::default(); n + 1];
+        slots[0].world_rotation = Matrix3::identity();
+        Self {
+            slots,
+            articulated: vec![Articulated::default(); n + 1],
+            effort: vec![0.0; n],
+            acceleration: vec![0.0; n],
+            mass_matrix: DMatrix::zeros(n, n),
+            regressor: DMatrix::zeros(n, n * PARAMETERS_PER_BODY),
+            jacobian: Matrix6xX::zeros(n),
+        }
+    }
+}
+
+/// Refuses slices that are not one number per joint: the caller's mistake, like an index out of
+/// bounds.
+#[track_caller]
+pub(crate) fn check_lengths(model: &Model, data: &Data, slices: &[&[f64]]) {
+    let n = model.dof();
+    assert!(
+        data.slots.len() == n + 1,
+        "Data is for {} joints, the model has {n}",
+        data.slots.len() - 1
+    );
+    for slice in slices {
+        assert!(
+            slice.len() == n,
+            "{} numbers given, the model has {n} joints",
+            slice.len()
+        );
+    }
+}

@@ -1,0 +1,286 @@
+//! The robot: its tree of links and joints, prepared for the algorithms.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::Inertia;
+use crate::data::Slot;
+
+mod document;
+mod error;
+mod shape;
+mod tree;
+mod urdf;
+
+pub use error::ModelError;
+pub use shape::{Geometry, Shape};
+
+/// Standard gravity as simulators take it \[m/s²\]; along the world's -z.
+const GRAVITY_M_S2: f64 = 9.81;
+
+/// A robot with a fixed base. Cheap to share by reference; what changes while it runs (gravity, tool)
+/// can be set without allocation.
+#[derive(Debug, Clone)]
+pub struct Model {
+    name: String,
+    joints: Vec<Joint>,
+    links: Vec<Link>,
+    /// In traversal order: parents first.
+    pub(crate) bodies: Vec<Body>,
+    /// Per link.
+    pub(crate) frames: Vec<Frame>,
+    pub(crate) gravity: Vector3<f64>,
+    tool: Option<(usize, Inertia)>,
+}
+
+/// A movable joint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Joint {
+    /// Its name, unique in the robot.
+    pub name: String,
+    /// What it lets move.
+    pub kind: JointKind,
+    /// The link it is mounted on, an index into [`Model::links`].
+    pub parent_link: usize,
+    /// The link it moves.
+    pub child_link: usize,
+    /// Its axis in the child link's frame, of length 1.
+    pub axis: [f64; 3],
+    /// Its limits as far as the URDF gives them.
+    pub limits: Limits,
+}
+
+/// What a joint lets move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum JointKind {
+    /// Turns within limits \[rad\].
+    Revolute,
+    /// Turns without limits \[rad\].
+    Continuous,
+    /// Slides \[m\].
+    Prismatic,
+}
+
+/// Limits of a joint; `None` where the URDF gives none or an infinite one.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Limits {
+    /// Lowest position \[rad or m\].
+    pub lower: Option<f64>,
+    /// Highest position \[rad or m\].
+    pub upper: Option<f64>,
+    /// Highest speed \[rad/s or m/s\].
+    pub velocity: Option<f64>,
+    /// Highest effort \[N m or N\].
+    pub effort: Option<f64>,
+}
+
+/// A link; also those behind fixed joints.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Link {
+    /// Its name, unique in the robot.
+    pub name: String,
+    /// Its inertia in its own frame as the URDF has it; zero where it has none.
+    pub inertia: Inertia,
+    /// How to draw it, from its `<visual>` elements.
+    pub shapes: Vec<Shape>,
+    /// The link it hangs on, by a movable or fixed joint; `None` for the root.
+    pub parent: Option<usize>,
+    /// The nearest joint towards the base that moves it; `None` for links that stand still.
+    pub joint: Option<usize>,
+}
+
+impl Link {
+    /// Mass \[kg\].
+    pub fn mass_kg(&self) -> f64 {
+        self.inertia.mass_kg()
+    }
+
+    /// Centre of mass in the link's frame \[m\]; its origin for a link without mass.
+    pub fn com_m(&self) -> [f64; 3] {
+        self.inertia.com_m()
+    }
+}
+
+/// A moving body: a joint's child link and all that is fixed to it. Its frame has the joint's axis as
+/// z, so that every joint costs as little as an aligned one.
+#[derive(Debug, Clone)]
+pub(crate) struct Body {
+    /// Index in document order.
+    pub joint: usize,
+    /// Slot of the parent: 0 is the base, i + 1 the body i.
+    pub parent: usize,
+    pub prismatic: bool,
+    /// Pose in the parent's frame at position zero.
+    pub rotation: Matrix3<f64>,
+    pub translation: Vector3<f64>,
+    /// Takes the child link's axes to the body's.
+    pub alignment: Matrix3<f64>,
+    /// The lumped links, and what was attached for good.
+    pub own: Inertia,
+    pub tool: Inertia,
+    pub load: Load,
+}
+
+/// A body's inertia as RNEA wants it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Load {
+    pub mass: f64,
+    pub first_moment: Vector3<f64>,
+    /// ∫ r rᵀ dm.
+    pub pseudo_inertia: Matrix3<f64>,
+}
+
+/// Where a link is on the body that carries it.
+#[derive(Debug, Clone)]
+pub(crate) struct Frame {
+    pub slot: usize,
+    pub rotation: Matrix3<f64>,
+    pub translation: Vector3<f64>,
+}
+
+impl Body {
+    /// Poses the body in its parent's frame.
+    #[inline]
+    pub fn place(&self, q: f64, slot: &mut Slot) {
+        let r = &self.rotation;
+        if self.prismatic {
+            slot.rotation = *r;
+            slot.translation = self.translation + r.column(2) * q;
+        } else {
+            let (sin, cos) = q.sin_cos();
+            let (x, y) = (r.column(0), r.column(1));
+            slot.rotation.set_column(0, &(x * cos + y * sin));
+            slot.rotation.set_column(1, &(y * cos - x * sin));
+            slot.rotation.set_column(2, &r.column(2));
+            slot.translation = self.translation;
+        }
+    }
+
+    /// With the tool.
+    pub fn inertia(&self) -> Inertia {
+        self.own + self.tool
+    }
+
+    pub fn update_load(&mut self) {
+        let total = self.inertia();
+        let trace = total.rotational.trace();
+        self.load = Load {
+            mass: total.mass,
+            first_moment: total.first_moment,
+            pseudo_inertia: Matrix3::from_diagonal_element(0.5 * trace) - total.rotational,
+        };
+    }
+}
+
+impl Model {
+    /// Reads a URDF.
+    ///
+    /// Revolute, continuous, prismatic and fixed joints in any tree; links behind fixed joints are
+    /// lumped into the body that carries them and stay as frames. Elements that do not describe
+    /// links and joints (`gazebo`, `transmission`, `ros2_control`, ...) are passed over.
+    ///
+    /// # Errors
+    /// What is wrong with the text, the elements or the tree, with the element's name and line.
+    pub fn from_urdf(xml: &str) -> Result<Self, ModelError> {
+        tree::build(urdf::read(xml)?)
+    }
+
+    /// The robot's name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Number of movable joints.
+    pub fn dof(&self) -> usize {
+        self.joints.len()
+    }
+
+    /// The movable joints, in the order of the URDF document.
+    pub fn joints(&self) -> &[Joint] {
+        &self.joints
+    }
+
+    /// Names of the movable joints, in the order of the URDF document.
+    pub fn joint_names(&self) -> impl ExactSizeIterator<Item = &str> {
+        self.joints.iter().map(|joint| joint.name.as_str())
+    }
+
+    /// All links, in the order of the URDF document.
+    pub fn links(&self) -> &[Link] {
+        &self.links
+    }
+
+    /// The movable joint of that name.
+    pub fn joint_index(&self, name: &str) -> Option<usize> {
+        self.joints.iter().position(|joint| joint.name == name)
+    }
+
+    /// The link of that name.
+    pub fn link_index(&self, name: &str) -> Option<usize> {
+        self.links.iter().position(|link| link.name == name)
+    }
+
+    /// Gravity in the world frame \[m/s²\]; (0, 0, -9.81) unless set.
+    pub fn gravity(&self) -> [f64; 3] {
+        self.gravity.into()
+    }
+
+    /// Sets gravity in the world frame \[m/s²\]; for a base that hangs or leans, gravity as it sees it.
+    pub fn set_gravity(&mut self, gravity_m_s2: [f64; 3]) {
+        self.gravity = gravity_m_s2.into();
+    }
+
+    /// Makes `inertia`, in the frame of `link`, part of the robot for good, beside whatever tool is set.
+    /// On a link that stands still it changes nothing.
+    ///
+    /// # Panics
+    /// If `link` is not an index into [`Model::links`].
+    pub fn attach(&mut self, link: usize, inertia: Inertia) {
+        self.change(link, |body, there| body.own += there, inertia);
+    }
+
+    /// Sets the tool: `inertia` in the frame of `link` takes the place of the tool before it, on
+    /// whatever link that was. [`Inertia::zero`] takes it off. On a link that stands still it changes
+    /// nothing.
+    ///
+    /// # Panics
+    /// If `link` is not an index into [`Model::links`].
+    pub fn set_tool(&mut self, link: usize, inertia: Inertia) {
+        if let Some((before, _)) = self.tool.take() {
+            self.change(before, |body, there| body.tool = there, Inertia::zero());
+        }
+        self.change(link, |body, there| body.tool = there, inertia);
+        self.tool = Some((link, inertia));
+    }
+
+    /// The tool that is set, and its link.
+    pub fn tool(&self) -> Option<(usize, Inertia)> {
+        self.tool
+    }
+
+    /// The ten inertial parameters of the body that `joint` moves, tool included, in the frame of its
+    /// child link: the factors of the regressor's columns, see [`crate::regressor`].
+    ///
+    /// # Panics
+    /// If `joint` is not an index into [`Model::joints`].
+    pub fn body_parameters(&self, joint: usize) -> [f64; 10] {
+        assert!(joint < self.dof(), "the robot has no joint {joint}");
+        let body = self.bodies.iter().find(|body| body.joint == joint);
+        body.map_or([0.0; 10], |body| {
+            let to_link = body.alignment.transpose();
+            body.inertia()
+                .moved(&to_link, &Vector3::zeros())
+                .parameters()
+        })
+    }
+
+    /// Applies a change of inertia, given in a link's frame, to the body that carries the link.
+    fn change(&mut self, link: usize, change: fn(&mut Body, Inertia), inertia: Inertia) {
+        let frame = &self.frames[link];
+        let Some(index) = frame.slot.checked_sub(1) else {
+            return;
+        };
+        let body = &mut self.bodies[index];
+        change(body, inertia.moved(&frame.rotation, &frame.translation));
+        body.update_load();
+    }
+}

@@ -1,0 +1,171 @@
+//! The URDF as XML: where things stand and what was written, which the URDF reader does not tell.
+//!
+//! `urdf-rs` gives no lines, takes what is missing for zero (limits), skips words that are no numbers
+//! in a vector, and reads an unexpanded xacro as a robot without links. So the XML is looked at
+//! first.
+
+use roxmltree::{Document, Error, Node};
+
+use super::ModelError;
+
+/// Where the links and joints stand and which limits are given, each in document order.
+#[derive(Debug)]
+pub(super) struct Marks {
+    pub link_lines: Vec<u32>,
+    pub joints: Vec<JointMarks>,
+}
+
+#[derive(Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "one per attribute")]
+pub(super) struct JointMarks {
+    pub line: u32,
+    pub lower: bool,
+    pub upper: bool,
+    pub velocity: bool,
+    pub effort: bool,
+}
+
+/// Looks the XML over.
+///
+/// # Errors
+/// If it is not XML, not a URDF, a xacro, or a number in it is none.
+pub(super) fn inspect(xml: &str) -> Result<Marks, ModelError> {
+    let document = Document::parse(xml).map_err(|error| not_xml(&error))?;
+    let root = document.root_element();
+    refuse_xacro(&document)?;
+    if root.tag_name().name() != "robot" {
+        let found = root.tag_name().name().to_owned();
+        return Err(ModelError::NotARobot {
+            line: line(root),
+            found,
+        });
+    }
+    for part in elements(root).filter(|node| is_any(*node, &["link", "joint"])) {
+        check_numbers(part)?;
+    }
+    let named = |name| elements(root).filter(move |node| node.has_tag_name(name));
+    Ok(Marks {
+        link_lines: named("link").map(line).collect(),
+        joints: named("joint").map(joint_marks).collect(),
+    })
+}
+
+fn not_xml(error: &Error) -> ModelError {
+    let at = error.pos();
+    if let Error::UnknownNamespace(prefix, _) = error
+        && prefix == "xacro"
+    {
+        return ModelError::Xacro {
+            line: at.row,
+            found: "xacro:".to_owned(),
+        };
+    }
+    ModelError::Xml {
+        line: at.row,
+        column: at.col,
+        reason: error.to_string(),
+    }
+}
+
+/// A `xmlns:xacro` alone is left over in every expanded file and means nothing.
+fn refuse_xacro(document: &Document) -> Result<(), ModelError> {
+    for node in document.descendants().filter(Node::is_element) {
+        let name = node.tag_name();
+        if name.namespace().is_some_and(|uri| uri.contains("xacro")) {
+            let found = format!("<xacro:{}>", name.name());
+            return Err(ModelError::Xacro {
+                line: line(node),
+                found,
+            });
+        }
+        for attribute in node.attributes() {
+            if attribute.value().contains("${") || attribute.value().contains("$(") {
+                let found = attribute.value().to_owned();
+                return Err(ModelError::Xacro {
+                    line: line(node),
+                    found,
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The attributes that hold numbers, and how many; limits may be infinite.
+const NUMBERS: &[(&str, &[&str], usize)] = &[
+    ("origin", &["xyz", "rpy"], 3),
+    ("axis", &["xyz"], 3),
+    ("mass", &["value"], 1),
+    ("inertia", &["ixx", "ixy", "ixz", "iyy", "iyz", "izz"], 1),
+    ("limit", &["lower", "upper", "velocity", "effort"], 1),
+];
+
+/// Checks the numbers of a link or joint.
+fn check_numbers(part: Node) -> Result<(), ModelError> {
+    for node in part.descendants().filter(Node::is_element) {
+        let tag = node.tag_name().name();
+        let Some((_, attributes, count)) = NUMBERS.iter().find(|(name, ..)| *name == tag) else {
+            continue;
+        };
+        for attribute in *attributes {
+            let Some(text) = node.attribute(*attribute) else {
+                continue;
+            };
+            let numbers: Vec<Option<f64>> = text
+                .split_whitespace()
+                .map(|word| word.parse().ok())
+                .collect();
+            let infinite_allowed = tag == "limit";
+            let good = |x: &Option<f64>| {
+                x.is_some_and(|x| x.is_finite() || (infinite_allowed && x.is_infinite()))
+            };
+            if numbers.len() != *count || !numbers.iter().all(good) {
+                return Err(ModelError::Number {
+                    line: line(node),
+                    element: describe(node, part),
+                    attribute: (*attribute).to_owned(),
+                    text: text.to_owned(),
+                    expected: if *count == 1 {
+                        "a number"
+                    } else {
+                        "three numbers"
+                    },
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+fn describe(node: Node, part: Node) -> String {
+    let name = part.attribute("name").unwrap_or("");
+    format!(
+        "<{}> of {} `{name}`",
+        node.tag_name().name(),
+        part.tag_name().name()
+    )
+}
+
+fn joint_marks(joint: Node) -> JointMarks {
+    let limit = elements(joint).find(|node| node.has_tag_name("limit"));
+    let given = |name| limit.is_some_and(|limit| limit.has_attribute(name));
+    JointMarks {
+        line: line(joint),
+        lower: given("lower"),
+        upper: given("upper"),
+        velocity: given("velocity"),
+        effort: given("effort"),
+    }
+}
+
+fn elements<'a, 'i>(node: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> {
+    node.children().filter(Node::is_element)
+}
+
+fn is_any(node: Node, names: &[&str]) -> bool {
+    names.iter().any(|name| node.has_tag_name(*name))
+}
+
+fn line(node: Node) -> u32 {
+    node.document().text_pos_at(node.range().start).row
+}

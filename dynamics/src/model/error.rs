@@ -1,0 +1,183 @@
+//! What keeps a text from being a robot.
+
+/// Why a URDF cannot be used. Lines count from 1.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ModelError {
+    /// The text is not XML.
+    #[error("not well-formed XML at line {line}, column {column}: {reason}")]
+    Xml {
+        /// Line.
+        line: u32,
+        /// Column.
+        column: u32,
+        /// What the XML reader says.
+        reason: String,
+    },
+    /// The text is a xacro template.
+    #[error(
+        "line {line}: `{found}` is xacro, not URDF; expand it first: `xacro FILE.xacro > FILE.urdf`"
+    )]
+    Xacro {
+        /// Line.
+        line: u32,
+        /// The element or attribute value that xacro would have expanded.
+        found: String,
+    },
+    /// The document is of another kind.
+    #[error("line {line}: the document is a <{found}>, a URDF is a <robot>")]
+    NotARobot {
+        /// Line.
+        line: u32,
+        /// The document's outermost element.
+        found: String,
+    },
+    /// A number is not one.
+    #[error("line {line}: {element} has {attribute}=\"{text}\": not {expected}")]
+    Number {
+        /// Line.
+        line: u32,
+        /// The element, and the link or joint it belongs to.
+        element: String,
+        /// The attribute.
+        attribute: String,
+        /// Its text.
+        text: String,
+        /// What is expected.
+        expected: &'static str,
+    },
+    /// The document breaks the URDF format in another way.
+    #[error("not a valid URDF: {reason}")]
+    Urdf {
+        /// What the URDF reader says.
+        reason: String,
+    },
+    /// Two links of one name.
+    #[error("line {line}: a second link `{link}`; the first is on line {first_line}")]
+    DuplicateLink {
+        /// The name.
+        link: String,
+        /// Line of the first.
+        first_line: u32,
+        /// Line of the second.
+        line: u32,
+    },
+    /// Two joints of one name.
+    #[error("line {line}: a second joint `{joint}`; the first is on line {first_line}")]
+    DuplicateJoint {
+        /// The name.
+        joint: String,
+        /// Line of the first.
+        first_line: u32,
+        /// Line of the second.
+        line: u32,
+    },
+    /// A joint names a link that is not there.
+    #[error("line {line}: joint `{joint}` names the {role} link `{link}`, which is not there")]
+    UnknownLink {
+        /// Line.
+        line: u32,
+        /// The joint.
+        joint: String,
+        /// `parent` or `child`.
+        role: &'static str,
+        /// The missing link.
+        link: String,
+    },
+    /// A joint of a kind that the dynamics do not know.
+    #[error(
+        "line {line}: joint `{joint}` is {kind}; revolute, continuous, prismatic and fixed joints are supported"
+    )]
+    UnsupportedJoint {
+        /// Line.
+        line: u32,
+        /// The joint.
+        joint: String,
+        /// Its kind.
+        kind: &'static str,
+    },
+    /// A joint that is coupled to another.
+    #[error(
+        "line {line}: joint `{joint}` mimics `{leader}`; coupled joints are not supported: make it fixed, or take out <mimic>"
+    )]
+    Mimic {
+        /// Line.
+        line: u32,
+        /// The joint.
+        joint: String,
+        /// The joint it follows.
+        leader: String,
+    },
+    /// A movable joint without a direction.
+    #[error("line {line}: the axis of joint `{joint}` is zero")]
+    ZeroAxis {
+        /// Line.
+        line: u32,
+        /// The joint.
+        joint: String,
+    },
+    /// A link weighs less than nothing.
+    #[error("line {line}: the mass of link `{link}` is {mass_kg} kg")]
+    NegativeMass {
+        /// Line.
+        line: u32,
+        /// The link.
+        link: String,
+        /// The mass.
+        mass_kg: f64,
+    },
+    /// A link that two joints move.
+    #[error("line {line}: link `{link}` is the child of both `{first}` and `{second}`")]
+    TwoParents {
+        /// Line of the second joint.
+        line: u32,
+        /// The link.
+        link: String,
+        /// A joint that moves it.
+        first: String,
+        /// The other.
+        second: String,
+    },
+    /// The robot is in pieces.
+    #[error("{} links hang on no joint, a robot has one root: {}", roots.len(), list(roots))]
+    SeveralRoots {
+        /// The links that are no joint's child.
+        roots: Vec<String>,
+    },
+    /// Joints that close a ring.
+    #[error("the joints form a cycle: {}", list(joints))]
+    Cycle {
+        /// The joints of the ring, in order.
+        joints: Vec<String>,
+    },
+    /// Nothing can move.
+    #[error("the robot `{robot}` has no movable joint")]
+    NothingMoves {
+        /// The robot.
+        robot: String,
+    },
+    /// What a joint moves weighs nothing: the dynamics would be meaningless.
+    #[error(
+        "line {line}: joint `{joint}` moves no mass: {} without a mass in <inertial>",
+        bodies(links)
+    )]
+    NoMass {
+        /// Line of the joint.
+        line: u32,
+        /// The joint.
+        joint: String,
+        /// The links it moves, up to the next movable joint.
+        links: Vec<String>,
+    },
+}
+
+fn list(names: &[String]) -> String {
+    let quoted: Vec<_> = names.iter().map(|name| format!("`{name}`")).collect();
+    quoted.join(", ")
+}
+
+fn bodies(links: &[String]) -> String {
+    match links {
+        [_] => format!("link {} is", list(links)),
+        _ => format!("links {} are", list(links)),
+    }
+}

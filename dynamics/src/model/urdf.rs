@@ -1,0 +1,213 @@
+//! The URDF's links and joints, each checked by itself; [`super::tree`] checks them together.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Isometry3, Vector3};
+
+use super::document::{self, JointMarks};
+use super::{Geometry, JointKind, Limits, ModelError, Shape};
+use crate::Inertia;
+use crate::inertia::symmetric;
+
+/// A robot as written.
+#[derive(Debug)]
+pub(super) struct Robot {
+    pub name: String,
+    pub links: Vec<RawLink>,
+    pub joints: Vec<RawJoint>,
+}
+
+#[derive(Debug)]
+pub(super) struct RawLink {
+    pub name: String,
+    pub inertia: Inertia,
+    pub shapes: Vec<Shape>,
+}
+
+/// A joint, fixed or not.
+#[derive(Debug)]
+pub(super) struct RawJoint {
+    pub name: String,
+    pub line: u32,
+    /// `None` if fixed.
+    pub movable: Option<Movable>,
+    /// Links by index.
+    pub parent: usize,
+    pub child: usize,
+    pub origin: Isometry3<f64>,
+}
+
+#[derive(Debug)]
+pub(super) struct Movable {
+    pub kind: JointKind,
+    /// Of length 1.
+    pub axis: Vector3<f64>,
+    pub limits: Limits,
+}
+
+/// Reads the document.
+///
+/// # Errors
+/// What is wrong with it, or with a link or joint taken by itself.
+pub(super) fn read(xml: &str) -> Result<Robot, ModelError> {
+    let marks = document::inspect(xml)?;
+    let robot = urdf_rs::read_from_string(xml).map_err(|error| ModelError::Urdf {
+        reason: error.to_string(),
+    })?;
+    let mut indices: BTreeMap<String, usize> = BTreeMap::new();
+    let mut links = Vec::with_capacity(robot.links.len());
+    for (index, (link, &line)) in robot.links.into_iter().zip(&marks.link_lines).enumerate() {
+        if let Some(first) = indices.insert(link.name.clone(), index) {
+            let first_line = marks.link_lines[first];
+            return Err(ModelError::DuplicateLink {
+                link: link.name,
+                first_line,
+                line,
+            });
+        }
+        links.push(read_link(link, line)?);
+    }
+    let mut seen: BTreeMap<String, u32> = BTreeMap::new();
+    let mut joints = Vec::with_capacity(robot.joints.len());
+    for (joint, marks) in robot.joints.into_iter().zip(&marks.joints) {
+        let line = marks.line;
+        if let Some(first_line) = seen.insert(joint.name.clone(), line) {
+            return Err(ModelError::DuplicateJoint {
+                joint: joint.name,
+                first_line,
+                line,
+            });
+        }
+        joints.push(read_joint(joint, marks, &indices)?);
+    }
+    Ok(Robot {
+        name: robot.name,
+        links,
+        joints,
+    })
+}
+
+fn read_link(link: urdf_rs::Link, line: u32) -> Result<RawLink, ModelError> {
+    let inertial = link.inertial;
+    let mass = inertial.mass.value;
+    if mass < 0.0 {
+        return Err(ModelError::NegativeMass {
+            line,
+            link: link.name,
+            mass_kg: mass,
+        });
+    }
+    let i = inertial.inertia;
+    let about_com = symmetric([i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz]);
+    let inertia = Inertia::from_parts(mass, Vector3::zeros(), about_com);
+    let shapes = link.visual.into_iter().map(|visual| Shape {
+        origin: pose(&visual.origin),
+        geometry: geometry(visual.geometry),
+    });
+    Ok(RawLink {
+        name: link.name,
+        inertia: inertia.transformed(&pose(&inertial.origin)),
+        shapes: shapes.collect(),
+    })
+}
+
+fn read_joint(
+    joint: urdf_rs::Joint,
+    marks: &JointMarks,
+    links: &BTreeMap<String, usize>,
+) -> Result<RawJoint, ModelError> {
+    let (name, line) = (joint.name, marks.line);
+    let link = |role, link: String| match links.get(&link) {
+        Some(&index) => Ok(index),
+        None => Err(ModelError::UnknownLink {
+            line,
+            joint: name.clone(),
+            role,
+            link,
+        }),
+    };
+    let (parent, child) = (
+        link("parent", joint.parent.link)?,
+        link("child", joint.child.link)?,
+    );
+    let unsupported = |kind| ModelError::UnsupportedJoint {
+        line,
+        joint: name.clone(),
+        kind,
+    };
+    let kind = match joint.joint_type {
+        urdf_rs::JointType::Fixed => None,
+        urdf_rs::JointType::Revolute => Some(JointKind::Revolute),
+        urdf_rs::JointType::Continuous => Some(JointKind::Continuous),
+        urdf_rs::JointType::Prismatic => Some(JointKind::Prismatic),
+        urdf_rs::JointType::Floating => return Err(unsupported("floating")),
+        urdf_rs::JointType::Planar => return Err(unsupported("planar")),
+        urdf_rs::JointType::Spherical => return Err(unsupported("spherical")),
+    };
+    let movable = match kind {
+        None => None,
+        Some(kind) => {
+            if let Some(mimic) = joint.mimic {
+                return Err(ModelError::Mimic {
+                    line,
+                    joint: name,
+                    leader: mimic.joint,
+                });
+            }
+            let axis = Vector3::from(*joint.axis.xyz);
+            let Some(axis) = axis.try_normalize(f64::MIN_POSITIVE) else {
+                return Err(ModelError::ZeroAxis { line, joint: name });
+            };
+            Some(Movable {
+                kind,
+                axis,
+                limits: limits(kind, &joint.limit, marks),
+            })
+        }
+    };
+    Ok(RawJoint {
+        name,
+        line,
+        movable,
+        parent,
+        child,
+        origin: pose(&joint.origin),
+    })
+}
+
+fn limits(kind: JointKind, limit: &urdf_rs::JointLimit, marks: &JointMarks) -> Limits {
+    let known = |given: bool, value: f64| (given && value.is_finite()).then_some(value);
+    let bounded = kind != JointKind::Continuous;
+    Limits {
+        lower: known(bounded && marks.lower, limit.lower),
+        upper: known(bounded && marks.upper, limit.upper),
+        velocity: known(marks.velocity, limit.velocity),
+        effort: known(marks.effort, limit.effort),
+    }
+}
+
+fn pose(pose: &urdf_rs::Pose) -> Isometry3<f64> {
+    let [roll, pitch, yaw] = *pose.rpy;
+    let rotation = nalgebra::UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+    Isometry3::from_parts(Vector3::from(*pose.xyz).into(), rotation)
+}
+
+fn geometry(geometry: urdf_rs::Geometry) -> Geometry {
+    match geometry {
+        urdf_rs::Geometry::Box { size } => Geometry::Box { size_m: *size },
+        urdf_rs::Geometry::Cylinder { radius, length } => Geometry::Cylinder {
+            radius_m: radius,
+            length_m: length,
+        },
+        // Drawn as the cylinder that just holds it.
+        urdf_rs::Geometry::Capsule { radius, length } => Geometry::Cylinder {
+            radius_m: radius,
+            length_m: length + 2.0 * radius,
+        },
+        urdf_rs::Geometry::Sphere { radius } => Geometry::Sphere { radius_m: radius },
+        urdf_rs::Geometry::Mesh { filename, scale } => Geometry::Mesh {
+            filename,
+            scale: scale.map_or([1.0; 3], |scale| *scale),
+        },
+    }
+}
