@@ -16,6 +16,7 @@ mod joint_map;
 mod mcap_file;
 mod mcap_write;
 mod recording;
+mod repair;
 pub mod ros;
 mod sqlite_file;
 
@@ -27,3 +28,4 @@ pub use mcap_write::{
     CHUNK_SPAN_NS, Compression, McapWriter, PROVENANCE, TopicWriter, WriteError, Written,
 };
 pub use recording::{JointStates, Message, Messages, Recording, RecordingKind, Stamped, Topic};
+pub use repair::{RepairError, Repaired, repair, repaired_path};

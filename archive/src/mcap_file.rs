@@ -5,6 +5,7 @@
 //! their messages in order of log time. At no time is more in memory than the index and the chunks
 //! that overlap the current log time.
 
+mod attachment;
 mod chunk;
 mod cursor;
 mod index;
@@ -12,6 +13,7 @@ mod layout;
 mod scan;
 mod walk;
 
+pub(crate) use attachment::attachment_header;
 pub(crate) use cursor::{McapCursor, Order};
 pub(crate) use index::{CRC_FROM_END_BYTES, read_footer, summary_crc};
 pub(crate) use layout::Layout;

@@ -1,5 +1,6 @@
 //! Writing MCAP files as ROS 2 does.
 
+mod error;
 mod rosbag2;
 mod summary_order;
 
@@ -14,6 +15,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::ros;
+pub use error::WriteError;
+use error::yaml;
+pub(crate) use error::{io, mcap};
 
 /// A chunk is closed, and handed to the operating system, when the next message would make it span
 /// this much log time: what a kill can cost at most \[ns\].
@@ -38,61 +42,12 @@ pub enum Compression {
     None,
 }
 
-/// Why a recording cannot be written.
-#[derive(Debug, thiserror::Error)]
-pub enum WriteError {
-    /// The operating system refuses.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What it says.
-        source: std::io::Error,
-    },
-    /// The file cannot be written on.
-    #[error("{}: {source}", path.display())]
-    Mcap {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: Box<mcap::McapError>,
-    },
-    /// A message cannot be encoded.
-    #[error("{}: topic {topic:?}: {source}", path.display())]
-    Encode {
-        /// The file.
-        path: PathBuf,
-        /// The topic.
-        topic: String,
-        /// What is wrong with the message.
-        source: ros::EncodeError,
-    },
-    /// The bag's metadata cannot be written as YAML.
-    #[error("{}: {source}", path.display())]
-    Metadata {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: Box<serde_saphyr::SerializeError>,
-    },
-    /// MCAP knows no time before the epoch.
-    #[error("{}: topic {topic:?}: a message at {ns} ns, before the epoch", path.display())]
-    BeforeEpoch {
-        /// The file.
-        path: PathBuf,
-        /// The topic.
-        topic: String,
-        /// The time \[ns\].
-        ns: i64,
-    },
-}
-
 /// Writes one MCAP file: profile `ros2`, CDR messages with their `ros2msg` text, and the metadata
 /// that rosbag2 looks for.
 ///
 /// While it is written the file is called `<name>.mcap.part`; [`McapWriter::finish`] completes and
 /// renames it. So a file with its proper name is whole, and a writer that died leaves a `.part`
-/// that [`Recording::open`](crate::Recording::open) reads.
+/// that [`Recording::open`](crate::Recording::open) reads and [`repair`](crate::repair()) completes.
 ///
 /// The same calls give the same bytes, on any machine. Memory is bounded by the open chunk, but for
 /// the index, which grows by about 300 bytes with each chunk (10 MB an hour).
@@ -158,9 +113,7 @@ impl McapWriter {
         provenance: &BTreeMap<String, String>,
     ) -> Result<Self, WriteError> {
         let path = path.as_ref().to_owned();
-        let mut part = path.clone().into_os_string();
-        part.push(".part");
-        let part = PathBuf::from(part);
+        let part = part_of(&path);
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(io(folder))?;
         }
@@ -304,21 +257,13 @@ impl McapWriter {
             &BTreeMap::from([("serialized_metadata".to_owned(), bag)]),
         )?;
         let Self {
-            mut writer,
+            writer,
             path,
             part,
             topics,
             ..
         } = self;
-        writer.finish().map_err(mcap(&part))?;
-        let file = writer
-            .into_inner()
-            .into_inner()
-            .map_err(|error| io(&part)(error.into_error()))?;
-        summary_order::sort(&file).map_err(io(&part))?;
-        file.sync_all().map_err(io(&part))?;
-        let bytes = file.metadata().map_err(io(&part))?.len();
-        fs::rename(&part, &path).map_err(io(&path))?;
+        let bytes = complete(writer, &part, &path)?;
         Ok(Written {
             messages: topics.iter().map(|topic| topic.count).sum(),
             path,
@@ -339,6 +284,31 @@ impl McapWriter {
             .write_metadata(&metadata)
             .map_err(mcap(&self.part))
     }
+}
+
+/// What a file is called until it is whole.
+pub(crate) fn part_of(path: &Path) -> PathBuf {
+    let mut part = path.to_owned().into_os_string();
+    part.push(".part");
+    part.into()
+}
+
+/// Completes the file that `writer` has written as `part` and renames it; gives its length.
+pub(crate) fn complete(
+    mut writer: mcap::Writer<BufWriter<File>>,
+    part: &Path,
+    path: &Path,
+) -> Result<u64, WriteError> {
+    writer.finish().map_err(mcap(part))?;
+    let file = writer
+        .into_inner()
+        .into_inner()
+        .map_err(|error| io(part)(error.into_error()))?;
+    summary_order::sort(&file).map_err(io(part))?;
+    file.sync_all().map_err(io(part))?;
+    let bytes = file.metadata().map_err(io(part))?.len();
+    fs::rename(part, path).map_err(io(path))?;
+    Ok(bytes)
 }
 
 /// Options that every file of ours shares.
@@ -372,26 +342,5 @@ fn set_aside(path: &Path, part: &Path) -> Result<Option<PathBuf>, WriteError> {
             return Ok(Some(aside));
         }
         n += 1;
-    }
-}
-
-fn io(path: &Path) -> impl FnOnce(std::io::Error) -> WriteError {
-    let path = path.to_owned();
-    move |source| WriteError::Io { path, source }
-}
-
-fn mcap(path: &Path) -> impl FnOnce(mcap::McapError) -> WriteError {
-    let path = path.to_owned();
-    move |source| WriteError::Mcap {
-        path,
-        source: Box::new(source),
-    }
-}
-
-fn yaml(path: &Path) -> impl FnOnce(serde_saphyr::SerializeError) -> WriteError {
-    let path = path.to_owned();
-    move |source| WriteError::Metadata {
-        path,
-        source: Box::new(source),
     }
 }

@@ -17,24 +17,29 @@ pub(super) struct ChunkHeader<'a> {
 }
 
 /// Takes fixed-size fields off the front of a slice.
-struct Fields<'a>(&'a [u8]);
+pub(super) struct Fields<'a>(pub(super) &'a [u8]);
 
 impl<'a> Fields<'a> {
-    fn take(&mut self, len: usize) -> Option<&'a [u8]> {
+    pub(super) fn take(&mut self, len: usize) -> Option<&'a [u8]> {
         let (field, rest) = self.0.split_at_checked(len)?;
         self.0 = rest;
         Some(field)
     }
 
-    fn u16(&mut self) -> Option<u16> {
+    pub(super) fn text(&mut self) -> Option<&'a str> {
+        let len = self.u32()? as usize;
+        std::str::from_utf8(self.take(len)?).ok()
+    }
+
+    pub(super) fn u16(&mut self) -> Option<u16> {
         Some(u16::from_le_bytes(self.take(2)?.try_into().ok()?))
     }
 
-    fn u32(&mut self) -> Option<u32> {
+    pub(super) fn u32(&mut self) -> Option<u32> {
         Some(u32::from_le_bytes(self.take(4)?.try_into().ok()?))
     }
 
-    fn u64(&mut self) -> Option<u64> {
+    pub(super) fn u64(&mut self) -> Option<u64> {
         Some(u64::from_le_bytes(self.take(8)?.try_into().ok()?))
     }
 }
@@ -49,10 +54,7 @@ impl<'a> ChunkHeader<'a> {
             end_ns: fields.u64()?,
             unpacked_bytes: fields.u64()?,
             crc: fields.u32()?,
-            compression: {
-                let len = fields.u32()? as usize;
-                std::str::from_utf8(fields.take(len)?).ok()?
-            },
+            compression: fields.text()?,
             packed_bytes: fields.u64()?,
         };
         Some((header, fields.0))

@@ -29,7 +29,10 @@ pub(super) enum Outcome {
 /// Fills `layout` from the index of `file`. Unless that is complete, `layout` is void.
 pub(super) fn read(file: &File, layout: &mut Layout) -> io::Result<Outcome> {
     let Some(footer) = read_footer(file, layout.file_bytes)? else {
-        return Ok(Outcome::Absent);
+        return Ok(Outcome::Unsound {
+            at: layout.file_bytes,
+            reason: "the file does not end in a footer".to_owned(),
+        });
     };
     let start = footer.summary_start;
     if start == 0 {

@@ -84,7 +84,7 @@ impl Layout {
             }
         }
         scan::read(&file, &mut layout).map_err(ArchiveError::io(path))?;
-        // A file that is torn has no index to speak of.
+        // Of a file that is torn within its data, that it has no index goes without saying.
         let torn = |damage: &Damage| damage.kind == DamageKind::TornTail;
         if layout.damage.iter().any(torn) {
             layout
