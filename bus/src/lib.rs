@@ -9,6 +9,7 @@
 pub mod link;
 pub mod sample;
 pub mod seat;
+pub mod shell;
 pub mod stage;
 
 pub use link::{

@@ -313,6 +313,28 @@ pub enum SampleRef<'a> {
     Health(&'a Health),
 }
 
+impl SampleRef<'_> {
+    /// What the sample begins with.
+    pub fn header(&self) -> &Header {
+        match self {
+            Self::JointState(sample) => &sample.header,
+            Self::TwinState(sample) => &sample.header,
+            Self::Detection(sample) => &sample.header,
+            Self::Health(sample) => &sample.header,
+        }
+    }
+
+    /// Which type it is.
+    pub fn kind(&self) -> SampleKind {
+        match self {
+            Self::JointState(_) => SampleKind::JointState,
+            Self::TwinState(_) => SampleKind::TwinState,
+            Self::Detection(_) => SampleKind::Detection,
+            Self::Health(_) => SampleKind::Health,
+        }
+    }
+}
+
 macro_rules! samples {
     ($($name:ident),+) => {$(
         impl Sample for $name {

@@ -1,0 +1,67 @@
+//! Health reports by the stream's own clock.
+
+use super::report::Report;
+use crate::link::{LinkError, Sender};
+use crate::sample::{Header, Health, Name};
+
+const SECOND_NS: i64 = 1_000_000_000;
+
+/// Sends a [`Health`] sample once a second of stream time and at the end.
+pub(super) struct HealthClock<'a> {
+    out: &'a mut dyn Sender<Health>,
+    stage: Name,
+    restarts: u64,
+    /// The second of stream time that the last report stood in.
+    second: Option<i64>,
+    newest: Header,
+}
+
+impl<'a> HealthClock<'a> {
+    pub(super) fn new(out: &'a mut dyn Sender<Health>, stage: &str, restarts: u64) -> Self {
+        Self {
+            out,
+            stage: Name::new(stage),
+            restarts,
+            second: None,
+            newest: Header::default(),
+        }
+    }
+
+    /// Takes note of a sample; true if a report is due. One is due at the first sample of each
+    /// second, also when the clock jumps back.
+    pub(super) fn note(&mut self, header: &Header) -> bool {
+        self.newest = *header;
+        let second = header.stamp_ns.div_euclid(SECOND_NS);
+        let before = self.second.replace(second);
+        before.is_some_and(|before| before != second)
+    }
+
+    pub(super) fn stamp_ns(&self) -> i64 {
+        self.newest.stamp_ns
+    }
+
+    pub(super) fn send(&mut self, report: &Report) -> Result<(), LinkError> {
+        let (stage, restarts, newest) = (self.stage, self.restarts, self.newest);
+        self.out.send_with(&mut |health| {
+            health.header.stamp_ns = newest.stamp_ns;
+            health.header.received_ns = newest.received_ns;
+            health.stage = stage;
+            health.received = report.received;
+            health.emitted = report.emitted;
+            health.dropped = report.dropped();
+            health.restarts = restarts;
+        })
+    }
+
+    pub(super) fn end(&mut self, report: &Report) -> Result<(), LinkError> {
+        self.send(report)?;
+        self.out.end()
+    }
+
+    pub(super) fn wait_until_taken(
+        &mut self,
+        timeout: std::time::Duration,
+    ) -> Result<usize, LinkError> {
+        self.out.wait_until_taken(timeout)
+    }
+}

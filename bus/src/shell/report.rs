@@ -1,0 +1,148 @@
+//! How a stage fares.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use serde::{Deserialize, Serialize};
+
+use crate::link::{Position, ReceiverCounts, SenderCounts};
+
+/// What a stage has done so far.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Report {
+    /// The stage.
+    pub stage: String,
+    /// Samples that came in; for a source, those it has read.
+    pub received: u64,
+    /// Samples that went out.
+    pub emitted: u64,
+    /// Holes in the inputs.
+    pub lost: u64,
+    /// Samples the stage itself had to drop.
+    pub refused: u64,
+    /// Samples that expected keep-all receivers did not get.
+    pub undelivered: u64,
+    /// Receivers that had not read to the end of the stream when the stage left.
+    pub untaken: usize,
+    /// Stamp of the newest sample \[ns since the epoch\].
+    pub stamp_ns: i64,
+    /// How far a source of known length is, from 0 to 1.
+    pub fraction_done: Option<f64>,
+    /// Each input.
+    pub inputs: Vec<InputReport>,
+    /// How it ended; `None` while it runs.
+    pub outcome: Option<Outcome>,
+}
+
+impl Report {
+    /// Samples lost before or in the stage.
+    pub fn dropped(&self) -> u64 {
+        self.lost + self.refused
+    }
+
+    /// Whether all that it should have dealt with and passed on was.
+    pub fn is_complete(&self) -> bool {
+        self.dropped() == 0 && self.undelivered == 0 && self.untaken == 0
+    }
+
+    pub(super) fn count_output(&mut self, counts: SenderCounts) {
+        self.emitted = counts.sent;
+        self.undelivered = counts.undelivered;
+    }
+
+    pub(super) fn count_inputs(&mut self) {
+        self.received = self.inputs.iter().map(|input| input.counts.received).sum();
+        self.lost = self.inputs.iter().map(|input| input.counts.lost).sum();
+    }
+}
+
+/// One input of a stage.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct InputReport {
+    /// The stage it comes from.
+    pub from: String,
+    /// What came and what did not.
+    #[serde(flatten)]
+    pub counts: ReceiverCounts,
+    /// How far it has come; goes into the seat of the stage's next life.
+    pub position: Option<Position>,
+    /// Whether the stream has ended.
+    pub ended: bool,
+}
+
+/// How a stage ended.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// Its inputs, or the source itself, have ended.
+    Ended,
+    /// It was told to stop.
+    Stopped,
+    /// It could not go on; the text says why.
+    Failed(String),
+}
+
+/// Where a shell posts its report while it runs. Clones are one.
+#[derive(Debug, Clone, Default)]
+pub struct Board(Arc<Mutex<Report>>);
+
+impl Board {
+    /// The newest report.
+    pub fn read(&self) -> Report {
+        self.0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
+    }
+
+    pub(super) fn post(&self, report: &Report) {
+        self.0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone_from(report);
+    }
+}
+
+/// Posts now and then, not for every sample.
+#[derive(Debug)]
+pub(super) struct Poster {
+    board: Board,
+    posted: Instant,
+}
+
+impl Poster {
+    const EVERY: Duration = Duration::from_millis(100);
+
+    pub(super) fn new(board: Board) -> Self {
+        Self {
+            board,
+            posted: Instant::now(),
+        }
+    }
+
+    /// Whether it is time to bring a report up to date and post it.
+    pub(super) fn is_due(&self) -> bool {
+        self.posted.elapsed() >= Self::EVERY
+    }
+
+    pub(super) fn post(&mut self, report: &Report) {
+        self.board.post(report);
+        self.posted = Instant::now();
+    }
+}
+
+/// An error and what it comes from, in one line.
+pub(super) fn text_of(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        let more = error.to_string();
+        // Transparent errors repeat their source's text.
+        if !text.ends_with(&more) {
+            text.push_str(": ");
+            text.push_str(&more);
+        }
+        cause = error.source();
+    }
+    text
+}

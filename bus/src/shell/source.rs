@@ -1,0 +1,99 @@
+//! The loop around a source.
+
+use std::time::Duration;
+
+use super::health::HealthClock;
+use super::report::{Outcome, Poster, Report, text_of};
+use super::stage::Out;
+use super::{Context, TAKEN_WITHIN};
+use crate::link::Sender;
+use crate::sample::{Health, Sample};
+use crate::stage::{Progress, Source, StageError};
+
+/// How long a source that has nothing now is left alone.
+const IDLE: Duration = Duration::from_millis(1);
+
+/// Runs `source` into `output` until it ends or is told to stop. When it fails its stream gets no
+/// end: it may be started again.
+pub fn run_source<T: Sample>(
+    context: &Context,
+    source: &mut dyn Source<T>,
+    output: &mut dyn Sender<T>,
+    health: &mut dyn Sender<Health>,
+) -> Report {
+    let mut shell = SourceShell {
+        context,
+        health: HealthClock::new(health, &context.stage, context.restarts),
+        poster: Poster::new(context.board.clone()),
+        report: Report {
+            stage: context.stage.clone(),
+            ..Report::default()
+        },
+    };
+    let outcome = shell
+        .run(source, output)
+        .unwrap_or_else(|error| Outcome::Failed(text_of(&error)));
+    shell.count(source, output);
+    shell.report.outcome = Some(outcome);
+    shell.poster.post(&shell.report);
+    shell.report
+}
+
+struct SourceShell<'a> {
+    context: &'a Context,
+    health: HealthClock<'a>,
+    poster: Poster,
+    report: Report,
+}
+
+impl SourceShell<'_> {
+    fn run<T: Sample>(
+        &mut self,
+        source: &mut dyn Source<T>,
+        output: &mut dyn Sender<T>,
+    ) -> Result<Outcome, StageError> {
+        let outcome = self.feed(source, output)?;
+        output.end()?;
+        self.count(source, output);
+        self.health.end(&self.report)?;
+        self.report.untaken =
+            output.wait_until_taken(TAKEN_WITHIN)? + self.health.wait_until_taken(TAKEN_WITHIN)?;
+        Ok(outcome)
+    }
+
+    fn feed<T: Sample>(
+        &mut self,
+        source: &mut dyn Source<T>,
+        output: &mut dyn Sender<T>,
+    ) -> Result<Outcome, StageError> {
+        loop {
+            if self.context.stop.is_stopped() {
+                return Ok(Outcome::Stopped);
+            }
+            let mut out = Out::new(output);
+            let progress = source.step(&mut out)?;
+            let due = out.newest.is_some_and(|header| self.health.note(&header));
+            if due || self.poster.is_due() {
+                self.count(source, output);
+                self.poster.post(&self.report);
+            }
+            if due {
+                self.health.send(&self.report)?;
+            }
+            match progress {
+                Progress::More => {}
+                Progress::Idle => std::thread::sleep(IDLE),
+                Progress::End => return Ok(Outcome::Ended),
+            }
+        }
+    }
+
+    fn count<T: Sample>(&mut self, source: &dyn Source<T>, output: &dyn Sender<T>) {
+        let report = &mut self.report;
+        report.count_output(output.counts());
+        report.refused = source.dropped();
+        report.received = report.emitted + report.refused;
+        report.fraction_done = source.fraction_done();
+        report.stamp_ns = self.health.stamp_ns();
+    }
+}
