@@ -1,0 +1,379 @@
+//! The source's part of the pipeline file.
+
+use std::path::PathBuf;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// A source: exactly one of `file`, `csv`, `zenoh` and `simulate`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    /// A recording: an MCAP file, a rosbag2 folder, or a sqlite3 bag.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<FileConfig>,
+    /// A table, with or without a header line.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub csv: Option<CsvConfig>,
+    /// Live messages over Zenoh.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub zenoh: Option<ZenohConfig>,
+    /// A simulated cell.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub simulate: Option<SimulateConfig>,
+    /// How fast recorded or simulated samples are given out. Live messages come when they come.
+    pub rate: Rate,
+    /// Low-pass on positions before they are differentiated, where the source gives no velocity \[Hz\].
+    #[schemars(range(min = 0.01, max = 10_000.0))]
+    pub velocity_cutoff_hz: f64,
+    /// A command, or another twin's effort, that is older than this does not belong to a sample \[s\].
+    #[schemars(range(min = 0.001, max = 3600.0))]
+    pub max_age_s: f64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            file: None,
+            csv: None,
+            zenoh: None,
+            simulate: None,
+            rate: Rate::default(),
+            velocity_cutoff_hz: 20.0,
+            max_age_s: 0.5,
+        }
+    }
+}
+
+impl Config {
+    /// The one source that is configured.
+    ///
+    /// # Errors
+    /// If there is none, or more than one.
+    pub fn input(&self) -> Result<Input<'_>, ConfigError> {
+        let mut inputs = [
+            self.file.as_ref().map(Input::File),
+            self.csv.as_ref().map(Input::Csv),
+            self.zenoh.as_ref().map(Input::Zenoh),
+            self.simulate.as_ref().map(Input::Simulate),
+        ]
+        .into_iter()
+        .flatten();
+        let first = inputs.next();
+        let others = inputs.count();
+        match (first, others) {
+            (Some(input), 0) => Ok(input),
+            (first, others) => Err(ConfigError::OneSource {
+                found: others + usize::from(first.is_some()),
+            }),
+        }
+    }
+
+    /// Every path in it, so that the program can resolve them against the pipeline file.
+    pub fn paths_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        [
+            self.file.as_mut().map(|file| &mut file.path),
+            self.csv.as_mut().map(|csv| &mut csv.path),
+            self.simulate
+                .as_mut()
+                .map(|simulate| &mut simulate.scenario),
+        ]
+        .into_iter()
+        .flatten()
+    }
+}
+
+/// The source that a [`Config`] names.
+#[derive(Debug, Clone, Copy)]
+pub enum Input<'a> {
+    /// A recording.
+    File(&'a FileConfig),
+    /// A table.
+    Csv(&'a CsvConfig),
+    /// Live messages.
+    Zenoh(&'a ZenohConfig),
+    /// A simulated cell.
+    Simulate(&'a SimulateConfig),
+}
+
+/// A recording.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FileConfig {
+    /// The MCAP file, the folder of a rosbag2 bag, or its `.db3`.
+    pub path: PathBuf,
+    /// Where in it the messages are.
+    #[serde(default)]
+    pub topics: Topics,
+}
+
+/// ROS 2 topics of one arm. A topic that is not named is not read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Topics {
+    /// Measured joint states (`sensor_msgs/msg/JointState`).
+    pub state: String,
+    /// Commanded positions, perhaps velocities (`sensor_msgs/msg/JointState`).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub command: Option<String>,
+    /// Efforts that somebody else's twin computed (`sensor_msgs/msg/JointState`).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub twin: Option<String>,
+    /// The attached tool (`geometry_msgs/msg/InertiaStamped`); mass 0 when it is put down.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tool: Option<String>,
+}
+
+impl Default for Topics {
+    fn default() -> Self {
+        Self {
+            state: "/joint_states".to_owned(),
+            command: None,
+            twin: None,
+            tool: None,
+        }
+    }
+}
+
+/// A table: one row an instant.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CsvConfig {
+    /// The file.
+    pub path: PathBuf,
+    /// Which column is what.
+    pub columns: tauscope_archive::CsvMapping,
+}
+
+/// Live messages over Zenoh. At least one of `connect` and `listen` must be given: nothing is found
+/// by multicast, so that two cells on one network cannot meet by accident.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ZenohConfig {
+    /// Endpoints to connect to, e.g. `tcp/localhost:7447`; tried again until they answer.
+    pub connect: Vec<String>,
+    /// Endpoints to listen on.
+    pub listen: Vec<String>,
+    /// Who publishes, and so what the keys look like.
+    pub keys: Keys,
+    /// `ROS_DOMAIN_ID` of the publishers, for `rmw_zenoh`.
+    #[schemars(range(max = 232))]
+    pub domain: u32,
+    /// Namespace of the bridge, for `ros2dds`, or prefix of the keys, for `tauscope`; by default the
+    /// cell's name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub namespace: Option<String>,
+    /// The topics.
+    pub topics: Topics,
+    /// Messages held while the pipeline is busy; the oldest gives way, and is counted.
+    #[schemars(range(min = 1, max = 1_000_000))]
+    pub queue: usize,
+}
+
+impl Default for ZenohConfig {
+    fn default() -> Self {
+        Self {
+            connect: Vec::new(),
+            listen: Vec::new(),
+            keys: Keys::default(),
+            domain: 0,
+            namespace: None,
+            topics: Topics::default(),
+            queue: 1024,
+        }
+    }
+}
+
+/// Key expressions of a publisher on Zenoh.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Keys {
+    /// ROS 2 nodes with `rmw_zenoh`: `<domain>/<topic>/<type>/<type hash>`.
+    #[default]
+    RmwZenoh,
+    /// ROS 2 nodes behind `zenoh-bridge-ros2dds`: `<namespace>/<topic>`.
+    Ros2dds,
+    /// tauscope's own: `<cell>/<topic>`.
+    Tauscope,
+}
+
+/// A simulated cell.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SimulateConfig {
+    /// The scenario file, as `tauscope simulate` takes it.
+    pub scenario: PathBuf,
+    /// Which of its recordings is played; by default the first.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recording: Option<String>,
+}
+
+/// How fast recorded samples are given out: `realtime`, `fast`, or a factor such as 2.5.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Rate {
+    /// As fast as they were recorded.
+    #[default]
+    Realtime,
+    /// As fast as the machine can.
+    Fast,
+    /// This many times as fast as they were recorded.
+    Factor(f64),
+}
+
+impl Rate {
+    /// Seconds of recording per second of time; `None` for as fast as possible.
+    pub fn factor(self) -> Option<f64> {
+        match self {
+            Self::Realtime => Some(1.0),
+            Self::Fast => None,
+            Self::Factor(factor) => Some(factor),
+        }
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(untagged)]
+enum RateForm {
+    Factor(f64),
+    Word(String),
+}
+
+impl<'de> Deserialize<'de> for Rate {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let expected = "`realtime`, `fast`, or a factor above 0";
+        let form = RateForm::deserialize(deserializer)
+            .map_err(|_| serde::de::Error::custom(format!("expected {expected}")))?;
+        match form {
+            RateForm::Factor(factor) if factor > 0.0 && factor.is_finite() => {
+                Ok(Self::Factor(factor))
+            }
+            RateForm::Word(word) if word == "realtime" => Ok(Self::Realtime),
+            RateForm::Word(word) if word == "fast" => Ok(Self::Fast),
+            RateForm::Factor(factor) => Err(serde::de::Error::custom(format!(
+                "{factor} is no rate: expected {expected}"
+            ))),
+            RateForm::Word(word) => Err(serde::de::Error::custom(format!(
+                "`{word}` is no rate: expected {expected}"
+            ))),
+        }
+    }
+}
+
+impl Serialize for Rate {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Realtime => serializer.serialize_str("realtime"),
+            Self::Fast => serializer.serialize_str("fast"),
+            Self::Factor(factor) => serializer.serialize_f64(*factor),
+        }
+    }
+}
+
+impl JsonSchema for Rate {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Rate".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "description": "`realtime`, `fast` (as fast as the machine can), or a factor such as 2.5.",
+            "anyOf": [
+                {"enum": ["realtime", "fast"]},
+                {"type": "number", "exclusiveMinimum": 0},
+            ],
+        })
+    }
+}
+
+/// What is wrong with a source's configuration.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ConfigError {
+    /// Not exactly one source.
+    #[error(
+        "an ingest stage has exactly one of `file`, `csv`, `zenoh` and `simulate`, found {found}"
+    )]
+    OneSource {
+        /// How many were given.
+        found: usize,
+    },
+    /// A Zenoh source that nothing can reach.
+    #[error("`zenoh` needs at least one endpoint in `connect` or `listen`")]
+    NoEndpoint,
+    /// Zenoh does not take an endpoint or a key.
+    #[error("zenoh does not take {what} `{text}`: {reason}")]
+    Zenoh {
+        /// Endpoint or key.
+        what: &'static str,
+        /// The text.
+        text: String,
+        /// What Zenoh says.
+        reason: String,
+    },
+    /// More joints than a sample has room for.
+    #[error("{found} joints, at most {limit} are supported")]
+    TooManyJoints {
+        /// How many there are.
+        found: usize,
+        /// How many fit.
+        limit: usize,
+    },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(yaml: &str) -> Result<Config, String> {
+        serde_saphyr::from_str(yaml).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn one_source_and_a_rate() {
+        let config =
+            parse("{file: {path: a.mcap, topics: {command: /joint_commands}}, rate: 2.5}").unwrap();
+        assert_eq!(config.rate, Rate::Factor(2.5));
+        let Ok(Input::File(file)) = config.input() else {
+            panic!("{:?}", config.input())
+        };
+        assert_eq!(file.topics.state, "/joint_states");
+        assert_eq!(file.topics.command.as_deref(), Some("/joint_commands"));
+        assert_eq!(
+            parse("{file: {path: a}, rate: fast}").unwrap().rate,
+            Rate::Fast
+        );
+    }
+
+    #[test]
+    fn no_source_or_two_are_refused() {
+        let none = parse("{rate: realtime}").unwrap();
+        assert_eq!(
+            none.input().unwrap_err(),
+            ConfigError::OneSource { found: 0 }
+        );
+        let two = parse("{file: {path: a}, zenoh: {}}").unwrap();
+        assert_eq!(
+            two.input().unwrap_err(),
+            ConfigError::OneSource { found: 2 }
+        );
+    }
+
+    #[test]
+    fn a_rate_that_is_none_says_what_would_be_one() {
+        for text in ["{rate: 0}", "{rate: slow}", "{rate: -1}", "{rate: [1]}"] {
+            let error = parse(text).unwrap_err();
+            assert!(
+                error.contains("`realtime`, `fast`, or a factor above 0"),
+                "{text}: {error}"
+            );
+        }
+    }
+
+    #[test]
+    fn unknown_keys_are_refused() {
+        assert!(
+            parse("{file: {path: a, topic: /x}}")
+                .unwrap_err()
+                .contains("topic")
+        );
+    }
+}

@@ -1,0 +1,40 @@
+//! Why a source cannot be opened, or not be read on.
+
+use tauscope_archive::ArchiveError;
+
+use crate::config::ConfigError;
+use crate::pack::PackError;
+use crate::simulated::ScenarioError;
+
+/// Why a source cannot be opened, or not be read on.
+#[derive(Debug, thiserror::Error)]
+pub enum IngestError {
+    /// The configuration makes no sense.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The recording cannot be read.
+    #[error(transparent)]
+    Archive(#[from] ArchiveError),
+    /// The recording can be read, but holds no sample of this cell.
+    #[error("{origin}: {source}")]
+    Pack {
+        /// Where the messages came from.
+        origin: String,
+        /// What is wrong with them.
+        source: PackError,
+    },
+    /// The scenario cannot be simulated.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// Zenoh cannot be reached, or not be used.
+    #[error("zenoh: {0}")]
+    Zenoh(String),
+}
+
+impl IngestError {
+    /// Whether the arguments or files are wrong (exit code 2), rather than what happened since
+    /// (exit code 1).
+    pub fn is_input(&self) -> bool {
+        !matches!(self, Self::Zenoh(_))
+    }
+}

@@ -1,0 +1,434 @@
+//! Packing: from messages of several topics to one sample an instant. Pure: no clock, no I/O.
+//!
+//! Joints are brought into the cell's order by name, parts of a state that several publishers send
+//! are put together, a missing velocity is differentiated, and each sample takes with it the newest
+//! command, the newest effort of another twin and the tool, at or before its stamp. A sample waits a
+//! little for these, so that the result does not depend on which of two messages was faster.
+
+mod differentiate;
+mod gather;
+mod layout;
+mod side;
+
+use std::collections::VecDeque;
+
+use tauscope_archive::ros;
+use tauscope_bus::{Header, JointArray, JointState, MAX_JOINTS, flags};
+
+use crate::config::ConfigError;
+use crate::setup::{Setup, Tool};
+use differentiate::Differentiator;
+use gather::{Gather, Gathered};
+use layout::Layouts;
+use side::Side;
+
+/// A stamp this far behind the one before is a clock that was set back; anything less is a message
+/// that came too late.
+const JUMP_BACK_NS: i64 = 500_000_000;
+/// Samples that wait for their command at most.
+const MAX_PENDING: usize = 1024;
+
+/// How samples are packed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PackSettings {
+    /// Low-pass on positions before they are differentiated \[Hz\].
+    pub velocity_cutoff_hz: f64,
+    /// Older commands and efforts of another twin do not belong to a sample \[ns\].
+    pub max_age_ns: i64,
+    /// How long a sample waits for the command and the other twin's effort of its instant, in time of
+    /// reception \[ns\].
+    pub wait_ns: i64,
+    /// Whether commands are to be waited for.
+    pub expects_command: bool,
+    /// Whether another twin's efforts are to be waited for.
+    pub expects_reference: bool,
+}
+
+/// What a [`Packer`] has counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct PackCounts {
+    /// Samples packed.
+    pub packed: u64,
+    /// States and side messages refused because a number in them is not finite.
+    pub not_finite: u64,
+    /// States refused because a newer one had come before.
+    pub late: u64,
+    /// States with the stamp of the one before; nothing is lost by leaving them out.
+    pub repeated: u64,
+    /// Messages without what their topic is for: a state without positions, an effort that is absent.
+    pub incomplete: u64,
+    /// Messages about other joints than the cell's.
+    pub foreign: u64,
+    /// Times that the clock was set back.
+    pub resets: u64,
+}
+
+impl PackCounts {
+    /// What is lost for good.
+    pub fn dropped(&self) -> u64 {
+        self.not_finite + self.late + self.incomplete
+    }
+}
+
+/// Why nothing could be packed out of a whole recording.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum PackError {
+    /// A number of a joint was never there.
+    #[error("{field} of joint `{joint}` is NaN throughout ({messages} messages)")]
+    NotFiniteThroughout {
+        /// The joint.
+        joint: String,
+        /// `position`, `velocity` or `effort`.
+        field: &'static str,
+        /// How many messages were read.
+        messages: u64,
+    },
+    /// Joints of the cell that no message names.
+    #[error(
+        "no joint state names {}; the messages name {}",
+        list(missing),
+        list(found)
+    )]
+    JointsMissing {
+        /// Joints of the cell that never came.
+        missing: Vec<String>,
+        /// Names that came instead (the first few).
+        found: Vec<String>,
+    },
+    /// No message has positions.
+    #[error("none of {messages} joint states has positions")]
+    NoPositions {
+        /// How many were read.
+        messages: u64,
+    },
+    /// Messages that never complete a state, or none at all.
+    #[error("{messages} joint states make no whole sample")]
+    NoSample {
+        /// How many were read.
+        messages: u64,
+    },
+}
+
+fn list(names: &[String]) -> String {
+    if names.is_empty() {
+        "no joint".to_owned()
+    } else {
+        names.join(", ")
+    }
+}
+
+/// Packs messages into samples.
+#[derive(Debug)]
+pub struct Packer {
+    settings: PackSettings,
+    joint_count: usize,
+    layouts: Layouts,
+    state: Gather,
+    command: Gather,
+    reference: Gather,
+    state_velocity: Differentiator,
+    command_velocity: Differentiator,
+    commands: Side<Command>,
+    references: Side<JointArray>,
+    tools: Side<Option<Tool>>,
+    fixed_tool: Option<Tool>,
+    pending: VecDeque<JointState>,
+    newest_ns: Option<i64>,
+    flushed: bool,
+    messages: u64,
+    counts: PackCounts,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Topic {
+    State,
+    Command,
+    Reference,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Command {
+    position: JointArray,
+    velocity: JointArray,
+    velocity_given: bool,
+}
+
+impl Packer {
+    /// A packer for a cell.
+    ///
+    /// # Errors
+    /// If a sample has no room for so many joints.
+    pub fn new(setup: &Setup, settings: PackSettings) -> Result<Self, ConfigError> {
+        let joint_count = setup.joint_names.len();
+        if joint_count > MAX_JOINTS {
+            return Err(ConfigError::TooManyJoints {
+                found: joint_count,
+                limit: MAX_JOINTS,
+            });
+        }
+        let differentiator = || Differentiator::new(joint_count, settings.velocity_cutoff_hz);
+        Ok(Self {
+            settings,
+            joint_count,
+            layouts: Layouts::new(&setup.joint_names),
+            state: Gather::new(joint_count),
+            command: Gather::new(joint_count),
+            reference: Gather::new(joint_count),
+            state_velocity: differentiator(),
+            command_velocity: differentiator(),
+            commands: Side::default(),
+            references: Side::default(),
+            tools: Side::default(),
+            fixed_tool: setup.tool,
+            pending: VecDeque::with_capacity(MAX_PENDING),
+            newest_ns: None,
+            flushed: false,
+            messages: 0,
+            counts: PackCounts::default(),
+        })
+    }
+
+    /// What it has counted.
+    pub fn counts(&self) -> PackCounts {
+        self.counts
+    }
+
+    /// Takes a measured state that was received at `received_ns`.
+    pub fn state(&mut self, message: &ros::JointState, received_ns: i64) {
+        self.messages += 1;
+        let Some(whole) = self.gather(Topic::State, message, received_ns) else {
+            return;
+        };
+        if whole.has_position {
+            self.sample(&whole, received_ns);
+        } else {
+            self.counts.incomplete += 1;
+        }
+    }
+
+    /// Takes a command.
+    pub fn command(&mut self, message: &ros::JointState, received_ns: i64) {
+        let Some(whole) = self.gather(Topic::Command, message, received_ns) else {
+            return;
+        };
+        if !whole.has_position {
+            self.counts.incomplete += 1;
+            return;
+        }
+        let differentiated = self.command_velocity.update(
+            whole.stamp_ns,
+            &whole.position,
+            whole.has_velocity.then_some(&whole.velocity),
+        );
+        let command = Command {
+            position: whole.position,
+            velocity: differentiated.velocity,
+            velocity_given: whole.has_velocity,
+        };
+        self.commands.push(whole.stamp_ns, command);
+    }
+
+    /// Takes the effort that another twin computed.
+    pub fn reference(&mut self, message: &ros::JointState, received_ns: i64) {
+        let Some(whole) = self.gather(Topic::Reference, message, received_ns) else {
+            return;
+        };
+        if whole.has_effort {
+            self.references.push(whole.stamp_ns, whole.effort);
+        } else {
+            self.counts.incomplete += 1;
+        }
+    }
+
+    /// Takes the tool that is attached from now on; mass 0 means none.
+    pub fn tool(&mut self, message: &ros::InertiaStamped, received_ns: i64) {
+        let inertia = &message.inertia;
+        let tool = Tool {
+            mass_kg: inertia.m,
+            com_m: [inertia.com.x, inertia.com.y, inertia.com.z],
+            inertia_kgm2: [
+                inertia.ixx,
+                inertia.ixy,
+                inertia.ixz,
+                inertia.iyy,
+                inertia.iyz,
+                inertia.izz,
+            ],
+        };
+        if !tool.is_finite() {
+            self.counts.not_finite += 1;
+            return;
+        }
+        let stamp_ns = stamp_of(&message.header, received_ns);
+        self.tools
+            .push(stamp_ns, (tool.mass_kg > 0.0).then_some(tool));
+    }
+
+    /// Gives out the next sample that need not wait any longer; `now_ns` is the present on the clock
+    /// of reception (the time of the newest message, where nothing is live).
+    pub fn pop(&mut self, now_ns: i64) -> Option<JointState> {
+        let front = self.pending.front()?;
+        let stamp_ns = front.header.stamp_ns;
+        let complete = (!self.settings.expects_command || self.commands.reaches(stamp_ns))
+            && (!self.settings.expects_reference || self.references.reaches(stamp_ns));
+        let waited = now_ns - front.header.received_ns >= self.settings.wait_ns;
+        if !(complete || waited || self.flushed || self.pending.len() >= MAX_PENDING) {
+            return None;
+        }
+        let mut sample = self.pending.pop_front()?;
+        self.attach(&mut sample);
+        self.counts.packed += 1;
+        Some(sample)
+    }
+
+    /// Whether a sample waits.
+    pub fn is_waiting(&self) -> bool {
+        !self.pending.is_empty()
+    }
+
+    /// No message will follow: nothing waits any longer.
+    pub fn flush(&mut self) {
+        self.flushed = true;
+    }
+
+    /// Says, after the last message, why there was no sample if there was none.
+    ///
+    /// # Errors
+    /// What kept every message from becoming a sample.
+    pub fn verdict(&self) -> Result<(), PackError> {
+        if self.counts.packed > 0 || !self.pending.is_empty() {
+            return Ok(());
+        }
+        let messages = self.messages;
+        if let Some((joint, field)) = self.state.never_finite() {
+            return Err(PackError::NotFiniteThroughout {
+                joint: self.layouts.joint_name(joint).to_owned(),
+                field,
+                messages,
+            });
+        }
+        let missing = self.layouts.never_named();
+        if messages > 0 && !missing.is_empty() {
+            let found = self.layouts.names_found();
+            return Err(PackError::JointsMissing { missing, found });
+        }
+        if messages > 0 && self.counts.incomplete == messages {
+            return Err(PackError::NoPositions { messages });
+        }
+        Err(PackError::NoSample { messages })
+    }
+
+    /// Adds a message to what its topic brought; gives the state of all joints once it is whole.
+    fn gather(
+        &mut self,
+        topic: Topic,
+        message: &ros::JointState,
+        received_ns: i64,
+    ) -> Option<Gathered> {
+        let layout = self.layouts.of(&message.name);
+        if layout.joints == 0 {
+            self.counts.foreign += 1;
+            return None;
+        }
+        let gather = match topic {
+            Topic::State => &mut self.state,
+            Topic::Command => &mut self.command,
+            Topic::Reference => &mut self.reference,
+        };
+        let whole = gather.add(layout, message, received_ns)?;
+        if !whole.is_finite(self.joint_count) {
+            self.counts.not_finite += 1;
+            return None;
+        }
+        Some(whole)
+    }
+
+    /// Puts a whole state among the samples that wait.
+    fn sample(&mut self, whole: &Gathered, received_ns: i64) {
+        let mut flags = flags::EFFORT_MEASURED * u32::from(whole.has_effort)
+            + flags::VELOCITY_MEASURED * u32::from(whole.has_velocity);
+        match self.newest_ns.map(|newest| whole.stamp_ns - newest) {
+            Some(0) => {
+                self.counts.repeated += 1;
+                return;
+            }
+            Some(step) if step < -JUMP_BACK_NS => {
+                self.counts.resets += 1;
+                self.state_velocity.reset();
+                flags |= flags::RESET;
+            }
+            Some(step) if step < 0 => {
+                self.counts.late += 1;
+                return;
+            }
+            _ => {}
+        }
+        self.newest_ns = Some(whole.stamp_ns);
+        let differentiated = self.state_velocity.update(
+            whole.stamp_ns,
+            &whole.position,
+            whole.has_velocity.then_some(&whole.velocity),
+        );
+        if differentiated.restarted && self.counts.packed + self.pending.len() as u64 > 0 {
+            flags |= flags::RESET;
+        }
+        self.pending.push_back(JointState {
+            header: Header {
+                stamp_ns: whole.stamp_ns,
+                received_ns,
+                sequence: 0,
+                flags,
+                joint_count: self.joint_count as u32,
+            },
+            position: whole.position,
+            velocity: differentiated.velocity,
+            effort: whole.effort,
+            ..JointState::default()
+        });
+    }
+
+    /// Adds what belongs to the sample's instant.
+    fn attach(&mut self, sample: &mut JointState) {
+        let stamp_ns = sample.header.stamp_ns;
+        if sample.header.has(flags::RESET) {
+            self.commands.forget_after(stamp_ns);
+            self.references.forget_after(stamp_ns);
+            self.tools.forget_after(stamp_ns);
+        }
+        let max_age_ns = self.settings.max_age_ns;
+        if let Some(command) = self.commands.at(stamp_ns, max_age_ns) {
+            sample.command_position = command.position;
+            sample.command_velocity = command.velocity;
+            sample.header.flags |= flags::COMMAND;
+            if command.velocity_given {
+                sample.header.flags |= flags::COMMAND_VELOCITY;
+            }
+        }
+        if let Some(effort) = self.references.at(stamp_ns, max_age_ns) {
+            sample.reference_effort = *effort;
+            sample.header.flags |= flags::REFERENCE;
+        }
+        // A tool stays until another is told of, however long that takes.
+        let tool = match self.tools.at(stamp_ns, i64::MAX) {
+            Some(told) => *told,
+            None => self.fixed_tool,
+        };
+        if let Some(tool) = tool {
+            sample.tool_mass_kg = tool.mass_kg;
+            sample.tool_com_m = tool.com_m;
+            sample.tool_inertia_kgm2 = tool.inertia_kgm2;
+            sample.header.flags |= flags::TOOL;
+        }
+    }
+}
+
+/// The header's stamp, or the time of reception where the publisher left it at zero.
+fn stamp_of(header: &ros::Header, received_ns: i64) -> i64 {
+    match header.stamp.ns() {
+        0 => received_ns,
+        stamp_ns => stamp_ns,
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,118 @@
+//! Puts together the state of all joints, which one message may bring or several.
+
+use tauscope_archive::ros;
+use tauscope_bus::{JointArray, MAX_JOINTS};
+
+use super::layout::Layout;
+use super::stamp_of;
+
+/// A state of all joints.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Gathered {
+    pub stamp_ns: i64,
+    pub position: JointArray,
+    pub velocity: JointArray,
+    pub effort: JointArray,
+    pub has_position: bool,
+    pub has_velocity: bool,
+    pub has_effort: bool,
+}
+
+impl Gathered {
+    pub fn is_finite(&self, joint_count: usize) -> bool {
+        [&self.position, &self.velocity, &self.effort]
+            .iter()
+            .all(|array| array[..joint_count].iter().all(|value| value.is_finite()))
+    }
+}
+
+/// The parts of a state that have come.
+#[derive(Debug)]
+pub(super) struct Gather {
+    all: u32,
+    seen: u32,
+    parts: Gathered,
+    /// Bit j: the number was finite once, or was not, for position, velocity and effort.
+    finite: [u32; 3],
+    not_finite: [u32; 3],
+}
+
+const NOTHING: Gathered = Gathered {
+    stamp_ns: 0,
+    position: [0.0; MAX_JOINTS],
+    velocity: [0.0; MAX_JOINTS],
+    effort: [0.0; MAX_JOINTS],
+    has_position: true,
+    has_velocity: true,
+    has_effort: true,
+};
+
+impl Gather {
+    pub fn new(joint_count: usize) -> Self {
+        Self {
+            all: u32::MAX.checked_shr(32 - joint_count as u32).unwrap_or(0),
+            seen: 0,
+            parts: NOTHING,
+            finite: [0; 3],
+            not_finite: [0; 3],
+        }
+    }
+
+    /// Adds a message; gives the state once each joint has been told of. Its stamp is that of its
+    /// newest part, and it has a velocity or effort if all parts have.
+    pub fn add(
+        &mut self,
+        layout: &Layout,
+        message: &ros::JointState,
+        received_ns: i64,
+    ) -> Option<Gathered> {
+        if self.seen == 0 {
+            self.parts = NOTHING;
+        }
+        self.seen |= layout.joints;
+        let parts = &mut self.parts;
+        parts.stamp_ns = parts.stamp_ns.max(stamp_of(&message.header, received_ns));
+        parts.has_position &= !message.position.is_empty();
+        parts.has_velocity &= !message.velocity.is_empty();
+        parts.has_effort &= !message.effort.is_empty();
+        let fields = [
+            (&message.position, &mut parts.position),
+            (&message.velocity, &mut parts.velocity),
+            (&message.effort, &mut parts.effort),
+        ];
+        for (field, (values, target)) in fields.into_iter().enumerate() {
+            for (&value, place) in values.iter().zip(&layout.places) {
+                let Some(j) = *place else { continue };
+                target[j] = value;
+                if value.is_finite() {
+                    self.finite[field] |= 1 << j;
+                } else {
+                    self.not_finite[field] |= 1 << j;
+                }
+            }
+        }
+        if self.seen & self.all != self.all {
+            return None;
+        }
+        self.seen = 0;
+        // What only some parts brought is void.
+        if !self.parts.has_velocity {
+            self.parts.velocity = [0.0; MAX_JOINTS];
+        }
+        if !self.parts.has_effort {
+            self.parts.effort = [0.0; MAX_JOINTS];
+        }
+        Some(self.parts)
+    }
+
+    /// The first joint and field that came and was never finite.
+    pub fn never_finite(&self) -> Option<(usize, &'static str)> {
+        ["position", "velocity", "effort"]
+            .into_iter()
+            .zip(self.not_finite.iter().zip(&self.finite))
+            .find_map(|(field, (bad, good))| {
+                let never = bad & !good;
+                (never != 0).then(|| (never.trailing_zeros() as usize, field))
+            })
+    }
+}

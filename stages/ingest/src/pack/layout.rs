@@ -1,0 +1,99 @@
+//! Where the joints of a message stand in the cell's order.
+
+/// Layouts that are remembered; a topic with more publishers than that is searched each time.
+const MAX_KNOWN: usize = 16;
+/// Foreign names that an error tells of.
+const MAX_FOUND: usize = 32;
+
+/// The order of one publisher's joints.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(super) struct Layout {
+    names: Vec<String>,
+    /// Place in the cell's order of each entry, if it is one of the cell's joints.
+    pub places: Vec<Option<usize>>,
+    /// Bit j: the message has joint j.
+    pub joints: u32,
+}
+
+/// The layouts of all publishers that were heard.
+#[derive(Debug)]
+pub(super) struct Layouts {
+    joint_names: Vec<String>,
+    known: Vec<Layout>,
+    newest: usize,
+    named: u32,
+    found: Vec<String>,
+}
+
+impl Layouts {
+    pub fn new(joint_names: &[String]) -> Self {
+        Self {
+            joint_names: joint_names.to_vec(),
+            known: Vec::new(),
+            newest: 0,
+            named: 0,
+            found: Vec::new(),
+        }
+    }
+
+    /// The layout of a message that names these joints. Looks a layout up by comparison, without
+    /// allocating: one publisher sends the same names each time.
+    pub fn of(&mut self, names: &[String]) -> &Layout {
+        let known = if self
+            .known
+            .get(self.newest)
+            .is_some_and(|l| l.names == names)
+        {
+            Some(self.newest)
+        } else {
+            self.known.iter().position(|layout| layout.names == names)
+        };
+        self.newest = match known {
+            Some(index) => index,
+            None => self.learn(names),
+        };
+        &self.known[self.newest]
+    }
+
+    fn learn(&mut self, names: &[String]) -> usize {
+        let places: Vec<_> = names
+            .iter()
+            .map(|name| self.joint_names.iter().position(|joint| joint == name))
+            .collect();
+        let joints = places.iter().flatten().fold(0, |mask, &j| mask | (1 << j));
+        self.named |= joints;
+        for name in names {
+            if self.found.len() < MAX_FOUND && !self.found.contains(name) {
+                self.found.push(name.clone());
+            }
+        }
+        if self.known.len() == MAX_KNOWN {
+            self.known.pop();
+        }
+        self.known.push(Layout {
+            names: names.to_vec(),
+            places,
+            joints,
+        });
+        self.known.len() - 1
+    }
+
+    pub fn joint_name(&self, joint: usize) -> &str {
+        &self.joint_names[joint]
+    }
+
+    /// Joints of the cell that no message named.
+    pub fn never_named(&self) -> Vec<String> {
+        self.joint_names
+            .iter()
+            .enumerate()
+            .filter(|(j, _)| self.named & (1 << j) == 0)
+            .map(|(_, name)| name.clone())
+            .collect()
+    }
+
+    /// The first few names that came.
+    pub fn names_found(&self) -> Vec<String> {
+        self.found.clone()
+    }
+}

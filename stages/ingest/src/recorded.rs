@@ -1,0 +1,280 @@
+//! Joint states out of a recording: MCAP, a rosbag2 bag, or a table.
+
+use std::path::{Path, PathBuf};
+
+use tauscope_archive::{ArchiveError, Damage, Messages, Recording, ros};
+use tauscope_bus::{Emit, JointState, Progress, Source, StageError};
+
+use crate::config::{Config, CsvConfig, FileConfig, Topics};
+use crate::error::IngestError;
+use crate::pack::{PackCounts, PackSettings, Packer};
+use crate::setup::Setup;
+
+/// How much later in the recording a command of a sample's instant may stand \[ns of log time\].
+const WAIT_NS: i64 = 100_000_000;
+/// Bounds the time of a step: messages that are read in one, and samples given out.
+const MESSAGES_PER_STEP: usize = 512;
+const SAMPLES_PER_STEP: usize = 16;
+
+/// Which part of a sample a topic brings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Role {
+    State,
+    Command,
+    Reference,
+    Tool,
+}
+
+/// A source that reads a recording, once, from its beginning to its end. Memory is bounded whatever
+/// the recording's size.
+pub struct RecordedSource {
+    path: PathBuf,
+    messages: Messages,
+    /// By the topic's place in the recording.
+    roles: Vec<Option<Role>>,
+    packer: Packer,
+    first: Option<JointState>,
+    message: ros::JointState,
+    tool: ros::InertiaStamped,
+    log_times_ns: (i64, i64),
+    now_ns: i64,
+    ended: bool,
+    damage: Vec<Damage>,
+    undecodable: u64,
+    first_undecodable: Option<ArchiveError>,
+}
+
+impl std::fmt::Debug for RecordedSource {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("RecordedSource")
+            .field("path", &self.path)
+            .field("counts", &self.packer.counts())
+            .finish_non_exhaustive()
+    }
+}
+
+impl RecordedSource {
+    /// Opens the recording that `file` names, and reads on to its first sample.
+    ///
+    /// # Errors
+    /// If it cannot be read, a topic is not there, or it holds no sample of this cell: no message
+    /// names a joint, a joint is NaN throughout.
+    pub fn open_file(
+        file: &FileConfig,
+        config: &Config,
+        setup: &Setup,
+    ) -> Result<Self, IngestError> {
+        let recording = Recording::open(&file.path)?;
+        Self::open(&recording, &file.topics, config, setup)
+    }
+
+    /// Opens the table that `csv` names, and reads on to its first sample.
+    ///
+    /// # Errors
+    /// As [`RecordedSource::open_file`]; an error in the table comes with its line.
+    pub fn open_csv(csv: &CsvConfig, config: &Config, setup: &Setup) -> Result<Self, IngestError> {
+        let recording = Recording::open_csv(&csv.path, &csv.columns, &setup.joint_names)?;
+        let topics = Topics::default();
+        Self::open(&recording, &topics, config, setup)
+    }
+
+    fn open(
+        recording: &Recording,
+        topics: &Topics,
+        config: &Config,
+        setup: &Setup,
+    ) -> Result<Self, IngestError> {
+        let named = |topic: &Option<String>| topic.is_some();
+        let settings = PackSettings {
+            velocity_cutoff_hz: config.velocity_cutoff_hz,
+            max_age_ns: (config.max_age_s * 1e9) as i64,
+            wait_ns: WAIT_NS,
+            expects_command: named(&topics.command),
+            expects_reference: named(&topics.twin),
+        };
+        let (roles, wanted) = roles(recording, topics)?;
+        let log_times_ns = (
+            recording.start_ns().unwrap_or(0),
+            recording.end_ns().unwrap_or(0),
+        );
+        let mut source = Self {
+            path: recording.path().to_owned(),
+            messages: recording.messages(&wanted)?,
+            roles,
+            packer: Packer::new(setup, settings)?,
+            first: None,
+            message: ros::JointState::default(),
+            tool: ros::InertiaStamped::default(),
+            log_times_ns,
+            now_ns: log_times_ns.0,
+            ended: false,
+            damage: recording.damage().to_vec(),
+            undecodable: 0,
+            first_undecodable: None,
+        };
+        for damage in &source.damage {
+            tracing::warn!("{damage}");
+        }
+        // What is wrong with the whole recording shows before anything is started.
+        while source.first.is_none() {
+            source.first = source.next_sample(usize::MAX)?;
+            if source.ended && source.first.is_none() {
+                if let Some(error) = source.first_undecodable.take() {
+                    return Err(error.into());
+                }
+                source.packer.verdict().map_err(|error| IngestError::Pack {
+                    origin: source.path.display().to_string(),
+                    source: error,
+                })?;
+            }
+        }
+        Ok(source)
+    }
+
+    /// Where it reads.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What it has counted.
+    pub fn counts(&self) -> PackCounts {
+        self.packer.counts()
+    }
+
+    /// Parts of the recording that could not be read so far.
+    pub fn damage(&self) -> &[Damage] {
+        &self.damage
+    }
+
+    /// Messages that were not what their topic says, so far.
+    pub fn undecodable(&self) -> u64 {
+        self.undecodable
+    }
+
+    /// The next sample, `None` at the end.
+    ///
+    /// # Errors
+    /// If the recording cannot be read any further.
+    pub fn next_packed(&mut self) -> Result<Option<JointState>, IngestError> {
+        match self.first.take() {
+            Some(first) => Ok(Some(first)),
+            None => self.next_sample(usize::MAX),
+        }
+    }
+
+    /// Reads at most `limit` messages on to the next sample.
+    fn next_sample(&mut self, limit: usize) -> Result<Option<JointState>, IngestError> {
+        let mut read = 0;
+        loop {
+            if let Some(sample) = self.packer.pop(self.now_ns) {
+                return Ok(Some(sample));
+            }
+            if self.ended || read >= limit {
+                return Ok(None);
+            }
+            self.read_message()?;
+            read += 1;
+        }
+    }
+
+    fn read_message(&mut self) -> Result<(), IngestError> {
+        let message = match self.messages.next_message() {
+            None => {
+                self.ended = true;
+                self.packer.flush();
+                return Ok(());
+            }
+            Some(Err(ArchiveError::Damaged(damage))) => {
+                tracing::warn!("{damage}");
+                if !self.damage.contains(&damage) {
+                    self.damage.push(damage);
+                }
+                return Ok(());
+            }
+            Some(other) => other?,
+        };
+        self.now_ns = message.log_time_ns;
+        let role = self.roles.get(message.topic_index).copied().flatten();
+        let decoded = match role {
+            None => return Ok(()),
+            Some(Role::Tool) => message.decode_into(&mut self.tool),
+            Some(_) => message.decode_into(&mut self.message),
+        };
+        if let Err(error) = decoded {
+            self.undecodable += 1;
+            if self.first_undecodable.is_none() {
+                tracing::warn!("{error}; further ones are only counted");
+                self.first_undecodable = Some(error);
+            }
+            return Ok(());
+        }
+        let (packer, now_ns) = (&mut self.packer, self.now_ns);
+        match role {
+            Some(Role::State) => packer.state(&self.message, now_ns),
+            Some(Role::Command) => packer.command(&self.message, now_ns),
+            Some(Role::Reference) => packer.reference(&self.message, now_ns),
+            Some(Role::Tool) => packer.tool(&self.tool, now_ns),
+            None => {}
+        }
+        Ok(())
+    }
+}
+
+/// The role of each of the recording's topics, and the names of those to read.
+fn roles<'a>(
+    recording: &Recording,
+    topics: &'a Topics,
+) -> Result<(Vec<Option<Role>>, Vec<&'a str>), ArchiveError> {
+    let mut wanted = vec![(topics.state.as_str(), Role::State)];
+    for (topic, role) in [
+        (&topics.command, Role::Command),
+        (&topics.twin, Role::Reference),
+        (&topics.tool, Role::Tool),
+    ] {
+        wanted.extend(topic.as_deref().map(|name| (name, role)));
+    }
+    let mut roles = vec![None; recording.topics().len()];
+    for &(name, role) in &wanted {
+        let topic = match role {
+            Role::Tool => recording.topic_of::<ros::InertiaStamped>(name)?,
+            _ => recording.topic_of::<ros::JointState>(name)?,
+        };
+        if let Some(index) = recording.topics().iter().position(|each| each == topic) {
+            roles[index] = Some(role);
+        }
+    }
+    Ok((roles, wanted.into_iter().map(|(name, _)| name).collect()))
+}
+
+impl Source<JointState> for RecordedSource {
+    fn step(&mut self, out: &mut dyn Emit<JointState>) -> Result<Progress, StageError> {
+        for _ in 0..SAMPLES_PER_STEP {
+            let sample = match self.first.take() {
+                Some(first) => Some(first),
+                None => self
+                    .next_sample(MESSAGES_PER_STEP)
+                    .map_err(StageError::failed)?,
+            };
+            match sample {
+                Some(sample) => out.emit(&mut |slot| *slot = sample)?,
+                None if self.ended => return Ok(Progress::End),
+                None => return Ok(Progress::More),
+            }
+        }
+        Ok(Progress::More)
+    }
+
+    fn dropped(&self) -> u64 {
+        let torn = self.damage.iter().filter(|part| part.loses_data()).count();
+        self.packer.counts().dropped() + self.undecodable + torn as u64
+    }
+
+    fn fraction_done(&self) -> Option<f64> {
+        let (start_ns, end_ns) = self.log_times_ns;
+        let whole = (end_ns - start_ns) as f64;
+        if self.ended || whole <= 0.0 {
+            return Some(1.0);
+        }
+        Some(((self.now_ns - start_ns) as f64 / whole).clamp(0.0, 1.0))
+    }
+}

@@ -1,0 +1,32 @@
+//! What a source must know of its cell.
+
+/// The facts of a cell that a source needs; the program works them out.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Setup {
+    /// The cell's name: the prefix of tauscope's own Zenoh keys.
+    pub cell: String,
+    /// The joints, in URDF order.
+    pub joint_names: Vec<String>,
+    /// The tool that is attached, as far as no topic says otherwise.
+    pub tool: Option<Tool>,
+}
+
+/// A tool, in the frame of the link it is attached to.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Tool {
+    /// Mass \[kg\].
+    pub mass_kg: f64,
+    /// Centre of mass \[m\].
+    pub com_m: [f64; 3],
+    /// Inertia about the centre of mass: xx, xy, xz, yy, yz, zz \[kg m²\].
+    pub inertia_kgm2: [f64; 6],
+}
+
+impl Tool {
+    /// Whether every number is finite.
+    pub fn is_finite(&self) -> bool {
+        self.mass_kg.is_finite()
+            && self.com_m.iter().all(|value| value.is_finite())
+            && self.inertia_kgm2.iter().all(|value| value.is_finite())
+    }
+}

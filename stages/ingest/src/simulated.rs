@@ -1,0 +1,33 @@
+//! The simulated cell: an arm with physics that its URDF does not tell of, driven along given motions,
+//! pushed now and then, and measured by imperfect sensors.
+//!
+//! Effort is the motor's: what the rigid body needs, plus what friction and the like cost, less what
+//! a push does for it (measured - RNEA = friction - Jᵀ F, with F the force on the robot). The same
+//! scenario gives the same numbers every time.
+
+mod check;
+mod controller;
+mod error;
+mod labels;
+mod messages;
+mod plant;
+mod push;
+mod scenario;
+mod sensors;
+mod simulation;
+mod source;
+mod trajectory;
+mod write;
+
+pub use error::ScenarioError;
+pub use labels::Labels;
+pub use scenario::{
+    ContactSpec, ControllerSettings, EffortUnit, FourierSpec, HandsSpec, MotionSpec, PointsSpec,
+    RecordedMotionSpec, RecordingSpec, Role, Scenario, Sensors, ToolSpec,
+};
+pub use simulation::{Event, Reading, Simulation};
+pub use source::SimulatedCell;
+pub use write::{Simulated, simulate};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,146 @@
+//! From what the arm does to what is published of it.
+
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use tauscope_bus::{JointArray, MAX_JOINTS};
+
+use super::error::ScenarioError;
+use super::scenario::{EffortUnit, Scenario};
+use super::trajectory::JointRange;
+
+/// The sensors of an arm.
+#[derive(Debug)]
+pub(super) struct SensorBank {
+    joint_count: usize,
+    position_noise_rad: f64,
+    position_step_rad: f64,
+    velocity_noise_rad_s: f64,
+    velocity_step_rad_s: f64,
+    effort_step_nm: f64,
+    effort_noise_nm: JointArray,
+    effort_gain: JointArray,
+    effort_bias_nm: JointArray,
+    unit_per_nm: JointArray,
+    rng: ChaCha8Rng,
+}
+
+/// What the sensors say at one instant.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Measured {
+    pub position: JointArray,
+    pub velocity: JointArray,
+    /// In the scenario's unit.
+    pub effort: JointArray,
+}
+
+impl SensorBank {
+    pub fn new(
+        scenario: &Scenario,
+        joints: &[JointRange],
+        rng: ChaCha8Rng,
+    ) -> Result<Self, ScenarioError> {
+        let sensors = &scenario.sensors;
+        let mut unit_per_nm = [1.0; MAX_JOINTS];
+        if scenario.effort_unit == EffortUnit::A {
+            for (unit, joint) in unit_per_nm.iter_mut().zip(joints) {
+                let constant = scenario.torque_constants_nm_per_a.get(&joint.name);
+                match constant {
+                    Some(&constant) if constant > 0.0 => *unit = 1.0 / constant,
+                    _ => {
+                        let joint = joint.name.clone();
+                        return Err(ScenarioError::NoTorqueConstant { joint });
+                    }
+                }
+            }
+        }
+        let mut effort_noise_nm = [0.0; MAX_JOINTS];
+        for (noise, joint) in effort_noise_nm.iter_mut().zip(joints) {
+            let share_nm = if joint.effort.is_finite() {
+                sensors.effort_noise_of_limit * joint.effort
+            } else {
+                0.0
+            };
+            *noise = sensors.effort_noise_nm.hypot(share_nm);
+        }
+        Ok(Self {
+            joint_count: joints.len(),
+            position_noise_rad: sensors.position_noise_rad,
+            position_step_rad: sensors.position_step_rad,
+            velocity_noise_rad_s: sensors.velocity_noise_rad_s,
+            velocity_step_rad_s: sensors.velocity_step_rad_s,
+            effort_step_nm: sensors.effort_step_nm,
+            effort_noise_nm,
+            effort_gain: by_joint("sensors.effort_gain", &sensors.effort_gain, 1.0, joints)?,
+            effort_bias_nm: by_joint(
+                "sensors.effort_bias_nm",
+                &sensors.effort_bias_nm,
+                0.0,
+                joints,
+            )?,
+            unit_per_nm,
+            rng,
+        })
+    }
+
+    /// A position in whole steps of the encoder.
+    pub fn in_steps(&self, position: &JointArray) -> JointArray {
+        position.map(|value| whole_steps(value, self.position_step_rad))
+    }
+
+    /// Measures an arm that is at `position`, moves with `velocity` and is driven with `effort_nm`.
+    pub fn measure(&mut self, position: &[f64], velocity: &[f64], effort_nm: &[f64]) -> Measured {
+        let mut measured = Measured {
+            position: [0.0; MAX_JOINTS],
+            velocity: [0.0; MAX_JOINTS],
+            effort: [0.0; MAX_JOINTS],
+        };
+        for j in 0..self.joint_count {
+            // Drawn whether used or not: changing one noise leaves the others as they were.
+            let [n_position, n_velocity, n_effort]: [f64; 3] =
+                [0; 3].map(|_| StandardNormal.sample(&mut self.rng));
+            let exact = position[j] + self.position_noise_rad * n_position;
+            measured.position[j] = whole_steps(exact, self.position_step_rad);
+            let exact = velocity[j] + self.velocity_noise_rad_s * n_velocity;
+            measured.velocity[j] = whole_steps(exact, self.velocity_step_rad_s);
+            let effort_nm = self.effort_gain[j] * effort_nm[j]
+                + self.effort_bias_nm[j]
+                + self.effort_noise_nm[j] * n_effort;
+            measured.effort[j] = whole_steps(effort_nm, self.effort_step_nm) * self.unit_per_nm[j];
+        }
+        measured
+    }
+}
+
+/// `value` rounded to a multiple of `step`, if that is not 0.
+fn whole_steps(value: f64, step: f64) -> f64 {
+    if step > 0.0 {
+        (value / step).round() * step
+    } else {
+        value
+    }
+}
+
+/// Values by joint name, put into the robot's order.
+fn by_joint(
+    what: &'static str,
+    values: &std::collections::BTreeMap<String, f64>,
+    default: f64,
+    joints: &[JointRange],
+) -> Result<JointArray, ScenarioError> {
+    let mut array = [default; MAX_JOINTS];
+    for (name, &value) in values {
+        let Some(j) = joints.iter().position(|joint| joint.name == *name) else {
+            return Err(ScenarioError::UnknownJoint {
+                what,
+                joint: name.clone(),
+                known: joints
+                    .iter()
+                    .map(|joint| joint.name.as_str())
+                    .collect::<Vec<_>>()
+                    .join(", "),
+            });
+        };
+        array[j] = value;
+    }
+    Ok(array)
+}

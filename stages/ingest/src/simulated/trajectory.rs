@@ -1,0 +1,89 @@
+//! The motion that the controller is told to make.
+
+mod fourier;
+mod points;
+mod spline;
+
+use tauscope_bus::JointArray;
+
+pub(super) use fourier::Fourier;
+pub(super) use points::{Allowed, Points};
+pub(super) use spline::Spline;
+
+/// What a joint can do, for those who plan its motion.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct JointRange {
+    pub name: String,
+    /// \[rad or m\].
+    pub lower: f64,
+    /// \[rad or m\].
+    pub upper: f64,
+    /// \[rad/s or m/s\].
+    pub velocity: f64,
+    /// \[N m or N\].
+    pub effort: f64,
+}
+
+impl JointRange {
+    pub fn middle(&self) -> f64 {
+        0.5 * (self.lower + self.upper)
+    }
+
+    /// Half the width of the range.
+    pub fn half(&self) -> f64 {
+        0.5 * (self.upper - self.lower)
+    }
+}
+
+/// Where the arm should be at an instant.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Target {
+    /// \[rad\].
+    pub position: JointArray,
+    /// \[rad/s\].
+    pub velocity: JointArray,
+    /// \[rad/s²\].
+    pub acceleration: JointArray,
+}
+
+/// A motion, known at any time from its start on. Asked with times that do not decrease.
+#[derive(Debug)]
+pub(super) enum Trajectory {
+    /// From point to point.
+    Points(Box<Points>),
+    /// Periodic excitation.
+    Fourier(Fourier),
+    /// Through the rows of a recording.
+    Spline(Spline),
+}
+
+impl Trajectory {
+    /// Where the arm should be `t_s` seconds from the start.
+    pub fn at(&mut self, t_s: f64) -> Target {
+        match self {
+            Self::Points(points) => points.at(t_s),
+            Self::Fourier(fourier) => fourier.at(t_s),
+            Self::Spline(spline) => spline.at(t_s),
+        }
+    }
+}
+
+/// The quintic polynomial from 0 to 1 with velocity and acceleration zero at both ends, its first and
+/// second derivative, at `u` from 0 to 1: the path of least jerk (Flash and Hogan 1985).
+fn quintic(u: f64) -> [f64; 3] {
+    let u = u.clamp(0.0, 1.0);
+    let (u2, u3) = (u * u, u * u * u);
+    [
+        u3 * (10.0 - 15.0 * u + 6.0 * u2),
+        30.0 * u2 * (1.0 - 2.0 * u + u2),
+        60.0 * u * (1.0 - 3.0 * u + 2.0 * u2),
+    ]
+}
+
+/// Largest value of the quintic's first derivative, at its middle.
+const QUINTIC_PEAK_VELOCITY: f64 = 1.875;
+/// Largest value of its second, 10/√3.
+const QUINTIC_PEAK_ACCELERATION: f64 = 5.773_502_691_896_258;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,143 @@
+//! Periodic excitation: a sum of sines, as Swevers et al. (1997) propose for identification.
+
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use tauscope_bus::{JointArray, MAX_JOINTS};
+
+use super::{JointRange, Target, quintic};
+use crate::simulated::error::ScenarioError;
+use crate::simulated::scenario::FourierSpec;
+
+/// Instants of a period at which limits are checked.
+const GRID: usize = 1000;
+/// The swing is blended in and out within this time, so that the arm begins and ends at rest \[s\].
+const BLEND_S: f64 = 2.0;
+
+/// The motion `q0 + s(t) Σ a sin(k ω t) + b cos(k ω t)`, with s(t) the blend.
+#[derive(Debug)]
+pub(in crate::simulated) struct Fourier {
+    about: JointArray,
+    /// By harmonic: coefficient of the sine and of the cosine, by joint.
+    waves: Vec<(JointArray, JointArray)>,
+    omega: f64,
+    joint_count: usize,
+    duration_s: f64,
+    blend_s: f64,
+}
+
+impl Fourier {
+    /// A swing of `duration_s` with random coefficients, as large as the limits allow.
+    pub fn new(
+        spec: &FourierSpec,
+        joints: &[JointRange],
+        duration_s: f64,
+        mut rng: ChaCha8Rng,
+    ) -> Result<Self, ScenarioError> {
+        let mut about = [0.0; MAX_JOINTS];
+        for (value, joint) in about.iter_mut().zip(joints) {
+            *value = joint.middle();
+        }
+        if let Some(given) = &spec.about {
+            super::super::check::position("motion.fourier.about", given, joints)?;
+            about[..joints.len()].copy_from_slice(given);
+        }
+        let omega = std::f64::consts::TAU / spec.period_s;
+        let waves = (1..=spec.harmonics)
+            .map(|k| {
+                // Equal shares of velocity for each harmonic.
+                let scale = 1.0 / f64::from(k);
+                let mut draw = || {
+                    let mut wave = [0.0; MAX_JOINTS];
+                    for value in &mut wave[..joints.len()] {
+                        *value = scale * (2.0 * rng.random::<f64>() - 1.0);
+                    }
+                    wave
+                };
+                (draw(), draw())
+            })
+            .collect();
+        let mut fourier = Self {
+            about,
+            waves,
+            omega,
+            joint_count: joints.len(),
+            duration_s,
+            blend_s: BLEND_S.min(0.5 * duration_s),
+        };
+        fourier.scale(spec, joints);
+        Ok(fourier)
+    }
+
+    /// Scales each joint's swing to its limits.
+    fn scale(&mut self, spec: &FourierSpec, joints: &[JointRange]) {
+        let mut peaks = [[0.0_f64; MAX_JOINTS]; 3];
+        for i in 0..GRID {
+            let t_s = std::f64::consts::TAU / self.omega * i as f64 / GRID as f64;
+            for (peak, swing) in peaks.iter_mut().zip(self.swing(t_s)) {
+                for (p, value) in peak.iter_mut().zip(swing) {
+                    *p = p.max(value.abs());
+                }
+            }
+        }
+        // The blend's own velocity and acceleration come on top of the swing's.
+        let ([_, ds, _], dds) = (quintic(0.5), super::QUINTIC_PEAK_ACCELERATION);
+        let (ds, dds) = (ds / self.blend_s, dds / self.blend_s / self.blend_s);
+        for (j, joint) in joints.iter().enumerate() {
+            let [position, velocity, acceleration] = peaks.map(|peak| peak[j]);
+            let room = spec.range * joint.half()
+                - (self.about[j] - joint.middle())
+                    .abs()
+                    .min(spec.range * joint.half());
+            let factor = (room / position)
+                .min(spec.speed * joint.velocity / (velocity + ds * position))
+                .min(
+                    spec.acceleration_rad_s2
+                        / (acceleration + 2.0 * ds * velocity + dds * position),
+                );
+            let factor = if factor.is_finite() { factor } else { 0.0 };
+            for (sine, cosine) in &mut self.waves {
+                sine[j] *= factor;
+                cosine[j] *= factor;
+            }
+        }
+    }
+
+    /// Position, velocity and acceleration of the sum of sines alone.
+    fn swing(&self, t_s: f64) -> [JointArray; 3] {
+        let mut swing = [[0.0; MAX_JOINTS]; 3];
+        for (k, (sine, cosine)) in self.waves.iter().enumerate() {
+            let rate = self.omega * (k + 1) as f64;
+            let (s, c) = (rate * t_s).sin_cos();
+            for j in 0..self.joint_count {
+                let wave = sine[j] * s + cosine[j] * c;
+                swing[0][j] += wave;
+                swing[1][j] += rate * (sine[j] * c - cosine[j] * s);
+                swing[2][j] -= rate * rate * wave;
+            }
+        }
+        swing
+    }
+
+    pub fn at(&self, t_s: f64) -> Target {
+        let [position, velocity, acceleration] = self.swing(t_s);
+        let left_s = self.duration_s - t_s;
+        let (u, direction) = if t_s <= left_s {
+            (t_s, 1.0)
+        } else {
+            (left_s, -1.0)
+        };
+        let [s, ds, dds] = quintic(u / self.blend_s);
+        let (ds, dds) = (
+            direction * ds / self.blend_s,
+            dds / self.blend_s / self.blend_s,
+        );
+        let mut target = Target::default();
+        for j in 0..self.joint_count {
+            target.position[j] = self.about[j] + s * position[j];
+            target.velocity[j] = s * velocity[j] + ds * position[j];
+            target.acceleration[j] =
+                s * acceleration[j] + 2.0 * ds * velocity[j] + dds * position[j];
+        }
+        target
+    }
+}

@@ -1,0 +1,130 @@
+//! Makes a scenario's recordings.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use tauscope_archive::{Compression, McapWriter, Written, ros};
+use tauscope_dynamics::Model;
+
+use super::error::ScenarioError;
+use super::labels::{Labels, RecordingLabels};
+use super::messages::CellMessages;
+use super::scenario::Scenario;
+use super::simulation::Simulation;
+
+/// What [`simulate`] has made.
+#[derive(Debug)]
+pub struct Simulated {
+    /// The recordings, in the scenario's order.
+    pub recordings: Vec<Written>,
+    /// Where the labels are.
+    pub labels_path: PathBuf,
+    /// The labels themselves.
+    pub labels: Labels,
+}
+
+/// Makes every recording of the scenario in the folder `out`, `<name>.mcap` each with
+/// `/joint_states`, `/joint_commands` and `/contact`, and `labels.json`.
+///
+/// `provenance` is written into each file; `progress` is told how much is done, from 0 to 1, and by
+/// returning `false` ends the work: `None` comes back then, and the recording at hand stays a `.part`.
+///
+/// # Errors
+/// If the scenario does not fit the robot, the arm runs away, or a file cannot be written.
+pub fn simulate(
+    scenario: &Scenario,
+    model: &Model,
+    out: &Path,
+    provenance: &BTreeMap<String, String>,
+    progress: &mut dyn FnMut(f64) -> bool,
+) -> Result<Option<Simulated>, ScenarioError> {
+    check_names(scenario)?;
+    // Everything is tried before anything is written.
+    let simulations = (0..scenario.recordings.len())
+        .map(|index| Simulation::new(scenario, model, index))
+        .collect::<Result<Vec<_>, _>>()?;
+    let whole_s: f64 = scenario.recordings.iter().map(|each| each.duration_s).sum();
+    let mut done_s = 0.0;
+    let set = out
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned();
+    let mut labels = Labels {
+        set,
+        ..Labels::default()
+    };
+    let mut recordings = Vec::new();
+    for (spec, mut simulation) in scenario.recordings.iter().zip(simulations) {
+        let path = out.join(format!("{}.mcap", spec.name));
+        let mut progress =
+            |fraction: f64| progress((done_s + fraction * spec.duration_s) / whole_s);
+        let messages = CellMessages::new(model, scenario.sensors.velocity);
+        let written = write(&path, messages, &mut simulation, provenance, &mut progress)?;
+        let Some(written) = written else {
+            return Ok(None);
+        };
+        recordings.push(written);
+        let label = RecordingLabels::new(spec, scenario.rate_hz, simulation.events());
+        labels.recordings.insert(spec.name.clone(), label);
+        done_s += spec.duration_s;
+    }
+    let labels_path = out.join("labels.json");
+    let unwritable = |source: std::io::Error| ScenarioError::Labels {
+        path: labels_path.clone(),
+        source,
+    };
+    let mut text = serde_json::to_vec_pretty(&labels).map_err(|error| unwritable(error.into()))?;
+    text.push(b'\n');
+    // Whole or not at all.
+    let part = out.join("labels.json.part");
+    std::fs::write(&part, text).map_err(unwritable)?;
+    std::fs::rename(&part, &labels_path).map_err(unwritable)?;
+    Ok(Some(Simulated {
+        recordings,
+        labels_path,
+        labels,
+    }))
+}
+
+/// Each recording has a name of its own.
+fn check_names(scenario: &Scenario) -> Result<(), ScenarioError> {
+    for (index, spec) in scenario.recordings.iter().enumerate() {
+        if scenario.recordings[..index]
+            .iter()
+            .any(|other| other.name == spec.name)
+        {
+            return Err(ScenarioError::Recording {
+                name: spec.name.clone(),
+                reason: "is there twice",
+                known: scenario.recording_names(),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Writes one recording; `None` if it was broken off.
+fn write(
+    path: &Path,
+    mut messages: CellMessages,
+    simulation: &mut Simulation,
+    provenance: &BTreeMap<String, String>,
+    progress: &mut dyn FnMut(f64) -> bool,
+) -> Result<Option<Written>, ScenarioError> {
+    let mut writer = McapWriter::create(path, Compression::Zstd, provenance)?;
+    let states = writer.add_topic::<ros::JointState>("/joint_states")?;
+    let commands = writer.add_topic::<ros::JointState>("/joint_commands")?;
+    let contacts = writer.add_topic::<ros::Bool>("/contact")?;
+    while let Some(reading) = simulation.next_reading()? {
+        messages.fill(&reading);
+        let ns = reading.stamp_ns;
+        writer.write(states, ns, ns, &messages.state)?;
+        writer.write(commands, ns, ns, &messages.command)?;
+        writer.write(contacts, ns, ns, &messages.contact)?;
+        if !progress(simulation.fraction_done()) {
+            return Ok(None);
+        }
+    }
+    Ok(Some(writer.finish()?))
+}

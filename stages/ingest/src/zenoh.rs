@@ -1,0 +1,277 @@
+//! Live joint states over Zenoh: ROS 2 nodes with `rmw_zenoh`, nodes behind `zenoh-bridge-ros2dds`, or
+//! tauscope's own keys.
+//!
+//! A subscriber only puts bytes into a bounded queue, where the oldest gives way; the rest is done by
+//! whoever asks for samples.
+
+mod attachment;
+mod keys;
+mod queue;
+
+use std::sync::Arc;
+use std::time::{Duration, SystemTime};
+
+use tauscope_archive::ros::{self, Message};
+use tauscope_bus::{Emit, JointState, Progress, Source, StageError};
+use zenoh::{Session, Wait};
+
+use crate::config::{Config, ConfigError, ZenohConfig};
+use crate::error::IngestError;
+use crate::pack::{PackCounts, PackSettings, Packer};
+use crate::setup::Setup;
+use attachment::{Attachment, Losses};
+use keys::KeyScheme;
+use queue::{Queue, Role, Waiting};
+
+/// How long a sample waits for the command of its instant \[ns\].
+const WAIT_NS: i64 = 10_000_000;
+/// A step waits this long for a message, or this long while a sample waits for its command.
+const LONGEST_WAIT: Duration = Duration::from_millis(50);
+const SHORTEST_WAIT: Duration = Duration::from_millis(2);
+/// Bounds the time of a step.
+const MESSAGES_PER_STEP: usize = 64;
+/// A joint state of sixteen joints has 1 kB.
+const MAX_PAYLOAD_BYTES: usize = 65_536;
+
+/// What a [`ZenohSource`] has counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ZenohCounts {
+    /// Messages that came.
+    pub received: u64,
+    /// Messages that gave way in the queue because the pipeline was busy.
+    pub overflowed: u64,
+    /// Messages that were lost on the way: holes in the publishers' numbers.
+    pub lost: u64,
+    /// Messages that are not what their topic says.
+    pub undecodable: u64,
+}
+
+/// A source that listens. It has no end; a publisher that comes back is heard again.
+pub struct ZenohSource {
+    /// Keeps the subscriptions alive.
+    session: Session,
+    queue: Arc<Queue>,
+    packer: Packer,
+    losses: Losses,
+    hashes: keys::HashWatch,
+    message: ros::JointState,
+    tool: ros::InertiaStamped,
+    counts: ZenohCounts,
+}
+
+impl std::fmt::Debug for ZenohSource {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("ZenohSource")
+            .field("counts", &self.counts())
+            .finish_non_exhaustive()
+    }
+}
+
+impl ZenohSource {
+    /// Opens a session and subscribes. Endpoints to connect to need not be there yet.
+    ///
+    /// # Errors
+    /// If an endpoint or key makes no sense, none is given, or an endpoint cannot be listened on.
+    pub fn open(zenoh: &ZenohConfig, config: &Config, setup: &Setup) -> Result<Self, IngestError> {
+        let session = zenoh::open(session_config(zenoh)?)
+            .wait()
+            .map_err(|error| IngestError::Zenoh(error.to_string()))?;
+        let queue = Arc::new(Queue::new(zenoh.queue));
+        let scheme = KeyScheme::new(zenoh, &setup.cell);
+        let topics = &zenoh.topics;
+        let named = [
+            (Some(&topics.state), Role::State),
+            (topics.command.as_ref(), Role::Command),
+            (topics.twin.as_ref(), Role::Reference),
+            (topics.tool.as_ref(), Role::Tool),
+        ];
+        for (topic, role) in named {
+            let Some(topic) = topic else { continue };
+            let key = match role {
+                Role::Tool => scheme.key(topic, &ros::InertiaStamped::dds_type()),
+                _ => scheme.key(topic, &ros::JointState::dds_type()),
+            };
+            subscribe(&session, &key, role, &queue)?;
+        }
+        let settings = PackSettings {
+            velocity_cutoff_hz: config.velocity_cutoff_hz,
+            max_age_ns: (config.max_age_s * 1e9) as i64,
+            wait_ns: WAIT_NS,
+            expects_command: topics.command.is_some(),
+            expects_reference: topics.twin.is_some(),
+        };
+        Ok(Self {
+            session,
+            queue,
+            packer: Packer::new(setup, settings)?,
+            losses: Losses::default(),
+            hashes: keys::HashWatch::new(&scheme),
+            message: ros::JointState::default(),
+            tool: ros::InertiaStamped::default(),
+            counts: ZenohCounts::default(),
+        })
+    }
+
+    /// What it has counted on the way in.
+    pub fn counts(&self) -> ZenohCounts {
+        ZenohCounts {
+            overflowed: self.queue.overflowed(),
+            lost: self.losses.lost(),
+            ..self.counts
+        }
+    }
+
+    /// What it has counted in packing.
+    pub fn pack_counts(&self) -> PackCounts {
+        self.packer.counts()
+    }
+
+    /// Whether the session is connected to anybody.
+    pub fn is_connected(&self) -> bool {
+        let info = self.session.info();
+        info.peers_zid().wait().next().is_some() || info.routers_zid().wait().next().is_some()
+    }
+
+    fn take(&mut self, waiting: &Waiting) {
+        self.counts.received += 1;
+        if let Some(attachment) = waiting.attachment {
+            self.losses.count(waiting.role, attachment);
+        }
+        let payload = waiting.payload.to_bytes();
+        let decoded = if payload.len() > MAX_PAYLOAD_BYTES {
+            Err(format!("{} bytes are too many", payload.len()))
+        } else if waiting.role == Role::Tool {
+            self.hashes
+                .compare(&waiting.key, ros::InertiaStamped::TYPE_HASH);
+            ros::decode_into(&payload, &mut self.tool).map_err(|error| error.to_string())
+        } else {
+            self.hashes
+                .compare(&waiting.key, ros::JointState::TYPE_HASH);
+            ros::decode_into(&payload, &mut self.message).map_err(|error| error.to_string())
+        };
+        if let Err(reason) = decoded {
+            if self.counts.undecodable == 0 {
+                tracing::warn!("{}: {reason}; further ones are only counted", waiting.key);
+            }
+            self.counts.undecodable += 1;
+            return;
+        }
+        let (packer, received_ns) = (&mut self.packer, waiting.received_ns);
+        match waiting.role {
+            Role::State => packer.state(&self.message, received_ns),
+            Role::Command => packer.command(&self.message, received_ns),
+            Role::Reference => packer.reference(&self.message, received_ns),
+            Role::Tool => packer.tool(&self.tool, received_ns),
+        }
+    }
+}
+
+impl Source<JointState> for ZenohSource {
+    fn step(&mut self, out: &mut dyn Emit<JointState>) -> Result<Progress, StageError> {
+        let mut progress = Progress::Idle;
+        for i in 0..MESSAGES_PER_STEP {
+            let patience = match (i, self.packer.is_waiting()) {
+                (0, false) => LONGEST_WAIT,
+                (0, true) => SHORTEST_WAIT,
+                _ => Duration::ZERO,
+            };
+            let waiting = self.queue.pop(patience);
+            if let Some(waiting) = &waiting {
+                self.take(waiting);
+            }
+            while let Some(sample) = self.packer.pop(now_ns()) {
+                out.emit(&mut |slot| *slot = sample)?;
+                progress = Progress::More;
+            }
+            if waiting.is_none() {
+                return Ok(progress);
+            }
+        }
+        Ok(Progress::More)
+    }
+
+    fn dropped(&self) -> u64 {
+        let counts = self.counts();
+        // A message that overflowed leaves a hole in the numbers too, where there are numbers.
+        self.packer.counts().dropped() + counts.undecodable + counts.overflowed.max(counts.lost)
+    }
+}
+
+/// The present on the clock of reception.
+fn now_ns() -> i64 {
+    SystemTime::now()
+        .duration_since(SystemTime::UNIX_EPOCH)
+        .map_or(0, |since| since.as_nanos() as i64)
+}
+
+fn subscribe(
+    session: &Session,
+    key: &str,
+    role: Role,
+    queue: &Arc<Queue>,
+) -> Result<(), IngestError> {
+    let queue = Arc::clone(queue);
+    session
+        .declare_subscriber(key.to_owned())
+        .callback(move |sample| {
+            let attachment = sample
+                .attachment()
+                .and_then(|bytes| Attachment::parse(&bytes.to_bytes()));
+            queue.push(Waiting {
+                role,
+                received_ns: now_ns(),
+                key: sample.key_expr().clone().into_owned(),
+                payload: sample.payload().clone(),
+                attachment,
+            });
+        })
+        .background()
+        .wait()
+        .map_err(|error| {
+            ConfigError::Zenoh {
+                what: "key",
+                text: key.to_owned(),
+                reason: error.to_string(),
+            }
+            .into()
+        })
+}
+
+/// A session that talks to the given endpoints only, and tries them again for ever.
+fn session_config(zenoh: &ZenohConfig) -> Result<zenoh::Config, ConfigError> {
+    if zenoh.connect.is_empty() && zenoh.listen.is_empty() {
+        return Err(ConfigError::NoEndpoint);
+    }
+    let mut config = zenoh::Config::default();
+    let list = |endpoints: &[String]| serde_json::Value::from(endpoints).to_string();
+    let settings = [
+        ("mode", "\"peer\"".to_owned()),
+        ("connect/endpoints", list(&zenoh.connect)),
+        ("listen/endpoints", list(&zenoh.listen)),
+        ("connect/timeout_ms", "-1".to_owned()),
+        ("connect/exit_on_failure", "false".to_owned()),
+        (
+            "connect/retry",
+            "{period_init_ms: 200, period_max_ms: 2000, period_increase_factor: 2}".to_owned(),
+        ),
+        ("listen/timeout_ms", "0".to_owned()),
+        ("listen/exit_on_failure", "true".to_owned()),
+        ("scouting/multicast/enabled", "false".to_owned()),
+        ("scouting/gossip/enabled", "false".to_owned()),
+        ("transport/shared_memory/enabled", "false".to_owned()),
+    ];
+    for (key, value) in settings {
+        config
+            .insert_json5(key, &value)
+            .map_err(|error| ConfigError::Zenoh {
+                what: if key.ends_with("endpoints") {
+                    "endpoints"
+                } else {
+                    "setting"
+                },
+                text: format!("{key}: {value}"),
+                reason: error.to_string(),
+            })?;
+    }
+    Ok(config)
+}
