@@ -12,6 +12,7 @@ mod bag_folder;
 mod csv_file;
 mod damage;
 mod error;
+mod info;
 mod joint_map;
 mod mcap_file;
 mod mcap_write;
@@ -23,6 +24,7 @@ mod sqlite_file;
 pub use csv_file::{Column, Columns, CsvError, CsvMapping, CsvProblem, limits as csv_limits};
 pub use damage::{Damage, DamageKind};
 pub use error::ArchiveError;
+pub use info::{Gap, Info, JointsInfo, TopicInfo};
 pub use joint_map::{JointMap, JointMapError};
 pub use mcap_write::{
     CHUNK_SPAN_NS, Compression, McapWriter, PROVENANCE, TopicWriter, WriteError, Written,

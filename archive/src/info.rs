@@ -1,0 +1,295 @@
+//! What is in a recording, at length.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use crate::damage::{Damage, seconds};
+use crate::recording::{Message, Recording, RecordingKind};
+use crate::ros::{JointState, Message as _};
+use crate::{ArchiveError, Topic};
+
+/// A pause counts as a gap if it is this many times as long as the topic's mean period.
+const GAP_PERIODS: i64 = 5;
+/// The longest gaps of a topic that are listed.
+const GAPS_LISTED: usize = 5;
+
+/// What is in a recording: found by reading all of it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Info {
+    /// Where it lies.
+    pub path: PathBuf,
+    /// What it is stored as.
+    pub kind: RecordingKind,
+    /// Its size on disk \[bytes\].
+    pub bytes: u64,
+    /// Log time of the first message \[ns since the epoch\].
+    pub start_ns: Option<i64>,
+    /// Log time of the last message \[ns since the epoch\].
+    pub end_ns: Option<i64>,
+    /// From the first to the last message \[s\].
+    pub duration_s: f64,
+    /// Messages that were read.
+    pub message_count: u64,
+    /// Its topics.
+    pub topics: Vec<TopicInfo>,
+    /// What made it, if it was one of ours.
+    pub provenance: Option<BTreeMap<String, String>>,
+    /// What of it cannot be read.
+    pub damage: Vec<Damage>,
+}
+
+/// What is on a topic.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TopicInfo {
+    /// Name, type and number of messages: of those that were read.
+    #[serde(flatten)]
+    pub topic: Topic,
+    /// Messages per second, on average from the first to the last of the topic.
+    pub rate_hz: Option<f64>,
+    /// The longest pauses of at least five mean periods, longest first.
+    pub gaps: Vec<Gap>,
+    /// Messages that are not what their type says.
+    pub undecodable: u64,
+    /// What its joint states hold, if it carries any.
+    pub joints: Option<JointsInfo>,
+}
+
+/// A pause in a topic.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Gap {
+    /// From the start of the recording to the last message before it \[s\].
+    pub at_s: f64,
+    /// How long it lasts \[s\].
+    pub duration_s: f64,
+}
+
+/// What joint states hold.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct JointsInfo {
+    /// Joints in the first message.
+    pub names: Vec<String>,
+    /// Whether positions were given in any message.
+    pub position: bool,
+    /// Whether velocities were.
+    pub velocity: bool,
+    /// Whether efforts were.
+    pub effort: bool,
+    /// Messages with a NaN in them.
+    pub nan_messages: u64,
+}
+
+impl Info {
+    /// Reads all of `recording`, once, with bounded memory.
+    ///
+    /// # Errors
+    /// If it can no longer be opened, or reading fails altogether. Damage is no error.
+    pub fn read(recording: &Recording) -> Result<Self, ArchiveError> {
+        let mut tallies: Vec<_> = recording.topics().iter().map(Tally::new).collect();
+        let mut damage = recording.damage().to_vec();
+        let mut messages = recording.all_messages()?;
+        while let Some(message) = messages.next_message() {
+            match message {
+                Ok(message) => tallies[message.topic_index].add(&message),
+                Err(ArchiveError::Damaged(found)) => damage.push(found),
+                Err(error) => return Err(error),
+            }
+        }
+        let start_ns = tallies.iter().filter_map(|tally| tally.first_ns).min();
+        let end_ns = tallies.iter().filter_map(|tally| tally.last_ns).max();
+        let topics = tallies.into_iter();
+        let topics: Vec<_> = topics
+            .map(|tally| tally.finish(start_ns.unwrap_or(0)))
+            .collect();
+        Ok(Self {
+            path: recording.path().to_owned(),
+            kind: recording.kind(),
+            bytes: recording.bytes(),
+            start_ns,
+            end_ns,
+            duration_s: start_ns
+                .zip(end_ns)
+                .map_or(0.0, |(start, end)| in_seconds(end - start)),
+            message_count: topics.iter().map(|info| info.topic.message_count).sum(),
+            topics,
+            provenance: recording.provenance().cloned(),
+            damage,
+        })
+    }
+
+    /// Whether messages are lost.
+    pub fn has_lost_data(&self) -> bool {
+        self.damage.iter().any(Damage::loses_data)
+    }
+}
+
+/// Counts a topic.
+struct Tally {
+    topic: Topic,
+    first_ns: Option<i64>,
+    last_ns: Option<i64>,
+    /// The longest pauses and where they begin, longest first.
+    pauses_ns: Vec<(i64, i64)>,
+    undecodable: u64,
+    joints: Option<JointsInfo>,
+    state: JointState,
+}
+
+impl Tally {
+    fn new(topic: &Topic) -> Self {
+        let joints = topic.type_name == JointState::TYPE && topic.message_encoding == "cdr";
+        Self {
+            topic: Topic {
+                message_count: 0,
+                ..topic.clone()
+            },
+            first_ns: None,
+            last_ns: None,
+            pauses_ns: Vec::new(),
+            undecodable: 0,
+            joints: joints.then(JointsInfo::default),
+            state: JointState::default(),
+        }
+    }
+
+    fn add(&mut self, message: &Message<'_>) {
+        let log_time_ns = message.log_time_ns;
+        self.topic.message_count += 1;
+        self.first_ns.get_or_insert(log_time_ns);
+        if let Some(last_ns) = self.last_ns.replace(log_time_ns) {
+            let pause_ns = log_time_ns - last_ns;
+            let rank = self.pauses_ns.partition_point(|&(p, _)| p >= pause_ns);
+            if rank < GAPS_LISTED {
+                self.pauses_ns.truncate(GAPS_LISTED - 1);
+                self.pauses_ns.insert(rank, (pause_ns, last_ns));
+            }
+        }
+        if let Some(joints) = &mut self.joints {
+            match message.decode_into(&mut self.state) {
+                Ok(()) => joints.add(&self.state),
+                Err(_) => self.undecodable += 1,
+            }
+        }
+    }
+
+    fn finish(self, start_ns: i64) -> TopicInfo {
+        let span_ns = self
+            .first_ns
+            .zip(self.last_ns)
+            .map_or(0, |(first, last)| last - first);
+        let periods = i64::try_from(self.topic.message_count.saturating_sub(1)).unwrap_or(0);
+        let gap = |&&(pause_ns, _): &&(i64, i64)| {
+            pause_ns.saturating_mul(periods) >= span_ns.saturating_mul(GAP_PERIODS)
+        };
+        let gaps = self.pauses_ns.iter().filter(gap);
+        TopicInfo {
+            rate_hz: (span_ns > 0).then(|| periods as f64 / in_seconds(span_ns)),
+            gaps: gaps
+                .map(|&(pause_ns, from_ns)| Gap {
+                    at_s: in_seconds(from_ns - start_ns),
+                    duration_s: in_seconds(pause_ns),
+                })
+                .collect(),
+            topic: self.topic,
+            undecodable: self.undecodable,
+            joints: self.joints,
+        }
+    }
+}
+
+impl JointsInfo {
+    fn add(&mut self, state: &JointState) {
+        if self.names.is_empty() {
+            self.names.clone_from(&state.name);
+        }
+        self.position |= !state.position.is_empty();
+        self.velocity |= !state.velocity.is_empty();
+        self.effort |= !state.effort.is_empty();
+        let mut values = [&state.position, &state.velocity, &state.effort]
+            .into_iter()
+            .flatten();
+        self.nan_messages += u64::from(values.any(|value| value.is_nan()));
+    }
+}
+
+fn in_seconds(ns: i64) -> f64 {
+    ns as f64 * 1e-9
+}
+
+impl fmt::Display for Info {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{}: {}, {} bytes, {} messages in {:.3} s",
+            self.path.display(),
+            self.kind,
+            self.bytes,
+            self.message_count,
+            self.duration_s
+        )?;
+        if let Some((start_ns, end_ns)) = self.start_ns.zip(self.end_ns) {
+            writeln!(f, "from {} s to {} s", seconds(start_ns), seconds(end_ns))?;
+        }
+        for topic in &self.topics {
+            write!(f, "{topic}")?;
+        }
+        for (key, value) in self.provenance.iter().flatten() {
+            writeln!(f, "made by: {key}: {value}")?;
+        }
+        for damage in &self.damage {
+            writeln!(f, "damage: {damage}")?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for TopicInfo {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Topic {
+            name,
+            type_name,
+            message_count,
+            ..
+        } = &self.topic;
+        write!(f, "{name}: {message_count} x {type_name}")?;
+        match self.rate_hz {
+            Some(rate_hz) => writeln!(f, ", {rate_hz:.1} Hz")?,
+            None => writeln!(f)?,
+        }
+        if let Some(joints) = &self.joints {
+            writeln!(f, "  {joints}")?;
+        }
+        for gap in &self.gaps {
+            writeln!(f, "  a gap of {:.3} s at {:.3} s", gap.duration_s, gap.at_s)?;
+        }
+        if self.undecodable > 0 {
+            writeln!(f, "  {} messages are not of that type", self.undecodable)?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for JointsInfo {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let given: Vec<_> = [
+            (self.position, "position"),
+            (self.velocity, "velocity"),
+            (self.effort, "effort"),
+        ]
+        .into_iter()
+        .filter_map(|(given, name)| given.then_some(name))
+        .collect();
+        write!(
+            f,
+            "joints {} with {}",
+            self.names.join(", "),
+            given.join(", ")
+        )?;
+        if self.nan_messages > 0 {
+            write!(f, "; NaN in {} messages", self.nan_messages)?;
+        }
+        Ok(())
+    }
+}
