@@ -1,0 +1,255 @@
+//! The archive: what is kept of the streams as MCAP, in messages that any ROS 2 tool reads.
+//!
+//! | topic | type | holds |
+//! | --- | --- | --- |
+//! | `/joint_states` | `sensor_msgs/msg/JointState` | what was received; velocity and effort are empty where they were not measured |
+//! | `/joint_commands` | `sensor_msgs/msg/JointState` | the command, when it changes and every 0.1 s |
+//! | `/tool` | `geometry_msgs/msg/InertiaStamped` | the tool, whenever it changes; mass 0 where there is none any more |
+//! | `/twin/joint_states` | `sensor_msgs/msg/JointState` | effort only: what the twin expects, not filtered |
+//! | `/residual` | `sensor_msgs/msg/JointState` | effort only: the filtered difference, from when the filters have settled on |
+//! | `/external_wrench` | `geometry_msgs/msg/WrenchStamped` | the estimated force on the robot, in the world's axes, with its torque about the world's origin, while there is one |
+//! | `/detections` | `diagnostic_msgs/msg/DiagnosticArray` | one status at each beginning and end of an alarm and each other change of a detector's state |
+//! | `/detections/<detector>/score` | `std_msgs/msg/Float64` | the score of each sample that the detector judged |
+//! | `/detections/<detector>/threshold` | `std_msgs/msg/Float64` | the threshold, whenever it changes |
+//! | `/diagnostics` | `diagnostic_msgs/msg/DiagnosticArray` | how the stages fare |
+//!
+//! Log time is when the source received the sample that a message comes from, publish time is that
+//! sample's stamp; so a `Float64`, which has no stamp of its own, does not lose it. The same samples
+//! in the same order give the same bytes. See `streams.rs` for the topics of several cells and
+//! of several streams of one kind.
+
+mod command;
+mod detections;
+mod joints;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use tauscope_archive::ros::{self, DiagnosticArray};
+use tauscope_archive::{Compression, McapWriter, TopicWriter, WriteError};
+use tauscope_bus::{Header, Health, SampleKind, SampleRef, TwinState, flags};
+
+use self::command::CommandTopics;
+use self::detections::DetectionTopics;
+use self::joints::{JointTopic, status};
+use crate::error::RecordError;
+use crate::streams::{Stream, Streams};
+
+/// An archive that is being written.
+pub(crate) struct Archive {
+    file: File,
+    /// By stream.
+    topics: Vec<Topics>,
+    /// By cell; made when the first report comes.
+    diagnostics: Vec<Option<TopicWriter<DiagnosticArray>>>,
+}
+
+/// What a stream writes to.
+enum Topics {
+    JointState {
+        state: JointTopic,
+        command: Box<CommandTopics>,
+    },
+    TwinState {
+        expected: JointTopic,
+        residual: JointTopic,
+    },
+    Detection(Box<DetectionTopics>),
+    Health,
+}
+
+/// The file, with the times that a sample's header gives.
+pub(crate) struct File {
+    writer: McapWriter,
+}
+
+impl File {
+    fn add<M: ros::Message>(&mut self, topic: &str) -> Result<TopicWriter<M>, WriteError> {
+        self.writer.add_topic(topic)
+    }
+
+    fn write<M: ros::Message>(
+        &mut self,
+        topic: TopicWriter<M>,
+        header: &Header,
+        message: &M,
+    ) -> Result<(), WriteError> {
+        self.writer
+            .write(topic, header.received_ns, header.stamp_ns, message)
+    }
+
+    /// Writes to a topic that is made at the first message.
+    fn write_late<M: ros::Message>(
+        &mut self,
+        topic: &mut Option<TopicWriter<M>>,
+        name: impl FnOnce() -> String,
+        header: &Header,
+        message: &M,
+    ) -> Result<(), WriteError> {
+        let topic = match *topic {
+            Some(topic) => topic,
+            None => *topic.insert(self.add(&name())?),
+        };
+        self.write(topic, header, message)
+    }
+}
+
+impl Archive {
+    /// Begins the file with the topics that are known by now.
+    pub fn create(
+        path: &Path,
+        compression: Compression,
+        provenance: &BTreeMap<String, String>,
+        streams: &Streams,
+    ) -> Result<Self, RecordError> {
+        let writer = McapWriter::create(path, compression, provenance)?;
+        if let Some(aside) = writer.set_aside() {
+            let aside = aside.display();
+            tracing::warn!("an unfinished archive of a run before was kept as {aside}");
+        }
+        let mut file = File { writer };
+        let mut topics = Vec::new();
+        // One topic of detections for all detectors of a cell.
+        let mut detections = vec![None; streams.cells.len()];
+        for stream in &streams.all {
+            topics.push(Topics::new(
+                &mut file,
+                streams,
+                stream,
+                &mut detections[stream.cell],
+            )?);
+        }
+        let diagnostics = vec![None; streams.cells.len()];
+        Ok(Self {
+            file,
+            topics,
+            diagnostics,
+        })
+    }
+
+    /// Takes a sample of the stream number `index`.
+    pub fn accept(
+        &mut self,
+        streams: &Streams,
+        index: usize,
+        sample: SampleRef<'_>,
+    ) -> Result<(), RecordError> {
+        let stream = &streams.all[index];
+        match (sample, &mut self.topics[index]) {
+            (SampleRef::Health(health), _) => self.report(streams, stream, health)?,
+            (SampleRef::JointState(sample), Topics::JointState { state, command }) => {
+                let has = |flag, values| {
+                    if sample.header.has(flag) {
+                        values
+                    } else {
+                        None
+                    }
+                };
+                state.write(
+                    &mut self.file,
+                    &sample.header,
+                    Some(&sample.position),
+                    has(flags::VELOCITY_MEASURED, Some(&sample.velocity)),
+                    has(flags::EFFORT_MEASURED, Some(&sample.effort)),
+                )?;
+                command.write(&mut self.file, sample)?;
+            }
+            (SampleRef::TwinState(sample), Topics::TwinState { expected, residual }) => {
+                let TwinState { header, .. } = sample;
+                let file = &mut self.file;
+                expected.write(file, header, None, None, Some(&sample.expected_effort))?;
+                if header.has(flags::READY) {
+                    residual.write(file, header, None, None, Some(&sample.residual))?;
+                }
+            }
+            (SampleRef::Detection(detection), Topics::Detection(topics)) => {
+                topics.write(&mut self.file, streams, stream, detection)?;
+            }
+            // `Streams::find` lets only samples of the announced type through.
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn report(
+        &mut self,
+        streams: &Streams,
+        stream: &Stream,
+        health: &Health,
+    ) -> Result<(), WriteError> {
+        let level = if health.dropped > 0 {
+            ros::Level::Warn
+        } else {
+            ros::Level::Ok
+        };
+        let message = match health.dropped {
+            0 => "nothing lost".to_owned(),
+            dropped => format!("{dropped} samples lost"),
+        };
+        let values = [
+            ("received", health.received),
+            ("emitted", health.emitted),
+            ("dropped", health.dropped),
+            ("restarts", health.restarts),
+        ];
+        let status = status(
+            level,
+            health.stage.as_str(),
+            message,
+            &streams.cells[stream.cell].name,
+            values.map(|(key, count)| (key, count.to_string())),
+        );
+        let array = DiagnosticArray {
+            header: ros::Header::new(health.header.stamp_ns, ""),
+            status: vec![status],
+        };
+        self.file.write_late(
+            &mut self.diagnostics[stream.cell],
+            || format!("{}/diagnostics", streams.prefix(stream.cell)),
+            &health.header,
+            &array,
+        )
+    }
+
+    /// Hands all to the operating system.
+    pub fn flush(&mut self) -> Result<(), RecordError> {
+        Ok(self.file.writer.flush()?)
+    }
+
+    /// Completes the file and gives it its name.
+    pub fn finish(self) -> Result<(), RecordError> {
+        self.file.writer.finish()?;
+        Ok(())
+    }
+}
+
+impl Topics {
+    fn new(
+        file: &mut File,
+        streams: &Streams,
+        stream: &Stream,
+        detections: &mut Option<TopicWriter<DiagnosticArray>>,
+    ) -> Result<Self, WriteError> {
+        let joints = &streams.cells[stream.cell].joint_names;
+        Ok(match stream.kind {
+            SampleKind::JointState => Self::JointState {
+                state: JointTopic::new(file.add(&stream.topic)?, joints),
+                command: Box::new(CommandTopics::new(streams, stream)),
+            },
+            SampleKind::TwinState => Self::TwinState {
+                expected: JointTopic::new(file.add(&stream.topic)?, joints),
+                residual: JointTopic::new(file.add(&streams.residual_topic(stream))?, joints),
+            },
+            SampleKind::Detection => {
+                let events = match *detections {
+                    Some(topic) => topic,
+                    None => *detections.insert(file.add(&stream.topic)?),
+                };
+                Self::Detection(Box::new(DetectionTopics::new(
+                    file, streams, stream, events,
+                )?))
+            }
+            SampleKind::Health => Self::Health,
+        })
+    }
+}

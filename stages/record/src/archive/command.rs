@@ -1,0 +1,96 @@
+//! What a joint state carries besides the measurement, the command and the tool, so that the archive
+//! replays as the recording did. Written when they change; a command that stays is told again now
+//! and then, because a source takes none that is old.
+
+use tauscope_archive::ros::{self, Inertia, InertiaStamped};
+use tauscope_archive::{TopicWriter, WriteError};
+use tauscope_bus::{JointArray, JointState, flags};
+
+use super::File;
+use super::joints::JointTopic;
+use crate::streams::{Stream, Streams};
+
+/// The topics of the command and of the tool, made when there is something to write.
+pub(super) struct CommandTopics {
+    joints: Vec<String>,
+    command_name: String,
+    command: Option<JointTopic>,
+    newest: Option<Command>,
+    newest_ns: i64,
+    tool_name: String,
+    tool: Option<TopicWriter<InertiaStamped>>,
+    attached: Option<Tool>,
+}
+
+/// A command is told again after this time \[ns\].
+const REPEAT_NS: u64 = 100_000_000;
+
+/// Position, and velocity if it was given.
+type Command = (JointArray, Option<JointArray>);
+
+/// Mass, centre of mass and inertia.
+type Tool = (f64, [f64; 3], [f64; 6]);
+
+impl CommandTopics {
+    pub fn new(streams: &Streams, stream: &Stream) -> Self {
+        let prefix = streams.prefix(stream.cell);
+        let suffix = stream.topic[prefix.len()..].trim_start_matches("/joint_states");
+        Self {
+            joints: streams.cells[stream.cell].joint_names.clone(),
+            command_name: format!("{prefix}/joint_commands{suffix}"),
+            command: None,
+            newest: None,
+            newest_ns: 0,
+            tool_name: format!("{prefix}/tool{suffix}"),
+            tool: None,
+            attached: None,
+        }
+    }
+
+    pub fn write(&mut self, file: &mut File, sample: &JointState) -> Result<(), WriteError> {
+        let header = &sample.header;
+        if header.has(flags::COMMAND) {
+            let velocity = header
+                .has(flags::COMMAND_VELOCITY)
+                .then_some(sample.command_velocity);
+            let command = (sample.command_position, velocity);
+            let old = header.stamp_ns.abs_diff(self.newest_ns) >= REPEAT_NS;
+            if self.newest != Some(command) || old {
+                let topic = match &mut self.command {
+                    Some(topic) => topic,
+                    none => {
+                        none.insert(JointTopic::new(file.add(&self.command_name)?, &self.joints))
+                    }
+                };
+                topic.write(file, header, Some(&command.0), command.1.as_ref(), None)?;
+                self.newest = Some(command);
+                self.newest_ns = header.stamp_ns;
+            }
+        }
+        let tool = header.has(flags::TOOL).then_some((
+            sample.tool_mass_kg,
+            sample.tool_com_m,
+            sample.tool_inertia_kgm2,
+        ));
+        if tool != self.attached {
+            self.attached = tool;
+            let (m, com, [ixx, ixy, ixz, iyy, iyz, izz]) = tool.unwrap_or_default();
+            let com = com.into();
+            let message = InertiaStamped {
+                header: ros::Header::new(header.stamp_ns, ""),
+                inertia: Inertia {
+                    m,
+                    com,
+                    ixx,
+                    ixy,
+                    ixz,
+                    iyy,
+                    iyz,
+                    izz,
+                },
+            };
+            file.write_late(&mut self.tool, || self.tool_name.clone(), header, &message)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,251 @@
+//! How the viewer opens: robot and events on the left, a plot a joint and the detectors on the
+//! right; a tab a cell.
+
+mod properties;
+
+use rerun::blueprint::{
+    Blueprint, BlueprintActivation, BlueprintPanel, ContainerLike, Grid, Horizontal,
+    SelectionPanel, Spatial3DView, StateTimelineView, Tabs, TextLogView, TimePanel, TimeSeriesView,
+    Vertical,
+};
+use rerun::components::Name;
+use rerun::external::re_sdk_types::blueprint::components::{PanelState, PlayState};
+use rerun::log::LogMsg;
+use rerun::{Rgba32, SeriesLines};
+use tauscope_bus::SampleKind;
+
+use self::properties::Properties;
+use super::detections::{events_entity, score_entity, state_entity, threshold_entity};
+use super::painter::Painter;
+use super::palette::{CONTACT, EXPECTED, MEASURED, RESIDUAL, SCORE};
+use super::store::entity;
+use super::tracks::STAMP;
+use crate::error::RecordError;
+use crate::streams::{Stream, Streams};
+
+/// How much of the past a live plot shows \[ns\].
+const LIVE_WINDOW_NS: i64 = 30_000_000_000;
+
+/// What the layout is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Purpose {
+    /// A stream that goes on.
+    Live,
+    /// A file.
+    File,
+}
+
+/// The layout's messages.
+pub(super) fn messages(
+    streams: &Streams,
+    painter: &Painter,
+    purpose: Purpose,
+) -> Result<Vec<LogMsg>, RecordError> {
+    let mut properties = Properties::default();
+    let mut layout = Layout {
+        streams,
+        painter,
+        purpose,
+        properties: &mut properties,
+    };
+    let mut cells: Vec<_> = (0..streams.cells.len())
+        .map(|cell| layout.cell(cell))
+        .collect();
+    let root = match cells.pop() {
+        Some(only) if cells.is_empty() => only,
+        last => Tabs::new(cells.into_iter().chain(last)).into(),
+    };
+    let mut time = TimePanel::new()
+        .with_timeline(STAMP)
+        .with_state(PanelState::Collapsed);
+    if purpose == Purpose::Live {
+        time = time.with_play_state(PlayState::Following);
+    }
+    let blueprint = Blueprint::new(root)
+        .with_auto_views(false)
+        .with_auto_layout(false)
+        .with_blueprint_panel(BlueprintPanel::from_state(PanelState::Hidden))
+        .with_selection_panel(SelectionPanel::from_state(PanelState::Hidden))
+        .with_time_panel(time);
+    properties.messages(
+        &blueprint,
+        painter.store.id.application_id(),
+        BlueprintActivation::default(),
+    )
+}
+
+struct Layout<'a> {
+    streams: &'a Streams,
+    painter: &'a Painter,
+    purpose: Purpose,
+    properties: &'a mut Properties,
+}
+
+impl Layout<'_> {
+    fn of(&self, cell: usize, kind: SampleKind) -> impl Iterator<Item = &Stream> {
+        self.streams
+            .all
+            .iter()
+            .filter(move |stream| stream.cell == cell && stream.kind == kind)
+    }
+
+    fn cell(&mut self, cell: usize) -> ContainerLike {
+        let events: Vec<_> = self
+            .of(cell, SampleKind::Detection)
+            .map(|stream| events_entity(stream).to_string())
+            .chain([format!(
+                "{}/diagnostics/**",
+                entity(&self.streams.prefix(cell), &[])
+            )])
+            .collect();
+        let events = TextLogView::new("Events").with_contents(events).into();
+        self.properties.events(&events);
+        let mut left = vec![events];
+        let mut left_shares = vec![1.0];
+        if let Some(robot) = self.painter.robot(cell) {
+            let view = Spatial3DView::new("Robot")
+                .with_origin(robot.entity().clone())
+                .with_contents(robot.contents())
+                .into();
+            self.properties.look_at(&view, robot.view_point());
+            left.insert(0, view);
+            left_shares.insert(0, 3.0);
+        }
+        let mut right = Vec::new();
+        let mut right_shares = Vec::new();
+        let joints = self.joints(cell);
+        if !joints.is_empty() {
+            let columns = joints.len().div_ceil(5).max(2);
+            right_shares.push(joints.len().div_ceil(columns) as f32);
+            right.push(Grid::new(joints).with_grid_columns(columns as u32).into());
+        }
+        let scores = self.scores(cell);
+        if !scores.is_empty() {
+            right_shares.push(1.3);
+            right.push(
+                if scores.len() == 1 {
+                    scores
+                } else {
+                    vec![Tabs::new(scores).into()]
+                }
+                .remove(0),
+            );
+            let states: Vec<_> = self
+                .of(cell, SampleKind::Detection)
+                .map(|stream| state_entity(stream).to_string())
+                .collect();
+            right_shares.push(0.5 + 0.2 * states.len() as f32);
+            right.push(StateTimelineView::new("State").with_contents(states).into());
+        }
+        let name = self.streams.cells[cell].name.clone();
+        let left = Vertical::new(left).with_row_shares(left_shares).into();
+        if right.is_empty() {
+            return left;
+        }
+        let right = Vertical::new(right).with_row_shares(right_shares).into();
+        Horizontal::new([left, right])
+            .with_column_shares([2.0, 3.0])
+            .with_name(name)
+            .into()
+    }
+
+    /// A plot a joint: measured, expected and what is between them.
+    fn joints(&mut self, cell: usize) -> Vec<ContainerLike> {
+        let efforts = |streams: &Streams, stream: &Stream| match stream.kind {
+            SampleKind::JointState => {
+                vec![(entity(&stream.topic, &["effort"]), "measured", MEASURED)]
+            }
+            SampleKind::TwinState => vec![
+                (entity(&stream.topic, &["effort"]), "expected", EXPECTED),
+                (
+                    entity(&streams.residual_topic(stream), &["effort"]),
+                    "residual",
+                    RESIDUAL,
+                ),
+            ],
+            _ => Vec::new(),
+        };
+        let series: Vec<_> = self
+            .streams
+            .all
+            .iter()
+            .filter(|stream| stream.cell == cell)
+            .flat_map(|stream| efforts(self.streams, stream))
+            .collect();
+        if series.is_empty() {
+            return Vec::new();
+        }
+        let info = &self.streams.cells[cell];
+        let unit = if info.effort_unit == "Nm" {
+            "N m"
+        } else {
+            &info.effort_unit
+        };
+        let count = info.joint_names.len();
+        let mut plots = Vec::new();
+        for (joint, name) in info.joint_names.iter().enumerate() {
+            let mut view = TimeSeriesView::new(format!("{name} [{unit}]"))
+                .with_contents(series.iter().map(|(entity, ..)| entity.to_string()));
+            for (entity, label, colour) in &series {
+                view = view.with_override(entity.clone(), &one_of(count, joint, label, *colour));
+            }
+            let view = view.into();
+            self.properties.plot(&view, joint == 0, self.window_ns());
+            plots.push(view);
+        }
+        plots
+    }
+
+    /// A plot a detector: its score and its threshold.
+    fn scores(&mut self, cell: usize) -> Vec<ContainerLike> {
+        let detectors: Vec<_> = self
+            .of(cell, SampleKind::Detection)
+            .map(|stream| {
+                (
+                    stream.label.clone(),
+                    score_entity(stream),
+                    threshold_entity(stream),
+                )
+            })
+            .collect();
+        let mut plots = Vec::new();
+        for (label, score, threshold) in detectors {
+            let view = TimeSeriesView::new(format!("Score of {label}"))
+                .with_contents([score.to_string(), threshold.to_string()])
+                .with_override(score, &line("score", SCORE))
+                .with_override(threshold, &line("threshold", CONTACT))
+                .into();
+            self.properties.plot(&view, true, self.window_ns());
+            plots.push(view);
+        }
+        plots
+    }
+
+    fn window_ns(&self) -> Option<i64> {
+        (self.purpose == Purpose::Live).then_some(LIVE_WINDOW_NS)
+    }
+}
+
+/// Of an entity with a series a joint, the one of a joint.
+fn one_of(count: usize, joint: usize, label: &str, colour: Rgba32) -> SeriesLines {
+    let names = (0..count).map(|j| Name::from(if j == joint { label } else { "other joints" }));
+    SeriesLines::new()
+        .with_names(names)
+        .with_visible_series((0..count).map(|j| j == joint))
+        .with_colors(vec![colour; count])
+        .with_widths(vec![1.5_f32; count])
+}
+
+fn line(label: &str, colour: Rgba32) -> SeriesLines {
+    SeriesLines::new()
+        .with_names([label])
+        .with_colors([colour])
+        .with_widths([1.5_f32])
+}
+
+/// An eye and the point that it looks at \[m\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ViewPoint {
+    pub eye_m: [f32; 3],
+    pub target_m: [f32; 3],
+}

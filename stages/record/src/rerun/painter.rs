@@ -1,0 +1,279 @@
+//! From samples to the picture: a state machine that gives out messages of a Rerun store.
+
+use rerun::archetypes::TextLog;
+use rerun::{ApplicationId, EntityPath, StoreId, StoreKind, TextLogLevel};
+use tauscope_bus::{Health, JointState, SampleKind, SampleRef, TwinState, flags};
+
+use super::detections::DetectionTracks;
+use super::robot::Robot;
+use super::store::{Out, Store, entity};
+use super::tracks::{RowTrack, ScalarTrack};
+use crate::error::RecordError;
+use crate::streams::{Stream, Streams};
+
+/// How much is gathered before it is sent.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pace {
+    /// At most so many samples.
+    pub samples: usize,
+    /// At most so much time between the first and the last stamp \[ns\].
+    pub span_ns: i64,
+}
+
+impl Pace {
+    /// Few, large batches: small files that open fast.
+    pub const FILE: Self = Self {
+        samples: 8192,
+        span_ns: 5_000_000_000,
+    };
+    /// Many, small batches: a picture that is a tenth of a second old.
+    pub const LIVE: Self = Self {
+        samples: 1000,
+        span_ns: 100_000_000,
+    };
+}
+
+/// Turns samples into messages.
+#[derive(Debug)]
+pub(super) struct Painter {
+    pub store: Store,
+    pace: Pace,
+    /// Samples gathered, and the stamp of the first.
+    gathered: usize,
+    first_ns: i64,
+    /// By cell.
+    robots: Vec<Option<Robot>>,
+    /// By stream.
+    tracks: Vec<Tracks>,
+    /// By stream: entity and what its last report said of trouble.
+    health: Vec<(EntityPath, u64)>,
+    texts: RowTrack,
+}
+
+/// What a stream draws.
+#[derive(Debug)]
+enum Tracks {
+    JointState {
+        position: ScalarTrack,
+        velocity: ScalarTrack,
+        effort: ScalarTrack,
+    },
+    TwinState {
+        expected: ScalarTrack,
+        residual: ScalarTrack,
+        draws_robot: bool,
+    },
+    Detection(Box<DetectionTracks>),
+    Health,
+}
+
+impl Painter {
+    /// A painter, and what has to be known of its store before anything else.
+    pub fn new(streams: &Streams, pace: Pace, out: &mut Out<'_>) -> Result<Self, RecordError> {
+        let cells: Vec<_> = streams
+            .cells
+            .iter()
+            .map(|cell| cell.name.as_str())
+            .collect();
+        // The viewer keeps one layout per application: other cells, another layout.
+        let application = ApplicationId::new_or_unknown(format!("tauscope {}", cells.join(" ")));
+        let store = Store {
+            id: StoreId::random(StoreKind::Recording, application),
+        };
+        out(store.announcement())?;
+        let mut robots = Vec::new();
+        for (index, cell) in streams.cells.iter().enumerate() {
+            robots.push(match &cell.model {
+                Some(model) => Some(Robot::new(model, &streams.prefix(index), &store, out)?),
+                None => None,
+            });
+        }
+        let mut tracks = Vec::new();
+        let mut health = Vec::new();
+        for stream in &streams.all {
+            tracks.push(Tracks::new(streams, stream, &store, out)?);
+            let topic = format!("{}/diagnostics", streams.prefix(stream.cell));
+            health.push((entity(&topic, &[&stream.stage]), 0));
+        }
+        let texts = RowTrack::default();
+        Ok(Self {
+            store,
+            pace,
+            gathered: 0,
+            first_ns: 0,
+            robots,
+            tracks,
+            health,
+            texts,
+        })
+    }
+
+    /// The robot of a cell.
+    pub fn robot(&self, cell: usize) -> Option<&Robot> {
+        self.robots[cell].as_ref()
+    }
+
+    /// Takes a sample of the stream number `index`.
+    pub fn accept(
+        &mut self,
+        streams: &Streams,
+        index: usize,
+        sample: SampleRef<'_>,
+        out: &mut Out<'_>,
+    ) -> Result<(), RecordError> {
+        let robot = &mut self.robots[streams.all[index].cell];
+        let stamp_ns = match (sample, &mut self.tracks[index]) {
+            (SampleRef::Health(health), _) => {
+                self.report(index, health)?;
+                health.header.stamp_ns
+            }
+            (SampleRef::JointState(state), tracks) => {
+                tracks.joint_state(state, robot.as_mut());
+                state.header.stamp_ns
+            }
+            (SampleRef::TwinState(state), tracks) => {
+                tracks.twin_state(state, robot.as_mut());
+                state.header.stamp_ns
+            }
+            (SampleRef::Detection(detection), Tracks::Detection(tracks)) => {
+                let joints = &streams.cells[streams.all[index].cell].joint_names;
+                tracks.accept(detection, index, joints, robot.as_mut(), &self.store)?;
+                detection.header.stamp_ns
+            }
+            (SampleRef::Detection(_), _) => return Ok(()),
+        };
+        if self.gathered == 0 {
+            self.first_ns = stamp_ns;
+        }
+        self.gathered += 1;
+        let span_ns = stamp_ns.abs_diff(self.first_ns);
+        if self.gathered >= self.pace.samples || span_ns >= self.pace.span_ns.unsigned_abs() {
+            self.flush(out)?;
+        }
+        Ok(())
+    }
+
+    /// Sends what was gathered.
+    pub fn flush(&mut self, out: &mut Out<'_>) -> Result<(), RecordError> {
+        self.gathered = 0;
+        for robot in self.robots.iter_mut().flatten() {
+            robot.flush(&self.store, out)?;
+        }
+        for tracks in &mut self.tracks {
+            tracks.flush(&self.store, out)?;
+        }
+        self.texts.flush(out)
+    }
+
+    /// Says in words if a stage has lost something, or was started anew, since it last reported.
+    fn report(&mut self, index: usize, health: &Health) -> Result<(), RecordError> {
+        let (entity, trouble_before) = &mut self.health[index];
+        let trouble = health.dropped + health.restarts;
+        if trouble == *trouble_before {
+            return Ok(());
+        }
+        *trouble_before = trouble;
+        let text = format!(
+            "{}: {} of {} samples lost, {} restarts",
+            health.stage, health.dropped, health.received, health.restarts
+        );
+        let text = TextLog::new(text).with_level(TextLogLevel::WARN);
+        self.texts.push(&self.store, &health.header, entity, &text)
+    }
+}
+
+impl Tracks {
+    fn new(
+        streams: &Streams,
+        stream: &Stream,
+        store: &Store,
+        out: &mut Out<'_>,
+    ) -> Result<Self, RecordError> {
+        let joints = &streams.cells[stream.cell].joint_names;
+        let joints: Vec<_> = joints.iter().map(String::as_str).collect();
+        let mut track = |topic: &str, field: &str| {
+            ScalarTrack::new(entity(topic, &[field]), &joints, store, out)
+        };
+        Ok(match stream.kind {
+            SampleKind::JointState => Self::JointState {
+                position: track(&stream.topic, "position")?,
+                velocity: track(&stream.topic, "velocity")?,
+                effort: track(&stream.topic, "effort")?,
+            },
+            SampleKind::TwinState => Self::TwinState {
+                expected: track(&stream.topic, "effort")?,
+                residual: track(&streams.residual_topic(stream), "effort")?,
+                draws_robot: !streams
+                    .all
+                    .iter()
+                    .any(|s| s.cell == stream.cell && s.kind == SampleKind::JointState),
+            },
+            SampleKind::Detection => {
+                Self::Detection(Box::new(DetectionTracks::new(streams, stream, store, out)?))
+            }
+            SampleKind::Health => Self::Health,
+        })
+    }
+
+    fn joint_state(&mut self, state: &JointState, robot: Option<&mut Robot>) {
+        let Self::JointState {
+            position,
+            velocity,
+            effort,
+        } = self
+        else {
+            return;
+        };
+        position.push(&state.header, &state.position);
+        if state.header.has(flags::VELOCITY_MEASURED) {
+            velocity.push(&state.header, &state.velocity);
+        }
+        if state.header.has(flags::EFFORT_MEASURED) {
+            effort.push(&state.header, &state.effort);
+        }
+        if let Some(robot) = robot {
+            robot.pose(&state.header, &state.position);
+        }
+    }
+
+    fn twin_state(&mut self, state: &TwinState, robot: Option<&mut Robot>) {
+        let Self::TwinState {
+            expected,
+            residual,
+            draws_robot,
+        } = self
+        else {
+            return;
+        };
+        expected.push(&state.header, &state.expected_effort);
+        // Before the filters have settled it is their transient, which would set the plots' scale.
+        if state.header.has(flags::READY) {
+            residual.push(&state.header, &state.residual);
+        }
+        if let (true, Some(robot)) = (*draws_robot, robot) {
+            robot.pose(&state.header, &state.position);
+        }
+    }
+
+    fn flush(&mut self, store: &Store, out: &mut Out<'_>) -> Result<(), RecordError> {
+        match self {
+            Self::JointState {
+                position,
+                velocity,
+                effort,
+            } => {
+                position.flush(store, out)?;
+                velocity.flush(store, out)?;
+                effort.flush(store, out)
+            }
+            Self::TwinState {
+                expected, residual, ..
+            } => {
+                expected.flush(store, out)?;
+                residual.flush(store, out)
+            }
+            Self::Detection(tracks) => tracks.flush(store, out),
+            Self::Health => Ok(()),
+        }
+    }
+}

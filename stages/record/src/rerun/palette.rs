@@ -1,0 +1,32 @@
+//! Colours: one meaning each, the same in every plot.
+
+use rerun::Rgba32;
+
+/// The measured effort.
+pub(super) const MEASURED: Rgba32 = Rgba32::from_rgb(86, 156, 238);
+/// The effort that the twin expects.
+pub(super) const EXPECTED: Rgba32 = Rgba32::from_rgb(255, 176, 66);
+/// What is between them.
+pub(super) const RESIDUAL: Rgba32 = Rgba32::from_rgb(214, 102, 168);
+/// A detector's score.
+pub(super) const SCORE: Rgba32 = Rgba32::from_rgb(94, 200, 178);
+/// What has to do with a contact: its threshold, the touched link, the force, the state.
+pub(super) const CONTACT: Rgba32 = Rgba32::from_rgb(232, 76, 76);
+/// A link.
+pub(super) const LINK: Rgba32 = Rgba32::from_rgb(176, 184, 196);
+/// Every second link, so that one sees where one ends.
+pub(super) const OTHER_LINK: Rgba32 = Rgba32::from_rgb(122, 132, 148);
+
+/// Behind the robot.
+pub(super) const BACKGROUND: Rgba32 = Rgba32::from_rgb(22, 25, 30);
+/// The floor.
+pub(super) const GRID: Rgba32 = Rgba32::from_unmultiplied_rgba(150, 160, 175, 40);
+
+/// How a detector's states look: state, words, colour.
+pub(super) const STATES: [(&str, &str, Rgba32); 5] = [
+    ("not_ready", "not ready", Rgba32::from_rgb(96, 100, 108)),
+    ("free", "free", Rgba32::from_rgb(58, 132, 84)),
+    ("contact", "contact", CONTACT),
+    ("cooperation", "cooperation", Rgba32::from_rgb(78, 118, 196)),
+    ("collision", "collision", Rgba32::from_rgb(176, 30, 96)),
+];

@@ -1,0 +1,70 @@
+//! What a detection says in words, the same in the archive and in the picture.
+
+use tauscope_bus::Detection;
+
+/// How serious it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Severity {
+    /// All is well.
+    Ok,
+    /// A contact.
+    Contact,
+    /// A collision.
+    Collision,
+    /// The detector cannot judge.
+    NotReady,
+}
+
+impl Severity {
+    pub fn of(detection: &Detection) -> Self {
+        match (detection.alarm(), detection.state.as_str()) {
+            (true, "collision") => Self::Collision,
+            (true, _) => Self::Contact,
+            (false, "not_ready") => Self::NotReady,
+            (false, _) => Self::Ok,
+        }
+    }
+}
+
+/// The joints that detected, by name.
+pub(crate) fn loaded_joints<'a>(detection: &Detection, joints: &'a [String]) -> Vec<&'a str> {
+    let loaded = |j: &usize| detection.joints & (1 << j) != 0;
+    (0..joints.len().min(32))
+        .filter(loaded)
+        .map(|j| joints[j].as_str())
+        .collect()
+}
+
+/// A detection's state in a few words, e.g. `contact at link5`.
+pub(crate) fn headline(detection: &Detection) -> String {
+    let state = detection.state.as_str().replace('_', " ");
+    match (detection.alarm(), detection.link.as_str()) {
+        (true, link) if !link.is_empty() => format!("{state} at {link}"),
+        _ => state,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tauscope_bus::flags;
+
+    use super::*;
+
+    #[test]
+    fn a_detection_in_words() {
+        let mut detection = Detection {
+            state: "not_ready".into(),
+            joints: 0b101,
+            ..Detection::default()
+        };
+        assert_eq!(headline(&detection), "not ready");
+        assert_eq!(Severity::of(&detection), Severity::NotReady);
+        detection.header.flags = flags::ALARM;
+        detection.state = "collision".into();
+        detection.link = "link5".into();
+        assert_eq!(headline(&detection), "collision at link5");
+        assert_eq!(Severity::of(&detection), Severity::Collision);
+        let joints = ["a", "b", "c"].map(str::to_owned);
+        assert_eq!(loaded_joints(&detection, &joints), ["a", "c"]);
+    }
+}
