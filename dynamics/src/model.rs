@@ -29,7 +29,7 @@ pub struct Model {
     /// Per link.
     pub(crate) frames: Vec<Frame>,
     pub(crate) gravity: Vector3<f64>,
-    tool: Option<(usize, Inertia)>,
+    tool_link: Option<usize>,
 }
 
 /// A movable joint.
@@ -245,16 +245,10 @@ impl Model {
     /// # Panics
     /// If `link` is not an index into [`Model::links`].
     pub fn set_tool(&mut self, link: usize, inertia: Inertia) {
-        if let Some((before, _)) = self.tool.take() {
+        if let Some(before) = self.tool_link.replace(link) {
             self.change(before, |body, there| body.tool = there, Inertia::zero());
         }
         self.change(link, |body, there| body.tool = there, inertia);
-        self.tool = Some((link, inertia));
-    }
-
-    /// The tool that is set, and its link.
-    pub fn tool(&self) -> Option<(usize, Inertia)> {
-        self.tool
     }
 
     /// The ten inertial parameters of the body that `joint` moves, tool included, in the frame of its

@@ -10,9 +10,7 @@ mod spec;
 mod viscous_friction;
 mod words;
 
-pub use coulomb_friction::CoulombFriction;
 pub use spec::{TermError, TermSpec};
-pub use viscous_friction::ViscousFriction;
 
 /// Every effect there is.
 pub static EFFECTS: &[&Effect] = &[&coulomb_friction::EFFECT, &viscous_friction::EFFECT];

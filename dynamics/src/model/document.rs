@@ -50,6 +50,33 @@ pub(super) fn inspect(xml: &str) -> Result<Marks, ModelError> {
     })
 }
 
+/// The link or joint that the URDF reader stumbled over, which it does not name: each is read alone.
+pub(super) fn blame(xml: &str, error: &urdf_rs::UrdfError) -> ModelError {
+    let document = match Document::parse(xml) {
+        Ok(document) => document,
+        Err(error) => return not_xml(&error),
+    };
+    let root = document.root_element();
+    let version = root.attribute("version").unwrap_or("1.0");
+    for part in elements(root).filter(|node| is_any(*node, &["link", "joint"])) {
+        let text = &xml[part.range()];
+        let alone = format!("<robot name=\"\" version=\"{version}\">{text}</robot>");
+        if let Err(error) = urdf_rs::read_from_string(&alone) {
+            return invalid(part, &error);
+        }
+    }
+    invalid(root, error)
+}
+
+fn invalid(node: Node, error: &urdf_rs::UrdfError) -> ModelError {
+    let name = node.attribute("name").unwrap_or("");
+    ModelError::Urdf {
+        line: line(node),
+        element: format!("{} `{name}`", node.tag_name().name()),
+        reason: error.to_string().trim_start_matches("custom: ").to_owned(),
+    }
+}
+
 fn not_xml(error: &Error) -> ModelError {
     let at = error.pos();
     if let Error::UnknownNamespace(prefix, _) = error

@@ -46,8 +46,12 @@ pub enum ModelError {
         expected: &'static str,
     },
     /// The document breaks the URDF format in another way.
-    #[error("not a valid URDF: {reason}")]
+    #[error("line {line}: {element} is not valid URDF: {reason}")]
     Urdf {
+        /// Line.
+        line: u32,
+        /// The link or joint, or else the robot.
+        element: String,
         /// What the URDF reader says.
         reason: String,
     },

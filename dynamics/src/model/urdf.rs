@@ -51,9 +51,7 @@ pub(super) struct Movable {
 /// What is wrong with it, or with a link or joint taken by itself.
 pub(super) fn read(xml: &str) -> Result<Robot, ModelError> {
     let marks = document::inspect(xml)?;
-    let robot = urdf_rs::read_from_string(xml).map_err(|error| ModelError::Urdf {
-        reason: error.to_string(),
-    })?;
+    let robot = urdf_rs::read_from_string(xml).map_err(|error| document::blame(xml, &error))?;
     let mut indices: BTreeMap<String, usize> = BTreeMap::new();
     let mut links = Vec::with_capacity(robot.links.len());
     for (index, (link, &line)) in robot.links.into_iter().zip(&marks.link_lines).enumerate() {

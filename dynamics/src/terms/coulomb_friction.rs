@@ -23,7 +23,7 @@ pub(super) static EFFECT: Effect = Effect {
 /// Effort Fc sgn(qd), with tanh(qd / 0.002 rad/s) for the sign, so that it has a value at rest and a
 /// simulation can be integrated through a reversal (Siciliano et al., *Robotics*, 2009, equation 7.42).
 #[derive(Debug, Clone, PartialEq)]
-pub struct CoulombFriction {
+struct CoulombFriction {
     joint: usize,
     values: [f64; 1],
 }

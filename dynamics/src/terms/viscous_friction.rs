@@ -19,7 +19,7 @@ pub(super) static EFFECT: Effect = Effect {
 
 /// Effort Fv qd (Siciliano et al., *Robotics*, 2009, equation 7.42).
 #[derive(Debug, Clone, PartialEq)]
-pub struct ViscousFriction {
+struct ViscousFriction {
     joint: usize,
     values: [f64; 1],
 }

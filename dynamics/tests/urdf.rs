@@ -1,0 +1,297 @@
+//! What is read from a URDF, and what is refused with which words.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![allow(clippy::float_cmp, reason = "numbers are read as they are written")]
+
+use tauscope_dynamics::{Data, Geometry, JointKind, Limits, Model, forward_kinematics, link_pose};
+
+const INERTIAL: &str = "<inertial><origin xyz='0 0 0.1'/><mass value='2'/>\
+    <inertia ixx='0.1' ixy='0' ixz='0' iyy='0.1' iyz='0' izz='0.1'/></inertial>";
+
+/// Two arms on a column, with everything that is to be read or passed over.
+fn robot() -> String {
+    format!(
+        r#"<?xml version="1.0"?>
+<robot name="two_arms" xmlns:xacro="http://ros.org/wiki/xacro">
+  <material name="grey"><color rgba="0.5 0.5 0.5 1"/></material>
+  <gazebo reference="left"><selfCollide>true</selfCollide></gazebo>
+  <joint name="left_arm" type="revolute">
+    <parent link="column"/>
+    <child link="left"/>
+    <origin xyz="0 1 0" rpy="0 0 1.5707963267948966"/>
+    <axis xyz="0 0 2"/>
+    <limit lower="-1" upper="1.5" velocity="3" effort="40"/>
+  </joint>
+  <joint name="weld" type="fixed"><parent link="left"/><child link="hand"/><origin xyz="0.5 0 0"/></joint>
+  <joint name="hoist" type="prismatic">
+    <parent link="base"/>
+    <child link="column"/>
+    <axis xyz="0 0 1"/>
+    <limit lower="0" upper="0.6" velocity="0.2" effort="INF"/>
+  </joint>
+  <joint name="right_arm" type="continuous">
+    <parent link="column"/>
+    <child link="right"/>
+    <limit velocity="2" effort="10"/>
+  </joint>
+  <link name="base"><visual><geometry><mesh filename="package://x/base.stl" scale="1 1 2"/></geometry></visual></link>
+  <link name="column">{INERTIAL}
+    <visual><origin xyz="0 0 0.3"/><geometry><box size="0.1 0.2 0.6"/></geometry><material name="grey"/></visual>
+    <visual><geometry><sphere radius="0.1"/></geometry></visual>
+  </link>
+  <link name="left"><visual><geometry><cylinder radius="0.05" length="0.4"/></geometry></visual></link>
+  <link name="hand">{INERTIAL}</link>
+  <link name="right">{INERTIAL}</link>
+  <transmission name="t"><type>x</type><joint name="left_arm"/></transmission>
+  <ros2_control name="c" type="system"><joint name="left_arm"/></ros2_control>
+</robot>
+"#
+    )
+}
+
+fn refusal(xml: &str) -> String {
+    Model::from_urdf(xml).unwrap_err().to_string()
+}
+
+#[test]
+fn joints_links_limits_and_shapes_are_as_written() {
+    let model = Model::from_urdf(&robot()).unwrap();
+    assert_eq!(model.name(), "two_arms");
+    assert!(model.joint_names().eq(["left_arm", "hoist", "right_arm"]));
+    let kinds: Vec<_> = model.joints().iter().map(|joint| joint.kind).collect();
+    assert_eq!(
+        kinds,
+        [
+            JointKind::Revolute,
+            JointKind::Prismatic,
+            JointKind::Continuous
+        ]
+    );
+    let [left, hoist, right] = [0, 1, 2].map(|j| &model.joints()[j]);
+    assert_eq!(
+        left.limits,
+        Limits {
+            lower: Some(-1.0),
+            upper: Some(1.5),
+            velocity: Some(3.0),
+            effort: Some(40.0)
+        }
+    );
+    assert_eq!(hoist.limits.effort, None, "infinite is none");
+    assert_eq!(hoist.limits.lower, Some(0.0));
+    assert_eq!((right.limits.lower, right.limits.upper), (None, None));
+    assert_eq!(left.axis, [0.0, 0.0, 1.0], "of length 1");
+    assert_eq!(right.axis, [1.0, 0.0, 0.0], "URDF's default");
+
+    let names: Vec<_> = model
+        .links()
+        .iter()
+        .map(|link| link.name.as_str())
+        .collect();
+    assert_eq!(names, ["base", "column", "left", "hand", "right"]);
+    let [base, column, left, hand, right] = [0, 1, 2, 3, 4].map(|l| &model.links()[l]);
+    assert_eq!(
+        [
+            base.joint,
+            column.joint,
+            left.joint,
+            hand.joint,
+            right.joint
+        ],
+        [None, Some(1), Some(0), Some(0), Some(2)]
+    );
+    assert_eq!(
+        [
+            base.parent,
+            column.parent,
+            left.parent,
+            hand.parent,
+            right.parent
+        ],
+        [None, Some(0), Some(1), Some(2), Some(1)]
+    );
+    assert_eq!(
+        (left.mass_kg(), hand.mass_kg(), hand.com_m()),
+        (0.0, 2.0, [0.0, 0.0, 0.1])
+    );
+    assert_eq!(
+        base.shapes[0].geometry,
+        Geometry::Mesh {
+            filename: "package://x/base.stl".to_owned(),
+            scale: [1.0, 1.0, 2.0]
+        }
+    );
+    assert_eq!(
+        column.shapes[0].geometry,
+        Geometry::Box {
+            size_m: [0.1, 0.2, 0.6]
+        }
+    );
+    assert_eq!(column.shapes[0].origin.translation.z, 0.3);
+    assert_eq!(
+        column.shapes[1].geometry,
+        Geometry::Sphere { radius_m: 0.1 }
+    );
+    assert_eq!(
+        left.shapes[0].geometry,
+        Geometry::Cylinder {
+            radius_m: 0.05,
+            length_m: 0.4
+        }
+    );
+}
+
+#[test]
+fn a_link_behind_a_fixed_joint_is_lumped_and_stays_a_frame() {
+    let model = Model::from_urdf(&robot()).unwrap();
+    let moved = model.body_parameters(0);
+    let expected = [2.0, 1.0, 0.0, 0.2];
+    for (found, expected) in moved.iter().zip(expected) {
+        assert!((found - expected).abs() < 1e-15, "{moved:?}");
+    }
+    let mut data = Data::new(&model);
+    forward_kinematics(&model, &mut data, &[std::f64::consts::FRAC_PI_2, 0.25, 0.0]);
+    let hand = link_pose(&model, &data, model.link_index("hand").unwrap());
+    let expected = nalgebra::Vector3::new(-0.5, 1.0, 0.25);
+    assert!((hand.translation.vector - expected).norm() < 1e-15);
+}
+
+#[test]
+fn what_is_no_urdf_is_told_apart() {
+    assert_eq!(
+        refusal("<robot name='r'>\n  <link name='a'>\n</robot>"),
+        "not well-formed XML at line 3, column 1: expected 'link' tag, not 'robot' at 3:1"
+    );
+    assert_eq!(
+        refusal("<?xml version='1.0'?>\n<sdf version='1.9'/>"),
+        "line 2: the document is a <sdf>, a URDF is a <robot>"
+    );
+    let xacro =
+        "<robot name='r' xmlns:xacro='http://www.ros.org/wiki/xacro'>\n<xacro:arm/></robot>";
+    assert_eq!(
+        refusal(xacro),
+        "line 2: `<xacro:arm>` is xacro, not URDF; expand it first: `xacro FILE.xacro > FILE.urdf`"
+    );
+    assert!(refusal("<robot name='r'>\n<xacro:arm/></robot>").starts_with("line 2: `xacro:` is"));
+    let expression = robot().replace("velocity=\"3\"", "velocity=\"${pi}\"");
+    assert!(refusal(&expression).starts_with("line 10: `${pi}` is xacro"));
+    assert_eq!(
+        refusal("<robot name='post'><link name='a'/></robot>"),
+        "the robot `post` has no movable joint"
+    );
+}
+
+#[test]
+fn each_fault_is_refused_by_name_and_line() {
+    for (from, to, expected) in [
+        (
+            "type=\"continuous\"",
+            "type=\"floating\"",
+            "line 19: joint `right_arm` is floating; revolute, continuous, prismatic and fixed joints are supported",
+        ),
+        (
+            "type=\"continuous\"",
+            "type=\"planar\"",
+            "line 19: joint `right_arm` is planar; revolute, continuous, prismatic and fixed joints are supported",
+        ),
+        (
+            "<limit velocity=\"2\" effort=\"10\"/>",
+            "<mimic joint=\"left_arm\"/>",
+            "line 19: joint `right_arm` mimics `left_arm`; coupled joints are not supported: make it fixed, or take out <mimic>",
+        ),
+        (
+            "<axis xyz=\"0 0 2\"/>",
+            "<axis xyz=\"0 0 0\"/>",
+            "line 5: the axis of joint `left_arm` is zero",
+        ),
+        (
+            "<link name=\"right\">",
+            "<link name=\"left\">",
+            "line 31: a second link `left`; the first is on line 29",
+        ),
+        (
+            "name=\"right_arm\"",
+            "name=\"weld\"",
+            "line 19: a second joint `weld`; the first is on line 12",
+        ),
+        (
+            "<child link=\"right\"/>",
+            "<child link=\"wrong\"/>",
+            "line 19: joint `right_arm` names the child link `wrong`, which is not there",
+        ),
+        (
+            "<child link=\"right\"/>",
+            "<child link=\"hand\"/>",
+            "line 19: link `hand` is the child of both `weld` and `right_arm`",
+        ),
+        (
+            "<link name=\"base\">",
+            "<link name=\"world\"/><link name=\"base\">",
+            "2 links hang on no joint, a robot has one root: `world`, `base`",
+        ),
+        (
+            "<parent link=\"base\"/>",
+            "<parent link=\"hand\"/>",
+            "the joints form a cycle: `left_arm`, `weld`, `hoist`",
+        ),
+        (
+            "<axis xyz=\"0 0 2\"/>",
+            "<axis xyz=\"0 0 one\"/>",
+            "line 9: <axis> of joint `left_arm` has xyz=\"0 0 one\": not three numbers",
+        ),
+        (
+            "upper=\"1.5\"",
+            "upper=\"NaN\"",
+            "line 10: <limit> of joint `left_arm` has upper=\"NaN\": not a number",
+        ),
+        (
+            "<link name=\"left\">",
+            "<link>",
+            "line 29: link `` is not valid URDF: missing field `name`",
+        ),
+        (
+            "type=\"continuous\"",
+            "type=\"ball\"",
+            "line 19: joint `right_arm` is not valid URDF: unknown variant `ball`, expected one of",
+        ),
+        (
+            "<mass value='2'/>",
+            "",
+            "line 25: link `column` is not valid URDF: missing field `mass`",
+        ),
+        (
+            "<color rgba=\"0.5 0.5 0.5 1\"/>",
+            "<color/>",
+            "line 2: robot `two_arms` is not valid URDF: missing field `rgba`",
+        ),
+    ] {
+        let xml = robot();
+        assert!(xml.contains(from), "{from}");
+        let found = refusal(&xml.replacen(from, to, 1));
+        assert!(found.starts_with(expected), "{found}\nis not\n{expected}");
+    }
+}
+
+#[test]
+fn masses_must_be_there_and_not_below_zero() {
+    let xml = robot();
+    let (head, tail) = xml.split_once("<link name=\"hand\">").unwrap();
+    let with = |inertial: &str| {
+        format!(
+            "{head}<link name=\"hand\">{}",
+            tail.replacen(INERTIAL, inertial, 1)
+        )
+    };
+    assert_eq!(
+        refusal(&with("")),
+        "line 5: joint `left_arm` moves no mass: links `left`, `hand` are without a mass in <inertial>"
+    );
+    assert_eq!(
+        refusal(&with(&INERTIAL.replace("'2'", "'-2'"))),
+        "line 30: the mass of link `hand` is -2 kg"
+    );
+    assert_eq!(
+        refusal(&with(&INERTIAL.replace("'2'", "'inf'"))),
+        "line 30: <mass> of link `hand` has value=\"inf\": not a number"
+    );
+}
