@@ -56,6 +56,13 @@ impl CsvTable {
         joints: &[String],
     ) -> Result<Self, ArchiveError> {
         let joints = mapping.joints.as_deref().unwrap_or(joints).to_vec();
+        if joints.is_empty() {
+            return Err(ArchiveError::CsvMapping {
+                path: path.to_owned(),
+                what: "joints".to_owned(),
+                reason: "there are none that the columns could stand for".to_owned(),
+            });
+        }
         let mut table = Self {
             path: path.to_owned(),
             mapping: mapping.clone(),

@@ -152,6 +152,9 @@ fn a_mapping_that_does_not_fit_is_refused() {
         error("0,1,2,3\n", &wrong),
         ": position: 1 columns for 2 joints"
     );
+    let mut nameless = wrong.clone();
+    nameless.joints = None;
+    assert!(error("0,1,2,3\n", &nameless).starts_with(": joints: there are none"));
     wrong.position.first = Some(1);
     assert_eq!(
         error("0,1,2,3\n", &wrong),

@@ -227,6 +227,7 @@ fn a_broken_chunk_is_told_and_the_rest_is_read() {
             panic!("{told:?}");
         };
         assert_eq!(damage.at, chunk.chunk_start_offset);
+        assert_eq!(damage.readable_until_ns, Some(whole[21].log_time_ns));
         let DamageKind::Chunk {
             start_ns, end_ns, ..
         } = damage.kind

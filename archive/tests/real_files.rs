@@ -31,7 +31,7 @@ fn mcap_files(folder: &Path) -> Vec<PathBuf> {
 /// Reads every message, in order, and writes it again: the same bytes must come out.
 fn check(path: &Path) {
     let recording = Recording::open(path).unwrap();
-    assert!(recording.damage().is_empty(), "{path:?}");
+    assert!(recording.damage().is_empty(), "{}", path.display());
     let mut messages = recording.all_messages().unwrap();
     let mut read = vec![0; recording.topics().len()];
     let mut last_ns = 0;
@@ -44,11 +44,11 @@ fn check(path: &Path) {
         match message.topic.type_name.as_str() {
             JointState::TYPE => {
                 ros::encode(&message.decode::<JointState>().unwrap(), &mut body).unwrap();
-                assert_eq!(body, message.body, "{path:?}");
+                assert_eq!(body, message.body, "{}", path.display());
             }
             Bool::TYPE => {
                 ros::encode(&message.decode::<Bool>().unwrap(), &mut body).unwrap();
-                assert_eq!(body, message.body, "{path:?}");
+                assert_eq!(body, message.body, "{}", path.display());
             }
             _ => {}
         }
@@ -65,7 +65,9 @@ fn real_recordings_are_read_whole() {
     };
     let files = mcap_files(&folder);
     assert_eq!(files.len(), 15);
-    files.iter().for_each(|path| check(path));
+    for path in files {
+        check(&path);
+    }
 }
 
 #[test]

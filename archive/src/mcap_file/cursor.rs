@@ -34,6 +34,8 @@ pub(crate) struct McapCursor {
     loaded: Vec<Loaded>,
     /// Index into `loaded` of the message that was given last.
     current: Option<usize>,
+    /// Log time of the message that was given last.
+    given_until_ns: Option<u64>,
     /// Told before anything else is given.
     damage: Vec<Damage>,
     unpacker: Unpacker,
@@ -111,6 +113,7 @@ impl McapCursor {
             next_extent: 0,
             loaded: Vec::new(),
             current: None,
+            given_until_ns: None,
             damage: Vec::new(),
             unpacker,
             packed: Vec::new(),
@@ -262,13 +265,11 @@ impl McapCursor {
     }
 
     fn damage(&self, extent: &Extent, kind: DamageKind) -> Damage {
-        let given = self.first().map(|(_, log_time)| log_time);
-        let until = given.unwrap_or(extent.start_ns).min(extent.start_ns);
         Damage {
             path: self.layout.path.clone(),
             at: extent.at,
             kind,
-            readable_until_ns: i64::try_from(until).ok(),
+            readable_until_ns: self.given_until_ns.and_then(|ns| i64::try_from(ns).ok()),
         }
     }
 }
@@ -298,6 +299,7 @@ impl Cursor for McapCursor {
             };
             let Some(extent) = load else {
                 self.current = first.map(|(i, _)| i);
+                self.given_until_ns = first.map(|(_, log_time)| log_time).or(self.given_until_ns);
                 return Ok(self.current.is_some());
             };
             self.next_extent += 1;

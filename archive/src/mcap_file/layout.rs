@@ -50,6 +50,8 @@ pub(crate) struct Schema {
 pub(crate) struct Layout {
     pub(crate) path: PathBuf,
     pub(crate) file_bytes: u64,
+    /// Whether the first record could be read.
+    header_read: bool,
     pub(crate) profile: String,
     pub(crate) library: String,
     pub(crate) schemas: BTreeMap<u16, Schema>,
@@ -98,6 +100,7 @@ impl Layout {
         Self {
             path: path.to_owned(),
             file_bytes,
+            header_read: false,
             profile: String::new(),
             library: String::new(),
             schemas: BTreeMap::new(),
@@ -113,17 +116,14 @@ impl Layout {
 
     /// A layout of which at least the first record could be read.
     fn checked(self) -> Result<Self, ArchiveError> {
-        let header_missing = self.library.is_empty() && self.profile.is_empty();
-        if header_missing
-            && self.extents.is_empty()
-            && let Some(damage) = self.damage.first()
-        {
-            return Err(ArchiveError::Unreadable {
-                reason: damage.kind.to_string(),
-                path: self.path,
-            });
+        if self.header_read {
+            return Ok(self);
         }
-        Ok(self)
+        let reason = self.damage.first().map(|damage| damage.kind.to_string());
+        Err(ArchiveError::Unreadable {
+            reason: reason.unwrap_or_else(|| "it has no header".to_owned()),
+            path: self.path,
+        })
     }
 
     pub(super) fn damage(&mut self, at: u64, kind: DamageKind) {
@@ -160,6 +160,7 @@ impl Layout {
         }
         match mcap::parse_record(opcode, body).map_err(|error| words(&error))? {
             Record::Header(header) => {
+                self.header_read = true;
                 self.profile = header.profile;
                 self.library = header.library;
             }

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use std::collections::BTreeMap;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use tauscope_archive::ros::{Bool, Header, JointState};
@@ -84,6 +85,7 @@ pub fn shared(test: &str, path: &str) -> Option<PathBuf> {
     if shared.is_dir() {
         return Some(shared.join(path));
     }
-    eprintln!("SKIPPED {test}: ../shared is absent");
+    // Not `eprintln!`, which the test harness hides.
+    let _ = writeln!(std::io::stderr(), "SKIPPED {test}: ../shared is absent");
     None
 }
