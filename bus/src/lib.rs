@@ -14,7 +14,7 @@ pub mod stage;
 
 pub use link::{
     Audience, Domain, InProcess, Keep, LinkError, Position, Received, Receiver, ReceiverCounts,
-    Sender, SenderCounts, SharedMemory, Transport,
+    Sender, SenderCounts, SharedMemory, Transport, Zenoh, ZenohEndpoints, ZenohRouter,
 };
 pub use sample::{
     Detection, EventKind, Header, Health, JointArray, JointState, MAX_JOINTS, Name, Sample,

@@ -16,10 +16,13 @@ mod in_process;
 mod queue;
 mod sequence;
 mod shared_memory;
+pub mod wire;
+pub mod zenoh;
 
 pub use fan_out::FanOut;
 pub use in_process::InProcess;
 pub use shared_memory::{Domain, DomainError, SharedMemory};
+pub use zenoh::{Zenoh, ZenohEndpoints, ZenohRouter};
 
 /// How long a sender waits for one keep-all receiver that takes nothing, before it counts the
 /// sample as undelivered and goes on. A receiver that has used this up is not waited for again until

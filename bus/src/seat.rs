@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use crate::link::{Audience, Domain, Keep, PATIENCE, Position};
+use crate::link::{Audience, Domain, Keep, PATIENCE, Position, ZenohEndpoints};
 use crate::sample::SampleKind;
 
 mod links;
@@ -162,16 +162,4 @@ pub struct OutputLink {
     pub transport: TransportKind,
     /// Who listens there.
     pub audience: Audience,
-}
-
-/// Where Zenoh sessions of this host meet others, e.g. `tcp/10.0.0.1:7447`. Nothing is discovered.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ZenohEndpoints {
-    /// Where it listens.
-    #[serde(default)]
-    pub listen: Vec<String>,
-    /// Where it connects to; it tries until it succeeds, and again when a connection breaks.
-    #[serde(default)]
-    pub connect: Vec<String>,
 }

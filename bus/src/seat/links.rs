@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::{Input, Output, Seat, TransportKind};
 use crate::link::{
     FanOut, LinkError, Position, Received, Receiver, ReceiverCounts, Sender, SharedMemory,
-    Transport as _,
+    Transport as _, Zenoh,
 };
 use crate::sample::{Detection, Health, JointState, Sample, SampleKind, SampleRef, TwinState};
 
@@ -13,6 +13,7 @@ use crate::sample::{Detection, Health, JointState, Sample, SampleKind, SampleRef
 #[derive(Debug)]
 pub struct Links {
     shared_memory: Option<SharedMemory>,
+    zenoh: Option<Zenoh>,
 }
 
 impl Links {
@@ -33,7 +34,16 @@ impl Links {
         } else {
             None
         };
-        Ok(Self { shared_memory })
+        let zenoh = if uses(TransportKind::Zenoh) {
+            let endpoints = seat.zenoh.clone().unwrap_or_default();
+            Some(Zenoh::open(&endpoints, seat.patience())?)
+        } else {
+            None
+        };
+        Ok(Self {
+            shared_memory,
+            zenoh,
+        })
     }
 
     /// Opens the sending end of `output` on all its ways.
@@ -48,7 +58,9 @@ impl Links {
                 TransportKind::Iceoryx2 => self
                     .shared_memory(&output.stream)?
                     .sender::<T>(&output.stream, link.audience)?,
-                TransportKind::Zenoh => return Err(not_open(&output.stream, "zenoh")),
+                TransportKind::Zenoh => self
+                    .zenoh(&output.stream)?
+                    .sender::<T>(&output.stream, link.audience)?,
             });
         }
         match ways.len() {
@@ -69,7 +81,10 @@ impl Links {
                 input.keep,
                 input.depth,
             )?,
-            TransportKind::Zenoh => return Err(not_open(&input.stream, "zenoh")),
+            TransportKind::Zenoh => {
+                self.zenoh(&input.stream)?
+                    .receiver::<T>(&input.stream, input.keep, input.depth)?
+            }
         };
         if let Some(position) = input.resume {
             receiver.resume(position);
@@ -94,6 +109,10 @@ impl Links {
         self.shared_memory
             .as_ref()
             .ok_or_else(|| not_open(stream, "iceoryx2"))
+    }
+
+    fn zenoh(&self, stream: &str) -> Result<&Zenoh, LinkError> {
+        self.zenoh.as_ref().ok_or_else(|| not_open(stream, "zenoh"))
     }
 }
 

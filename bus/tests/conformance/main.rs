@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use tauscope_bus::{
     Audience, Domain, Header, InProcess, JointState, Keep, LinkError, Received, Receiver, Sample,
-    Sender, SharedMemory, Transport, TwinState,
+    Sender, SharedMemory, Transport, TwinState, Zenoh, ZenohEndpoints, ZenohRouter,
 };
 
 mod promises;
@@ -75,6 +75,83 @@ impl Drop for SharedMemorySides {
     }
 }
 
+/// Two sessions that meet directly.
+struct ZenohSides {
+    sending: Zenoh,
+    receiving: Zenoh,
+}
+
+impl Sides for ZenohSides {
+    type Transport = Zenoh;
+    const SENDER_SEES_REFUSALS: bool = false;
+    fn new(patience: Duration) -> Self {
+        let endpoint = free_endpoint();
+        Self {
+            sending: Zenoh::open(&listen(&endpoint), patience).unwrap(),
+            receiving: Zenoh::open(&connect(&endpoint), patience).unwrap(),
+        }
+    }
+    fn sending(&self) -> &Zenoh {
+        &self.sending
+    }
+    fn receiving(&self) -> &Zenoh {
+        &self.receiving
+    }
+}
+
+/// Two sessions on two hosts, each of which has a router.
+struct ZenohHostSides {
+    sides: ZenohSides,
+    _routers: [ZenohRouter; 2],
+}
+
+impl Sides for ZenohHostSides {
+    type Transport = Zenoh;
+    const SENDER_SEES_REFUSALS: bool = false;
+    fn new(patience: Duration) -> Self {
+        let (a, b) = (free_endpoint(), free_endpoint());
+        let both = ZenohEndpoints {
+            connect: vec![a.clone()],
+            ..listen(&b)
+        };
+        Self {
+            _routers: [
+                ZenohRouter::open(&listen(&a)).unwrap(),
+                ZenohRouter::open(&both).unwrap(),
+            ],
+            sides: ZenohSides {
+                sending: Zenoh::open(&connect(&a), patience).unwrap(),
+                receiving: Zenoh::open(&connect(&b), patience).unwrap(),
+            },
+        }
+    }
+    fn sending(&self) -> &Zenoh {
+        &self.sides.sending
+    }
+    fn receiving(&self) -> &Zenoh {
+        &self.sides.receiving
+    }
+}
+
+fn free_endpoint() -> String {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    format!("tcp/{}", listener.local_addr().unwrap())
+}
+
+fn listen(endpoint: &str) -> ZenohEndpoints {
+    ZenohEndpoints {
+        listen: vec![endpoint.to_owned()],
+        connect: Vec::new(),
+    }
+}
+
+fn connect(endpoint: &str) -> ZenohEndpoints {
+    ZenohEndpoints {
+        listen: Vec::new(),
+        connect: vec![endpoint.to_owned()],
+    }
+}
+
 /// Sends `count` samples that carry their number as stamp.
 fn send(sender: &mut dyn Sender<JointState>, first: i64, count: i64) {
     for number in first..first + count {
@@ -136,6 +213,8 @@ macro_rules! conforms {
 
 conforms!(in_process, InProcessSides);
 conforms!(shared_memory, SharedMemorySides);
+conforms!(zenoh, ZenohSides);
+conforms!(zenoh_between_hosts, ZenohHostSides);
 
 /// What a link that carries `T` says when it is opened or used for a stream that carries `JointState`.
 fn refusal<S: Sides, T: Sample>(sides: &S, sender: &mut dyn Sender<JointState>) -> LinkError {

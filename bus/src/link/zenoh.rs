@@ -1,0 +1,188 @@
+//! Links between hosts: Zenoh.
+//!
+//! # What travels
+//!
+//! | key | what |
+//! | --- | --- |
+//! | `<stream>`, that is `<cell>/<stage>` or `<cell>/<stage>/health` | samples |
+//! | `<stream>/@all/<id>`, `<stream>/@newest/<id>` | a liveliness token of each receiver |
+//! | `<stream>/@end/<id>` | the receiver of that id has taken the end of the stream; payload: the sender's instance |
+//!
+//! (Chunks that begin with `@` are matched by no wildcard, so `<cell>/**` gives samples alone.)
+//!
+//! A sample is put with
+//!
+//! - encoding `zenoh/bytes;tauscope/JointState/1`, the type name of the sample after the semicolon;
+//! - payload: the sample as it lies in memory, little-endian, without a frame: see [`wire`](super::wire)
+//!   for the offsets;
+//! - attachment: the sender's instance, a little-endian `u64`, another one after each restart, while
+//!   the sequence number in the sample's header counts from 0 again;
+//! - congestion control `block`, no express: nothing is dropped on the way unless a link breaks.
+//!
+//! # What is counted
+//!
+//! A put that a broken link swallows gives no error: the receiver sees the hole in the sequence. The
+//! sender sees by the tokens which of its receivers are connected, and counts what it sends while
+//! one is missing as undelivered. A receiver that takes nothing holds up its session's other streams
+//! for the patience of its end, then drops what comes until it reads again, and counts that.
+//!
+//! Nothing is discovered: sessions meet at the endpoints that they are given, and nowhere else.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+use zenoh::Wait as _;
+use zenoh::bytes::Encoding;
+
+use super::{Audience, Keep, LinkError, PATIENCE, Receiver, Sender, Transport};
+use crate::sample::{Sample, SampleKind};
+
+mod receiver;
+mod sender;
+
+const TRANSPORT: &str = "zenoh";
+
+/// Where Zenoh sessions of this host meet others, e.g. `tcp/10.0.0.1:7447`.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ZenohEndpoints {
+    /// Where it listens.
+    #[serde(default)]
+    pub listen: Vec<String>,
+    /// Where it connects to; it tries until it succeeds, and again when a connection breaks.
+    #[serde(default)]
+    pub connect: Vec<String>,
+}
+
+/// Streams between hosts. Clones share one session.
+#[derive(Debug, Clone)]
+pub struct Zenoh {
+    session: zenoh::Session,
+    patience: Duration,
+    /// Ends of this session so far, so that each has a number.
+    ends: Arc<AtomicU64>,
+}
+
+impl Zenoh {
+    /// Opens a session; what it connects to need not be there yet.
+    ///
+    /// # Errors
+    /// [`LinkError::Open`] if an endpoint is none, or cannot be listened at.
+    pub fn open(endpoints: &ZenohEndpoints, patience: Duration) -> Result<Self, LinkError> {
+        Ok(Self {
+            session: open_session("peer", endpoints, patience)?,
+            patience,
+            ends: Arc::default(),
+        })
+    }
+
+    /// A number for an end, unlike any other session's: their random ids differ.
+    fn unique(&self) -> u64 {
+        let id = self.session.zid().to_le_bytes();
+        let mut low = [0; 8];
+        low.copy_from_slice(&id[..8]);
+        u64::from_le_bytes(low).wrapping_add(self.ends.fetch_add(1, Ordering::Relaxed))
+    }
+}
+
+impl Transport for Zenoh {
+    fn sender<T: Sample>(
+        &self,
+        stream: &str,
+        audience: Audience,
+    ) -> Result<Box<dyn Sender<T>>, LinkError> {
+        Ok(Box::new(sender::ZenohSender::<T>::open(
+            self, stream, audience,
+        )?))
+    }
+
+    fn receiver<T: Sample>(
+        &self,
+        stream: &str,
+        keep: Keep,
+        depth: usize,
+    ) -> Result<Box<dyn Receiver<T>>, LinkError> {
+        Ok(Box::new(receiver::ZenohReceiver::<T>::open(
+            self, stream, keep, depth,
+        )?))
+    }
+}
+
+/// Where the sessions of a host's processes meet those of other hosts. Only one process can listen
+/// at an endpoint: the supervisor keeps this, and each stage's process connects to it.
+#[derive(Debug)]
+pub struct ZenohRouter {
+    _session: zenoh::Session,
+}
+
+impl ZenohRouter {
+    /// Listens and connects at `endpoints`, and passes on what comes until it is dropped.
+    ///
+    /// # Errors
+    /// As [`Zenoh::open`].
+    pub fn open(endpoints: &ZenohEndpoints) -> Result<Self, LinkError> {
+        Ok(Self {
+            _session: open_session("router", endpoints, PATIENCE)?,
+        })
+    }
+}
+
+fn open_session(
+    mode: &str,
+    endpoints: &ZenohEndpoints,
+    patience: Duration,
+) -> Result<zenoh::Session, LinkError> {
+    let failed = |error: zenoh::Error| LinkError::Open {
+        stream: "*".to_owned(),
+        transport: TRANSPORT,
+        reason: error.to_string(),
+    };
+    // A receiver gives out before the link is closed over it.
+    let close_after_us = (patience * 2).as_micros().to_string();
+    let quoted = |text: &str| format!("{text:?}");
+    let settings = [
+        ("mode", quoted(mode)),
+        ("listen/endpoints", format!("{:?}", endpoints.listen)),
+        ("connect/endpoints", format!("{:?}", endpoints.connect)),
+        ("connect/timeout_ms", "-1".to_owned()),
+        ("connect/exit_on_failure", "false".to_owned()),
+        (
+            "connect/retry",
+            "{period_init_ms: 100, period_max_ms: 500, period_increase_factor: 1.5}".to_owned(),
+        ),
+        ("scouting/multicast/enabled", "false".to_owned()),
+        ("scouting/gossip/enabled", "false".to_owned()),
+        ("open/return_conditions/connect_scouted", "false".to_owned()),
+        ("transport/shared_memory/enabled", "false".to_owned()),
+        (
+            "transport/link/tx/queue/congestion_control/block/wait_before_close",
+            close_after_us,
+        ),
+    ];
+    let mut config = zenoh::Config::default();
+    for (key, value) in &settings {
+        config.insert_json5(key, value).map_err(failed)?;
+    }
+    zenoh::open(config).wait().map_err(failed)
+}
+
+fn open_error(stream: &str, error: &zenoh::Error) -> LinkError {
+    LinkError::Open {
+        stream: stream.to_owned(),
+        transport: TRANSPORT,
+        reason: error.to_string(),
+    }
+}
+
+fn encoding(kind: SampleKind) -> Encoding {
+    Encoding::ZENOH_BYTES.with_schema(kind.type_name())
+}
+
+fn policy(keep: Keep) -> &'static str {
+    match keep {
+        Keep::All => "@all",
+        Keep::Newest => "@newest",
+    }
+}
