@@ -53,11 +53,30 @@ impl Config {
         }
     }
 
+    /// The canonical name of the detector that is configured, if it is one.
+    pub fn name(&self) -> Option<&'static str> {
+        self.detector(&Setup::default())
+            .ok()
+            .map(|detector| detector.name())
+    }
+
+    /// Every detector with its usual settings.
+    pub fn every(setup: &Setup) -> Vec<Box<dyn Detector>> {
+        let all = Self {
+            twin_regression: Some(twin_regression::Settings::default()),
+            naive_difference: Some(naive_difference::Settings::default()),
+            ..Self::default()
+        };
+        all.detectors(setup)
+    }
+
     /// A line a detector.
     fn detectors(&self, setup: &Setup) -> Vec<Box<dyn Detector>> {
         [
-            self.twin_regression.as_ref().map(twin_regression::Settings::build),
-            self.naive_difference.as_ref().map(|settings| settings.build(setup)),
+            self.twin_regression.as_ref().map(twin_regression::build),
+            self.naive_difference
+                .as_ref()
+                .map(|settings| naive_difference::build(settings, setup)),
         ]
         .into_iter()
         .flatten()

@@ -49,7 +49,11 @@ impl Alarm {
     pub fn step(&mut self, stamp_ns: i64, score: Option<f64>) -> Step {
         let Some(score) = score else {
             self.newest_low_ns = None;
-            return if self.contact_ns.take().is_some() { Step::Offset } else { Step::Free };
+            return if self.contact_ns.take().is_some() {
+                Step::Offset
+            } else {
+                Step::Free
+            };
         };
         // Equation 7: True where the score is equal, too.
         let high = score >= self.threshold;
@@ -89,15 +93,28 @@ mod tests {
 
     fn steps(scores: &[f64]) -> Vec<Step> {
         let mut alarm = Alarm::new(10.0, 2.0, 0.025);
-        (0..).zip(scores).map(|(i, &score)| alarm.step(i * 10 * MS, Some(score))).collect()
+        (0..)
+            .zip(scores)
+            .map(|(i, &score)| alarm.step(i * 10 * MS, Some(score)))
+            .collect()
     }
 
     #[test]
     fn a_contact_begins_where_the_score_left_its_usual_range() {
         let steps = steps(&[1.0, 1.0, 4.0, 8.0, 10.0, 11.0]);
         assert_eq!(steps[3], Step::Free);
-        assert_eq!(steps[4], Step::Onset { contact_ns: 10 * MS });
-        assert_eq!(steps[5], Step::Contact { contact_ns: 10 * MS });
+        assert_eq!(
+            steps[4],
+            Step::Onset {
+                contact_ns: 10 * MS
+            }
+        );
+        assert_eq!(
+            steps[5],
+            Step::Contact {
+                contact_ns: 10 * MS
+            }
+        );
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Which joints felt a contact, which link was touched, and how hard.
 //!
 //! A force on link k loads only the joints between the base and k: the outermost joint that is loaded
-//! names the link. The force follows from the loaded joints, τ_ext = Jᵀ F (Haddadin, De Luca and
+//! names the link. The force follows from the loaded joints, `τ_ext = Jᵀ F` (Haddadin, De Luca and
 //! Albu-Schäffer, "Robot Collisions: A Survey on Detection, Isolation, and Identification", 2017,
 //! sections V and VI), with the point of contact taken at the link's centre of mass.
 
@@ -42,8 +42,16 @@ impl Isolation {
     /// For the robot of `setup`; without a model only the loaded joints are told.
     pub fn new(setup: Setup) -> Self {
         Self {
-            noise: setup.joints.iter().map(|joint| joint.noise.unwrap_or(f64::INFINITY)).collect(),
-            effort_per_nm: setup.joints.iter().map(|joint| joint.effort_per_nm).collect(),
+            noise: setup
+                .joints
+                .iter()
+                .map(|joint| joint.noise.unwrap_or(f64::INFINITY))
+                .collect(),
+            effort_per_nm: setup
+                .joints
+                .iter()
+                .map(|joint| joint.effort_per_nm)
+                .collect(),
             model: setup.model.map(|model| {
                 let data = Data::new(&model);
                 (model, data)
@@ -54,7 +62,9 @@ impl Isolation {
     /// The loaded joints: bit j for joint j.
     pub fn loaded_joints(&self, residual: &JointArray) -> u32 {
         let loaded = self.noise.iter().zip(residual).enumerate();
-        loaded.filter(|(_, (noise, r))| r.abs() > LOADED_SIGMAS * **noise).fold(0, |m, (j, _)| m | 1 << j)
+        loaded
+            .filter(|(_, (noise, r))| r.abs() > LOADED_SIGMAS * **noise)
+            .fold(0, |m, (j, _)| m | 1 << j)
     }
 
     /// The contact behind the loaded joints, or nothing if none is loaded or there is no model.
@@ -94,6 +104,8 @@ impl Isolation {
 
     /// The name of a link.
     pub fn link_name(&self, link: usize) -> &str {
-        self.model.as_ref().map_or("", |(model, _)| model.links()[link].name.as_str())
+        self.model
+            .as_ref()
+            .map_or("", |(model, _)| model.links()[link].name.as_str())
     }
 }

@@ -16,14 +16,13 @@ use crate::stage::Setup;
 #[serde(deny_unknown_fields)]
 pub struct Settings {}
 
-impl Settings {
-    pub(crate) fn build(&self, setup: &Setup) -> Box<dyn Detector> {
-        let mut regression = [(1.0, 0.0); MAX_JOINTS];
-        for (own, joint) in regression.iter_mut().zip(&setup.joints) {
-            *own = (joint.gain, joint.offset);
-        }
-        Box::new(NaiveDifference { regression })
+/// The detector behind a twin with the gains and offsets of `setup`.
+pub(crate) fn build(_: &Settings, setup: &Setup) -> Box<dyn Detector> {
+    let mut regression = [(1.0, 0.0); MAX_JOINTS];
+    for (own, joint) in regression.iter_mut().zip(&setup.joints) {
+        *own = (joint.gain, joint.offset);
     }
+    Box::new(NaiveDifference { regression })
 }
 
 struct NaiveDifference {
@@ -50,6 +49,9 @@ impl Detector for NaiveDifference {
                 (sample.filtered_effort[j] - model).powi(2)
             })
             .sum();
-        Judgement { score, ready: sample.header.has(flags::READY) }
+        Judgement {
+            score,
+            ready: sample.header.has(flags::READY),
+        }
     }
 }

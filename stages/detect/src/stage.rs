@@ -63,7 +63,9 @@ impl Detect {
         let low = setup
             .scores
             .get(detector.name())
-            .map_or(0.5 * threshold, |score| score.mean + score.standard_deviation);
+            .map_or(0.5 * threshold, |score| {
+                score.mean + score.standard_deviation
+            });
         Ok(Self {
             name: Name::new(detector.name()),
             detector,
@@ -80,9 +82,10 @@ impl Stage<TwinState, Detection> for Detect {
         out: &mut dyn Emit<Detection>,
     ) -> Result<(), StageError> {
         let judgement = self.detector.judge(sample);
-        let step = self
-            .alarm
-            .step(sample.header.stamp_ns, judgement.ready.then_some(judgement.score));
+        let step = self.alarm.step(
+            sample.header.stamp_ns,
+            judgement.ready.then_some(judgement.score),
+        );
         let (state, event, contact_ns) = match step {
             Step::Free if judgement.ready => ("free", 0, None),
             Step::Free => ("not_ready", 0, None),

@@ -41,7 +41,10 @@ pub struct Calibration {
 impl Calibration {
     /// An empty regression for this many joints.
     pub fn new(joint_count: usize) -> Self {
-        Self { joints: vec![Moments::default(); joint_count], samples: 0 }
+        Self {
+            joints: vec![Moments::default(); joint_count],
+            samples: 0,
+        }
     }
 
     /// How many samples were taken.
@@ -57,7 +60,10 @@ impl Calibration {
         self.samples += 1;
         let n = self.samples as f64;
         for (j, m) in self.joints.iter_mut().enumerate() {
-            let (x, y) = (sample.filtered_expected_effort[j], sample.filtered_effort[j]);
+            let (x, y) = (
+                sample.filtered_expected_effort[j],
+                sample.filtered_effort[j],
+            );
             let (dx, dy) = (x - m.mean_x, y - m.mean_y);
             m.mean_x += dx / n;
             m.mean_y += dy / n;
@@ -86,7 +92,11 @@ impl Calibration {
                         gain,
                         offset: m.mean_y - gain * m.mean_x,
                         noise: (left / n).sqrt(),
-                        explained: if varies && m.yy > 0.0 { 1.0 - left / m.yy } else { 0.0 },
+                        explained: if varies && m.yy > 0.0 {
+                            1.0 - left / m.yy
+                        } else {
+                            0.0
+                        },
                         excitation: (m.xx / n).sqrt(),
                     }
                 })
@@ -103,7 +113,11 @@ mod tests {
 
     fn sample(model: f64, measured: f64) -> TwinState {
         let mut sample = TwinState {
-            header: Header { flags: flags::READY, joint_count: 1, ..Header::default() },
+            header: Header {
+                flags: flags::READY,
+                joint_count: 1,
+                ..Header::default()
+            },
             ..TwinState::default()
         };
         sample.filtered_expected_effort[0] = model;
@@ -133,10 +147,10 @@ mod tests {
             calibration.add(&sample(2.0, 5.0 + f64::from(i % 2)));
         }
         let fit = calibration.fit().unwrap()[0];
-        assert_eq!(fit.gain, 1.0);
+        assert!((fit.gain - 1.0).abs() < f64::EPSILON);
         assert!((fit.offset - 3.5).abs() < 1e-9);
         assert!((fit.noise - 0.5).abs() < 1e-9);
-        assert_eq!(fit.explained, 0.0);
+        assert!(fit.explained.abs() < f64::EPSILON);
     }
 
     #[test]

@@ -15,5 +15,6 @@ pub use calibration::{Calibration, JointFit};
 pub use config::{Config, Expected, Motion};
 pub use stage::{Setup, Twin, TwinError};
 pub use twin_file::{
-    Correction, Filters, JointCorrection, Robot, ScoreStatistics, TwinFile, TwinFileError,
+    Correction, Filters, JointCorrection, Robot, ScoreStatistics, TWIN_FILE_VERSION, TwinFile,
+    TwinFileError,
 };

@@ -31,7 +31,9 @@ impl MotionTracker {
 
     /// Time after a reset from which on the acceleration can be trusted \[s\].
     pub fn settling_time_s(&self) -> f64 {
-        self.acceleration_filters.first().map_or(0.0, FilteredDerivative::settling_time_s)
+        self.acceleration_filters
+            .first()
+            .map_or(0.0, FilteredDerivative::settling_time_s)
     }
 
     /// Whether the sample holds the motion that is followed.
@@ -56,8 +58,9 @@ impl MotionTracker {
         let (position, velocity) = self.source(sample);
         let (position, velocity) = (*position, *velocity);
         if self.motion == Motion::VelocityHistory {
-            for j in 0..self.acceleration_filters.len() {
-                self.position[j] += 0.5 * (self.previous_velocity[j] + velocity[j]) * dt_s;
+            let velocities = self.previous_velocity.iter().zip(&velocity);
+            for (position, (before, now)) in self.position.iter_mut().zip(velocities) {
+                *position += 0.5 * (before + now) * dt_s;
             }
         } else {
             self.position = position;

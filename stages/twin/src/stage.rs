@@ -104,7 +104,9 @@ impl Twin {
 
     /// Attaches the tool that the sample tells of, if it is another than before.
     fn follow_tool(&mut self, sample: &JointState) {
-        let (Some((model, _)), Some(link)) = (&mut self.model, self.tool_link) else { return };
+        let (Some((model, _)), Some(link)) = (&mut self.model, self.tool_link) else {
+            return;
+        };
         let tool = sample.header.has(flags::TOOL).then(|| {
             let mut all = [sample.tool_mass_kg; 10];
             all[1..4].copy_from_slice(&sample.tool_com_m);
@@ -116,7 +118,11 @@ impl Twin {
         }
         self.tool = tool;
         let inertia = tool.map_or_else(Inertia::zero, |_| {
-            Inertia::new(sample.tool_mass_kg, sample.tool_com_m, sample.tool_inertia_kgm2)
+            Inertia::new(
+                sample.tool_mass_kg,
+                sample.tool_com_m,
+                sample.tool_inertia_kgm2,
+            )
         });
         model.set_tool(link, inertia);
     }
@@ -133,7 +139,12 @@ impl Twin {
                     &self.motion.acceleration[..n],
                 );
                 effort[..n].copy_from_slice(rnea(model, data, position, velocity, acceleration));
-                let at = terms::MotionSample { dt_s, position, velocity, acceleration };
+                let at = terms::MotionSample {
+                    dt_s,
+                    position,
+                    velocity,
+                    acceleration,
+                };
                 for term in &mut self.correction.terms {
                     term.add_effort(&at, &mut effort[..n]);
                 }
@@ -158,7 +169,9 @@ impl Stage<JointState, TwinState> for Twin {
     ) -> Result<(), StageError> {
         let n = self.unit_per_nm.len();
         let stamp_ns = sample.header.stamp_ns;
-        let dt_s = self.previous_ns.map(|before| (stamp_ns - before) as f64 * 1e-9);
+        let dt_s = self
+            .previous_ns
+            .map(|before| (stamp_ns - before) as f64 * 1e-9);
         // A time that runs backwards, a gap, or a source that says so: what the filters hold is void.
         let go_on = matches!(dt_s, Some(dt) if (0.0..=self.max_gap_s).contains(&dt))
             && !sample.header.has(flags::RESET);
@@ -192,7 +205,10 @@ impl Stage<JointState, TwinState> for Twin {
             self.previous_ns = None;
         }
         let settled = (stamp_ns - self.reset_ns) as f64 * 1e-9 >= self.settling_time_s;
-        let mut header = Header { sequence: 0, ..sample.header };
+        let mut header = Header {
+            sequence: 0,
+            ..sample.header
+        };
         header.flags &= !(flags::READY | flags::RESET);
         if known && go_on && settled {
             header.flags |= flags::READY;

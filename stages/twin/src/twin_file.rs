@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use tauscope_dynamics::terms::{Term, TermError, TermSpec};
 
 /// The only version of the format so far.
-pub const VERSION: u32 = 1;
+pub const TWIN_FILE_VERSION: u32 = 1;
 
 /// A corrected twin.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -80,7 +80,12 @@ pub struct JointCorrection {
 
 impl Default for JointCorrection {
     fn default() -> Self {
-        Self { gain: 1.0, offset: 0.0, noise: None, explained: None }
+        Self {
+            gain: 1.0,
+            offset: 0.0,
+            noise: None,
+            explained: None,
+        }
     }
 }
 
@@ -100,7 +105,9 @@ pub struct ScoreStatistics {
 #[derive(Debug, thiserror::Error)]
 pub enum TwinFileError {
     /// It corrects a joint that the robot has not.
-    #[error("the twin corrects joint `{joint}`, which the robot does not have; its joints: {known}")]
+    #[error(
+        "the twin corrects joint `{joint}`, which the robot does not have; its joints: {known}"
+    )]
     UnknownJoint {
         /// The joint in the file.
         joint: String,
@@ -132,7 +139,10 @@ pub struct Correction {
 impl Correction {
     /// No correction: the rigid-body model as it is.
     pub fn none(joint_count: usize) -> Self {
-        Self { joints: vec![JointCorrection::default(); joint_count], terms: Vec::new() }
+        Self {
+            joints: vec![JointCorrection::default(); joint_count],
+            terms: Vec::new(),
+        }
     }
 }
 
