@@ -1,0 +1,272 @@
+//! Calibration: what a twin's gain, offset and noise per joint are, and what the detectors' scores do
+//! while nothing touches the robot. The stages are the pipeline's own, so that the numbers hold there.
+
+use std::path::{Path, PathBuf};
+
+use tauscope_bus::{SampleRef, Sink, StageError, TwinState, flags};
+use tauscope_detect::Detector;
+use tauscope_ingest::{FileConfig, RecordedSource, Topics};
+use tauscope_twin::{Calibration, Filters, JointCorrection, Robot, ScoreStatistics, TwinFile};
+
+use crate::build;
+use crate::pipeline::Cell;
+use crate::provenance;
+use crate::replay::{Graph, ReplayError};
+
+/// What to calibrate, and on what.
+#[derive(Debug)]
+pub struct Job<'a> {
+    /// The cell.
+    pub cell: &'a Cell,
+    /// Topics of the recordings.
+    pub topics: &'a Topics,
+    /// The twin, without a model.
+    pub twin: &'a tauscope_twin::Config,
+    /// Contact-free recordings that the gains are fitted on.
+    pub fit: &'a [PathBuf],
+    /// Contact-free recordings that noise and scores are measured on; those of the fit if empty.
+    pub validation: &'a [PathBuf],
+}
+
+/// Why a calibration gives nothing.
+#[derive(Debug, thiserror::Error)]
+pub enum CalibrateError {
+    /// A recording cannot be run through the stages.
+    #[error("{}: {source}", recording.display())]
+    Recording {
+        /// The recording.
+        recording: PathBuf,
+        /// Why.
+        source: ReplayError,
+    },
+    /// The recordings are over before the filters have settled, or hold no effort.
+    #[error(
+        "no sample to calibrate on: the recordings hold no effort, or end before the twin's filters have settled"
+    )]
+    TooShort,
+}
+
+impl CalibrateError {
+    /// Whether the arguments or files are wrong (exit code 2), rather than what happened since.
+    pub fn is_input(&self) -> bool {
+        match self {
+            Self::Recording { source, .. } => source.is_input(),
+            Self::TooShort => true,
+        }
+    }
+}
+
+/// A calibrated twin, and what was lost on the way to it.
+#[derive(Debug)]
+pub struct Calibrated {
+    /// The twin.
+    pub file: TwinFile,
+    /// Samples that the gains were fitted on.
+    pub samples: u64,
+    /// Samples of the recordings that were lost or refused.
+    pub lost: u64,
+}
+
+impl Job<'_> {
+    /// Fits gain and offset, then measures noise and scores. `progress` is told the place of the
+    /// recording among all that are read, and how far it is.
+    ///
+    /// # Errors
+    /// If a recording cannot be read, or all are too short.
+    pub fn run(&self, progress: &dyn Fn(usize, f64)) -> Result<Calibrated, CalibrateError> {
+        let joint_count = self.cell.facts.joint_names.len();
+        let mut lost = 0;
+        let mut calibration = Calibration::new(joint_count);
+        for (index, recording) in self.fit.iter().enumerate() {
+            let step = &mut |fraction| progress(index, fraction);
+            lost += self.each(recording, None, step, &mut |sample| calibration.add(sample))?;
+        }
+        let Some(fits) = calibration.fit() else {
+            return Err(CalibrateError::TooShort);
+        };
+        let mut file = self.file();
+        for (name, fit) in self.cell.facts.joint_names.iter().zip(&fits) {
+            let joint = JointCorrection {
+                gain: fit.gain,
+                offset: fit.offset,
+                noise: None,
+                explained: Some(fit.explained),
+            };
+            file.joints.insert(name.clone(), joint);
+        }
+
+        let measured = if self.validation.is_empty() {
+            self.fit
+        } else {
+            self.validation
+        };
+        let mut noise = vec![Spread::default(); joint_count];
+        let mut detectors = self
+            .detectors(&file)
+            .map_err(|source| CalibrateError::Recording {
+                recording: measured[0].clone(),
+                source,
+            })?;
+        for (index, recording) in measured.iter().enumerate() {
+            let step = &mut |fraction| progress(self.fit.len() + index, fraction);
+            let seen = self.each(recording, Some(&file), step, &mut |sample| {
+                for (spread, residual) in noise.iter_mut().zip(sample.residual) {
+                    spread.add(residual);
+                }
+                for (detector, spread) in &mut detectors {
+                    let judgement = detector.judge(sample);
+                    if judgement.ready {
+                        spread.add(judgement.score);
+                    }
+                }
+            })?;
+            lost += if self.validation.is_empty() { 0 } else { seen };
+        }
+        for (name, spread) in self.cell.facts.joint_names.iter().zip(&noise) {
+            if let Some(joint) = file.joints.get_mut(name) {
+                // About zero: a standing error of the twin is noise to a detector, too.
+                joint.noise = Some(spread.root_mean_square());
+            }
+        }
+        file.scores = (detectors.iter())
+            .map(|(detector, spread)| (detector.name().to_owned(), spread.statistics()))
+            .collect();
+        Ok(Calibrated {
+            file,
+            samples: calibration.samples(),
+            lost,
+        })
+    }
+
+    /// How many recordings are read, for a progress bar.
+    pub fn recordings(&self) -> usize {
+        let measured = if self.validation.is_empty() {
+            self.fit
+        } else {
+            self.validation
+        };
+        self.fit.len() + measured.len()
+    }
+
+    /// Runs a recording through source and twin and hands over every sample whose filters have
+    /// settled; returns what was lost.
+    fn each(
+        &self,
+        recording: &Path,
+        model: Option<&TwinFile>,
+        progress: &mut dyn FnMut(f64),
+        take: &mut (dyn FnMut(&TwinState) + Send),
+    ) -> Result<u64, CalibrateError> {
+        let failed = |source: ReplayError| CalibrateError::Recording {
+            recording: recording.to_owned(),
+            source,
+        };
+        let mut run = || -> Result<u64, ReplayError> {
+            let config = tauscope_ingest::Config::default();
+            let file = FileConfig {
+                path: recording.to_owned(),
+                topics: self.topics.clone(),
+            };
+            let setup = build::ingest_setup(self.cell);
+            let source = RecordedSource::open_file(&file, &config, &setup)?;
+            let twin = build::twin(self.twin, model, self.cell)?;
+            let mut graph = Graph::default();
+            let states = graph.source("ingest", Box::new(source))?;
+            let twins = graph.stage("twin", Box::new(twin), &states)?;
+            let input = graph.listen::<TwinState>(&twins)?;
+            graph.sink("calibration", Box::new(Settled(take)), vec![input]);
+            let counts = graph.run(progress)?;
+            Ok(counts.iter().map(|stage| stage.dropped).sum())
+        };
+        run().map_err(failed)
+    }
+
+    /// The twin as far as it is known before the fit.
+    fn file(&self) -> TwinFile {
+        let facts = &self.cell.facts;
+        TwinFile {
+            version: tauscope_twin::TWIN_FILE_VERSION,
+            robot: Robot {
+                name: self
+                    .cell
+                    .model
+                    .as_ref()
+                    .map_or_else(String::new, |m| m.name().to_owned()),
+                urdf_sha256: facts
+                    .urdf
+                    .as_ref()
+                    .map_or_else(String::new, |urdf| provenance::sha256(urdf.as_bytes())),
+            },
+            effort_unit: facts.effort_unit.as_str().to_owned(),
+            filters: Filters {
+                velocity_cutoff_hz: self.twin.velocity_cutoff_hz,
+                effort_cutoff_hz: self.twin.effort_cutoff_hz,
+            },
+            joints: std::collections::BTreeMap::new(),
+            terms: Vec::new(),
+            scores: std::collections::BTreeMap::new(),
+            provenance: std::collections::BTreeMap::new(),
+        }
+    }
+
+    /// Every detector behind this twin, its score not yet measured.
+    fn detectors(&self, file: &TwinFile) -> Result<Vec<(Box<dyn Detector>, Spread)>, ReplayError> {
+        let setup = build::detect_setup(Some(file), self.cell)?;
+        let all = tauscope_detect::Config::every(&setup);
+        Ok(all
+            .into_iter()
+            .map(|detector| (detector, Spread::default()))
+            .collect())
+    }
+}
+
+/// Hands every sample whose filters have settled to a closure.
+struct Settled<'a>(&'a mut (dyn FnMut(&TwinState) + Send));
+
+impl Sink for Settled<'_> {
+    fn accept(&mut self, _from: &str, sample: SampleRef<'_>) -> Result<(), StageError> {
+        if let SampleRef::TwinState(sample) = sample
+            && sample.header.has(flags::READY)
+        {
+            (self.0)(sample);
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self) -> Result<(), StageError> {
+        Ok(())
+    }
+}
+
+/// Mean and spread of a number, as it comes (Welford).
+#[derive(Debug, Clone, Copy, Default)]
+struct Spread {
+    count: u64,
+    mean: f64,
+    squares: f64,
+}
+
+impl Spread {
+    fn add(&mut self, value: f64) {
+        self.count += 1;
+        let delta = value - self.mean;
+        self.mean += delta / self.count as f64;
+        self.squares += delta * (value - self.mean);
+    }
+
+    fn variance(&self) -> f64 {
+        self.squares / self.count.max(1) as f64
+    }
+
+    fn root_mean_square(&self) -> f64 {
+        (self.variance() + self.mean * self.mean).sqrt()
+    }
+
+    fn statistics(&self) -> ScoreStatistics {
+        ScoreStatistics {
+            mean: self.mean,
+            standard_deviation: self.variance().sqrt(),
+            samples: self.count,
+        }
+    }
+}

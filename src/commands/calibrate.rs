@@ -1,0 +1,229 @@
+//! `tauscope calibrate`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+use comfy_table::{CellAlignment, Table, presets};
+use tauscope_ingest::Topics;
+use tauscope_twin::{Expected, Motion, TwinFile};
+
+use super::print;
+use crate::calibrate::{Calibrated, Job};
+use crate::exit::{Exit, Failure};
+use crate::pipeline::{Cell, EffortUnit};
+use crate::progress::Progress;
+use crate::provenance;
+use crate::report::Problem;
+
+/// Below this share of the measured effort's variance that the model explains, the gain is worth
+/// little.
+const WEAK: f64 = 0.5;
+
+/// Learn gain, offset and noise per joint from contact-free recordings, and what the detectors'
+/// scores do while nothing touches the robot.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Contact-free recordings that the gains are fitted on.
+    #[arg(required = true)]
+    recordings: Vec<PathBuf>,
+    /// The robot's URDF.
+    #[arg(long, value_name = "URDF")]
+    robot: PathBuf,
+    /// Where the corrected twin goes.
+    #[arg(long, default_value = "twin.yaml")]
+    out: PathBuf,
+    /// Contact-free recordings that noise and scores, and so the detectors' thresholds, are measured
+    /// on; without them, those of the fit, which flatter.
+    #[arg(long, value_name = "RECORDING", num_args = 1..)]
+    validation: Vec<PathBuf>,
+    /// Unit of the measured effort.
+    #[arg(long, value_enum, default_value_t)]
+    effort_unit: EffortUnit,
+    /// Torque constant of a joint in N m/A, for efforts in A; for all joints or for none.
+    #[arg(long, value_name = "JOINT=CONSTANT", value_parser = joint_constant)]
+    torque_constant: Vec<(String, f64)>,
+    /// Topic of the measured joint states.
+    #[arg(long, default_value = "/joint_states")]
+    state_topic: String,
+    /// Topic of the commanded motion, for `--motion commanded`.
+    #[arg(long)]
+    command_topic: Option<String>,
+    /// Topic of another twin's effort: it is corrected instead of the URDF's.
+    #[arg(long)]
+    twin_topic: Option<String>,
+    /// The motion whose effort is computed.
+    #[arg(long, default_value = "measured", value_parser = motion)]
+    motion: Motion,
+    /// Low-pass on the velocity before it is differentiated, in Hz.
+    #[arg(long, default_value_t = tauscope_twin::Config::default().velocity_cutoff_hz)]
+    velocity_cutoff_hz: f64,
+    /// Low-pass on measured and expected effort, in Hz.
+    #[arg(long, default_value_t = tauscope_twin::Config::default().effort_cutoff_hz)]
+    effort_cutoff_hz: f64,
+    /// Machine-readable.
+    #[arg(long)]
+    json: bool,
+}
+
+fn joint_constant(text: &str) -> Result<(String, f64), String> {
+    let (joint, constant) = text.split_once('=').ok_or("give it as joint=constant")?;
+    match constant.parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok((joint.to_owned(), value)),
+        _ => Err(format!("`{constant}` is no positive number")),
+    }
+}
+
+fn motion(text: &str) -> Result<Motion, String> {
+    match text {
+        "measured" => Ok(Motion::Measured),
+        "velocity_history" => Ok(Motion::VelocityHistory),
+        "commanded" => Ok(Motion::Commanded),
+        _ => Err("it is one of measured, velocity_history, commanded".to_owned()),
+    }
+}
+
+/// Calibrates and writes the twin.
+pub fn run(args: &Args) -> Result<Exit, Failure> {
+    let constants = args.torque_constant.iter().cloned().collect();
+    let cell = Cell::from_urdf(&args.robot, args.effort_unit, constants)?;
+    let topics = Topics {
+        state: args.state_topic.clone(),
+        command: args.command_topic.clone(),
+        twin: args.twin_topic.clone(),
+        tool: None,
+    };
+    if args.motion == Motion::Commanded && args.command_topic.is_none() {
+        return Err(Failure::rejected(
+            "--motion commanded needs --command-topic",
+        ));
+    }
+    let twin = tauscope_twin::Config {
+        model: None,
+        motion: args.motion,
+        expected: if args.twin_topic.is_some() {
+            Expected::Topic
+        } else {
+            Expected::Model
+        },
+        velocity_cutoff_hz: args.velocity_cutoff_hz,
+        effort_cutoff_hz: args.effort_cutoff_hz,
+        ..tauscope_twin::Config::default()
+    };
+    let job = Job {
+        cell: &cell,
+        topics: &topics,
+        twin: &twin,
+        fit: &args.recordings,
+        validation: &args.validation,
+    };
+    let progress = Progress::new(job.recordings());
+    let result = job.run(&|index, fraction| progress.set(index, fraction));
+    drop(progress);
+    let mut calibrated = result.map_err(|error| {
+        if error.is_input() {
+            Failure::rejected(error.to_string())
+        } else {
+            Failure::Failed(error.into())
+        }
+    })?;
+    calibrated.file.provenance = provenance(args)?;
+    write(&args.out, &calibrated.file)?;
+    if args.json {
+        print(&serde_json::to_string_pretty(&calibrated.file).context("the twin")?)?;
+    } else {
+        print(&report(&calibrated, &cell, args))?;
+    }
+    Ok(Exit::from_loss(calibrated.lost > 0))
+}
+
+/// What went in, by name and hash.
+fn provenance(args: &Args) -> anyhow::Result<std::collections::BTreeMap<String, String>> {
+    let mut all = std::collections::BTreeMap::new();
+    all.insert("tauscope".to_owned(), env!("CARGO_PKG_VERSION").to_owned());
+    for (role, recordings) in [("fit", &args.recordings), ("validation", &args.validation)] {
+        for recording in recordings {
+            let name = recording
+                .file_name()
+                .unwrap_or(recording.as_os_str())
+                .to_string_lossy();
+            all.insert(
+                format!("{role}/{name}"),
+                provenance::sha256_of_file(recording)?,
+            );
+        }
+    }
+    Ok(all)
+}
+
+/// Writes the twin beside `path` and moves it there once it is whole.
+fn write(path: &Path, file: &TwinFile) -> Result<(), Failure> {
+    let text = serde_saphyr::to_string(file).context("the twin")?;
+    let mut part = path.as_os_str().to_owned();
+    part.push(".part");
+    std::fs::write(&part, text)
+        .and_then(|()| std::fs::rename(&part, path))
+        .map_err(|error| Problem::of_file(path, format!("cannot write: {error}")).into())
+        .map_err(|report: crate::report::Report| Failure::Rejected(report))
+}
+
+fn report(calibrated: &Calibrated, cell: &Cell, args: &Args) -> String {
+    let unit = args.effort_unit.as_str();
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING);
+    table.set_header(
+        ["joint", "gain", "offset", "noise", "explained"]
+            .map(str::to_owned)
+            .map(|name| match name.as_str() {
+                "offset" | "noise" => format!("{name} [{unit}]"),
+                _ => name,
+            }),
+    );
+    let mut weak = Vec::new();
+    for name in &cell.facts.joint_names {
+        let joint = calibrated
+            .file
+            .joints
+            .get(name)
+            .copied()
+            .unwrap_or_default();
+        let explained = joint.explained.unwrap_or(0.0);
+        if explained < WEAK {
+            weak.push(name.as_str());
+        }
+        table.add_row([
+            name.clone(),
+            format!("{:.4}", joint.gain),
+            format!("{:.4}", joint.offset),
+            format!("{:.4}", joint.noise.unwrap_or(f64::NAN)),
+            format!("{:.1} %", 100.0 * explained),
+        ]);
+    }
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    let mut text = format!("{table}\n\nfitted on {} samples", calibrated.samples);
+    if !weak.is_empty() {
+        text.push_str(&format!(
+            "\nnote: the model explains less than {:.0} % of the effort of {}: friction or too little motion outweighs it, so the gain there is not to be read as the drive's",
+            100.0 * WEAK,
+            weak.join(", ")
+        ));
+    }
+    for (name, score) in &calibrated.file.scores {
+        text.push_str(&format!(
+            "\n{name}: score {:.4} +- {:.4} on contact-free data",
+            score.mean, score.standard_deviation
+        ));
+    }
+    if args.validation.is_empty() {
+        text.push_str("\nnote: noise and scores were measured on the recordings of the fit; give others with --validation for thresholds that hold");
+    }
+    if calibrated.lost > 0 {
+        text.push_str(&format!(
+            "\n{} samples of the recordings were lost",
+            calibrated.lost
+        ));
+    }
+    text.push_str(&format!("\nwrote {}", args.out.display()));
+    text
+}

@@ -1,0 +1,295 @@
+//! `tauscope replay`.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use anyhow::Context as _;
+use comfy_table::{CellAlignment, Table, presets};
+use serde::Serialize;
+
+use super::print;
+use crate::exit::{Exit, Failure};
+use crate::pipeline::Pipeline;
+use crate::progress::Progress;
+use crate::replay::{
+    Event, JointRms, Outcome, Replay, ReplayError, TwinChoice, stem, write_events, write_summary,
+};
+use crate::report::{Problem, Report};
+
+/// Run a pipeline's stages over recordings, in process, as fast as the machine allows: the same bytes
+/// every time. The recordings take the place of the pipeline's own source.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// MCAP files, rosbag2 folders, `.db3` bags, or tables (`.csv`, if the pipeline's source is one).
+    #[arg(required = true)]
+    recordings: Vec<PathBuf>,
+    /// The pipeline file.
+    #[arg(long, default_value = "pipeline.yaml")]
+    pipeline: PathBuf,
+    /// Folder for the results: an archive (and picture) per recording as the pipeline's recorder says,
+    /// `summary.parquet` and `events.parquet` over all. Without it nothing is written.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// How many recordings are worked on at once.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
+    jobs: u16,
+    /// The stage whose place the recordings take, where the pipeline has several sources.
+    #[arg(long)]
+    source: Option<String>,
+    /// For archives that already hold a twin's effort: compute it anew, or keep it.
+    #[arg(long, value_enum, default_value_t)]
+    twin: TwinChoice,
+    /// Machine-readable.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Replays them.
+pub fn run(args: &Args) -> Result<Exit, Failure> {
+    let pipeline = Pipeline::load(&args.pipeline, None)?;
+    check_names(args)?;
+    let replay = Replay::new(&pipeline, args.source.as_deref(), args.twin)
+        .map_err(|error| Failure::rejected(error.to_string()))?;
+    for stage in replay.left_out() {
+        eprintln!(
+            "note: stage `{stage}` is a program of its own and not replayed; `tauscope run` runs it"
+        );
+    }
+    if let Some(out) = &args.out {
+        std::fs::create_dir_all(out).map_err(|error| {
+            Failure::rejected(format!("cannot make {}: {error}", out.display()))
+        })?;
+    }
+    let results = replay_all(&replay, args);
+    let mut outcomes = Vec::new();
+    let mut wrong = Report::default();
+    let mut failed = None;
+    for (recording, result) in args.recordings.iter().zip(results) {
+        match result {
+            Ok(outcome) => outcomes.push(outcome),
+            Err(error) if error.is_input() => {
+                wrong.push(Problem::of_file(recording, error.to_string()));
+            }
+            Err(error) => {
+                eprintln!("error: {}: {error}", recording.display());
+                failed = Some(Exit::Failed);
+            }
+        }
+    }
+    if let Some(out) = &args.out {
+        write_summary(out, &outcomes).context("the summary")?;
+        write_events(out, &outcomes).context("the events")?;
+    }
+    if args.json {
+        let all: Vec<_> = outcomes.iter().map(Summary::of).collect();
+        print(&serde_json::to_string_pretty(&all).context("the summary")?)?;
+    } else if !outcomes.is_empty() {
+        print(&table(&outcomes))?;
+    }
+    wrong.into_result(())?;
+    let lossy = outcomes.iter().any(|outcome| outcome.lost > 0);
+    Ok(Exit::from_loss(lossy).and(failed.unwrap_or(Exit::Done)))
+}
+
+/// Results are named after their recordings, so two of one name would overwrite each other.
+fn check_names(args: &Args) -> Result<(), Report> {
+    let mut report = Report::default();
+    for (index, recording) in args.recordings.iter().enumerate() {
+        let same = |other: &&PathBuf| stem(other) == stem(recording);
+        if let Some(first) = args.recordings[..index].iter().find(same) {
+            let title = format!(
+                "`{}` and `{}` would give results of one name, `{}`",
+                first.display(),
+                recording.display(),
+                stem(recording)
+            );
+            report.push(
+                Problem::new(title).help("replay them in two commands with two --out folders"),
+            );
+        }
+        let target = args
+            .out
+            .as_ref()
+            .map(|out| out.join(format!("{}.mcap", stem(recording))));
+        if target.is_some_and(|target| same_file(&target, recording)) {
+            let title = format!(
+                "the result would overwrite the recording `{}`",
+                recording.display()
+            );
+            report.push(Problem::new(title).help("choose another --out folder"));
+        }
+    }
+    report.into_result(())
+}
+
+fn same_file(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
+/// The result of each recording, in their order, whatever the number of jobs.
+fn replay_all(replay: &Replay<'_>, args: &Args) -> Vec<Result<Outcome, ReplayError>> {
+    let next = AtomicUsize::new(0);
+    let results: Mutex<Vec<_>> = Mutex::new(args.recordings.iter().map(|_| None).collect());
+    let progress = Progress::new(args.recordings.len());
+    std::thread::scope(|scope| {
+        for _ in 0..usize::from(args.jobs).min(args.recordings.len()) {
+            scope.spawn(|| {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(recording) = args.recordings.get(index) else {
+                        break;
+                    };
+                    let result = replay.run(recording, args.out.as_deref(), &mut |fraction| {
+                        progress.set(index, fraction);
+                    });
+                    progress.set(index, 1.0);
+                    let mut results = results
+                        .lock()
+                        .unwrap_or_else(std::sync::PoisonError::into_inner);
+                    results[index] = Some(result);
+                }
+            });
+        }
+    });
+    let results = results
+        .into_inner()
+        .unwrap_or_else(std::sync::PoisonError::into_inner);
+    results.into_iter().flatten().collect()
+}
+
+/// What is told of a recording.
+#[derive(Debug, Serialize)]
+struct Summary<'a> {
+    recording: &'a str,
+    cell: &'a str,
+    effort_unit: &'a str,
+    duration_s: f64,
+    lost: u64,
+    joints: &'a [String],
+    twins: Vec<TwinSummary<'a>>,
+    detectors: Vec<DetectorSummary<'a>>,
+    stages: &'a [crate::replay::StageCounts],
+    files: &'a [PathBuf],
+}
+
+#[derive(Debug, Serialize)]
+struct TwinSummary<'a> {
+    stage: &'a str,
+    samples: u64,
+    moving_samples: u64,
+    joints: Vec<JointRms>,
+}
+
+#[derive(Debug, Serialize)]
+struct DetectorSummary<'a> {
+    stage: &'a str,
+    detector: &'a str,
+    judged: u64,
+    events: &'a [Event],
+}
+
+impl<'a> Summary<'a> {
+    fn of(outcome: &'a Outcome) -> Self {
+        Self {
+            recording: &outcome.recording,
+            cell: &outcome.cell,
+            effort_unit: &outcome.effort_unit,
+            duration_s: outcome.duration_s,
+            lost: outcome.lost,
+            joints: &outcome.joint_names,
+            twins: (outcome.twins.iter())
+                .map(|twin| TwinSummary {
+                    stage: &twin.stage,
+                    samples: twin.samples,
+                    moving_samples: twin.moving_samples,
+                    joints: twin.rms(),
+                })
+                .collect(),
+            detectors: (outcome.detectors.iter())
+                .map(|detector| DetectorSummary {
+                    stage: &detector.stage,
+                    detector: &detector.detector,
+                    judged: detector.judged,
+                    events: &detector.events,
+                })
+                .collect(),
+            stages: &outcome.stages,
+            files: &outcome.files,
+        }
+    }
+}
+
+/// For people: per recording a line a stage, how far the twin was off, and the events.
+fn table(outcomes: &[Outcome]) -> String {
+    let mut text = String::new();
+    for outcome in outcomes {
+        let _ = writeln!(text, "{} ({:.1} s)", outcome.recording, outcome.duration_s);
+        for stage in &outcome.stages {
+            let _ = writeln!(
+                text,
+                "  {:<16} received {:>8}  emitted {:>8}  dropped {:>6}",
+                stage.stage, stage.received, stage.emitted, stage.dropped
+            );
+        }
+        for twin in &outcome.twins {
+            let moving = 100.0 * twin.moving_samples as f64 / twin.samples.max(1) as f64;
+            let _ = writeln!(
+                text,
+                "  residual of {}, RMS in {} over {} samples, {moving:.0} % of them moving:",
+                twin.stage, outcome.effort_unit, twin.samples
+            );
+            let _ = writeln!(text, "{}", rms_table(outcome, &twin.rms()));
+        }
+        for detector in &outcome.detectors {
+            let _ = writeln!(
+                text,
+                "  {}: {} events",
+                detector.detector,
+                detector.events.len()
+            );
+            for event in &detector.events {
+                let _ = writeln!(text, "    {}", event_line(event));
+            }
+        }
+        for file in &outcome.files {
+            let _ = writeln!(text, "  wrote {}", file.display());
+        }
+    }
+    text
+}
+
+fn rms_table(outcome: &Outcome, rms: &[JointRms]) -> Table {
+    let mut table = Table::new();
+    table.load_preset(presets::NOTHING);
+    let names = outcome.joint_names.iter().map(String::as_str);
+    table.set_header(std::iter::once("   ").chain(names));
+    let rows: [(&str, fn(&JointRms) -> f64); 3] = [
+        ("   all samples", |rms| rms.residual_rms),
+        ("   moving", |rms| rms.residual_rms_moving),
+        ("   low-passed", |rms| rms.filtered_residual_rms),
+    ];
+    for (name, value) in rows {
+        let values = rms.iter().map(|rms| format!("{:.3}", value(rms)));
+        table.add_row(std::iter::once(name.to_owned()).chain(values));
+    }
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+fn event_line(event: &Event) -> String {
+    let mut line = format!("{:8.3} s to {:8.3} s  {}", event.t, event.t_off, event.kind);
+    if let Some(link) = &event.link {
+        let _ = write!(line, " at {link}");
+    }
+    if let Some([x, y, z]) = event.force {
+        let _ = write!(line, ", {:.1} N", (x * x + y * y + z * z).sqrt());
+    }
+    if !event.joints.is_empty() {
+        let _ = write!(line, " ({})", event.joints.join(", "));
+    }
+    line
+}

@@ -1,0 +1,52 @@
+//! A progress bar over recordings or sources: on a terminal, none in a pipe.
+
+use std::sync::{Mutex, PoisonError};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+/// Steps of the bar; a recording's part is at least one of them.
+const STEPS: f64 = 10_000.0;
+
+/// How far the recordings are, together.
+#[derive(Debug)]
+pub struct Progress {
+    bar: ProgressBar,
+    /// By recording, from 0 to 1.
+    done: Mutex<Vec<f64>>,
+}
+
+impl Progress {
+    /// A bar over `count` recordings.
+    pub fn new(count: usize) -> Self {
+        // Hides itself where standard error is no terminal.
+        let bar = ProgressBar::with_draw_target(Some(STEPS as u64), ProgressDrawTarget::stderr());
+        let style = ProgressStyle::with_template("{bar:40} {percent:>3} % {elapsed} (left: {eta})");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        Self {
+            bar,
+            done: Mutex::new(vec![0.0; count]),
+        }
+    }
+
+    /// Recording `index` has come to `fraction`.
+    pub fn set(&self, index: usize, fraction: f64) {
+        let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(own) = done.get_mut(index) else {
+            return;
+        };
+        *own = fraction;
+        let mean = done.iter().sum::<f64>() / done.len() as f64;
+        self.bar.set_position((mean * STEPS) as u64);
+    }
+
+    /// Writes a line to standard error, above the bar.
+    pub fn say(&self, line: &str) {
+        self.bar.suspend(|| eprintln!("{line}"));
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}

@@ -1,0 +1,313 @@
+//! A pipeline in one process and one thread.
+//!
+//! After each step of a source every stage below takes all there is for it, in the order of the
+//! pipeline (each stage after those it listens to), before the next step. So the order of everything
+//! that is written is a function of the pipeline and the recording alone.
+
+use std::time::Duration;
+
+use serde::Serialize;
+use tauscope_bus::{
+    Audience, Emit, InProcess, Keep, LinkError, Progress, Received, Receiver, Sample, SampleRef,
+    Sender, Sink, Source, Stage, StageError, Transport,
+};
+
+/// Samples a stage may leave unread. A source gives out at most a few in a step, and they are all
+/// taken before its next one.
+const DEPTH: usize = 1024;
+
+/// Where a stage's output goes.
+struct Outlet<T: Sample>(Box<dyn Sender<T>>);
+
+impl<T: Sample> Emit<T> for Outlet<T> {
+    fn emit(&mut self, write: &mut dyn FnMut(&mut T)) -> Result<(), LinkError> {
+        self.0.send_with(write)
+    }
+}
+
+/// What a stage has counted.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct StageCounts {
+    /// The stage.
+    pub stage: String,
+    /// Samples that came in.
+    pub received: u64,
+    /// Samples that went out.
+    pub emitted: u64,
+    /// Samples that it had to refuse, or that did not reach it.
+    pub dropped: u64,
+}
+
+/// A stage with its links, whatever its types are.
+trait Node {
+    /// Takes what there is; false once nothing more will come out of it.
+    fn turn(&mut self) -> Result<bool, StageError>;
+    fn counts(&self) -> StageCounts;
+    fn fraction_done(&self) -> Option<f64> {
+        None
+    }
+}
+
+struct SourceNode<T: Sample> {
+    name: String,
+    source: Box<dyn Source<T>>,
+    out: Outlet<T>,
+    ended: bool,
+}
+
+impl<T: Sample> Node for SourceNode<T> {
+    fn turn(&mut self) -> Result<bool, StageError> {
+        if !self.ended && self.source.step(&mut self.out)? == Progress::End {
+            self.ended = true;
+            self.out.0.end()?;
+        }
+        Ok(!self.ended)
+    }
+
+    fn counts(&self) -> StageCounts {
+        StageCounts {
+            stage: self.name.clone(),
+            received: 0,
+            emitted: self.out.0.counts().sent,
+            dropped: self.source.dropped(),
+        }
+    }
+
+    fn fraction_done(&self) -> Option<f64> {
+        if self.ended {
+            Some(1.0)
+        } else {
+            self.source.fraction_done()
+        }
+    }
+}
+
+struct StageNode<I: Sample, O: Sample> {
+    name: String,
+    stage: Box<dyn Stage<I, O>>,
+    input: Box<dyn Receiver<I>>,
+    out: Outlet<O>,
+    ended: bool,
+}
+
+impl<I: Sample, O: Sample> Node for StageNode<I, O> {
+    fn turn(&mut self) -> Result<bool, StageError> {
+        while !self.ended {
+            let mut result = Ok(());
+            let (stage, out) = (&mut self.stage, &mut self.out);
+            let received = self.input.receive(Duration::ZERO, &mut |sample| {
+                result = stage.accept(sample, out);
+            })?;
+            result?;
+            match received {
+                Received::Sample => {}
+                Received::Nothing => break,
+                Received::End => {
+                    self.stage.finish(&mut self.out)?;
+                    self.out.0.end()?;
+                    self.ended = true;
+                }
+            }
+        }
+        Ok(!self.ended)
+    }
+
+    fn counts(&self) -> StageCounts {
+        let input = self.input.counts();
+        StageCounts {
+            stage: self.name.clone(),
+            received: input.received,
+            emitted: self.out.0.counts().sent,
+            dropped: input.lost + self.stage.dropped(),
+        }
+    }
+}
+
+/// A receiver whose sample type is known at run time only.
+trait AnyInput {
+    fn take(
+        &mut self,
+        read: &mut dyn FnMut(SampleRef<'_>) -> Result<(), StageError>,
+    ) -> Result<Received, StageError>;
+    fn counts(&self) -> tauscope_bus::ReceiverCounts;
+}
+
+impl<T: Sample> AnyInput for Box<dyn Receiver<T>> {
+    fn take(
+        &mut self,
+        read: &mut dyn FnMut(SampleRef<'_>) -> Result<(), StageError>,
+    ) -> Result<Received, StageError> {
+        let mut result = Ok(());
+        let received =
+            self.receive(Duration::ZERO, &mut |sample| result = read(sample.as_ref()))?;
+        result?;
+        Ok(received)
+    }
+
+    fn counts(&self) -> tauscope_bus::ReceiverCounts {
+        (**self).counts()
+    }
+}
+
+/// One of the streams that a sink listens to.
+pub struct SinkInput {
+    from: String,
+    receiver: Box<dyn AnyInput>,
+    open: bool,
+}
+
+struct SinkNode<'a> {
+    name: String,
+    sink: Box<dyn Sink + 'a>,
+    inputs: Vec<SinkInput>,
+    ended: bool,
+}
+
+impl Node for SinkNode<'_> {
+    fn turn(&mut self) -> Result<bool, StageError> {
+        if self.ended {
+            return Ok(false);
+        }
+        for SinkInput {
+            from,
+            receiver,
+            open,
+        } in &mut self.inputs
+        {
+            while *open {
+                match receiver.take(&mut |sample| self.sink.accept(from, sample))? {
+                    Received::Sample => {}
+                    Received::Nothing => break,
+                    Received::End => *open = false,
+                }
+            }
+        }
+        if self.inputs.iter().all(|input| !input.open) {
+            self.sink.finish()?;
+            self.ended = true;
+        }
+        Ok(!self.ended)
+    }
+
+    fn counts(&self) -> StageCounts {
+        let counts = self.inputs.iter().map(|input| input.receiver.counts());
+        let (received, lost) = counts.fold((0, 0), |(r, l), c| (r + c.received, l + c.lost));
+        StageCounts {
+            stage: self.name.clone(),
+            received,
+            emitted: 0,
+            dropped: lost + self.sink.dropped(),
+        }
+    }
+}
+
+/// A stream of a [`Graph`], by the stage that makes it.
+#[derive(Debug, Clone)]
+pub struct Stream {
+    stage: String,
+    key: String,
+}
+
+/// Stages in one thread, in the order in which they were added.
+#[derive(Default)]
+pub struct Graph<'a> {
+    links: InProcess,
+    nodes: Vec<Box<dyn Node + 'a>>,
+}
+
+impl<'a> Graph<'a> {
+    /// Adds a source.
+    ///
+    /// # Errors
+    /// If its link cannot be opened.
+    pub fn source<T: Sample>(
+        &mut self,
+        name: &str,
+        source: Box<dyn Source<T>>,
+    ) -> Result<Stream, LinkError> {
+        let (stream, out) = self.outlet(name)?;
+        let name = name.to_owned();
+        self.nodes.push(Box::new(SourceNode {
+            name,
+            source,
+            out,
+            ended: false,
+        }));
+        Ok(stream)
+    }
+
+    /// Adds a stage that listens to `input`.
+    ///
+    /// # Errors
+    /// If a link cannot be opened, or `input` carries another type.
+    pub fn stage<I: Sample, O: Sample>(
+        &mut self,
+        name: &str,
+        stage: Box<dyn Stage<I, O>>,
+        input: &Stream,
+    ) -> Result<Stream, LinkError> {
+        let input = self.links.receiver(&input.key, Keep::All, DEPTH)?;
+        let (stream, out) = self.outlet(name)?;
+        let name = name.to_owned();
+        self.nodes.push(Box::new(StageNode {
+            name,
+            stage,
+            input,
+            out,
+            ended: false,
+        }));
+        Ok(stream)
+    }
+
+    /// A receiving end of `stream` for a sink.
+    ///
+    /// # Errors
+    /// If the link cannot be opened, or the stream carries another type.
+    pub fn listen<T: Sample>(&mut self, stream: &Stream) -> Result<SinkInput, LinkError> {
+        let receiver: Box<dyn Receiver<T>> = self.links.receiver(&stream.key, Keep::All, DEPTH)?;
+        Ok(SinkInput {
+            from: stream.stage.clone(),
+            receiver: Box::new(receiver),
+            open: true,
+        })
+    }
+
+    /// Adds a sink.
+    pub fn sink(&mut self, name: &str, sink: Box<dyn Sink + 'a>, inputs: Vec<SinkInput>) {
+        let name = name.to_owned();
+        self.nodes.push(Box::new(SinkNode {
+            name,
+            sink,
+            inputs,
+            ended: false,
+        }));
+    }
+
+    fn outlet<T: Sample>(&mut self, name: &str) -> Result<(Stream, Outlet<T>), LinkError> {
+        let stream = Stream {
+            stage: name.to_owned(),
+            key: name.to_owned(),
+        };
+        let out = self.links.sender(&stream.key, Audience::default())?;
+        Ok((stream, Outlet(out)))
+    }
+
+    /// Runs until every source has ended and everything has passed through. `progress` is told how
+    /// far the sources are, from 0 to 1, where they know.
+    ///
+    /// # Errors
+    /// The first that a stage gives.
+    pub fn run(&mut self, progress: &mut dyn FnMut(f64)) -> Result<Vec<StageCounts>, StageError> {
+        loop {
+            let mut going = false;
+            for node in &mut self.nodes {
+                going |= node.turn()?;
+            }
+            let done = self.nodes.iter().filter_map(|node| node.fraction_done());
+            progress(done.fold(1.0, f64::min));
+            if !going {
+                return Ok(self.nodes.iter().map(|node| node.counts()).collect());
+            }
+        }
+    }
+}
