@@ -1,10 +1,17 @@
 //! From what the pipeline file says to stages that run: the same for `run`, `replay` and the check,
 //! which builds every twin and detector to see whether it can be.
 
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use tauscope_bus::{Emit, JointState, LinkError, Progress, SampleKind, Source, StageError};
 use tauscope_detect::Detect;
+use tauscope_ingest::{IngestError, Paced, Rate, SimulatedRobot};
+use tauscope_record::{CellInfo, RecordError, Recorder, StreamInfo};
 use tauscope_twin::{Correction, Twin, TwinFile};
 
-use crate::pipeline::Cell;
+use crate::pipeline::{Cell, Pipeline, Settings};
+use crate::provenance;
 
 /// Why a stage cannot be built.
 #[derive(Debug, thiserror::Error)]
@@ -18,6 +25,90 @@ pub enum BuildError {
     /// The detector.
     #[error(transparent)]
     Detect(#[from] tauscope_detect::ConfigError),
+}
+
+/// What a source of `cell` must know of it.
+pub fn ingest_setup(cell: &Cell) -> tauscope_ingest::Setup {
+    tauscope_ingest::Setup {
+        cell: cell.facts.name.clone(),
+        joint_names: cell.facts.joint_names.clone(),
+        tool: cell
+            .facts
+            .tool
+            .as_ref()
+            .filter(|tool| tool.mass_kg > 0.0)
+            .map(|tool| tauscope_ingest::Tool {
+                mass_kg: tool.mass_kg,
+                com_m: tool.com_m,
+                inertia_kgm2: tool.inertia_kgm2,
+            }),
+    }
+}
+
+/// A source of `cell`. One that is started again goes on behind the sample with the stamp
+/// `after_ns`.
+pub fn ingest(
+    config: &tauscope_ingest::Config,
+    robot: Option<&SimulatedRobot>,
+    cell: &Cell,
+    after_ns: Option<i64>,
+) -> Result<Box<dyn Source<JointState>>, IngestError> {
+    let setup = ingest_setup(cell);
+    let Some(after_ns) = after_ns else {
+        return tauscope_ingest::open(config, &setup, robot);
+    };
+    // What was given out before is read again as fast as can be, and only then paced.
+    let fast = tauscope_ingest::Config {
+        rate: Rate::Fast,
+        ..config.clone()
+    };
+    let rest = After {
+        inner: tauscope_ingest::open(&fast, &setup, robot)?,
+        after_ns,
+    };
+    Ok(match config.rate.factor() {
+        Some(factor) => Box::new(Paced::new(rest, factor)),
+        None => Box::new(rest),
+    })
+}
+
+/// A source without the samples up to a stamp.
+struct After {
+    inner: Box<dyn Source<JointState>>,
+    after_ns: i64,
+}
+
+struct EmitAfter<'a> {
+    out: &'a mut dyn Emit<JointState>,
+    after_ns: i64,
+}
+
+impl Emit<JointState> for EmitAfter<'_> {
+    fn emit(&mut self, write: &mut dyn FnMut(&mut JointState)) -> Result<(), LinkError> {
+        let mut sample = JointState::default();
+        write(&mut sample);
+        if sample.header.stamp_ns <= self.after_ns {
+            return Ok(());
+        }
+        self.out.emit(&mut |slot| *slot = sample)
+    }
+}
+
+impl Source<JointState> for After {
+    fn step(&mut self, out: &mut dyn Emit<JointState>) -> Result<Progress, StageError> {
+        self.inner.step(&mut EmitAfter {
+            out,
+            after_ns: self.after_ns,
+        })
+    }
+
+    fn dropped(&self) -> u64 {
+        self.inner.dropped()
+    }
+
+    fn fraction_done(&self) -> Option<f64> {
+        self.inner.fraction_done()
+    }
 }
 
 /// What `model` corrects in `cell`; nothing without one.
@@ -50,6 +141,14 @@ pub fn detect(
     model: Option<&TwinFile>,
     cell: &Cell,
 ) -> Result<Detect, BuildError> {
+    Ok(Detect::new(config, detect_setup(model, cell)?)?)
+}
+
+/// What a detector behind a twin of `cell` with this `model` must know.
+pub fn detect_setup(
+    model: Option<&TwinFile>,
+    cell: &Cell,
+) -> Result<tauscope_detect::Setup, BuildError> {
     let correction = correction(model, cell)?;
     let constants = cell.facts.torque_constants_nm_per_a.as_deref();
     let joints = correction.joints.iter().enumerate().map(|(index, joint)| {
@@ -71,10 +170,83 @@ pub fn detect(
             };
             (name.clone(), score)
         });
-    let setup = tauscope_detect::Setup {
+    Ok(tauscope_detect::Setup {
         joints: joints.collect(),
         model: cell.model.clone(),
         scores: scores.collect(),
-    };
-    Ok(Detect::new(config, setup)?)
+    })
+}
+
+/// What a recorder must know of a stream.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct StreamFacts {
+    /// The stage that makes it.
+    pub stage: String,
+    /// Its cell.
+    pub cell: String,
+    /// What it carries.
+    pub kind: SampleKind,
+    /// The detector, where it is one of ours.
+    pub detector: Option<String>,
+}
+
+/// What a recorder must know of the streams of these stages.
+pub fn streams(pipeline: &Pipeline, stages: &[usize]) -> Vec<StreamFacts> {
+    let makers = stages.iter().map(|&from| &pipeline.stages[from]);
+    let facts = makers.filter_map(|maker| {
+        let detector = match &maker.settings {
+            Settings::Detect { config, .. } => {
+                let detector = config.name();
+                detector.map(str::to_owned)
+            }
+            _ => None,
+        };
+        Some(StreamFacts {
+            stage: maker.name.clone(),
+            cell: maker.cells.first()?.clone(),
+            kind: maker.role.gives()?,
+            detector,
+        })
+    });
+    facts.collect()
+}
+
+/// A recorder of the streams that these stages of `pipeline` put out.
+pub fn recorder(
+    pipeline: &Pipeline,
+    config: &tauscope_record::Config,
+    heard: &[usize],
+) -> Result<Recorder, RecordError> {
+    let streams = streams(pipeline, heard);
+    let is_heard = |cell: &&Cell| streams.iter().any(|stream| stream.cell == cell.facts.name);
+    let cells: Vec<&Cell> = pipeline.cells.values().filter(is_heard).collect();
+    recorder_of(config, &cells, &streams, &provenance::of(pipeline))
+}
+
+/// A recorder of `streams`, which belong to `cells`.
+pub fn recorder_of(
+    config: &tauscope_record::Config,
+    cells: &[&Cell],
+    streams: &[StreamFacts],
+    provenance: &BTreeMap<String, String>,
+) -> Result<Recorder, RecordError> {
+    let cells: Vec<CellInfo> = cells
+        .iter()
+        .map(|cell| CellInfo {
+            name: cell.facts.name.clone(),
+            joint_names: cell.facts.joint_names.clone(),
+            model: cell.model.clone(),
+            effort_unit: cell.facts.effort_unit.as_str().to_owned(),
+        })
+        .collect();
+    let streams: Vec<StreamInfo> = streams
+        .iter()
+        .map(|stream| StreamInfo {
+            stage: stream.stage.clone(),
+            cell: stream.cell.clone(),
+            kind: stream.kind,
+            detector: stream.detector.clone(),
+        })
+        .collect();
+    Recorder::new(config, &cells, &streams, provenance)
 }

@@ -2,7 +2,7 @@
 
 use clap::{Parser, Subcommand};
 
-use crate::commands::{check, schema};
+use crate::commands::{calibrate, check, info, repair, replay, run, schema, simulate, stage};
 
 /// A robot's measured effort beside its digital twin's: stream, detect, record.
 ///
@@ -13,12 +13,22 @@ use crate::commands::{check, schema};
 pub struct Cli {
     /// Without one: run.
     #[command(subcommand)]
-    pub command: Command,
+    pub command: Option<Command>,
 }
 
 /// What there is to do; each in its own module of [`crate::commands`].
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    Run(run::Args),
     Check(check::Args),
     Schema(schema::Args),
+    Replay(replay::Args),
+    Calibrate(calibrate::Args),
+    Simulate(simulate::Args),
+    Info(info::Args),
+    Repair(repair::Args),
+    #[command(hide = true)]
+    Stage(stage::StageArgs),
+    #[command(hide = true)]
+    Exec(stage::ExecArgs),
 }

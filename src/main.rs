@@ -2,13 +2,18 @@
 //! stages.
 
 mod build;
+mod calibrate;
 mod cli;
 mod commands;
 mod exit;
 mod pipeline;
 mod plan;
+mod progress;
+mod provenance;
+mod replay;
 mod report;
 mod suggest;
+mod supervisor;
 mod yaml;
 
 use std::process::ExitCode;
@@ -16,11 +21,21 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use cli::{Cli, Command};
-use commands::{check, schema};
 
 fn main() -> ExitCode {
-    exit::code(match Cli::parse().command {
-        Command::Check(args) => check::run(&args),
-        Command::Schema(args) => schema::run(&args),
+    let command = Cli::parse()
+        .command
+        .unwrap_or_else(|| Command::Run(Default::default()));
+    exit::code(match command {
+        Command::Run(args) => commands::run::run(&args),
+        Command::Check(args) => commands::check::run(&args),
+        Command::Schema(args) => commands::schema::run(&args),
+        Command::Replay(args) => commands::replay::run(&args),
+        Command::Calibrate(args) => commands::calibrate::run(&args),
+        Command::Simulate(args) => commands::simulate::run(&args),
+        Command::Info(args) => commands::info::run(&args),
+        Command::Repair(args) => commands::repair::run(&args),
+        Command::Stage(args) => return commands::stage::run(&args),
+        Command::Exec(args) => return commands::stage::exec(&args),
     })
 }

@@ -4,6 +4,7 @@ mod cells;
 mod file;
 mod files;
 mod role;
+mod scenario;
 mod wiring;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -14,8 +15,9 @@ use tauscope_bus::Keep;
 use tauscope_twin::TwinFile;
 
 pub use cells::{Cell, CellFacts};
-pub use file::{EffortUnit, HostEntry, KeepEntry, OutsideEntry, PipelineFile, ToolEntry};
+pub use file::{EffortUnit, HostEntry, KeepEntry, OutsideEntry, PipelineFile};
 pub use role::{Role, words_for};
+pub use scenario::ScenarioFacts;
 
 use crate::report::{Problem, Report};
 use crate::suggest;
@@ -34,6 +36,8 @@ pub struct Pipeline {
     pub hosts: BTreeMap<String, HostEntry>,
     /// The stages, each after those it listens to.
     pub stages: Vec<Stage>,
+    /// SHA-256 of the file that each twin's `model` names, by stage.
+    pub model_sha256: BTreeMap<String, String>,
 }
 
 /// A stage, its inputs looked up.
@@ -53,6 +57,8 @@ pub struct Stage {
     pub keep: Keep,
     /// Its own part of the file, paths resolved, files read.
     pub settings: Settings,
+    /// What a simulated source simulates.
+    pub scenario: Option<ScenarioFacts>,
 }
 
 impl Stage {
@@ -103,7 +109,7 @@ impl Pipeline {
         if let Some(host) = host {
             check_host(&file.value, host, &mut report);
         }
-        let mut settings = files::resolve(&file, host, &cells, wiring.as_ref(), &mut report);
+        let mut files = files::resolve(&file, host, &cells, wiring.as_ref(), &mut report);
         let wiring = report.into_result(wiring)?;
         let Some(wiring) = wiring else {
             return Err(Problem::of_file(path, "the stages make no pipeline").into());
@@ -114,7 +120,7 @@ impl Pipeline {
         }
         let mut stages = Vec::new();
         for &index in &wiring.order {
-            let Some(settings) = settings[index].take() else {
+            let Some(settings) = files.settings[index].take() else {
                 continue;
             };
             let entry = &file.value.stages[index];
@@ -132,21 +138,19 @@ impl Pipeline {
                     Some(KeepEntry::All) | None => Keep::All,
                 },
                 settings,
+                scenario: files.scenarios.remove(&index),
             });
         }
         let text = file.text().to_owned();
+        let model_sha256 = files.model_sha256;
         Ok(Self {
             path: path.to_owned(),
             text,
             cells,
             hosts: file.value.hosts,
             stages,
+            model_sha256,
         })
-    }
-
-    /// The stage of this name.
-    pub fn stage(&self, name: &str) -> Option<&Stage> {
-        self.stages.iter().find(|stage| stage.name == name)
     }
 }
 

@@ -35,11 +35,6 @@ pub struct Located<T> {
 }
 
 impl<T> Located<T> {
-    /// The file.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
     /// The file's text.
     pub fn text(&self) -> &str {
         &self.source.text

@@ -1,7 +1,7 @@
 //! What a cell's entry says, looked up in its URDF: the facts that its stages need.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use tauscope_bus::MAX_JOINTS;
@@ -17,8 +17,6 @@ use crate::yaml::{Located, Place};
 pub struct Cell {
     /// The facts as they can be handed to another process.
     pub facts: CellFacts,
-    /// Where the URDF was read from.
-    pub urdf_path: Option<PathBuf>,
     /// The robot.
     pub model: Option<Model>,
 }
@@ -49,8 +47,54 @@ impl Cell {
         let model = facts.urdf.as_deref().map(Model::from_urdf).transpose()?;
         Ok(Self {
             facts,
-            urdf_path: None,
             model,
+        })
+    }
+
+    /// A cell of the robot at `path`, without a pipeline file; `constants` by joint \[N m/A\], for all
+    /// joints or for none.
+    ///
+    /// # Errors
+    /// If the URDF cannot be read or used, or the constants are not those of its joints.
+    pub fn from_urdf(
+        path: &Path,
+        effort_unit: EffortUnit,
+        constants: BTreeMap<String, f64>,
+    ) -> Result<Self, Report> {
+        let urdf = std::fs::read_to_string(path)
+            .map_err(|error| Problem::of_file(path, format!("cannot read the URDF: {error}")))?;
+        let model = Model::from_urdf(&urdf)
+            .map_err(|error| Problem::of_file(path, format!("cannot use the URDF: {error}")))?;
+        let joint_names: Vec<String> = model.joint_names().map(str::to_owned).collect();
+        let mut report = Report::default();
+        for joint in constants
+            .keys()
+            .filter(|joint| !joint_names.contains(joint))
+        {
+            let names = joint_names.iter().map(String::as_str);
+            let problem = Problem::new(format!("the robot has no joint `{joint}`"));
+            report.push(problem.maybe_help(suggest::help(joint, "its joints are", names)));
+        }
+        let by_joint: Option<Vec<f64>> = joint_names
+            .iter()
+            .map(|joint| constants.get(joint).copied())
+            .collect();
+        if by_joint.is_none() && !constants.is_empty() {
+            report.push(Problem::new(
+                "torque constants are wanted for all joints or for none",
+            ));
+        }
+        let facts = CellFacts {
+            name: model.name().to_owned(),
+            urdf: Some(urdf),
+            joint_names,
+            effort_unit,
+            torque_constants_nm_per_a: by_joint,
+            tool: None,
+        };
+        report.into_result(Self {
+            facts,
+            model: Some(model),
         })
     }
 
@@ -86,9 +130,9 @@ struct Resolver<'a> {
 impl Resolver<'_> {
     fn resolve(&self, name: &str) -> Result<Cell, Report> {
         let mut report = Report::default();
-        let (urdf_path, urdf, model) = match self.robot() {
-            Ok(Some((path, text, model))) => (Some(path), Some(text), Some(model)),
-            Ok(None) => (None, None, None),
+        let (urdf, model) = match self.robot() {
+            Ok(Some((text, model))) => (Some(text), Some(model)),
+            Ok(None) => (None, None),
             Err(problem) => return Err(problem.into()),
         };
         let joint_names = self.joint_names(model.as_ref(), &mut report);
@@ -104,12 +148,11 @@ impl Resolver<'_> {
         };
         report.into_result(Cell {
             facts,
-            urdf_path,
             model,
         })
     }
 
-    fn robot(&self) -> Result<Option<(PathBuf, String, Model)>, Problem> {
+    fn robot(&self) -> Result<Option<(String, Model)>, Problem> {
         let Some(robot) = &self.entry.robot else {
             return Ok(None);
         };
@@ -123,7 +166,7 @@ impl Resolver<'_> {
             self.file
                 .at(&place, format!("cannot use the URDF: {error}"))
         })?;
-        Ok(Some((path, text, model)))
+        Ok(Some((text, model)))
     }
 
     fn joint_names(&self, model: Option<&Model>, report: &mut Report) -> Vec<String> {

@@ -51,12 +51,16 @@ pub struct CellEntry {
 }
 
 /// Unit of a measured effort.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema, clap::ValueEnum,
+)]
 pub enum EffortUnit {
     /// Torque \[N m\] (force \[N\] for a prismatic joint).
     #[default]
+    #[value(name = "Nm")]
     Nm,
     /// Motor current \[A\].
+    #[value(name = "A")]
     A,
 }
 

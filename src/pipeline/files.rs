@@ -9,20 +9,32 @@ use tauscope_twin::{Expected, Motion, TwinFile};
 use super::cells::Cell;
 use super::file::{OutsideEntry, PipelineFile, StageEntry};
 use super::role::Role;
+use super::scenario::ScenarioFacts;
 use super::wiring::Wiring;
 use super::{Settings, stage_place};
 use crate::build;
+use crate::provenance;
 use crate::report::Report;
 use crate::yaml::{self, Located, Place};
 
-/// Reads and checks what each stage names; by place in the file, `None` where something is wrong.
+/// What the files that stages name hold.
+pub struct Files {
+    /// What each stage is told; `None` where something is wrong.
+    pub settings: Vec<Option<Settings>>,
+    /// SHA-256 of each twin's model, by the stage's name.
+    pub model_sha256: BTreeMap<String, String>,
+    /// The scenarios of simulated sources.
+    pub scenarios: BTreeMap<usize, ScenarioFacts>,
+}
+
+/// Reads and checks what each stage names, by place in the file.
 pub fn resolve(
     file: &Located<PipelineFile>,
     host: Option<&str>,
     cells: &BTreeMap<String, Cell>,
     wiring: Option<&Wiring>,
     report: &mut Report,
-) -> Vec<Option<Settings>> {
+) -> Files {
     let mut resolver = Resolver {
         file,
         host,
@@ -30,6 +42,8 @@ pub fn resolve(
         wiring,
         report,
         models: BTreeMap::new(),
+        model_sha256: BTreeMap::new(),
+        scenarios: BTreeMap::new(),
     };
     let count = file.value.stages.len();
     // Twins before detectors, which rest on their models.
@@ -38,7 +52,11 @@ pub fn resolve(
     }
     let settings = (0..count).map(|index| resolver.stage(index)).collect();
     resolver.outputs_apart();
-    settings
+    Files {
+        settings,
+        model_sha256: resolver.model_sha256,
+        scenarios: resolver.scenarios,
+    }
 }
 
 struct Resolver<'a> {
@@ -49,6 +67,8 @@ struct Resolver<'a> {
     report: &'a mut Report,
     /// By twin stage; absent where the twin names none or it is wrong.
     models: BTreeMap<usize, TwinFile>,
+    model_sha256: BTreeMap<String, String>,
+    scenarios: BTreeMap<usize, ScenarioFacts>,
 }
 
 impl<'a> Resolver<'a> {
@@ -135,7 +155,47 @@ impl<'a> Resolver<'a> {
             self.report.push(self.file.at(&path_place, title));
             return None;
         }
+        let scenario = match &config.simulate {
+            Some(simulate) if self.is_here(index) => {
+                match ScenarioFacts::load(&simulate.scenario) {
+                    Ok(scenario) => Some(scenario),
+                    Err(problems) => {
+                        self.report.append(problems);
+                        return None;
+                    }
+                }
+            }
+            _ => None,
+        };
+        self.try_to_open(index, &path_place, &config, scenario.as_ref());
+        self.scenarios
+            .extend(scenario.map(|scenario| (index, scenario)));
         Some(Settings::Ingest(config))
+    }
+
+    /// Opens a source that reads files, as the stage will: what is wrong with them is known before
+    /// anything starts.
+    fn try_to_open(
+        &mut self,
+        index: usize,
+        place: &Place,
+        config: &tauscope_ingest::Config,
+        scenario: Option<&ScenarioFacts>,
+    ) {
+        let Some(cell) = self.cell(index) else { return };
+        if config.zenoh.is_some() || !self.is_here(index) {
+            return;
+        }
+        let opened = scenario
+            .map(ScenarioFacts::robot)
+            .transpose()
+            .map_err(|error| error.to_string())
+            .and_then(|robot| {
+                build::ingest(config, robot.as_ref(), cell, None).map_err(|error| error.to_string())
+            });
+        if let Err(text) = opened {
+            self.report.push(self.file.at(place, text));
+        }
     }
 
     fn twin_model(&mut self, index: usize) {
@@ -155,6 +215,8 @@ impl<'a> Resolver<'a> {
         }
         match yaml::load::<TwinFile>(&path) {
             Ok(model) => {
+                let hash = provenance::sha256(model.text().as_bytes());
+                self.model_sha256.insert(entry.name.clone(), hash);
                 self.models.insert(index, model.value);
             }
             Err(problems) => self.report.append(problems),

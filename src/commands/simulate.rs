@@ -1,0 +1,87 @@
+//! `tauscope simulate`.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use anyhow::Context;
+use tauscope_archive::Written;
+use tauscope_ingest::simulated::{self, ScenarioError};
+
+use crate::exit::{Exit, Failure};
+use crate::pipeline::ScenarioFacts;
+use crate::progress::Progress;
+use crate::provenance;
+
+/// Make recordings of a simulated cell, with the physics and the contacts that a scenario chooses.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The scenario file.
+    scenario: PathBuf,
+    /// The folder the recordings go to, with `labels.json`.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Machine-readable.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Makes them.
+pub fn run(args: &Args) -> Result<Exit, Failure> {
+    let facts = ScenarioFacts::load(&args.scenario)?;
+    let robot = facts.robot().context("cannot use the URDF")?;
+    let scenario = serde_json::to_string(&facts.scenario).context("cannot encode the scenario")?;
+    let made_of = BTreeMap::from([
+        ("tauscope".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+        ("scenario".to_owned(), scenario),
+        (
+            "urdf_sha256".to_owned(),
+            provenance::sha256(facts.urdf.as_bytes()),
+        ),
+    ]);
+    let progress = Progress::new(1);
+    let made = simulated::simulate(
+        &robot.scenario,
+        &robot.model,
+        &args.out,
+        &made_of,
+        &mut |fraction| {
+            progress.set(0, fraction);
+            true
+        },
+    );
+    drop(progress);
+    let made = match made {
+        Ok(Some(made)) => made,
+        Ok(None) => return Err(anyhow::anyhow!("ended before it was done").into()),
+        Err(
+            error @ (ScenarioError::Unstable { .. }
+            | ScenarioError::Write(_)
+            | ScenarioError::Labels { .. }),
+        ) => return Err(Failure::Failed(error.into())),
+        Err(error) => return Err(Failure::rejected(error.to_string())),
+    };
+    let text = if args.json {
+        let recordings: Vec<_> = made
+            .recordings
+            .iter()
+            .map(|each| each.path.clone())
+            .collect();
+        let value = serde_json::json!({"recordings": recordings, "labels": made.labels_path});
+        serde_json::to_string_pretty(&value).context("cannot encode the result")?
+    } else {
+        let mut lines: Vec<String> = made.recordings.iter().map(line).collect();
+        lines.push(made.labels_path.display().to_string());
+        lines.join("\n")
+    };
+    super::print(&text)?;
+    Ok(Exit::Done)
+}
+
+fn line(written: &Written) -> String {
+    let Written {
+        path,
+        messages,
+        bytes,
+    } = written;
+    format!("{}: {messages} messages, {bytes} bytes", path.display())
+}

@@ -1,0 +1,124 @@
+//! The hidden commands with which `tauscope run` starts its stages.
+
+use std::os::unix::process::CommandExt;
+use std::process::{Command, ExitCode};
+
+use rustix::process::{Signal, set_parent_process_death_signal};
+use tauscope_bus::shell::{Child, ChildError};
+use tauscope_ingest::SimulatedRobot;
+
+use crate::build::{self, BuildError};
+use crate::pipeline::{Cell, ScenarioFacts, Settings};
+use crate::supervisor::Instructions;
+
+/// A stage of ours: its seat stands on standard input.
+#[derive(Debug, clap::Args)]
+pub struct StageArgs {}
+
+/// A program that is not ours, which ends when the supervisor does.
+#[derive(Debug, clap::Args)]
+pub struct ExecArgs {
+    /// The program and its arguments.
+    #[arg(required = true, last = true)]
+    command: Vec<std::ffi::OsString>,
+}
+
+/// Why a stage cannot be made from its seat.
+#[derive(Debug, thiserror::Error)]
+enum SeatError {
+    #[error("the seat holds no stage of ours: {0}")]
+    Config(#[from] serde_json::Error),
+    #[error("the seat names no cell")]
+    NoCell,
+    #[error("an outside stage was started as one of ours")]
+    Outside,
+    #[error(transparent)]
+    Model(#[from] tauscope_dynamics::ModelError),
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    #[error(transparent)]
+    Ingest(#[from] tauscope_ingest::IngestError),
+    #[error(transparent)]
+    Record(#[from] tauscope_record::RecordError),
+}
+
+/// Takes the seat and runs the stage to its end.
+pub fn run(_args: &StageArgs) -> ExitCode {
+    let child = match Child::take_seat() {
+        Ok(child) => child,
+        Err(error) => return no_seat(&error),
+    };
+    match Made::from_seat(&child) {
+        Ok(Made::Source(mut source)) => child.source(&mut *source),
+        Ok(Made::Twin(mut twin)) => child.stage(&mut *twin),
+        Ok(Made::Detect(mut detect)) => child.stage(&mut *detect),
+        Ok(Made::Record(mut recorder)) => child.sink(&mut *recorder),
+        Err(error) => child.fail(&error),
+    }
+}
+
+/// Becomes the program, once its end is tied to the supervisor's.
+pub fn exec(args: &ExecArgs) -> ExitCode {
+    let Some((program, arguments)) = args.command.split_first() else {
+        return ExitCode::FAILURE;
+    };
+    // Survives the exec. Where it fails, the program still sees its standard input end.
+    if let Err(error) = set_parent_process_death_signal(Some(Signal::TERM)) {
+        eprintln!("warning: may outlive the supervisor: {error}");
+    }
+    let error = Command::new(program).args(arguments).exec();
+    eprintln!("error: cannot start {}: {error}", program.display());
+    ExitCode::FAILURE
+}
+
+fn no_seat(error: &ChildError) -> ExitCode {
+    eprintln!("error: {error}; this command is for `tauscope run`");
+    ExitCode::FAILURE
+}
+
+/// A stage of ours, made.
+enum Made {
+    Source(Box<dyn tauscope_bus::Source<tauscope_bus::JointState>>),
+    Twin(Box<tauscope_twin::Twin>),
+    Detect(Box<tauscope_detect::Detect>),
+    Record(Box<tauscope_record::Recorder>),
+}
+
+impl Made {
+    fn from_seat(child: &Child) -> Result<Self, SeatError> {
+        let told: Instructions = serde_json::from_value(child.seat().config.clone())?;
+        let cells: Vec<Cell> = told
+            .cells
+            .into_iter()
+            .map(Cell::from_facts)
+            .collect::<Result<_, _>>()?;
+        let cell = || cells.first().ok_or(SeatError::NoCell);
+        Ok(match &told.settings {
+            Settings::Ingest(config) => {
+                let robot: Option<SimulatedRobot> = told
+                    .scenario
+                    .as_ref()
+                    .map(ScenarioFacts::robot)
+                    .transpose()?;
+                Self::Source(build::ingest(
+                    config,
+                    robot.as_ref(),
+                    cell()?,
+                    told.after_ns,
+                )?)
+            }
+            Settings::Twin { config, model } => {
+                Self::Twin(Box::new(build::twin(config, model.as_ref(), cell()?)?))
+            }
+            Settings::Detect { config, model } => {
+                Self::Detect(Box::new(build::detect(config, model.as_ref(), cell()?)?))
+            }
+            Settings::Record(config) => {
+                let cells: Vec<&Cell> = cells.iter().collect();
+                let recorder = build::recorder_of(config, &cells, &told.streams, &told.provenance)?;
+                Self::Record(Box::new(recorder))
+            }
+            Settings::Outside(_) => return Err(SeatError::Outside),
+        })
+    }
+}

@@ -1,0 +1,256 @@
+//! Runs the stages of one host, each as a process of its own, and looks after them.
+//!
+//! A stage that dies is started again, at once the first time and later the more often it dies; one
+//! that dies too often is given up, and with it the run. On Ctrl-C or SIGTERM the sources are ended
+//! and the rest finishes with what it has; a second time ends everything at once. Nothing outlives
+//! the supervisor: a stage ends when its standard input closes, and Linux kills it when its parent
+//! dies.
+
+mod local;
+mod process;
+
+mod restart;
+mod seats;
+mod summary;
+mod tally;
+
+use std::path::Path;
+use std::time::Duration;
+
+use anyhow::Context;
+use tauscope_bus::{Domain, SharedMemory};
+use tokio::signal::unix::{Signal, SignalKind, signal};
+use tokio::sync::mpsc;
+use tokio::time::Instant;
+
+use crate::pipeline::Pipeline;
+use crate::plan::{Link, Over};
+
+use crate::progress::Progress;
+use local::Local;
+use process::{Event, Process};
+pub use seats::Instructions;
+pub use summary::Summary;
+
+/// A stage whose inputs have all ended has this long to finish by itself before it is asked to.
+const GRACE: Duration = Duration::from_secs(2);
+/// Events that are not handled yet; a stage that says more waits.
+const EVENTS: usize = 256;
+
+/// Which life of which stage an event belongs to.
+type Mark = (usize, u64);
+
+/// Runs the stages on `host` (all without one) until they have ended.
+pub async fn run(
+    pipeline: &Pipeline,
+    links: &[Link],
+    host: Option<&str>,
+) -> anyhow::Result<Summary> {
+    let domain = Domain::unique();
+    let seats = seats::seats(pipeline, links, host, &domain)?;
+    let here = |at: usize| seats.iter().any(|(place, _)| *place == at);
+    let shares = |link: &Link| link.over == Over::SharedMemory && here(link.to);
+    let shared_memory = if links.iter().any(shares) {
+        Some(SharedMemory::open(&domain)?)
+    } else {
+        None
+    };
+    let sources = seats
+        .iter()
+        .filter(|(_, seat)| seat.inputs.is_empty())
+        .count();
+    let (sender, events) = mpsc::channel(EVENTS);
+    let mut supervisor = Supervisor {
+        pipeline,
+        stages: seats
+            .into_iter()
+            .map(|(at, seat)| Local::new(at, seat))
+            .collect(),
+        shared_memory,
+        sender,
+        stopping: false,
+        progress: Progress::new(sources),
+    };
+    supervisor.start_all()?;
+    let outcome = supervisor.watch(events).await;
+    let summary = Summary::new(pipeline, links, &supervisor.stages);
+    drop(supervisor);
+    // Best effort: what is left of it does no harm.
+    let _ = domain.remove();
+    outcome.map(|()| summary)
+}
+
+struct Supervisor<'a> {
+    pipeline: &'a Pipeline,
+    stages: Vec<Local>,
+    shared_memory: Option<SharedMemory>,
+    sender: mpsc::Sender<(Mark, Event)>,
+    stopping: bool,
+    progress: Progress,
+}
+
+impl Supervisor<'_> {
+    /// Those that listen before those they listen to, so that few wait for long.
+    fn start_all(&mut self) -> anyhow::Result<()> {
+        for index in (0..self.stages.len()).rev() {
+            self.start(index)?;
+        }
+        Ok(())
+    }
+
+    fn start(&mut self, index: usize) -> anyhow::Result<()> {
+        let stage = &mut self.stages[index];
+        let settings = &self.pipeline.stages[stage.at].settings;
+        let folder = self.pipeline.path.parent().unwrap_or(Path::new(""));
+        let command = process::command(settings, folder)?;
+        let mark = (index, stage.seat.restarts);
+        let process = Process::start(command, &stage.seat, mark, self.sender.clone())?;
+        let id = process.id();
+        self.progress.say(&format!(
+            "stage `{}` runs as process {id}",
+            stage.seat.stage
+        ));
+        stage.started(process);
+        Ok(())
+    }
+
+    async fn watch(&mut self, mut events: mpsc::Receiver<(Mark, Event)>) -> anyhow::Result<()> {
+        let mut interrupt = signal(SignalKind::interrupt()).context("cannot catch Ctrl-C")?;
+        let mut terminate = signal(SignalKind::terminate()).context("cannot catch SIGTERM")?;
+        while !self.stages.iter().all(Local::is_over) {
+            let due = self.stages.iter().filter_map(Local::due).min();
+            let alarm = due.unwrap_or_else(|| Instant::now() + Duration::from_secs(3600));
+            tokio::select! {
+                Some((mark, event)) = events.recv() => self.take(mark, event),
+                () = any(&mut interrupt, &mut terminate) => self.interrupted(),
+                () = tokio::time::sleep_until(alarm) => self.alarm(),
+            }
+        }
+        Ok(())
+    }
+
+    fn take(&mut self, (index, life): Mark, event: Event) {
+        let stage = &mut self.stages[index];
+        // Each life's exit is its last event, so there are none of earlier ones.
+        debug_assert_eq!(stage.seat.restarts, life, "an event of another life");
+        match event {
+            Event::Said(line) => self.progress.say(&format!("[{}] {line}", stage.seat.stage)),
+            Event::Reported(line) => {
+                if stage.report(&line) {
+                    self.show_progress();
+                } else {
+                    self.progress.say(&format!("[{}] {line}", stage.seat.stage));
+                }
+            }
+            Event::Exited(status) => {
+                let name = stage.seat.stage.clone();
+                match stage.exited(status) {
+                    local::End::InOrder => {}
+                    local::End::Died { how, again } => {
+                        self.clean();
+                        self.progress.say(&died(&name, &how, again));
+                        if again.is_none() {
+                            self.stop();
+                        }
+                    }
+                }
+                self.settle();
+            }
+        }
+    }
+
+    fn show_progress(&self) {
+        let sources = self
+            .stages
+            .iter()
+            .filter(|stage| stage.seat.inputs.is_empty());
+        for (index, source) in sources.enumerate() {
+            if let Some(fraction) = source.fraction_done() {
+                self.progress.set(index, fraction);
+            }
+        }
+    }
+
+    /// Frees what the dead process still holds in shared memory, so that those who wait for it go on
+    /// and its next life finds room.
+    fn clean(&self) {
+        if let Some(shared_memory) = &self.shared_memory {
+            shared_memory.clean_dead_peers();
+        }
+    }
+
+    fn interrupted(&mut self) {
+        if self.stopping {
+            self.progress.say("ending everything at once");
+            for stage in &mut self.stages {
+                stage.kill();
+            }
+            return;
+        }
+        self.progress
+            .say("ending the sources; the other stages finish (again to end everything)");
+        self.stop();
+    }
+
+    /// Ends the stages that listen to nobody here; the others follow as their inputs end.
+    fn stop(&mut self) {
+        self.stopping = true;
+        for stage in &mut self.stages {
+            stage.no_restart();
+        }
+        self.settle();
+    }
+
+    /// Asks those to end whose time has come.
+    fn settle(&mut self) {
+        for index in 0..self.stages.len() {
+            let inputs = &self.pipeline.stages[self.stages[index].at].inputs;
+            let local = |at: &usize| self.stages.iter().find(|stage| stage.at == *at);
+            let all_over = inputs.iter().filter_map(local).all(Local::is_over);
+            let is_remote = inputs.iter().any(|at| local(at).is_none());
+            let is_source = inputs.is_empty();
+            let stage = &mut self.stages[index];
+            if self.stopping && all_over && (is_source || is_remote) {
+                stage.stop();
+            } else if all_over && !is_source && !is_remote {
+                stage.finish_by(Instant::now() + GRACE);
+            }
+        }
+    }
+
+    fn alarm(&mut self) {
+        let now = Instant::now();
+        for index in 0..self.stages.len() {
+            if self.stages[index].due().is_none_or(|due| due > now) {
+                continue;
+            }
+            if !self.stages[index].is_waiting() {
+                self.stages[index].stop();
+                continue;
+            }
+            if let Err(error) = self.start(index) {
+                self.progress.say(&format!("error: {error:#}"));
+                self.stages[index].give_up();
+                self.stop();
+            }
+        }
+    }
+}
+
+fn died(name: &str, how: &str, again: Option<Duration>) -> String {
+    match again {
+        None => format!("error: stage `{name}` {how} and is not started again"),
+        Some(Duration::ZERO) => format!("warning: stage `{name}` {how}: starting it again"),
+        Some(wait) => {
+            let wait = wait.as_millis();
+            format!("warning: stage `{name}` {how}: starting it again in {wait} ms")
+        }
+    }
+}
+
+async fn any(one: &mut Signal, other: &mut Signal) {
+    tokio::select! {
+        _ = one.recv() => {}
+        _ = other.recv() => {}
+    }
+}

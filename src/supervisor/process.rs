@@ -1,0 +1,197 @@
+//! One process of a stage: started, listened to, ended.
+
+use std::path::Path;
+use std::pin::pin;
+use std::process::{ExitStatus, Stdio};
+use std::time::Duration;
+
+use anyhow::Context;
+use rustix::process::{Pid, Signal, kill_process_group};
+use tauscope_bus::Seat;
+use tokio::io::{AsyncBufReadExt, AsyncRead, AsyncWriteExt, BufReader};
+use tokio::process::{Child, ChildStdin, Command};
+use tokio::sync::mpsc;
+
+use crate::pipeline::{OutsideEntry, Settings};
+
+/// Longer lines of a stage are cut.
+const LONGEST_LINE_BYTES: usize = 64 * 1024;
+/// The line that asks a process to end.
+const STOP: &[u8] = b"stop";
+/// How long a dead process is still heard out.
+const LAST_WORDS: Duration = Duration::from_millis(200);
+
+/// What a stage's process does.
+#[derive(Debug)]
+pub enum Event {
+    /// A line on its standard error.
+    Said(String),
+    /// A line on its standard output.
+    Reported(String),
+    /// It has ended, and all it said was heard.
+    Exited(std::io::Result<ExitStatus>),
+}
+
+/// A running process. Dropped, its process group is killed.
+#[derive(Debug)]
+pub struct Process {
+    group: Pid,
+    orders: mpsc::Sender<Vec<u8>>,
+}
+
+/// How a stage is started.
+pub fn command(settings: &Settings, folder: &Path) -> anyhow::Result<Command> {
+    let program = std::env::current_exe().context("cannot find the program itself")?;
+    let mut command = Command::new(program);
+    match settings {
+        Settings::Outside(OutsideEntry { command: words, .. }) => {
+            command.arg("exec").arg("--").args(words);
+            if !folder.as_os_str().is_empty() {
+                command.current_dir(folder);
+            }
+        }
+        _ => {
+            command.arg("stage");
+        }
+    }
+    Ok(command)
+}
+
+impl Process {
+    /// Starts it and tells it its seat; what it does comes to `events`, marked with `mark`.
+    pub fn start<M: Copy + Send + Sync + 'static>(
+        mut command: Command,
+        seat: &Seat,
+        mark: M,
+        events: mpsc::Sender<(M, Event)>,
+    ) -> anyhow::Result<Self> {
+        let line = serde_json::to_vec(seat)?;
+        let mut child = command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            // Ctrl-C in a terminal goes to the supervisor alone, which ends the stages in order.
+            .process_group(0)
+            .spawn()
+            .with_context(|| format!("cannot start stage `{}`", seat.stage))?;
+        let group = child
+            .id()
+            .and_then(|id| Pid::from_raw(id.cast_signed()))
+            .context("the process has no id")?;
+        let (orders, inbox) = mpsc::channel(2);
+        if let Some(stdin) = child.stdin.take() {
+            tokio::spawn(tell(stdin, line, inbox));
+        }
+        tokio::spawn(follow(child, mark, events));
+        Ok(Self { group, orders })
+    }
+
+    /// Asks it to end: a source stops, any other stage finishes with what it has.
+    pub fn stop(&self) {
+        // A full inbox holds the same order already; a closed one has no reader left.
+        let _ = self.orders.try_send(STOP.to_vec());
+    }
+
+    /// Ends it and all that it started, at once.
+    pub fn kill(&self) {
+        // The only error is that it has gone already.
+        let _ = kill_process_group(self.group, Signal::KILL);
+    }
+
+    /// Its process id.
+    pub fn id(&self) -> i32 {
+        self.group.as_raw_nonzero().get()
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+/// Writes to a process what it is told, and closes its standard input once nobody can tell it more.
+async fn tell(mut stdin: ChildStdin, seat: Vec<u8>, mut orders: mpsc::Receiver<Vec<u8>>) {
+    let mut next = Some(seat);
+    while let Some(mut line) = next {
+        line.push(b'\n');
+        // A process that does not listen any more is one that exits, which is noticed elsewhere.
+        if stdin.write_all(&line).await.is_err() {
+            return;
+        }
+        next = orders.recv().await;
+    }
+}
+
+/// Hears a process out and waits for it.
+async fn follow<M: Copy + Send + Sync + 'static>(
+    mut child: Child,
+    mark: M,
+    events: mpsc::Sender<(M, Event)>,
+) {
+    let said = child.stderr.take();
+    let reported = child.stdout.take();
+    let heard = async {
+        tokio::join!(
+            lines(said, mark, &events, Event::Said),
+            lines(reported, mark, &events, Event::Reported)
+        )
+    };
+    let mut heard = pin!(heard);
+    let status = tokio::select! {
+        _ = &mut heard => child.wait().await,
+        status = child.wait() => {
+            // What it said last is still in the pipes; but a process that it started may hold them
+            // open for ever.
+            let _ = tokio::time::timeout(LAST_WORDS, heard).await;
+            status
+        }
+    };
+    let _ = events.send((mark, Event::Exited(status))).await;
+}
+
+/// Sends every line of a pipe.
+async fn lines<M: Copy + Send + Sync>(
+    pipe: Option<impl AsyncRead + Unpin>,
+    mark: M,
+    events: &mpsc::Sender<(M, Event)>,
+    event: fn(String) -> Event,
+) {
+    let Some(pipe) = pipe else { return };
+    let mut pipe = BufReader::new(pipe);
+    let mut line = Vec::new();
+    loop {
+        let (taken, ended) = match pipe.fill_buf().await {
+            Ok([]) | Err(_) => break,
+            Ok(bytes) => match bytes.iter().position(|&byte| byte == b'\n') {
+                Some(at) => {
+                    line.extend_from_slice(&bytes[..at]);
+                    (at + 1, true)
+                }
+                None => {
+                    line.extend_from_slice(bytes);
+                    (bytes.len(), false)
+                }
+            },
+        };
+        pipe.consume(taken);
+        if (ended || line.len() > LONGEST_LINE_BYTES) && !send(&mut line, mark, events, event).await
+        {
+            return;
+        }
+    }
+    if !line.is_empty() {
+        send(&mut line, mark, events, event).await;
+    }
+}
+
+async fn send<M: Copy + Send + Sync>(
+    line: &mut Vec<u8>,
+    mark: M,
+    events: &mpsc::Sender<(M, Event)>,
+    event: fn(String) -> Event,
+) -> bool {
+    let text = String::from_utf8_lossy(line).trim_end().to_owned();
+    line.clear();
+    events.send((mark, event(text))).await.is_ok()
+}

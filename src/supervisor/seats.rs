@@ -1,0 +1,231 @@
+//! What each stage's process is told: its seat.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+use tauscope_bus::seat::{Cell as SeatCell, Input, Output, OutputLink, TransportKind};
+use tauscope_bus::{
+    Audience, Domain, EffortUnit as SeatUnit, Keep, SampleKind, Seat, ZenohEndpoints,
+};
+
+use crate::build::{self, StreamFacts};
+use crate::pipeline::{CellFacts, EffortUnit, Pipeline, Role, ScenarioFacts, Settings};
+use crate::plan::{Link, Over};
+use crate::provenance;
+
+/// Samples that a stage which keeps all may leave unread before those before it wait.
+const DEPTH_ALL: usize = 1024;
+/// Samples that a stage which keeps the newest may leave unread: some, so that a pause of the
+/// scheduler costs nothing.
+const DEPTH_NEWEST: usize = 16;
+/// Stages of another host are started by another hand: how long they are waited for \[ms\].
+const START_ACROSS_HOSTS_MS: u64 = 60_000;
+
+/// What a stage of ours finds in its seat as `config`.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct Instructions {
+    /// Its own part of the pipeline file.
+    pub settings: Settings,
+    /// Its cells.
+    pub cells: Vec<CellFacts>,
+    /// What is recorded of each stage it listens to, for a recorder.
+    pub streams: Vec<StreamFacts>,
+    /// What made the archive, for a recorder.
+    pub provenance: BTreeMap<String, String>,
+    /// For a simulated source.
+    #[serde(default)]
+    pub scenario: Option<ScenarioFacts>,
+    /// For a source that is started again: the stamp of the last sample it gave out \[ns\].
+    #[serde(default)]
+    pub after_ns: Option<i64>,
+}
+
+/// The seats of the stages on `host` (of all without one), with their place in the pipeline.
+pub fn seats(
+    pipeline: &Pipeline,
+    links: &[Link],
+    host: Option<&str>,
+    domain: &Domain,
+) -> Result<Vec<(usize, Seat)>, serde_json::Error> {
+    let planner = Planner {
+        pipeline,
+        links,
+        host,
+        domain,
+    };
+    let here = |index: &usize| host.is_none() || pipeline.stages[*index].host.as_deref() == host;
+    (0..pipeline.stages.len())
+        .filter(here)
+        .map(|at| Ok((at, planner.seat(at)?)))
+        .collect()
+}
+
+struct Planner<'a> {
+    pipeline: &'a Pipeline,
+    links: &'a [Link],
+    host: Option<&'a str>,
+    domain: &'a Domain,
+}
+
+impl Planner<'_> {
+    fn seat(&self, at: usize) -> Result<Seat, serde_json::Error> {
+        let stage = &self.pipeline.stages[at];
+        let mut seat = Seat::new(&stage.name, self.domain.clone());
+        seat.cells = stage
+            .cells
+            .iter()
+            .filter_map(|cell| self.cell(cell))
+            .collect();
+        seat.inputs = self.inputs(at);
+        seat.output = stage.role.gives().map(|kind| self.output(at, kind));
+        seat.health = Some(self.health(at));
+        let outputs = seat
+            .output
+            .iter()
+            .chain(&seat.health)
+            .flat_map(|output| &output.links);
+        let crosses = outputs.map(|link| link.transport);
+        let crosses = crosses.chain(seat.inputs.iter().map(|input| input.transport));
+        if crosses
+            .into_iter()
+            .any(|transport| transport == TransportKind::Zenoh)
+        {
+            seat.zenoh = self.endpoints();
+            seat.start_within_ms = START_ACROSS_HOSTS_MS;
+        }
+        seat.config = match &stage.settings {
+            Settings::Outside(outside) => outside.settings.clone().unwrap_or_default(),
+            settings => serde_json::to_value(self.instructions(at, settings))?,
+        };
+        Ok(seat)
+    }
+
+    fn instructions(&self, at: usize, settings: &Settings) -> Instructions {
+        let stage = &self.pipeline.stages[at];
+        let cells = stage
+            .cells
+            .iter()
+            .filter_map(|cell| self.pipeline.cells.get(cell));
+        let is_recorder = stage.role == Role::Record;
+        Instructions {
+            settings: settings.clone(),
+            cells: cells.map(|cell| cell.facts.clone()).collect(),
+            streams: if is_recorder {
+                build::streams(self.pipeline, &stage.inputs)
+            } else {
+                Vec::new()
+            },
+            provenance: if is_recorder {
+                provenance::of(self.pipeline)
+            } else {
+                BTreeMap::new()
+            },
+            scenario: stage.scenario.clone(),
+            after_ns: None,
+        }
+    }
+
+    fn cell(&self, name: &str) -> Option<SeatCell> {
+        let facts = &self.pipeline.cells.get(name)?.facts;
+        Some(SeatCell {
+            name: facts.name.clone(),
+            joints: facts.joint_names.clone(),
+            effort_unit: match facts.effort_unit {
+                EffortUnit::Nm => SeatUnit::Nm,
+                EffortUnit::A => SeatUnit::A,
+            },
+        })
+    }
+
+    fn inputs(&self, at: usize) -> Vec<Input> {
+        let mut inputs = Vec::new();
+        for link in self.links.iter().filter(|link| link.to == at) {
+            let input = |stream: String, kind| Input {
+                from: self.pipeline.stages[link.from].name.clone(),
+                stream,
+                kind,
+                transport: transport(link.over),
+                keep: link.keep,
+                depth: match link.keep {
+                    Keep::All => DEPTH_ALL,
+                    Keep::Newest => DEPTH_NEWEST,
+                },
+                resume: None,
+            };
+            inputs.push(input(link.stream.clone(), link.carries));
+            if self.hears_health(at) {
+                inputs.push(input(health_stream(&link.stream), SampleKind::Health));
+            }
+        }
+        inputs
+    }
+
+    /// A recorder keeps the health reports of what it records.
+    fn hears_health(&self, at: usize) -> bool {
+        self.pipeline.stages[at].role == Role::Record
+    }
+
+    fn output(&self, at: usize, kind: SampleKind) -> Output {
+        let listeners: Vec<&Link> = self.links.iter().filter(|link| link.from == at).collect();
+        Output {
+            stream: self.pipeline.stages[at].stream(),
+            kind,
+            links: ways(&listeners),
+        }
+    }
+
+    fn health(&self, at: usize) -> Output {
+        let listeners = self.links.iter().filter(|link| link.from == at);
+        let listeners: Vec<&Link> = listeners
+            .filter(|link| self.hears_health(link.to))
+            .collect();
+        Output {
+            stream: health_stream(&self.pipeline.stages[at].stream()),
+            kind: SampleKind::Health,
+            links: ways(&listeners),
+        }
+    }
+
+    fn endpoints(&self) -> Option<ZenohEndpoints> {
+        let host = self.pipeline.hosts.get(self.host?)?;
+        Some(ZenohEndpoints {
+            listen: host.listen.0.clone(),
+            connect: host.connect.0.clone(),
+        })
+    }
+}
+
+fn health_stream(stream: &str) -> String {
+    format!("{stream}/health")
+}
+
+fn transport(over: Over) -> TransportKind {
+    match over {
+        Over::SharedMemory => TransportKind::Iceoryx2,
+        Over::Zenoh => TransportKind::Zenoh,
+    }
+}
+
+/// The ways a stream leaves, and how many listen on each.
+fn ways(listeners: &[&Link]) -> Vec<OutputLink> {
+    let way = |over: Over| {
+        let count = |keep| {
+            listeners
+                .iter()
+                .filter(|link| link.over == over && link.keep == keep)
+                .count()
+        };
+        let audience = Audience {
+            keep_all: count(Keep::All),
+            keep_newest: count(Keep::Newest),
+        };
+        (audience != Audience::default()).then_some(OutputLink {
+            transport: transport(over),
+            audience,
+        })
+    };
+    [Over::SharedMemory, Over::Zenoh]
+        .into_iter()
+        .filter_map(way)
+        .collect()
+}

@@ -1,0 +1,175 @@
+//! What came of a run: a line for each stage and each link.
+
+use comfy_table::{CellAlignment, Table, presets};
+use serde::Serialize;
+use tauscope_bus::SampleKind;
+
+use super::local::Local;
+use crate::exit::Exit;
+use crate::pipeline::Pipeline;
+use crate::plan::{Link, Over};
+
+/// What came of a run on this host.
+#[derive(Debug, Clone, Serialize)]
+pub struct Summary {
+    /// The stages of this host, in the order of the pipeline.
+    pub stages: Vec<StageSummary>,
+    /// The links of this host, by what their receiving ends counted; a link to another host by what
+    /// its sending end counted.
+    pub links: Vec<LinkSummary>,
+}
+
+/// One stage.
+#[derive(Debug, Clone, Serialize)]
+pub struct StageSummary {
+    /// Its name.
+    pub stage: String,
+    /// Whether it ever said what it has done: a program that is not ours may not.
+    pub reported: bool,
+    /// Samples that came in; for a source, those it read.
+    pub received: u64,
+    /// Samples that went out.
+    pub emitted: u64,
+    /// Samples lost on the way to it, and those it had to refuse.
+    pub dropped: u64,
+    /// How often it was started again.
+    pub restarts: u64,
+    /// Whether it was given up.
+    pub failed: bool,
+}
+
+/// One link.
+#[derive(Debug, Clone, Serialize)]
+pub struct LinkSummary {
+    /// The stage it comes from.
+    pub from: String,
+    /// The stage it goes to.
+    pub to: String,
+    /// What it ran over.
+    pub over: Over,
+    /// Samples sent, where the sender is here.
+    pub emitted: Option<u64>,
+    /// Samples received, where the receiver is here.
+    pub received: Option<u64>,
+    /// Samples that did not arrive.
+    pub dropped: u64,
+}
+
+impl Summary {
+    /// Adds up what the stages have reported.
+    pub fn new(pipeline: &Pipeline, links: &[Link], stages: &[Local]) -> Self {
+        let here = |at: usize| stages.iter().find(|stage| stage.at == at);
+        let links = links.iter().filter_map(|link| {
+            let (sender, receiver) = (here(link.from), here(link.to));
+            if sender.is_none() && receiver.is_none() {
+                return None;
+            }
+            let emitted = sender.map(|stage| stage.tally.sums().emitted);
+            let counts = receiver.map(|stage| {
+                let is_it = |input: &tauscope_bus::seat::Input| input.stream == link.stream;
+                let place = stage.seat.inputs.iter().position(is_it);
+                let counts = stage.tally.sums().inputs;
+                place
+                    .and_then(|place| counts.get(place).copied())
+                    .unwrap_or_default()
+            });
+            Some(LinkSummary {
+                from: pipeline.stages[link.from].name.clone(),
+                to: pipeline.stages[link.to].name.clone(),
+                over: link.over,
+                emitted,
+                received: counts.map(|counts| counts.received),
+                dropped: counts.map_or(0, |counts| counts.lost),
+            })
+        });
+        Self {
+            links: links.collect(),
+            stages: stages.iter().map(StageSummary::new).collect(),
+        }
+    }
+
+    /// How the run ended.
+    pub fn exit(&self) -> Exit {
+        if self.stages.iter().any(|stage| stage.failed) {
+            return Exit::Failed;
+        }
+        let dropped = self.stages.iter().any(|stage| stage.dropped > 0);
+        Exit::from_loss(dropped || self.links.iter().any(|link| link.dropped > 0))
+    }
+
+    /// As tables.
+    pub fn table(&self) -> String {
+        let mut stages = new(&["stage", "received", "emitted", "dropped", "restarts"]);
+        for stage in &self.stages {
+            let count = |count: u64| {
+                if stage.reported {
+                    count.to_string()
+                } else {
+                    "?".to_owned()
+                }
+            };
+            let failed = if stage.failed { " (failed)" } else { "" };
+            stages.add_row([
+                format!("{}{failed}", stage.stage),
+                count(stage.received),
+                count(stage.emitted),
+                count(stage.dropped),
+                stage.restarts.to_string(),
+            ]);
+        }
+        let mut links = new(&["link", "emitted", "received", "dropped"]);
+        for link in &self.links {
+            let over = match link.over {
+                Over::SharedMemory => "",
+                Over::Zenoh => " (Zenoh)",
+            };
+            let count = |count: Option<u64>| count.map_or(String::new(), |count| count.to_string());
+            links.add_row([
+                format!("{} -> {}{over}", link.from, link.to),
+                count(link.emitted),
+                count(link.received),
+                link.dropped.to_string(),
+            ]);
+        }
+        for table in [&mut stages, &mut links] {
+            for column in table.column_iter_mut().skip(1) {
+                column.set_cell_alignment(CellAlignment::Right);
+            }
+        }
+        format!("{}\n\n{}", stages.trim_fmt(), links.trim_fmt())
+    }
+}
+
+impl StageSummary {
+    fn new(stage: &Local) -> Self {
+        let sums = stage.tally.sums();
+        let inputs = stage.seat.inputs.iter().zip(&sums.inputs);
+        // Health reports come along with what is recorded; they are not what is asked for here.
+        let data = inputs.filter(|(input, _)| input.kind != SampleKind::Health);
+        let (mut received, mut lost) = (0, 0);
+        for (_, counts) in data {
+            received += counts.received;
+            lost += counts.lost;
+        }
+        if stage.seat.inputs.is_empty() {
+            received = sums.emitted + sums.refused;
+        }
+        Self {
+            stage: stage.seat.stage.clone(),
+            reported: stage.tally.is_known(),
+            received,
+            emitted: sums.emitted,
+            dropped: lost + sums.refused,
+            restarts: stage.seat.restarts,
+            failed: stage.is_lost(),
+        }
+    }
+}
+
+fn new(header: &[&str]) -> Table {
+    let mut table = Table::new();
+    table
+        .load_preset(presets::UTF8_FULL_CONDENSED)
+        .set_header(header);
+    table
+}
