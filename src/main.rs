@@ -1,6 +1,7 @@
 //! The `tauscope` program: command line, pipeline file, supervisor, replay. Its physics is in the
 //! stages.
 
+mod announce;
 mod build;
 mod calibrate;
 mod cli;
@@ -23,6 +24,13 @@ use clap::Parser;
 use cli::{Cli, Command};
 
 fn main() -> ExitCode {
+    // What libraries and stages warn of goes where errors go.
+    tracing_subscriber::fmt()
+        .with_max_level(tracing::Level::WARN)
+        .with_writer(std::io::stderr)
+        .without_time()
+        .with_target(false)
+        .init();
     let command = Cli::parse()
         .command
         .unwrap_or_else(|| Command::Run(Default::default()));

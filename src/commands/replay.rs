@@ -271,7 +271,11 @@ fn rms_table(outcome: &Outcome, rms: &[JointRms]) -> Table {
         ("   low-passed", |rms| rms.filtered_residual_rms),
     ];
     for (name, value) in rows {
-        let values = rms.iter().map(|rms| format!("{:.3}", value(rms)));
+        let values = rms.iter().map(value).map(|rms| match rms.is_finite() {
+            true => format!("{rms:.3}"),
+            // No sample of that kind.
+            false => "-".to_owned(),
+        });
         table.add_row(std::iter::once(name.to_owned()).chain(values));
     }
     for column in table.column_iter_mut().skip(1) {

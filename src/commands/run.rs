@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 
 use crate::exit::{Exit, Failure};
-use crate::pipeline::Pipeline;
+use crate::pipeline::{Pipeline, Settings};
 use crate::plan;
 use crate::report::Problem;
 use crate::suggest;
@@ -64,5 +64,32 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
         summary.table()
     };
     super::print(&text)?;
+    if !args.json {
+        super::print(&written(&pipeline, host))?;
+    }
     Ok(summary.exit())
+}
+
+/// What this host's recorders wrote, and how to open it.
+fn written(pipeline: &Pipeline, host: Option<&str>) -> String {
+    let mut text = String::new();
+    for stage in &pipeline.stages {
+        let Settings::Record(config) = &stage.settings else { continue };
+        if host.is_some() && stage.host.as_deref() != host {
+            continue;
+        }
+        let picture = config.rerun.as_ref().and_then(|rerun| rerun.file.as_ref());
+        for path in [config.mcap.as_ref(), picture].into_iter().flatten().filter(|p| p.exists()) {
+            let size = std::fs::metadata(path).map_or(0, |file| file.len());
+            text += &format!("wrote {} ({:.1} MB)\n", path.display(), size as f64 * 1e-6);
+        }
+        if let Some(path) = picture.filter(|path| path.exists()) {
+            let version = tauscope_record::rerun_version();
+            text += &format!(
+                "see it: pip install rerun-sdk=={version} && rerun {}\n",
+                path.display()
+            );
+        }
+    }
+    text
 }

@@ -7,6 +7,7 @@ use rustix::process::{Signal, set_parent_process_death_signal};
 use tauscope_bus::shell::{Child, ChildError};
 use tauscope_ingest::SimulatedRobot;
 
+use crate::announce::Announced;
 use crate::build::{self, BuildError};
 use crate::pipeline::{Cell, ScenarioFacts, Settings};
 use crate::supervisor::Instructions;
@@ -80,7 +81,7 @@ fn no_seat(error: &ChildError) -> ExitCode {
 enum Made {
     Source(Box<dyn tauscope_bus::Source<tauscope_bus::JointState>>),
     Twin(Box<tauscope_twin::Twin>),
-    Detect(Box<tauscope_detect::Detect>),
+    Detect(Box<Announced<tauscope_detect::Detect>>),
     Record(Box<tauscope_record::Recorder>),
 }
 
@@ -111,7 +112,8 @@ impl Made {
                 Self::Twin(Box::new(build::twin(config, model.as_ref(), cell()?)?))
             }
             Settings::Detect { config, model } => {
-                Self::Detect(Box::new(build::detect(config, model.as_ref(), cell()?)?))
+                let detect = build::detect(config, model.as_ref(), cell()?)?;
+                Self::Detect(Box::new(Announced::new(detect, &cell()?.facts.joint_names)))
             }
             Settings::Record(config) => {
                 let cells: Vec<&Cell> = cells.iter().collect();

@@ -14,3 +14,8 @@ pub use error::RecordError;
 pub use recorder::Recorder;
 pub use streams::{CellInfo, StreamInfo};
 pub use tauscope_archive::Compression;
+
+/// Version of Rerun that the pictures are made for; a viewer of this version opens them.
+pub fn rerun_version() -> String {
+    ::rerun::build_info().version.to_string()
+}
