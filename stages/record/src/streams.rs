@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use tauscope_bus::{Header, MAX_JOINTS, SampleKind, SampleRef};
+use tauscope_bus::{MAX_JOINTS, SampleKind, SampleRef};
 use tauscope_dynamics::Model;
 
 use crate::error::RecordError;
@@ -190,7 +190,7 @@ impl Streams {
             });
         };
         let stream = &self.all[index];
-        let (kind, header) = kind_and_header(sample);
+        let kind = sample.kind();
         if kind == SampleKind::Health {
             return Ok(index);
         }
@@ -203,7 +203,7 @@ impl Streams {
             });
         }
         let cell = &self.cells[stream.cell];
-        let (expected, found) = (cell.joint_names.len(), header.joint_count as usize);
+        let (expected, found) = (cell.joint_names.len(), sample.header().joint_count as usize);
         let carries_joints = kind != SampleKind::Detection;
         if carries_joints && (found != expected || found > MAX_JOINTS) {
             let (stage, cell) = (from.to_owned(), cell.name.clone());
@@ -215,15 +215,6 @@ impl Streams {
             });
         }
         Ok(index)
-    }
-}
-
-fn kind_and_header<'a>(sample: &SampleRef<'a>) -> (SampleKind, &'a Header) {
-    match *sample {
-        SampleRef::JointState(sample) => (SampleKind::JointState, &sample.header),
-        SampleRef::TwinState(sample) => (SampleKind::TwinState, &sample.header),
-        SampleRef::Detection(sample) => (SampleKind::Detection, &sample.header),
-        SampleRef::Health(sample) => (SampleKind::Health, &sample.header),
     }
 }
 

@@ -4,9 +4,8 @@
 mod properties;
 
 use rerun::blueprint::{
-    Blueprint, BlueprintActivation, BlueprintPanel, ContainerLike, Grid, Horizontal,
-    SelectionPanel, Spatial3DView, StateTimelineView, Tabs, TextLogView, TimePanel, TimeSeriesView,
-    Vertical,
+    Blueprint, BlueprintActivation, BlueprintPanel, ContainerLike, Horizontal, SelectionPanel,
+    Spatial3DView, StateTimelineView, Tabs, TextLogView, TimePanel, TimeSeriesView, Vertical,
 };
 use rerun::components::Name;
 use rerun::external::re_sdk_types::blueprint::components::{PanelState, PlayState};
@@ -115,13 +114,12 @@ impl Layout<'_> {
         let mut right_shares = Vec::new();
         let joints = self.joints(cell);
         if !joints.is_empty() {
-            let columns = joints.len().div_ceil(5).max(2);
-            right_shares.push(joints.len().div_ceil(columns) as f32);
-            right.push(Grid::new(joints).with_grid_columns(columns as u32).into());
+            right_shares.push(joints.len().div_ceil(plots_a_row(joints.len())) as f32);
+            right.push(in_rows(joints));
         }
         let scores = self.scores(cell);
         if !scores.is_empty() {
-            right_shares.push(1.3);
+            right_shares.push(1.0);
             right.push(
                 if scores.len() == 1 {
                     scores
@@ -134,8 +132,10 @@ impl Layout<'_> {
                 .of(cell, SampleKind::Detection)
                 .map(|stream| state_entity(stream).to_string())
                 .collect();
-            right_shares.push(0.5 + 0.2 * states.len() as f32);
-            right.push(StateTimelineView::new("State").with_contents(states).into());
+            right_shares.push(0.4 + 0.2 * states.len() as f32);
+            let view = StateTimelineView::new("State").with_contents(states).into();
+            self.properties.plot(&view, false, self.window_ns());
+            right.push(view);
         }
         let name = self.streams.cells[cell].name.clone();
         let left = Vertical::new(left).with_row_shares(left_shares).into();
@@ -224,6 +224,22 @@ impl Layout<'_> {
     fn window_ns(&self) -> Option<i64> {
         (self.purpose == Purpose::Live).then_some(LIVE_WINDOW_NS)
     }
+}
+
+/// Two plots a row, more where there would be more than five rows.
+fn plots_a_row(plots: usize) -> usize {
+    plots.div_ceil(5).max(2)
+}
+
+/// Plots in rows; the last row's are wider if they are fewer. (A grid would leave a hole.)
+fn in_rows(plots: Vec<ContainerLike>) -> ContainerLike {
+    let a_row = plots_a_row(plots.len());
+    let mut plots = plots.into_iter();
+    let mut rows = Vec::<ContainerLike>::new();
+    while plots.len() > 0 {
+        rows.push(Horizontal::new(plots.by_ref().take(a_row)).into());
+    }
+    Vertical::new(rows).into()
 }
 
 /// Of an entity with a series a joint, the one of a joint.

@@ -16,6 +16,9 @@ use crate::words::{Severity, headline, loaded_joints};
 /// The arrow and the colour follow at most so often \[ns\]: a viewer shows no more.
 const FORCE_PERIOD_NS: u64 = 20_000_000;
 
+/// A state that stays is told again after this time \[ns\], for a viewer that came late.
+const STATE_PERIOD_NS: u64 = 1_000_000_000;
+
 /// The tracks of one detector.
 #[derive(Debug)]
 pub(super) struct DetectionTracks {
@@ -25,7 +28,8 @@ pub(super) struct DetectionTracks {
     events: RowTrack,
     events_entity: EntityPath,
     force: ForceTrack,
-    previous: Option<Name>,
+    /// State that was told last, and when.
+    told: Option<(Name, i64)>,
     /// Stamp of the arrow that is shown now.
     shown_ns: Option<i64>,
 }
@@ -78,16 +82,17 @@ impl DetectionTracks {
             events: RowTrack::default(),
             events_entity: events_entity(stream),
             force: ForceTrack::new(wrench),
-            previous: None,
+            told: None,
             shown_ns: None,
         })
     }
 
-    /// Takes a detection of the stream number `index`.
+    /// Takes a detection of the stream number `index`; the recording began at `start_ns`.
     pub fn accept(
         &mut self,
         detection: &Detection,
         index: usize,
+        start_ns: i64,
         joints: &[String],
         robot: Option<&mut Robot>,
         store: &Store,
@@ -97,12 +102,15 @@ impl DetectionTracks {
             self.score.push(header, &[detection.score]);
         }
         self.threshold.push(header, &[detection.threshold]);
-        if self.previous != Some(detection.state) {
-            self.previous = Some(detection.state);
+        let as_told = |(state, told_ns): (Name, i64)| {
+            state == detection.state && header.stamp_ns.abs_diff(told_ns) < STATE_PERIOD_NS
+        };
+        if !self.told.is_some_and(as_told) {
+            self.told = Some((detection.state, header.stamp_ns));
             self.state.push(header, detection.state.as_str());
         }
         if detection.event() != EventKind::None {
-            self.tell(detection, joints, store)?;
+            self.tell(detection, start_ns, joints, store)?;
         }
         self.draw_force(detection);
         if let Some(robot) = robot {
@@ -134,20 +142,26 @@ impl DetectionTracks {
     fn tell(
         &mut self,
         detection: &Detection,
+        start_ns: i64,
         joints: &[String],
         store: &Store,
     ) -> Result<(), RecordError> {
+        let header = &detection.header;
         let ended = detection.event() == EventKind::Offset;
-        let mut parts = vec![if ended {
+        let what = if ended {
             "contact ended".to_owned()
         } else {
             headline(detection)
-        }];
+        };
+        let mut parts = vec![format!(
+            "{:.2} s: {what}",
+            (header.stamp_ns - start_ns) as f64 * 1e-9
+        )];
         let joints = loaded_joints(detection, joints);
         if !joints.is_empty() {
             parts.push(format!("seen by {}", joints.join(", ")));
         }
-        if detection.header.has(flags::FORCE) {
+        if header.has(flags::FORCE) {
             parts.push(format!("{:.0} N", norm(detection.force_n)));
         }
         let level = match Severity::of(detection) {
@@ -159,8 +173,7 @@ impl DetectionTracks {
         let text = TextLog::new(parts.join(", "))
             .with_level(level)
             .with_color(colour);
-        self.events
-            .push(store, &detection.header, &self.events_entity, &text)
+        self.events.push(store, header, &self.events_entity, &text)
     }
 
     pub fn flush(&mut self, store: &Store, out: &mut Out<'_>) -> Result<(), RecordError> {

@@ -41,6 +41,8 @@ pub(super) struct Painter {
     /// Samples gathered, and the stamp of the first.
     gathered: usize,
     first_ns: i64,
+    /// Stamp of the recording's first sample.
+    start_ns: Option<i64>,
     /// By cell.
     robots: Vec<Option<Robot>>,
     /// By stream.
@@ -101,6 +103,7 @@ impl Painter {
             pace,
             gathered: 0,
             first_ns: 0,
+            start_ns: None,
             robots,
             tracks,
             health,
@@ -121,27 +124,21 @@ impl Painter {
         sample: SampleRef<'_>,
         out: &mut Out<'_>,
     ) -> Result<(), RecordError> {
-        let robot = &mut self.robots[streams.all[index].cell];
-        let stamp_ns = match (sample, &mut self.tracks[index]) {
-            (SampleRef::Health(health), _) => {
-                self.report(index, health)?;
-                health.header.stamp_ns
-            }
-            (SampleRef::JointState(state), tracks) => {
-                tracks.joint_state(state, robot.as_mut());
-                state.header.stamp_ns
-            }
-            (SampleRef::TwinState(state), tracks) => {
-                tracks.twin_state(state, robot.as_mut());
-                state.header.stamp_ns
-            }
+        let cell = streams.all[index].cell;
+        let robot = self.robots[cell].as_mut();
+        let stamp_ns = sample.header().stamp_ns;
+        let start_ns = *self.start_ns.get_or_insert(stamp_ns);
+        match (sample, &mut self.tracks[index]) {
+            (SampleRef::Health(health), _) => self.report(index, health)?,
+            (SampleRef::JointState(state), tracks) => tracks.joint_state(state, robot),
+            (SampleRef::TwinState(state), tracks) => tracks.twin_state(state, robot),
             (SampleRef::Detection(detection), Tracks::Detection(tracks)) => {
-                let joints = &streams.cells[streams.all[index].cell].joint_names;
-                tracks.accept(detection, index, joints, robot.as_mut(), &self.store)?;
-                detection.header.stamp_ns
+                let joints = &streams.cells[cell].joint_names;
+                tracks.accept(detection, index, start_ns, joints, robot, &self.store)?;
             }
-            (SampleRef::Detection(_), _) => return Ok(()),
-        };
+            // `Streams::find` lets only samples of the announced type through.
+            (SampleRef::Detection(_), _) => {}
+        }
         if self.gathered == 0 {
             self.first_ns = stamp_ns;
         }

@@ -149,7 +149,7 @@ impl Robot {
             .max(0.2);
         let middle: [f64; 3] = std::array::from_fn(|i| 0.5 * (low[i] + high[i]));
         // From the front, the side and a little above.
-        let towards_eye = [1.0, -0.9, 0.35];
+        let towards_eye = [0.85, -0.75, 0.25];
         ViewPoint {
             eye_m: std::array::from_fn(|i| (middle[i] + size * towards_eye[i]) as f32),
             target_m: middle.map(|metre| metre as f32),

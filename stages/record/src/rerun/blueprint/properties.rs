@@ -47,17 +47,16 @@ impl Properties {
         self.set(view, "Background", &background);
     }
 
-    /// A text log: when and what.
+    /// A text log: how bad and what. When stands in the text: the viewer's own column shows the
+    /// beginning of the date.
     pub fn events(&mut self, view: &ContainerLike) {
         let when = Timestamps {
-            visible: true.into(),
+            visible: false.into(),
             timeline: STAMP.into(),
         };
         let what = [TextLogColumnKind::LogLevel, TextLogColumnKind::Body].map(|kind| {
-            TextLogColumn(Column {
-                visible: true.into(),
-                kind,
-            })
+            let visible = true.into();
+            TextLogColumn(Column { visible, kind })
         });
         let columns = TextLogColumns::new()
             .with_timeline_columns([TimelineColumn(when)])

@@ -12,9 +12,10 @@ use crate::error::RecordError;
 use crate::rerun::store::{Out, Store};
 
 /// Radius of a skeleton's bones, as a part of the robot's length.
-const BONE_RADIUS: f64 = 0.035;
-/// Radius of its joints, as a part of the bones'.
-const JOINT_RADIUS: f32 = 1.3;
+const BONE_RADIUS: f64 = 0.03;
+/// Radius and length of the drum at each joint, as a part of the bones' radius.
+const DRUM_RADIUS: f32 = 1.25;
+const DRUM_LENGTH: f32 = 3.6;
 
 /// The shapes of one link, in its frame.
 #[derive(Debug, Default, Clone, PartialEq)]
@@ -46,42 +47,46 @@ pub(super) fn of(model: &Model) -> Vec<Shapes> {
         .zip(&all)
         .map(|(link, shapes)| shapes.is_empty() && (bare || !link.shapes.is_empty()))
         .collect();
-    if !bony.contains(&true) {
-        return all;
+    if bony.contains(&true) {
+        add_skeleton(model, &bony, &mut all);
     }
+    all
+}
+
+/// Adds bones from each bony link's origin to its children's, and a drum at each joint that moves one.
+fn add_skeleton(model: &Model, bony: &[bool], all: &mut [Shapes]) {
     let mut data = Data::new(model);
     forward_kinematics(model, &mut data, &vec![0.0; model.dof()]);
+    let pose = |link| link_pose(model, &data, link);
     let bones: Vec<_> = model
         .links()
         .iter()
         .enumerate()
         .filter_map(|(child, link)| link.parent.map(|parent| (parent, child)))
         .map(|(parent, child)| {
-            let from_parent = link_pose(model, &data, parent).inverse();
             (
                 parent,
-                child,
-                (from_parent * link_pose(model, &data, child))
-                    .translation
-                    .vector,
+                (pose(parent).inverse() * pose(child)).translation.vector,
             )
         })
         .collect();
-    let length: f64 = bones.iter().map(|(_, _, bone)| bone.norm()).sum();
+    let length: f64 = bones.iter().map(|(_, bone)| bone.norm()).sum();
     let radius = (BONE_RADIUS * length) as f32;
-    for (parent, child, bone) in bones {
+    for (parent, bone) in bones {
         if bony[parent] && bone.norm() > 1e-6 {
             all[parent]
                 .bones
                 .push((bone.norm() as f32, radius, along(bone)));
         }
-        if bony[child] {
-            all[child]
-                .spheres
-                .push((JOINT_RADIUS * radius, to_pose(&Isometry3::identity())));
-        }
     }
-    all
+    for joint in model.joints().iter().filter(|joint| bony[joint.child_link]) {
+        let drum = (
+            DRUM_LENGTH * radius,
+            DRUM_RADIUS * radius,
+            along(joint.axis.into()),
+        );
+        all[joint.child_link].cylinders.push(drum);
+    }
 }
 
 impl Shapes {
