@@ -6,7 +6,7 @@
 //! | --- | --- |
 //! | standard input, first line | the [`Seat`] |
 //! | standard input, from then on | the line `stop`, or its end, tells the stage to stop: it deals with what has arrived, completes its output and leaves. `SIGTERM` does the same; `SIGINT` is left to the supervisor, since a terminal sends it to both |
-//! | standard output | one [`Line`] each: `{"event":"ready","missing":0}` once its receivers are connected (or the wait for them is over), `{"event":"report",...}` once a second, `{"event":"done",...}` at the end |
+//! | standard output | one [`Line`] each: `{"event":"ready","missing":0}` once its receivers are connected (or the wait for them is over), `{"event":"report",...}` ten times a second, `{"event":"done",...}` at the end |
 //! | standard error | anything, for people |
 //! | exit code | 0 ended or stopped, 1 failed |
 //!
@@ -30,8 +30,8 @@ use crate::sample::{Health, Sample};
 use crate::seat::{Links, Output, Seat};
 use crate::stage::{Sink, Source, Stage};
 
-/// How often a running stage reports.
-const REPORT_EVERY: Duration = Duration::from_secs(1);
+/// How often a running stage reports: what a killed stage did since then is not known.
+const REPORT_EVERY: Duration = Duration::from_millis(100);
 /// How often the wait for receivers looks whether the stage is to stop.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 
@@ -303,7 +303,7 @@ fn health_sender(
     }
 }
 
-/// Runs `body` while another thread says once a second what is on the board.
+/// Runs `body` while another thread says now and then what is on the board.
 fn reporting<R>(context: &Context, body: impl FnOnce() -> R) -> R {
     std::thread::scope(|scope| {
         let (finished, until_finished) = mpsc::channel::<()>();

@@ -1,0 +1,259 @@
+//! Round-trip latency of a link between two processes, beside bare iceoryx2 with the same payload.
+//!
+//! `cargo bench -p tauscope-bus --bench link_latency`
+//!
+//! - `bare, polling`: a publisher and a subscriber each way, both sides spinning: the floor.
+//! - `bare, waiting`: the same, where the reader sleeps until an event says that a sample was sent.
+//! - `link, shared memory`: our link, which waits in the same way.
+//! - `link, zenoh`: our link over TCP on the loopback device.
+
+// Without what it measures over, a measurement has no more to say.
+#![allow(clippy::unwrap_used)]
+
+use std::process::{Child, Command};
+use std::time::{Duration, Instant};
+
+use hdrhistogram::Histogram;
+use iceoryx2::port::listener::Listener;
+use iceoryx2::port::notifier::Notifier;
+use iceoryx2::port::publisher::Publisher;
+use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::prelude::{
+    Config, FileName, Node, NodeBuilder, Path, PortFactory as _, SemanticString as _,
+};
+use iceoryx2::service::ipc_threadsafe::Service;
+use tauscope_bus::link::PATIENCE;
+use tauscope_bus::{
+    Audience, Domain, Keep, Received, Receiver, Sender, SharedMemory, Transport, TwinState, Zenoh,
+    ZenohEndpoints,
+};
+
+const WARM_UP: usize = 2_000;
+const ROUNDS: usize = 50_000;
+const LONG: Duration = Duration::from_secs(20);
+
+/// One side of a ping-pong.
+trait Side {
+    fn send(&mut self, number: i64);
+    fn receive(&mut self) -> i64;
+}
+
+fn main() {
+    let arguments: Vec<_> = std::env::args().skip(1).collect();
+    if let [role, way, place] = arguments.as_slice()
+        && role == "echo"
+    {
+        return echo(&mut *open(way, place, "pong", "ping"));
+    }
+    println!(
+        "round trip of {} bytes between two processes [us], {ROUNDS} rounds",
+        size_of::<TwinState>()
+    );
+    println!(
+        "{:<22}{:>9}{:>9}{:>9}{:>9}",
+        "", "p50", "p90", "p99", "p99.9"
+    );
+    let ways = [
+        "bare, polling",
+        "bare, waiting",
+        "link, shared memory",
+        "link, zenoh",
+    ];
+    let medians = ways.map(|way| {
+        let histogram = measure(way);
+        let at = |quantile| histogram.value_at_quantile(quantile) as f64 / 1e3;
+        println!(
+            "{way:<22}{:>9.2}{:>9.2}{:>9.2}{:>9.2}",
+            at(0.5),
+            at(0.9),
+            at(0.99),
+            at(0.999)
+        );
+        at(0.5)
+    });
+    println!(
+        "link over shared memory: {:.2} times bare iceoryx2 that waits as well (p50)",
+        medians[2] / medians[1]
+    );
+}
+
+fn measure(way: &str) -> Histogram<u64> {
+    let domain = Domain::unique();
+    let place = if way == "link, zenoh" {
+        let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+        format!("tcp/{}", listener.local_addr().unwrap())
+    } else {
+        domain.as_str().to_owned()
+    };
+    let mut other = other_process(way, &place);
+    let mut side = open(way, &place, "ping", "pong");
+    let mut histogram = Histogram::new(3).unwrap();
+    for round in 0..WARM_UP + ROUNDS {
+        let begin = Instant::now();
+        side.send(round as i64);
+        assert_eq!(side.receive(), round as i64);
+        if round >= WARM_UP {
+            histogram.record(begin.elapsed().as_nanos() as u64).unwrap();
+        }
+    }
+    side.send(-1);
+    other.wait().unwrap();
+    drop(side);
+    domain.remove().unwrap();
+    histogram
+}
+
+fn other_process(way: &str, place: &str) -> Child {
+    Command::new(std::env::current_exe().unwrap())
+        .args(["echo", way, place])
+        .spawn()
+        .unwrap()
+}
+
+fn echo(side: &mut dyn Side) {
+    loop {
+        let number = side.receive();
+        if number < 0 {
+            return;
+        }
+        side.send(number);
+    }
+}
+
+fn open(way: &str, place: &str, send: &str, receive: &str) -> Box<dyn Side> {
+    match way {
+        "bare, polling" => Box::new(Bare::open(place, send, receive, false)),
+        "bare, waiting" => Box::new(Bare::open(place, send, receive, true)),
+        "link, shared memory" => {
+            let domain = Domain::new(place).unwrap();
+            let links = SharedMemory::open(&domain).unwrap();
+            Box::new(Linked::open(&links, send, receive))
+        }
+        _ => {
+            let endpoint = vec![place.to_owned()];
+            let mut endpoints = ZenohEndpoints::default();
+            if send == "ping" {
+                endpoints.listen = endpoint;
+            } else {
+                endpoints.connect = endpoint;
+            }
+            let links = Zenoh::open(&endpoints, PATIENCE).unwrap();
+            Box::new(Linked::open(&links, send, receive))
+        }
+    }
+}
+
+struct Linked {
+    sender: Box<dyn Sender<TwinState>>,
+    receiver: Box<dyn Receiver<TwinState>>,
+}
+
+impl Linked {
+    fn open(links: &impl Transport, send: &str, receive: &str) -> Self {
+        let mut receiver = links.receiver(receive, Keep::All, 8).unwrap();
+        let one = Audience::of(Keep::All, 1);
+        let mut sender: Box<dyn Sender<TwinState>> = links.sender(send, one).unwrap();
+        let deadline = Instant::now() + LONG;
+        // The side that answers is heard once it is asked.
+        while send == "ping" && sender.wait_for_receivers(Duration::from_millis(5)).unwrap() > 0 {
+            assert!(Instant::now() < deadline, "the other side does not come");
+            receiver
+                .receive(Duration::ZERO, &mut |_: &TwinState| {})
+                .unwrap();
+        }
+        Self { sender, receiver }
+    }
+}
+
+impl Side for Linked {
+    fn send(&mut self, number: i64) {
+        self.sender
+            .send_with(&mut |sample| sample.header.stamp_ns = number)
+            .unwrap();
+    }
+
+    fn receive(&mut self) -> i64 {
+        let mut number = None;
+        let read = &mut |sample: &TwinState| number = Some(sample.header.stamp_ns);
+        assert_eq!(self.receiver.receive(LONG, read).unwrap(), Received::Sample);
+        number.unwrap()
+    }
+}
+
+struct Bare {
+    publisher: Publisher<Service, TwinState, ()>,
+    subscriber: Subscriber<Service, TwinState, ()>,
+    notifier: Notifier<Service>,
+    listener: Listener<Service>,
+    waiting: bool,
+    _node: Node<Service>,
+}
+
+impl Bare {
+    fn open(place: &str, send: &str, receive: &str, waiting: bool) -> Self {
+        let mut config = Config::default();
+        let root = format!("/tmp/tauscope_{place}");
+        config
+            .global
+            .set_root_path(&Path::new(root.as_bytes()).unwrap());
+        config.global.prefix = FileName::new(format!("{place}_").as_bytes()).unwrap();
+        let node = NodeBuilder::new()
+            .config(&config)
+            .create::<Service>()
+            .unwrap();
+        let samples = |name: &str| {
+            node.service_builder(&name.try_into().unwrap())
+                .publish_subscribe::<TwinState>()
+                .open_or_create()
+                .unwrap()
+        };
+        let events = |name: &str| {
+            node.service_builder(&name.try_into().unwrap())
+                .event()
+                .open_or_create()
+                .unwrap()
+        };
+        let listener = events(receive).listener_builder().create().unwrap();
+        let subscriber = samples(receive).subscriber_builder().create().unwrap();
+        let out = samples(send);
+        let publisher = out.publisher_builder().create().unwrap();
+        let notifier = events(send).notifier_builder().create().unwrap();
+        let deadline = Instant::now() + LONG;
+        while out.dynamic_config().number_of_subscribers() == 0 {
+            assert!(Instant::now() < deadline, "the other side does not come");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        Self {
+            publisher,
+            subscriber,
+            notifier,
+            listener,
+            waiting,
+            _node: node,
+        }
+    }
+}
+
+impl Side for Bare {
+    fn send(&mut self, number: i64) {
+        let mut sample = self.publisher.loan().unwrap();
+        sample.payload_mut().header.stamp_ns = number;
+        sample.send().unwrap();
+        if self.waiting {
+            self.notifier.notify().unwrap();
+        }
+    }
+
+    fn receive(&mut self) -> i64 {
+        loop {
+            if let Some(sample) = self.subscriber.receive().unwrap() {
+                return sample.payload().header.stamp_ns;
+            }
+            if self.waiting {
+                self.listener.timed_wait(|_| {}, LONG).unwrap();
+            } else {
+                std::hint::spin_loop();
+            }
+        }
+    }
+}
