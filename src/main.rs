@@ -7,6 +7,7 @@ mod calibrate;
 mod cli;
 mod commands;
 mod exit;
+mod files;
 mod pipeline;
 mod plan;
 mod progress;

@@ -6,15 +6,20 @@ use clap::ValueEnum;
 use serde_json::json;
 
 use crate::exit::{Exit, Failure};
+use crate::files::FileKind;
 use crate::pipeline::Pipeline;
 use crate::plan;
 
-/// Check a pipeline file, and print its stages, hosts and links.
+/// Check a pipeline file, and print its stages, hosts and links; or check another kind of file.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The pipeline file.
+    /// The pipeline file, or another one with `--kind`.
     #[arg(default_value = "pipeline.yaml")]
-    pipeline: PathBuf,
+    file: PathBuf,
+    /// What kind of file it is. Of those that are no pipeline the shape is checked: every key, every
+    /// type, every unit of choice.
+    #[arg(long, value_enum, default_value_t)]
+    kind: FileKind,
     /// Look for recordings and programs for the stages of this host only.
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
@@ -41,7 +46,11 @@ enum Format {
 
 /// Checks and prints.
 pub fn run(args: &Args) -> Result<Exit, Failure> {
-    let pipeline = Pipeline::load(&args.pipeline, args.host.as_deref())?;
+    if args.kind != FileKind::Pipeline {
+        args.kind.check_shape(&args.file)?;
+        return Ok(Exit::Done);
+    }
+    let pipeline = Pipeline::load(&args.file, args.host.as_deref())?;
     let links = plan::links(&pipeline);
     let format = if args.json { Format::Json } else { args.format };
     let text = match format {

@@ -3,15 +3,20 @@
 use serde_json::Value;
 
 use crate::exit::{Exit, Failure};
-use crate::pipeline::PipelineFile;
+use crate::files::FileKind;
 
-/// Print the JSON Schema of the pipeline file, for editors that complete and check it.
+/// Print the JSON Schema of the pipeline file, or of another kind of file, for editors that complete
+/// and check it.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// Which kind of file.
+    #[arg(value_enum, default_value_t)]
+    kind: FileKind,
+}
 
 /// Prints it.
-pub fn run(_args: &Args) -> Result<Exit, Failure> {
-    let mut schema = schemars::schema_for!(PipelineFile).to_value();
+pub fn run(args: &Args) -> Result<Exit, Failure> {
+    let mut schema = args.kind.schema().to_value();
     plain_descriptions(&mut schema);
     let text = serde_json::to_string_pretty(&schema).map_err(anyhow::Error::from)?;
     super::print(&text)?;

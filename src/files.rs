@@ -1,0 +1,63 @@
+//! The kinds of file that people write, one type each: what `tauscope schema` prints and
+//! `tauscope check --kind` checks.
+
+mod case;
+mod set;
+
+use std::path::Path;
+
+use schemars::{JsonSchema, Schema};
+use serde::de::DeserializeOwned;
+
+use crate::pipeline::PipelineFile;
+use crate::report::Report;
+use crate::yaml;
+
+pub use case::CaseFile;
+pub use set::SetFile;
+
+/// A kind of file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+pub enum FileKind {
+    /// What `tauscope run` runs.
+    #[default]
+    Pipeline,
+    /// A corrected twin, which `tauscope calibrate` writes.
+    Twin,
+    /// What `tauscope simulate` simulates.
+    Scenario,
+    /// A robot and recordings whose mismatch is to be explained.
+    Case,
+    /// Labelled recordings that detectors are evaluated on.
+    Set,
+}
+
+impl FileKind {
+    /// The JSON Schema of its type.
+    pub fn schema(self) -> Schema {
+        match self {
+            Self::Pipeline => schemars::schema_for!(PipelineFile),
+            Self::Twin => schemars::schema_for!(tauscope_twin::TwinFile),
+            Self::Scenario => schemars::schema_for!(tauscope_ingest::simulated::Scenario),
+            Self::Case => schemars::schema_for!(CaseFile),
+            Self::Set => schemars::schema_for!(SetFile),
+        }
+    }
+
+    /// Checks the shape of the file at `path`.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it, each with its place.
+    pub fn check_shape(self, path: &Path) -> Result<(), Report> {
+        fn of<T: DeserializeOwned + JsonSchema>(path: &Path) -> Result<(), Report> {
+            yaml::load::<T>(path).map(|_| ())
+        }
+        match self {
+            Self::Pipeline => of::<PipelineFile>(path),
+            Self::Twin => of::<tauscope_twin::TwinFile>(path),
+            Self::Scenario => of::<tauscope_ingest::simulated::Scenario>(path),
+            Self::Case => of::<CaseFile>(path),
+            Self::Set => of::<SetFile>(path),
+        }
+    }
+}
