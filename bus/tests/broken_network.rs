@@ -1,0 +1,141 @@
+//! A network that breaks between two hosts: what it swallows is counted.
+
+// Helpers outside a test function.
+#![allow(clippy::unwrap_used)]
+
+use std::io::{Read, Write};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use tauscope_bus::{
+    Audience, JointState, Keep, Received, Receiver, Sender, Transport, Zenoh, ZenohEndpoints,
+};
+
+const LONG: Duration = Duration::from_secs(20);
+
+/// Passes connections on to another address until it is cut.
+struct Proxy {
+    address: SocketAddr,
+    cut: Arc<AtomicBool>,
+    connections: Arc<Mutex<Vec<TcpStream>>>,
+}
+
+impl Proxy {
+    fn to(target: SocketAddr) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let proxy = Self {
+            address: listener.local_addr().unwrap(),
+            cut: Arc::default(),
+            connections: Arc::default(),
+        };
+        let (cut, connections) = (Arc::clone(&proxy.cut), Arc::clone(&proxy.connections));
+        std::thread::spawn(move || {
+            for near in listener.incoming().map(Result::unwrap) {
+                if cut.load(Ordering::Relaxed) {
+                    continue;
+                }
+                let Ok(far) = TcpStream::connect(target) else {
+                    continue;
+                };
+                for (from, to) in [(&near, &far), (&far, &near)] {
+                    let (from, to) = (from.try_clone().unwrap(), to.try_clone().unwrap());
+                    std::thread::spawn(move || pass(from, to));
+                }
+                connections.lock().unwrap().extend([near, far]);
+            }
+        });
+        proxy
+    }
+
+    /// Ends all connections and takes no new ones.
+    fn cut(&self) {
+        self.cut.store(true, Ordering::Relaxed);
+        for connection in self.connections.lock().unwrap().drain(..) {
+            // It may be gone already.
+            let _ = connection.shutdown(Shutdown::Both);
+        }
+    }
+
+    fn mend(&self) {
+        self.cut.store(false, Ordering::Relaxed);
+    }
+}
+
+fn pass(mut from: TcpStream, mut to: TcpStream) {
+    let mut buffer = [0; 4096];
+    while let Ok(length) = from.read(&mut buffer) {
+        if length == 0 || to.write_all(&buffer[..length]).is_err() {
+            break;
+        }
+    }
+    let _ = to.shutdown(Shutdown::Both);
+}
+
+fn missing_becomes(sender: &mut dyn Sender<JointState>, missing: usize) {
+    let deadline = Instant::now() + LONG;
+    while sender.wait_for_receivers(Duration::from_millis(5)).unwrap() != missing {
+        assert!(Instant::now() < deadline, "never {missing} missing");
+    }
+}
+
+#[test]
+fn what_a_broken_network_swallows_is_counted_and_the_rest_comes() {
+    let listen = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listen.local_addr().unwrap();
+    drop(listen);
+    let proxy = Proxy::to(address);
+    let open = |listen: &[SocketAddr], connect: &[SocketAddr]| {
+        let texts = |addresses: &[SocketAddr]| {
+            addresses
+                .iter()
+                .map(|address| format!("tcp/{address}"))
+                .collect()
+        };
+        let endpoints = ZenohEndpoints {
+            listen: texts(listen),
+            connect: texts(connect),
+        };
+        Zenoh::open(&endpoints, LONG).unwrap()
+    };
+    let (a, b) = (open(&[address], &[]), open(&[], &[proxy.address]));
+    let mut sender: Box<dyn Sender<JointState>> =
+        a.sender("c/s", Audience::of(Keep::All, 1)).unwrap();
+    let mut receiver: Box<dyn Receiver<JointState>> = b.receiver("c/s", Keep::All, 64).unwrap();
+    let mut number = 0;
+    let mut send = |sender: &mut dyn Sender<JointState>| {
+        for _ in 0..10 {
+            sender
+                .send_with(&mut |sample| sample.header.stamp_ns = number)
+                .unwrap();
+            number += 1;
+        }
+    };
+    missing_becomes(&mut *sender, 0);
+    send(&mut *sender);
+    let mut heard = Vec::new();
+    while heard.len() < 10 {
+        let read = &mut |sample: &JointState| heard.push(sample.header.stamp_ns);
+        assert_eq!(receiver.receive(LONG, read).unwrap(), Received::Sample);
+    }
+    proxy.cut();
+    missing_becomes(&mut *sender, 1);
+    send(&mut *sender);
+    assert_eq!(sender.counts().undelivered, 10);
+    proxy.mend();
+    missing_becomes(&mut *sender, 0);
+    send(&mut *sender);
+    sender.end().unwrap();
+    while receiver
+        .receive(LONG, &mut |sample| heard.push(sample.header.stamp_ns))
+        .unwrap()
+        == Received::Sample
+    {}
+    assert_eq!(heard, (0..10).chain(20..30).collect::<Vec<_>>());
+    assert_eq!(
+        (receiver.counts().received, receiver.counts().lost),
+        (20, 10)
+    );
+    assert_eq!(sender.wait_until_taken(LONG).unwrap(), 0);
+}
