@@ -1,22 +1,5 @@
-//! The archive: what is kept of the streams as MCAP, in messages that any ROS 2 tool reads.
-//!
-//! | topic | type | holds |
-//! | --- | --- | --- |
-//! | `/joint_states` | `sensor_msgs/msg/JointState` | what was received; velocity and effort are empty where they were not measured |
-//! | `/joint_commands` | `sensor_msgs/msg/JointState` | the command, when it changes and every 0.1 s |
-//! | `/tool` | `geometry_msgs/msg/InertiaStamped` | the tool, whenever it changes; mass 0 where there is none any more |
-//! | `/twin/joint_states` | `sensor_msgs/msg/JointState` | effort only: what the twin expects, not filtered |
-//! | `/residual` | `sensor_msgs/msg/JointState` | effort only: the filtered difference, from when the filters have settled on |
-//! | `/external_wrench` | `geometry_msgs/msg/WrenchStamped` | the estimated force on the robot, in the world's axes, with its torque about the world's origin, while there is one |
-//! | `/detections` | `diagnostic_msgs/msg/DiagnosticArray` | one status at each beginning and end of an alarm and each other change of a detector's state |
-//! | `/detections/<detector>/score` | `std_msgs/msg/Float64` | the score of each sample that the detector judged |
-//! | `/detections/<detector>/threshold` | `std_msgs/msg/Float64` | the threshold, whenever it changes |
-//! | `/diagnostics` | `diagnostic_msgs/msg/DiagnosticArray` | how the stages fare |
-//!
-//! Log time is when the source received the sample that a message comes from, publish time is that
-//! sample's stamp; so a `Float64`, which has no stamp of its own, does not lose it. The same samples
-//! in the same order give the same bytes. See `streams.rs` for the topics of several cells and
-//! of several streams of one kind.
+//! The archive: what is kept of the streams as MCAP, in messages that any ROS 2 tool reads. Topic by
+//! topic it is described in `docs/archive.md`.
 
 mod command;
 mod detections;

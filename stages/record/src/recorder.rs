@@ -13,7 +13,8 @@ use crate::streams::{CellInfo, StreamInfo, Streams};
 /// Keeps what it listens to: all of it in an archive, a view of it for the Rerun viewer.
 ///
 /// Memory is bounded: an open chunk of the archive, some seconds of the picture's file, some seconds
-/// of a live picture that no viewer takes.
+/// of a live picture that no viewer takes. Only the indexes of the two files grow, by about 35 MB an
+/// hour together.
 pub struct Recorder {
     streams: Streams,
     archive: Option<Archive>,

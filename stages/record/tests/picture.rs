@@ -108,7 +108,7 @@ fn the_file_holds_efforts_robot_and_detections_on_the_importers_paths_and_timeli
     let timelines: BTreeSet<_> = effort
         .timelines()
         .keys()
-        .map(|name| name.as_str())
+        .map(rerun::TimelineName::as_str)
         .collect();
     let expected = ["message_log_time", "message_publish_time", "ros2_timestamp"];
     assert_eq!(timelines, BTreeSet::from(expected));
