@@ -4,7 +4,7 @@
 use serde::Deserialize;
 use tauscope_bus::{Detection, Emit, Name, Seat, Stage, StageError, TwinState, flags};
 
-/// What the pipeline file may say: `outside: {command: [...], config: {threshold: 8.0}}`.
+/// What the pipeline file may say: `outside: {command: [...], settings: {threshold: 8.0}}`.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
