@@ -18,19 +18,30 @@ mod suggest;
 mod supervisor;
 mod yaml;
 
+use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::Parser;
+use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
 
 use cli::{Cli, Command};
 
 fn main() -> ExitCode {
-    // What libraries and stages warn of goes where errors go.
-    tracing_subscriber::fmt()
-        .with_max_level(tracing::Level::WARN)
+    // What libraries and stages warn of goes where errors go. Zenoh warns of what is meant: that
+    // nothing is discovered, and that a peer is not there yet.
+    let filter = Targets::new()
+        .with_default(LevelFilter::WARN)
+        .with_target("zenoh", LevelFilter::ERROR);
+    let lines = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
         .without_time()
-        .with_target(false)
+        .with_target(false);
+    tracing_subscriber::registry()
+        .with(lines)
+        .with(filter)
         .init();
     let command = Cli::parse()
         .command

@@ -10,6 +10,7 @@ mod local;
 mod process;
 
 mod restart;
+mod router;
 mod seats;
 mod summary;
 mod tally;
@@ -18,7 +19,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Context;
-use tauscope_bus::{Domain, SharedMemory};
+use tauscope_bus::{Domain, Seat, SharedMemory};
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::mpsc;
 use tokio::time::Instant;
@@ -29,6 +30,7 @@ use crate::plan::{Link, Over};
 use crate::progress::Progress;
 use local::Local;
 use process::{Event, Process};
+use router::Router;
 pub use seats::Instructions;
 pub use summary::Summary;
 
@@ -41,17 +43,33 @@ const EVENTS: usize = 256;
 type Mark = (usize, u64);
 
 /// Runs the stages on `host` (all without one) until they have ended.
-pub async fn run(
+pub fn run(pipeline: &Pipeline, links: &[Link], host: Option<&str>) -> anyhow::Result<Summary> {
+    let domain = Domain::unique();
+    let router = Router::open(pipeline, links, host)?;
+    let meeting_point = router.as_ref().map(Router::endpoint);
+    let seats = seats::seats(pipeline, links, host, &domain, meeting_point)?;
+    // One thread: it waits for pipes, processes and signals. And Linux ties a child's life to the
+    // thread that started it.
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .context("cannot wait for processes")?;
+    let outcome = runtime.block_on(supervise(pipeline, links, seats, &domain));
+    // Best effort: what is left of it does no harm.
+    let _ = domain.remove();
+    outcome
+}
+
+async fn supervise(
     pipeline: &Pipeline,
     links: &[Link],
-    host: Option<&str>,
+    seats: Vec<(usize, Seat)>,
+    domain: &Domain,
 ) -> anyhow::Result<Summary> {
-    let domain = Domain::unique();
-    let seats = seats::seats(pipeline, links, host, &domain)?;
     let here = |at: usize| seats.iter().any(|(place, _)| *place == at);
     let shares = |link: &Link| link.over == Over::SharedMemory && here(link.to);
     let shared_memory = if links.iter().any(shares) {
-        Some(SharedMemory::open(&domain)?)
+        Some(SharedMemory::open(domain)?)
     } else {
         None
     };
@@ -72,12 +90,8 @@ pub async fn run(
         progress: Progress::new(sources),
     };
     supervisor.start_all()?;
-    let outcome = supervisor.watch(events).await;
-    let summary = Summary::new(pipeline, links, &supervisor.stages);
-    drop(supervisor);
-    // Best effort: what is left of it does no harm.
-    let _ = domain.remove();
-    outcome.map(|()| summary)
+    supervisor.watch(events).await?;
+    Ok(Summary::new(pipeline, links, &supervisor.stages))
 }
 
 struct Supervisor<'a> {

@@ -51,13 +51,7 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
         (host, _) => host.as_deref(),
     };
     let links = plan::links(&pipeline);
-    // One thread: it waits for pipes, processes and signals. And Linux ties a child's life to the
-    // thread that started it.
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .context("cannot wait for processes")?;
-    let summary = runtime.block_on(supervisor::run(&pipeline, &links, host))?;
+    let summary = supervisor::run(&pipeline, &links, host)?;
     let text = if args.json {
         serde_json::to_string_pretty(&summary).context("cannot encode the summary")?
     } else {
@@ -74,12 +68,18 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
 fn written(pipeline: &Pipeline, host: Option<&str>) -> String {
     let mut text = String::new();
     for stage in &pipeline.stages {
-        let Settings::Record(config) = &stage.settings else { continue };
+        let Settings::Record(config) = &stage.settings else {
+            continue;
+        };
         if host.is_some() && stage.host.as_deref() != host {
             continue;
         }
         let picture = config.rerun.as_ref().and_then(|rerun| rerun.file.as_ref());
-        for path in [config.mcap.as_ref(), picture].into_iter().flatten().filter(|p| p.exists()) {
+        for path in [config.mcap.as_ref(), picture]
+            .into_iter()
+            .flatten()
+            .filter(|p| p.exists())
+        {
             let size = std::fs::metadata(path).map_or(0, |file| file.len());
             text += &format!("wrote {} ({:.1} MB)\n", path.display(), size as f64 * 1e-6);
         }

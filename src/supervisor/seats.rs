@@ -40,18 +40,20 @@ pub struct Instructions {
     pub after_ns: Option<i64>,
 }
 
-/// The seats of the stages on `host` (of all without one), with their place in the pipeline.
+/// The seats of the stages on `host` (of all without one), with their place in the pipeline; where
+/// they meet other hosts, at `router`.
 pub fn seats(
     pipeline: &Pipeline,
     links: &[Link],
     host: Option<&str>,
     domain: &Domain,
+    router: Option<&str>,
 ) -> Result<Vec<(usize, Seat)>, serde_json::Error> {
     let planner = Planner {
         pipeline,
         links,
-        host,
         domain,
+        router,
     };
     let here = |index: &usize| host.is_none() || pipeline.stages[*index].host.as_deref() == host;
     (0..pipeline.stages.len())
@@ -63,8 +65,9 @@ pub fn seats(
 struct Planner<'a> {
     pipeline: &'a Pipeline,
     links: &'a [Link],
-    host: Option<&'a str>,
     domain: &'a Domain,
+    /// Where the stages of this host meet other hosts.
+    router: Option<&'a str>,
 }
 
 impl Planner<'_> {
@@ -90,7 +93,15 @@ impl Planner<'_> {
             .into_iter()
             .any(|transport| transport == TransportKind::Zenoh)
         {
-            seat.zenoh = self.endpoints();
+            let connect = self
+                .router
+                .iter()
+                .map(|&endpoint| endpoint.to_owned())
+                .collect();
+            seat.zenoh = Some(ZenohEndpoints {
+                listen: Vec::new(),
+                connect,
+            });
             seat.start_within_ms = START_ACROSS_HOSTS_MS;
         }
         seat.config = match &stage.settings {
@@ -184,14 +195,6 @@ impl Planner<'_> {
             kind: SampleKind::Health,
             links: ways(&listeners),
         }
-    }
-
-    fn endpoints(&self) -> Option<ZenohEndpoints> {
-        let host = self.pipeline.hosts.get(self.host?)?;
-        Some(ZenohEndpoints {
-            listen: host.listen.0.clone(),
-            connect: host.connect.0.clone(),
-        })
     }
 }
 

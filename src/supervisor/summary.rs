@@ -58,6 +58,32 @@ pub struct LinkSummary {
 impl Summary {
     /// Adds up what the stages have reported.
     pub fn new(pipeline: &Pipeline, links: &[Link], stages: &[Local]) -> Self {
+        let mut summary = Self::reported(pipeline, links, stages);
+        // A stage that was killed has sent more than it lived to report, as its listeners know.
+        for stage in summary
+            .stages
+            .iter_mut()
+            .filter(|stage| stage.restarts > 0 || stage.failed)
+        {
+            let links = summary
+                .links
+                .iter_mut()
+                .filter(|link| link.from == stage.stage);
+            let known =
+                links.map(|link| link.received.map_or(0, |received| received + link.dropped));
+            stage.emitted = stage.emitted.max(known.max().unwrap_or(0));
+            for link in summary
+                .links
+                .iter_mut()
+                .filter(|link| link.from == stage.stage)
+            {
+                link.emitted = Some(stage.emitted);
+            }
+        }
+        summary
+    }
+
+    fn reported(pipeline: &Pipeline, links: &[Link], stages: &[Local]) -> Self {
         let here = |at: usize| stages.iter().find(|stage| stage.at == at);
         let links = links.iter().filter_map(|link| {
             let (sender, receiver) = (here(link.from), here(link.to));
@@ -73,13 +99,15 @@ impl Summary {
                     .and_then(|place| counts.get(place).copied())
                     .unwrap_or_default()
             });
+            // What another host received is known there; here, what its stages were not there for.
+            let undelivered = || sender.map_or(0, |stage| stage.tally.sums().undelivered);
             Some(LinkSummary {
                 from: pipeline.stages[link.from].name.clone(),
                 to: pipeline.stages[link.to].name.clone(),
                 over: link.over,
                 emitted,
                 received: counts.map(|counts| counts.received),
-                dropped: counts.map_or(0, |counts| counts.lost),
+                dropped: counts.map_or_else(undelivered, |counts| counts.lost),
             })
         });
         Self {
