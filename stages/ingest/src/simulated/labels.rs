@@ -70,5 +70,5 @@ impl RecordingLabels {
 
 /// To four digits: nobody knows a push better.
 fn round(value: f64) -> f64 {
-    (value * 1e4).round() * 1e-4
+    (value * 1e4).round() / 1e4
 }

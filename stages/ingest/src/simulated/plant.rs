@@ -1,6 +1,6 @@
 //! The arm itself: its URDF, and the physics that the URDF does not tell of.
 
-use nalgebra::{DVector, Vector3};
+use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
 use tauscope_dynamics::terms::{MotionSample, Term, TermSpec};
 use tauscope_dynamics::{
     Data, Model, forward_kinematics, link_jacobian, link_pose, mass_matrix, rnea,
@@ -24,6 +24,33 @@ pub(super) struct Contact {
     pub force_n: [f64; 3],
 }
 
+/// What the drives are told: an effort, and a velocity to keep to. Their own loop is fast, so it acts
+/// on the velocity at the end of a step.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Drive<'a> {
+    /// \[N m\]
+    pub effort_nm: &'a [f64],
+    /// Effort by velocity error \[N m s/rad\].
+    pub damping: &'a [f64],
+    /// The velocity to keep to \[rad/s\].
+    pub velocity: &'a [f64],
+    /// The most a drive can give, either way \[N m\].
+    pub limit_nm: &'a [f64],
+}
+
+impl Drive<'_> {
+    /// The effort of joint `j` at `velocity`, and how fast it falls with it.
+    fn effort(&self, j: usize, velocity: f64) -> (f64, f64) {
+        let free = self.effort_nm[j] + self.damping[j] * (self.velocity[j] - velocity);
+        let limit = self.limit_nm[j];
+        if free.abs() > limit {
+            (limit.copysign(free), 0.0)
+        } else {
+            (free, self.damping[j])
+        }
+    }
+}
+
 /// The arm and its state.
 ///
 /// Equation of motion: `M(q) qdd + h(q, qd) + physics(q, qd, qdd) = effort + Jᵀ F`, with the physics
@@ -32,9 +59,46 @@ pub(super) struct Contact {
 pub(super) struct Plant {
     model: Model,
     data: Data,
-    terms: Vec<Box<dyn Term>>,
+    physics: Physics,
     position: Vec<f64>,
     velocity: Vec<f64>,
+    /// Of the step that led here.
+    applied_nm: Vec<f64>,
+    work: Work,
+}
+
+/// Memory of a step, used again for the next.
+#[derive(Debug)]
+struct Work {
+    zero: Vec<f64>,
+    /// Gravity and the like, less the contacts.
+    load: Vec<f64>,
+    velocity: Vec<f64>,
+    beside: Vec<f64>,
+    effort: Vec<f64>,
+    effort_beside: Vec<f64>,
+    effort_at_rest: Vec<f64>,
+    inertia: DMatrix<f64>,
+    system: DMatrix<f64>,
+    missing: DVector<f64>,
+}
+
+impl Work {
+    fn new(n: usize) -> Self {
+        let zero = || vec![0.0; n];
+        Self {
+            zero: zero(),
+            load: zero(),
+            velocity: zero(),
+            beside: zero(),
+            effort: zero(),
+            effort_beside: zero(),
+            effort_at_rest: zero(),
+            inertia: DMatrix::zeros(n, n),
+            system: DMatrix::zeros(n, n),
+            missing: DVector::zeros(n),
+        }
+    }
 }
 
 impl Plant {
@@ -44,14 +108,15 @@ impl Plant {
         physics: &[TermSpec],
         position: &[f64],
     ) -> Result<Self, ScenarioError> {
-        let joint_names: Vec<_> = model.joints().iter().map(|j| j.name.clone()).collect();
-        let terms = physics.iter().map(|spec| spec.build(&joint_names));
+        let n = position.len();
         Ok(Self {
-            terms: terms.collect::<Result<_, _>>()?,
+            physics: Physics::new(model, physics)?,
             model: model.clone(),
             data: Data::new(model),
             position: position.to_vec(),
-            velocity: vec![0.0; position.len()],
+            velocity: vec![0.0; n],
+            applied_nm: vec![0.0; n],
+            work: Work::new(n),
         })
     }
 
@@ -76,131 +141,164 @@ impl Plant {
         (pose.translation.vector + pose.rotation * Vector3::from(point_m)).into()
     }
 
-    /// Moves on by `dt_s` under a constant effort \[N m\].
+    /// Effort of the drives in the step that led here \[N m\].
+    pub fn applied_nm(&self) -> &[f64] {
+        &self.applied_nm
+    }
+
+    /// Moves on by `dt_s`.
     ///
     /// Semi-implicit: the new velocity is the solution v of
-    /// `M (v - v0) = dt (effort + Jᵀ F - h(q0, v0) - physics(q0, v))`, the new position q0 + dt v. The
+    /// `M (v - v0) = dt (effort(v) + Jᵀ F - h(q0, v0) - physics(q0, v))`, the new position q0 + dt v. The
     /// physics is taken at the new velocity because friction near standstill is far stiffer than any
-    /// explicit step could be: its smoothed sign changes within 2 mrad/s.
-    pub fn step(&mut self, dt_s: f64, effort_nm: &[f64], contacts: impl Iterator<Item = Contact>) {
-        let n = self.position.len();
-        let rest = vec![0.0; n];
-        let bias = rnea(
-            &self.model,
-            &mut self.data,
-            &self.position,
-            &self.velocity,
-            &rest,
-        );
-        let mut drive: Vec<f64> = effort_nm.iter().zip(bias).map(|(e, h)| e - h).collect();
+    /// explicit step could be: its smoothed sign changes within 2 mrad/s. So is a drive's velocity loop
+    /// on a light joint.
+    pub fn step(&mut self, dt_s: f64, drive: &Drive<'_>, contacts: impl Iterator<Item = Contact>) {
+        let (model, data, work) = (&self.model, &mut self.data, &mut self.work);
+        let bias = rnea(model, data, &self.position, &self.velocity, &work.zero);
+        work.load.copy_from_slice(bias);
         for contact in contacts {
-            self.add_contact(&contact, &mut drive);
+            add_contact(model, data, &self.position, &contact, &mut work.load);
         }
-        let inertia = mass_matrix(&self.model, &mut self.data, &self.position);
-        let inertia = inertia.clone();
-
-        let before = self.velocity.clone();
-        let mut velocity = before.clone();
+        work.inertia
+            .copy_from(mass_matrix(model, data, &self.position));
+        work.velocity.copy_from_slice(&self.velocity);
         for _ in 0..MAX_ITERATIONS {
-            let physics = self.physics(0.0, &before, &velocity, dt_s);
-            let damping = self.damping(&before, &velocity, &physics, dt_s);
-            let change = DVector::from_fn(n, |j, _| velocity[j] - before[j]);
-            let mut missing = -(&inertia * change);
-            for j in 0..n {
-                missing[j] += dt_s * (drive[j] - physics[j]);
-            }
-            let mut system = inertia.clone();
-            for j in 0..n {
-                system[(j, j)] += dt_s * damping[j];
-            }
-            // The mass matrix is positive definite, and damping only adds to it.
-            let Some(factors) = system.cholesky() else {
-                velocity.fill(f64::NAN);
-                break;
+            let Some(largest) = self.approach(dt_s, drive) else {
+                self.velocity.fill(f64::NAN);
+                return;
             };
-            let step = factors.solve(&missing);
-            for j in 0..n {
-                velocity[j] += step[j];
-            }
-            if step.amax() < TOLERANCE {
+            if largest < TOLERANCE {
                 break;
             }
         }
+        let work = &mut self.work;
+        let step = Step {
+            position: &self.position,
+            before: &self.velocity,
+            dt_s,
+        };
         // Once more with the time that passes, so that what has a memory remembers this step.
-        self.physics(dt_s, &before, &velocity, dt_s);
-        for (position, velocity) in self.position.iter_mut().zip(&velocity) {
-            *position += dt_s * velocity;
+        self.physics
+            .cost(&step, dt_s, &work.velocity, &mut work.effort);
+        for (j, &velocity) in work.velocity.iter().enumerate() {
+            self.position[j] += dt_s * velocity;
+            self.applied_nm[j] = drive.effort(j, velocity).0;
         }
-        self.velocity = velocity;
+        self.velocity.copy_from_slice(&work.velocity);
     }
 
-    /// The effort that the physics costs at `velocity`, reached from `before` within `step_s`.
-    /// `elapsed_s` passes for what has a memory.
-    fn physics(
-        &mut self,
-        elapsed_s: f64,
-        before: &[f64],
-        velocity: &[f64],
-        step_s: f64,
-    ) -> Vec<f64> {
-        let acceleration: Vec<f64> = velocity
-            .iter()
-            .zip(before)
-            .map(|(v, v0)| (v - v0) / step_s)
-            .collect();
-        let mut effort = vec![0.0; velocity.len()];
+    /// Brings the new velocity nearer to the solution by a step of Newton's, and gives that step's
+    /// largest change; `None` if there is no such step.
+    fn approach(&mut self, dt_s: f64, drive: &Drive<'_>) -> Option<f64> {
+        let n = self.position.len();
+        let work = &mut self.work;
+        let step = Step {
+            position: &self.position,
+            before: &self.velocity,
+            dt_s,
+        };
+        for (beside, velocity) in work.beside.iter_mut().zip(&work.velocity) {
+            *beside = velocity + SLOPE_STEP;
+        }
+        self.physics
+            .cost(&step, 0.0, &work.velocity, &mut work.effort);
+        self.physics
+            .cost(&step, 0.0, &work.beside, &mut work.effort_beside);
+        self.physics
+            .cost(&step, 0.0, &work.zero, &mut work.effort_at_rest);
+        let mut system = std::mem::replace(&mut work.system, DMatrix::zeros(0, 0));
+        system.copy_from(&work.inertia);
+        for j in 0..n {
+            let velocity = work.velocity[j];
+            let (effort, fall) = drive.effort(j, velocity);
+            let mut missing = dt_s * (effort - work.load[j] - work.effort[j]);
+            for k in 0..n {
+                missing -= work.inertia[(j, k)] * (work.velocity[k] - self.velocity[k]);
+            }
+            work.missing[j] = missing;
+            // How fast the physics' effort grows: its slope or, where that is more, the slope of its
+            // line through standstill, which keeps a step through the kink of Coulomb friction from
+            // going too far.
+            let slope = (work.effort_beside[j] - work.effort[j]) / SLOPE_STEP;
+            let line = if velocity.abs() > SLOPE_STEP {
+                (work.effort[j] - work.effort_at_rest[j]) / velocity
+            } else {
+                0.0
+            };
+            system[(j, j)] += dt_s * (slope.max(line).max(0.0) + fall);
+        }
+        // The mass matrix is positive definite, and this only adds to it.
+        let factors = Cholesky::new(system)?;
+        factors.solve_mut(&mut work.missing);
+        work.system = factors.unpack_dirty();
+        for (velocity, change) in work.velocity.iter_mut().zip(&work.missing) {
+            *velocity += change;
+        }
+        Some(work.missing.amax())
+    }
+}
+
+/// Takes `Jᵀ F` off the load.
+fn add_contact(
+    model: &Model,
+    data: &mut Data,
+    position: &[f64],
+    contact: &Contact,
+    load: &mut [f64],
+) {
+    forward_kinematics(model, data, position);
+    let pose = link_pose(model, data, contact.link);
+    let force = Vector3::from(contact.force_n);
+    let moment = (pose.rotation * Vector3::from(contact.point_m)).cross(&force);
+    let jacobian = link_jacobian(model, data, contact.link);
+    for (j, load) in load.iter_mut().enumerate() {
+        for k in 0..3 {
+            *load -= jacobian[(k, j)] * force[k] + jacobian[(k + 3, j)] * moment[k];
+        }
+    }
+}
+
+/// The step that is being taken.
+struct Step<'a> {
+    position: &'a [f64],
+    /// The velocity it begins with.
+    before: &'a [f64],
+    dt_s: f64,
+}
+
+/// What the URDF does not tell of.
+#[derive(Debug)]
+struct Physics {
+    terms: Vec<Box<dyn Term>>,
+    acceleration: Vec<f64>,
+}
+
+impl Physics {
+    fn new(model: &Model, specs: &[TermSpec]) -> Result<Self, ScenarioError> {
+        let joint_names: Vec<_> = model.joints().iter().map(|j| j.name.clone()).collect();
+        let terms = specs.iter().map(|spec| spec.build(&joint_names));
+        Ok(Self {
+            terms: terms.collect::<Result<_, _>>()?,
+            acceleration: vec![0.0; model.dof()],
+        })
+    }
+
+    /// The effort that it costs to end the step with `velocity`. `elapsed_s` passes for what has a
+    /// memory: 0 only tries.
+    fn cost(&mut self, step: &Step<'_>, elapsed_s: f64, velocity: &[f64], effort: &mut [f64]) {
+        for ((acceleration, v), v0) in self.acceleration.iter_mut().zip(velocity).zip(step.before) {
+            *acceleration = (v - v0) / step.dt_s;
+        }
+        effort.fill(0.0);
         let at = MotionSample {
             dt_s: elapsed_s,
-            position: &self.position,
+            position: step.position,
             velocity,
-            acceleration: &acceleration,
+            acceleration: &self.acceleration,
         };
         for term in &mut self.terms {
-            term.add_effort(&at, &mut effort);
-        }
-        effort
-    }
-
-    /// How fast the physics' effort grows with velocity, joint by joint: the larger of its slope and,
-    /// where it brakes, of its line through standstill. The latter keeps a step through the kink of
-    /// Coulomb friction from going too far.
-    fn damping(
-        &mut self,
-        before: &[f64],
-        velocity: &[f64],
-        physics: &[f64],
-        step_s: f64,
-    ) -> Vec<f64> {
-        let n = velocity.len();
-        let beside: Vec<f64> = velocity.iter().map(|v| v + SLOPE_STEP).collect();
-        let beside = self.physics(0.0, before, &beside, step_s);
-        let rest = vec![0.0; n];
-        let at_rest = self.physics(0.0, before, &rest, step_s);
-        (0..n)
-            .map(|j| {
-                let slope = (beside[j] - physics[j]) / SLOPE_STEP;
-                let line = if velocity[j].abs() > SLOPE_STEP {
-                    (physics[j] - at_rest[j]) / velocity[j]
-                } else {
-                    0.0
-                };
-                slope.max(line).max(0.0)
-            })
-            .collect()
-    }
-
-    /// Adds `Jᵀ F`.
-    fn add_contact(&mut self, contact: &Contact, drive: &mut [f64]) {
-        forward_kinematics(&self.model, &mut self.data, &self.position);
-        let pose = link_pose(&self.model, &self.data, contact.link);
-        let arm = pose.rotation * Vector3::from(contact.point_m);
-        let force = Vector3::from(contact.force_n);
-        let moment = arm.cross(&force);
-        let jacobian = link_jacobian(&self.model, &mut self.data, contact.link);
-        for (j, effort) in drive.iter_mut().enumerate() {
-            for k in 0..3 {
-                *effort += jacobian[(k, j)] * force[k] + jacobian[(k + 3, j)] * moment[k];
-            }
+            term.add_effort(&at, effort);
         }
     }
 }

@@ -14,6 +14,9 @@ pub struct Scenario {
     /// Version of this format: 1.
     #[schemars(range(min = 1, max = 1))]
     pub version: u32,
+    /// Name of the set of recordings, for the labels.
+    #[serde(default = "default_name")]
+    pub name: String,
     /// The robot's URDF; relative to this file.
     pub robot: PathBuf,
     /// Everything random follows from this number and the recording's place in the list.
@@ -67,6 +70,10 @@ impl Scenario {
         let recorded = motions.filter_map(|motion| motion.recorded.as_mut());
         std::iter::once(&mut self.robot).chain(recorded.map(|recorded| &mut recorded.path))
     }
+}
+
+fn default_name() -> String {
+    "simulated".to_owned()
 }
 
 fn default_start_s() -> u32 {

@@ -132,9 +132,8 @@ impl Simulation {
             if self.step % STEPS_PER_CONTROL == 0 {
                 self.target = self.trajectory.at(time_s);
                 let dt_s = (STEPS_PER_CONTROL * STEP_NS) as f64 * 1e-9;
-                let (position, velocity) = (self.plant.position(), self.plant.velocity());
                 self.controller
-                    .update(dt_s, &self.target, position, velocity);
+                    .update(dt_s, &self.target, self.plant.position());
             }
             let due = self.step >= self.next_sample;
             let reading = due.then(|| self.read(time_s));
@@ -165,11 +164,14 @@ impl Simulation {
         // The instants of the rate, each moved to the next step of the plant.
         let index = (time_s * self.rate_hz + 1e-6).floor() + 1.0;
         self.next_sample = (index / self.rate_hz * 1e9 / STEP_NS as f64 - 1e-6).ceil() as i64;
-        let measured = self.sensors.measure(
-            self.plant.position(),
-            self.plant.velocity(),
-            &self.controller.effort_nm[..n],
-        );
+        // Before the first step there is no effort but the controller's.
+        let effort_nm = match self.step {
+            0 => &self.controller.drive(0.0).effort_nm[..n],
+            _ => self.plant.applied_nm(),
+        };
+        let measured =
+            self.sensors
+                .measure(self.plant.position(), self.plant.velocity(), effort_nm);
         Reading {
             stamp_ns: self.start_ns + self.step * STEP_NS,
             position: measured.position,
@@ -193,8 +195,9 @@ impl Simulation {
             }
         });
         let dt_s = STEP_NS as f64 * 1e-9;
-        self.plant
-            .step(dt_s, &self.controller.effort_nm[..n], contacts);
+        let since_target = self.step % STEPS_PER_CONTROL + 1;
+        let drive = self.controller.drive(since_target as f64 * dt_s);
+        self.plant.step(dt_s, &drive, contacts);
         let velocity = self.plant.velocity();
         if let Some(j) = (0..n).find(|&j| velocity[j].is_nan() || velocity[j].abs() > RUNAWAY) {
             return Err(ScenarioError::Unstable {

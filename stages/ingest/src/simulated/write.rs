@@ -45,13 +45,8 @@ pub fn simulate(
         .collect::<Result<Vec<_>, _>>()?;
     let whole_s: f64 = scenario.recordings.iter().map(|each| each.duration_s).sum();
     let mut done_s = 0.0;
-    let set = out
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned();
     let mut labels = Labels {
-        set,
+        set: scenario.name.clone(),
         ..Labels::default()
     };
     let mut recordings = Vec::new();

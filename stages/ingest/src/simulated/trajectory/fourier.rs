@@ -9,7 +9,7 @@ use crate::simulated::error::ScenarioError;
 use crate::simulated::scenario::FourierSpec;
 
 /// Instants of a period at which limits are checked.
-const GRID: usize = 1000;
+const STEPS_PER_PERIOD: f64 = 1000.0;
 /// The swing is blended in and out within this time, so that the arm begins and ends at rest \[s\].
 const BLEND_S: f64 = 2.0;
 
@@ -68,33 +68,37 @@ impl Fourier {
         Ok(fourier)
     }
 
-    /// Scales each joint's swing to its limits.
+    /// Scales each joint's swing to its limits: all of it is linear in the coefficients.
     fn scale(&mut self, spec: &FourierSpec, joints: &[JointRange]) {
         let mut peaks = [[0.0_f64; MAX_JOINTS]; 3];
-        for i in 0..GRID {
-            let t_s = std::f64::consts::TAU / self.omega * i as f64 / GRID as f64;
-            for (peak, swing) in peaks.iter_mut().zip(self.swing(t_s)) {
-                for (p, value) in peak.iter_mut().zip(swing) {
-                    *p = p.max(value.abs());
+        // A period with the blend before it and one with the blend after it show all there is.
+        let window_s = (self.blend_s + spec.period_s).min(self.duration_s);
+        let step_s = spec.period_s / STEPS_PER_PERIOD;
+        for i in 0..=(window_s / step_s).ceil() as usize {
+            let into_s = (i as f64 * step_s).min(window_s);
+            for t_s in [into_s, self.duration_s - into_s] {
+                let target = self.at(t_s);
+                for (j, about) in self.about.iter().enumerate() {
+                    let swing = target.position[j] - about;
+                    peaks[0][j] = peaks[0][j].max(swing.abs());
+                    peaks[1][j] = peaks[1][j].max(target.velocity[j].abs());
+                    peaks[2][j] = peaks[2][j].max(target.acceleration[j].abs());
                 }
             }
         }
-        // The blend's own velocity and acceleration come on top of the swing's.
-        let ([_, ds, _], dds) = (quintic(0.5), super::QUINTIC_PEAK_ACCELERATION);
-        let (ds, dds) = (ds / self.blend_s, dds / self.blend_s / self.blend_s);
         for (j, joint) in joints.iter().enumerate() {
             let [position, velocity, acceleration] = peaks.map(|peak| peak[j]);
-            let room = spec.range * joint.half()
-                - (self.about[j] - joint.middle())
-                    .abs()
-                    .min(spec.range * joint.half());
+            let range = spec.range * joint.half();
+            let room = (range - (self.about[j] - joint.middle()).abs()).max(0.0);
             let factor = (room / position)
-                .min(spec.speed * joint.velocity / (velocity + ds * position))
-                .min(
-                    spec.acceleration_rad_s2
-                        / (acceleration + 2.0 * ds * velocity + dds * position),
-                );
-            let factor = if factor.is_finite() { factor } else { 0.0 };
+                .min(spec.speed * joint.velocity / velocity)
+                .min(spec.acceleration_rad_s2 / acceleration);
+            // The peak may lie between two instants of the grid.
+            let factor = if factor.is_finite() {
+                0.99 * factor
+            } else {
+                0.0
+            };
             for (sine, cosine) in &mut self.waves {
                 sine[j] *= factor;
                 cosine[j] *= factor;
