@@ -10,7 +10,7 @@ use tauscope_ingest::{IngestError, Paced, Rate, SimulatedRobot};
 use tauscope_record::{CellInfo, RecordError, Recorder, StreamInfo};
 use tauscope_twin::{Correction, Twin, TwinFile};
 
-use crate::pipeline::{Cell, Pipeline, Settings};
+use crate::pipeline::{Cell, EffortUnit, Pipeline, Settings};
 use crate::provenance;
 
 /// Why a stage cannot be built.
@@ -152,12 +152,19 @@ pub fn detect_setup(
     let correction = correction(model, cell)?;
     let constants = cell.facts.torque_constants_nm_per_a.as_deref();
     let joints = correction.joints.iter().enumerate().map(|(index, joint)| {
-        let model_unit_per_nm = constants.map_or(1.0, |constants| 1.0 / constants[index]);
+        // The regression's gain is no drive gain where friction outweighs what the model knows: it
+        // stands for one only where nothing else is known and the model explains the effort.
+        let effort_per_nm = match (cell.facts.effort_unit, constants) {
+            (EffortUnit::Nm, _) => 1.0,
+            (EffortUnit::A, Some(constants)) => 1.0 / constants[index],
+            (EffortUnit::A, None) if joint.explained.is_some_and(|share| share > 0.5) => joint.gain,
+            (EffortUnit::A, None) => f64::NAN,
+        };
         tauscope_detect::JointSetup {
             gain: joint.gain,
             offset: joint.offset,
             noise: joint.noise,
-            effort_per_nm: joint.gain * model_unit_per_nm,
+            effort_per_nm,
         }
     });
     let scores = model

@@ -23,26 +23,21 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use tracing_subscriber::filter::{LevelFilter, Targets};
-use tracing_subscriber::layer::SubscriberExt;
-use tracing_subscriber::util::SubscriberInitExt;
+use tracing_subscriber::prelude::*;
 
 use cli::{Cli, Command};
 
 fn main() -> ExitCode {
-    // What libraries and stages warn of goes where errors go. Zenoh warns of what is meant: that
-    // nothing is discovered, and that a peer is not there yet.
-    let filter = Targets::new()
-        .with_default(LevelFilter::WARN)
-        .with_target("zenoh", LevelFilter::ERROR);
+    // What stages warn of, and what libraries fail in, goes where errors go.
+    let targets = Targets::new()
+        .with_default(LevelFilter::ERROR)
+        .with_target("tauscope", LevelFilter::WARN);
     let lines = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         .with_ansi(std::io::stderr().is_terminal())
         .without_time()
         .with_target(false);
-    tracing_subscriber::registry()
-        .with(lines)
-        .with(filter)
-        .init();
+    tracing_subscriber::registry().with(lines.with_filter(targets)).init();
     let command = Cli::parse()
         .command
         .unwrap_or_else(|| Command::Run(Default::default()));

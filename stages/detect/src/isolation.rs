@@ -1,9 +1,10 @@
 //! Which joints felt a contact, which link was touched, and how hard.
 //!
-//! A force on link k loads only the joints between the base and k: the outermost joint that is loaded
-//! names the link. The force follows from the loaded joints, `τ_ext = Jᵀ F` (Haddadin, De Luca and
+//! A force on link k loads only the joints between the base and k, by τ = Jᵀ F (Haddadin, De Luca and
 //! Albu-Schäffer, "Robot Collisions: A Survey on Detection, Isolation, and Identification", 2017,
-//! sections V and VI), with the point of contact taken at the link's centre of mass.
+//! sections V and VI). For every link the force is sought that explains the residual of all joints
+//! best, the point of contact taken at the link's centre of mass; the link that leaves least
+//! unexplained is the touched one.
 
 use nalgebra::{Matrix3, Vector3};
 use tauscope_bus::{JointArray, TwinState};
@@ -67,39 +68,48 @@ impl Isolation {
             .fold(0, |m, (j, _)| m | 1 << j)
     }
 
-    /// The contact behind the loaded joints, or nothing if none is loaded or there is no model.
-    pub fn locate(&mut self, sample: &TwinState, loaded: u32) -> Option<Contact> {
+    /// The contact that explains the residual best, or nothing if no link explains any of it or there
+    /// is no model.
+    pub fn locate(&mut self, sample: &TwinState) -> Option<Contact> {
         let (model, data) = self.model.as_mut()?;
-        let outermost = (u32::BITS - 1).checked_sub(loaded.leading_zeros())? as usize;
-        let joint = model.joints().get(outermost)?;
-        let link = joint.child_link;
         let n = self.noise.len();
         forward_kinematics(model, data, &sample.position[..n]);
-        let pose = link_pose(model, data, link);
-        let arm = pose.rotation * Vector3::from(model.links()[link].com_m());
-        let jacobian = link_jacobian(model, data, link);
+        let mut best: Option<(f64, Contact)> = None;
+        for joint in 0..n {
+            let link = model.joints()[joint].child_link;
+            let pose = link_pose(model, data, link);
+            let arm = pose.rotation * Vector3::from(model.links()[link].com_m());
+            let jacobian = link_jacobian(model, data, link);
 
-        // Weighted least squares: minimise Σ ((τ_j - J_jᵀ F) / σ_j)² + λ |F|².
-        let (mut information, mut pull) = (Matrix3::zeros(), Vector3::zeros());
-        for j in 0..=outermost {
-            let noise_nm = (self.noise[j] / self.effort_per_nm[j]).abs();
-            if !(noise_nm.is_finite() && noise_nm > 0.0) {
-                continue;
+            // Weighted least squares: minimise Σ ((τ_j - J_jᵀ F) / σ_j)² + λ |F|².
+            let (mut information, mut pull) = (Matrix3::zeros(), Vector3::zeros());
+            for j in 0..n {
+                let weight = self.effort_per_nm[j] / self.noise[j];
+                let torque = -sample.residual[j] / self.effort_per_nm[j];
+                if !(weight.is_finite() && torque.is_finite()) {
+                    continue;
+                }
+                let column = jacobian.column(j);
+                let angular = column.fixed_rows::<3>(3).into_owned();
+                let row = (column.fixed_rows::<3>(0) + angular.cross(&arm)) * weight;
+                information += row * row.transpose();
+                pull += row * (torque * weight);
             }
-            let column = jacobian.column(j);
-            let angular = column.fixed_rows::<3>(3).into_owned();
-            let row = column.fixed_rows::<3>(0) + angular.cross(&arm);
-            let torque = -sample.residual[j] / self.effort_per_nm[j];
-            information += row * row.transpose() / (noise_nm * noise_nm);
-            pull += row * torque / (noise_nm * noise_nm);
+            let damped = information + Matrix3::identity() * (DAMPING * information.trace());
+            let Some(inverse) = damped.try_inverse() else { continue };
+            let force = inverse * pull;
+            // What the force explains of Σ (τ_j / σ_j)².
+            let explained = 2.0 * pull.dot(&force) - force.dot(&(information * force));
+            if best.is_none_or(|(most, _)| explained > most) {
+                let contact = Contact {
+                    link,
+                    force_n: force.into(),
+                    point_m: (pose.translation.vector + arm).into(),
+                };
+                best = Some((explained, contact));
+            }
         }
-        let damping = DAMPING * information.trace();
-        let force = (information + Matrix3::identity() * damping).try_inverse()? * pull;
-        Some(Contact {
-            link,
-            force_n: force.into(),
-            point_m: (pose.translation.vector + arm).into(),
-        })
+        best.map(|(_, contact)| contact)
     }
 
     /// The name of a link.

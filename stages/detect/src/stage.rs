@@ -30,7 +30,8 @@ pub struct JointSetup {
     pub offset: f64,
     /// Standard deviation of the contact-free residual \[effort unit\], where known.
     pub noise: Option<f64>,
-    /// How much the measured effort changes by 1 N m at the joint \[effort unit per N m\].
+    /// How much the measured effort changes by 1 N m at the joint \[effort unit per N m\]; NaN where
+    /// that is not known, and the joint tells nothing of a force.
     pub effort_per_nm: f64,
 }
 
@@ -97,7 +98,7 @@ impl Stage<TwinState, Detection> for Detect {
         let mut contact = None;
         if contact_ns.is_some() {
             joints = self.isolation.loaded_joints(&sample.residual);
-            contact = self.isolation.locate(sample, joints);
+            contact = self.isolation.locate(sample);
         }
         out.emit(&mut |slot| {
             slot.header = sample.header;

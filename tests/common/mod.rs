@@ -1,0 +1,65 @@
+//! What the tests of the whole program share.
+#![allow(dead_code, reason = "each test file uses its own part")]
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The program under test.
+pub fn tauscope() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_tauscope"))
+}
+
+/// The root of the project.
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The recordings and robots that come with it.
+pub fn bundled() -> PathBuf {
+    root().join("tests/data")
+}
+
+/// Real recordings, if they are there. If not, says so where the test harness does not hide it.
+pub fn shared(test: &str) -> Option<PathBuf> {
+    let shared = root().join("../shared");
+    if shared.is_dir() {
+        return Some(shared);
+    }
+    skipped(test, "../shared is absent");
+    None
+}
+
+/// Says that a test was not run, past the harness, which shows nothing of a test that passes.
+pub fn skipped(test: &str, why: &str) {
+    let _ = writeln!(std::io::stderr(), "SKIPPED {test}: {why}");
+}
+
+/// Writes a file and returns its path.
+pub fn write(path: &Path, text: &str) -> PathBuf {
+    std::fs::write(path, text).unwrap();
+    path.to_owned()
+}
+
+/// What a command said and how it ended.
+#[derive(Debug)]
+pub struct Out {
+    /// Exit code; -1 if a signal ended it.
+    pub code: i32,
+    /// Standard output.
+    pub stdout: String,
+    /// Standard error.
+    pub stderr: String,
+}
+
+impl Out {
+    /// Runs `command` to its end.
+    pub fn of(mut command: Command) -> Self {
+        let out = command.output().unwrap();
+        Self {
+            code: out.status.code().unwrap_or(-1),
+            stdout: String::from_utf8(out.stdout).unwrap(),
+            stderr: String::from_utf8(out.stderr).unwrap(),
+        }
+    }
+}

@@ -1,0 +1,177 @@
+//! Recordings of real arms, where they are at hand: what others computed from them must come out.
+
+mod common;
+
+use std::path::Path;
+
+use common::{Out, shared, tauscope, write};
+
+/// `tauscope replay --json` of one recording; the residual's RMS by joint, all and moving samples.
+fn rms(out: &Out) -> (Vec<f64>, Vec<f64>) {
+    let summary: serde_json::Value = serde_json::from_str(&out.stdout).unwrap();
+    let joints = summary[0]["twins"][0]["joints"].as_array().unwrap();
+    let column = |name: &str| joints.iter().map(|j| j[name].as_f64().unwrap()).collect();
+    (column("residual_rms"), column("residual_rms_moving"))
+}
+
+fn within_5_percent(found: &[f64], expected: &[f64]) {
+    assert_eq!(found.len(), expected.len());
+    for (found, expected) in found.iter().zip(expected) {
+        assert!(
+            (found / expected - 1.0).abs() < 0.05,
+            "{found} against {expected}"
+        );
+    }
+}
+
+fn replay(folder: &Path, pipeline: &str, recordings: &[&Path]) -> Out {
+    let file = write(&folder.join("pipeline.yaml"), pipeline);
+    let mut command = tauscope();
+    command
+        .arg("replay")
+        .arg("--json")
+        .arg("--pipeline")
+        .arg(file)
+        .args(recordings);
+    command.arg("--out").arg(folder.join("out"));
+    Out::of(command)
+}
+
+#[test]
+fn a_rigid_ur10e_is_off_by_what_two_other_analyses_found() {
+    let Some(shared) = shared("a_rigid_ur10e_is_off_by_what_two_other_analyses_found") else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let recordings = shared.join("recordings/ur10e");
+    let robot = shared.join("robots/ur10e.urdf");
+    let mut calibrate = tauscope();
+    calibrate
+        .args(["calibrate", "--effort-unit", "A", "--robot"])
+        .arg(&robot);
+    calibrate.arg(recordings.join("20_02_10-30sec_12harm.mcap"));
+    calibrate.arg("--out").arg(folder.path().join("twin.yaml"));
+    let calibrated = Out::of(calibrate);
+    assert_eq!(calibrated.code, 0, "{}", calibrated.stderr);
+    let test = recordings.join("20_01_17-ptp_10_points.mcap");
+    let pipeline = format!(
+        "version: 1\ncells: {{ur10e: {{robot: {}, effort_unit: A}}}}\nstages:\n\
+         - {{name: ingest, ingest: {{file: {{path: {}}}}}}}\n\
+         - {{name: twin, input: ingest, twin: {{model: twin.yaml}}}}\n",
+        robot.display(),
+        test.display(),
+    );
+    let out = replay(folder.path(), &pipeline, &[&test]);
+    assert_eq!(out.code, 0, "{}", out.stderr);
+    let (all, moving) = rms(&out);
+    within_5_percent(&all, &[1.593, 1.678, 1.013, 0.377, 0.325, 0.229]);
+    within_5_percent(&moving, &[1.841, 1.806, 1.199, 0.414, 0.386, 0.251]);
+}
+
+#[test]
+fn touches_of_a_standing_franka_stand_out() {
+    let Some(shared) = shared("touches_of_a_standing_franka_stand_out") else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let names = ["a4", "b8", "c5", "f2"];
+    let recordings = names.map(|name| shared.join(format!("recordings/franka-touch/{name}.mcap")));
+    let pipeline = format!(
+        "version: 1\ncells: {{franka: {{robot: {}}}}}\nstages:\n\
+         - {{name: ingest, ingest: {{file: {{path: {}}}}}}}\n\
+         - {{name: twin, input: ingest, twin: {{}}}}\n\
+         - {{name: detect, input: twin, detect: {{twin_regression: {{}}, threshold: {{score: 100}}}}}}\n\
+         - {{name: record, inputs: [ingest, twin, detect], record: {{mcap: x.mcap}}}}\n",
+        shared.join("robots/panda_like.urdf").display(),
+        recordings[0].display(),
+    );
+    let paths: Vec<&Path> = recordings.iter().map(AsRef::as_ref).collect();
+    let out = replay(folder.path(), &pipeline, &paths);
+    assert_eq!(out.code, 0, "{}", out.stderr);
+    let summary: serde_json::Value = serde_json::from_str(&out.stdout).unwrap();
+    for (index, name) in names.iter().enumerate() {
+        assert_eq!(summary[index]["recording"], *name);
+        assert_eq!(summary[index]["lost"], 0);
+        assert!(folder.path().join(format!("out/{name}.mcap")).exists());
+    }
+    // 15 or 16 touches a file; with a twin that is not even calibrated most of b8's stand out.
+    let events = summary[1]["detectors"][0]["events"]
+        .as_array()
+        .unwrap()
+        .len();
+    assert!((12..=16).contains(&events), "{events} events");
+}
+
+#[test]
+fn a_sqlite3_bag_is_replayed_whole() {
+    let Some(shared) = shared("a_sqlite3_bag_is_replayed_whole") else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let bag = shared.join("recordings/ur10-bag/ur10_exciting_trajectory.db3");
+    let pipeline = format!(
+        "version: 1\ncells: {{ur10: {{robot: {}}}}}\nstages:\n\
+         - {{name: ingest, ingest: {{file: {{path: {}}}}}}}\n\
+         - {{name: twin, input: ingest, twin: {{}}}}\n",
+        shared.join("robots/ur10_like.urdf").display(),
+        bag.display(),
+    );
+    let out = replay(folder.path(), &pipeline, &[&bag]);
+    assert_eq!(out.code, 0, "{}", out.stderr);
+    let summary: serde_json::Value = serde_json::from_str(&out.stdout).unwrap();
+    assert_eq!(summary[0]["stages"][0]["emitted"], 3441);
+}
+
+/// A pipeline that reads `table` of the UR10e as its users have it.
+fn csv_pipeline(shared: &Path, table: &Path) -> String {
+    format!(
+        "version: 1\ncells: {{ur10e: {{robot: {}, effort_unit: A}}}}\nstages:\n\
+         - name: ingest\n  ingest:\n    csv:\n      path: {}\n      columns:\n        \
+         time: {{number: 1}}\n        position: {{first: 2}}\n        velocity: {{first: 8}}\n        \
+         effort: {{first: 14}}\n\
+         - {{name: twin, input: ingest, twin: {{}}}}\n",
+        shared.join("robots/ur10e.urdf").display(),
+        table.display(),
+    )
+}
+
+#[test]
+fn a_table_gives_what_the_archive_of_the_same_motion_gives() {
+    let Some(shared) = shared("a_table_gives_what_the_archive_of_the_same_motion_gives") else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let recordings = shared.join("recordings/ur10e");
+    let table = recordings.join("csv/20_02_05-20sec_8harm.csv");
+    let archive = recordings.join("20_02_05-20sec_8harm.mcap");
+    let pipeline = csv_pipeline(&shared, &table);
+    let from_table = replay(folder.path(), &pipeline, &[&table]);
+    assert_eq!(from_table.code, 0, "{}", from_table.stderr);
+    let from_archive = replay(folder.path(), &pipeline, &[&archive]);
+    assert_eq!(from_archive.code, 0, "{}", from_archive.stderr);
+    let (table, archive) = (rms(&from_table), rms(&from_archive));
+    for (table, archive) in table.0.iter().zip(&archive.0) {
+        assert!(
+            (table - archive).abs() < 1e-3 * archive,
+            "{table} against {archive}"
+        );
+    }
+}
+
+#[test]
+fn a_broken_table_is_refused_with_its_line() {
+    let Some(shared) = shared("a_broken_table_is_refused_with_its_line") else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let table = shared.join("recordings/ur10e/csv/dirty.csv");
+    let pipeline = csv_pipeline(&shared, &table);
+    let out = replay(folder.path(), &pipeline, &[&table]);
+    assert_eq!(out.code, 2, "{}", out.stdout);
+    assert!(
+        out.stderr.contains("dirty.csv:3: column 3"),
+        "{}",
+        out.stderr
+    );
+    assert!(!folder.path().join("out/dirty.mcap").exists());
+}
