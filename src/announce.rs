@@ -1,8 +1,6 @@
 //! Says on the terminal what a detector finds, as it finds it.
 
-use tauscope_bus::{
-    Detection, Emit, EventKind, LinkError, Stage, StageError, TwinState, flags,
-};
+use tauscope_bus::{Detection, Emit, EventKind, LinkError, Stage, StageError, TwinState, flags};
 
 /// A detect stage whose events are told on standard error. Its stream is untouched.
 pub struct Announced<S> {
@@ -15,7 +13,11 @@ pub struct Announced<S> {
 impl<S> Announced<S> {
     /// `stage` in a cell with these joints.
     pub fn new(stage: S, joint_names: &[String]) -> Self {
-        Self { stage, joint_names: joint_names.to_vec(), start_ns: None }
+        Self {
+            stage,
+            joint_names: joint_names.to_vec(),
+            start_ns: None,
+        }
     }
 }
 
@@ -27,7 +29,14 @@ impl<S: Stage<TwinState, Detection>> Stage<TwinState, Detection> for Announced<S
     ) -> Result<(), StageError> {
         let start_ns = *self.start_ns.get_or_insert(sample.header.stamp_ns);
         let joint_names = &self.joint_names;
-        self.stage.accept(sample, &mut Listener { out, joint_names, start_ns })
+        self.stage.accept(
+            sample,
+            &mut Listener {
+                out,
+                joint_names,
+                start_ns,
+            },
+        )
     }
 
     fn finish(&mut self, out: &mut dyn Emit<Detection>) -> Result<(), StageError> {

@@ -71,6 +71,9 @@ pub struct CaseTopics {
 
 impl Default for CaseTopics {
     fn default() -> Self {
-        Self { state: "/joint_states".to_owned(), command: None }
+        Self {
+            state: "/joint_states".to_owned(),
+            command: None,
+        }
     }
 }

@@ -75,7 +75,12 @@ pub struct SetTopics {
 
 impl Default for SetTopics {
     fn default() -> Self {
-        Self { state: "/joint_states".to_owned(), command: None, twin: None, contact: None }
+        Self {
+            state: "/joint_states".to_owned(),
+            command: None,
+            twin: None,
+            contact: None,
+        }
     }
 }
 

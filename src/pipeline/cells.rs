@@ -45,10 +45,7 @@ impl Cell {
     /// If the URDF is not one, which the check of the file had excluded.
     pub fn from_facts(facts: CellFacts) -> Result<Self, tauscope_dynamics::ModelError> {
         let model = facts.urdf.as_deref().map(Model::from_urdf).transpose()?;
-        Ok(Self {
-            facts,
-            model,
-        })
+        Ok(Self { facts, model })
     }
 
     /// A cell of the robot at `path`, without a pipeline file; `constants` by joint \[N m/A\], for all
@@ -146,10 +143,7 @@ impl Resolver<'_> {
             torque_constants_nm_per_a: constants,
             tool: self.entry.tool.clone(),
         };
-        report.into_result(Cell {
-            facts,
-            model,
-        })
+        report.into_result(Cell { facts, model })
     }
 
     fn robot(&self) -> Result<Option<(String, Model)>, Problem> {
