@@ -85,9 +85,9 @@ impl Sides for ZenohSides {
     type Transport = Zenoh;
     const SENDER_SEES_REFUSALS: bool = false;
     fn new(patience: Duration) -> Self {
-        let endpoint = free_endpoint();
+        let (sending, endpoint) = listening(|endpoints| Zenoh::open(endpoints, patience));
         Self {
-            sending: Zenoh::open(&listen(&endpoint), patience).unwrap(),
+            sending,
             receiving: Zenoh::open(&connect(&endpoint), patience).unwrap(),
         }
     }
@@ -109,16 +109,15 @@ impl Sides for ZenohHostSides {
     type Transport = Zenoh;
     const SENDER_SEES_REFUSALS: bool = false;
     fn new(patience: Duration) -> Self {
-        let (a, b) = (free_endpoint(), free_endpoint());
-        let both = ZenohEndpoints {
-            connect: vec![a.clone()],
-            ..listen(&b)
-        };
+        let (router_a, a) = listening(ZenohRouter::open);
+        let (router_b, b) = listening(|endpoints| {
+            ZenohRouter::open(&ZenohEndpoints {
+                connect: vec![a.clone()],
+                ..endpoints.clone()
+            })
+        });
         Self {
-            _routers: [
-                ZenohRouter::open(&listen(&a)).unwrap(),
-                ZenohRouter::open(&both).unwrap(),
-            ],
+            _routers: [router_a, router_b],
             sides: ZenohSides {
                 sending: Zenoh::open(&connect(&a), patience).unwrap(),
                 receiving: Zenoh::open(&connect(&b), patience).unwrap(),
@@ -133,16 +132,20 @@ impl Sides for ZenohHostSides {
     }
 }
 
-fn free_endpoint() -> String {
-    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
-    format!("tcp/{}", listener.local_addr().unwrap())
-}
-
-fn listen(endpoint: &str) -> ZenohEndpoints {
-    ZenohEndpoints {
-        listen: vec![endpoint.to_owned()],
-        connect: Vec::new(),
-    }
+/// Opens something that listens, and says where. Another process may be quicker to take a port that
+/// was free.
+fn listening<R>(open: impl Fn(&ZenohEndpoints) -> Result<R, LinkError>) -> (R, String) {
+    let mut attempts = (0..20).map(|_| {
+        let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+        let endpoint = format!("tcp/{}", port.local_addr().unwrap());
+        drop(port);
+        let endpoints = ZenohEndpoints {
+            listen: vec![endpoint.clone()],
+            connect: Vec::new(),
+        };
+        open(&endpoints).map(|opened| (opened, endpoint))
+    });
+    attempts.find_map(Result::ok).expect("no port is free")
 }
 
 fn connect(endpoint: &str) -> ZenohEndpoints {

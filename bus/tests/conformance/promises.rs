@@ -67,14 +67,20 @@ pub fn order_is_kept<S: Sides>() {
 
 pub fn late_joiner_hears_the_rest<S: Sides>() {
     let sides = S::new(LONG);
-    let mut sender = sides.sending().sender(STREAM, audience(1, 0)).unwrap();
+    let mut early = sides.receiving().receiver(STREAM, Keep::All, 64).unwrap();
+    let mut sender = sides.sending().sender(STREAM, audience(2, 0)).unwrap();
+    early.receive(Duration::ZERO, &mut |_| {}).unwrap();
+    missing_becomes(&mut *sender, 1);
     send(&mut *sender, 0, 5);
-    let mut receiver = sides.receiving().receiver(STREAM, Keep::All, 64).unwrap();
-    meet(&mut *sender, &mut [&mut receiver]);
+    // So that nothing is on its way any more.
+    assert_eq!(take(&mut *early, 5), [0, 1, 2, 3, 4]);
+    let mut late = sides.receiving().receiver(STREAM, Keep::All, 64).unwrap();
+    meet(&mut *sender, &mut [&mut late]);
     send(&mut *sender, 5, 5);
-    assert_eq!(take(&mut *receiver, 5), [5, 6, 7, 8, 9]);
-    assert_eq!(receiver.counts().lost, 0, "it was not there");
+    assert_eq!(take(&mut *late, 5), [5, 6, 7, 8, 9]);
+    assert_eq!(late.counts().lost, 0, "it was not there");
     assert_eq!(sender.counts().undelivered, 5, "but it was expected");
+    assert_eq!(take(&mut *early, 5), [5, 6, 7, 8, 9]);
 }
 
 pub fn slow_reader_that_keeps_all_loses_nothing<S: Sides>() {
