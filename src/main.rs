@@ -37,10 +37,12 @@ fn main() -> ExitCode {
         .with_ansi(std::io::stderr().is_terminal())
         .without_time()
         .with_target(false);
-    tracing_subscriber::registry().with(lines.with_filter(targets)).init();
+    tracing_subscriber::registry()
+        .with(lines.with_filter(targets))
+        .init();
     let command = Cli::parse()
         .command
-        .unwrap_or_else(|| Command::Run(Default::default()));
+        .unwrap_or_else(|| Command::Run(commands::run::Args::default()));
     exit::code(match command {
         Command::Run(args) => commands::run::run(&args),
         Command::Check(args) => commands::check::run(&args),

@@ -74,7 +74,7 @@ impl Stage {
 #[serde(rename_all = "snake_case")]
 pub enum Settings {
     /// A source.
-    Ingest(tauscope_ingest::Config),
+    Ingest(Box<tauscope_ingest::Config>),
     /// A twin.
     Twin {
         /// From the pipeline file.

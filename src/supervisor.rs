@@ -36,6 +36,8 @@ pub use summary::Summary;
 
 /// A stage whose inputs have all ended has this long to finish by itself before it is asked to.
 const GRACE: Duration = Duration::from_secs(2);
+/// Long enough where nothing is due.
+const NEVER: Duration = Duration::from_hours(24);
 /// Events that are not handled yet; a stage that says more waits.
 const EVENTS: usize = 256;
 
@@ -133,7 +135,7 @@ impl Supervisor<'_> {
         let mut terminate = signal(SignalKind::terminate()).context("cannot catch SIGTERM")?;
         while !self.stages.iter().all(Local::is_over) {
             let due = self.stages.iter().filter_map(Local::due).min();
-            let alarm = due.unwrap_or_else(|| Instant::now() + Duration::from_secs(3600));
+            let alarm = due.unwrap_or_else(|| Instant::now() + NEVER);
             tokio::select! {
                 Some((mark, event)) = events.recv() => self.take(mark, event),
                 () = any(&mut interrupt, &mut terminate) => self.interrupted(),

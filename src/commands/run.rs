@@ -9,7 +9,7 @@ use crate::pipeline::{Pipeline, Settings};
 use crate::plan;
 use crate::report::Problem;
 use crate::suggest;
-use crate::supervisor;
+use crate::supervisor::{self, Summary};
 
 /// Run a pipeline: check the file, start this host's stages, look after them until the source ends
 /// or Ctrl-C.
@@ -59,37 +59,35 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
     };
     super::print(&text)?;
     if !args.json {
-        super::print(&written(&pipeline, host))?;
+        super::print(&written(&pipeline, &summary))?;
     }
     Ok(summary.exit())
 }
 
-/// What this host's recorders wrote, and how to open it.
-fn written(pipeline: &Pipeline, host: Option<&str>) -> String {
-    let mut text = String::new();
-    for stage in &pipeline.stages {
-        let Settings::Record(config) = &stage.settings else {
+/// What this host's recorders have completed, and how to open it.
+fn written(pipeline: &Pipeline, summary: &Summary) -> String {
+    let mut lines = Vec::new();
+    for stage in summary.stages.iter().filter(|stage| !stage.failed) {
+        let stage = pipeline
+            .stages
+            .iter()
+            .find(|known| known.name == stage.stage);
+        let Some(Settings::Record(config)) = stage.map(|stage| &stage.settings) else {
             continue;
         };
-        if host.is_some() && stage.host.as_deref() != host {
-            continue;
-        }
         let picture = config.rerun.as_ref().and_then(|rerun| rerun.file.as_ref());
-        for path in [config.mcap.as_ref(), picture]
-            .into_iter()
-            .flatten()
-            .filter(|p| p.exists())
-        {
-            let size = std::fs::metadata(path).map_or(0, |file| file.len());
-            text += &format!("wrote {} ({:.1} MB)\n", path.display(), size as f64 * 1e-6);
+        let files = config.mcap.iter().chain(picture);
+        for (path, file) in files.filter_map(|path| Some((path, path.metadata().ok()?))) {
+            let megabytes = file.len() as f64 * 1e-6;
+            lines.push(format!("wrote {} ({megabytes:.1} MB)", path.display()));
         }
-        if let Some(path) = picture.filter(|path| path.exists()) {
+        if let Some(path) = picture {
             let version = tauscope_record::rerun_version();
-            text += &format!(
-                "see it: pip install rerun-sdk=={version} && rerun {}\n",
-                path.display()
-            );
+            let path = path.display();
+            lines.push(format!(
+                "see it: pip install rerun-sdk=={version} && rerun {path}"
+            ));
         }
     }
-    text
+    lines.join("\n")
 }

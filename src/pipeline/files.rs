@@ -170,7 +170,7 @@ impl<'a> Resolver<'a> {
         self.try_to_open(index, &path_place, &config, scenario.as_ref());
         self.scenarios
             .extend(scenario.map(|scenario| (index, scenario)));
-        Some(Settings::Ingest(config))
+        Some(Settings::Ingest(Box::new(config)))
     }
 
     /// Opens a source that reads files, as the stage will: what is wrong with them is known before

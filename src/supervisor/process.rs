@@ -163,16 +163,11 @@ async fn lines<M: Copy + Send + Sync>(
     loop {
         let (taken, ended) = match pipe.fill_buf().await {
             Ok([]) | Err(_) => break,
-            Ok(bytes) => match bytes.iter().position(|&byte| byte == b'\n') {
-                Some(at) => {
-                    line.extend_from_slice(&bytes[..at]);
-                    (at + 1, true)
-                }
-                None => {
-                    line.extend_from_slice(bytes);
-                    (bytes.len(), false)
-                }
-            },
+            Ok(bytes) => {
+                let end = bytes.iter().position(|&byte| byte == b'\n');
+                line.extend_from_slice(&bytes[..end.unwrap_or(bytes.len())]);
+                (end.map_or(bytes.len(), |end| end + 1), end.is_some())
+            }
         };
         pipe.consume(taken);
         if (ended || line.len() > LONGEST_LINE_BYTES) && !send(&mut line, mark, events, event).await
