@@ -309,7 +309,10 @@ impl<'a> Replay<'a> {
             .filter(|input| streams.contains_key(input))
             .collect();
         let recorder = build::recorder(self.pipeline, config, &heard)?;
-        let inputs = self.inputs(graph, heard.into_iter(), streams)?;
+        let mut inputs = self.inputs(graph, heard.iter().copied(), streams)?;
+        for index in heard {
+            inputs.push(graph.listen_to_health(&streams[&index])?);
+        }
         graph.sink(&stage.name, Box::new(recorder), inputs);
         Ok(())
     }

@@ -257,3 +257,21 @@ impl<T: Sample, S: Sender<T> + ?Sized> Sender<T> for Box<S> {
         (**self).counts()
     }
 }
+
+impl<T: Sample, S: Sender<T> + ?Sized> Sender<T> for &mut S {
+    fn send_with(&mut self, write: &mut dyn FnMut(&mut T)) -> Result<(), LinkError> {
+        (**self).send_with(write)
+    }
+    fn end(&mut self) -> Result<(), LinkError> {
+        (**self).end()
+    }
+    fn wait_for_receivers(&mut self, timeout: Duration) -> Result<usize, LinkError> {
+        (**self).wait_for_receivers(timeout)
+    }
+    fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError> {
+        (**self).wait_until_taken(timeout)
+    }
+    fn counts(&self) -> SenderCounts {
+        (**self).counts()
+    }
+}

@@ -18,6 +18,7 @@ mod source;
 mod stage;
 
 pub use child::{Child, ChildError, Line, outside};
+pub use health::HealthClock;
 pub use report::{Board, InputReport, Outcome, Report};
 pub use sink::{SinkInput, run_sink};
 pub use source::run_source;

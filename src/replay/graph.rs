@@ -7,23 +7,34 @@
 use std::time::Duration;
 
 use serde::Serialize;
+use tauscope_bus::shell::{HealthClock, Report};
 use tauscope_bus::{
-    Audience, Emit, InProcess, Keep, LinkError, Progress, Received, Receiver, Sample, SampleRef,
-    Sender, Sink, Source, Stage, StageError, Transport,
+    Audience, Emit, Header, InProcess, Keep, LinkError, Progress, Received, Receiver, Sample,
+    SampleRef, Sender, Sink, Source, Stage, StageError, Transport,
 };
 
 /// Samples a stage may leave unread. A source gives out at most a few in a step, and they are all
 /// taken before its next one.
 const DEPTH: usize = 1024;
 
-/// Where a stage's output goes.
-struct Outlet<T: Sample>(Box<dyn Sender<T>>);
+/// Where a stage's output goes, and the header of what went out last.
+struct Outlet<T: Sample> {
+    link: Box<dyn Sender<T>>,
+    newest: Option<Header>,
+}
 
 impl<T: Sample> Emit<T> for Outlet<T> {
     fn emit(&mut self, write: &mut dyn FnMut(&mut T)) -> Result<(), LinkError> {
-        self.0.send_with(write)
+        let newest = &mut self.newest;
+        self.link.send_with(&mut |slot| {
+            write(slot);
+            *newest = Some(*slot.header());
+        })
     }
 }
+
+/// A stage's health reports, by the stream's own clock.
+type Health = HealthClock<Box<dyn Sender<tauscope_bus::Health>>>;
 
 /// What a stage has counted.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -36,6 +47,18 @@ pub struct StageCounts {
     pub emitted: u64,
     /// Samples that it had to refuse, or that did not reach it.
     pub dropped: u64,
+}
+
+impl StageCounts {
+    fn report(&self) -> Report {
+        Report {
+            stage: self.stage.clone(),
+            received: self.received,
+            emitted: self.emitted,
+            refused: self.dropped,
+            ..Report::default()
+        }
+    }
 }
 
 /// A stage with its links, whatever its types are.
@@ -52,14 +75,28 @@ struct SourceNode<T: Sample> {
     name: String,
     source: Box<dyn Source<T>>,
     out: Outlet<T>,
+    health: Health,
     ended: bool,
 }
 
 impl<T: Sample> Node for SourceNode<T> {
     fn turn(&mut self) -> Result<bool, StageError> {
-        if !self.ended && self.source.step(&mut self.out)? == Progress::End {
+        if self.ended {
+            return Ok(false);
+        }
+        let progress = self.source.step(&mut self.out)?;
+        if self
+            .out
+            .newest
+            .take()
+            .is_some_and(|newest| self.health.note(&newest))
+        {
+            self.health.send(&self.counts().report())?;
+        }
+        if progress == Progress::End {
             self.ended = true;
-            self.out.0.end()?;
+            self.out.link.end()?;
+            self.health.end(&self.counts().report())?;
         }
         Ok(!self.ended)
     }
@@ -68,7 +105,7 @@ impl<T: Sample> Node for SourceNode<T> {
         StageCounts {
             stage: self.name.clone(),
             received: 0,
-            emitted: self.out.0.counts().sent,
+            emitted: self.out.link.counts().sent,
             dropped: self.source.dropped(),
         }
     }
@@ -87,24 +124,28 @@ struct StageNode<I: Sample, O: Sample> {
     stage: Box<dyn Stage<I, O>>,
     input: Box<dyn Receiver<I>>,
     out: Outlet<O>,
+    health: Health,
     ended: bool,
 }
 
 impl<I: Sample, O: Sample> Node for StageNode<I, O> {
     fn turn(&mut self) -> Result<bool, StageError> {
         while !self.ended {
-            let mut result = Ok(());
-            let (stage, out) = (&mut self.stage, &mut self.out);
+            let (mut result, mut due) = (Ok(()), false);
+            let (stage, out, health) = (&mut self.stage, &mut self.out, &mut self.health);
             let received = self.input.receive(Duration::ZERO, &mut |sample| {
+                due = health.note(sample.header());
                 result = stage.accept(sample, out);
             })?;
             result?;
             match received {
+                Received::Sample if due => self.health.send(&self.counts().report())?,
                 Received::Sample => {}
                 Received::Nothing => break,
                 Received::End => {
                     self.stage.finish(&mut self.out)?;
-                    self.out.0.end()?;
+                    self.out.link.end()?;
+                    self.health.end(&self.counts().report())?;
                     self.ended = true;
                 }
             }
@@ -117,7 +158,7 @@ impl<I: Sample, O: Sample> Node for StageNode<I, O> {
         StageCounts {
             stage: self.name.clone(),
             received: input.received,
-            emitted: self.out.0.counts().sent,
+            emitted: self.out.link.counts().sent,
             dropped: input.lost + self.stage.dropped(),
         }
     }
@@ -205,7 +246,16 @@ impl Node for SinkNode<'_> {
 #[derive(Debug, Clone)]
 pub struct Stream {
     stage: String,
-    key: String,
+}
+
+impl Stream {
+    fn key(&self) -> &str {
+        &self.stage
+    }
+
+    fn health_key(&self) -> String {
+        format!("{}/health", self.stage)
+    }
 }
 
 /// Stages in one thread, in the order in which they were added.
@@ -225,12 +275,13 @@ impl<'a> Graph<'a> {
         name: &str,
         source: Box<dyn Source<T>>,
     ) -> Result<Stream, LinkError> {
-        let (stream, out) = self.outlet(name)?;
+        let (stream, out, health) = self.outlets(name)?;
         let name = name.to_owned();
         self.nodes.push(Box::new(SourceNode {
             name,
             source,
             out,
+            health,
             ended: false,
         }));
         Ok(stream)
@@ -246,14 +297,15 @@ impl<'a> Graph<'a> {
         stage: Box<dyn Stage<I, O>>,
         input: &Stream,
     ) -> Result<Stream, LinkError> {
-        let input = self.links.receiver(&input.key, Keep::All, DEPTH)?;
-        let (stream, out) = self.outlet(name)?;
+        let input = self.links.receiver(input.key(), Keep::All, DEPTH)?;
+        let (stream, out, health) = self.outlets(name)?;
         let name = name.to_owned();
         self.nodes.push(Box::new(StageNode {
             name,
             stage,
             input,
             out,
+            health,
             ended: false,
         }));
         Ok(stream)
@@ -264,7 +316,19 @@ impl<'a> Graph<'a> {
     /// # Errors
     /// If the link cannot be opened, or the stream carries another type.
     pub fn listen<T: Sample>(&mut self, stream: &Stream) -> Result<SinkInput, LinkError> {
-        let receiver: Box<dyn Receiver<T>> = self.links.receiver(&stream.key, Keep::All, DEPTH)?;
+        self.input::<T>(stream, stream.key())
+    }
+
+    /// A receiving end of the health reports of the stage that makes `stream`, for a sink.
+    ///
+    /// # Errors
+    /// If the link cannot be opened.
+    pub fn listen_to_health(&mut self, stream: &Stream) -> Result<SinkInput, LinkError> {
+        self.input::<tauscope_bus::Health>(stream, &stream.health_key())
+    }
+
+    fn input<T: Sample>(&mut self, stream: &Stream, key: &str) -> Result<SinkInput, LinkError> {
+        let receiver: Box<dyn Receiver<T>> = self.links.receiver(key, Keep::All, DEPTH)?;
         Ok(SinkInput {
             from: stream.stage.clone(),
             receiver: Box::new(receiver),
@@ -283,13 +347,19 @@ impl<'a> Graph<'a> {
         }));
     }
 
-    fn outlet<T: Sample>(&mut self, name: &str) -> Result<(Stream, Outlet<T>), LinkError> {
+    fn outlets<T: Sample>(&mut self, name: &str) -> Result<(Stream, Outlet<T>, Health), LinkError> {
         let stream = Stream {
             stage: name.to_owned(),
-            key: name.to_owned(),
         };
-        let out = self.links.sender(&stream.key, Audience::default())?;
-        Ok((stream, Outlet(out)))
+        let link = self.links.sender(stream.key(), Audience::default())?;
+        let health = self
+            .links
+            .sender(&stream.health_key(), Audience::default())?;
+        Ok((
+            stream,
+            Outlet { link, newest: None },
+            HealthClock::new(health, name, 0),
+        ))
     }
 
     /// Runs until every source has ended and everything has passed through. `progress` is told how

@@ -7,8 +7,8 @@ use crate::sample::{Header, Health, Name};
 const SECOND_NS: i64 = 1_000_000_000;
 
 /// Sends a [`Health`] sample once a second of stream time and at the end.
-pub(super) struct HealthClock<'a> {
-    out: &'a mut dyn Sender<Health>,
+pub struct HealthClock<S> {
+    out: S,
     stage: Name,
     restarts: u64,
     /// The second of stream time that the last report stood in.
@@ -16,8 +16,9 @@ pub(super) struct HealthClock<'a> {
     newest: Header,
 }
 
-impl<'a> HealthClock<'a> {
-    pub(super) fn new(out: &'a mut dyn Sender<Health>, stage: &str, restarts: u64) -> Self {
+impl<S: Sender<Health>> HealthClock<S> {
+    /// For the stage of that name, which has been started again `restarts` times.
+    pub fn new(out: S, stage: &str, restarts: u64) -> Self {
         Self {
             out,
             stage: Name::new(stage),
@@ -29,7 +30,7 @@ impl<'a> HealthClock<'a> {
 
     /// Takes note of a sample; true if a report is due. One is due at the first sample of each
     /// second, also when the clock jumps back.
-    pub(super) fn note(&mut self, header: &Header) -> bool {
+    pub fn note(&mut self, header: &Header) -> bool {
         self.newest = *header;
         let second = header.stamp_ns.div_euclid(SECOND_NS);
         let before = self.second.replace(second);
@@ -40,7 +41,11 @@ impl<'a> HealthClock<'a> {
         self.newest.stamp_ns
     }
 
-    pub(super) fn send(&mut self, report: &Report) -> Result<(), LinkError> {
+    /// Sends a report.
+    ///
+    /// # Errors
+    /// What the link says.
+    pub fn send(&mut self, report: &Report) -> Result<(), LinkError> {
         let (stage, restarts, newest) = (self.stage, self.restarts, self.newest);
         self.out.send_with(&mut |health| {
             health.header.stamp_ns = newest.stamp_ns;
@@ -53,7 +58,11 @@ impl<'a> HealthClock<'a> {
         })
     }
 
-    pub(super) fn end(&mut self, report: &Report) -> Result<(), LinkError> {
+    /// Sends the last report, and the end of the stream.
+    ///
+    /// # Errors
+    /// What the link says.
+    pub fn end(&mut self, report: &Report) -> Result<(), LinkError> {
         self.send(report)?;
         self.out.end()
     }

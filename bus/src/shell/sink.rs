@@ -67,7 +67,7 @@ pub fn run_sink(
 }
 
 struct SinkShell<'a> {
-    health: HealthClock<'a>,
+    health: HealthClock<&'a mut dyn Sender<Health>>,
     poster: Poster,
     report: Report,
     sink: &'a mut dyn Sink,

@@ -41,7 +41,7 @@ pub fn run_source<T: Sample>(
 
 struct SourceShell<'a> {
     context: &'a Context,
-    health: HealthClock<'a>,
+    health: HealthClock<&'a mut dyn Sender<Health>>,
     poster: Poster,
     report: Report,
 }

@@ -45,7 +45,7 @@ pub fn run_stage<I: Sample, O: Sample>(
 
 struct StageShell<'a> {
     context: &'a Context,
-    health: HealthClock<'a>,
+    health: HealthClock<&'a mut dyn Sender<Health>>,
     poster: Poster,
     report: Report,
 }
