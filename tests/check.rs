@@ -1,0 +1,344 @@
+//! `tauscope check`: everything that is wrong at once, each at its place, and nothing started.
+
+mod common;
+
+use std::path::Path;
+
+use common::{Out, bundled, tauscope, write};
+
+fn check(folder: &Path, text: &str, more: &[&str]) -> Out {
+    std::fs::copy(bundled().join("demo_arm.urdf"), folder.join("arm.urdf")).unwrap();
+    write(&folder.join("pipeline.yaml"), text);
+    let mut command = tauscope();
+    command.current_dir(folder).arg("check").args(more);
+    Out::of(command)
+}
+
+/// What is said of a file that is wrong.
+fn errors(text: &str) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let out = check(folder.path(), text, &[]);
+    assert_eq!((out.code, out.stdout.as_str()), (2, ""), "{}", out.stderr);
+    out.stderr
+}
+
+/// A pipeline with these stages.
+fn stages(lines: &str) -> String {
+    format!("version: 1\ncells: {{demo: {{robot: arm.urdf}}}}\nstages:\n{lines}")
+}
+
+const GOOD: &str = "
+- {name: record, inputs: [ingest, twin, detect], record: {mcap: out/x.mcap}}
+- {name: detect, input: twin, keep: newest, detect: {naive_difference: {}, threshold: {score: 9}}}
+- {name: twin, input: ingest, twin: {}}
+- {name: ingest, ingest: {zenoh: {connect: [tcp/127.0.0.1:7447]}}}
+";
+
+#[test]
+fn a_good_file_is_shown_as_tables_pictures_and_json() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = check(folder.path(), &stages(GOOD), &[]);
+    assert_eq!((out.code, out.stderr.as_str()), (0, ""));
+    let rows: Vec<String> = out
+        .stdout
+        .lines()
+        .filter(|line| line.starts_with('│'))
+        .map(|line| {
+            line.split(['│', '┆'])
+                .map(str::trim)
+                .collect::<Vec<_>>()
+                .join("|")
+        })
+        .collect();
+    assert_eq!(
+        rows,
+        [
+            "|stage|is|cell|host|listens to|puts out|",
+            "|ingest|ingest|demo|this one||joint states|",
+            "|twin|twin|demo|this one|ingest|twin states|",
+            "|detect|detect|demo|this one|twin|detections|",
+            "|record|record|demo|this one|ingest, twin, detect||",
+            "|from|to|carries|over|keeps|",
+            "|ingest|twin|joint states|shared memory|all|",
+            "|twin|detect|twin states|shared memory|newest|",
+            "|ingest|record|joint states|shared memory|all|",
+            "|twin|record|twin states|shared memory|all|",
+            "|detect|record|detections|shared memory|all|",
+        ]
+    );
+    let mermaid = check(folder.path(), &stages(GOOD), &["--format", "mermaid"]).stdout;
+    assert!(mermaid.starts_with("flowchart LR\n"), "{mermaid}");
+    assert!(mermaid.contains("s1 -->|twin states| s2"), "{mermaid}");
+    let dot = check(folder.path(), &stages(GOOD), &["--format", "dot"]).stdout;
+    assert!(
+        dot.contains("s0 -> s1 [label=\"joint states\", style=solid];"),
+        "{dot}"
+    );
+    let json = check(folder.path(), &stages(GOOD), &["--json"]).stdout;
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["links"][1]["stream"], "demo/twin");
+    assert_eq!(json["links"][1]["keep"], "newest");
+}
+
+#[test]
+fn the_structure_is_checked_all_at_once() {
+    assert_eq!(
+        errors(
+            "version: 2
+cells: {demo: {robto: arm.urdf, effort_unit: NM}}
+stages:
+- name: ingest
+  ingest: {zenoh: {connect: tcp/localhost:7447}, rate: slow}
+- {input: ingest, twin: {effort_cutoff_hz: -4}}
+"
+        ),
+        "\
+error: expected at most 1, found the number 2
+ --> pipeline.yaml:1:10
+  |
+1 | version: 2
+  |          ^ `version`
+
+error: unknown key `robto`
+ --> pipeline.yaml:2:16
+  |
+2 | cells: {demo: {robto: arm.urdf, effort_unit: NM}}
+  |                ^^^^^
+  |
+  = help: did you mean `robot`?
+
+error: expected one of `Nm`, `A`, found the text `NM`
+ --> pipeline.yaml:2:46
+  |
+2 | cells: {demo: {robto: arm.urdf, effort_unit: NM}}
+  |                                              ^^
+
+error: expected a list, found the text `tcp/localhost:7447`
+ --> pipeline.yaml:5:29
+  |
+5 |   ingest: {zenoh: {connect: tcp/localhost:7447}, rate: slow}
+  |                             ^^^^^^^^^^^^^^^^^^ `stages[0].ingest.zenoh.connect`
+
+error: expected `realtime` or `fast` or a number, found the text `slow`
+ --> pipeline.yaml:5:56
+  |
+5 |   ingest: {zenoh: {connect: tcp/localhost:7447}, rate: slow}
+  |                                                        ^^^^
+
+error: the key `name` is missing in `stages[1]`
+ --> pipeline.yaml:6:3
+  |
+6 | - {input: ingest, twin: {effort_cutoff_hz: -4}}
+  |   ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
+  |
+  = help: `name`: The stage's name: letters, digits, `_` and `-`.
+
+error: expected at least 0.01, found the number -4
+ --> pipeline.yaml:6:44
+  |
+6 | - {input: ingest, twin: {effort_cutoff_hz: -4}}
+  |                                            ^^ `stages[1].twin.effort_cutoff_hz`
+
+7 errors; nothing was started
+"
+    );
+}
+
+#[test]
+fn the_wiring_is_checked_all_at_once() {
+    assert_eq!(
+        errors(&stages(
+            "- {name: ingest, ingest: {zenoh: {connect: [tcp/127.0.0.1:7447]}}}
+- {name: twin, input: ingst, twin: {}}
+- {name: twin, input: ingest, twin: {}, detect: {}}
+- {name: detect, input: ingest, detect: {naive_difference: {}, threshold: {score: 9}}}
+- {name: record, inputs: [twin, twin, record], record: {mcap: x.mcap}}
+"
+        )),
+        "\
+error: there is no stage `ingst`
+ --> pipeline.yaml:5:23
+  |
+5 | - {name: twin, input: ingst, twin: {}}
+  |                       ^^^^^
+  |
+  = help: did you mean `ingest`?
+
+error: two stages are named `twin`
+ --> pipeline.yaml:6:10
+  |
+5 | - {name: twin, input: ingst, twin: {}}
+  |          ---- the first one
+6 | - {name: twin, input: ingest, twin: {}, detect: {}}
+  |          ^^^^ the second one
+
+error: stage `twin` is two things at once
+ --> pipeline.yaml:6:41
+  |
+6 | - {name: twin, input: ingest, twin: {}, detect: {}}
+  |                               ----      ^^^^^^ `detect`
+  |                               |
+  |                               `twin`
+  |
+  = help: make two stages of it
+
+error: a `detect` stage takes twin states, but `ingest` puts out joint states
+ --> pipeline.yaml:7:25
+  |
+7 | - {name: detect, input: ingest, detect: {naive_difference: {}, threshold: {score: 9}}}
+  |                         ^^^^^^
+  |
+  = help: let it listen to a `twin` stage
+
+error: `record` listens to `twin` twice
+ --> pipeline.yaml:8:33
+  |
+8 | - {name: record, inputs: [twin, twin, record], record: {mcap: x.mcap}}
+  |                           ----  ^^^^
+  |                           |
+  |                           already here
+
+error: `record` puts out nothing that one could listen to
+ --> pipeline.yaml:8:39
+  |
+8 | - {name: record, inputs: [twin, twin, record], record: {mcap: x.mcap}}
+  |                                       ^^^^^^
+
+error: the stages run in a circle: record -> record
+ --> pipeline.yaml:8:39
+  |
+8 | - {name: record, inputs: [twin, twin, record], record: {mcap: x.mcap}}
+  |                                       ^^^^^^
+  |
+  = help: a pipeline has a beginning: a stage cannot listen to what it causes
+
+7 errors; nothing was started
+"
+    );
+}
+
+#[test]
+fn a_cycle_is_named() {
+    let text = errors(&stages(
+        "- {name: a, input: c, outside: {command: [cat], output: detection}}
+- {name: b, input: a, outside: {command: [cat], output: detection}}
+- {name: c, input: b, outside: {command: [cat], output: detection}}
+",
+    ));
+    assert!(
+        text.starts_with("error: the stages run in a circle: a -> b -> c -> a\n"),
+        "{text}"
+    );
+}
+
+#[test]
+fn what_files_hold_is_checked_too() {
+    let text = errors(&format!(
+        "version: 1
+cells:
+  demo:
+    robot: arm.urdf
+    effort_unit: A
+    torque_constants_nm_per_a: {{joint1: 11, jiont2: 11}}
+    tool: {{link: tol}}
+  sound: {{robot: arm.urdf}}
+  other: {{robot: nowhere.urdf}}
+  third: {{robot: pipeline.yaml}}
+stages:
+- {{name: a, cell: demo, ingest: {{file: {{path: nowhere.mcap}}}}}}
+- {{name: b, cell: sound, ingest: {{file: {{path: {recording}, topics: {{state: /nothing}}}}}}}}
+- {{name: twin, input: a, twin: {{model: nowhere.yaml}}}}
+- {{name: ours, input: a, twin: {{motion: commanded}}}}
+- {{name: r1, inputs: [a], record: {{mcap: out/x.mcap}}}}
+- {{name: r2, inputs: [b], record: {{mcap: ./out/../out/x.mcap}}}}
+- {{name: theirs, input: a, outside: {{command: [./nowhere], output: twin_state}}}}
+",
+        recording = bundled().join("demo.mcap").display()
+    ));
+    for wanted in [
+        "error: no torque constant for `joint2`",
+        "error: the robot has no joint `jiont2`",
+        "error: the robot has no link `tol`",
+        "error: cannot read the URDF: No such file",
+        "error: cannot use the URDF: ",
+        "error: there is no recording nowhere.mcap",
+        "no topic \"/nothing\"",
+        "error: there is no twin nowhere.yaml",
+        "error: the source `a` reads no `command` topic for this",
+        "error: `r2` would overwrite ./out/../out/x.mcap",
+        "error: there is no program ./nowhere",
+    ] {
+        assert!(text.contains(wanted), "`{wanted}` is missing in\n{text}");
+    }
+}
+
+#[test]
+fn hosts_are_checked() {
+    let text = errors(
+        "version: 1
+cells: {demo: {robot: arm.urdf}}
+hosts: {a: {listen: tcp/10.0.0.1:7447}, b: {connect: [tcp/10.0.0.1:7447]}}
+stages:
+- {name: ingest, host: a, ingest: {zenoh: {connect: [tcp/127.0.0.1:7447]}}}
+- {name: twin, input: ingest, twin: {}}
+- {name: record, host: c, inputs: [ingest], record: {mcap: x.mcap}}
+",
+    );
+    assert!(
+        text.contains("error: stage `twin` does not say on which host it runs"),
+        "{text}"
+    );
+    assert!(text.contains("error: there is no host `c`"), "{text}");
+}
+
+#[test]
+fn a_recording_is_looked_for_on_the_host_that_reads_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "version: 1
+cells: {demo: {robot: arm.urdf}}
+hosts: {a: {listen: tcp/10.0.0.1:7447}, b: {connect: tcp/10.0.0.1:7447}}
+stages:
+- {name: ingest, host: a, ingest: {file: {path: only_on_a.mcap}}}
+- {name: twin, host: b, input: ingest, twin: {}}
+";
+    assert_eq!(check(folder.path(), text, &["--host", "b"]).code, 0);
+    assert_eq!(check(folder.path(), text, &["--host", "a"]).code, 2);
+    assert_eq!(check(folder.path(), text, &["--host", "c"]).code, 2);
+}
+
+#[test]
+fn wrong_arguments_and_files_end_with_2() {
+    let folder = tempfile::tempdir().unwrap();
+    for arguments in [
+        &["run", "nowhere.yaml"][..],
+        &["check", "nowhere.yaml"],
+        &["info", "nowhere.mcap"],
+        &["repair", "nowhere.mcap"],
+        &["simulate", "nowhere.yaml", "--out", "out"],
+        &["run", "--no-such-option"],
+        &["no-such-command"],
+        // Without an argument it is `run pipeline.yaml`, and there is none here.
+        &[],
+    ] {
+        let mut command = tauscope();
+        command.current_dir(folder.path()).args(arguments);
+        let out = Out::of(command);
+        assert_eq!(out.code, 2, "{arguments:?}: {}", out.stderr);
+        assert!(!out.stderr.is_empty(), "{arguments:?}");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn the_schema_accepts_what_check_accepts() {
+    let mut command = tauscope();
+    command.arg("schema");
+    let schema: serde_json::Value = serde_json::from_str(&Out::of(command).stdout).unwrap();
+    assert_eq!(schema["title"], "tauscope pipeline");
+    let description = &schema["$defs"]["CellEntry"]["properties"]["torque_constants_nm_per_a"];
+    let description = description["description"].as_str().unwrap();
+    assert!(
+        description.contains("[N m/A]"),
+        "no Rust escapes: {description}"
+    );
+}

@@ -1,0 +1,29 @@
+//! The pipelines in `docs/pipeline.md` are good ones.
+
+mod common;
+
+use common::{Out, bundled, root, tauscope, write};
+
+#[test]
+fn every_pipeline_in_the_documentation_passes_the_check() {
+    let text = std::fs::read_to_string(root().join("docs/pipeline.md")).unwrap();
+    let blocks = text
+        .split("```yaml\n")
+        .skip(1)
+        .map(|rest| rest.split("```").next().unwrap());
+    let pipelines: Vec<&str> = blocks
+        .filter(|block| block.starts_with("version: 1"))
+        .collect();
+    assert!(pipelines.len() >= 2, "{} pipelines", pipelines.len());
+    for pipeline in pipelines {
+        let folder = tempfile::tempdir().unwrap();
+        for file in ["demo_arm.urdf", "demo.mcap"] {
+            std::fs::copy(bundled().join(file), folder.path().join(file)).unwrap();
+        }
+        write(&folder.path().join("pipeline.yaml"), pipeline);
+        let mut command = tauscope();
+        command.current_dir(folder.path()).arg("check");
+        let out = Out::of(command);
+        assert_eq!(out.code, 0, "{pipeline}\n{}", out.stderr);
+    }
+}
