@@ -127,6 +127,8 @@ impl Local {
     /// Its process has ended, and all that it said was heard.
     pub fn exited(&mut self, status: std::io::Result<ExitStatus>) -> End {
         let outcome = self.tally.newest().outcome.clone();
+        // One that says itself why it cannot even begin would say the same again.
+        let said_why = outcome.is_some();
         let how = match (status, outcome) {
             (Ok(status), _) if status.success() => {
                 self.state = State::Ended;
@@ -136,8 +138,8 @@ impl Local {
             (Ok(status), _) => words_for(status),
             (Err(error), _) => format!("cannot be waited for: {error}"),
         };
-        // What could not even begin would fail the same way again.
-        let may_return = self.ready && !self.last_life && !self.told_to_stop;
+        let can_begin = self.ready || !said_why;
+        let may_return = can_begin && !self.last_life && !self.told_to_stop;
         let again = if may_return {
             self.deaths.note(std::time::Instant::now())
         } else {

@@ -1,0 +1,132 @@
+//! A pipeline that is running.
+#![allow(dead_code, reason = "each test file uses its own part")]
+
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use crate::common::tauscope;
+
+/// Slow machines run the tests, too; nothing waits this long where all is well.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// `tauscope run`, heard line by line.
+pub struct Live {
+    child: Child,
+    lines: Receiver<String>,
+    /// What was heard so far.
+    pub heard: Vec<String>,
+}
+
+impl Live {
+    /// Runs `pipeline.yaml` in `folder`.
+    pub fn start(folder: &Path, more: &[&str]) -> Self {
+        let mut command = tauscope();
+        command
+            .current_dir(folder)
+            .args(["run", "--json"])
+            .args(more);
+        let mut child = command
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let (sender, lines) = channel();
+        let stderr = BufReader::new(child.stderr.take().unwrap());
+        std::thread::spawn(move || {
+            for line in stderr.lines().map_while(Result::ok) {
+                if sender.send(line).is_err() {
+                    return;
+                }
+            }
+        });
+        Self {
+            child,
+            lines,
+            heard: Vec::new(),
+        }
+    }
+
+    /// Its process id.
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// Waits for a line that begins with `start` and returns the rest of it.
+    pub fn wait_for(&mut self, start: &str) -> String {
+        let deadline = Instant::now() + PATIENCE;
+        loop {
+            let left = deadline.saturating_duration_since(Instant::now());
+            let Ok(line) = self.lines.recv_timeout(left) else {
+                panic!("no line that begins with {start:?} in {:#?}", self.heard);
+            };
+            let rest = line.strip_prefix(start).map(str::to_owned);
+            self.heard.push(line);
+            if let Some(rest) = rest {
+                return rest;
+            }
+        }
+    }
+
+    /// The process of a stage that is about to be started.
+    pub fn wait_for_stage(&mut self, stage: &str) -> u32 {
+        let id = self.wait_for(&format!("stage `{stage}` runs as process "));
+        id.parse().unwrap()
+    }
+
+    /// Waits for its end: exit code (-1 for a signal) and summary.
+    pub fn end(mut self) -> (i32, serde_json::Value) {
+        let deadline = Instant::now() + PATIENCE;
+        let status = loop {
+            if let Some(status) = self.child.try_wait().unwrap() {
+                break status;
+            }
+            if Instant::now() > deadline {
+                self.child.kill().unwrap();
+                panic!(
+                    "it does not end: {:#?}",
+                    self.lines.try_iter().collect::<Vec<_>>()
+                );
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        };
+        let summary = serde_json::from_reader(self.child.stdout.take().unwrap());
+        (
+            status.code().unwrap_or(-1),
+            summary.unwrap_or(serde_json::Value::Null),
+        )
+    }
+}
+
+/// Sends a signal, e.g. `KILL`.
+pub fn signal(process: u32, name: &str) {
+    let status = Command::new("kill")
+        .arg(format!("-{name}"))
+        .arg(process.to_string())
+        .status();
+    assert!(status.unwrap().success(), "no process {process}");
+}
+
+/// Whether the process is there (and more than the remains of one that nobody has waited for).
+pub fn is_alive(process: u32) -> bool {
+    let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+    let state = stat.rsplit(')').next().unwrap_or("").trim_start();
+    !state.is_empty() && !state.starts_with('Z')
+}
+
+/// Waits until `condition` holds.
+pub fn wait_until(what: &str, condition: impl Fn() -> bool) {
+    let deadline = Instant::now() + PATIENCE;
+    while !condition() {
+        assert!(Instant::now() < deadline, "not in time: {what}");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+/// A stage's line of the summary.
+pub fn stage<'a>(summary: &'a serde_json::Value, name: &str) -> &'a serde_json::Value {
+    let stages = summary["stages"].as_array().unwrap();
+    stages.iter().find(|stage| stage["stage"] == name).unwrap()
+}

@@ -1,0 +1,131 @@
+//! kill -9 of any one stage: the supervisor says so and starts it again within a second, and the
+//! others go on.
+
+#[path = "common/live.rs"]
+mod live;
+
+mod common;
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use common::{bundled, write};
+use live::{Live, is_alive, signal, stage, wait_until};
+
+const STAGES: [&str; 4] = ["record", "detect", "twin", "ingest"];
+
+fn pipeline(folder: &Path) {
+    let data = bundled();
+    let text = format!(
+        "version: 1
+cells: {{demo: {{robot: {robot}}}}}
+stages:
+- {{name: ingest, ingest: {{file: {{path: {recording}}}, rate: 4}}}}
+- {{name: twin, input: ingest, twin: {{}}}}
+- {{name: detect, input: twin, detect: {{naive_difference: {{}}, threshold: {{score: 1000}}}}}}
+- {{name: record, inputs: [ingest, twin, detect], record: {{mcap: out.mcap}}}}
+",
+        robot = data.join("demo_arm.urdf").display(),
+        recording = data.join("demo.mcap").display(),
+    );
+    write(&folder.join("pipeline.yaml"), &text);
+}
+
+fn kill_and_watch(victim: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    pipeline(folder.path());
+    let mut live = Live::start(folder.path(), &[]);
+    let ids = STAGES.map(|stage| live.wait_for_stage(stage));
+    let part = folder.path().join("out.mcap.part");
+    wait_until("samples flow", || {
+        part.metadata().is_ok_and(|file| file.len() > 50_000)
+    });
+
+    let killed = ids[STAGES.iter().position(|&stage| stage == victim).unwrap()];
+    let at = Instant::now();
+    signal(killed, "KILL");
+    live.wait_for(&format!(
+        "warning: stage `{victim}` was killed by signal 9: starting it again"
+    ));
+    let again = live.wait_for_stage(victim);
+    let took = at.elapsed();
+    assert!(
+        took < Duration::from_secs(1),
+        "{victim} was back after {took:?}"
+    );
+    assert!(is_alive(again), "{victim}");
+    for (other, id) in STAGES
+        .iter()
+        .zip(ids)
+        .filter(|(other, _)| **other != victim)
+    {
+        assert!(is_alive(id), "{other} went with {victim}");
+    }
+
+    let (code, summary) = live.end();
+    let restarts = |name: &str| stage(&summary, name)["restarts"].as_u64().unwrap();
+    for name in STAGES {
+        assert_eq!(
+            restarts(name),
+            u64::from(name == victim),
+            "{name}: {summary}"
+        );
+        assert_eq!(stage(&summary, name)["failed"], false, "{name}: {summary}");
+    }
+    // A source goes on where it was, so nothing need be lost; every other stage misses what was on
+    // its way to it, and that is said.
+    let dropped = stage(&summary, victim)["dropped"].as_u64().unwrap();
+    if victim == "ingest" {
+        assert_eq!((code, dropped), (0, 0), "{summary}");
+    } else {
+        assert_eq!(code, 3, "{victim}: {summary}");
+        assert!(dropped > 0, "{victim}: {summary}");
+    }
+    let out = folder.path().join("out.mcap");
+    assert!(
+        out.exists() && !part.exists(),
+        "{victim}: the archive is not whole"
+    );
+}
+
+#[test]
+fn a_killed_recorder_is_started_again() {
+    kill_and_watch("record");
+}
+
+#[test]
+fn a_killed_detector_is_started_again() {
+    kill_and_watch("detect");
+}
+
+#[test]
+fn a_killed_twin_is_started_again() {
+    kill_and_watch("twin");
+}
+
+#[test]
+fn a_killed_source_goes_on_where_it_was() {
+    kill_and_watch("ingest");
+}
+
+#[test]
+fn a_stage_that_keeps_dying_ends_the_run() {
+    let folder = tempfile::tempdir().unwrap();
+    pipeline(folder.path());
+    let mut live = Live::start(folder.path(), &[]);
+    for death in 1..=5 {
+        let twin = live.wait_for_stage("twin");
+        signal(twin, "KILL");
+        let end = if death < 5 {
+            "starting it again"
+        } else {
+            "and is not started again"
+        };
+        let start = if death < 5 { "warning" } else { "error" };
+        let line = live.wait_for(&format!("{start}: stage `twin` was killed by signal 9"));
+        assert!(line.contains(end), "death {death}: {line}");
+    }
+    let (code, summary) = live.end();
+    assert_eq!(code, 1, "{summary}");
+    assert_eq!(stage(&summary, "twin")["failed"], true);
+}

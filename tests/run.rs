@@ -1,0 +1,131 @@
+//! `tauscope run`: stages as processes, their end in order, and what is said of it.
+
+#[path = "common/live.rs"]
+mod live;
+
+mod common;
+
+use std::path::Path;
+
+use common::{Out, bundled, tauscope, write};
+use live::{Live, is_alive, signal, stage, wait_until};
+
+/// The bundled recording at this rate through everything, into `out.mcap`.
+fn pipeline(folder: &Path, rate: &str) {
+    let data = bundled();
+    let text = format!(
+        "version: 1
+cells: {{demo: {{robot: {robot}}}}}
+stages:
+- {{name: ingest, ingest: {{file: {{path: {recording}}}, rate: {rate}}}}}
+- {{name: twin, input: ingest, twin: {{}}}}
+- {{name: detect, input: twin, detect: {{naive_difference: {{}}, threshold: {{score: 1000}}}}}}
+- {{name: record, inputs: [ingest, twin, detect], record: {{mcap: out.mcap}}}}
+",
+        robot = data.join("demo_arm.urdf").display(),
+        recording = data.join("demo.mcap").display(),
+    );
+    write(&folder.join("pipeline.yaml"), &text);
+}
+
+fn info(path: &Path) -> serde_json::Value {
+    let mut command = tauscope();
+    command.args(["info", "--json"]).arg(path);
+    let out = Out::of(command);
+    assert_eq!(out.code, 0, "{}", out.stderr);
+    serde_json::from_str(&out.stdout).unwrap()
+}
+
+fn count(info: &serde_json::Value, topic: &str) -> u64 {
+    let topics = info["topics"].as_array().unwrap();
+    topics.iter().find(|each| each["name"] == topic).unwrap()["message_count"]
+        .as_u64()
+        .unwrap()
+}
+
+#[test]
+fn a_recording_goes_through_every_stage_and_nothing_is_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    pipeline(folder.path(), "fast");
+    let (code, summary) = Live::start(folder.path(), &[]).end();
+    assert_eq!(code, 0, "{summary}");
+    let samples = count(&info(&bundled().join("demo.mcap")), "/joint_states");
+    assert_eq!(stage(&summary, "ingest")["emitted"], samples);
+    assert_eq!(stage(&summary, "detect")["received"], samples);
+    assert_eq!(stage(&summary, "record")["received"], 3 * samples);
+    for link in summary["links"].as_array().unwrap() {
+        assert_eq!(link["received"], samples, "{link}");
+        assert_eq!(link["dropped"], 0, "{link}");
+    }
+    let archive = info(&folder.path().join("out.mcap"));
+    assert_eq!(count(&archive, "/joint_states"), samples);
+    assert_eq!(count(&archive, "/twin/joint_states"), samples);
+}
+
+#[test]
+fn an_interrupt_ends_the_source_and_the_rest_finishes() {
+    for name in ["INT", "TERM"] {
+        let folder = tempfile::tempdir().unwrap();
+        pipeline(folder.path(), "realtime");
+        let mut live = Live::start(folder.path(), &[]);
+        live.wait_for_stage("ingest");
+        let part = folder.path().join("out.mcap.part");
+        wait_until("the archive grows", || {
+            part.metadata().is_ok_and(|file| file.len() > 20_000)
+        });
+        signal(live.id(), name);
+        let (code, summary) = live.end();
+        assert_eq!(code, 0, "{name}: {summary}");
+        let samples = stage(&summary, "ingest")["emitted"].as_u64().unwrap();
+        assert!(samples > 0);
+        let archive = info(&folder.path().join("out.mcap"));
+        assert_eq!(
+            count(&archive, "/joint_states"),
+            samples,
+            "{name}: {summary}"
+        );
+        assert_eq!(
+            count(&archive, "/twin/joint_states"),
+            samples,
+            "{name}: {summary}"
+        );
+    }
+}
+
+#[test]
+fn nothing_outlives_a_supervisor_that_is_killed() {
+    let folder = tempfile::tempdir().unwrap();
+    pipeline(folder.path(), "realtime");
+    // A program that listens to nothing, not even to the end of its standard input.
+    let mut text = std::fs::read_to_string(folder.path().join("pipeline.yaml")).unwrap();
+    text += "- {name: deaf, inputs: [detect], outside: {command: [sleep, \"1000\"]}}\n";
+    write(&folder.path().join("pipeline.yaml"), &text);
+    let mut live = Live::start(folder.path(), &[]);
+    let stages: Vec<u32> = ["deaf", "record", "detect", "twin", "ingest"]
+        .map(|stage| live.wait_for_stage(stage))
+        .into();
+    assert!(stages.iter().all(|&id| is_alive(id)));
+    signal(live.id(), "KILL");
+    assert_eq!(live.end().0, -1);
+    wait_until("all stages have gone", || {
+        !stages.iter().any(|&id| is_alive(id))
+    });
+    // What had been recorded is whole.
+    info(&folder.path().join("out.mcap"));
+}
+
+#[test]
+fn a_stage_that_cannot_begin_fails_the_run() {
+    let folder = tempfile::tempdir().unwrap();
+    pipeline(folder.path(), "fast");
+    let text = std::fs::read_to_string(folder.path().join("pipeline.yaml")).unwrap();
+    // There is no such folder and none can be made.
+    let text = text.replace("mcap: out.mcap", "mcap: pipeline.yaml/out.mcap");
+    write(&folder.path().join("pipeline.yaml"), &text);
+    let mut live = Live::start(folder.path(), &[]);
+    live.wait_for("error: stage `record` failed: ");
+    let (code, summary) = live.end();
+    assert_eq!(code, 1, "{summary}");
+    assert_eq!(stage(&summary, "record")["failed"], true);
+    assert_eq!(stage(&summary, "record")["restarts"], 0);
+}
