@@ -102,15 +102,16 @@ impl Pipeline {
     /// # Errors
     /// Everything that is wrong, each with its place.
     pub fn load(path: &Path, host: Option<&str>) -> Result<Self, Report> {
-        let file = yaml::load::<PipelineFile>(path)?;
+        let examined = yaml::examine::<PipelineFile>(path)?;
+        let file = &examined.file;
         let mut report = Report::default();
-        let wiring = wiring::check(&file, &mut report);
-        let cells = cells::resolve(&file, &mut report);
+        let wiring = wiring::check(file, &mut report);
+        let cells = cells::resolve(file, &mut report);
         if let Some(host) = host {
             check_host(&file.value, host, &mut report);
         }
-        let mut files = files::resolve(&file, host, &cells, wiring.as_ref(), &mut report);
-        let wiring = report.into_result(wiring)?;
+        let mut files = files::resolve(file, host, &cells, wiring.as_ref(), &mut report);
+        let file = examined.into_sound(report)?;
         let Some(wiring) = wiring else {
             return Err(Problem::of_file(path, "the stages make no pipeline").into());
         };

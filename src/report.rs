@@ -160,6 +160,16 @@ impl Report {
         self.problems.append(&mut other.problems);
     }
 
+    /// All but the problems whose place is in one of these ranges of bytes.
+    #[must_use]
+    pub fn without_those_in(mut self, ranges: &[Range<usize>]) -> Self {
+        self.problems.retain(|problem| {
+            let at = problem.labels.first().map(|label| label.span.start);
+            !at.is_some_and(|at| ranges.iter().any(|range| range.contains(&at)))
+        });
+        self
+    }
+
     /// Whether nothing is wrong.
     pub fn is_empty(&self) -> bool {
         self.problems.is_empty()

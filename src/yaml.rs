@@ -74,6 +74,65 @@ pub fn load<T: DeserializeOwned + JsonSchema>(path: &Path) -> Result<Located<T>,
     parse(path, read(path)?)
 }
 
+/// A file that can be looked at further although its shape is wrong in places.
+#[derive(Debug)]
+pub struct Examined<T> {
+    /// The file, what is wrong left out of it.
+    pub file: Located<T>,
+    /// What is wrong with its shape.
+    mismatches: Report,
+    /// The entries of its top in which something is.
+    entries: Vec<Range<usize>>,
+}
+
+impl<T> Examined<T> {
+    /// The file, if nothing is wrong.
+    ///
+    /// # Errors
+    /// What is wrong with its shape, and of `found`, which was found since, all that is not in an entry
+    /// whose shape is wrong: that may only follow from what was left out.
+    pub fn into_sound(self, found: Report) -> Result<Located<T>, Report> {
+        let mut report = self.mismatches;
+        report.append(found.without_those_in(&self.entries));
+        report.into_result(self.file)
+    }
+}
+
+/// As [`load`], but what is wrong with the shape of one entry does not keep the others from being
+/// looked at, so that everything wrong is found at once.
+///
+/// # Errors
+/// As [`load`], where the file makes no sense without what is wrong.
+pub fn examine<T: DeserializeOwned + JsonSchema>(path: &Path) -> Result<Examined<T>, Report> {
+    let source = Source::new(path, read(path)?);
+    let (mut value, spans) = tree::parse(&source)?;
+    let mismatches = structure::check::<T>(&source, &value, &spans);
+    let wrong = structure::prune::<T>(&mut value);
+    let (Some(wrong), Ok(value)) = (wrong, T::deserialize(&value)) else {
+        mismatches.into_result(())?;
+        return Err(misread::<T>(value, &source, &spans));
+    };
+    let entries = wrong.iter().map(|place| spans.value(&place.entry())).collect();
+    let path = path.to_owned();
+    let file = Located { value, path, source, spans };
+    Ok(Examined { file, mismatches, entries })
+}
+
+/// What deserialising says of a value that the schema lets pass.
+fn misread<T: DeserializeOwned>(
+    value: serde_json::Value,
+    source: &Arc<Source>,
+    spans: &Spans,
+) -> Report {
+    match serde_path_to_error::deserialize::<_, T>(value) {
+        Ok(_) => Report::default(),
+        Err(error) => {
+            let place = Place::from_serde(error.path());
+            Problem::at(source, spans.value(&place), error.inner().to_string()).into()
+        }
+    }
+}
+
 /// The same from a text that was read from `path`.
 ///
 /// # Errors
@@ -86,10 +145,8 @@ pub fn parse<T: DeserializeOwned + JsonSchema>(
     let (value, spans) = tree::parse(&source)?;
     let mismatches = structure::check::<T>(&source, &value, &spans);
     mismatches.into_result(())?;
-    let value = serde_path_to_error::deserialize(value).map_err(|error| {
-        let place = Place::from_serde(error.path());
-        Problem::at(&source, spans.value(&place), error.inner().to_string())
-    })?;
+    let value =
+        T::deserialize(&value).map_err(|_| misread::<T>(value.clone(), &source, &spans))?;
     Ok(Located {
         value,
         path: path.to_owned(),

@@ -44,6 +44,13 @@ impl Place {
             })
     }
 
+    /// The entry of the file's top that this place is in: `/stages/2`, `/cells/demo`.
+    pub(super) fn entry(&self) -> Self {
+        let ends = self.0.match_indices('/').map(|(at, _)| at);
+        let end = ends.skip(1).nth(1).unwrap_or(self.0.len());
+        Self(self.0[..end].to_owned())
+    }
+
     fn parent(&self) -> Option<Self> {
         self.0.rfind('/').map(|at| Self(self.0[..at].to_owned()))
     }

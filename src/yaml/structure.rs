@@ -33,6 +33,38 @@ pub fn check<T: JsonSchema>(source: &Arc<Source>, value: &Value, spans: &Spans) 
     report
 }
 
+/// Takes out of `value` every key whose value has the wrong shape, so that the rest can be looked at;
+/// the places of what was taken out. `None` if that cannot be had: something is missing, or the whole
+/// is of the wrong kind.
+pub fn prune<T: JsonSchema>(value: &mut Value) -> Option<Vec<Place>> {
+    let schema = schemars::schema_for!(T).to_value();
+    let validator = jsonschema::validator_for(&schema).ok()?;
+    let mut wrong = Vec::new();
+    for error in validator.iter_errors(value) {
+        let pointer = error.instance_path().as_str().to_owned();
+        match error.kind() {
+            Mismatch::AdditionalProperties { unexpected }
+            | Mismatch::UnevaluatedProperties { unexpected } => {
+                wrong.extend(unexpected.iter().map(|key| (pointer.clone(), key.clone())));
+            }
+            Mismatch::Required { .. } => return None,
+            _ => {
+                let (parent, key) = pointer.rsplit_once('/')?;
+                wrong.push((parent.to_owned(), key.replace("~1", "/").replace("~0", "~")));
+            }
+        }
+    }
+    let mut places = Vec::new();
+    for (parent, key) in wrong {
+        // An item of a list stays: without it the others would change their places.
+        if let Some(Value::Object(map)) = value.pointer_mut(&parent) {
+            map.remove(&key);
+        }
+        places.push(Place::from_pointer(&parent).key(&key));
+    }
+    validator.is_valid(value).then_some(places)
+}
+
 /// Names of JSON Schema's types as people say them.
 fn type_words(kind: &TypeKind) -> String {
     let names: Vec<&str> = match kind {
