@@ -1,0 +1,266 @@
+//! Live sources over loopback, with publishers as ROS 2 would have them.
+#![allow(
+    clippy::unwrap_used,
+    clippy::float_cmp,
+    reason = "what is copied comes out as it went in"
+)]
+
+mod common;
+
+use std::net::TcpListener;
+use std::time::{Duration, Instant};
+
+use common::{Collect, cell, state};
+use tauscope_archive::ros::{self, Message};
+use tauscope_bus::{JointState, Source, flags};
+use tauscope_ingest::{Config, Keys, Topics, ZenohConfig, ZenohSource};
+use zenoh::{Session, Wait};
+
+const PATIENCE: Duration = Duration::from_secs(30);
+const MS: i64 = 1_000_000;
+
+/// An endpoint that nobody listens on right now.
+fn endpoint() -> String {
+    let port = TcpListener::bind("127.0.0.1:0")
+        .unwrap()
+        .local_addr()
+        .unwrap()
+        .port();
+    format!("tcp/127.0.0.1:{port}")
+}
+
+fn publisher(listen: &str) -> Session {
+    let mut config = zenoh::Config::default();
+    for (key, value) in [
+        ("mode", "\"router\"".to_owned()),
+        ("listen/endpoints", format!("[\"{listen}\"]")),
+        ("scouting/multicast/enabled", "false".to_owned()),
+    ] {
+        config.insert_json5(key, &value).unwrap();
+    }
+    zenoh::open(config).wait().unwrap()
+}
+
+fn source(endpoint: &str, keys: Keys, topics: Topics) -> ZenohSource {
+    let zenoh = ZenohConfig {
+        connect: vec![endpoint.to_owned()],
+        keys,
+        topics,
+        ..ZenohConfig::default()
+    };
+    ZenohSource::open(&zenoh, &Config::default(), &cell("a b")).unwrap()
+}
+
+fn attachment(sequence: i64) -> Vec<u8> {
+    let mut bytes = sequence.to_le_bytes().to_vec();
+    bytes.extend(7_i64.to_le_bytes());
+    bytes.push(16);
+    bytes.extend([9; 16]);
+    bytes
+}
+
+fn body(message: &ros::JointState) -> Vec<u8> {
+    let mut body = Vec::new();
+    ros::encode(message, &mut body).unwrap();
+    body
+}
+
+/// Puts states until the first one comes through: a subscription takes its time to become known.
+fn meet(session: &Session, key: &str, source: &mut ZenohSource) {
+    let deadline = Instant::now() + PATIENCE;
+    let mut out = Collect(Vec::new());
+    while out.0.is_empty() {
+        assert!(Instant::now() < deadline, "nothing came through");
+        session
+            .put(key, body(&state(MS, "a b", &[0.0, 0.0], &[])))
+            .wait()
+            .unwrap();
+        source.step(&mut out).unwrap();
+    }
+}
+
+/// Steps until `count` samples have come.
+fn receive(source: &mut ZenohSource, count: usize) -> Vec<JointState> {
+    let deadline = Instant::now() + PATIENCE;
+    let mut out = Collect(Vec::new());
+    while out.0.len() < count {
+        assert!(Instant::now() < deadline, "{} of {count} came", out.0.len());
+        source.step(&mut out).unwrap();
+    }
+    out.0
+}
+
+#[test]
+fn rmw_zenoh_with_commands_and_lost_messages() {
+    let endpoint = endpoint();
+    let session = publisher(&endpoint);
+    let topics = Topics {
+        command: Some("/joint_commands".to_owned()),
+        ..Topics::default()
+    };
+    let mut source = source(&endpoint, Keys::RmwZenoh, topics);
+    let key = |topic: &str| {
+        format!(
+            "0/{topic}/{}/{}",
+            ros::JointState::dds_type(),
+            ros::JointState::TYPE_HASH
+        )
+    };
+    let (states, commands) = (key("joint_states"), key("joint_commands"));
+    meet(&session, &states, &mut source);
+    for i in 1..=50_i64 {
+        let (stamp_ns, q) = (1000 * MS + i * 10 * MS, i as f64);
+        session
+            .put(&commands, body(&state(stamp_ns, "b a", &[-q, q], &[])))
+            .wait()
+            .unwrap();
+        // Number 20 is lost on the way.
+        let put = session
+            .put(
+                &states,
+                body(&state(stamp_ns, "b a", &[2.0 * q, q], &[0.2, 0.1])),
+            )
+            .attachment(attachment(if i < 20 { i } else { i + 1 }));
+        put.wait().unwrap();
+    }
+    let samples = receive(&mut source, 50);
+    let (first, last) = (&samples[0], &samples[samples.len() - 1]);
+    assert_eq!(last.position[..2], [50.0, 100.0]);
+    assert_eq!(last.effort[..2], [0.1, 0.2]);
+    assert!(last.header.has(flags::COMMAND));
+    assert_eq!(last.command_position[..2], [50.0, -50.0]);
+    assert_eq!(last.header.stamp_ns, 1500 * MS);
+    assert!(last.header.received_ns >= first.header.received_ns);
+    assert!(
+        first.header.received_ns > 1_600_000_000_000 * MS,
+        "a clock of this century"
+    );
+    assert_eq!(source.counts().lost, 1);
+    assert_eq!(source.counts().undecodable, 0);
+    assert_eq!(source.dropped(), 1);
+}
+
+#[test]
+fn another_version_of_the_type_is_heard() {
+    let endpoint = endpoint();
+    let session = publisher(&endpoint);
+    let mut source = source(&endpoint, Keys::RmwZenoh, Topics::default());
+    let key = format!("0/joint_states/{}/RIHS01_0123", ros::JointState::dds_type());
+    meet(&session, &key, &mut source);
+    assert_eq!(source.dropped(), 0);
+}
+
+#[test]
+fn a_bridge_and_our_own_keys() {
+    for (keys, namespace, key) in [
+        (Keys::Ros2dds, Some("bot1"), "bot1/joint_states"),
+        (Keys::Tauscope, None, "demo/joint_states"),
+    ] {
+        let endpoint = endpoint();
+        let session = publisher(&endpoint);
+        let zenoh = ZenohConfig {
+            connect: vec![endpoint],
+            keys,
+            namespace: namespace.map(str::to_owned),
+            ..ZenohConfig::default()
+        };
+        let mut source = ZenohSource::open(&zenoh, &Config::default(), &cell("a b")).unwrap();
+        meet(&session, key, &mut source);
+        // What is no joint state is counted, and does no harm.
+        session.put(key, vec![1, 2, 3]).wait().unwrap();
+        session
+            .put(key, body(&state(5000 * MS, "a b", &[1.0, 2.0], &[])))
+            .wait()
+            .unwrap();
+        let samples = receive(&mut source, 1);
+        assert_eq!(samples[0].position[..2], [1.0, 2.0]);
+        assert_eq!(source.counts().undecodable, 1);
+        assert_eq!(source.dropped(), 1);
+    }
+}
+
+#[test]
+fn a_publisher_that_comes_late_and_one_that_comes_back_are_heard() {
+    let endpoint = endpoint();
+    let mut source = source(&endpoint, Keys::Tauscope, Topics::default());
+    let mut nothing = Collect(Vec::new());
+    source.step(&mut nothing).unwrap();
+    assert!(nothing.0.is_empty() && !source.is_connected());
+    let key = "demo/joint_states";
+    for round in 1..=2 {
+        let session = publisher(&endpoint);
+        meet_at(&session, key, &mut source, round * 100_000);
+        session.close().wait().unwrap();
+    }
+}
+
+/// As `meet`, with stamps that go on from `first_ms`.
+fn meet_at(session: &Session, key: &str, source: &mut ZenohSource, first_ms: i64) {
+    let deadline = Instant::now() + PATIENCE;
+    let mut out = Collect(Vec::new());
+    let mut stamp_ms = first_ms;
+    while !out
+        .0
+        .iter()
+        .any(|s: &JointState| s.header.stamp_ns >= first_ms * MS)
+    {
+        assert!(Instant::now() < deadline, "nothing came through");
+        stamp_ms += 1;
+        session
+            .put(key, body(&state(stamp_ms * MS, "a b", &[0.0, 0.0], &[])))
+            .wait()
+            .unwrap();
+        source.step(&mut out).unwrap();
+    }
+}
+
+#[test]
+fn a_busy_pipeline_loses_the_oldest_and_says_how_many() {
+    let endpoint = endpoint();
+    let session = publisher(&endpoint);
+    let zenoh = ZenohConfig {
+        connect: vec![endpoint],
+        keys: Keys::Tauscope,
+        queue: 10,
+        ..ZenohConfig::default()
+    };
+    let mut source = ZenohSource::open(&zenoh, &Config::default(), &cell("a b")).unwrap();
+    let key = "demo/joint_states";
+    meet(&session, key, &mut source);
+    while source.step(&mut Collect(Vec::new())).unwrap() != tauscope_bus::Progress::Idle {}
+    for i in 1..=100_i64 {
+        let put = session.put(key, body(&state(i * 10 * MS, "a b", &[i as f64, 0.0], &[])));
+        put.congestion_control(zenoh::qos::CongestionControl::Block)
+            .wait()
+            .unwrap();
+    }
+    let deadline = Instant::now() + PATIENCE;
+    while source.counts().overflowed < 90 {
+        assert!(Instant::now() < deadline, "{:?}", source.counts());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let samples = receive(&mut source, 10);
+    let kept: Vec<_> = samples.iter().map(|s| s.position[0]).collect();
+    assert_eq!(kept, (91..=100).map(f64::from).collect::<Vec<_>>());
+    assert_eq!(source.dropped(), 90);
+}
+
+#[test]
+fn what_cannot_work_is_refused() {
+    let open = |zenoh: ZenohConfig| {
+        ZenohSource::open(&zenoh, &Config::default(), &cell("a b")).unwrap_err()
+    };
+    let error = open(ZenohConfig::default());
+    assert!(error.is_input());
+    assert!(
+        error.to_string().contains("`connect` or `listen`"),
+        "{error}"
+    );
+    let nonsense = ZenohConfig {
+        connect: vec!["localhost:7447".to_owned()],
+        ..ZenohConfig::default()
+    };
+    let error = open(nonsense);
+    assert!(error.is_input());
+    assert!(error.to_string().contains("localhost:7447"), "{error}");
+}
