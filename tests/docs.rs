@@ -1,0 +1,91 @@
+//! The files that the documentation shows are good ones.
+
+mod common;
+
+use common::{Out, bundled, root, tauscope, write};
+
+/// The first block of `document` that begins with this line.
+fn block(document: &str, fence: &str) -> String {
+    let text = std::fs::read_to_string(root().join("docs").join(document)).unwrap();
+    let start = text.find(&format!("```{fence}\n")).unwrap() + fence.len() + 4;
+    let rest = &text[start..];
+    rest[..rest.find("```").unwrap()].to_owned()
+}
+
+fn passes(kind: &str, text: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    let file = write(&folder.path().join("file.yaml"), text);
+    let mut command = tauscope();
+    command.args(["check", "--kind", kind]).arg(file);
+    let out = Out::of(command);
+    assert_eq!(out.code, 0, "{kind}: {}", out.stderr);
+}
+
+#[test]
+fn the_twin_the_case_and_the_set_pass_the_check() {
+    passes("twin", &block("twin.md", "yaml"));
+    passes("case", &block("case-and-set.md", "yaml case"));
+    passes("set", &block("case-and-set.md", "yaml set"));
+}
+
+#[test]
+fn the_check_of_a_kind_refuses_another_kind() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = write(
+        &folder.path().join("set.yaml"),
+        &block("case-and-set.md", "yaml set"),
+    );
+    let mut command = tauscope();
+    command.args(["check", "--kind", "case"]).arg(file);
+    let out = Out::of(command);
+    assert_eq!(out.code, 2);
+    assert!(out.stderr.contains("unknown key `set`"), "{}", out.stderr);
+}
+
+#[test]
+fn the_scenario_is_simulated_and_its_twin_calibrated_as_documented() {
+    let folder = tempfile::tempdir().unwrap();
+    let robot = folder.path().join("demo_arm.urdf");
+    std::fs::copy(bundled().join("demo_arm.urdf"), &robot).unwrap();
+    let file = write(
+        &folder.path().join("scenario.yaml"),
+        &block("scenario.md", "yaml"),
+    );
+    let mut simulate = tauscope();
+    simulate
+        .arg("simulate")
+        .arg(file)
+        .arg("--out")
+        .arg(folder.path());
+    let out = Out::of(simulate);
+    assert_eq!(out.code, 0, "{}", out.stderr);
+    let mut calibrate = tauscope();
+    calibrate
+        .arg("calibrate")
+        .arg("--robot")
+        .arg(robot)
+        .arg(folder.path().join("free.mcap"));
+    calibrate.arg("--out").arg(folder.path().join("twin.yaml"));
+    let out = Out::of(calibrate);
+    assert_eq!(out.code, 0, "{}", out.stderr);
+    passes(
+        "twin",
+        &std::fs::read_to_string(folder.path().join("twin.yaml")).unwrap(),
+    );
+}
+
+#[test]
+fn the_bundled_files_pass_the_check() {
+    for (kind, file) in [
+        ("scenario", "demo.scenario.yaml"),
+        ("twin", "demo.twin.yaml"),
+    ] {
+        passes(
+            kind,
+            &std::fs::read_to_string(bundled().join(file)).unwrap(),
+        );
+    }
+    let mut command = tauscope();
+    command.current_dir(root()).arg("check");
+    assert_eq!(Out::of(command).code, 0);
+}
