@@ -35,6 +35,14 @@ impl IngestError {
     /// Whether the arguments or files are wrong (exit code 2), rather than what happened since
     /// (exit code 1).
     pub fn is_input(&self) -> bool {
-        !matches!(self, Self::Zenoh(_))
+        !matches!(
+            self,
+            Self::Zenoh(_)
+                | Self::Scenario(
+                    ScenarioError::Unstable { .. }
+                        | ScenarioError::Write(_)
+                        | ScenarioError::Labels { .. }
+                )
+        )
     }
 }

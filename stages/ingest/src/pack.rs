@@ -109,7 +109,7 @@ impl Packer {
             references: Side::default(),
             tools: Side::default(),
             fixed_tool: setup.tool,
-            pending: VecDeque::with_capacity(MAX_PENDING),
+            pending: VecDeque::new(),
             newest_ns: None,
             flushed: false,
             messages: 0,

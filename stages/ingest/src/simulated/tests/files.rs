@@ -103,3 +103,32 @@ fn work_that_is_broken_off_leaves_nothing_that_looks_whole() {
         .collect();
     assert_eq!(left, [PathBuf::from("a.mcap.part")]);
 }
+
+#[test]
+fn the_motion_of_a_recording_is_made_again() {
+    let folder = tempfile::tempdir().unwrap();
+    make(1, folder.path());
+    let again = ideal(
+        &format!(
+            "duration_s: 4, motion: {{recorded: {{path: {:?}, topic: /joint_commands}}}}",
+            folder.path().join("b.mcap")
+        ),
+        "",
+    );
+    let of_b = scenario(
+        "{version: 1, robot: demo_arm.urdf, seed: 1, rate_hz: 1000, recordings: [\
+          {name: a, duration_s: 2, motion: {points: {}}}, \
+          {name: b, duration_s: 8, motion: {fourier: {}}}]}",
+    );
+    let mut first = Simulation::new(&of_b, &arm(), 1).unwrap();
+    let mut fastest = 0.0_f64;
+    for reading in readings(&again) {
+        let first = first.next_reading().unwrap().unwrap();
+        for j in 0..N {
+            let error = reading.command_position[j] - first.command_position[j];
+            assert!(error.abs() < 1e-3, "joint {j}: {error}");
+            fastest = fastest.max(reading.velocity[j].abs());
+        }
+    }
+    assert!(fastest > 0.3, "{fastest}");
+}
