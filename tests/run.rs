@@ -63,6 +63,75 @@ fn a_recording_goes_through_every_stage_and_nothing_is_lost() {
 }
 
 #[test]
+fn two_cells_and_several_detectors_run_side_by_side() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = bundled();
+    let mut text = "version: 1\ncells:\n".to_owned();
+    for cell in ["left", "right"] {
+        text += &format!(
+            "  {cell}: {{robot: {}}}\n",
+            data.join("demo_arm.urdf").display()
+        );
+    }
+    text += "stages:\n";
+    let mut recorded = Vec::new();
+    for (cell, recording) in [("left", "demo.mcap"), ("right", "demo_validation.mcap")] {
+        let path = data.join(recording);
+        text += &format!(
+            "- {{name: {cell}_in, cell: {cell}, ingest: {{file: {{path: {path}}}, rate: fast}}}}
+- {{name: {cell}_twin, input: {cell}_in, twin: {{}}}}
+- {{name: {cell}_one, input: {cell}_twin, detect: {{naive_difference: {{}}, threshold: {{score: 1000}}}}}}
+- {{name: {cell}_two, input: {cell}_twin, detect: {{twin_regression: {{}}, threshold: {{score: 1000}}}}}}
+",
+            path = path.display()
+        );
+        recorded.extend(["in", "twin", "one", "two"].map(|stage| format!("{cell}_{stage}")));
+    }
+    text += &format!(
+        "- {{name: all, inputs: [{}], record: {{mcap: out.mcap}}}}\n",
+        recorded.join(", ")
+    );
+    write(&folder.path().join("pipeline.yaml"), &text);
+    let (code, summary) = Live::start(folder.path(), &[]).end();
+    assert_eq!(code, 0, "{summary}");
+    let archive = info(&folder.path().join("out.mcap"));
+    for (cell, recording) in [("left", "demo.mcap"), ("right", "demo_validation.mcap")] {
+        let samples = count(&info(&data.join(recording)), "/joint_states");
+        for stage in ["one", "two"] {
+            assert_eq!(
+                stage_of(&summary, cell, stage)["received"],
+                samples,
+                "{summary}"
+            );
+        }
+        assert_eq!(count(&archive, &format!("/{cell}/joint_states")), samples);
+    }
+}
+
+fn stage_of<'a>(summary: &'a serde_json::Value, cell: &str, name: &str) -> &'a serde_json::Value {
+    stage(summary, &format!("{cell}_{name}"))
+}
+
+#[test]
+fn a_second_interrupt_ends_everything_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    pipeline(folder.path(), "realtime");
+    let mut text = std::fs::read_to_string(folder.path().join("pipeline.yaml")).unwrap();
+    text += "- {name: deaf, outside: {command: [sleep, \"1000\"], output: joint_state}}\n";
+    write(&folder.path().join("pipeline.yaml"), &text);
+    let mut live = Live::start(folder.path(), &[]);
+    let deaf = live.wait_for_stage("deaf");
+    live.wait_for_stage("ingest");
+    signal(live.id(), "INT");
+    live.wait_for("ending the sources");
+    signal(live.id(), "INT");
+    live.wait_for("ending everything at once");
+    let (code, summary) = live.end();
+    assert_eq!(code, 1, "{summary}");
+    assert!(!is_alive(deaf));
+}
+
+#[test]
 fn an_interrupt_ends_the_source_and_the_rest_finishes() {
     for name in ["INT", "TERM"] {
         let folder = tempfile::tempdir().unwrap();
@@ -98,12 +167,16 @@ fn nothing_outlives_a_supervisor_that_is_killed() {
     pipeline(folder.path(), "realtime");
     // A program that listens to nothing, not even to the end of its standard input.
     let mut text = std::fs::read_to_string(folder.path().join("pipeline.yaml")).unwrap();
-    text += "- {name: deaf, inputs: [detect], outside: {command: [sleep, \"1000\"]}}\n";
+    text += "- {name: deaf, outside: {command: [sleep, \"1000\"], output: joint_state}}\n";
     write(&folder.path().join("pipeline.yaml"), &text);
     let mut live = Live::start(folder.path(), &[]);
     let stages: Vec<u32> = ["deaf", "record", "detect", "twin", "ingest"]
         .map(|stage| live.wait_for_stage(stage))
         .into();
+    let part = folder.path().join("out.mcap.part");
+    wait_until("the archive grows", || {
+        part.metadata().is_ok_and(|file| file.len() > 20_000)
+    });
     assert!(stages.iter().all(|&id| is_alive(id)));
     signal(live.id(), "KILL");
     assert_eq!(live.end().0, -1);

@@ -1,5 +1,6 @@
 //! A pipeline that is running.
 #![allow(dead_code, reason = "each test file uses its own part")]
+#![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -10,7 +11,7 @@ use std::time::{Duration, Instant};
 use crate::common::tauscope;
 
 /// Slow machines run the tests, too; nothing waits this long where all is well.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_mins(1);
 
 /// `tauscope run`, heard line by line.
 pub struct Live {
@@ -97,6 +98,14 @@ impl Live {
             status.code().unwrap_or(-1),
             summary.unwrap_or(serde_json::Value::Null),
         )
+    }
+}
+
+/// A test that fails leaves nothing behind.
+impl Drop for Live {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
     }
 }
 

@@ -1,5 +1,6 @@
 //! What the tests of the whole program share.
 #![allow(dead_code, reason = "each test file uses its own part")]
+#![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
