@@ -1,5 +1,7 @@
 //! `tauscope check`: everything that is wrong at once, each at its place, and nothing started.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
 mod common;
 
 use std::path::Path;
@@ -270,6 +272,46 @@ stages:
     ] {
         assert!(text.contains(wanted), "`{wanted}` is missing in\n{text}");
     }
+}
+
+#[test]
+fn a_twin_made_for_another_robot_or_other_filters_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = std::fs::read_to_string(bundled().join("demo.twin.yaml")).unwrap();
+    assert!(model.contains("name: demo_arm\n") && model.contains("effort_cutoff_hz: 4.0\n"));
+    let model = model.replace("name: demo_arm\n", "name: other_arm\n");
+    write(&folder.path().join("twin.yaml"), &model);
+    let pipeline = stages(
+        "- {name: ingest, ingest: {zenoh: {connect: [tcp/127.0.0.1:7447]}}}
+- {name: twin, input: ingest, twin: {model: twin.yaml, effort_cutoff_hz: 5}}
+",
+    );
+    let out = check(folder.path(), &pipeline, &[]);
+    assert_eq!(
+        (out.code, out.stderr.as_str()),
+        (
+            2,
+            "\
+error: this twin was made for the robot `other_arm`, not for `demo_arm`
+ --> pipeline.yaml:5:45
+  |
+5 | - {name: twin, input: ingest, twin: {model: twin.yaml, effort_cutoff_hz: 5}}
+  |                                             ^^^^^^^^^
+  |
+  = help: calibrate one for this robot: `tauscope calibrate`
+
+error: `effort_cutoff_hz` is 5, but the twin's model was made with 4
+ --> pipeline.yaml:5:74
+  |
+5 | - {name: twin, input: ingest, twin: {model: twin.yaml, effort_cutoff_hz: 5}}
+  |                                                                          ^
+  |
+  = help: give `effort_cutoff_hz: 4`, or calibrate anew: its thresholds hold for no other
+
+2 errors; nothing was started
+"
+        )
+    );
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! kill -9 of any one stage: the supervisor says so and starts it again within a second, and the
 //! others go on.
+#![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 #[path = "common/live.rs"]
 mod live;

@@ -1,4 +1,5 @@
 //! A stage from another crate takes a place in a pipeline by name.
+#![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 #[path = "common/live.rs"]
 mod live;

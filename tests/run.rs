@@ -1,4 +1,5 @@
 //! `tauscope run`: stages as processes, their end in order, and what is said of it.
+#![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 #[path = "common/live.rs"]
 mod live;
@@ -66,36 +67,34 @@ fn a_recording_goes_through_every_stage_and_nothing_is_lost() {
 fn two_cells_and_several_detectors_run_side_by_side() {
     let folder = tempfile::tempdir().unwrap();
     let data = bundled();
-    let mut text = "version: 1\ncells:\n".to_owned();
-    for cell in ["left", "right"] {
-        text += &format!(
-            "  {cell}: {{robot: {}}}\n",
-            data.join("demo_arm.urdf").display()
-        );
-    }
-    text += "stages:\n";
-    let mut recorded = Vec::new();
-    for (cell, recording) in [("left", "demo.mcap"), ("right", "demo_validation.mcap")] {
+    let robot = data.join("demo_arm.urdf").display().to_string();
+    let cells = [("left", "demo.mcap"), ("right", "demo_validation.mcap")];
+    let branches = cells.map(|(cell, recording)| {
         let path = data.join(recording);
-        text += &format!(
+        format!(
             "- {{name: {cell}_in, cell: {cell}, ingest: {{file: {{path: {path}}}, rate: fast}}}}
 - {{name: {cell}_twin, input: {cell}_in, twin: {{}}}}
 - {{name: {cell}_one, input: {cell}_twin, detect: {{naive_difference: {{}}, threshold: {{score: 1000}}}}}}
 - {{name: {cell}_two, input: {cell}_twin, detect: {{twin_regression: {{}}, threshold: {{score: 1000}}}}}}
 ",
             path = path.display()
-        );
-        recorded.extend(["in", "twin", "one", "two"].map(|stage| format!("{cell}_{stage}")));
-    }
-    text += &format!(
-        "- {{name: all, inputs: [{}], record: {{mcap: out.mcap}}}}\n",
+        )
+    });
+    let recorded = cells.map(|(cell, _)| format!("{cell}_in, {cell}_twin, {cell}_one, {cell}_two"));
+    let text = format!(
+        "version: 1
+cells: {{left: {{robot: {robot}}}, right: {{robot: {robot}}}}}
+stages:
+{}- {{name: all, inputs: [{}], record: {{mcap: out.mcap}}}}
+",
+        branches.concat(),
         recorded.join(", ")
     );
     write(&folder.path().join("pipeline.yaml"), &text);
     let (code, summary) = Live::start(folder.path(), &[]).end();
     assert_eq!(code, 0, "{summary}");
     let archive = info(&folder.path().join("out.mcap"));
-    for (cell, recording) in [("left", "demo.mcap"), ("right", "demo_validation.mcap")] {
+    for (cell, recording) in cells {
         let samples = count(&info(&data.join(recording)), "/joint_states");
         for stage in ["one", "two"] {
             assert_eq!(

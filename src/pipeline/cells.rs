@@ -56,7 +56,7 @@ impl Cell {
     pub fn from_urdf(
         path: &Path,
         effort_unit: EffortUnit,
-        constants: BTreeMap<String, f64>,
+        constants: &BTreeMap<String, f64>,
     ) -> Result<Self, Report> {
         let urdf = std::fs::read_to_string(path)
             .map_err(|error| Problem::of_file(path, format!("cannot read the URDF: {error}")))?;
