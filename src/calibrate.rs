@@ -210,7 +210,7 @@ impl Job<'_> {
     }
 
     /// Every detector behind this twin, its score not yet measured.
-    fn detectors(&self, file: &TwinFile) -> Result<Vec<(Box<dyn Detector>, Spread)>, ReplayError> {
+    fn detectors(&self, file: &TwinFile) -> Result<Vec<Scored>, ReplayError> {
         let setup = build::detect_setup(Some(file), self.cell)?;
         let all = tauscope_detect::Config::every(&setup);
         Ok(all
@@ -237,6 +237,9 @@ impl Sink for Settled<'_> {
         Ok(())
     }
 }
+
+/// A detector and what its score has done.
+type Scored = (Box<dyn Detector>, Spread);
 
 /// Mean and spread of a number, as it comes (Welford).
 #[derive(Debug, Clone, Copy, Default)]

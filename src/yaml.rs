@@ -112,10 +112,22 @@ pub fn examine<T: DeserializeOwned + JsonSchema>(path: &Path) -> Result<Examined
         mismatches.into_result(())?;
         return Err(misread::<T>(value, &source, &spans));
     };
-    let entries = wrong.iter().map(|place| spans.value(&place.entry())).collect();
+    let entries = wrong
+        .iter()
+        .map(|place| spans.value(&place.entry()))
+        .collect();
     let path = path.to_owned();
-    let file = Located { value, path, source, spans };
-    Ok(Examined { file, mismatches, entries })
+    let file = Located {
+        value,
+        path,
+        source,
+        spans,
+    };
+    Ok(Examined {
+        file,
+        mismatches,
+        entries,
+    })
 }
 
 /// What deserialising says of a value that the schema lets pass.
@@ -145,8 +157,7 @@ pub fn parse<T: DeserializeOwned + JsonSchema>(
     let (value, spans) = tree::parse(&source)?;
     let mismatches = structure::check::<T>(&source, &value, &spans);
     mismatches.into_result(())?;
-    let value =
-        T::deserialize(&value).map_err(|_| misread::<T>(value.clone(), &source, &spans))?;
+    let value = T::deserialize(&value).map_err(|_| misread::<T>(value.clone(), &source, &spans))?;
     Ok(Located {
         value,
         path: path.to_owned(),

@@ -1,5 +1,7 @@
 //! The files that the documentation shows are good ones.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
 mod common;
 
 use common::{Out, bundled, root, tauscope, write};

@@ -1,6 +1,8 @@
 //! Replay of the bundled recording: what is found, that it is the same every time, and that old
 //! archives can be gone through anew.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
 mod common;
 
 use std::path::{Path, PathBuf};

@@ -1,5 +1,7 @@
 //! Two hosts of one pipeline file: on one machine over loopback, and in two network namespaces.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
 #[path = "common/live.rs"]
 mod live;
 

@@ -85,7 +85,7 @@ fn motion(text: &str) -> Result<Motion, String> {
 /// Calibrates and writes the twin.
 pub fn run(args: &Args) -> Result<Exit, Failure> {
     let constants = args.torque_constant.iter().cloned().collect();
-    let cell = Cell::from_urdf(&args.robot, args.effort_unit, constants)?;
+    let cell = Cell::from_urdf(&args.robot, args.effort_unit, &constants)?;
     let topics = Topics {
         state: args.state_topic.clone(),
         command: args.command_topic.clone(),

@@ -260,21 +260,27 @@ fn table(outcomes: &[Outcome]) -> String {
     text
 }
 
+/// A row of the table: its name, and what stands in it of a joint.
+type Row = (&'static str, fn(&JointRms) -> f64);
+
 fn rms_table(outcome: &Outcome, rms: &[JointRms]) -> Table {
     let mut table = Table::new();
     table.load_preset(presets::NOTHING);
     let names = outcome.joint_names.iter().map(String::as_str);
     table.set_header(std::iter::once("   ").chain(names));
-    let rows: [(&str, fn(&JointRms) -> f64); 3] = [
+    let rows: [Row; 3] = [
         ("   all samples", |rms| rms.residual_rms),
         ("   moving", |rms| rms.residual_rms_moving),
         ("   low-passed", |rms| rms.filtered_residual_rms),
     ];
     for (name, value) in rows {
-        let values = rms.iter().map(value).map(|rms| match rms.is_finite() {
-            true => format!("{rms:.3}"),
-            // No sample of that kind.
-            false => "-".to_owned(),
+        let values = rms.iter().map(value).map(|rms| {
+            // Not a number where there was no sample of that kind.
+            if rms.is_finite() {
+                format!("{rms:.3}")
+            } else {
+                "-".to_owned()
+            }
         });
         table.add_row(std::iter::once(name.to_owned()).chain(values));
     }

@@ -40,24 +40,22 @@ impl Sink for &mut Observer {
         let observed = &mut self.observed;
         let stamp_ns = match sample {
             SampleRef::TwinState(sample) => {
-                match observed.twins.get_mut(from) {
-                    Some(tally) => tally.add(sample),
-                    None => {
-                        let mut tally = TwinTally::new(from, self.joint_names.len());
-                        tally.add(sample);
-                        observed.twins.insert(from.to_owned(), tally);
-                    }
+                if !observed.twins.contains_key(from) {
+                    let tally = TwinTally::new(from, self.joint_names.len());
+                    observed.twins.insert(from.to_owned(), tally);
+                }
+                if let Some(tally) = observed.twins.get_mut(from) {
+                    tally.add(sample);
                 }
                 sample.header.stamp_ns
             }
             SampleRef::Detection(sample) => {
-                match observed.detectors.get_mut(from) {
-                    Some(tally) => tally.add(sample),
-                    None => {
-                        let mut tally = DetectionTally::new(from, &self.joint_names);
-                        tally.add(sample);
-                        observed.detectors.insert(from.to_owned(), tally);
-                    }
+                if !observed.detectors.contains_key(from) {
+                    let tally = DetectionTally::new(from, &self.joint_names);
+                    observed.detectors.insert(from.to_owned(), tally);
+                }
+                if let Some(tally) = observed.detectors.get_mut(from) {
+                    tally.add(sample);
                 }
                 sample.header.stamp_ns
             }

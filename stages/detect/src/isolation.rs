@@ -96,7 +96,9 @@ impl Isolation {
                 pull += row * (torque * weight);
             }
             let damped = information + Matrix3::identity() * (DAMPING * information.trace());
-            let Some(inverse) = damped.try_inverse() else { continue };
+            let Some(inverse) = damped.try_inverse() else {
+                continue;
+            };
             let force = inverse * pull;
             // What the force explains of Σ (τ_j / σ_j)².
             let explained = 2.0 * pull.dot(&force) - force.dot(&(information * force));
