@@ -13,7 +13,6 @@ mod csv_file;
 mod damage;
 mod error;
 mod info;
-mod joint_map;
 mod mcap_file;
 mod mcap_write;
 mod recording;
@@ -25,7 +24,6 @@ pub use csv_file::{Column, Columns, CsvError, CsvMapping, CsvProblem, limits as 
 pub use damage::{Damage, DamageKind};
 pub use error::ArchiveError;
 pub use info::{Gap, Info, JointsInfo, TopicInfo};
-pub use joint_map::{JointMap, JointMapError};
 pub use mcap_write::{
     CHUNK_SPAN_NS, Compression, McapWriter, PROVENANCE, TopicWriter, WriteError, Written,
 };
