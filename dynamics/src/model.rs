@@ -7,6 +7,7 @@ use crate::data::Slot;
 
 mod document;
 mod error;
+mod places;
 mod shape;
 mod tree;
 mod urdf;
@@ -29,7 +30,8 @@ pub struct Model {
     /// Per link.
     pub(crate) frames: Vec<Frame>,
     pub(crate) gravity: Vector3<f64>,
-    tool_link: Option<usize>,
+    /// The link that [`Model::set_tool`] was last called with.
+    tool_on: Option<usize>,
 }
 
 /// A movable joint.
@@ -245,7 +247,7 @@ impl Model {
     /// # Panics
     /// If `link` is not an index into [`Model::links`].
     pub fn set_tool(&mut self, link: usize, inertia: Inertia) {
-        if let Some(before) = self.tool_link.replace(link) {
+        if let Some(before) = self.tool_on.replace(link) {
             self.change(before, |body, there| body.tool = there, Inertia::zero());
         }
         self.change(link, |body, there| body.tool = there, inertia);

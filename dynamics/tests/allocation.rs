@@ -8,7 +8,7 @@ use std::hint::black_box;
 
 use nalgebra::Vector3;
 use tauscope_dynamics::derivative::FilteredDerivative;
-use tauscope_dynamics::terms::{EFFECTS, MotionSample, TermSpec};
+use tauscope_dynamics::terms::{CoordinateKind, EFFECTS, MotionSample, Site};
 use tauscope_dynamics::{
     Data, Inertia, Model, Wrench, forward_dynamics, forward_kinematics, gravity_effort,
     link_jacobian, link_pose, mass_matrix, regressor, rnea,
@@ -80,19 +80,21 @@ fn nothing_is_allocated_per_call() {
     }];
     let tool = Inertia::new(0.5, [0.0, 0.0, 0.1], [0.001; 6]);
     let mut derivative = FilteredDerivative::new(12.0);
-    let names = ["turn".to_owned(), "slide".to_owned()];
-    let spec = |effect: &&tauscope_dynamics::terms::Effect| TermSpec {
-        effect: effect.name.to_owned(),
-        joint: "slide".to_owned(),
-        parameters: effect
-            .parameters
-            .iter()
-            .map(|p| (p.name.to_owned(), 1.0))
-            .collect(),
-    };
     let mut terms: Vec<_> = EFFECTS
         .iter()
-        .map(|effect| spec(effect).build(&names).unwrap())
+        .map(|effect| {
+            let site = Site {
+                model: &model,
+                joint: 1,
+                source: 0,
+                link: tip,
+            };
+            let coordinates = effect.coordinates.iter().map(|c| match c.kind {
+                CoordinateKind::Shape { lower, upper, .. } => 0.5 * (lower + upper),
+                _ => 0.5,
+            });
+            (effect.build)(&site, &coordinates.collect::<Vec<_>>())
+        })
         .collect();
     let mut effort = [0.0; 2];
 
@@ -112,12 +114,15 @@ fn nothing_is_allocated_per_call() {
             black_box(derivative.update(0.001, 0.3));
             let at = MotionSample {
                 dt_s: 0.001,
+                recording_s: 1.0,
+                session_s: 1.0,
                 position: &q,
                 velocity: &qd,
                 acceleration: &qdd,
+                transmitted: &q,
             };
             for term in &mut terms {
-                term.add_effort(&at, &mut effort);
+                term.act(&at, &mut effort);
             }
         }
     });

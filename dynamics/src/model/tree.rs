@@ -65,7 +65,7 @@ pub(super) fn build(robot: Robot) -> Result<Model, ModelError> {
         // Every link is reached: the order holds them all.
         frames: frames.into_iter().flatten().collect(),
         gravity: Vector3::new(0.0, 0.0, -GRAVITY_M_S2),
-        tool_link: None,
+        tool_on: None,
     })
 }
 

@@ -5,137 +5,199 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{EFFECTS, Effect, Term, effect, get};
+use super::table::{self, TableSpec};
+use super::{EFFECTS, Effect, PlaceKind, Site, Term, effect};
+use crate::Model;
+
+mod error;
+
+pub use error::TermError;
 
 /// A term as a file holds it: `{effect: viscous_friction, joint: joint1, parameters:
 /// {viscous_nms_per_rad: 3.0}}`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TermSpec {
     /// Canonical name of the effect.
     pub effect: String,
-    /// The joint it is in.
-    pub joint: String,
-    /// All its parameters by canonical name.
+    /// The joint it is in, for effects of a joint.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint: Option<String>,
+    /// The link it is in, for effects of a link. For those of the tool and of the base it may be left
+    /// out: the link `tool`, or else the last of the chain, and the root.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub link: Option<String>,
+    /// The joint that drives it, for couplings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source_joint: Option<String>,
+    /// Its parameters by canonical name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub parameters: BTreeMap<String, f64>,
-}
-
-/// Why a term cannot be built or changed.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum TermError {
-    /// There is no such effect.
-    #[error("there is no effect `{effect}`; known are: {known}")]
-    UnknownEffect {
-        /// The name given.
-        effect: String,
-        /// The names there are.
-        known: String,
-    },
-    /// The robot has no such joint.
-    #[error("`{effect}` names joint `{joint}`, which the robot does not have; its joints: {known}")]
-    UnknownJoint {
-        /// The effect.
-        effect: String,
-        /// The name given.
-        joint: String,
-        /// The robot's joints.
-        known: String,
-    },
-    /// The effect has no such parameter.
-    #[error("`{effect}` has no parameter `{parameter}`; it has: {known}")]
-    UnknownParameter {
-        /// The effect.
-        effect: &'static str,
-        /// The name given.
-        parameter: String,
-        /// The names there are.
-        known: String,
-    },
-    /// A parameter is not given.
-    #[error("`{effect}` needs the parameter `{parameter}`")]
-    MissingParameter {
-        /// The effect.
-        effect: &'static str,
-        /// The parameter.
-        parameter: &'static str,
-    },
-    /// A value that cannot be.
-    #[error("`{parameter}` of `{effect}` is {value}, it must be a number of at least {minimum}")]
-    OutOfRange {
-        /// The effect.
-        effect: &'static str,
-        /// The parameter.
-        parameter: &'static str,
-        /// The value given.
-        value: f64,
-        /// The least that is possible.
-        minimum: f64,
-    },
+    /// The curve of an `unknown` effect, which has no other parameters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub table: Option<TableSpec>,
 }
 
 impl TermSpec {
-    /// The spec of a term in a robot with these joints.
-    ///
-    /// # Panics
-    /// If the term is in a joint that is not among `joint_names`.
-    pub fn of(term: &dyn Term, joint_names: &[String]) -> Self {
+    /// The spec of a term that was built at this site.
+    pub fn of(term: &dyn Term, site: &Site<'_>) -> Self {
         let effect = term.effect();
-        let value = |name: &&'static str| Some(((*name).to_owned(), get(term, name)?));
-        let names: Vec<_> = effect
-            .parameters
-            .iter()
-            .map(|parameter| parameter.name)
-            .collect();
+        let joint = |index: usize| Some(site.model.joints()[index].name.clone());
+        let link = |index: usize| Some(site.model.links()[index].name.clone());
+        let (mut at_joint, mut at_link, mut source_joint) = (None, None, None);
+        match effect.place {
+            PlaceKind::Joint => at_joint = joint(site.joint),
+            PlaceKind::TwoJoints => {
+                at_joint = joint(site.joint);
+                source_joint = joint(site.source);
+            }
+            PlaceKind::Link | PlaceKind::Tool => at_link = link(site.link),
+            PlaceKind::Base => at_link = link(site.model.base_link()),
+            PlaceKind::All => {}
+        }
+        let values = (effect.to_parameters)(term.coordinates());
+        let named = effect.parameters.iter().zip(values);
         Self {
             effect: effect.name.to_owned(),
-            joint: joint_names[term.joint()].clone(),
-            parameters: names.iter().filter_map(value).collect(),
+            joint: at_joint,
+            link: at_link,
+            source_joint,
+            parameters: named.map(|(p, value)| (p.name.to_owned(), value)).collect(),
+            table: term.table().map(|table| TableSpec::of(table, site.model)),
         }
     }
 
-    /// Makes the term for a robot whose joints are `joint_names`, in URDF order.
+    /// Makes the term for a robot.
     ///
     /// # Errors
-    /// If the effect, the joint or a parameter is unknown, a parameter is missing or a value impossible.
-    pub fn build(&self, joint_names: &[String]) -> Result<Box<dyn Term>, TermError> {
-        let Some(effect) = effect(&self.effect) else {
-            return Err(TermError::UnknownEffect {
-                effect: self.effect.clone(),
-                known: list(EFFECTS.iter().map(|effect| effect.name)),
+    /// If the effect, its place or a parameter is unknown, a place or parameter is missing, or a value
+    /// impossible.
+    pub fn build(&self, model: &Model) -> Result<Box<dyn Term>, TermError> {
+        let effect = self.effect()?;
+        let site = self.site(model)?;
+        for (name, &value) in &self.parameters {
+            effect.check(name, value)?;
+        }
+        if effect.name == table::EFFECT.name {
+            return self.build_table(&site);
+        }
+        if self.table.is_some() {
+            return Err(TermError::NoTable {
+                effect: effect.name,
             });
-        };
-        let Some(joint) = joint_names.iter().position(|name| *name == self.joint) else {
-            return Err(TermError::UnknownJoint {
-                effect: self.effect.clone(),
-                joint: self.joint.clone(),
-                known: list(joint_names.iter().map(String::as_str)),
-            });
-        };
-        for (parameter, &value) in &self.parameters {
-            effect.check(parameter, value)?;
         }
         let value = |parameter: &super::Parameter| {
-            let (effect, parameter) = (effect.name, parameter.name);
-            let missing = TermError::MissingParameter { effect, parameter };
-            self.parameters.get(parameter).copied().ok_or(missing)
+            let given = self.parameters.get(parameter.name).copied();
+            given
+                .or(parameter.default)
+                .ok_or(TermError::MissingParameter {
+                    effect: effect.name,
+                    parameter: parameter.name,
+                })
         };
-        let values = effect
-            .parameters
-            .iter()
-            .map(value)
-            .collect::<Result<Vec<_>, _>>()?;
-        Ok((effect.build)(joint, &values))
+        let values = effect.parameters.iter().map(value);
+        let values = values.collect::<Result<Vec<_>, _>>()?;
+        let coordinates = (effect.to_coordinates)(&values);
+        Ok((effect.build)(&site, &coordinates))
+    }
+
+    /// The effect it names.
+    ///
+    /// # Errors
+    /// If there is none of that name.
+    pub fn effect(&self) -> Result<&'static Effect, TermError> {
+        effect(&self.effect).ok_or_else(|| TermError::UnknownEffect {
+            effect: self.effect.clone(),
+            known: list(EFFECTS.iter().map(|effect| effect.name)),
+        })
+    }
+
+    /// The site it names in this robot.
+    ///
+    /// # Errors
+    /// If the effect or a joint or link is unknown, or one is missing.
+    pub fn site<'m>(&self, model: &'m Model) -> Result<Site<'m>, TermError> {
+        let effect = self.effect()?;
+        let joint = |name: &Option<String>, key| match name {
+            Some(name) => model
+                .joint_index(name)
+                .ok_or_else(|| TermError::UnknownJoint {
+                    effect: effect.name,
+                    joint: name.clone(),
+                    known: list(model.joint_names()),
+                }),
+            None => Err(TermError::MissingPlace {
+                effect: effect.name,
+                key,
+            }),
+        };
+        let link = || match &self.link {
+            Some(name) => {
+                let index = model
+                    .link_index(name)
+                    .ok_or_else(|| TermError::UnknownLink {
+                        effect: effect.name,
+                        link: name.clone(),
+                        known: list(model.links().iter().map(|link| link.name.as_str())),
+                    });
+                index.map(Some)
+            }
+            None => Ok(None),
+        };
+        let mut site = Site {
+            model,
+            joint: 0,
+            source: 0,
+            link: 0,
+        };
+        match effect.place {
+            PlaceKind::Joint => site.joint = joint(&self.joint, "joint")?,
+            PlaceKind::TwoJoints => {
+                site.joint = joint(&self.joint, "joint")?;
+                site.source = joint(&self.source_joint, "source_joint")?;
+            }
+            PlaceKind::Link => {
+                site.link = link()?.ok_or(TermError::MissingPlace {
+                    effect: effect.name,
+                    key: "link",
+                })?;
+            }
+            PlaceKind::Tool => site.link = link()?.unwrap_or_else(|| model.tool_link()),
+            PlaceKind::Base => site.link = link()?.unwrap_or_else(|| model.base_link()),
+            PlaceKind::All => {}
+        }
+        Ok(site)
+    }
+
+    fn build_table(&self, site: &Site<'_>) -> Result<Box<dyn Term>, TermError> {
+        let Some(spec) = &self.table else {
+            return Err(TermError::MissingTable {
+                effect: table::EFFECT.name,
+            });
+        };
+        let of_joint = match &spec.of_joint {
+            None => site.joint,
+            Some(name) => site
+                .model
+                .joint_index(name)
+                .ok_or_else(|| TermError::UnknownJoint {
+                    effect: table::EFFECT.name,
+                    joint: name.clone(),
+                    known: list(site.model.joint_names()),
+                })?,
+        };
+        super::table(site, spec.table(of_joint))
     }
 }
 
 impl Effect {
     /// The index of a parameter that can have this value.
-    pub(super) fn check(&self, parameter: &str, value: f64) -> Result<usize, TermError> {
-        let Some(index) = self
-            .parameters
-            .iter()
-            .position(|known| known.name == parameter)
-        else {
+    ///
+    /// # Errors
+    /// If there is no such parameter or the value is impossible.
+    pub fn check(&self, parameter: &str, value: f64) -> Result<usize, TermError> {
+        let found = self.parameters.iter().position(|p| p.name == parameter);
+        let Some(index) = found else {
             return Err(TermError::UnknownParameter {
                 effect: self.name,
                 parameter: parameter.to_owned(),
@@ -148,7 +210,10 @@ impl Effect {
                 effect: self.name,
                 parameter: known.name,
                 value,
-                minimum: known.minimum,
+                expected: match known.minimum {
+                    f64::NEG_INFINITY => "a number".to_owned(),
+                    minimum => format!("a number of at least {minimum}"),
+                },
             });
         }
         Ok(index)
@@ -163,8 +228,8 @@ fn list<'a>(names: impl Iterator<Item = &'a str>) -> String {
 mod tests {
     use super::*;
 
-    fn joints() -> Vec<String> {
-        vec!["joint1".to_owned(), "joint2".to_owned()]
+    fn joints() -> Model {
+        Model::massless(&["joint1".to_owned(), "joint2".to_owned()])
     }
 
     fn spec(json: &str) -> TermSpec {
@@ -175,13 +240,11 @@ mod tests {
 
     #[test]
     fn a_spec_becomes_a_term_and_a_spec_again() {
-        let term = spec(VISCOUS).build(&joints()).unwrap();
-        assert_eq!(term.joint(), 1);
-        assert_eq!(
-            term.sentence("joint2"),
-            "Joint joint2 has viscous friction of 3 N m s/rad."
-        );
-        let again = TermSpec::of(&*term, &joints());
+        let model = joints();
+        let spec = spec(VISCOUS);
+        let term = spec.build(&model).unwrap();
+        assert_eq!(term.coordinates(), [3.0]);
+        let again = TermSpec::of(&*term, &spec.site(&model).unwrap());
         assert_eq!(serde_json::to_string(&again).unwrap(), VISCOUS);
     }
 
@@ -190,14 +253,14 @@ mod tests {
         let message = |json: &str| spec(json).build(&joints()).unwrap_err().to_string();
         for (from, to, expected) in [
             (
-                "viscous_friction",
-                "viscous",
-                "there is no effect `viscous`; known are: coulomb_friction, viscous_friction",
-            ),
-            (
                 "joint2",
                 "joint7",
                 "`viscous_friction` names joint `joint7`, which the robot does not have; its joints: joint1, joint2",
+            ),
+            (
+                r#""joint":"joint2","#,
+                "",
+                "`viscous_friction` needs the key `joint`",
             ),
             (
                 "viscous_nms_per_rad",
@@ -217,5 +280,7 @@ mod tests {
         ] {
             assert_eq!(message(&VISCOUS.replace(from, to)), expected);
         }
+        let unknown = message(&VISCOUS.replace("viscous_friction", "viscous"));
+        assert!(unknown.starts_with("there is no effect `viscous`; known are: "));
     }
 }

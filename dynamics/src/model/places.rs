@@ -1,0 +1,112 @@
+//! Which link is which, and a stand-in for a robot that is not known.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{Body, Frame, GRAVITY_M_S2, Joint, JointKind, Limits, Link, Load, Model};
+use crate::Inertia;
+
+impl Model {
+    /// The link that holds tools and payloads: the one named `tool` or, failing that, `tool0`; else,
+    /// of the links on which no other hangs, the one with the most movable joints between it and the
+    /// base, the last of several.
+    pub fn tool_link(&self) -> usize {
+        let moves = |link: &usize| self.links[*link].joint.is_some();
+        let named = ["tool", "tool0"]
+            .iter()
+            .filter_map(|name| self.link_index(name));
+        if let Some(link) = named.filter(moves).next() {
+            return link;
+        }
+        let holds = |link: usize| self.links.iter().any(|other| other.parent == Some(link));
+        (0..self.links.len())
+            .filter(|&link| !holds(link))
+            .max_by_key(|&link| self.joints_before(link))
+            .unwrap_or(0)
+    }
+
+    /// The link that stands still and carries all others.
+    pub fn base_link(&self) -> usize {
+        let root = self.links.iter().position(|link| link.parent.is_none());
+        root.unwrap_or(0)
+    }
+
+    /// Number of movable joints between a link and the base.
+    fn joints_before(&self, link: usize) -> usize {
+        let mut count = 0;
+        let mut at = self.links[link].joint;
+        while let Some(joint) = at {
+            count += 1;
+            at = self.links[self.joints[joint].parent_link].joint;
+        }
+        count
+    }
+
+    /// A chain of joints of these names without masses or lengths: the stand-in for a robot of which
+    /// nothing else is known. No motion costs it any effort.
+    pub fn massless(joint_names: &[String]) -> Self {
+        let link = |name: String, parent: Option<usize>| Link {
+            name,
+            inertia: Inertia::zero(),
+            shapes: Vec::new(),
+            parent,
+            joint: parent,
+        };
+        let frame = |slot| Frame {
+            slot,
+            rotation: Matrix3::identity(),
+            translation: Vector3::zeros(),
+        };
+        let mut model = Self {
+            name: String::new(),
+            joints: Vec::new(),
+            links: vec![link("base".to_owned(), None)],
+            bodies: Vec::new(),
+            frames: vec![frame(0)],
+            gravity: Vector3::new(0.0, 0.0, -GRAVITY_M_S2),
+            tool_on: None,
+        };
+        for (j, name) in joint_names.iter().enumerate() {
+            model.joints.push(Joint {
+                name: name.clone(),
+                kind: JointKind::Continuous,
+                parent_link: j,
+                child_link: j + 1,
+                axis: [0.0, 0.0, 1.0],
+                limits: Limits::default(),
+            });
+            // Behind link j, moved by joint j.
+            model.links.push(link(format!("{name}_link"), Some(j)));
+            model.frames.push(frame(j + 1));
+            model.bodies.push(Body {
+                joint: j,
+                parent: j,
+                prismatic: false,
+                rotation: Matrix3::identity(),
+                translation: Vector3::zeros(),
+                alignment: Matrix3::identity(),
+                own: Inertia::zero(),
+                tool: Inertia::zero(),
+                load: Load::default(),
+            });
+        }
+        model
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Data, rnea};
+
+    #[test]
+    fn a_massless_chain_costs_nothing() {
+        let names = ["a".to_owned(), "b".to_owned(), "c".to_owned()];
+        let model = Model::massless(&names);
+        let mut data = Data::new(&model);
+        let effort = rnea(&model, &mut data, &[0.1; 3], &[1.0; 3], &[2.0; 3]);
+        assert_eq!(effort, [0.0; 3]);
+        assert_eq!(model.joint_names().collect::<Vec<_>>(), ["a", "b", "c"]);
+        assert_eq!(model.links()[model.tool_link()].name, "c_link");
+        assert_eq!(model.base_link(), 0);
+    }
+}

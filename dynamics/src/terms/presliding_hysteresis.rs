@@ -1,0 +1,135 @@
+//! Friction that stretches bristles before it slides: LuGre.
+
+use super::law::array;
+use super::{Coordinate, Effect, Layer, MotionSample, Parameter, PlaceKind, Scale, Site, Term};
+
+/// The LuGre model with a static friction that equals the kinetic one (Canudas de Wit, Olsson, Åström
+/// and Lischinsky, "A New Model for Control of Systems with Friction", 1995, equations 1 to 3), written
+/// in the share u = σ0 z / Fc of the bristles' deflection at which they slide, and κ = σ0 / Fc:
+///
+/// effort = Fc u + σ1 (qd - |qd| u),   du/dt = κ (qd - |qd| u)
+pub(super) static EFFECT: Effect = Effect {
+    name: "presliding_hysteresis",
+    place: PlaceKind::Joint,
+    layer: Layer::Joint,
+    parameters: &[
+        Parameter::at_least("coulomb_nm", 0.0),
+        Parameter::at_least("bristle_stiffness_nm_per_rad", 0.0),
+        Parameter::at_least("bristle_damping_nms_per_rad", 0.0),
+    ],
+    coordinates: &[
+        Coordinate::positive_factor("coulomb_nm"),
+        Coordinate::positive_factor("bristle_damping_nms_per_rad"),
+        Coordinate::shape("stiffness_by_coulomb_per_rad", 3.0, 3000.0, 14, Scale::Log),
+    ],
+    to_parameters: |c| vec![c[0], c[2] * c[0], c[1]],
+    to_coordinates: |p| vec![p[0], p[2], p[1] / p[0].max(1e-9)],
+    build: |site, values| Box::new(PreslidingHysteresis::new(site, array(values))),
+};
+
+#[derive(Debug)]
+struct PreslidingHysteresis {
+    joint: usize,
+    /// Fc, σ1, κ.
+    values: [f64; 3],
+    /// Share of the deflection at which the bristles slide, -1 to 1.
+    deflection: f64,
+    velocity: Option<f64>,
+}
+
+impl PreslidingHysteresis {
+    fn new(site: &Site<'_>, values: [f64; 3]) -> Self {
+        Self {
+            joint: site.joint,
+            values,
+            deflection: 0.0,
+            velocity: None,
+        }
+    }
+}
+
+impl Term for PreslidingHysteresis {
+    fn effect(&self) -> &'static Effect {
+        &EFFECT
+    }
+
+    fn coordinates(&self) -> &[f64] {
+        &self.values
+    }
+
+    fn reset(&mut self) {
+        self.deflection = 0.0;
+        self.velocity = None;
+    }
+
+    fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
+        let [coulomb, damping, steepness] = self.values;
+        let velocity = at.velocity[self.joint];
+        let before = self.velocity.unwrap_or(velocity);
+        if at.dt_s > 0.0 || self.velocity.is_none() {
+            // Over the distance moved the deflection nears ±1 exponentially, whatever the speed.
+            let distance = 0.5 * (before + velocity) * at.dt_s;
+            let aim = distance.signum();
+            let left = (-steepness * distance.abs()).exp();
+            self.deflection = aim + (self.deflection - aim) * left;
+            self.velocity = Some(velocity);
+        }
+        let stretching = velocity - velocity.abs() * self.deflection;
+        effort[self.joint] += coulomb * self.deflection + damping * stretching;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{TwoJoints, sample};
+    use super::*;
+
+    /// The model as published, by small steps of Euler's.
+    #[test]
+    fn agrees_with_the_published_equations() {
+        let (coulomb, stiffness, damping) = (3.0, 140.0, 1.4);
+        let robot = TwoJoints::new();
+        let coordinates = (EFFECT.to_coordinates)(&[coulomb, stiffness, damping]);
+        let mut term = (EFFECT.build)(&robot.site(), &coordinates);
+        let speed = |t: f64| 0.2 * (2.0 * t).sin() + 0.05 * (9.0 * t).cos();
+        let (mut z, steps) = (0.0_f64, 1000);
+        let mut worst = 0.0_f64;
+        for k in 0..600 {
+            let (dt, t) = (0.01, 0.01 * f64::from(k));
+            let v = speed(t);
+            if k > 0 {
+                for i in 0..steps {
+                    let part = (f64::from(i) + 0.5) / f64::from(steps);
+                    let v = speed(t - dt + part * dt);
+                    z += dt / f64::from(steps) * (v - stiffness / coulomb * v.abs() * z);
+                }
+            }
+            let rate = v - stiffness / coulomb * v.abs() * z;
+            let expected = stiffness * z + damping * rate;
+            let at = sample(
+                if k > 0 { dt } else { 0.0 },
+                t,
+                [0.0; 2],
+                [v, 0.0],
+                [0.0; 2],
+            );
+            let mut effort = [0.0; 2];
+            term.act(&at.view(), &mut effort);
+            worst = worst.max((effort[0] - expected).abs());
+        }
+        assert!(worst < 0.02, "{worst} of 3 N m");
+    }
+
+    #[test]
+    fn slides_at_the_coulomb_effort() {
+        let robot = TwoJoints::new();
+        let mut term = (EFFECT.build)(&robot.site(), &[2.0, 1.0, 500.0]);
+        let mut effort = [0.0; 2];
+        for k in 0..100 {
+            effort = [0.0; 2];
+            let at = sample(0.01, 0.01 * f64::from(k), [0.0; 2], [-0.5, 0.0], [0.0; 2]);
+            term.act(&at.view(), &mut effort);
+        }
+        assert!((effort[0] + 2.0).abs() < 1e-9);
+    }
+}

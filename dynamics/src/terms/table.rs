@@ -1,0 +1,241 @@
+//! What no name fits: a curve, as measured.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{Effect, Layer, MotionSample, PlaceKind, Site, Term, TermError, sign};
+use crate::Model;
+
+pub(super) static EFFECT: Effect = Effect {
+    name: "unknown",
+    place: PlaceKind::Joint,
+    layer: Layer::Joint,
+    parameters: &[],
+    coordinates: &[],
+    to_parameters: <[f64]>::to_vec,
+    to_coordinates: <[f64]>::to_vec,
+    // Without a table there is nothing to describe.
+    build: |site, _| {
+        Box::new(Curve {
+            joint: site.joint,
+            table: Table {
+                against: Against::Position,
+                of_joint: site.joint,
+                by_direction: false,
+                knots: vec![0.0],
+                values: vec![0.0],
+            },
+        })
+    },
+};
+
+/// What a curve is drawn against.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Against {
+    /// Position of a joint \[rad or m\].
+    Position,
+    /// Velocity of a joint \[rad/s or m/s\].
+    Velocity,
+    /// Acceleration of a joint \[rad/s² or m/s²\].
+    Acceleration,
+    /// Effort that a joint's gear transmits \[N m or N\].
+    Load,
+    /// Time since the start of the recording \[s\].
+    RecordingTime,
+    /// Time since the start of the session \[s\].
+    SessionTime,
+}
+
+impl Against {
+    /// Its value at an instant; `joint` where it is one of a joint.
+    pub fn value(self, at: &MotionSample<'_>, joint: usize) -> f64 {
+        match self {
+            Self::Position => at.position[joint],
+            Self::Velocity => at.velocity[joint],
+            Self::Acceleration => at.acceleration[joint],
+            Self::Load => at.transmitted[joint],
+            Self::RecordingTime => at.recording_s,
+            Self::SessionTime => at.session_s,
+        }
+    }
+}
+
+/// A curve through knots, straight between them and held at the ends.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    /// What it is drawn against.
+    pub against: Against,
+    /// The joint whose position, velocity, acceleration or load that is.
+    pub of_joint: usize,
+    /// Whether the effort turns its sign with the joint's direction of motion, as friction's does.
+    pub by_direction: bool,
+    /// Where the curve is given, rising.
+    pub knots: Vec<f64>,
+    /// Effort at the knots \[N m or N\].
+    pub values: Vec<f64>,
+}
+
+/// A [`Table`] as a file holds it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TableSpec {
+    /// What it is drawn against.
+    pub against: Against,
+    /// The joint whose position, velocity, acceleration or load that is; the effect's own by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub of_joint: Option<String>,
+    /// Whether the effort turns its sign with the joint's direction of motion, as friction's does.
+    #[serde(default)]
+    pub by_direction: bool,
+    /// Where the curve is given, rising.
+    pub knots: Vec<f64>,
+    /// Effort at the knots \[N m or N\].
+    pub values: Vec<f64>,
+}
+
+impl TableSpec {
+    pub(super) fn of(table: &Table, model: &Model) -> Self {
+        Self {
+            against: table.against,
+            of_joint: Some(model.joints()[table.of_joint].name.clone()),
+            by_direction: table.by_direction,
+            knots: table.knots.clone(),
+            values: table.values.clone(),
+        }
+    }
+
+    pub(super) fn table(&self, of_joint: usize) -> Table {
+        Table {
+            against: self.against,
+            of_joint,
+            by_direction: self.by_direction,
+            knots: self.knots.clone(),
+            values: self.values.clone(),
+        }
+    }
+}
+
+/// Makes an `unknown` effect of the curve `table` in the joint of `site`.
+///
+/// # Errors
+/// If the curve has no knots, their number is not that of the values, they do not rise, or a number is
+/// not finite.
+pub fn table(site: &Site<'_>, table: Table) -> Result<Box<dyn Term>, TermError> {
+    let wrong = |reason| Err(TermError::Table { reason });
+    if table.knots.is_empty() {
+        return wrong("`knots` are missing");
+    }
+    if table.knots.len() != table.values.len() {
+        return wrong("`values` are not one per knot");
+    }
+    let mut numbers = table.knots.iter().chain(&table.values);
+    if !numbers.all(|x| x.is_finite()) {
+        return wrong("numbers are not all finite");
+    }
+    if table.knots.windows(2).any(|pair| pair[0] >= pair[1]) {
+        return wrong("`knots` do not rise");
+    }
+    Ok(Box::new(Curve {
+        joint: site.joint,
+        table,
+    }))
+}
+
+#[derive(Debug)]
+struct Curve {
+    joint: usize,
+    table: Table,
+}
+
+impl Table {
+    /// The curve at `x`.
+    fn at(&self, x: f64) -> f64 {
+        let next = self.knots.partition_point(|&knot| knot <= x);
+        let last = self.knots.len() - 1;
+        if next == 0 {
+            return self.values[0];
+        }
+        if next > last {
+            return self.values[last];
+        }
+        let (x0, x1) = (self.knots[next - 1], self.knots[next]);
+        let (y0, y1) = (self.values[next - 1], self.values[next]);
+        y0 + (y1 - y0) * (x - x0) / (x1 - x0)
+    }
+}
+
+impl Term for Curve {
+    fn effect(&self) -> &'static Effect {
+        &EFFECT
+    }
+
+    fn coordinates(&self) -> &[f64] {
+        &[]
+    }
+
+    fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
+        let value = self
+            .table
+            .at(self.table.against.value(at, self.table.of_joint));
+        let direction = if self.table.by_direction {
+            sign(at.velocity[self.joint])
+        } else {
+            1.0
+        };
+        effort[self.joint] += value * direction;
+    }
+
+    fn table(&self) -> Option<&Table> {
+        Some(&self.table)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{TwoJoints, push};
+    use super::*;
+
+    fn curve() -> Table {
+        Table {
+            against: Against::Position,
+            of_joint: 1,
+            by_direction: true,
+            knots: vec![0.0, 1.0, 3.0],
+            values: vec![2.0, 4.0, 0.0],
+        }
+    }
+
+    #[test]
+    fn straight_between_knots_and_held_at_the_ends() {
+        let robot = TwoJoints::new();
+        let mut term = table(&robot.site(), curve()).unwrap();
+        for (q, expected) in [(-1.0, 2.0), (0.0, 2.0), (0.5, 3.0), (2.0, 2.0), (7.0, 0.0)] {
+            let effort = push(&mut *term, [0.0, q], [-0.5, 0.0], [0.0; 2]);
+            assert_eq!(effort, [-expected, 0.0], "at {q}");
+        }
+    }
+
+    #[test]
+    fn a_spec_and_back() {
+        let robot = TwoJoints::new();
+        let term = table(&robot.site(), curve()).unwrap();
+        let spec = crate::terms::TermSpec::of(&*term, &robot.site());
+        let again = spec.build(&robot.model).unwrap();
+        assert_eq!(again.table(), Some(&curve()));
+    }
+
+    #[test]
+    fn what_is_no_curve_is_refused() {
+        let robot = TwoJoints::new();
+        let refused = |change: fn(&mut Table)| {
+            let mut wrong = curve();
+            change(&mut wrong);
+            table(&robot.site(), wrong).is_err()
+        };
+        assert!(refused(|t| t.knots.clear()));
+        assert!(refused(|t| t.values.truncate(1)));
+        assert!(refused(|t| t.knots.reverse()));
+        assert!(refused(|t| t.values[0] = f64::NAN));
+    }
+}

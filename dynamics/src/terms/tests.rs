@@ -1,0 +1,364 @@
+//! What every term must do, and what tests of single terms share.
+
+use super::*;
+use crate::{Data, rnea};
+
+/// A robot of two joints whose second carries a tool, and a site in it.
+pub(super) struct TwoJoints {
+    pub model: Model,
+}
+
+const ARM: &str = r#"<robot name="arm"><link name="base"/>
+  <joint name="one" type="continuous"><parent link="base"/><child link="upper"/>
+    <origin xyz="0 0 0.3"/><axis xyz="0 1 0.2"/></joint>
+  <link name="upper"><inertial><origin xyz="0.01 0.02 0.2"/><mass value="3"/>
+    <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.02"/></inertial></link>
+  <joint name="two" type="continuous"><parent link="upper"/><child link="lower"/>
+    <origin xyz="0 0 0.5"/><axis xyz="0 1 0"/></joint>
+  <link name="lower"><inertial><origin xyz="0.1 0 0.15"/><mass value="1.5"/>
+    <inertia ixx="0.03" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.01"/></inertial></link>
+  <joint name="mount" type="fixed"><parent link="lower"/><child link="tool"/>
+    <origin xyz="0 0 0.4" rpy="0.3 0.2 0.1"/></joint>
+  <link name="tool"/></robot>"#;
+
+impl TwoJoints {
+    pub fn new() -> Self {
+        Self {
+            model: Model::from_urdf(ARM).unwrap(),
+        }
+    }
+
+    /// The first joint, driven by the second, and the link that `place` asks for.
+    pub fn site_for(&self, place: PlaceKind) -> Site<'_> {
+        let link = match place {
+            PlaceKind::Tool => self.model.tool_link(),
+            PlaceKind::Base => self.model.base_link(),
+            _ => self.model.link_index("lower").unwrap(),
+        };
+        Site {
+            model: &self.model,
+            joint: 0,
+            source: 1,
+            link,
+        }
+    }
+
+    pub fn site(&self) -> Site<'_> {
+        self.site_for(PlaceKind::Joint)
+    }
+}
+
+/// An instant that owns its numbers.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Instant {
+    pub dt_s: f64,
+    pub time_s: f64,
+    pub position: [f64; 2],
+    pub velocity: [f64; 2],
+    pub acceleration: [f64; 2],
+    pub transmitted: [f64; 2],
+}
+
+impl Instant {
+    pub fn view(&self) -> MotionSample<'_> {
+        MotionSample {
+            dt_s: self.dt_s,
+            recording_s: self.time_s,
+            session_s: self.time_s + 100.0,
+            position: &self.position,
+            velocity: &self.velocity,
+            acceleration: &self.acceleration,
+            transmitted: &self.transmitted,
+        }
+    }
+}
+
+pub(super) fn sample(
+    dt_s: f64,
+    time_s: f64,
+    position: [f64; 2],
+    velocity: [f64; 2],
+    acceleration: [f64; 2],
+) -> Instant {
+    Instant {
+        dt_s,
+        time_s,
+        position,
+        velocity,
+        acceleration,
+        transmitted: [0.0; 2],
+    }
+}
+
+/// What a term adds at one instant, the first.
+pub(super) fn push(term: &mut dyn Term, q: [f64; 2], qd: [f64; 2], qdd: [f64; 2]) -> [f64; 2] {
+    let mut effort = [0.0; 2];
+    term.act(&sample(0.0, 0.0, q, qd, qdd).view(), &mut effort);
+    effort
+}
+
+/// Some motion at 100 Hz, with the rigid body's effort.
+pub(super) fn motion(model: &Model, samples: u32) -> Vec<Instant> {
+    let mut data = Data::new(model);
+    let wave = |k: usize, order: i32, t: f64| {
+        let (a, w, p) = [(0.8, 2.1, 0.3), (0.6, 3.3, 1.2)][k];
+        let shift = f64::from(order) * std::f64::consts::FRAC_PI_2;
+        a * f64::powi(w, order) * (w * t + p + shift).sin()
+    };
+    (0..samples)
+        .map(|k| {
+            let t = 0.01 * f64::from(k);
+            let of = |order| [wave(0, order, t), wave(1, order, t)];
+            let dt_s = if k == 0 { 0.0 } else { 0.01 };
+            let mut at = sample(dt_s, t, of(0), of(1), of(2));
+            let effort = rnea(
+                model,
+                &mut data,
+                &at.position,
+                &at.velocity,
+                &at.acceleration,
+            );
+            at.transmitted.copy_from_slice(effort);
+            at
+        })
+        .collect()
+}
+
+/// What a term makes of a motion's rigid effort, less that effort.
+pub(super) fn run(term: &mut dyn Term, motion: &[Instant]) -> Vec<[f64; 2]> {
+    term.reset();
+    motion
+        .iter()
+        .map(|at| {
+            let mut effort = at.transmitted;
+            term.act(&at.view(), &mut effort);
+            [0, 1].map(|j| effort[j] - at.transmitted[j])
+        })
+        .collect()
+}
+
+/// Coordinates that a term of this effect may well have: factors near 1, shapes within their range,
+/// and times within the motion.
+pub(super) fn plausible(effect: &Effect) -> Vec<f64> {
+    let one = |(i, coordinate): (usize, &Coordinate)| match coordinate.kind {
+        CoordinateKind::Factor { .. } => 0.7 + 0.13 * i as f64,
+        CoordinateKind::Shape {
+            lower,
+            upper,
+            scale: Scale::Log,
+            ..
+        } => lower.powf(0.6) * upper.powf(0.4),
+        CoordinateKind::Shape {
+            lower,
+            upper,
+            scale: Scale::Linear,
+            ..
+        } => 0.8 * lower + 0.2 * upper,
+        // Of an effort of some 20 N m.
+        CoordinateKind::Shape { lower, .. } => 10.0 * lower,
+        CoordinateKind::RecordingTime => 0.5 + 0.2 * i as f64,
+        CoordinateKind::SessionTime => 100.5 + 0.2 * i as f64,
+    };
+    effect.coordinates.iter().enumerate().map(one).collect()
+}
+
+fn difference(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
+    let pairs = a.as_flattened().iter().zip(b.as_flattened());
+    pairs.fold(0.0, |worst, (a, b)| worst.max((a - b).abs()))
+}
+
+fn factors(effect: &Effect) -> Vec<usize> {
+    let is_factor = |c: &Coordinate| matches!(c.kind, CoordinateKind::Factor { .. });
+    (0..effect.coordinates.len())
+        .filter(|&i| is_factor(&effect.coordinates[i]))
+        .collect()
+}
+
+#[test]
+fn names_are_unique_and_found() {
+    for one in EFFECTS {
+        assert!(std::ptr::eq(effect(one.name).unwrap(), *one));
+    }
+    assert!(effect("viscous friction").is_none());
+}
+
+#[test]
+fn coordinates_and_parameters_say_the_same() {
+    for effect in EFFECTS {
+        let coordinates = plausible(effect);
+        let parameters = (effect.to_parameters)(&coordinates);
+        assert_eq!(parameters.len(), effect.parameters.len(), "{}", effect.name);
+        for (parameter, value) in effect.parameters.iter().zip(&parameters) {
+            assert!(
+                effect.check(parameter.name, *value).is_ok(),
+                "{}",
+                effect.name
+            );
+        }
+        let again = (effect.to_coordinates)(&parameters);
+        for (a, b) in coordinates.iter().zip(&again) {
+            assert!(
+                (a - b).abs() < 1e-9,
+                "{}: {coordinates:?} {again:?}",
+                effect.name
+            );
+        }
+        // Where nothing acts, no direction or phase is known; numbers they must be.
+        let nothing = (effect.to_parameters)(&vec![0.0; coordinates.len()]);
+        assert!(nothing.iter().all(|x| x.is_finite()), "{}", effect.name);
+    }
+}
+
+#[test]
+fn a_term_survives_its_file() {
+    let robot = TwoJoints::new();
+    let motion = motion(&robot.model, 100);
+    for effect in EFFECTS.iter().filter(|e| !e.coordinates.is_empty()) {
+        let site = robot.site_for(effect.place);
+        let mut term = (effect.build)(&site, &plausible(effect));
+        let spec = TermSpec::of(&*term, &site);
+        let text = serde_json::to_string(&spec).unwrap();
+        let again: TermSpec = serde_json::from_str(&text).unwrap();
+        assert_eq!(again, spec);
+        let mut again = again.build(&robot.model).unwrap();
+        let difference = difference(&run(&mut *term, &motion), &run(&mut *again, &motion));
+        assert!(difference < 1e-6, "{}: {difference}", effect.name);
+    }
+}
+
+#[test]
+fn factors_are_factors_and_without_them_nothing_happens() {
+    let robot = TwoJoints::new();
+    let motion = motion(&robot.model, 150);
+    for effect in EFFECTS {
+        let site = robot.site_for(effect.place);
+        let mut at = |coordinates: &[f64]| run(&mut *(effect.build)(&site, coordinates), &motion);
+        let mut none = plausible(effect);
+        for i in factors(effect) {
+            none[i] = 0.0;
+        }
+        let without = at(&none);
+        let has_shape = effect.layer != Layer::Joint;
+        if !has_shape {
+            assert!(
+                difference(&without, &vec![[0.0; 2]; 150]) == 0.0,
+                "{}",
+                effect.name
+            );
+        }
+        for i in factors(effect) {
+            let CoordinateKind::Factor { step, .. } = effect.coordinates[i].kind else {
+                continue;
+            };
+            let mut with = none.clone();
+            with[i] = step;
+            let one = at(&with);
+            with[i] = 2.0 * step;
+            let two = at(&with);
+            let mut scale = 0.0_f64;
+            let mut worst = 0.0_f64;
+            for ((zero, one), two) in without.iter().zip(&one).zip(&two) {
+                for j in 0..2 {
+                    let effect = one[j] - zero[j];
+                    scale = scale.max(effect.abs());
+                    worst = worst.max((two[j] - zero[j] - 2.0 * effect).abs());
+                }
+            }
+            let tolerance = if step < 1.0 { 1e-2 } else { 1e-9 };
+            assert!(scale > 0.0, "{}: {i} does nothing", effect.name);
+            assert!(
+                worst <= tolerance * scale,
+                "{}: {i}: {worst} of {scale}",
+                effect.name
+            );
+        }
+    }
+}
+
+#[test]
+fn a_reset_forgets() {
+    let robot = TwoJoints::new();
+    let motion = motion(&robot.model, 200);
+    for effect in EFFECTS {
+        let mut term = (effect.build)(&robot.site_for(effect.place), &plausible(effect));
+        let first = run(&mut *term, &motion[50..]);
+        run(&mut *term, &motion[..70]);
+        assert_eq!(run(&mut *term, &motion[50..]), first, "{}", effect.name);
+    }
+}
+
+#[test]
+fn friction_only_takes() {
+    let robot = TwoJoints::new();
+    let motion = motion(&robot.model, 300);
+    for name in [
+        "viscous_friction",
+        "coulomb_friction",
+        "stribeck_friction",
+        "asymmetric_coulomb",
+        "load_dependent_friction",
+        "quadratic_drag",
+        "temperature_viscous",
+        "friction_step",
+    ] {
+        let effect = effect(name).unwrap();
+        let mut term = (effect.build)(&robot.site(), &plausible(effect));
+        for (at, effort) in motion.iter().zip(run(&mut *term, &motion)) {
+            assert!(effort[0] * at.velocity[0] >= 0.0, "{name}");
+            assert_eq!(effort[1], 0.0, "{name}");
+        }
+    }
+}
+
+#[test]
+fn what_alters_the_model_costs_the_same_either_way() {
+    let robot = TwoJoints::new();
+    let motion = motion(&robot.model, 50);
+    for effect in EFFECTS {
+        let site = robot.site_for(effect.place);
+        let mut term = (effect.build)(&site, &plausible(effect));
+        let mut altered = robot.model.clone();
+        if !term.alter(&mut altered) {
+            assert!(term.inertia().is_none(), "{}", effect.name);
+            continue;
+        }
+        let mut data = Data::new(&altered);
+        for (at, added) in motion.iter().zip(run(&mut *term, &motion)) {
+            let effort = rnea(
+                &altered,
+                &mut data,
+                &at.position,
+                &at.velocity,
+                &at.acceleration,
+            );
+            for j in 0..2 {
+                let expected = effort[j] - at.transmitted[j];
+                assert!((added[j] - expected).abs() < 1e-9, "{}", effect.name);
+            }
+        }
+        let Some((link, inertia)) = term.inertia() else {
+            continue;
+        };
+        let mut attached = robot.model.clone();
+        attached.attach(link, inertia);
+        for joint in 0..2 {
+            let (a, b) = (
+                altered.body_parameters(joint),
+                attached.body_parameters(joint),
+            );
+            assert!(
+                a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12),
+                "{}",
+                effect.name
+            );
+        }
+    }
+}
+
+#[test]
+fn a_sign_is_full_at_a_few_hundredths_and_smooth_through_zero() {
+    assert!((sign(0.02) - 1.0).abs() < 1e-7);
+    assert!((sign(-0.02) + 1.0).abs() < 1e-7);
+    assert_eq!(sign(0.0), 0.0);
+    assert!((sign(0.002) - 1.0_f64.tanh()).abs() < 1e-15);
+}
