@@ -1,6 +1,6 @@
 //! Rigid-body inertia.
 
-use std::ops::{Add, AddAssign};
+use std::ops::{Add, AddAssign, Sub};
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
@@ -21,6 +21,15 @@ impl Inertia {
     /// Nothing is checked: the difference of two bodies is an inertia too.
     pub fn new(mass_kg: f64, com_m: [f64; 3], inertia_kgm2: [f64; 6]) -> Self {
         Self::from_parts(mass_kg, com_m.into(), symmetric(inertia_kgm2))
+    }
+
+    /// The body of these ten parameters, in the order of [`Inertia::parameters`].
+    pub fn from_parameters([mass, hx, hy, hz, xx, xy, xz, yy, yz, zz]: [f64; 10]) -> Self {
+        Self {
+            mass,
+            first_moment: Vector3::new(hx, hy, hz),
+            rotational: symmetric([xx, xy, xz, yy, yz, zz]),
+        }
     }
 
     /// A body that is not there.
@@ -54,6 +63,14 @@ impl Inertia {
     pub fn inertia_about_origin_kgm2(&self) -> [f64; 6] {
         let i = &self.rotational;
         [i.m11, i.m12, i.m13, i.m22, i.m23, i.m33]
+    }
+
+    /// Inertia about the centre of mass: xx, xy, xz, yy, yz, zz \[kg m²\]; about the origin for a body
+    /// without mass.
+    pub fn inertia_about_com_kgm2(&self) -> [f64; 6] {
+        let com = -Vector3::from(self.com_m());
+        self.moved(&Matrix3::identity(), &com)
+            .inertia_about_origin_kgm2()
     }
 
     /// The parameters in which a robot's dynamics are linear, in the order of the regressor's
@@ -106,6 +123,17 @@ impl AddAssign for Inertia {
     }
 }
 
+impl Sub for Inertia {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        Self {
+            mass: self.mass - other.mass,
+            first_moment: self.first_moment - other.first_moment,
+            rotational: self.rotational - other.rotational,
+        }
+    }
+}
+
 /// The matrix of xx, xy, xz, yy, yz, zz.
 pub(crate) fn symmetric([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> Matrix3<f64> {
     Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
@@ -141,6 +169,17 @@ mod tests {
         let back = there.transformed(&pose.inverse());
         assert!((back.rotational - body.rotational).norm() < 1e-14);
         assert!((back.first_moment - body.first_moment).norm() < 1e-14);
+    }
+
+    #[test]
+    fn parameters_are_the_body() {
+        let about_com = [0.3, 0.01, -0.02, 0.2, 0.03, 0.25];
+        let body = Inertia::new(1.7, [0.1, -0.2, 0.4], about_com);
+        assert_eq!(Inertia::from_parameters(body.parameters()), body);
+        for (a, b) in body.inertia_about_com_kgm2().iter().zip(about_com) {
+            assert!((a - b).abs() < 1e-15);
+        }
+        assert_eq!(body - body, Inertia::zero());
     }
 
     #[test]

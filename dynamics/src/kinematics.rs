@@ -30,11 +30,17 @@ pub fn link_pose(model: &Model, data: &Data, link: usize) -> Isometry3<f64> {
     let frame = &model.frames[link];
     let slot = &data.slots[frame.slot];
     let rotation = Rotation3::from_matrix_unchecked(slot.world_rotation * frame.rotation);
-    let translation = slot.world_translation + slot.world_rotation * frame.translation;
     Isometry3::from_parts(
-        translation.into(),
+        link_origin(model, data, link).into(),
         UnitQuaternion::from_rotation_matrix(&rotation),
     )
+}
+
+/// Origin of a link's frame in the world after [`forward_kinematics`] \[m\].
+pub(crate) fn link_origin(model: &Model, data: &Data, link: usize) -> Vector3<f64> {
+    let frame = &model.frames[link];
+    let slot = &data.slots[frame.slot];
+    slot.world_translation + slot.world_rotation * frame.translation
 }
 
 /// Jacobian of a link after [`forward_kinematics`]: 6 x n; rows are the linear velocity (x, y, z) of

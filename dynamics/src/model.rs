@@ -253,6 +253,18 @@ impl Model {
         self.change(link, |body, there| body.tool = there, inertia);
     }
 
+    /// The same robot with nothing but `inertia`, in the frame of `link`: what it alone costs.
+    pub(crate) fn ghost(&self, link: usize, inertia: Inertia) -> Self {
+        let mut ghost = self.clone();
+        for body in &mut ghost.bodies {
+            body.own = Inertia::zero();
+            body.tool = Inertia::zero();
+            body.update_load();
+        }
+        ghost.attach(link, inertia);
+        ghost
+    }
+
     /// The ten inertial parameters of the body that `joint` moves, tool included, in the frame of its
     /// child link: the factors of the regressor's columns, see [`crate::regressor`].
     ///

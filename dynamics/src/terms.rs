@@ -7,10 +7,20 @@
 //! linear as it can be, e.g. `A sin(q - q0)` by the factors of `sin q` and `cos q`.
 
 mod asymmetric_coulomb;
+mod base_tilt;
+mod cable_spring;
+mod contact_wall;
 mod coulomb_friction;
+mod counterbalance_spring;
+mod external_push;
 mod friction_step;
+mod ghost;
 mod law;
+mod link_com;
+mod link_mass;
 mod load_dependent_friction;
+mod payload;
+mod payload_pickup;
 mod physics;
 mod presliding_hysteresis;
 mod quadratic_drag;
@@ -21,6 +31,13 @@ mod table;
 mod temperature_viscous;
 #[cfg(test)]
 mod tests;
+mod torque_bias;
+mod torque_delay;
+mod torque_gain;
+mod torque_lowpass;
+mod torque_ripple;
+mod torque_saturation;
+mod transmission_coupling;
 mod viscous_friction;
 
 use crate::{Inertia, Model};
@@ -41,6 +58,22 @@ pub static EFFECTS: &[&Effect] = &[
     &temperature_viscous::EFFECT,
     &friction_step::EFFECT,
     &rotor_inertia::EFFECT,
+    &torque_gain::EFFECT,
+    &torque_bias::EFFECT,
+    &transmission_coupling::EFFECT,
+    &counterbalance_spring::EFFECT,
+    &cable_spring::EFFECT,
+    &torque_ripple::EFFECT,
+    &payload::EFFECT,
+    &link_mass::EFFECT,
+    &link_com::EFFECT,
+    &base_tilt::EFFECT,
+    &external_push::EFFECT,
+    &contact_wall::EFFECT,
+    &payload_pickup::EFFECT,
+    &torque_delay::EFFECT,
+    &torque_lowpass::EFFECT,
+    &torque_saturation::EFFECT,
     &table::EFFECT,
 ];
 

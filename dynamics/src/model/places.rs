@@ -11,10 +11,10 @@ impl Model {
     /// base, the last of several.
     pub fn tool_link(&self) -> usize {
         let moves = |link: &usize| self.links[*link].joint.is_some();
-        let named = ["tool", "tool0"]
+        let mut named = ["tool", "tool0"]
             .iter()
             .filter_map(|name| self.link_index(name));
-        if let Some(link) = named.filter(moves).next() {
+        if let Some(link) = named.find(moves) {
             return link;
         }
         let holds = |link: usize| self.links.iter().any(|other| other.parent == Some(link));

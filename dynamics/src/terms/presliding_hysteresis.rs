@@ -1,9 +1,9 @@
-//! Friction that stretches bristles before it slides: LuGre.
+//! Friction that stretches bristles before it slides: `LuGre`.
 
 use super::law::array;
 use super::{Coordinate, Effect, Layer, MotionSample, Parameter, PlaceKind, Scale, Site, Term};
 
-/// The LuGre model with a static friction that equals the kinetic one (Canudas de Wit, Olsson, Åström
+/// The `LuGre` model with a static friction that equals the kinetic one (Canudas de Wit, Olsson, Åström
 /// and Lischinsky, "A New Model for Control of Systems with Friction", 1995, equations 1 to 3), written
 /// in the share u = σ0 z / Fc of the bristles' deflection at which they slide, and κ = σ0 / Fc:
 ///

@@ -1,0 +1,76 @@
+//! A base that does not stand level.
+
+use nalgebra::{Rotation3, Vector3};
+
+use super::law::array;
+use super::{Coordinate, CoordinateKind, Effect, Layer, MotionSample, Parameter, PlaceKind, Term};
+use crate::{Data, Model, gravity_effort};
+
+/// The base is rolled about its x axis and then pitched about the y axis that results, R = Rx(roll)
+/// Ry(pitch); gravity in its frame is Rᵀ g. To first order linear in the angles.
+pub(super) static EFFECT: Effect = Effect {
+    name: "base_tilt",
+    place: PlaceKind::Base,
+    layer: Layer::Body,
+    parameters: &[Parameter::any("roll_rad"), Parameter::any("pitch_rad")],
+    coordinates: &[angle("roll_rad"), angle("pitch_rad")],
+    to_parameters: <[f64]>::to_vec,
+    to_coordinates: <[f64]>::to_vec,
+    build: |site, values| {
+        let mut model = site.model.clone();
+        let level = Vector3::from(model.gravity());
+        let tilted = tilted(&level, array(values));
+        // Gravity's effort is linear in gravity: the difference costs the difference.
+        model.set_gravity((tilted - level).into());
+        Box::new(BaseTilt {
+            values: array(values),
+            data: Data::new(&model),
+            model,
+        })
+    },
+};
+
+const fn angle(name: &'static str) -> Coordinate {
+    let kind = CoordinateKind::Factor {
+        step: 1e-3,
+        minimum: f64::NEG_INFINITY,
+    };
+    Coordinate { name, kind }
+}
+
+/// Gravity as the tilted base sees it.
+fn tilted(gravity: &Vector3<f64>, [roll, pitch]: [f64; 2]) -> Vector3<f64> {
+    let roll = Rotation3::from_axis_angle(&Vector3::x_axis(), roll);
+    let pitch = Rotation3::from_axis_angle(&Vector3::y_axis(), pitch);
+    (roll * pitch).inverse_transform_vector(gravity)
+}
+
+#[derive(Debug)]
+struct BaseTilt {
+    values: [f64; 2],
+    model: Model,
+    data: Data,
+}
+
+impl Term for BaseTilt {
+    fn effect(&self) -> &'static Effect {
+        &EFFECT
+    }
+
+    fn coordinates(&self) -> &[f64] {
+        &self.values
+    }
+
+    fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
+        let added = gravity_effort(&self.model, &mut self.data, at.position);
+        for (effort, added) in effort.iter_mut().zip(added) {
+            *effort += added;
+        }
+    }
+
+    fn alter(&self, model: &mut Model) -> bool {
+        let gravity = tilted(&model.gravity().into(), self.values);
+        model.set_gravity(gravity.into());
+        true
+    }
+}

@@ -1,0 +1,135 @@
+//! Somebody or something that pushes the arm for a while.
+
+use nalgebra::Vector3;
+
+use super::law::array;
+use super::{Coordinate, CoordinateKind, Effect, Layer, MotionSample, Parameter, PlaceKind, Term};
+use crate::kinematics::link_origin;
+use crate::{Data, Model, forward_kinematics, link_jacobian};
+
+/// A constant force on the origin of a link, along the world's axes: effort -Jᵀ F while it lasts.
+pub(super) static EFFECT: Effect = Effect {
+    name: "external_push",
+    place: PlaceKind::Link,
+    layer: Layer::Body,
+    parameters: &[
+        Parameter::any("force_x_n"),
+        Parameter::any("force_y_n"),
+        Parameter::any("force_z_n"),
+        Parameter::any("t_start_s"),
+        Parameter::any("t_end_s"),
+    ],
+    coordinates: &[
+        Coordinate::factor("force_x_n"),
+        Coordinate::factor("force_y_n"),
+        Coordinate::factor("force_z_n"),
+        Coordinate {
+            name: "t_start_s",
+            kind: CoordinateKind::SessionTime,
+        },
+        Coordinate {
+            name: "t_end_s",
+            kind: CoordinateKind::SessionTime,
+        },
+    ],
+    to_parameters: <[f64]>::to_vec,
+    to_coordinates: <[f64]>::to_vec,
+    build: |site, values| {
+        Box::new(ExternalPush {
+            values: array(values),
+            at_link: AtLink::new(site.model, site.link),
+        })
+    },
+};
+
+#[derive(Debug)]
+struct ExternalPush {
+    values: [f64; 5],
+    at_link: AtLink,
+}
+
+impl Term for ExternalPush {
+    fn effect(&self) -> &'static Effect {
+        &EFFECT
+    }
+
+    fn coordinates(&self) -> &[f64] {
+        &self.values
+    }
+
+    fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
+        let [x, y, z, start, end] = self.values;
+        if !(start <= at.session_s && at.session_s < end) {
+            return;
+        }
+        self.at_link.place(at.position);
+        self.at_link.resist(&Vector3::new(x, y, z), effort);
+    }
+}
+
+/// The origin of a link, and forces on it.
+#[derive(Debug)]
+pub(super) struct AtLink {
+    link: usize,
+    model: Model,
+    data: Data,
+}
+
+impl AtLink {
+    pub fn new(model: &Model, link: usize) -> Self {
+        Self {
+            link,
+            data: Data::new(model),
+            model: model.clone(),
+        }
+    }
+
+    /// Goes where the link is now, and gives its origin in the world \[m\].
+    pub fn place(&mut self, position: &[f64]) -> Vector3<f64> {
+        forward_kinematics(&self.model, &mut self.data, position);
+        link_origin(&self.model, &self.data, self.link)
+    }
+
+    /// Adds the effort that it takes to hold against `force_n`.
+    pub fn resist(&mut self, force_n: &Vector3<f64>, effort: &mut [f64]) {
+        let jacobian = link_jacobian(&self.model, &mut self.data, self.link);
+        for (effort, column) in effort.iter_mut().zip(jacobian.column_iter()) {
+            *effort -= column.fixed_rows::<3>(0).dot(force_n);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{TwoJoints, sample};
+    use super::*;
+    use crate::{Wrench, forward_dynamics};
+
+    #[test]
+    fn the_effort_holds_the_arm_against_the_push() {
+        let robot = TwoJoints::new();
+        let site = robot.site();
+        let force_n = [3.0, -7.0, 11.0];
+        let [x, y, z] = force_n;
+        let mut term = (EFFECT.build)(&site, &[x, y, z, 105.0, 106.0]);
+        let q = [0.4, -0.9];
+        let mut at = |t: f64| {
+            let mut effort = [0.0; 2];
+            term.act(&sample(0.01, t, q, [0.0; 2], [0.0; 2]).view(), &mut effort);
+            effort
+        };
+        assert_eq!(at(4.99), [0.0; 2]);
+        assert_eq!(at(6.0), [0.0; 2]);
+        let mut effort = at(5.0);
+        let mut data = Data::new(&robot.model);
+        let gravity = crate::gravity_effort(&robot.model, &mut data, &q);
+        effort.iter_mut().zip(gravity).for_each(|(e, g)| *e += g);
+        let push = Wrench {
+            link: site.link,
+            force_n: force_n.into(),
+            moment_nm: Vector3::zeros(),
+        };
+        let still = forward_dynamics(&robot.model, &mut data, &q, &[0.0; 2], &effort, &[push]);
+        assert!(still.iter().all(|qdd| qdd.abs() < 1e-10), "{still:?}");
+    }
+}

@@ -1,0 +1,62 @@
+//! A sensor that cannot report more than so much.
+
+use super::law::array;
+use super::{Coordinate, Effect, Layer, MotionSample, Parameter, PlaceKind, Scale, Term};
+
+/// Recorded effort: the true one, cut off at ± the limit.
+pub(super) static EFFECT: Effect = Effect {
+    name: "torque_saturation",
+    place: PlaceKind::Joint,
+    layer: Layer::Record,
+    parameters: &[Parameter::at_least("limit_nm", 0.0)],
+    coordinates: &[Coordinate::shape("limit_nm", 0.3, 1.0, 15, Scale::OfEffort)],
+    to_parameters: <[f64]>::to_vec,
+    to_coordinates: <[f64]>::to_vec,
+    build: |site, values| {
+        Box::new(TorqueSaturation {
+            joint: site.joint,
+            values: array(values),
+        })
+    },
+};
+
+#[derive(Debug)]
+struct TorqueSaturation {
+    joint: usize,
+    values: [f64; 1],
+}
+
+impl Term for TorqueSaturation {
+    fn effect(&self) -> &'static Effect {
+        &EFFECT
+    }
+
+    fn coordinates(&self) -> &[f64] {
+        &self.values
+    }
+
+    fn act(&mut self, _at: &MotionSample<'_>, effort: &mut [f64]) {
+        let effort = &mut effort[self.joint];
+        // A negative limit, which a fit may try, cuts all off.
+        let limit = self.values[0].max(0.0);
+        *effort = effort.clamp(-limit, limit);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{TwoJoints, sample};
+    use super::*;
+
+    #[test]
+    fn cuts_off_either_way() {
+        let robot = TwoJoints::new();
+        let mut term = (EFFECT.build)(&robot.site(), &[2.0]);
+        for (before, after) in [(3.0, 2.0), (-7.0, -2.0), (1.5, 1.5)] {
+            let mut effort = [before, 9.0];
+            let at = sample(0.0, 0.0, [0.0; 2], [0.0; 2], [0.0; 2]);
+            term.act(&at.view(), &mut effort);
+            assert_eq!(effort, [after, 9.0]);
+        }
+    }
+}
