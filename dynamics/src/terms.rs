@@ -7,6 +7,7 @@
 //! linear as it can be, e.g. `A sin(q - q0)` by the factors of `sin q` and `cos q`.
 
 mod asymmetric_coulomb;
+mod backlash;
 mod base_tilt;
 mod cable_spring;
 mod contact_wall;
@@ -15,6 +16,7 @@ mod counterbalance_spring;
 mod external_push;
 mod friction_step;
 mod ghost;
+mod joint_elasticity;
 mod law;
 mod link_com;
 mod link_mass;
@@ -38,6 +40,7 @@ mod torque_lowpass;
 mod torque_ripple;
 mod torque_saturation;
 mod transmission_coupling;
+mod two_masses;
 mod viscous_friction;
 
 use crate::{Inertia, Model};
@@ -74,6 +77,8 @@ pub static EFFECTS: &[&Effect] = &[
     &torque_delay::EFFECT,
     &torque_lowpass::EFFECT,
     &torque_saturation::EFFECT,
+    &joint_elasticity::EFFECT,
+    &backlash::EFFECT,
     &table::EFFECT,
 ];
 

@@ -99,6 +99,11 @@ pub(super) fn push(term: &mut dyn Term, q: [f64; 2], qd: [f64; 2], qdd: [f64; 2]
 
 /// Some motion at 100 Hz, with the rigid body's effort.
 pub(super) fn motion(model: &Model, samples: u32) -> Vec<Instant> {
+    motion_with(model, samples, 0.01)
+}
+
+/// The same motion on another clock.
+pub(super) fn motion_with(model: &Model, samples: u32, dt: f64) -> Vec<Instant> {
     let mut data = Data::new(model);
     let wave = |k: usize, order: i32, t: f64| {
         let (a, w, p) = [(0.8, 2.1, 0.3), (0.6, 3.3, 1.2)][k];
@@ -107,9 +112,9 @@ pub(super) fn motion(model: &Model, samples: u32) -> Vec<Instant> {
     };
     (0..samples)
         .map(|k| {
-            let t = 0.01 * f64::from(k);
+            let t = dt * f64::from(k);
             let of = |order| [wave(0, order, t), wave(1, order, t)];
-            let dt_s = if k == 0 { 0.0 } else { 0.01 };
+            let dt_s = if k == 0 { 0.0 } else { dt };
             let mut at = sample(dt_s, t, of(0), of(1), of(2));
             let effort = rnea(
                 model,

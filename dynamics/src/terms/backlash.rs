@@ -1,0 +1,169 @@
+//! A joint whose transmission has play.
+
+use super::law::array;
+use super::two_masses::{Deviation, Oscillator, Transmission, TwoMasses};
+use super::{Coordinate, Effect, Layer, MotionSample, Parameter, PlaceKind, Scale, Term};
+
+/// Natural frequency \[rad/s\] and damping ratio of the contact on either side of the play: it settles
+/// within some 5 ms and does not bounce.
+const CONTACT_FREQUENCY: f64 = 1000.0;
+const CONTACT_DAMPING: f64 = 0.7;
+
+/// Longest step through the play \[s\].
+const STEP_S: f64 = 5e-4;
+const MOST_STEPS: f64 = 200.0;
+
+/// Between rotor and link there is a play of a total width; within it nothing comes through, on either
+/// side a stiff and damped contact pushes and never pulls. The rotor has the inertia J and carries the
+/// encoder; the link starts at rest on the side that it loads.
+pub(super) static EFFECT: Effect = Effect {
+    name: "backlash",
+    place: PlaceKind::Joint,
+    layer: Layer::Body,
+    parameters: &[
+        Parameter::at_least("gap_rad", 0.0),
+        Parameter::at_least("rotor_inertia_kgm2", 0.0),
+    ],
+    coordinates: &[
+        Coordinate::positive_factor("rotor_inertia_kgm2"),
+        Coordinate::shape("gap_rad", 0.0003, 0.035, 10, Scale::Log),
+    ],
+    to_parameters: |c| vec![c[1], c[0]],
+    to_coordinates: |p| vec![p[1], p[0]],
+    build: |site, values| {
+        let values: [f64; 2] = array(values);
+        Box::new(Backlash {
+            joint: site.joint,
+            values,
+            play: Play {
+                half: 0.5 * values[1].max(0.0),
+            },
+            masses: TwoMasses::new(site),
+        })
+    },
+};
+
+#[derive(Debug)]
+struct Play {
+    /// Half its width \[rad\].
+    half: f64,
+}
+
+impl Play {
+    /// How far the link has gone into a contact \[rad\].
+    fn depth(&self, angle: f64) -> f64 {
+        angle - angle.clamp(-self.half, self.half)
+    }
+
+    /// Acceleration by the contact; 0 where there is none or it would pull.
+    fn push(&self, at: Deviation) -> f64 {
+        let depth = self.depth(at.angle);
+        let push =
+            -CONTACT_FREQUENCY * (CONTACT_FREQUENCY * depth + 2.0 * CONTACT_DAMPING * at.rate);
+        if push * depth < 0.0 { push } else { 0.0 }
+    }
+}
+
+impl Transmission for Play {
+    fn settled(&self, _inertia: f64, forcing: f64) -> Deviation {
+        let depth = forcing / (CONTACT_FREQUENCY * CONTACT_FREQUENCY);
+        Deviation {
+            angle: depth + self.half.copysign(forcing),
+            rate: 0.0,
+        }
+    }
+
+    fn advance(&self, _inertia: f64, from: Deviation, forcing: [f64; 2], dt_s: f64) -> Deviation {
+        let steps = (dt_s / STEP_S).ceil().clamp(1.0, MOST_STEPS);
+        let h = dt_s / steps;
+        let contact = Oscillator::new(CONTACT_FREQUENCY, CONTACT_DAMPING, h);
+        let slope = (forcing[1] - forcing[0]) / steps;
+        let mut at = from;
+        for k in 0..steps as u32 {
+            let now = forcing[0] + slope * f64::from(k);
+            let pushed = self.push(at) != 0.0;
+            if pushed {
+                let side = self.half.copysign(at.angle);
+                at.angle -= side;
+                at = contact.step(at, [now, now + slope]);
+                at.angle += side;
+            } else {
+                let mean = now + 0.5 * slope;
+                at.angle += h * (at.rate + 0.5 * h * mean);
+                at.rate += h * mean;
+            }
+        }
+        at
+    }
+
+    fn acceleration(&self, _inertia: f64, at: Deviation) -> f64 {
+        self.push(at)
+    }
+}
+
+#[derive(Debug)]
+struct Backlash {
+    joint: usize,
+    values: [f64; 2],
+    play: Play,
+    masses: TwoMasses,
+}
+
+impl Term for Backlash {
+    fn effect(&self) -> &'static Effect {
+        &EFFECT
+    }
+
+    fn coordinates(&self) -> &[f64] {
+        &self.values
+    }
+
+    fn reset(&mut self) {
+        self.masses.reset();
+    }
+
+    fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
+        self.masses.act(at, &self.play, effort);
+        effort[self.joint] += self.values[0] * at.acceleration[self.joint];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{TwoJoints, motion, run};
+    use super::super::two_masses::tests::simulated;
+    use super::*;
+
+    #[test]
+    fn agrees_with_a_simulation_of_both_masses_away_from_impacts() {
+        let robot = TwoJoints::new();
+        let gap = 0.01;
+        let motion = motion(&robot.model, 300);
+        let mut term = (EFFECT.build)(&robot.site(), &[0.0, gap]);
+        let ours = run(&mut *term, &motion);
+        let play = Play { half: gap / 2.0 };
+        let forcing = -motion[0].transmitted[0];
+        let start = play.settled(1.0, forcing).angle;
+        let expected = simulated(&robot, 300, start, |at, inertia| inertia * play.push(at));
+        let mut off: Vec<_> = ours
+            .iter()
+            .zip(&expected)
+            .map(|(ours, expected)| (ours[0] - expected[0]).abs())
+            .collect();
+        let largest = expected
+            .iter()
+            .fold(0.0_f64, |most, e| most.max(e[0].abs()));
+        off.sort_by(f64::total_cmp);
+        assert!(largest > 2.0, "it is felt: {largest}");
+        assert!(off[off.len() * 9 / 10] < 0.1, "{}", off[off.len() * 9 / 10]);
+    }
+
+    #[test]
+    fn without_play_the_joint_is_rigid() {
+        let robot = TwoJoints::new();
+        let mut term = (EFFECT.build)(&robot.site(), &[0.0, 0.0]);
+        for effort in run(&mut *term, &motion(&robot.model, 200)) {
+            assert!(effort.iter().all(|e| e.abs() < 0.1), "{effort:?}");
+        }
+    }
+}

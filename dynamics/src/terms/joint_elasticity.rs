@@ -1,0 +1,134 @@
+//! A joint whose transmission gives way like a spring.
+
+use super::law::array;
+use super::two_masses::{Deviation, Oscillator, Transmission, TwoMasses};
+use super::{Coordinate, Effect, Layer, MotionSample, Parameter, PlaceKind, Scale, Term};
+
+/// Share of the critical damping that the link has against a rotor that stands still. It is none of the
+/// parameters: motions of robots do not show it.
+const DAMPING_RATIO: f64 = 0.1;
+
+/// A spring between rotor and link, T = -K δ - D δ̇ with the damping D = 2 ζ √(K M), ζ = 0.1, and a rotor of
+/// inertia J. The encoder is on the rotor; the link starts at rest against it.
+pub(super) static EFFECT: Effect = Effect {
+    name: "joint_elasticity",
+    place: PlaceKind::Joint,
+    layer: Layer::Body,
+    parameters: &[
+        Parameter::at_least("stiffness_nm_per_rad", 1.0),
+        Parameter::at_least("rotor_inertia_kgm2", 0.0),
+    ],
+    coordinates: &[
+        Coordinate::positive_factor("rotor_inertia_kgm2"),
+        Coordinate::shape("stiffness_nm_per_rad", 50.0, 1e5, 14, Scale::Log),
+    ],
+    to_parameters: |c| vec![c[1], c[0]],
+    to_coordinates: |p| vec![p[1], p[0]],
+    build: |site, values| {
+        let values: [f64; 2] = array(values);
+        Box::new(JointElasticity {
+            joint: site.joint,
+            values,
+            spring: Spring(values[1].max(1.0)),
+            masses: TwoMasses::new(site),
+        })
+    },
+};
+
+/// Its stiffness \[N m/rad\].
+#[derive(Debug)]
+struct Spring(f64);
+
+impl Transmission for Spring {
+    fn settled(&self, inertia: f64, forcing: f64) -> Deviation {
+        Deviation {
+            angle: forcing * inertia / self.0,
+            rate: 0.0,
+        }
+    }
+
+    fn advance(&self, inertia: f64, from: Deviation, forcing: [f64; 2], dt_s: f64) -> Deviation {
+        let frequency = (self.0 / inertia).sqrt();
+        Oscillator::new(frequency, DAMPING_RATIO, dt_s).step(from, forcing)
+    }
+
+    fn acceleration(&self, inertia: f64, at: Deviation) -> f64 {
+        let frequency = (self.0 / inertia).sqrt();
+        -frequency * (frequency * at.angle + 2.0 * DAMPING_RATIO * at.rate)
+    }
+}
+
+#[derive(Debug)]
+struct JointElasticity {
+    joint: usize,
+    values: [f64; 2],
+    spring: Spring,
+    masses: TwoMasses,
+}
+
+impl Term for JointElasticity {
+    fn effect(&self) -> &'static Effect {
+        &EFFECT
+    }
+
+    fn coordinates(&self) -> &[f64] {
+        &self.values
+    }
+
+    fn reset(&mut self) {
+        self.masses.reset();
+    }
+
+    fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
+        self.masses.act(at, &self.spring, effort);
+        effort[self.joint] += self.values[0] * at.acceleration[self.joint];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{TwoJoints, motion, run};
+    use super::super::two_masses::tests::simulated;
+    use super::*;
+
+    #[test]
+    fn agrees_with_a_simulation_of_both_masses_from_soft_to_stiff() {
+        let robot = TwoJoints::new();
+        let motion = motion(&robot.model, 200);
+        // Upright, at about 1.3 kg m².
+        for (stiffness, tolerance) in [(150.0, 0.05), (2000.0, 0.05), (30_000.0, 0.05)] {
+            let mut term = (EFFECT.build)(&robot.site(), &[0.0, stiffness]);
+            let ours = run(&mut *term, &motion);
+            let damping = |inertia: f64| 2.0 * DAMPING_RATIO * (stiffness * inertia).sqrt();
+            let mut angle = 0.0;
+            let mut data = crate::Data::new(&robot.model);
+            for _ in 0..100 {
+                let mut q = motion[0].position;
+                q[0] += angle;
+                let (qd, qdd) = (motion[0].velocity, motion[0].acceleration);
+                let load = crate::rnea(&robot.model, &mut data, &q, &qd, &qdd)[0];
+                angle = -load / stiffness;
+            }
+            let expected = simulated(&robot, 200, angle, |at, inertia| {
+                -stiffness * at.angle - damping(inertia) * at.rate
+            });
+            let (mut scale, mut worst) = (0.0_f64, 0.0_f64);
+            for (ours, expected) in ours.iter().zip(&expected) {
+                for j in 0..2 {
+                    scale = scale.max(expected[j].abs());
+                    worst = worst.max((ours[j] - expected[j]).abs());
+                }
+            }
+            assert!(worst < tolerance * scale, "{stiffness}: {worst} of {scale}");
+        }
+    }
+
+    #[test]
+    fn a_very_stiff_joint_is_rigid() {
+        let robot = TwoJoints::new();
+        let mut term = (EFFECT.build)(&robot.site(), &[0.0, 1e7]);
+        for effort in run(&mut *term, &motion(&robot.model, 200)) {
+            assert!(effort.iter().all(|e| e.abs() < 0.05), "{effort:?}");
+        }
+    }
+}

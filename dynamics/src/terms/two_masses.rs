@@ -1,0 +1,344 @@
+//! A joint whose rotor and link are two masses: the encoder sits on the rotor, the link moves nearly,
+//! not quite, alike.
+//!
+//! Given the rotor's motion θ(t) as measured and that of the other joints, the link of joint j moves by
+//!
+//! M(q) q̈ + rest(q, q̇) = T,   with q = θ + δ,
+//!
+//! where M is the inertia that the joint moves (it does not depend on q itself), rest is the remaining
+//! effort of the rigid body, and T is what comes through the transmission as a function of δ and δ̇ (Spong,
+//! "Modeling and Control of Elastic Joint Robots", 1987, with the rotor's motion given). The state is δ, so
+//! nothing drifts: M δ̈ = T + F with F = -rest - M θ̈, which is taken to run straight between samples, and
+//! M to be the mean of both. The effort of the motor is J θ̈ + T, that of the other joints the rigid body's with the
+//! link's motion.
+
+use super::{MotionSample, Site};
+use crate::{Data, Model, rnea};
+
+/// The link is not followed further from its rotor than this \[rad\]: no transmission bears it.
+const LARGEST_DEVIATION: f64 = 1.0;
+
+/// An inertia below this is none \[kg m²\].
+const LEAST_INERTIA: f64 = 1e-9;
+
+/// A second look at the end of a step changes nothing if the link is this near to where it was expected
+/// \[rad\].
+const NEAR_ENOUGH: f64 = 1e-6;
+
+/// How far the link is from where the rotor has it, and how fast that changes.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Deviation {
+    /// \[rad\]
+    pub angle: f64,
+    /// \[rad/s\]
+    pub rate: f64,
+}
+
+/// What is between rotor and link. Accelerations are those of the link: torque by the inertia that it
+/// moves.
+pub(super) trait Transmission {
+    /// The deviation at rest under a steady forcing \[rad/s²\].
+    fn settled(&self, inertia: f64, forcing: f64) -> Deviation;
+
+    /// The deviation `dt_s` later; the forcing runs straight from the first to the second value.
+    fn advance(&self, inertia: f64, from: Deviation, forcing: [f64; 2], dt_s: f64) -> Deviation;
+
+    /// Acceleration of the link by what comes through \[rad/s²\].
+    fn acceleration(&self, inertia: f64, at: Deviation) -> f64;
+}
+
+/// The link behind the transmission, followed along a motion.
+#[derive(Debug)]
+pub(super) struct TwoMasses {
+    joint: usize,
+    model: Model,
+    data: Data,
+    rigid: Vec<f64>,
+    position: Vec<f64>,
+    velocity: Vec<f64>,
+    acceleration: Vec<f64>,
+    before: Option<Before>,
+}
+
+/// The sample before.
+#[derive(Debug, Clone, Copy)]
+struct Before {
+    deviation: Deviation,
+    /// F \[N m\].
+    load: f64,
+    /// M \[kg m²\].
+    inertia: f64,
+}
+
+impl TwoMasses {
+    pub fn new(site: &Site<'_>) -> Self {
+        let n = site.model.dof();
+        Self {
+            joint: site.joint,
+            model: site.model.clone(),
+            data: Data::new(site.model),
+            rigid: vec![0.0; n],
+            position: vec![0.0; n],
+            velocity: vec![0.0; n],
+            acceleration: vec![0.0; n],
+            before: None,
+        }
+    }
+
+    pub fn reset(&mut self) {
+        self.before = None;
+    }
+
+    /// Adds what the motion costs more than without `transmission`; the rotor's own inertia not counted.
+    pub fn act(
+        &mut self,
+        at: &MotionSample<'_>,
+        transmission: &impl Transmission,
+        effort: &mut [f64],
+    ) {
+        let j = self.joint;
+        let rotor_acceleration = at.acceleration[j];
+        self.position.copy_from_slice(at.position);
+        self.velocity.copy_from_slice(at.velocity);
+        self.acceleration.copy_from_slice(at.acceleration);
+        self.effort(Deviation::default(), at, rotor_acceleration);
+        self.rigid.copy_from_slice(&self.data.effort);
+        let faster = self.effort(Deviation::default(), at, rotor_acceleration + 1.0);
+        let inertia = faster - self.rigid[j];
+        if inertia < LEAST_INERTIA {
+            return;
+        }
+        let (deviation, rest) = match self.before {
+            None => self.settle(at, transmission, inertia),
+            Some(before) => self.advance(before, at, transmission, inertia),
+        };
+        if at.dt_s > 0.0 || self.before.is_none() {
+            self.before = Some(Before {
+                deviation,
+                load: -rest - inertia * rotor_acceleration,
+                inertia,
+            });
+        }
+        let link_acceleration = transmission.acceleration(inertia, deviation) - rest / inertia;
+        self.effort(deviation, at, link_acceleration);
+        let link = &self.data.effort;
+        for ((effort, link), rigid) in effort.iter_mut().zip(link).zip(&self.rigid) {
+            *effort += link - rigid;
+        }
+    }
+
+    /// Where the link rests as the recording begins: looked for step by step, since what it bears
+    /// depends on where it is.
+    fn settle(
+        &mut self,
+        at: &MotionSample<'_>,
+        transmission: &impl Transmission,
+        inertia: f64,
+    ) -> (Deviation, f64) {
+        let mut deviation = Deviation::default();
+        let mut rest = self.effort(deviation, at, 0.0);
+        for _ in 0..10 {
+            let forcing = -rest / inertia - at.acceleration[self.joint];
+            let next = limited(transmission.settled(inertia, forcing));
+            // Half way, so that a soft joint does not swing between two guesses.
+            let step = 0.5 * (next.angle - deviation.angle);
+            deviation.angle = if step.abs() < NEAR_ENOUGH {
+                next.angle
+            } else {
+                deviation.angle + step
+            };
+            rest = self.effort(deviation, at, 0.0);
+            if step.abs() < NEAR_ENOUGH {
+                break;
+            }
+        }
+        (deviation, rest)
+    }
+
+    /// Where the link is after `at.dt_s`, by a step with what it bore where it was and, if that is not
+    /// where it is, another with what it bears there.
+    fn advance(
+        &mut self,
+        before: Before,
+        at: &MotionSample<'_>,
+        transmission: &impl Transmission,
+        inertia: f64,
+    ) -> (Deviation, f64) {
+        let j = self.joint;
+        let from = before.deviation;
+        let mut rest = self.effort(from, at, 0.0);
+        if at.dt_s <= 0.0 {
+            return (from, rest);
+        }
+        let mean = 0.5 * (before.inertia + inertia);
+        let mut expected = from;
+        for _ in 0..2 {
+            let load = -rest - inertia * at.acceleration[j];
+            let forcing = [before.load / mean, load / mean];
+            let next = limited(transmission.advance(mean, from, forcing, at.dt_s));
+            rest = self.effort(next, at, 0.0);
+            let off = (next.angle - expected.angle).abs();
+            expected = next;
+            if off < NEAR_ENOUGH {
+                break;
+            }
+        }
+        (expected, rest)
+    }
+
+    /// Effort of the rigid body at the joint with the link where `deviation` has it; that of all joints
+    /// is left in `data`.
+    fn effort(&mut self, deviation: Deviation, at: &MotionSample<'_>, acceleration: f64) -> f64 {
+        let j = self.joint;
+        self.position[j] = at.position[j] + deviation.angle;
+        self.velocity[j] = at.velocity[j] + deviation.rate;
+        self.acceleration[j] = acceleration;
+        let (q, qd, qdd) = (&self.position, &self.velocity, &self.acceleration);
+        rnea(&self.model, &mut self.data, q, qd, qdd)[j]
+    }
+}
+
+/// Keeps a link that tore off within bounds.
+fn limited(deviation: Deviation) -> Deviation {
+    if deviation.angle.abs() <= LARGEST_DEVIATION {
+        return deviation;
+    }
+    let angle = if deviation.angle.is_nan() {
+        0.0
+    } else {
+        LARGEST_DEVIATION.copysign(deviation.angle)
+    };
+    Deviation { angle, rate: 0.0 }
+}
+
+/// Exact steps of the damped oscillator δ̈ + 2 ζ ω δ̇ + ω² δ = f with ζ < 1.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Oscillator {
+    frequency: f64,
+    damping: f64,
+    dt_s: f64,
+    /// How a deviation from the steady course and its rate carry over.
+    angle: [f64; 2],
+    rate: [f64; 2],
+}
+
+impl Oscillator {
+    /// For steps of `dt_s`; `frequency` ω in rad/s, `damping` ζ.
+    pub fn new(frequency: f64, damping: f64, dt_s: f64) -> Self {
+        let decay = frequency * damping;
+        let swing = frequency * (1.0 - damping * damping).sqrt();
+        let (sin, cos) = (swing * dt_s).sin_cos();
+        let left = (-decay * dt_s).exp();
+        Self {
+            frequency,
+            damping,
+            dt_s,
+            angle: [left * (cos + decay / swing * sin), left * sin / swing],
+            rate: [
+                -left * frequency * frequency / swing * sin,
+                left * (cos - decay / swing * sin),
+            ],
+        }
+    }
+
+    /// The state a step later; the forcing runs straight from the first to the second value.
+    pub fn step(&self, from: Deviation, forcing: [f64; 2]) -> Deviation {
+        let stiffness = self.frequency * self.frequency;
+        let rate = (forcing[1] - forcing[0]) / self.dt_s / stiffness;
+        let lag = 2.0 * self.damping / self.frequency * rate;
+        let off = from.angle - (forcing[0] / stiffness - lag);
+        let drift = from.rate - rate;
+        Deviation {
+            angle: forcing[1] / stiffness - lag + self.angle[0] * off + self.angle[1] * drift,
+            rate: rate + self.rate[0] * off + self.rate[1] * drift,
+        }
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::super::tests::{TwoJoints, motion_with, sample};
+    use super::*;
+
+    /// Effort of the first joint's motor along a motion, by small steps: `torque` is what comes through
+    /// at a deviation, for the inertia that the joint moves.
+    pub fn simulated(
+        robot: &TwoJoints,
+        samples: u32,
+        start: f64,
+        torque: impl Fn(Deviation, f64) -> f64,
+    ) -> Vec<[f64; 2]> {
+        let model = &robot.model;
+        let mut data = Data::new(model);
+        let steps = 2000;
+        let dt = 0.01 / f64::from(steps);
+        let fine = motion_with(model, samples * steps, dt);
+        let mut at = Deviation {
+            angle: start,
+            rate: 0.0,
+        };
+        let mut efforts = Vec::new();
+        for (k, now) in fine.iter().enumerate() {
+            let (mut q, mut qd, mut qdd) = (now.position, now.velocity, now.acceleration);
+            q[0] += at.angle;
+            qd[0] += at.rate;
+            qdd[0] = 0.0;
+            let rest = rnea(model, &mut data, &q, &qd, &qdd)[0];
+            qdd[0] = 1.0;
+            let inertia = rnea(model, &mut data, &q, &qd, &qdd)[0] - rest;
+            qdd[0] = (torque(at, inertia) - rest) / inertia;
+            if k % steps as usize == 0 {
+                let effort = rnea(model, &mut data, &q, &qd, &qdd);
+                efforts.push([
+                    effort[0] - now.transmitted[0],
+                    effort[1] - now.transmitted[1],
+                ]);
+            }
+            at.rate += dt * (qdd[0] - now.acceleration[0]);
+            at.angle += dt * at.rate;
+        }
+        efforts
+    }
+
+    #[test]
+    fn the_oscillator_is_exact_in_one_step_or_many() {
+        let whole = Oscillator::new(30.0, 0.1, 0.2);
+        let part = Oscillator::new(30.0, 0.1, 0.002);
+        let start = Deviation {
+            angle: 0.01,
+            rate: -0.3,
+        };
+        let end = whole.step(start, [5.0, -9.0]);
+        let mut at = start;
+        let (mut x, mut v) = (start.angle, start.rate);
+        for k in 0..100 {
+            let forcing = |share: f64| 5.0 - 14.0 * share;
+            let (a, b) = (f64::from(k) / 100.0, f64::from(k + 1) / 100.0);
+            at = part.step(at, [forcing(a), forcing(b)]);
+            for i in 0..1000 {
+                let f = forcing(a + (b - a) * (f64::from(i) + 0.5) / 1000.0);
+                v += 2e-6 * (f - 2.0 * 0.1 * 30.0 * v - 900.0 * x);
+                x += 2e-6 * v;
+            }
+        }
+        assert!((at.angle - end.angle).abs() < 1e-12 && (at.rate - end.rate).abs() < 1e-10);
+        assert!((x - end.angle).abs() < 1e-6 && (v - end.rate).abs() < 1e-4);
+    }
+
+    #[test]
+    fn nothing_moves_nothing() {
+        let model = Model::massless(&["one".to_owned(), "two".to_owned()]);
+        let site = Site {
+            model: &model,
+            joint: 0,
+            source: 0,
+            link: 0,
+        };
+        let mut term =
+            (super::super::effect("joint_elasticity").unwrap().build)(&site, &[0.5, 1e3]);
+        let mut effort = [0.0; 2];
+        let at = sample(0.01, 0.0, [0.1; 2], [0.2; 2], [3.0; 2]);
+        term.act(&at.view(), &mut effort);
+        assert_eq!(effort, [1.5, 0.0]);
+    }
+}
