@@ -236,9 +236,18 @@ def allowed(name, joint, taken):
             return False
         if same and (k == other or "alone" in (k, other) or {k, other} in CLASHES):
             return False
-        if "alone" in (k, other) and {k, other} & {"lag", "alone"} and k != other or k == other == "alone":
+        if "alone" in (k, other) and (k == other or "lag" in (k, other)):
             return False
     return True
+
+
+def together(names, count, rng):
+    """Some distinct effects that may be in one case."""
+    out = []
+    for name in (str(x) for x in rng.permutation(names)):
+        if len(out) < count and allowed(name, None, [{"effect": x, "joint": x} for x in out]):
+            out.append(name)
+    return out
 
 
 def draw(name, c, rng, target, taken=()):

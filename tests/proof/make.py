@@ -2,10 +2,11 @@
 
     python make.py --out DIR --seed 1 --count 20 [--kind single|combo|null|unknown|mixed] [--effects a,b] [--robots DIR_OR_FILES ...]
 
-DIR gets cases/<id>/{case.yaml, rec_XX.mcap}, robots/*.urdf and answers.json.  The same call gives the same bytes.
+DIR gets cases/<id>/{case.yaml, rec_XX.mcap}, robots/*.urdf, answers.json and its sha256.  The same call gives the same bytes.
 """
 import argparse
 import glob
+import hashlib
 import json
 import os
 import sys
@@ -70,8 +71,7 @@ def plan(o, rng, robots):
             deck = deck or [str(x) for x in rng.permutation(allowed)]
             names = [deck.pop()]
         else:
-            short = [x for x in allowed if x != "temperature_viscous"]
-            names = [str(x) for x in rng.choice(short, size=min(len(short), int(rng.integers(2, 5))), replace=False)]
+            names = draws.together([x for x in allowed if x != "temperature_viscous"], int(rng.integers(2, 5)), rng)
         rows.append((kind, names))
     order = []
     for kind, names in rows:
@@ -154,7 +154,7 @@ def simulate(robot, effects, recs, commands, starts):
 def case(o, ident, kind, names, robot, rng, folder):
     """Draw, simulate and check until a case is sound; write its files; its entry in the answers."""
     rejected = []
-    for _ in range(40):
+    for _ in range(25):
         entry = attempt(o, ident, kind, names, robot, rng, folder, rejected)
         if entry:
             return entry
@@ -260,14 +260,17 @@ def main():
             file.write(robot.stripped_urdf())
         try:
             answers.append(case(o, f"{o.prefix}{i:02d}", kind, names, robot, np.random.default_rng([o.seed, i]), o.out))
-        except RuntimeError as error:
+        except RuntimeError as error:            # such a set of effects cannot be shown on this robot: the case is left out
             print(error, file=sys.stderr)
             continue
         a = answers[-1]
         print(a["case"], a["kind"], a["robot"], [(e["effect"], e.get("joint", e.get("link")), round(e["snr_rms"], 1)) for e in a["effects"]],
               f"closure {a['closure_sigma']:.3f}", "rejected", len(a["rejected"]), flush=True)
+        text = json.dumps({"cases": answers}, indent=1) + "\n"
         with open(os.path.join(o.out, "answers.json"), "w") as file:
-            json.dump({"cases": answers}, file, indent=1)
+            file.write(text)
+        with open(os.path.join(o.out, "answers.sha256"), "w") as file:
+            file.write(hashlib.sha256(text.encode()).hexdigest() + "  answers.json\n")
 
 
 if __name__ == "__main__":

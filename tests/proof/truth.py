@@ -151,8 +151,8 @@ def visibility(robot, effect, pairs, sigma):
 
 
 def smoothed(x, dt, band=BAND_HZ):
-    """Zero-phase smoothing to `band` Hz (Gaussian of fourth order: flat for slow motion), reflected oddly at the ends."""
-    width = 0.2 / band / dt
+    """Zero-phase smoothing to `band` Hz (-3 dB; Gaussian of fourth order, flat for slow motion), reflected oddly at the ends."""
+    width = 0.2355 / band / dt
     k = np.arange(-int(4 * width) - 1, int(4 * width) + 2)
     w = np.exp(-0.5 * (k / width)**2) * (1.5 - 0.5 * (k / width)**2)
     w /= w.sum()
