@@ -18,7 +18,7 @@ pub(super) static EFFECT: Effect = Effect {
     coordinates: &[
         Coordinate::positive_factor("coulomb_nm"),
         Coordinate::positive_factor("static_excess_nm"),
-        Coordinate::shape("stribeck_velocity_rad_s", 0.005, 5.0, 12, Scale::Log),
+        Coordinate::shape("stribeck_velocity_rad_s", 0.02, 5.0, 12, Scale::Log),
     ],
     to_parameters: |c| vec![c[0], c[0] + c[1], c[2]],
     to_coordinates: |p| vec![p[0], p[1] - p[0], p[2]],

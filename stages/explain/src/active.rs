@@ -1,0 +1,313 @@
+//! A piece of physics that is part of an explanation, and what it does to the recordings.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use tauscope_dynamics::terms::{
+    Coordinate, CoordinateKind, Effect, Layer, MotionSample, Physics, PlaceKind, Site, Term,
+};
+
+use crate::problem::Problem;
+
+/// Where an effect is: indices into the model's joints and links; what its kind of place does not ask for is 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
+pub struct Whereabouts {
+    /// The joint.
+    pub joint: usize,
+    /// The joint that drives it.
+    pub source: usize,
+    /// The link.
+    pub link: usize,
+}
+
+/// An effect at a place, without its numbers.
+#[derive(Debug, Clone, Copy)]
+pub struct Hypothesis {
+    /// What.
+    pub effect: &'static Effect,
+    /// Where.
+    pub place: Whereabouts,
+}
+
+impl PartialEq for Hypothesis {
+    fn eq(&self, other: &Self) -> bool {
+        self.effect.name == other.effect.name && self.place == other.place
+    }
+}
+
+impl Hypothesis {
+    /// With numbers.
+    pub fn with(self, coordinates: Vec<f64>) -> Active {
+        Active {
+            hypothesis: self,
+            coordinates,
+        }
+    }
+
+    /// The one joint whose effort it changes, if there is only one.
+    pub fn only_joint(&self) -> Option<usize> {
+        let at_joint = matches!(self.effect.place, PlaceKind::Joint | PlaceKind::TwoJoints);
+        (at_joint && self.effect.layer != Layer::Body).then_some(self.place.joint)
+    }
+
+    /// Indices of the coordinates that are factors.
+    pub fn factors(&self) -> Vec<usize> {
+        let is_factor = |c: &Coordinate| matches!(c.kind, CoordinateKind::Factor { .. });
+        let coordinates = self.effect.coordinates.iter().enumerate();
+        coordinates.filter(|(_, c)| is_factor(c)).map(|(i, _)| i).collect()
+    }
+}
+
+/// An effect at a place with its numbers.
+#[derive(Debug, Clone)]
+pub struct Active {
+    /// What and where.
+    pub hypothesis: Hypothesis,
+    /// In the effect's coordinates.
+    pub coordinates: Vec<f64>,
+}
+
+impl Active {
+    /// The term for a problem's robot.
+    pub fn term(&self, problem: &Problem) -> Box<dyn Term> {
+        let Whereabouts {
+            joint,
+            source,
+            link,
+        } = self.hypothesis.place;
+        let site = Site {
+            model: &problem.model,
+            joint,
+            source,
+            link,
+        };
+        (self.hypothesis.effect.build)(&site, &self.coordinates)
+    }
+
+    /// Its parameters, as reports hold them.
+    pub fn parameters(&self) -> Vec<f64> {
+        (self.hypothesis.effect.to_parameters)(&self.coordinates)
+    }
+}
+
+/// A signal that is zero but for one joint, or not.
+#[derive(Debug, Clone)]
+pub struct Column {
+    /// The joint that `values` belong to; `None` if they are of all joints.
+    pub joint: Option<usize>,
+    /// Rows of the joint, or of all joints one after the other.
+    pub values: Vec<f64>,
+}
+
+impl Column {
+    /// The rows of a joint, `None` if they are zero.
+    pub fn of_joint(&self, joint: usize, rows: usize) -> Option<&[f64]> {
+        match self.joint {
+            Some(own) => (own == joint).then_some(&self.values[..]),
+            None => Some(&self.values[joint * rows..(joint + 1) * rows]),
+        }
+    }
+}
+
+/// Efforts of all tracks under some physics, unfiltered and row-major, one `Vec` per track.
+#[derive(Debug, Clone)]
+pub struct Efforts {
+    /// Rigid body and [`Layer::Body`] terms: what the gears transmit.
+    pub body: Vec<Vec<f64>>,
+    /// With the [`Layer::Joint`] terms.
+    pub mechanical: Vec<Vec<f64>>,
+    /// With the [`Layer::Record`] terms: what is recorded.
+    pub recorded: Vec<Vec<f64>>,
+}
+
+fn terms_of(problem: &Problem, actives: &[Active], layer: Layer) -> Vec<Box<dyn Term>> {
+    let of_layer = actives
+        .iter()
+        .filter(|active| active.hypothesis.effect.layer == layer);
+    of_layer.map(|active| active.term(problem)).collect()
+}
+
+impl Efforts {
+    /// Under the physics of `actives`.
+    pub fn new(problem: &Problem, actives: &[Active]) -> Self {
+        let rigid: Vec<Vec<f64>> = problem.tracks.iter().map(|t| t.track.rigid.clone()).collect();
+        let body = run(problem, terms_of(problem, actives, Layer::Body), &rigid);
+        let mechanical = run(problem, terms_of(problem, actives, Layer::Joint), &body);
+        let recorded = record(problem, actives, &mechanical);
+        Self {
+            body,
+            mechanical,
+            recorded,
+        }
+    }
+}
+
+/// Efforts with terms of one layer added.
+fn run(problem: &Problem, terms: Vec<Box<dyn Term>>, start: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    if terms.is_empty() {
+        return start.to_vec();
+    }
+    let mut physics = Physics::new(terms, problem.joints);
+    let tracks = problem.tracks.iter().zip(start);
+    tracks.map(|(track, start)| track.track.run(&mut physics, start)).collect()
+}
+
+/// What is recorded of mechanical efforts.
+pub fn record(problem: &Problem, actives: &[Active], mechanical: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    run(problem, terms_of(problem, actives, Layer::Record), mechanical)
+}
+
+/// What `active` alone changes, as a signal: added to the physics that made `efforts`.
+///
+/// [`Layer::Record`] terms of `others` are passed through; one that is itself of that layer acts after them.
+pub fn change(problem: &Problem, others: &[Active], efforts: &Efforts, active: &Active) -> Column {
+    let layer = active.hypothesis.effect.layer;
+    let mut term = active.term(problem);
+    let through = layer != Layer::Record
+        && others.iter().any(|other| other.hypothesis.effect.layer == Layer::Record);
+    let changed: Vec<Vec<f64>> = match layer {
+        Layer::Record => act_over(problem, &mut *term, &efforts.recorded, &efforts.body),
+        _ if through => act_over(problem, &mut *term, &efforts.mechanical, &efforts.body),
+        _ => {
+            let zero: Vec<Vec<f64>> = efforts.body.iter().map(|b| vec![0.0; b.len()]).collect();
+            act_over(problem, &mut *term, &zero, &efforts.body)
+        }
+    };
+    let difference: Vec<Vec<f64>> = match layer {
+        Layer::Record => subtract(changed, &efforts.recorded),
+        _ if through => subtract(record(problem, others, &changed), &efforts.recorded),
+        _ => changed,
+    };
+    let coupled = through
+        && others
+            .iter()
+            .any(|other| other.hypothesis.effect.place == PlaceKind::TwoJoints);
+    match active.hypothesis.only_joint() {
+        Some(joint) if !coupled => {
+            let mut values = vec![0.0; problem.rows];
+            problem.joint_signal(&difference, joint, &mut values);
+            Column {
+                joint: Some(joint),
+                values,
+            }
+        }
+        _ => Column {
+            joint: None,
+            values: problem.signal(&difference),
+        },
+    }
+}
+
+fn act_over(
+    problem: &Problem,
+    term: &mut dyn Term,
+    start: &[Vec<f64>],
+    transmitted: &[Vec<f64>],
+) -> Vec<Vec<f64>> {
+    let n = problem.joints;
+    let mut out = start.to_vec();
+    for ((track, effort), transmitted) in problem.tracks.iter().zip(&mut out).zip(transmitted) {
+        term.reset();
+        track.track.each(|k, at| {
+            let row = k * n..(k + 1) * n;
+            let at = MotionSample {
+                transmitted: &transmitted[row.clone()],
+                ..*at
+            };
+            term.act(&at, &mut effort[row]);
+        });
+    }
+    out
+}
+
+fn subtract(mut from: Vec<Vec<f64>>, what: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    for (from, what) in from.iter_mut().zip(what) {
+        for (a, b) in from.iter_mut().zip(what) {
+            *a -= b;
+        }
+    }
+    from
+}
+
+/// The columns of a hypothesis at some shape.
+#[derive(Debug)]
+pub struct Columns {
+    /// What its shape alone does, `None` if nothing.
+    pub alone: Option<Column>,
+    /// What each of its factors adds per unit.
+    pub factors: Vec<Column>,
+}
+
+/// Columns that were computed before, by hypothesis and shape. They are those of a grid, so their number is bounded.
+#[derive(Debug, Default)]
+pub struct ColumnCache(Mutex<HashMap<Key, Arc<Columns>>>);
+
+type Key = (&'static str, Whereabouts, Vec<u64>);
+
+/// Problems with more rows than this do without the cache: memory stays bounded.
+const CACHED_ROWS: usize = 12_000;
+
+/// The columns of a hypothesis at some shape, beside the physics `others` that made `efforts`.
+pub fn columns(
+    problem: &Problem,
+    others: &[Active],
+    efforts: &Efforts,
+    hypothesis: Hypothesis,
+    shape: &[f64],
+) -> Arc<Columns> {
+    let effect = hypothesis.effect;
+    // What a term adds depends on the motion alone, unless it is recorded through something or scales with the load.
+    let alike = effect.layer != Layer::Record
+        && effect.name != "load_dependent_friction"
+        && others.iter().all(|other| other.hypothesis.effect.layer != Layer::Record)
+        && problem.rows <= CACHED_ROWS;
+    if !alike {
+        return Arc::new(compute_columns(problem, others, efforts, hypothesis, shape));
+    }
+    let bits = shape.iter().map(|value| value.to_bits()).collect();
+    let key: Key = (effect.name, hypothesis.place, bits);
+    let lock = || problem.cache.0.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(known) = lock().get(&key) {
+        return Arc::clone(known);
+    }
+    let new = Arc::new(compute_columns(problem, others, efforts, hypothesis, shape));
+    lock().insert(key, Arc::clone(&new));
+    new
+}
+
+fn compute_columns(
+    problem: &Problem,
+    others: &[Active],
+    efforts: &Efforts,
+    hypothesis: Hypothesis,
+    shape: &[f64],
+) -> Columns {
+    let factors = hypothesis.factors();
+    let mut coordinates = shape.to_vec();
+    for &i in &factors {
+        coordinates[i] = 0.0;
+    }
+    let at = |coordinates: &[f64]| {
+        let active = hypothesis.with(coordinates.to_vec());
+        change(problem, others, efforts, &active)
+    };
+    let alone = at(&coordinates);
+    let mut each = Vec::with_capacity(factors.len());
+    for &i in &factors {
+        let CoordinateKind::Factor { step, .. } = hypothesis.effect.coordinates[i].kind else {
+            continue;
+        };
+        coordinates[i] = step;
+        let mut column = at(&coordinates);
+        coordinates[i] = 0.0;
+        for (value, base) in column.values.iter_mut().zip(&alone.values) {
+            *value = (*value - base) / step;
+        }
+        each.push(column);
+    }
+    let silent = alone.values.iter().all(|x| *x == 0.0);
+    Columns {
+        alone: (!silent).then_some(alone),
+        factors: each,
+    }
+}

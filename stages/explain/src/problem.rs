@@ -1,0 +1,405 @@
+//! The data of a fit: smoothed motion, rigid-body effort and filtered measured effort of the recordings.
+
+use tauscope_dynamics::terms::{MotionSample, Physics};
+use tauscope_dynamics::{Data, Model, rnea};
+
+use crate::active::ColumnCache;
+use crate::recording::{MAX_GAP_S, Recording};
+use crate::smoother::{LowPass, MotionSmoother};
+
+/// What is compared lies below this frequency, unless the recordings are too slow for it \[Hz\].
+const CUTOFF_HZ: f64 = 8.0;
+/// The cutoff is at most this share of the sample rate.
+const CUTOFF_OF_RATE: f64 = 0.1;
+/// Motion is smoothed this many times higher, so that its filter does not show below the cutoff.
+const MOTION_CUTOFF_RATIO: f64 = 2.0;
+/// Recordings faster than this are thinned for the fit \[Hz\].
+const FIT_RATE_HZ: f64 = 130.0;
+/// Below this speed a joint stands: its friction is any value up to breakaway \[rad/s\].
+pub const STANDSTILL_RAD_S: f64 = 0.01;
+/// Samples nearer than this to an end of the recording are left out, in periods of the cutoff.
+const END_PERIODS: f64 = 0.8;
+/// And nearer than this to a standstill or reversal of the joint: what friction does there, the motion does not tell.
+const REVERSAL_PERIODS: f64 = 0.4;
+/// Fast recordings are filtered this many times higher than what is compared before they are thinned.
+const ALIASING_RATIO: f64 = 5.0;
+/// A joint that moves in less than this share of the time is judged at rest, too.
+const LEAST_MOVING_SHARE: f64 = 0.2;
+
+/// One recording as a fit sees it. Matrices are row-major: one number per joint and sample.
+#[derive(Debug, Clone)]
+pub struct Track {
+    /// The recording's name.
+    pub name: String,
+    /// Its start \[s from the start of the session\].
+    pub session_s: f64,
+    /// \[s from its start\]
+    pub time_s: Vec<f64>,
+    /// Smoothed position \[rad or m\].
+    pub position: Vec<f64>,
+    /// Smoothed velocity \[rad/s or m/s\].
+    pub velocity: Vec<f64>,
+    /// Smoothed acceleration \[rad/s² or m/s²\].
+    pub acceleration: Vec<f64>,
+    /// What the twin says \[N m or N\].
+    pub rigid: Vec<f64>,
+}
+
+impl Track {
+    /// The motion of a recording, at all its samples, and what the twin says of it. `unit_nm` turns the
+    /// recording's unit into N m, by joint.
+    pub fn new(
+        recording: &Recording,
+        session_s: f64,
+        model: &Model,
+        cutoff_hz: f64,
+        unit_nm: &[f64],
+    ) -> Self {
+        let n = model.dof();
+        let count = recording.len();
+        let smoother = MotionSmoother::new(&recording.time_s, MOTION_CUTOFF_RATIO * cutoff_hz);
+        let mut track = Self {
+            name: recording.name.clone(),
+            session_s,
+            time_s: recording.time_s.clone(),
+            position: vec![0.0; n * count],
+            velocity: vec![0.0; n * count],
+            acceleration: vec![0.0; n * count],
+            rigid: vec![0.0; n * count],
+        };
+        for j in 0..n {
+            let measured: Vec<f64> = (0..count).map(|k| recording.position[k * n + j]).collect();
+            for (k, state) in smoother.smooth(&measured).iter().enumerate() {
+                track.position[k * n + j] = state.x;
+                track.velocity[k * n + j] = state.y;
+                track.acceleration[k * n + j] = state.z;
+            }
+        }
+        if recording.reference.is_empty() {
+            let mut data = Data::new(model);
+            for k in 0..count {
+                let row = k * n..(k + 1) * n;
+                let effort = rnea(
+                    model,
+                    &mut data,
+                    &track.position[row.clone()],
+                    &track.velocity[row.clone()],
+                    &track.acceleration[row.clone()],
+                );
+                track.rigid[row].copy_from_slice(effort);
+            }
+        } else {
+            for (k, value) in recording.reference.iter().enumerate() {
+                track.rigid[k] = value * unit_nm[k % n];
+            }
+        }
+        track
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.time_s.is_empty()
+    }
+
+    /// Keeps the samples of these indices.
+    fn thin(&self, keep: &[usize], n: usize) -> Self {
+        let rows = |from: &[f64]| -> Vec<f64> {
+            keep.iter().flat_map(|&k| from[k * n..(k + 1) * n].to_vec()).collect()
+        };
+        Self {
+            name: self.name.clone(),
+            session_s: self.session_s,
+            time_s: keep.iter().map(|&k| self.time_s[k]).collect(),
+            position: rows(&self.position),
+            velocity: rows(&self.velocity),
+            acceleration: rows(&self.acceleration),
+            rigid: rows(&self.rigid),
+        }
+    }
+
+    /// Runs `physics` over the track, from `start` efforts (row-major) to what is recorded.
+    pub fn run(&self, physics: &mut Physics, start: &[f64]) -> Vec<f64> {
+        let mut effort = start.to_vec();
+        physics.reset();
+        self.each(|k, at| {
+            let n = at.position.len();
+            physics.act(at, &mut effort[k * n..(k + 1) * n]);
+        });
+        effort
+    }
+
+    /// Calls `visit` with every sample in order.
+    pub fn each(&self, mut visit: impl FnMut(usize, &MotionSample<'_>)) {
+        let n = self.position.len() / self.len().max(1);
+        for k in 0..self.len() {
+            let row = k * n..(k + 1) * n;
+            let at = MotionSample {
+                dt_s: if k == 0 { 0.0 } else { self.time_s[k] - self.time_s[k - 1] },
+                recording_s: self.time_s[k],
+                session_s: self.session_s + self.time_s[k],
+                position: &self.position[row.clone()],
+                velocity: &self.velocity[row.clone()],
+                acceleration: &self.acceleration[row.clone()],
+                transmitted: &self.rigid[row],
+            };
+            visit(k, &at);
+        }
+    }
+}
+
+/// A track with the filter of its clock and the samples that are compared.
+#[derive(Debug)]
+pub struct FitTrack {
+    /// The motion, thinned.
+    pub track: Track,
+    /// By joint, passing over what does not count there.
+    filters: Vec<LowPass>,
+    /// Samples at which filtered signals are compared.
+    pub compared: Vec<usize>,
+    /// Where they begin in the rows of the problem.
+    pub first_row: usize,
+}
+
+impl FitTrack {
+    /// Rows of the problem that are this track's.
+    pub fn rows(&self) -> std::ops::Range<usize> {
+        self.first_row..self.first_row + self.compared.len()
+    }
+
+    /// Filters one joint's signal on the track's clock and writes what is compared.
+    pub fn compare(&self, joint: usize, mut signal: Vec<f64>, into: &mut [f64]) {
+        self.filters[joint].apply(&mut signal);
+        for (value, &k) in into.iter_mut().zip(&self.compared) {
+            *value = signal[k];
+        }
+    }
+}
+
+/// Everything that a fit works on. A *signal* is joint-major: `rows` numbers for joint 0, then for joint 1,
+/// and so on; the rows of each joint are those of the tracks, one after the other.
+#[derive(Debug)]
+pub struct Problem {
+    /// The robot.
+    pub model: Model,
+    /// Number of joints.
+    pub joints: usize,
+    /// The recordings.
+    pub tracks: Vec<FitTrack>,
+    /// Rows per joint.
+    pub rows: usize,
+    /// Measured effort, filtered \[N m or N\].
+    pub measured: Vec<f64>,
+    /// 1 where a joint's row counts, 0 where it stands still or the filters have no footing.
+    pub weight: Vec<f64>,
+    /// Standard deviation of the measured effort's white noise after the filter, by joint \[N m\]: the least
+    /// that any model can leave.
+    pub white_noise: Vec<f64>,
+    /// Largest measured effort by joint, unfiltered \[N m\].
+    pub largest_effort: Vec<f64>,
+    /// Half amplitude of the filter \[Hz\].
+    pub cutoff_hz: f64,
+    /// Columns that were computed before.
+    pub cache: ColumnCache,
+}
+
+impl Problem {
+    /// Prepares recordings with effort for a fit; `unit_nm` turns the recordings' unit into N m, by joint.
+    /// Standstills of the joints in `rests_count` are compared, too.
+    pub fn new(
+        model: &Model,
+        recordings: &[Recording],
+        session_start_ns: i64,
+        unit_nm: &[f64],
+        rests_count: &[bool],
+    ) -> Self {
+        let n = model.dof();
+        let slowest = recordings
+            .iter()
+            .map(|r| (r.len() - 1) as f64 / r.duration_s().max(1e-3))
+            .fold(f64::INFINITY, f64::min);
+        let cutoff_hz = CUTOFF_HZ.min(CUTOFF_OF_RATE * slowest);
+        let mut problem = Self {
+            model: model.clone(),
+            joints: n,
+            tracks: Vec::new(),
+            rows: 0,
+            measured: Vec::new(),
+            weight: Vec::new(),
+            white_noise: vec![0.0; n],
+            largest_effort: vec![0.0; n],
+            cutoff_hz,
+            cache: ColumnCache::default(),
+        };
+        let (mut measured, mut weight) = (Vec::new(), Vec::new());
+        let mut variances = vec![Vec::new(); n];
+        let tracks: Vec<(Track, Track, Vec<usize>)> = recordings
+            .iter()
+            .map(|recording| {
+                let session_s = (recording.start_ns - session_start_ns) as f64 * 1e-9;
+                let full = Track::new(recording, session_s, model, cutoff_hz, unit_nm);
+                let kept = thinned(&full.time_s, 1.0 / FIT_RATE_HZ);
+                (full.thin(&kept, n), full, kept)
+            })
+            .collect();
+        let moves = moving_joints(tracks.iter().map(|(track, _, _)| track), n);
+        for (recording, (track, full, kept)) in recordings.iter().zip(tracks) {
+            let compared = spaced(&track.time_s, 0.5 / cutoff_hz);
+            let mut filters = Vec::with_capacity(n);
+            for j in 0..n {
+                let counts = track.counts(j, moves[j] && !rests_count[j], cutoff_hz);
+                let filter = LowPass::weighted(&track.time_s, cutoff_hz, |k| counts[k]);
+                let mut signal: Vec<f64> = (0..full.len())
+                    .map(|k| recording.effort[k * n + j] * unit_nm[j])
+                    .collect();
+                let largest = signal.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+                problem.largest_effort[j] = problem.largest_effort[j].max(largest);
+                let rate = (full.len() - 1) as f64 / recording.duration_s();
+                variances[j].push(white_variance(&signal) * cutoff_hz * 0.95 / (0.5 * rate));
+                if kept.len() < full.len() {
+                    // Against aliasing.
+                    LowPass::new(&full.time_s, ALIASING_RATIO * cutoff_hz).apply(&mut signal);
+                }
+                let mut signal: Vec<f64> = kept.iter().map(|&k| signal[k]).collect();
+                filter.apply(&mut signal);
+                measured.push(compared.iter().map(|&k| signal[k]).collect::<Vec<_>>());
+                weight.push(compared.iter().map(|&k| f64::from(counts[k])).collect::<Vec<_>>());
+                filters.push(filter);
+            }
+            let first_row = problem.rows;
+            problem.rows += compared.len();
+            problem.tracks.push(FitTrack {
+                track,
+                filters,
+                compared,
+                first_row,
+            });
+        }
+        for j in 0..n {
+            for r in 0..recordings.len() {
+                problem.measured.extend(&measured[r * n + j]);
+                problem.weight.extend(&weight[r * n + j]);
+            }
+            variances[j].sort_by(f64::total_cmp);
+            problem.white_noise[j] = variances[j][variances[j].len() / 2].sqrt();
+        }
+        problem
+    }
+
+    /// The part of a signal that is joint `joint`'s.
+    pub fn joint_rows(&self, joint: usize) -> std::ops::Range<usize> {
+        joint * self.rows..(joint + 1) * self.rows
+    }
+
+    /// Filters efforts over all tracks (row-major, one `Vec` per track) into a signal.
+    pub fn signal(&self, efforts: &[Vec<f64>]) -> Vec<f64> {
+        let mut signal = vec![0.0; self.joints * self.rows];
+        for j in 0..self.joints {
+            self.joint_signal(efforts, j, &mut signal[j * self.rows..(j + 1) * self.rows]);
+        }
+        signal
+    }
+
+    /// The same for one joint.
+    pub fn joint_signal(&self, efforts: &[Vec<f64>], joint: usize, into: &mut [f64]) {
+        for (track, effort) in self.tracks.iter().zip(efforts) {
+            let one = effort.iter().skip(joint).step_by(self.joints).copied().collect();
+            track.compare(joint, one, &mut into[track.rows()]);
+        }
+    }
+}
+
+impl Track {
+    /// Which samples of a joint are worth comparing: not the ends, not beside a gap and, where the joint `moves`
+    /// at all, not its standstills and reversals.
+    fn counts(&self, joint: usize, moves: bool, cutoff_hz: f64) -> Vec<bool> {
+        let n = self.position.len() / self.len();
+        let time = &self.time_s;
+        let mut counts = vec![true; time.len()];
+        let mut spoil = |from: f64, to: f64| {
+            let first = time.partition_point(|t| *t < from);
+            let last = time.partition_point(|t| *t <= to);
+            counts[first..last].fill(false);
+        };
+        let margin = END_PERIODS / cutoff_hz;
+        let (start, end) = (time[0], time[time.len() - 1]);
+        spoil(start, start + margin);
+        spoil(end - margin, end);
+        for pair in time.windows(2) {
+            if pair[1] - pair[0] > MAX_GAP_S {
+                spoil(pair[0] - margin, pair[1] + margin);
+            }
+        }
+        if moves {
+            let margin = REVERSAL_PERIODS / cutoff_hz;
+            let velocity = |k: usize| self.velocity[k * n + joint];
+            for k in 0..time.len() {
+                let reverses = k > 0 && velocity(k) * velocity(k - 1) < 0.0;
+                if reverses || velocity(k).abs() < STANDSTILL_RAD_S {
+                    spoil(time[k] - margin, time[k] + margin);
+                }
+            }
+        }
+        counts
+    }
+}
+
+/// Which joints move in a fair share of the time; the others are judged at rest, too.
+fn moving_joints<'a>(tracks: impl Iterator<Item = &'a Track>, n: usize) -> Vec<bool> {
+    let (mut moving, mut samples) = (vec![0_usize; n], 0);
+    for track in tracks {
+        samples += track.len();
+        for (k, velocity) in track.velocity.iter().enumerate() {
+            moving[k % n] += usize::from(velocity.abs() > 2.0 * STANDSTILL_RAD_S);
+        }
+    }
+    let share = |count: &usize| *count as f64 > LEAST_MOVING_SHARE * samples as f64;
+    moving.iter().map(share).collect()
+}
+
+/// Indices of samples at least `step_s` apart (but for a tenth of it, for uneven clocks).
+fn thinned(time_s: &[f64], step_s: f64) -> Vec<usize> {
+    let mut kept = Vec::new();
+    let mut next = f64::NEG_INFINITY;
+    for (k, &t) in time_s.iter().enumerate() {
+        if t >= next {
+            kept.push(k);
+            next = t + 0.9 * step_s;
+        }
+    }
+    kept
+}
+
+/// Indices of the samples nearest to an even grid of `step_s`.
+fn spaced(time_s: &[f64], step_s: f64) -> Vec<usize> {
+    let mut kept = Vec::new();
+    let mut at = time_s[0] + 0.5 * step_s;
+    let end = time_s[time_s.len() - 1];
+    while at < end {
+        let k = time_s.partition_point(|t| *t < at).min(time_s.len() - 1);
+        if kept.last() != Some(&k) {
+            kept.push(k);
+        }
+        at += step_s;
+    }
+    kept
+}
+
+/// Variance of the white noise on a smooth signal, from its fourth differences, robust against jumps.
+pub fn white_variance(signal: &[f64]) -> f64 {
+    let mut squares: Vec<f64> = signal
+        .windows(5)
+        .map(|x| (x[0] - 4.0 * x[1] + 6.0 * x[2] - 4.0 * x[3] + x[4]).abs())
+        .collect();
+    if squares.is_empty() {
+        return 0.0;
+    }
+    squares.sort_by(f64::total_cmp);
+    // The median of |normal| is 0.6745 standard deviations; 70 = 1 + 16 + 36 + 16 + 1.
+    let deviation = squares[squares.len() / 2] / 0.6745;
+    deviation * deviation / 70.0
+}

@@ -1,0 +1,386 @@
+//! A recording as columns: what was measured, sample by sample, in the robot's joint order.
+
+use std::path::{Path, PathBuf};
+
+use tauscope_archive::{ArchiveError, Recording as Archive};
+
+/// A clock that stands still for longer than this is a gap \[s\].
+pub const MAX_GAP_S: f64 = 0.25;
+
+/// One recording. Matrices are row-major: `joint_count` numbers per sample.
+#[derive(Debug, Clone)]
+pub struct Recording {
+    /// The file's stem.
+    pub name: String,
+    /// Where it lies.
+    pub path: PathBuf,
+    /// Stamp of its first sample \[ns since the epoch\].
+    pub start_ns: i64,
+    /// Time of each sample since the first \[s\], strictly increasing.
+    pub time_s: Vec<f64>,
+    /// Position \[rad or m\].
+    pub position: Vec<f64>,
+    /// Velocity as recorded \[rad/s or m/s\]; empty where there is none.
+    pub velocity: Vec<f64>,
+    /// Effort in the recording's unit; empty where there is none.
+    pub effort: Vec<f64>,
+    /// Another twin's effort at the same instants, in the recording's unit; empty where there is none.
+    pub reference: Vec<f64>,
+    /// For each recorded row, the sample that stands for it: repeated rows share one.
+    pub sample_of_row: Vec<usize>,
+    /// What did not come through.
+    pub losses: Losses,
+}
+
+/// What was left out on reading.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Losses {
+    /// Rows whose numbers are not finite.
+    pub not_finite: u64,
+    /// Rows that repeat the stamp of the row before.
+    pub repeated: u64,
+    /// Rows whose stamp lies before that of the row before.
+    pub backward: u64,
+    /// Rows in which a joint of the robot is missing.
+    pub incomplete: u64,
+    /// Messages that could not be read.
+    pub unreadable: u64,
+}
+
+impl Losses {
+    /// Rows of data that are lost, repeats not counted.
+    pub fn lost(&self) -> u64 {
+        self.not_finite + self.backward + self.incomplete + self.unreadable
+    }
+}
+
+/// Why a recording cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordingError {
+    /// It cannot be read.
+    #[error(transparent)]
+    Archive(#[from] ArchiveError),
+    /// A joint of the robot is not in it.
+    #[error("{path}: joint `{joint}` is not in it; it has: {known}", path = path.display())]
+    MissingJoint {
+        /// The recording.
+        path: PathBuf,
+        /// The robot's joint.
+        joint: String,
+        /// The recording's joints.
+        known: String,
+    },
+    /// A joint's effort or position is never a number.
+    #[error("{path}: {what} of joint `{joint}` is NaN throughout", path = path.display())]
+    AlwaysNan {
+        /// The recording.
+        path: PathBuf,
+        /// `position` or `effort`.
+        what: &'static str,
+        /// The joint.
+        joint: String,
+    },
+    /// Nothing usable is left.
+    #[error("{path}: no usable joint states on `{topic}`", path = path.display())]
+    Empty {
+        /// The recording.
+        path: PathBuf,
+        /// The topic.
+        topic: String,
+    },
+}
+
+/// Topics to read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RecordingTopics {
+    /// Measured joint states.
+    pub state: String,
+    /// Another twin's efforts.
+    pub reference: Option<String>,
+}
+
+impl Recording {
+    /// Reads a recording, joints put in the order of `joint_names`.
+    ///
+    /// # Errors
+    /// If it cannot be read, lacks a joint or holds nothing usable.
+    pub fn read(
+        path: &Path,
+        topics: &RecordingTopics,
+        joint_names: &[String],
+    ) -> Result<Self, RecordingError> {
+        let archive = Archive::open(path)?;
+        let name = path.file_stem().map_or_else(
+            || path.display().to_string(),
+            |stem| stem.to_string_lossy().into_owned(),
+        );
+        let mut reader = Reader {
+            recording: Self {
+                name,
+                path: path.to_owned(),
+                start_ns: 0,
+                time_s: Vec::new(),
+                position: Vec::new(),
+                velocity: Vec::new(),
+                effort: Vec::new(),
+                reference: Vec::new(),
+                sample_of_row: Vec::new(),
+                losses: Losses::default(),
+            },
+            joint_names,
+            order: Vec::new(),
+            names: Vec::new(),
+            known: String::new(),
+            finite_position: vec![false; joint_names.len()],
+            finite_effort: vec![false; joint_names.len()],
+            last_ns: None,
+            has_velocity: true,
+            has_effort: true,
+        };
+        let mut states = archive.joint_states(&topics.state)?;
+        while let Some(state) = states.next_state() {
+            match state {
+                Ok(stamped) => reader.take(stamped.message),
+                Err(_) => reader.recording.losses.unreadable += 1,
+            }
+        }
+        let mut recording = reader.finish(&topics.state)?;
+        if let Some(topic) = &topics.reference {
+            recording.read_reference(&archive, topic, joint_names)?;
+        }
+        Ok(recording)
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.time_s.is_empty()
+    }
+
+    /// From the first sample to the last \[s\].
+    pub fn duration_s(&self) -> f64 {
+        self.time_s.last().copied().unwrap_or(0.0)
+    }
+
+    /// Another twin's effort, interpolated to this recording's instants.
+    fn read_reference(
+        &mut self,
+        archive: &Archive,
+        topic: &str,
+        joint_names: &[String],
+    ) -> Result<(), RecordingError> {
+        let mut times = Vec::new();
+        let mut rows: Vec<f64> = Vec::new();
+        let mut states = archive.joint_states(topic)?;
+        let mut order = Vec::new();
+        while let Some(state) = states.next_state() {
+            let Ok(stamped) = state else {
+                self.losses.unreadable += 1;
+                continue;
+            };
+            let message = stamped.message;
+            if order.is_empty() {
+                order = indices(&message.name, joint_names).map_err(|joint| {
+                    RecordingError::MissingJoint {
+                        path: self.path.clone(),
+                        joint,
+                        known: message.name.join(", "),
+                    }
+                })?;
+            }
+            let time_s = (message.header.stamp.ns() - self.start_ns) as f64 * 1e-9;
+            let row: Vec<f64> = order
+                .iter()
+                .filter_map(|&at| message.effort.get(at).copied())
+                .collect();
+            let later = times.last().is_none_or(|last| time_s > *last);
+            if row.len() == order.len() && row.iter().all(|x| x.is_finite()) && later {
+                times.push(time_s);
+                rows.extend(row);
+            }
+        }
+        if times.is_empty() {
+            return Err(RecordingError::Empty {
+                path: self.path.clone(),
+                topic: topic.to_owned(),
+            });
+        }
+        let n = joint_names.len();
+        self.reference = Vec::with_capacity(self.len() * n);
+        let mut at = 0;
+        for &time_s in &self.time_s {
+            while at + 2 < times.len() && times[at + 1] <= time_s {
+                at += 1;
+            }
+            let next = (at + 1).min(times.len() - 1);
+            let span = times[next] - times[at];
+            let share = if span > 0.0 {
+                ((time_s - times[at]) / span).clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
+            for j in 0..n {
+                let (a, b) = (rows[at * n + j], rows[next * n + j]);
+                self.reference.push(a + share * (b - a));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Where each of `wanted` stands in `names`; the first that is not there otherwise.
+fn indices(names: &[String], wanted: &[String]) -> Result<Vec<usize>, String> {
+    let find = |joint: &String| {
+        let at = names.iter().position(|name| name == joint);
+        at.ok_or_else(|| joint.clone())
+    };
+    wanted.iter().map(find).collect()
+}
+
+struct Reader<'a> {
+    recording: Recording,
+    joint_names: &'a [String],
+    /// Where each of the robot's joints stands in the message.
+    order: Vec<usize>,
+    /// Names of the message that `order` holds for.
+    names: Vec<String>,
+    known: String,
+    finite_position: Vec<bool>,
+    finite_effort: Vec<bool>,
+    last_ns: Option<i64>,
+    has_velocity: bool,
+    has_effort: bool,
+}
+
+impl Reader<'_> {
+    fn take(&mut self, message: &tauscope_archive::ros::JointState) {
+        let recording = &mut self.recording;
+        if self.order.is_empty() || message.name != self.names {
+            self.known = message.name.join(", ");
+            match indices(&message.name, self.joint_names) {
+                Ok(order) => {
+                    self.order = order;
+                    self.names.clone_from(&message.name);
+                }
+                Err(_) => {
+                    recording.losses.incomplete += 1;
+                    self.skip_row();
+                    return;
+                }
+            }
+        }
+        let stamp_ns = message.header.stamp.ns();
+        let count = message.name.len();
+        if message.position.len() != count {
+            recording.losses.incomplete += 1;
+            self.skip_row();
+            return;
+        }
+        if let Some(last_ns) = self.last_ns {
+            if stamp_ns < last_ns {
+                recording.losses.backward += 1;
+                self.skip_row();
+                return;
+            }
+            if stamp_ns == last_ns {
+                recording.losses.repeated += 1;
+                self.skip_row();
+                return;
+            }
+        }
+        let effort = (message.effort.len() == count).then_some(&message.effort);
+        let velocity = (message.velocity.len() == count).then_some(&message.velocity);
+        let mut finite = true;
+        for (j, &at) in self.order.iter().enumerate() {
+            let position = message.position[at].is_finite();
+            self.finite_position[j] |= position;
+            finite &= position;
+            if let Some(effort) = effort {
+                self.finite_effort[j] |= effort[at].is_finite();
+                finite &= effort[at].is_finite();
+            }
+        }
+        if !finite {
+            recording.losses.not_finite += 1;
+            self.skip_row();
+            return;
+        }
+        if recording.time_s.is_empty() {
+            recording.start_ns = stamp_ns;
+        }
+        self.last_ns = Some(stamp_ns);
+        recording.time_s.push((stamp_ns - recording.start_ns) as f64 * 1e-9);
+        recording.sample_of_row.push(recording.time_s.len() - 1);
+        for &at in &self.order {
+            recording.position.push(message.position[at]);
+        }
+        match velocity {
+            Some(velocity) if self.has_velocity => {
+                recording.velocity.extend(self.order.iter().map(|&at| velocity[at]));
+            }
+            _ => self.has_velocity = false,
+        }
+        match effort {
+            Some(effort) if self.has_effort => {
+                recording.effort.extend(self.order.iter().map(|&at| effort[at]));
+            }
+            _ => self.has_effort = false,
+        }
+    }
+
+    /// A row that is left out is answered by the sample before it.
+    fn skip_row(&mut self) {
+        let last = self.recording.time_s.len().saturating_sub(1);
+        self.recording.sample_of_row.push(last);
+    }
+
+    fn finish(mut self, topic: &str) -> Result<Recording, RecordingError> {
+        let path = || self.recording.path.clone();
+        if self.order.is_empty() && !self.known.is_empty() {
+            let joint = self
+                .joint_names
+                .iter()
+                .find(|joint| !self.known.split(", ").any(|name| name == joint.as_str()));
+            return Err(RecordingError::MissingJoint {
+                path: path(),
+                joint: joint.cloned().unwrap_or_default(),
+                known: self.known.clone(),
+            });
+        }
+        if self.recording.losses.not_finite > 0 {
+            let nan = |what, seen: &[bool]| {
+                let joint = seen.iter().position(|seen| !seen)?;
+                Some(RecordingError::AlwaysNan {
+                    path: path(),
+                    what,
+                    joint: self.joint_names[joint].clone(),
+                })
+            };
+            if let Some(error) = nan("the position", &self.finite_position) {
+                return Err(error);
+            }
+            if let Some(error) = nan("the effort", &self.finite_effort)
+                && self.has_effort
+            {
+                return Err(error);
+            }
+        }
+        if self.recording.time_s.len() < 2 {
+            return Err(RecordingError::Empty {
+                path: path(),
+                topic: topic.to_owned(),
+            });
+        }
+        if !self.has_velocity {
+            self.recording.velocity.clear();
+        }
+        if !self.has_effort {
+            self.recording.effort.clear();
+        }
+        Ok(self.recording)
+    }
+}

@@ -1,0 +1,272 @@
+//! The contest: which pieces of physics, together, explain what the twin leaves.
+//!
+//! Forward, one piece at a time, always the one with the most evidence; after each the earlier ones must prove
+//! themselves again; in the end each is taken out and every rival tried in its place.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use tauscope_dynamics::terms::Layer;
+
+use crate::active::{Active, Hypothesis};
+use crate::fit::Fit;
+use crate::problem::Problem;
+use crate::propose::{Base, Proposal};
+
+/// Evidence that a piece of physics needs \[nats\].
+pub const LEAST_EVIDENCE: f64 = 8.0;
+/// Least share of what is then left at some joint that a piece of physics must explain.
+pub const LEAST_SIZE: f64 = 0.04;
+/// How many proposals of a round are refined before one is taken.
+const REFINED: usize = 3;
+/// More pieces of physics than this are not looked for.
+const MOST_PIECES: usize = 14;
+/// A joint whose variance is below this many times its white noise is not tried with costly effects.
+const QUIET: f64 = 1.15;
+
+/// A fit and the evidence for it, all penalties counted.
+#[derive(Debug, Clone)]
+pub struct Explanation {
+    /// The fit.
+    pub fit: Fit,
+    /// Penalty by active.
+    pub penalties: Vec<f64>,
+}
+
+impl Explanation {
+    /// Log-likelihood less penalties.
+    pub fn score(&self) -> f64 {
+        self.fit.likelihood() - self.penalties.iter().sum::<f64>()
+    }
+}
+
+/// What can be tried, and on what.
+pub struct Search<'a> {
+    /// The data.
+    pub problem: &'a Problem,
+    /// The library.
+    pub hypotheses: &'a [Hypothesis],
+    /// Called now and then with a text.
+    pub say: &'a (dyn Fn(&str) + Sync),
+}
+
+impl Search<'_> {
+    /// Finds the explanation, from pieces of physics with their penalties that are taken for true at first.
+    pub fn run(&self, start: Vec<Active>, penalties: Vec<f64>) -> Explanation {
+        let mut best = Explanation {
+            fit: Fit::new(self.problem, start).refined(self.problem),
+            penalties,
+        };
+        loop {
+            best = self.forward(best);
+            let before = best.score();
+            best = self.exchange(best);
+            if best.score() <= before + 0.5 {
+                return best;
+            }
+        }
+    }
+
+    /// Every hypothesis that could change the effort of one of `joints`, beside what `fit` holds, most evidence
+    /// first.
+    pub fn proposals(&self, fit: &Fit, joints: &[usize]) -> Vec<Proposal> {
+        let base = Base::new(self.problem, fit, self.hypotheses.len());
+        let touches = |h: &Hypothesis| h.only_joint().is_none_or(|joint| joints.contains(&joint));
+        let wanted: Vec<Hypothesis> = self
+            .hypotheses
+            .iter()
+            .filter(|h| touches(h) && self.is_worth_a_try(fit, **h))
+            .copied()
+            .collect();
+        // An elastic joint or one with play has a rotor: where a rotor's inertia is no help, they are not tried.
+        let rotor = |joint: usize| {
+            let is = |h: &&Hypothesis| h.effect.name == ROTOR && h.place.joint == joint;
+            let hypothesis = self.hypotheses.iter().find(is);
+            hypothesis.is_none_or(|h| base.propose(*h).is_some_and(|p| p.gain > LEAST_EVIDENCE))
+                || fit.actives.iter().any(|a| is(&&a.hypothesis))
+        };
+        let wanted: Vec<Hypothesis> = wanted
+            .into_iter()
+            .filter(|h| !has_rotor(h) || rotor(h.place.joint))
+            .collect();
+        let next = AtomicUsize::new(0);
+        let work = || {
+            let mut found = Vec::new();
+            loop {
+                let at = next.fetch_add(1, Ordering::Relaxed);
+                let Some(hypothesis) = wanted.get(at) else { return found };
+                found.extend(base.propose_in_time(*hypothesis));
+            }
+        };
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        let mut all: Vec<Proposal> = std::thread::scope(|scope| {
+            let workers: Vec<_> = (1..threads).map(|_| scope.spawn(work)).collect();
+            let mut all = work();
+            for worker in workers {
+                all.extend(worker.join().unwrap_or_default());
+            }
+            all
+        });
+        all.sort_by(|a, b| {
+            let place = |p: &Proposal| (p.active.hypothesis.effect.name, p.active.hypothesis.place);
+            b.evidence().total_cmp(&a.evidence()).then_with(|| place(a).cmp(&place(b)))
+        });
+        all
+    }
+
+    fn is_worth_a_try(&self, fit: &Fit, hypothesis: Hypothesis) -> bool {
+        let same = fit.actives.iter().filter(|active| active.hypothesis == hypothesis).count();
+        if same >= most_at_one_place(hypothesis) {
+            return false;
+        }
+        let excess = |j: usize| {
+            fit.variance[j] > QUIET * self.problem.white_noise[j] * self.problem.white_noise[j]
+        };
+        match hypothesis.only_joint() {
+            Some(joint) => excess(joint),
+            None if hypothesis.effect.layer == Layer::Body
+                && hypothesis.effect.place == tauscope_dynamics::terms::PlaceKind::Joint =>
+            {
+                excess(hypothesis.place.joint)
+            }
+            None => (0..self.problem.joints).any(excess),
+        }
+    }
+
+    /// Adds pieces of physics while there is evidence for more.
+    fn forward(&self, mut best: Explanation) -> Explanation {
+        while best.fit.actives.len() < MOST_PIECES {
+            let all: Vec<usize> = (0..self.problem.joints).collect();
+            let proposals = self.proposals(&best.fit, &all);
+            let Some(next) = self.best_of(&best, &proposals) else { break };
+            (self.say)(&format!("+ {}", describe(&next)));
+            best = self.pruned(next);
+        }
+        best
+    }
+
+    /// The best explanation with one of the proposals, if there is evidence enough for any.
+    fn best_of(&self, now: &Explanation, proposals: &[Proposal]) -> Option<Explanation> {
+        let mut best: Option<Explanation> = None;
+        let worthy = proposals
+            .iter()
+            .filter(|p| p.evidence() > LEAST_EVIDENCE && p.size > LEAST_SIZE);
+        for proposal in worthy.take(REFINED) {
+            let fit = now.fit.with(self.problem, proposal.active.clone()).refined(self.problem);
+            let mut penalties = now.penalties.clone();
+            penalties.push(proposal.penalty);
+            let next = Explanation { fit, penalties };
+            if best.as_ref().is_none_or(|best| next.score() > best.score()) {
+                best = Some(next);
+            }
+        }
+        best.filter(|best| best.score() > now.score() + LEAST_EVIDENCE)
+    }
+
+    /// Takes out what is no longer needed.
+    fn pruned(&self, mut best: Explanation) -> Explanation {
+        'again: loop {
+            for index in 0..best.fit.actives.len() {
+                let less = self.less(&best, index);
+                let size = (0..self.problem.joints)
+                    .map(|j| (less.fit.variance[j] - best.fit.variance[j]) / best.fit.variance[j])
+                    .fold(0.0, f64::max);
+                if less.score() + LEAST_EVIDENCE > best.score() || size < LEAST_SIZE {
+                    (self.say)(&format!("- {}", best.fit.actives[index].hypothesis.effect.name));
+                    best = less;
+                    continue 'again;
+                }
+            }
+            return best;
+        }
+    }
+
+    /// The explanation without one of its pieces, refined.
+    pub fn less(&self, from: &Explanation, index: usize) -> Explanation {
+        let mut penalties = from.penalties.clone();
+        penalties.remove(index);
+        Explanation {
+            fit: from.fit.without(self.problem, index).refined(self.problem),
+            penalties,
+        }
+    }
+
+    /// Takes each piece out, and each two at one joint, and tries all rivals in their place.
+    fn exchange(&self, mut best: Explanation) -> Explanation {
+        let mut index = 0;
+        while index < best.fit.actives.len() {
+            let without = self.less(&best, index);
+            let proposals = self.proposals(&without.fit, &worse_joints(&without.fit, &best.fit));
+            if let Some(other) = self.best_of(&without, &proposals)
+                && other.score() > best.score() + 0.5
+            {
+                (self.say)(&format!("= {}", describe(&other)));
+                best = self.pruned(other);
+                index = 0;
+                continue;
+            }
+            index += 1;
+        }
+        let joint = |i: usize, best: &Explanation| best.fit.actives[i].hypothesis.only_joint();
+        let mut pair = (0, 1);
+        while pair.1 < best.fit.actives.len() {
+            let (a, b) = pair;
+            if joint(a, &best).is_some() && joint(a, &best) == joint(b, &best) {
+                let without = self.less(&self.less(&best, b), a);
+                let proposals = self.proposals(&without.fit, &worse_joints(&without.fit, &best.fit));
+                if let Some(other) = self.best_of(&without, &proposals)
+                    && other.score() > best.score() + 0.5
+                {
+                    (self.say)(&format!("== {}", describe(&other)));
+                    best = self.pruned(other);
+                    pair = (0, 1);
+                    continue;
+                }
+            }
+            pair.0 += 1;
+            if pair.0 == pair.1 {
+                pair = (0, pair.1 + 1);
+            }
+        }
+        best
+    }
+}
+
+const ROTOR: &str = "rotor_inertia";
+
+/// Whether an effect splits a joint in rotor and link: those are costly to try.
+fn has_rotor(hypothesis: &Hypothesis) -> bool {
+    matches!(hypothesis.effect.name, "joint_elasticity" | "backlash")
+}
+
+/// The joints at which `fit` leaves clearly more than `better`.
+fn worse_joints(fit: &Fit, better: &Fit) -> Vec<usize> {
+    let worse = |&j: &usize| fit.variance[j] > (1.0 + LEAST_SIZE) * better.variance[j];
+    (0..fit.variance.len()).filter(worse).collect()
+}
+
+/// How many of one effect there may be at one place.
+fn most_at_one_place(hypothesis: Hypothesis) -> usize {
+    match hypothesis.effect.name {
+        "external_push" => 8,
+        "torque_ripple" => 2,
+        _ => 1,
+    }
+}
+
+fn describe(explanation: &Explanation) -> String {
+    let one = |active: &Active| {
+        let place = active.hypothesis.place;
+        let values: Vec<String> =
+            active.coordinates.iter().map(|v| format!("{v:.4}")).collect();
+        format!(
+            "{}@{}/{}/{} [{}]",
+            active.hypothesis.effect.name,
+            place.joint,
+            place.source,
+            place.link,
+            values.join(", ")
+        )
+    };
+    let all: Vec<String> = explanation.fit.actives.iter().map(one).collect();
+    format!("{:.1}: {}", explanation.score(), all.join("; "))
+}
