@@ -20,7 +20,7 @@ pub(super) static EFFECT: Effect = Effect {
     ],
     coordinates: &[
         Coordinate::positive_factor("rotor_inertia_kgm2"),
-        Coordinate::shape("stiffness_nm_per_rad", 50.0, 1e5, 14, Scale::Log),
+        Coordinate::shape("stiffness_nm_per_rad", 5.0, 1e5, 18, Scale::Log),
     ],
     to_parameters: |c| vec![c[1], c[0]],
     to_coordinates: |p| vec![p[1], p[0]],

@@ -4,8 +4,11 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use tauscope_dynamics::terms::{
-    Coordinate, CoordinateKind, Effect, Layer, MotionSample, Physics, PlaceKind, Site, Term,
+    Coordinate, CoordinateKind, Effect, Layer, MotionSample, Physics, PlaceKind, Site, Table, Term,
+    table,
 };
+
+use tauscope_dynamics::Model;
 
 use crate::problem::Problem;
 
@@ -19,6 +22,9 @@ pub struct Whereabouts {
     /// The link.
     pub link: usize,
 }
+
+/// Slow, but fast enough for a sign.
+const SLOW_RAD_S: f64 = 0.02;
 
 /// An effect at a place, without its numbers.
 #[derive(Debug, Clone, Copy)]
@@ -41,6 +47,7 @@ impl Hypothesis {
         Active {
             hypothesis: self,
             coordinates,
+            curve: None,
         }
     }
 
@@ -48,6 +55,40 @@ impl Hypothesis {
     pub fn only_joint(&self) -> Option<usize> {
         let at_joint = matches!(self.effect.place, PlaceKind::Joint | PlaceKind::TwoJoints);
         (at_joint && self.effect.layer != Layer::Body).then_some(self.place.joint)
+    }
+
+    /// Whether its effort jumps where a joint reverses, so that at rest it may be anything in between.
+    pub fn is_set_valued(&self, model: &Model) -> bool {
+        let Some(joint) = self.only_joint() else { return false };
+        let Whereabouts { source, link, .. } = self.place;
+        let site = Site { model, joint, source, link };
+        let middle = |c: &Coordinate| match c.kind {
+            CoordinateKind::Factor { .. } => 1.0,
+            CoordinateKind::Shape { lower, upper, .. } => (lower * upper).abs().sqrt(),
+            _ => 0.0,
+        };
+        let coordinates: Vec<f64> = self.effect.coordinates.iter().map(middle).collect();
+        let mut term = (self.effect.build)(&site, &coordinates);
+        let n = model.dof();
+        let (zero, one) = (vec![0.0; n], vec![1.0; n]);
+        let mut at = |velocity: f64| {
+            let velocity = vec![velocity; n];
+            let mut effort = vec![0.0; n];
+            // Long enough for what has a memory to forget.
+            let at = MotionSample {
+                dt_s: 1e3,
+                recording_s: 1.0,
+                session_s: 1.0,
+                position: &zero,
+                velocity: &velocity,
+                acceleration: &zero,
+                transmitted: &one,
+            };
+            term.act(&at, &mut effort);
+            effort[joint]
+        };
+        let jump = (at(SLOW_RAD_S) - at(-SLOW_RAD_S)).abs();
+        jump > 0.5 * at(1.0).abs().max(1e-12)
     }
 
     /// Indices of the coordinates that are factors.
@@ -63,8 +104,10 @@ impl Hypothesis {
 pub struct Active {
     /// What and where.
     pub hypothesis: Hypothesis,
-    /// In the effect's coordinates.
+    /// In the effect's coordinates; the values at the knots for a curve.
     pub coordinates: Vec<f64>,
+    /// What an `unknown` effect is drawn against; its own values are passed over.
+    pub curve: Option<Table>,
 }
 
 impl Active {
@@ -81,7 +124,25 @@ impl Active {
             source,
             link,
         };
-        (self.hypothesis.effect.build)(&site, &self.coordinates)
+        let curve = self.curve.as_ref().and_then(|curve| {
+            let values = self.coordinates.clone();
+            table(&site, Table { values, ..curve.clone() }).ok()
+        });
+        curve.unwrap_or_else(|| (self.hypothesis.effect.build)(&site, &self.coordinates))
+    }
+
+    /// Whether its effort jumps where its joint reverses.
+    pub fn is_set_valued(&self, model: &Model) -> bool {
+        match &self.curve {
+            Some(curve) => curve.by_direction,
+            None => self.hypothesis.is_set_valued(model),
+        }
+    }
+
+    /// How a coordinate enters.
+    pub fn kind(&self, coordinate: usize) -> CoordinateKind {
+        let of_effect = self.hypothesis.effect.coordinates.get(coordinate);
+        of_effect.map_or(Coordinate::factor("value_nm").kind, |c| c.kind)
     }
 
     /// Its parameters, as reports hold them.

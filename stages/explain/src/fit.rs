@@ -187,7 +187,7 @@ fn damped(
 /// Step of the difference quotient of a coordinate.
 fn step_of(problem: &Problem, active: &Active, c: usize) -> f64 {
     let value = active.coordinates[c];
-    match active.hypothesis.effect.coordinates[c].kind {
+    match active.kind(c) {
         CoordinateKind::Factor { step, .. } => step,
         CoordinateKind::Shape { lower, upper, scale, .. } => match scale {
             Scale::Log => 1e-3 * value.abs().max(lower),
@@ -202,7 +202,7 @@ fn step_of(problem: &Problem, active: &Active, c: usize) -> f64 {
 
 /// Lowest and highest value of a coordinate.
 fn bounds(problem: &Problem, active: &Active, c: usize) -> (f64, f64) {
-    match active.hypothesis.effect.coordinates[c].kind {
+    match active.kind(c) {
         CoordinateKind::Factor { minimum, .. } => (minimum, f64::INFINITY),
         CoordinateKind::Shape { lower, upper, scale, .. } => match scale {
             Scale::OfEffort => {

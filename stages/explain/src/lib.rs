@@ -11,5 +11,6 @@ pub mod recording;
 pub mod report;
 pub mod search;
 pub mod smoother;
+mod unknown;
 mod wall;
 pub mod windows;

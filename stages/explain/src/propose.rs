@@ -55,7 +55,7 @@ impl<'a> Base<'a> {
             .iter()
             .map(|&(i, c)| {
                 let active = &fit.actives[i];
-                let range = match active.hypothesis.effect.coordinates[c].kind {
+                let range = match active.kind(c) {
                     CoordinateKind::Factor { .. } => return 0.0,
                     CoordinateKind::Shape { lower, upper, scale, .. } => match scale {
                         Scale::Log => 0.5 * active.coordinates[c].abs().max(lower),

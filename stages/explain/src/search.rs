@@ -11,11 +11,24 @@ use crate::active::{Active, Hypothesis};
 use crate::fit::Fit;
 use crate::problem::Problem;
 use crate::propose::{Base, Proposal};
+use crate::windows::{TimeKind, time_kind};
 
 /// Evidence that a piece of physics needs \[nats\].
 pub const LEAST_EVIDENCE: f64 = 8.0;
-/// Least share of what is then left at some joint that a piece of physics must explain.
-pub const LEAST_SIZE: f64 = 0.04;
+/// Least share of what is then left at some joint that a piece of physics must explain: less is in reach of what
+/// differentiation and filters leave.
+pub const LEAST_SIZE: f64 = 0.12;
+/// The same for what lasts only for an interval, which must have this much more evidence.
+const LEAST_SIZE_OF_INTERVAL: f64 = 0.03;
+const INTERVAL_EVIDENCE: f64 = 40.0;
+/// Least share beside a curve without a name in the same joint, which the name may only patch.
+const LEAST_SIZE_BESIDE_CURVE: f64 = 1.0;
+/// Evidence that a curve without a name needs \[nats\].
+const CURVE_EVIDENCE: f64 = 25.0;
+/// A curve is not looked for at a joint whose variance is below this many times its white noise.
+const CURVE_EXCESS: f64 = 1.6;
+/// A curve must divide the variance that is left at its joint by this.
+const CURVE_SIZE: f64 = 1.35;
 /// How many proposals of a round are refined before one is taken.
 const REFINED: usize = 3;
 /// More pieces of physics than this are not looked for.
@@ -56,6 +69,19 @@ impl Search<'_> {
             fit: Fit::new(self.problem, start).refined(self.problem),
             penalties,
         };
+        best = self.pruned(best);
+        best = self.named(best);
+        for joint in 0..self.problem.joints {
+            if let Some(described) = self.described(&best, joint) {
+                (self.say)(&format!("? {}", describe(&described)));
+                best = self.named(self.pruned(described));
+            }
+        }
+        best
+    }
+
+    /// Adds and exchanges names until nothing is gained.
+    fn named(&self, mut best: Explanation) -> Explanation {
         loop {
             best = self.forward(best);
             let before = best.score();
@@ -64,6 +90,47 @@ impl Search<'_> {
                 return best;
             }
         }
+    }
+
+    /// The explanation with a curve in a joint, where names do not do: beside the names, if much is left, or in place
+    /// of them, if it does better than they.
+    fn described(&self, best: &Explanation, joint: usize) -> Option<Explanation> {
+        let excess = |fit: &Fit| {
+            fit.variance[joint] / (self.problem.white_noise[joint] * self.problem.white_noise[joint])
+        };
+        let own: Vec<usize> = (0..best.fit.actives.len())
+            .filter(|&i| best.fit.actives[i].hypothesis.only_joint() == Some(joint))
+            .collect();
+        if own.iter().any(|&i| best.fit.actives[i].curve.is_some()) {
+            return None;
+        }
+        let with = |from: &Explanation| {
+            let base = Base::new(self.problem, &from.fit, self.hypotheses.len());
+            let curve = base.propose_curve(joint)?;
+            let fit = from.fit.with(self.problem, curve.active).refined(self.problem);
+            let mut penalties = from.penalties.clone();
+            penalties.push(curve.penalty);
+            Some(Explanation { fit, penalties })
+        };
+        if !own.is_empty() {
+            let mut bare = best.clone();
+            for &i in own.iter().rev() {
+                bare.fit.actives.remove(i);
+                bare.penalties.remove(i);
+            }
+            bare.fit = Fit::new(self.problem, bare.fit.actives).refined(self.problem);
+            if let Some(instead) = with(&bare)
+                && instead.score() > best.score() + CURVE_EVIDENCE
+            {
+                return Some(instead);
+            }
+        }
+        if excess(&best.fit) < CURVE_EXCESS {
+            return None;
+        }
+        let beside = with(best)?;
+        let less = best.fit.variance[joint] / beside.fit.variance[joint];
+        (beside.score() > best.score() + CURVE_EVIDENCE && less > CURVE_SIZE).then_some(beside)
     }
 
     /// Every hypothesis that could change the effort of one of `joints`, beside what `fit` holds, most evidence
@@ -139,7 +206,12 @@ impl Search<'_> {
             let proposals = self.proposals(&best.fit, &all);
             let Some(next) = self.best_of(&best, &proposals) else { break };
             (self.say)(&format!("+ {}", describe(&next)));
-            best = self.pruned(next);
+            let next = self.pruned(next);
+            // What is added and taken out again would be added for ever.
+            if next.score() < best.score() + LEAST_EVIDENCE {
+                break;
+            }
+            best = next;
         }
         best
     }
@@ -147,9 +219,10 @@ impl Search<'_> {
     /// The best explanation with one of the proposals, if there is evidence enough for any.
     fn best_of(&self, now: &Explanation, proposals: &[Proposal]) -> Option<Explanation> {
         let mut best: Option<Explanation> = None;
-        let worthy = proposals
-            .iter()
-            .filter(|p| p.evidence() > LEAST_EVIDENCE && p.size > LEAST_SIZE);
+        let worthy = proposals.iter().filter(|p| {
+            let (evidence, size) = needs(p.active.hypothesis, &now.fit);
+            p.evidence() > evidence && p.size > size
+        });
         for proposal in worthy.take(REFINED) {
             let fit = now.fit.with(self.problem, proposal.active.clone()).refined(self.problem);
             let mut penalties = now.penalties.clone();
@@ -159,7 +232,7 @@ impl Search<'_> {
                 best = Some(next);
             }
         }
-        best.filter(|best| best.score() > now.score() + LEAST_EVIDENCE)
+        best
     }
 
     /// Takes out what is no longer needed.
@@ -170,7 +243,12 @@ impl Search<'_> {
                 let size = (0..self.problem.joints)
                     .map(|j| (less.fit.variance[j] - best.fit.variance[j]) / best.fit.variance[j])
                     .fold(0.0, f64::max);
-                if less.score() + LEAST_EVIDENCE > best.score() || size < LEAST_SIZE {
+                let active = &best.fit.actives[index];
+                let (evidence, least) = match active.curve {
+                    Some(_) => (CURVE_EVIDENCE, CURVE_SIZE - 1.0),
+                    None => needs(active.hypothesis, &best.fit),
+                };
+                if less.score() + evidence > best.score() || size < least {
                     (self.say)(&format!("- {}", best.fit.actives[index].hypothesis.effect.name));
                     best = less;
                     continue 'again;
@@ -236,6 +314,19 @@ const ROTOR: &str = "rotor_inertia";
 /// Whether an effect splits a joint in rotor and link: those are costly to try.
 fn has_rotor(hypothesis: &Hypothesis) -> bool {
     matches!(hypothesis.effect.name, "joint_elasticity" | "backlash")
+}
+
+/// Evidence and size that a piece of physics needs beside what `fit` holds.
+fn needs(hypothesis: Hypothesis, fit: &Fit) -> (f64, f64) {
+    let joint = hypothesis.only_joint();
+    let curve = |a: &Active| a.curve.is_some() && a.hypothesis.only_joint() == joint;
+    if joint.is_some() && fit.actives.iter().any(curve) {
+        return (LEAST_EVIDENCE, LEAST_SIZE_BESIDE_CURVE);
+    }
+    match time_kind(hypothesis) {
+        TimeKind::Once => (INTERVAL_EVIDENCE, LEAST_SIZE_OF_INTERVAL),
+        _ => (LEAST_EVIDENCE, LEAST_SIZE),
+    }
 }
 
 /// The joints at which `fit` leaves clearly more than `better`.
