@@ -10,6 +10,7 @@ use tauscope_dynamics::terms::{
 
 use tauscope_dynamics::Model;
 
+use crate::drive::{gains, is_drive};
 use crate::problem::Problem;
 
 /// Where an effect is: indices into the model's joints and links; what its kind of place does not ask for is 0.
@@ -54,7 +55,8 @@ impl Hypothesis {
     /// The one joint whose effort it changes, if there is only one.
     pub fn only_joint(&self) -> Option<usize> {
         let at_joint = matches!(self.effect.place, PlaceKind::Joint | PlaceKind::TwoJoints);
-        (at_joint && self.effect.layer != Layer::Body).then_some(self.place.joint)
+        (at_joint && (self.effect.layer != Layer::Body || is_drive(self)))
+            .then_some(self.place.joint)
     }
 
     /// Whether its effort jumps where a joint reverses, so that at rest it may be anything in between.
@@ -113,13 +115,18 @@ pub struct Active {
 impl Active {
     /// The term for a problem's robot.
     pub fn term(&self, problem: &Problem) -> Box<dyn Term> {
+        self.term_for(&problem.model)
+    }
+
+    /// The term for a robot.
+    pub fn term_for(&self, model: &Model) -> Box<dyn Term> {
         let Whereabouts {
             joint,
             source,
             link,
         } = self.hypothesis.place;
         let site = Site {
-            model: &problem.model,
+            model,
             joint,
             source,
             link,
@@ -179,13 +186,18 @@ pub struct Efforts {
     pub mechanical: Vec<Vec<f64>>,
     /// With the [`Layer::Record`] terms: what is recorded.
     pub recorded: Vec<Vec<f64>>,
+    /// Scale of each joint's drive.
+    pub gains: Vec<f64>,
 }
 
 fn terms_of(problem: &Problem, actives: &[Active], layer: Layer) -> Vec<Box<dyn Term>> {
-    let of_layer = actives
+    let mut of_layer: Vec<&Active> = actives
         .iter()
-        .filter(|active| active.hypothesis.effect.layer == layer);
-    of_layer.map(|active| active.term(problem)).collect()
+        .filter(|active| active.hypothesis.effect.layer == layer)
+        .collect();
+    // The scale of a drive is that of all bodies.
+    of_layer.sort_by_key(|active| is_drive(&active.hypothesis));
+    of_layer.iter().map(|active| active.term(problem)).collect()
 }
 
 impl Efforts {
@@ -199,6 +211,7 @@ impl Efforts {
             body,
             mechanical,
             recorded,
+            gains: gains(actives, problem.joints),
         }
     }
 }
@@ -223,6 +236,9 @@ pub fn record(problem: &Problem, actives: &[Active], mechanical: &[Vec<f64>]) ->
 /// [`Layer::Record`] terms of `others` are passed through; one that is itself of that layer acts after them.
 pub fn change(problem: &Problem, others: &[Active], efforts: &Efforts, active: &Active) -> Column {
     let layer = active.hypothesis.effect.layer;
+    if is_drive(&active.hypothesis) {
+        return scaled_bodies(problem, efforts, active);
+    }
     let mut term = active.term(problem);
     let through = layer != Layer::Record
         && others.iter().any(|other| other.hypothesis.effect.layer == Layer::Record);
@@ -234,6 +250,11 @@ pub fn change(problem: &Problem, others: &[Active], efforts: &Efforts, active: &
             act_over(problem, &mut *term, &zero, &efforts.body)
         }
     };
+    let mut changed = changed;
+    if layer == Layer::Body && efforts.gains.iter().any(|gain| *gain != 1.0) {
+        let start = if through { Some(&efforts.mechanical) } else { None };
+        scale_added(&mut changed, start, &efforts.gains);
+    }
     let difference: Vec<Vec<f64>> = match layer {
         Layer::Record => subtract(changed, &efforts.recorded),
         _ if through => subtract(record(problem, others, &changed), &efforts.recorded),
@@ -256,6 +277,30 @@ pub fn change(problem: &Problem, others: &[Active], efforts: &Efforts, active: &
             joint: None,
             values: problem.signal(&difference),
         },
+    }
+}
+
+/// What the scale of one drive changes: its joint's share of the bodies' effort.
+fn scaled_bodies(problem: &Problem, efforts: &Efforts, active: &Active) -> Column {
+    let joint = active.hypothesis.place.joint;
+    let share = active.coordinates[0] / efforts.gains[joint];
+    let scaled: Vec<Vec<f64>> =
+        efforts.body.iter().map(|body| body.iter().map(|x| share * x).collect()).collect();
+    let mut values = vec![0.0; problem.rows];
+    problem.joint_signal(&scaled, joint, &mut values);
+    Column {
+        joint: Some(joint),
+        values,
+    }
+}
+
+/// Scales what was added to `start` (or to nothing) by the drives.
+fn scale_added(changed: &mut [Vec<f64>], start: Option<&Vec<Vec<f64>>>, gains: &[f64]) {
+    for (r, changed) in changed.iter_mut().enumerate() {
+        for (k, value) in changed.iter_mut().enumerate() {
+            let before = start.map_or(0.0, |start| start[r][k]);
+            *value = before + gains[k % gains.len()] * (*value - before);
+        }
     }
 }
 
@@ -320,6 +365,7 @@ pub fn columns(
     // What a term adds depends on the motion alone, unless it is recorded through something or scales with the load.
     let alike = effect.layer != Layer::Record
         && effect.name != "load_dependent_friction"
+        && (effect.layer != Layer::Body || efforts.gains.iter().all(|gain| *gain == 1.0))
         && others.iter().all(|other| other.hypothesis.effect.layer != Layer::Record)
         && problem.rows <= CACHED_ROWS;
     if !alike {

@@ -2,15 +2,27 @@
 //! on recordings that were never fitted.
 
 pub mod active;
+mod audit;
+pub mod drive;
+pub mod explain;
+mod findings;
 pub mod fit;
+pub mod interval;
 pub mod least_squares;
 pub mod library;
+mod locate;
+mod next_motion;
 pub mod problem;
 pub mod propose;
 pub mod recording;
 pub mod report;
 pub mod search;
 pub mod smoother;
+mod standstill;
 mod unknown;
 mod wall;
 pub mod windows;
+mod words;
+
+pub use explain::{Input, Outcome, Start, explain};
+pub use recording::{Recording, RecordingError, RecordingTopics};

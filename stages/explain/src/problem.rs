@@ -6,6 +6,7 @@ use tauscope_dynamics::{Data, Model, rnea};
 use crate::active::ColumnCache;
 use crate::recording::{MAX_GAP_S, Recording};
 use crate::smoother::{LowPass, MotionSmoother};
+use crate::standstill;
 
 /// What is compared lies below this frequency, unless the recordings are too slow for it \[Hz\].
 const CUTOFF_HZ: f64 = 8.0;
@@ -46,18 +47,18 @@ pub struct Track {
 }
 
 impl Track {
-    /// The motion of a recording, at all its samples, and what the twin says of it. `unit_nm` turns the
-    /// recording's unit into N m, by joint.
+    /// The motion of a recording, at all its samples, and what the twin says of it. Motion is smoothed with half
+    /// amplitude at `motion_cutoff_hz`; `unit_nm` turns the recording's unit into N m, by joint.
     pub fn new(
         recording: &Recording,
         session_s: f64,
         model: &Model,
-        cutoff_hz: f64,
+        motion_cutoff_hz: f64,
         unit_nm: &[f64],
     ) -> Self {
         let n = model.dof();
         let count = recording.len();
-        let smoother = MotionSmoother::new(&recording.time_s, MOTION_CUTOFF_RATIO * cutoff_hz);
+        let smoother = MotionSmoother::new(&recording.time_s, motion_cutoff_hz);
         let mut track = Self {
             name: recording.name.clone(),
             session_s,
@@ -69,7 +70,9 @@ impl Track {
         };
         for j in 0..n {
             let measured: Vec<f64> = (0..count).map(|k| recording.position[k * n + j]).collect();
-            for (k, state) in smoother.smooth(&measured).iter().enumerate() {
+            let mut states = smoother.smooth(&measured);
+            standstill::resmooth(&recording.time_s, &measured, &mut states);
+            for (k, state) in states.iter().enumerate() {
                 track.position[k * n + j] = state.x;
                 track.velocity[k * n + j] = state.y;
                 track.acceleration[k * n + j] = state.z;
@@ -208,21 +211,29 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Prepares recordings with effort for a fit; `unit_nm` turns the recordings' unit into N m, by joint.
-    /// Standstills of the joints in `rests_count` are compared, too.
+    /// The frequency below which these recordings are compared \[Hz\].
+    pub fn cutoff_hz(recordings: &[Recording]) -> f64 {
+        let rate = |r: &Recording| (r.len() - 1) as f64 / r.duration_s().max(1e-3);
+        let slowest = recordings.iter().map(rate).fold(f64::INFINITY, f64::min);
+        CUTOFF_HZ.min(CUTOFF_OF_RATE * slowest)
+    }
+
+    /// The half amplitude of the smoother of motion for a comparison below `cutoff_hz` \[Hz\].
+    pub fn motion_cutoff_hz(cutoff_hz: f64) -> f64 {
+        MOTION_CUTOFF_RATIO * cutoff_hz
+    }
+
+    /// Prepares recordings with effort, and their `tracks` at all samples, for a fit below `cutoff_hz`; `unit_nm`
+    /// turns the recordings' unit into N m, by joint. Standstills of the joints in `rests_count` are compared, too.
     pub fn new(
         model: &Model,
         recordings: &[Recording],
-        session_start_ns: i64,
+        tracks: Vec<Track>,
+        cutoff_hz: f64,
         unit_nm: &[f64],
         rests_count: &[bool],
     ) -> Self {
         let n = model.dof();
-        let slowest = recordings
-            .iter()
-            .map(|r| (r.len() - 1) as f64 / r.duration_s().max(1e-3))
-            .fold(f64::INFINITY, f64::min);
-        let cutoff_hz = CUTOFF_HZ.min(CUTOFF_OF_RATE * slowest);
         let mut problem = Self {
             model: model.clone(),
             joints: n,
@@ -237,11 +248,9 @@ impl Problem {
         };
         let (mut measured, mut weight) = (Vec::new(), Vec::new());
         let mut variances = vec![Vec::new(); n];
-        let tracks: Vec<(Track, Track, Vec<usize>)> = recordings
-            .iter()
-            .map(|recording| {
-                let session_s = (recording.start_ns - session_start_ns) as f64 * 1e-9;
-                let full = Track::new(recording, session_s, model, cutoff_hz, unit_nm);
+        let tracks: Vec<(Track, Track, Vec<usize>)> = tracks
+            .into_iter()
+            .map(|full| {
                 let kept = thinned(&full.time_s, 1.0 / FIT_RATE_HZ);
                 (full.thin(&kept, n), full, kept)
             })

@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use tauscope_dynamics::terms::Layer;
 
 use crate::active::{Active, Hypothesis};
+use crate::drive::is_drive;
 use crate::fit::Fit;
 use crate::problem::Problem;
 use crate::propose::{Base, Proposal};
@@ -99,7 +100,10 @@ impl Search<'_> {
             fit.variance[joint] / (self.problem.white_noise[joint] * self.problem.white_noise[joint])
         };
         let own: Vec<usize> = (0..best.fit.actives.len())
-            .filter(|&i| best.fit.actives[i].hypothesis.only_joint() == Some(joint))
+            .filter(|&i| {
+                let hypothesis = &best.fit.actives[i].hypothesis;
+                hypothesis.only_joint() == Some(joint) && !is_drive(hypothesis)
+            })
             .collect();
         if own.iter().any(|&i| best.fit.actives[i].curve.is_some()) {
             return None;
@@ -239,6 +243,9 @@ impl Search<'_> {
     fn pruned(&self, mut best: Explanation) -> Explanation {
         'again: loop {
             for index in 0..best.fit.actives.len() {
+                if is_drive(&best.fit.actives[index].hypothesis) {
+                    continue;
+                }
                 let less = self.less(&best, index);
                 let size = (0..self.problem.joints)
                     .map(|j| (less.fit.variance[j] - best.fit.variance[j]) / best.fit.variance[j])
@@ -272,6 +279,10 @@ impl Search<'_> {
     fn exchange(&self, mut best: Explanation) -> Explanation {
         let mut index = 0;
         while index < best.fit.actives.len() {
+            if is_drive(&best.fit.actives[index].hypothesis) {
+                index += 1;
+                continue;
+            }
             let without = self.less(&best, index);
             let proposals = self.proposals(&without.fit, &worse_joints(&without.fit, &best.fit));
             if let Some(other) = self.best_of(&without, &proposals)
@@ -284,7 +295,10 @@ impl Search<'_> {
             }
             index += 1;
         }
-        let joint = |i: usize, best: &Explanation| best.fit.actives[i].hypothesis.only_joint();
+        let joint = |i: usize, best: &Explanation| {
+            let hypothesis = &best.fit.actives[i].hypothesis;
+            if is_drive(hypothesis) { None } else { hypothesis.only_joint() }
+        };
         let mut pair = (0, 1);
         while pair.1 < best.fit.actives.len() {
             let (a, b) = pair;

@@ -1,0 +1,420 @@
+//! From recordings to a report: the whole way.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use tauscope_dynamics::Model;
+use tauscope_dynamics::terms::{Physics, Site, TermError, TermSpec};
+
+use crate::active::{Active, Hypothesis};
+use crate::audit;
+use crate::drive;
+use crate::findings;
+use crate::fit::Fit;
+use crate::library;
+use crate::locate;
+use crate::problem::{Problem, Track};
+use crate::recording::Recording;
+use crate::report::{JointPicture, RecordingPicture, Report, Verdict};
+use crate::search::{Explanation, Search};
+
+/// Motion of a prediction is smoothed with the best of these, as shares of the fit's cutoff.
+const PREDICTION_CUTOFFS: [f64; 5] = [0.75, 1.0, 1.4, 2.0, 3.0];
+/// Samples of a picture, at most.
+const PICTURE_SAMPLES: usize = 2000;
+
+/// What is to be explained.
+#[derive(Debug)]
+pub struct Input {
+    /// Name of the case.
+    pub case: String,
+    /// The robot; massless joints where the twin is a topic.
+    pub model: Model,
+    /// Whether the robot's bodies are known: not where the twin is a topic.
+    pub bodies: bool,
+    /// Unit of the recordings' effort: `Nm` or `A`.
+    pub effort_unit: String,
+    /// By joint, where the unit is `A` and they are known \[N m/A\].
+    pub torque_constants_nm_per_a: Option<Vec<f64>>,
+    /// Recordings that may be fitted.
+    pub fit: Vec<Recording>,
+    /// Recordings that nothing is fitted on.
+    pub holdout: Vec<Recording>,
+    /// A corrected twin to start from, if there is one.
+    pub start: Option<Start>,
+    /// Effects that are left out of the library.
+    pub without: BTreeSet<String>,
+}
+
+/// A corrected twin.
+#[derive(Debug, Clone, Default)]
+pub struct Start {
+    /// Its physics.
+    pub terms: Vec<TermSpec>,
+    /// Gain of each joint's bodies \[effort unit per model unit\].
+    pub gain: Vec<f64>,
+    /// Offset of each joint \[effort unit\].
+    pub offset: Vec<f64>,
+}
+
+/// What came of it.
+#[derive(Debug)]
+pub struct Outcome {
+    /// What is said.
+    pub report: Report,
+    /// The physics of the corrected twin that lasts: what the start had and what was found.
+    pub terms: Vec<TermSpec>,
+    /// Gain of each joint's bodies \[effort unit per model unit\].
+    pub gain: Vec<f64>,
+    /// The corrected twin's effort on each hold-out recording: row-major, one row per recorded row \[effort unit\].
+    pub predictions: Vec<(String, Vec<f64>)>,
+    /// What is drawn.
+    pub pictures: Vec<RecordingPicture>,
+}
+
+/// Explains. `progress` is told the share that is done, 0 to 1, and what is being done.
+///
+/// # Errors
+/// If a term of the start cannot be built for the robot.
+pub fn explain(
+    mut input: Input,
+    progress: &(dyn Fn(f64, &str) + Sync),
+) -> Result<Outcome, TermError> {
+    let joints: Vec<String> = input.model.joint_names().map(str::to_owned).collect();
+    progress(0.0, "audit");
+    if let Some(reason) = audit::before(&input) {
+        return Ok(not_evaluated(&input, joints, reason));
+    }
+    if input.holdout.is_empty() {
+        hold_out_some(&mut input);
+    }
+    let unit_nm = input
+        .torque_constants_nm_per_a
+        .clone()
+        .unwrap_or_else(|| vec![1.0; joints.len()]);
+    let session_start_ns = input
+        .fit
+        .iter()
+        .chain(&input.holdout)
+        .map(|recording| recording.start_ns)
+        .min()
+        .unwrap_or(0);
+    let setup = Setup {
+        input: &input,
+        unit_nm: &unit_nm,
+        session_start_ns,
+    };
+    let problem = setup.problem(&vec![false; joints.len()])?;
+    if let Some(reason) = audit::of_problem(&input, &problem) {
+        return Ok(not_evaluated(&input, joints, reason));
+    }
+    let hypotheses = setup.hypotheses();
+    let unscaled = input.effort_unit == "A"
+        && input.torque_constants_nm_per_a.is_none()
+        && input.start.is_none();
+    let drives = if unscaled { drive::unknown_gains(joints.len()) } else { Vec::new() };
+    let say = |text: &str| {
+        // Nobody knows how many rounds there will be: each takes a share of what is left.
+        progress(0.1, text);
+    };
+    let search = Search {
+        problem: &problem,
+        hypotheses: &hypotheses,
+        say: &say,
+    };
+    let penalties = vec![0.0; drives.len()];
+    let moving = search.run(drives, penalties);
+    // Where friction is not set-valued, standstills tell as much as motion.
+    progress(0.6, "standstills");
+    let rests_count: Vec<bool> = (0..joints.len())
+        .map(|j| {
+            let holds = |a: &Active| {
+                a.hypothesis.only_joint() == Some(j) && a.is_set_valued(&input.model)
+            };
+            !moving.fit.actives.iter().any(holds)
+        })
+        .collect();
+    let problem = setup.problem(&rests_count)?;
+    let search = Search {
+        problem: &problem,
+        hypotheses: &hypotheses,
+        say: &say,
+    };
+    let found = search.run(moving.fit.actives, moving.penalties);
+    progress(0.8, "rivals");
+    let before = Fit::new(&problem, Vec::new());
+    let named = findings::of(&search, &found, &before, &input, &joints);
+    progress(0.95, "proof");
+    let proof = setup.proof(&problem, &found)?;
+    let verdict = if found.fit.actives.iter().any(|a| a.curve.is_some()) {
+        Verdict::UnknownRemains
+    } else if named.findings.is_empty() {
+        Verdict::NothingMissing
+    } else {
+        Verdict::Explained
+    };
+    let noise_floor = (0..joints.len())
+        .map(|j| audit::white_noise(&input.fit, j, joints.len()))
+        .collect();
+    let mut notes = named.notes;
+    notes.extend(audit::notes(&input, &rests_count));
+    let report = Report {
+        case: input.case.clone(),
+        verdict,
+        reason: None,
+        summary: findings::summary(verdict, &named.findings, &proof.before, &proof.after),
+        effort_unit: input.effort_unit.clone(),
+        located: locate::located(&problem, &before, &joints),
+        undetectable: findings::undetectable(&search, &found, &joints, &unit_nm),
+        findings: named.findings,
+        rejected: named.rejected,
+        next_motions: named.next_motions,
+        notes,
+        joints,
+        holdout_rms_before: proof.before,
+        holdout_rms_after: proof.after,
+        noise_floor,
+        holdout_predictions: BTreeMap::new(),
+    };
+    progress(1.0, "done");
+    Ok(Outcome {
+        report,
+        terms: setup.lasting_terms(&found)?,
+        gain: drive::gains(&found.fit.actives, unit_nm.len()),
+        predictions: proof.predictions,
+        pictures: proof.pictures,
+    })
+}
+
+/// Without hold-out recordings some of those to be fitted are held out: about a third, the last ones, so that
+/// what lasts only for a while may be met in both.
+fn hold_out_some(input: &mut Input) {
+    let out = (input.fit.len() / 3).max(usize::from(input.fit.len() > 1));
+    input.holdout = input.fit.split_off(input.fit.len() - out);
+}
+
+fn not_evaluated(input: &Input, joints: Vec<String>, reason: String) -> Outcome {
+    let nan = vec![f64::NAN; joints.len()];
+    Outcome {
+        report: Report {
+            case: input.case.clone(),
+            verdict: Verdict::NotEvaluated,
+            summary: format!("Nothing was evaluated: {reason}."),
+            reason: Some(reason),
+            effort_unit: input.effort_unit.clone(),
+            findings: Vec::new(),
+            rejected: Vec::new(),
+            located: Vec::new(),
+            undetectable: Vec::new(),
+            next_motions: Vec::new(),
+            notes: audit::losses(input),
+            joints,
+            holdout_rms_before: nan.clone(),
+            holdout_rms_after: nan.clone(),
+            noise_floor: nan,
+            holdout_predictions: BTreeMap::new(),
+        },
+        terms: Vec::new(),
+        gain: Vec::new(),
+        predictions: Vec::new(),
+        pictures: Vec::new(),
+    }
+}
+
+struct Setup<'a> {
+    input: &'a Input,
+    unit_nm: &'a [f64],
+    session_start_ns: i64,
+}
+
+struct Proof {
+    before: Vec<f64>,
+    after: Vec<f64>,
+    predictions: Vec<(String, Vec<f64>)>,
+    pictures: Vec<RecordingPicture>,
+}
+
+impl Setup<'_> {
+    fn hypotheses(&self) -> Vec<Hypothesis> {
+        let input = self.input;
+        let mut without = input.without.clone();
+        if input.effort_unit == "A" && input.torque_constants_nm_per_a.is_none() && input.start.is_none() {
+            // The scale of each joint is free as it is.
+            without.insert("torque_gain".to_owned());
+        }
+        library::hypotheses(&input.model, input.bodies, &without)
+    }
+
+    /// Terms of the start, in N m.
+    fn start_physics(&self) -> Result<Physics, TermError> {
+        let n = self.input.model.dof();
+        let terms = match &self.input.start {
+            Some(start) => start
+                .terms
+                .iter()
+                .map(|spec| spec.build(&self.input.model))
+                .collect::<Result<_, _>>()?,
+            None => Vec::new(),
+        };
+        Ok(Physics::new(terms, n))
+    }
+
+    fn track(&self, recording: &Recording, motion_cutoff_hz: f64) -> Result<Track, TermError> {
+        let session_s = (recording.start_ns - self.session_start_ns) as f64 * 1e-9;
+        let model = &self.input.model;
+        let mut track = Track::new(recording, session_s, model, motion_cutoff_hz, self.unit_nm);
+        if let Some(start) = &self.input.start {
+            let n = self.unit_nm.len();
+            for (k, value) in track.rigid.iter_mut().enumerate() {
+                *value *= start.gain[k % n];
+            }
+            let mut physics = self.start_physics()?;
+            track.rigid = track.run(&mut physics, &track.rigid);
+            for (k, value) in track.rigid.iter_mut().enumerate() {
+                *value += start.offset[k % n] * self.unit_nm[k % n];
+            }
+        }
+        Ok(track)
+    }
+
+    fn problem(&self, rests_count: &[bool]) -> Result<Problem, TermError> {
+        let cutoff_hz = Problem::cutoff_hz(&self.input.fit);
+        let motion_cutoff_hz = Problem::motion_cutoff_hz(cutoff_hz);
+        let tracks = self
+            .input
+            .fit
+            .iter()
+            .map(|recording| self.track(recording, motion_cutoff_hz))
+            .collect::<Result<Vec<_>, _>>()?;
+        let fit = &self.input.fit;
+        Ok(Problem::new(&self.input.model, fit, tracks, cutoff_hz, self.unit_nm, rests_count))
+    }
+
+    /// The corrected twin's effort over a track, in the recording's unit.
+    fn predict(&self, problem: &Problem, found: &Explanation, track: &Track) -> Vec<f64> {
+        let terms = findings::in_order(&found.fit.actives)
+            .into_iter()
+            .map(|active| active.term(problem))
+            .collect();
+        let mut physics = Physics::new(terms, self.unit_nm.len());
+        let mut effort = track.run(&mut physics, &track.rigid);
+        for (k, value) in effort.iter_mut().enumerate() {
+            *value /= self.unit_nm[k % self.unit_nm.len()];
+        }
+        effort
+    }
+
+    /// The smoothing that predicts the fitted recordings' unfiltered effort best.
+    fn best_smoothing(&self, problem: &Problem, found: &Explanation) -> Result<f64, TermError> {
+        let n = self.unit_nm.len();
+        let mut best = (f64::INFINITY, Problem::motion_cutoff_hz(problem.cutoff_hz));
+        for share in PREDICTION_CUTOFFS {
+            let mut sum = vec![0.0; n];
+            let mut count = 0.0;
+            for recording in &self.input.fit {
+                let track = self.track(recording, share * problem.cutoff_hz)?;
+                let predicted = self.predict(problem, found, &track);
+                for (k, (p, m)) in predicted.iter().zip(&recording.effort).enumerate() {
+                    sum[k % n] += (m - p) * (m - p);
+                }
+                count += recording.len() as f64;
+            }
+            let likelihood: f64 = sum.iter().map(|s| (s / count).max(1e-16).ln()).sum();
+            if likelihood < best.0 {
+                best = (likelihood, share * problem.cutoff_hz);
+            }
+        }
+        Ok(best.1)
+    }
+
+    fn proof(&self, problem: &Problem, found: &Explanation) -> Result<Proof, TermError> {
+        let n = self.unit_nm.len();
+        let smoothing_hz = self.best_smoothing(problem, found)?;
+        let (mut before, mut after, mut count) = (vec![0.0; n], vec![0.0; n], 0.0);
+        let (mut predictions, mut pictures) = (Vec::new(), Vec::new());
+        let held = self.input.holdout.iter().map(|recording| (recording, true));
+        let fitted = self.input.fit.iter().map(|recording| (recording, false));
+        for (recording, held_out) in held.chain(fitted) {
+            let track = self.track(recording, smoothing_hz)?;
+            let predicted = self.predict(problem, found, &track);
+            let rigid: Vec<f64> = track
+                .rigid
+                .iter()
+                .enumerate()
+                .map(|(k, value)| value / self.unit_nm[k % n])
+                .collect();
+            if held_out {
+                for (k, measured) in recording.effort.iter().enumerate() {
+                    before[k % n] += (measured - rigid[k]).powi(2);
+                    after[k % n] += (measured - predicted[k]).powi(2);
+                }
+                count += if recording.effort.is_empty() { 0.0 } else { recording.len() as f64 };
+                let rows = recording
+                    .sample_of_row
+                    .iter()
+                    .flat_map(|&k| predicted[k * n..(k + 1) * n].iter().copied());
+                predictions.push((recording.name.clone(), rows.collect()));
+            }
+            if !recording.effort.is_empty() {
+                pictures.push(picture(recording, held_out, &track, &rigid, &predicted));
+            }
+        }
+        let rms = |sums: Vec<f64>| sums.iter().map(|s| (s / count).sqrt()).collect();
+        Ok(Proof {
+            before: rms(before),
+            after: rms(after),
+            predictions,
+            pictures,
+        })
+    }
+
+    /// What a corrected twin keeps: not what came and went.
+    fn lasting_terms(&self, found: &Explanation) -> Result<Vec<TermSpec>, TermError> {
+        let mut terms = self.input.start.as_ref().map_or_else(Vec::new, |start| start.terms.clone());
+        let model = &self.input.model;
+        for active in &found.fit.actives {
+            if drive::is_drive(&active.hypothesis) || !findings::lasts(active.hypothesis) {
+                continue;
+            }
+            let place = active.hypothesis.place;
+            let site = Site {
+                model,
+                joint: place.joint,
+                source: place.source,
+                link: place.link,
+            };
+            terms.push(TermSpec::of(&*active.term_for(model), &site));
+        }
+        Ok(terms)
+    }
+}
+
+fn picture(
+    recording: &Recording,
+    held_out: bool,
+    track: &Track,
+    before: &[f64],
+    after: &[f64],
+) -> RecordingPicture {
+    let n = before.len() / track.len().max(1);
+    let stride = track.len().div_ceil(PICTURE_SAMPLES).max(1);
+    let joint = |j: usize| {
+        let thin = |values: &[f64]| -> Vec<f64> {
+            (0..track.len()).step_by(stride).map(|k| values[k * n + j]).collect()
+        };
+        JointPicture {
+            joint: String::new(),
+            time_s: track.time_s.iter().step_by(stride).copied().collect(),
+            position: thin(&track.position),
+            velocity: thin(&track.velocity),
+            measured: thin(&recording.effort),
+            before: thin(before),
+            after: thin(after),
+        }
+    };
+    RecordingPicture {
+        recording: recording.name.clone(),
+        held_out,
+        start_ns: recording.start_ns,
+        joints: (0..n).map(joint).collect(),
+    }
+}

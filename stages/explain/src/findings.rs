@@ -1,0 +1,405 @@
+//! From the winning explanation to what is said: findings with intervals, rivals, what could have hidden.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+use tauscope_dynamics::terms::{Layer, PlaceKind};
+
+use crate::active::{Active, Column, Hypothesis, columns};
+use crate::drive::is_drive;
+use crate::explain::Input;
+use crate::fit::Fit;
+use crate::interval::{HALF_WIDTH_95, covariance, parameter_deviations};
+use crate::next_motion;
+use crate::propose::{Base, shapes};
+use crate::report::{Finding, NextMotion, Rejected, Rival, Undetectable, Verdict};
+use crate::search::{Explanation, LEAST_EVIDENCE, LEAST_SIZE, Search};
+use crate::windows::{TimeKind, time_kind};
+use crate::words;
+
+/// A rival this close \[nats\], or within this share of the winner's evidence, cannot be told apart from it.
+const TIE: f64 = 5.0;
+const TIE_SHARE: f64 = 0.01;
+/// How many rivals of a finding are refined, and how many are told.
+const RIVALS: usize = 5;
+/// A known scale needs at least this many times its own deviation.
+const KNOWN_SCALE: f64 = 5.0;
+
+/// What is said of an explanation.
+pub struct Named {
+    /// That which explains most first.
+    pub findings: Vec<Finding>,
+    /// Rivals.
+    pub rejected: Vec<Rejected>,
+    /// For what cannot be told apart.
+    pub next_motions: Vec<NextMotion>,
+    /// On the scales of drives.
+    pub notes: Vec<String>,
+}
+
+/// Whether an effect is part of the arm, not something that came and went.
+pub fn lasts(hypothesis: Hypothesis) -> bool {
+    matches!(time_kind(hypothesis), TimeKind::Always | TimeKind::Step)
+        && hypothesis.effect.name != "contact_wall"
+}
+
+/// The physics in the order in which it acts within its layer: drives last.
+pub fn in_order(actives: &[Active]) -> Vec<&Active> {
+    let mut all: Vec<&Active> = actives.iter().collect();
+    all.sort_by_key(|active| is_drive(&active.hypothesis));
+    all
+}
+
+fn place_of(input: &Input, joints: &[String], hypothesis: &Hypothesis) -> (Option<String>, Option<String>) {
+    let link = |index: usize| Some(input.model.links()[index].name.clone());
+    match hypothesis.effect.place {
+        PlaceKind::Joint | PlaceKind::TwoJoints => (Some(joints[hypothesis.place.joint].clone()), None),
+        PlaceKind::Link | PlaceKind::Tool => (None, link(hypothesis.place.link)),
+        PlaceKind::Base => (None, link(input.model.base_link())),
+        PlaceKind::All => (None, None),
+    }
+}
+
+fn rival(input: &Input, joints: &[String], hypothesis: &Hypothesis) -> Rival {
+    let (joint, link) = place_of(input, joints, hypothesis);
+    Rival {
+        effect: hypothesis.effect.name.to_owned(),
+        joint,
+        link,
+    }
+}
+
+/// Names everything in `found`.
+pub fn of(search: &Search<'_>, found: &Explanation, before: &Fit, input: &Input, joints: &[String]) -> Named {
+    let fit = &found.fit;
+    let spread = covariance(search.problem, fit);
+    let total = mismatch(before, fit, before);
+    let mut named = Named {
+        findings: Vec::new(),
+        rejected: Vec::new(),
+        next_motions: Vec::new(),
+        notes: Vec::new(),
+    };
+    for (index, active) in fit.actives.iter().enumerate() {
+        let deviations = parameter_deviations(fit, &spread, index);
+        if is_drive(&active.hypothesis) {
+            named.notes.push(drive_note(active, deviations[0], joints));
+            continue;
+        }
+        let less = search.less(found, index);
+        let evidence = found.score() - less.score();
+        let contest = contest(search, found, &less, active);
+        let (mut parameters, mut intervals) = (BTreeMap::new(), BTreeMap::new());
+        let effect = active.hypothesis.effect;
+        let values = active.parameters();
+        for ((parameter, value), deviation) in effect.parameters.iter().zip(&values).zip(&deviations) {
+            parameters.insert(parameter.name.to_owned(), number(*value));
+            if deviation.is_finite() {
+                let half = HALF_WIDTH_95 * deviation;
+                let low = (value - half).max(parameter.minimum);
+                intervals.insert(parameter.name.to_owned(), [low, value + half]);
+            }
+        }
+        if effect.place == PlaceKind::TwoJoints {
+            let source = joints[active.hypothesis.place.source].clone();
+            parameters.insert("source_joint".to_owned(), Value::from(source));
+        }
+        if effect.name == "torque_saturation" {
+            parameters.insert("mode".to_owned(), Value::from("sensor"));
+        }
+        if let Some(curve) = &active.curve {
+            let against = serde_json::to_value(curve.against).unwrap_or(Value::Null);
+            parameters.insert("against".to_owned(), against);
+            parameters.insert("by_direction".to_owned(), Value::from(curve.by_direction));
+        }
+        let (joint, link) = place_of(input, joints, &active.hypothesis);
+        let place = joint.clone().or_else(|| link.clone()).unwrap_or_default();
+        let when = when(search, active, &mut parameters, &mut intervals);
+        let sentence = words::sentence(active, &place, &parameters, &intervals, joints);
+        let equivalent_to: Vec<Rival> =
+            contest.ties.iter().map(|h| rival(input, joints, h)).collect();
+        for (hypothesis, reason) in contest.rejected {
+            let (joint, link) = place_of(input, joints, &hypothesis);
+            let effect = hypothesis.effect.name.to_owned();
+            named.rejected.push(Rejected { effect, joint, link, reason });
+        }
+        if let Some(next) = next_motion::of(&active.hypothesis, &contest.ties, input, joints) {
+            named.next_motions.push(next);
+        }
+        named.findings.push(Finding {
+            effect: effect.name.to_owned(),
+            joint,
+            link,
+            parameters,
+            intervals_95: intervals,
+            confidence: confidence(evidence, contest.margin),
+            recording: when.recording,
+            t_start: when.start,
+            t_end: when.end,
+            explains: (mismatch(&less.fit, fit, before) / total).clamp(0.0, 1.0),
+            equivalent_to,
+            sentence,
+        });
+    }
+    merge_waves(&mut named.findings);
+    named.findings.sort_by(|a, b| b.explains.total_cmp(&a.explains));
+    named
+}
+
+fn number(value: f64) -> Value {
+    serde_json::Number::from_f64(value).map_or(Value::Null, Value::Number)
+}
+
+/// What `with` explains of what `without` leaves, in units of each joint's final noise.
+fn mismatch(without: &Fit, with: &Fit, count: &Fit) -> f64 {
+    (0..with.variance.len())
+        .map(|j| (without.squares[j] - with.squares[j]).max(0.0) / with.variance[j] / count.count[j].max(1.0))
+        .sum::<f64>()
+        .max(1e-12)
+}
+
+/// From the evidence against leaving it out and against the best rival \[nats\].
+fn confidence(evidence: f64, margin: f64) -> f64 {
+    let odds = |nats: f64| 1.0 / (1.0 + (-nats / 4.0).exp());
+    (odds(evidence) * odds(margin)).clamp(0.5, 0.999)
+}
+
+struct When {
+    recording: Option<String>,
+    start: Option<f64>,
+    end: Option<f64>,
+}
+
+/// The times of a finding, taken out of its parameters where they hold for one recording.
+fn when(
+    search: &Search<'_>,
+    active: &Active,
+    parameters: &mut BTreeMap<String, Value>,
+    intervals: &mut BTreeMap<String, [f64; 2]>,
+) -> When {
+    let mut none = When { recording: None, start: None, end: None };
+    let known = parameters.clone();
+    let get = |name: &str| known.get(name).and_then(Value::as_f64);
+    match time_kind(active.hypothesis) {
+        TimeKind::Always => none,
+        TimeKind::Step => {
+            none.start = get("change_time_session_s");
+            none
+        }
+        TimeKind::EveryRecording => {
+            (none.start, none.end) = (get("t_start_s"), get("t_end_s"));
+            none
+        }
+        TimeKind::Once => {
+            let (Some(start), Some(end)) = (get("t_start_s"), get("t_end_s")) else { return none };
+            let middle = 0.5 * (start + end);
+            let track = search
+                .problem
+                .tracks
+                .iter()
+                .map(|track| &track.track)
+                .rfind(|track| track.session_s <= middle);
+            let Some(track) = track else { return none };
+            for name in ["t_start_s", "t_end_s"] {
+                if let Some(value) = get(name) {
+                    parameters.insert(name.to_owned(), number(value - track.session_s));
+                }
+                if let Some(interval) = intervals.get_mut(name) {
+                    *interval = interval.map(|t| t - track.session_s);
+                }
+            }
+            When {
+                recording: Some(track.name.clone()),
+                start: Some(start - track.session_s),
+                end: Some(end - track.session_s),
+            }
+        }
+    }
+}
+
+struct Contest {
+    ties: Vec<Hypothesis>,
+    rejected: Vec<(Hypothesis, String)>,
+    /// Evidence for the winner over the best rival that is no tie \[nats\].
+    margin: f64,
+}
+
+/// Every rival in the place of one piece of physics.
+fn contest(search: &Search<'_>, found: &Explanation, less: &Explanation, active: &Active) -> Contest {
+    let mut result = Contest { ties: Vec::new(), rejected: Vec::new(), margin: f64::INFINITY };
+    if active.curve.is_some() {
+        return result;
+    }
+    let evidence = found.score() - less.score();
+    let worse: Vec<usize> = (0..search.problem.joints)
+        .filter(|&j| less.fit.variance[j] > (1.0 + LEAST_SIZE) * found.fit.variance[j])
+        .collect();
+    let proposals = search.proposals(&less.fit, &worse);
+    let rivals = proposals.iter().filter(|p| p.active.hypothesis != active.hypothesis && p.evidence() > 0.0);
+    for proposal in rivals.take(RIVALS) {
+        let fit = less.fit.with(search.problem, proposal.active.clone()).refined(search.problem);
+        let penalties = [&less.penalties[..], &[proposal.penalty]].concat();
+        let other = Explanation { fit, penalties };
+        let behind = found.score() - other.score();
+        let hypothesis = proposal.active.hypothesis;
+        if behind < TIE.max(TIE_SHARE * evidence) {
+            result.ties.push(hypothesis);
+            continue;
+        }
+        result.margin = result.margin.min(behind);
+        let share = ((other.fit.likelihood() - less.fit.likelihood())
+            / (found.fit.likelihood() - less.fit.likelihood()).max(1e-9))
+        .clamp(0.0, 1.0);
+        let reason = format!(
+            "in the place of {} it gains {:.0} % of the log-likelihood and is {behind:.0} nats behind",
+            words::name(active.hypothesis.effect.name),
+            100.0 * share
+        );
+        result.rejected.push((hypothesis, reason));
+    }
+    result
+}
+
+fn drive_note(active: &Active, deviation: f64, joints: &[String]) -> String {
+    let gain = 1.0 + active.coordinates[0];
+    let joint = &joints[active.hypothesis.place.joint];
+    if !(deviation.is_finite() && gain > KNOWN_SCALE * deviation) {
+        return format!(
+            "The gain of joint {joint} is not identifiable: hardly any gravity or inertia acts on it in these \
+             recordings ({} A per N m, 95 % interval {} to {}).",
+            words::number(gain),
+            words::number(gain - HALF_WIDTH_95 * deviation),
+            words::number(gain + HALF_WIDTH_95 * deviation)
+        );
+    }
+    format!(
+        "The drive of joint {joint} has {} N m/A (95 % interval {} to {}).",
+        words::number(1.0 / gain),
+        words::number(1.0 / (gain + HALF_WIDTH_95 * deviation)),
+        words::number(1.0 / (gain - HALF_WIDTH_95 * deviation))
+    )
+}
+
+/// Two waves of ripple at one joint are told as one finding, the larger first.
+fn merge_waves(findings: &mut Vec<Finding>) {
+    const WAVE: [&str; 3] = ["amplitude_nm", "cycles_per_rev", "phase_rad"];
+    let amplitude = |f: &Finding| f.parameters.get(WAVE[0]).and_then(Value::as_f64).unwrap_or(0.0);
+    let mut index = 0;
+    while index < findings.len() {
+        let twin = (index + 1..findings.len()).find(|&other| {
+            findings[index].effect == "torque_ripple"
+                && findings[other].effect == "torque_ripple"
+                && findings[index].joint == findings[other].joint
+        });
+        if let Some(other) = twin {
+            let mut second = findings.remove(other);
+            if amplitude(&second) > amplitude(&findings[index]) {
+                std::mem::swap(&mut second, &mut findings[index]);
+            }
+            let first = &mut findings[index];
+            for name in WAVE {
+                let (stem, unit) = name.split_once('_').unwrap_or((name, ""));
+                let renamed = match name {
+                    "cycles_per_rev" => "cycles_per_rev2".to_owned(),
+                    _ => format!("{stem}2_{unit}"),
+                };
+                if let Some(value) = second.parameters.remove(name) {
+                    first.parameters.insert(renamed.clone(), value);
+                }
+                if let Some(interval) = second.intervals_95.remove(name) {
+                    first.intervals_95.insert(renamed, interval);
+                }
+            }
+            first.explains = (first.explains + second.explains).min(1.0);
+            first.sentence = format!("{} {}", first.sentence, second.sentence);
+        }
+        index += 1;
+    }
+}
+
+/// The verdict in a sentence.
+pub fn summary(verdict: Verdict, findings: &[Finding], before: &[f64], after: &[f64]) -> String {
+    let ratio = {
+        let sum = |all: &[f64]| all.iter().map(|x| x * x).sum::<f64>().sqrt();
+        sum(after) / sum(before)
+    };
+    let proof = if ratio.is_finite() {
+        format!(" On recordings that were not fitted the error falls to {:.0} %.", 100.0 * ratio)
+    } else {
+        String::new()
+    };
+    match verdict {
+        Verdict::NothingMissing => "Nothing is missing: what the twin leaves is the noise of the measurement.".to_owned(),
+        Verdict::NotEvaluated => "Nothing was evaluated.".to_owned(),
+        Verdict::Explained | Verdict::UnknownRemains => {
+            let first = findings.first().map_or("", |f| f.sentence.as_str());
+            let more = match findings.len() {
+                0 | 1 => String::new(),
+                2 => " One more effect was found.".to_owned(),
+                n => format!(" {} more effects were found.", n - 1),
+            };
+            format!("{first}{more}{proof}")
+        }
+    }
+}
+
+/// The smallest effects of one factor that would have been named, for each joint and the tool.
+pub fn undetectable(
+    search: &Search<'_>,
+    found: &Explanation,
+    joints: &[String],
+    unit_nm: &[f64],
+) -> Vec<Undetectable> {
+    let _ = unit_nm;
+    let base = Base::new(search.problem, &found.fit, search.hypotheses.len());
+    let mut all = Vec::new();
+    for hypothesis in search.hypotheses {
+        let factors = hypothesis.factors();
+        let simple = factors.len() == hypothesis.effect.coordinates.len()
+            && (factors.len() == 1 || hypothesis.effect.name == "payload")
+            && hypothesis.effect.place != PlaceKind::TwoJoints
+            && (hypothesis.effect.layer != Layer::Body || hypothesis.effect.name != "drive_gain");
+        let there = found.fit.actives.iter().any(|a| a.hypothesis == *hypothesis);
+        if !simple || there || hypothesis.effect.name == "link_mass" {
+            continue;
+        }
+        let Some(shape) = shapes(search.problem, *hypothesis).into_iter().next() else { continue };
+        let columns = columns(search.problem, &found.fit.actives, &found.fit.efforts, *hypothesis, &shape);
+        let Some(column) = columns.factors.first() else { continue };
+        let Some(smallest) = smallest(search, &found.fit, column, base.penalty(1, hypothesis.only_joint())) else {
+            continue;
+        };
+        let joint = matches!(hypothesis.effect.place, PlaceKind::Joint).then(|| joints[hypothesis.place.joint].clone());
+        let link = matches!(hypothesis.effect.place, PlaceKind::Tool | PlaceKind::Link)
+            .then(|| search.problem.model.links()[hypothesis.place.link].name.clone());
+        let parameter = hypothesis.effect.parameters[0].name.to_owned();
+        // A gain of 1 does nothing: what counts is how far from it.
+        let name = if parameter == "gain" { "gain_minus_one".to_owned() } else { parameter };
+        all.push(Undetectable {
+            effect: hypothesis.effect.name.to_owned(),
+            joint,
+            link,
+            smallest_findable: BTreeMap::from([(name, smallest)]),
+        });
+    }
+    all
+}
+
+/// The factor of a column at which both evidence and size suffice.
+fn smallest(search: &Search<'_>, fit: &Fit, column: &Column, penalty: f64) -> Option<f64> {
+    let problem = search.problem;
+    let (mut information, mut share) = (0.0, 0.0_f64);
+    for j in 0..problem.joints {
+        let Some(values) = column.of_joint(j, problem.rows) else { continue };
+        let weight = &problem.weight[problem.joint_rows(j)];
+        let square: f64 = values.iter().zip(weight).map(|(v, w)| w * v * v).sum();
+        information += square / fit.variance[j];
+        share = share.max(square / fit.variance[j] / fit.count[j].max(1.0));
+    }
+    if information <= 0.0 {
+        return None;
+    }
+    let by_evidence = (2.0 * (LEAST_EVIDENCE + penalty) / information).sqrt();
+    let by_size = (LEAST_SIZE / share).sqrt();
+    Some(by_evidence.max(by_size))
+}

@@ -1,0 +1,111 @@
+//! How well the numbers of an explanation are known.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::active::Column;
+use crate::fit::Fit;
+use crate::problem::Problem;
+
+/// Lags over which what is left is taken to be correlated, in compared samples.
+const LAGS: usize = 6;
+/// Half width of a 95 % interval of a normal variable, in standard deviations.
+pub const HALF_WIDTH_95: f64 = 1.96;
+
+/// Covariance of all free coordinates of a fit, in the order of [`Fit::parameters`].
+///
+/// The sandwich `A⁻¹ B A⁻¹` with A the normal matrix and B the covariance of the scores, autocorrelation within
+/// each recording counted with Bartlett's weights (Newey and West, "A Simple, Positive Semi-Definite,
+/// Heteroskedasticity and Autocorrelation Consistent Covariance Matrix", 1987), but never less than white noise
+/// of the variance that is left gives.
+pub fn covariance(problem: &Problem, fit: &Fit) -> DMatrix<f64> {
+    let jacobian = fit.jacobian(problem);
+    let p = jacobian.len();
+    let mut normal = DMatrix::<f64>::zeros(p, p);
+    let mut scores = DMatrix::<f64>::zeros(p, p);
+    for j in 0..problem.joints {
+        let touching: Vec<(usize, &[f64])> = jacobian
+            .iter()
+            .enumerate()
+            .filter_map(|(a, column): (usize, &Column)| {
+                Some((a, column.of_joint(j, problem.rows)?))
+            })
+            .collect();
+        let variance = fit.squares[j] / (fit.count[j] - touching.len() as f64).max(1.0);
+        let variance = variance.max(1e-16);
+        let rows = problem.joint_rows(j);
+        for track in &problem.tracks {
+            let mut past: Vec<DVector<f64>> = Vec::new();
+            for row in track.rows() {
+                let mut score = DVector::zeros(p);
+                let at = rows.start + row;
+                if problem.weight[at] > 0.0 {
+                    let mut column = DVector::zeros(p);
+                    for (a, values) in &touching {
+                        column[*a] = values[row];
+                    }
+                    normal.ger(1.0 / variance, &column, &column, 1.0);
+                    score = column * (fit.residual[at] / variance);
+                }
+                scores.ger(1.0, &score, &score, 1.0);
+                for (lag, earlier) in past.iter().rev().take(LAGS).enumerate() {
+                    let weight = 1.0 - (lag + 1) as f64 / (LAGS + 1) as f64;
+                    scores.ger(weight, &score, earlier, 1.0);
+                    scores.ger(weight, earlier, &score, 1.0);
+                }
+                past.push(score);
+                if past.len() > LAGS {
+                    past.remove(0);
+                }
+            }
+        }
+    }
+    let scale: Vec<f64> = (0..p).map(|a| normal[(a, a)].max(1e-300).sqrt()).collect();
+    let mut scaled = DMatrix::from_fn(p, p, |a, b| normal[(a, b)] / (scale[a] * scale[b]));
+    for a in 0..p {
+        scaled[(a, a)] += 1e-9;
+    }
+    let Some(inverse) = scaled.try_inverse() else {
+        return DMatrix::from_diagonal_element(p, p, f64::INFINITY);
+    };
+    let inverse = DMatrix::from_fn(p, p, |a, b| inverse[(a, b)] / (scale[a] * scale[b]));
+    let mut covariance = &inverse * scores * &inverse;
+    for a in 0..p {
+        let (robust, white) = (covariance[(a, a)], inverse[(a, a)]);
+        if robust < white {
+            let grow = (white / robust.max(1e-300)).sqrt();
+            for b in 0..p {
+                covariance[(a, b)] *= grow;
+                covariance[(b, a)] *= grow;
+            }
+        }
+    }
+    covariance
+}
+
+/// Standard deviations of the parameters of one piece of physics from the covariance of its coordinates.
+pub fn parameter_deviations(fit: &Fit, covariance: &DMatrix<f64>, index: usize) -> Vec<f64> {
+    let first: usize = fit.actives[..index].iter().map(|a| a.coordinates.len()).sum();
+    let active = &fit.actives[index];
+    let count = active.coordinates.len();
+    let own = covariance.view((first, first), (count, count)).into_owned();
+    let centre = active.parameters();
+    let mut slopes = DMatrix::<f64>::zeros(centre.len(), count);
+    for c in 0..count {
+        let step = (1e-3 * own[(c, c)].max(0.0).sqrt()).max(1e-9 * active.coordinates[c].abs()).max(1e-12);
+        if !step.is_finite() {
+            return vec![f64::INFINITY; centre.len()];
+        }
+        let mut there = active.clone();
+        there.coordinates[c] += step;
+        for (row, (a, b)) in there.parameters().iter().zip(&centre).enumerate() {
+            let mut change = a - b;
+            // Angles may wrap between the two.
+            if change.abs() > std::f64::consts::PI {
+                change -= change.signum() * std::f64::consts::TAU;
+            }
+            slopes[(row, c)] = change / step;
+        }
+    }
+    let spread = &slopes * own * slopes.transpose();
+    (0..centre.len()).map(|row| spread[(row, row)].max(0.0).sqrt()).collect()
+}
