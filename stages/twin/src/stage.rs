@@ -3,7 +3,8 @@
 use tauscope_bus::{
     Emit, Header, JointArray, JointState, MAX_JOINTS, Stage, StageError, TwinState, flags,
 };
-use tauscope_dynamics::{Data, Inertia, Model, lowpass::Butterworth2, rnea, terms};
+use tauscope_dynamics::terms::{MotionSample, Physics, TermError};
+use tauscope_dynamics::{Data, Inertia, Model, lowpass::Butterworth2, rnea};
 
 use crate::config::{Config, Expected};
 use crate::motion::MotionTracker;
@@ -36,6 +37,15 @@ pub enum TwinError {
         /// How many there are.
         found: usize,
     },
+    /// One of the terms of the correction cannot be built.
+    #[error(transparent)]
+    Term(#[from] TermError),
+    /// A term that changes what bodies cost, in a robot that is not known.
+    #[error("the twin's `{effect}` needs the robot: give `robot: <URDF>`")]
+    UnknownBodies {
+        /// The effect.
+        effect: &'static str,
+    },
 }
 
 /// The twin stage. Pure: the same samples in give the same samples out.
@@ -48,21 +58,25 @@ pub struct Twin {
     tool_link: Option<usize>,
     tool: Option<[f64; 10]>,
     correction: Correction,
-    /// Model unit per N m: 1, or 1/torque constant.
-    unit_per_nm: Vec<f64>,
+    physics: Physics,
+    /// N m per model unit: 1, or the torque constant.
+    nm_per_unit: Vec<f64>,
     motion: MotionTracker,
     measured_filters: Vec<Butterworth2>,
     expected_filters: Vec<Butterworth2>,
     /// Stamp of the sample before, and of the last reset.
     previous_ns: Option<i64>,
     reset_ns: i64,
+    /// The first stamp of all: where the session begins.
+    start_ns: Option<i64>,
 }
 
 impl Twin {
     /// A twin for a cell; `correction` in the cell's joint order.
     ///
     /// # Errors
-    /// If it needs a model and there is none, or there are too many joints.
+    /// If it needs a model and there is none, there are too many joints, or a term of the correction does
+    /// not fit the robot.
     pub fn new(config: &Config, setup: Setup, correction: Correction) -> Result<Self, TwinError> {
         let joint_count = setup.joint_names.len();
         if joint_count > MAX_JOINTS {
@@ -73,10 +87,10 @@ impl Twin {
         }
         let motion = MotionTracker::new(config.motion, joint_count, config.velocity_cutoff_hz);
         let effort_filter = Butterworth2::new(config.effort_cutoff_hz);
-        let unit_per_nm = match &setup.torque_constants_nm_per_a {
-            Some(constants) => constants.iter().map(|k| 1.0 / k).collect(),
-            None => vec![1.0; joint_count],
-        };
+        let nm_per_unit = setup
+            .torque_constants_nm_per_a
+            .unwrap_or_else(|| vec![1.0; joint_count]);
+        let physics = physics(&correction, setup.model.as_ref(), &setup.joint_names)?;
         Ok(Self {
             expected: config.expected,
             max_gap_s: config.max_gap_s,
@@ -88,12 +102,14 @@ impl Twin {
             tool_link: setup.tool_link,
             tool: None,
             correction,
-            unit_per_nm,
+            physics,
+            nm_per_unit,
             motion,
             measured_filters: vec![effort_filter.clone(); joint_count],
             expected_filters: vec![effort_filter; joint_count],
             previous_ns: None,
             reset_ns: 0,
+            start_ns: None,
         })
     }
 
@@ -103,9 +119,9 @@ impl Twin {
     }
 
     /// Attaches the tool that the sample tells of, if it is another than before.
-    fn follow_tool(&mut self, sample: &JointState) {
+    fn follow_tool(&mut self, sample: &JointState) -> Result<(), StageError> {
         let (Some((model, _)), Some(link)) = (&mut self.model, self.tool_link) else {
-            return;
+            return Ok(());
         };
         let tool = sample.header.has(flags::TOOL).then(|| {
             let mut all = [sample.tool_mass_kg; 10];
@@ -114,7 +130,7 @@ impl Twin {
             all
         });
         if tool == self.tool {
-            return;
+            return Ok(());
         }
         self.tool = tool;
         let inertia = tool.map_or_else(Inertia::zero, |_| {
@@ -125,40 +141,75 @@ impl Twin {
             )
         });
         model.set_tool(link, inertia);
+        if !self.physics.bodies().is_empty() {
+            // A tilted base or an elastic joint bears the tool as well.
+            self.physics =
+                Physics::build(&self.correction.terms, model).map_err(StageError::failed)?;
+        }
+        Ok(())
     }
 
     /// Expected effort of the motion as it stands, in the measured effort's unit; not filtered.
+    ///
+    /// `expected = record(gain * bodies(rigid) + joints) / torque constant + offset`, where bodies, joints
+    /// and record are the terms of these layers and rigid is the effort of the rigid body, or that of
+    /// somebody else's twin.
     fn expected_effort(&mut self, dt_s: f64, sample: &JointState) -> JointArray {
-        let n = self.unit_per_nm.len();
+        let n = self.nm_per_unit.len();
+        let stamp_ns = sample.header.stamp_ns;
+        let since_s = |ns: i64| (stamp_ns - ns) as f64 * 1e-9;
         let mut effort = [0.0; MAX_JOINTS];
-        match (&mut self.model, self.expected) {
-            (Some((model, data)), Expected::Model) => {
-                let (position, velocity, acceleration) = (
-                    &self.motion.position[..n],
-                    &self.motion.velocity[..n],
-                    &self.motion.acceleration[..n],
-                );
-                effort[..n].copy_from_slice(rnea(model, data, position, velocity, acceleration));
-                let at = terms::MotionSample {
-                    dt_s,
-                    position,
-                    velocity,
-                    acceleration,
-                };
-                for term in &mut self.correction.terms {
-                    term.add_effort(&at, &mut effort[..n]);
-                }
-                for (value, unit) in effort[..n].iter_mut().zip(&self.unit_per_nm) {
-                    *value *= unit;
-                }
+        let (position, velocity, acceleration) = (
+            &self.motion.position[..n],
+            &self.motion.velocity[..n],
+            &self.motion.acceleration[..n],
+        );
+        if let (Some((model, data)), Expected::Model) = (&mut self.model, self.expected) {
+            effort[..n].copy_from_slice(rnea(model, data, position, velocity, acceleration));
+        } else {
+            let reference = sample.reference_effort.iter().zip(&self.nm_per_unit);
+            for (value, (reference, nm)) in effort.iter_mut().zip(reference) {
+                *value = reference * nm;
             }
-            _ => effort = sample.reference_effort,
         }
+        let at = MotionSample {
+            dt_s,
+            recording_s: since_s(self.reset_ns),
+            session_s: since_s(self.start_ns.unwrap_or(stamp_ns)),
+            position,
+            velocity,
+            acceleration,
+            transmitted: &[],
+        };
+        self.physics.act_bodies(&at, &mut effort[..n]);
         for (value, joint) in effort[..n].iter_mut().zip(&self.correction.joints) {
-            *value = joint.gain * *value + joint.offset;
+            *value *= joint.gain;
+        }
+        self.physics.act_joints(&at, &mut effort[..n]);
+        for (j, joint) in self.correction.joints.iter().enumerate() {
+            effort[j] = effort[j] / self.nm_per_unit[j] + joint.offset;
         }
         effort
     }
+}
+
+/// The terms of a correction, built for the robot or, where it is not known, for its joints alone.
+fn physics(
+    correction: &Correction,
+    model: Option<&Model>,
+    joint_names: &[String],
+) -> Result<Physics, TwinError> {
+    let Some(model) = model else {
+        let stand_in = Model::massless(joint_names);
+        let physics = Physics::build(&correction.terms, &stand_in)?;
+        return match physics.bodies().first() {
+            Some(term) => Err(TwinError::UnknownBodies {
+                effect: term.effect().name,
+            }),
+            None => Ok(physics),
+        };
+    };
+    Ok(Physics::build(&correction.terms, model)?)
 }
 
 impl Stage<JointState, TwinState> for Twin {
@@ -167,7 +218,7 @@ impl Stage<JointState, TwinState> for Twin {
         sample: &JointState,
         out: &mut dyn Emit<TwinState>,
     ) -> Result<(), StageError> {
-        let n = self.unit_per_nm.len();
+        let n = self.nm_per_unit.len();
         let stamp_ns = sample.header.stamp_ns;
         let dt_s = self
             .previous_ns
@@ -179,12 +230,14 @@ impl Stage<JointState, TwinState> for Twin {
             && sample.header.has(flags::EFFORT_MEASURED)
             && (self.expected == Expected::Model || sample.header.has(flags::REFERENCE));
 
-        self.follow_tool(sample);
+        self.follow_tool(sample)?;
+        self.start_ns.get_or_insert(stamp_ns);
         let dt_s = if go_on { dt_s.unwrap_or(0.0) } else { 0.0 };
         if go_on {
             self.motion.update(dt_s, sample);
         } else {
             self.motion.reset(sample);
+            self.physics.reset();
             self.reset_ns = stamp_ns;
         }
         let expected = self.expected_effort(dt_s, sample);

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tauscope_dynamics::terms::{Term, TermError, TermSpec};
+use tauscope_dynamics::terms::TermSpec;
 
 /// The only version of the format so far.
 pub const TWIN_FILE_VERSION: u32 = 1;
@@ -61,7 +61,8 @@ pub struct Filters {
 /// How one joint's measured effort follows from the model's:
 /// `measured = gain * model + offset` (Tajiri and Iwamoto, equation 4).
 ///
-/// The model's effort is in N m, or in A where the cell gives torque constants.
+/// The model's effort is in N m, or in A where the cell gives torque constants. Where there are terms, the
+/// gain applies to the effort of the bodies; the terms of joints come on top, then those of recording.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JointCorrection {
@@ -122,18 +123,15 @@ pub enum TwinFileError {
         /// The cell's unit.
         expected: String,
     },
-    /// One of its terms cannot be built.
-    #[error(transparent)]
-    Term(#[from] TermError),
 }
 
-/// A [`TwinFile`] put into a robot's joint order, ready to apply.
-#[derive(Debug)]
+/// A [`TwinFile`] put into a robot's joint order.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Correction {
     /// By joint in URDF order.
     pub joints: Vec<JointCorrection>,
     /// The physics that the rigid-body model leaves out.
-    pub terms: Vec<Box<dyn Term>>,
+    pub terms: Vec<TermSpec>,
 }
 
 impl Correction {
@@ -150,8 +148,7 @@ impl TwinFile {
     /// Puts the corrections into the order of `joint_names`.
     ///
     /// # Errors
-    /// If the file names a joint that is not there, was made for another effort unit, or holds a term
-    /// that cannot be built.
+    /// If the file names a joint that is not there or was made for another effort unit.
     pub fn resolve(
         &self,
         joint_names: &[String],
@@ -173,9 +170,7 @@ impl TwinFile {
             };
             correction.joints[index] = *values;
         }
-        for spec in &self.terms {
-            correction.terms.push(spec.build(joint_names)?);
-        }
+        correction.terms.clone_from(&self.terms);
         Ok(correction)
     }
 }

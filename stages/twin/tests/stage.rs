@@ -278,7 +278,7 @@ fn the_file_corrects_gain_offset_and_friction() {
     let correction = file.resolve(&joints, "Nm").unwrap();
     let mut twin = Twin::new(&Config::default(), setup(), correction).unwrap();
     let states = run(&mut twin, std::iter::once(sample(0.0, 1.0, 0.2, 0.0)));
-    let expected = 1.5 * (effort(1.0, 0.0) + 3.0 * 0.2) - 0.25;
+    let expected = 1.5 * effort(1.0, 0.0) + 3.0 * 0.2 - 0.25;
     assert!((states[0].expected_effort[0] - expected).abs() < 1e-12);
 
     assert!(
@@ -295,4 +295,110 @@ fn the_file_corrects_gain_offset_and_friction() {
         error.contains("`hinge`") && error.contains("elbow"),
         "{error}"
     );
+}
+
+/// A correction of gain 1.5 and offset -0.25 with terms.
+fn corrected(terms: &str) -> Correction {
+    let mut correction = Correction::none(1);
+    correction.joints[0].gain = 1.5;
+    correction.joints[0].offset = -0.25;
+    correction.terms = serde_json::from_str(terms).unwrap();
+    correction
+}
+
+#[test]
+fn terms_act_in_layers_whatever_their_order() {
+    let terms = r#"[
+        {"effect": "torque_gain", "joint": "hinge", "parameters": {"gain": 1.1}},
+        {"effect": "load_dependent_friction", "joint": "hinge", "parameters": {"coefficient": 0.2}},
+        {"effect": "link_mass", "link": "rod", "parameters": {"delta_mass_kg": 1.0}}]"#;
+    let setup = Setup {
+        torque_constants_nm_per_a: Some(vec![4.0]),
+        ..setup()
+    };
+    let mut twin = Twin::new(&Config::default(), setup, corrected(terms)).unwrap();
+    let states = run(&mut twin, std::iter::once(sample(0.0, 1.0, 0.5, 0.0)));
+    let gear = 1.5 * effort(1.0, 0.0) * (MASS_KG + 1.0) / MASS_KG;
+    let expected = 1.1 * (gear + 0.2 * gear) / 4.0 - 0.25;
+    assert!((states[0].expected_effort[0] - expected).abs() < 1e-9);
+}
+
+#[test]
+fn somebody_elses_twin_may_lack_friction_but_not_bodies() {
+    let config = Config {
+        expected: Expected::Topic,
+        ..Config::default()
+    };
+    let blind = || Setup {
+        model: None,
+        torque_constants_nm_per_a: Some(vec![4.0]),
+        ..setup()
+    };
+    let viscous = r#"[{"effect": "viscous_friction", "joint": "hinge",
+        "parameters": {"viscous_nms_per_rad": 3.0}}]"#;
+    let mut twin = Twin::new(&config, blind(), corrected(viscous)).unwrap();
+    let mut sample = sample(0.0, 1.0, 0.5, 0.0);
+    sample.header.flags |= flags::REFERENCE;
+    sample.reference_effort[0] = 7.0;
+    let states = run(&mut twin, std::iter::once(sample));
+    let expected = 1.5 * 7.0 + 3.0 * 0.5 / 4.0 - 0.25;
+    assert!((states[0].expected_effort[0] - expected).abs() < 1e-12);
+
+    let tilt = r#"[{"effect": "base_tilt", "parameters": {"roll_rad": 0.1, "pitch_rad": 0}}]"#;
+    let error = Twin::new(&config, blind(), corrected(tilt)).unwrap_err();
+    assert!(error.to_string().contains("`base_tilt` needs the robot"));
+}
+
+#[test]
+fn a_term_that_does_not_fit_the_robot_is_refused() {
+    let wrong = r#"[{"effect": "viscous_friction", "joint": "elbow",
+        "parameters": {"viscous_nms_per_rad": 3.0}}]"#;
+    let error = Twin::new(&Config::default(), setup(), corrected(wrong)).unwrap_err();
+    assert!(error.to_string().contains("elbow"), "{error}");
+}
+
+#[test]
+fn a_recording_begins_at_a_reset_and_the_session_does_not() {
+    let terms = r#"[
+        {"effect": "friction_step", "joint": "hinge", "parameters":
+            {"coulomb_before_nm": 1.0, "coulomb_after_nm": 3.0, "change_time_session_s": 9.995}},
+        {"effect": "temperature_viscous", "joint": "hinge", "parameters":
+            {"viscous_warm_nms_per_rad": 0.0, "viscous_extra_cold_nms_per_rad": 10.0,
+             "time_constant_s": 5.0}}]"#;
+    let mut twin = Twin::new(&Config::default(), setup(), corrected(terms)).unwrap();
+    // Two recordings of 6 s each, one right after the other: 1 s is missing between them.
+    let both = swing(0.0)
+        .chain(swing(0.0).map(|mut sample| {
+            sample.header.stamp_ns += 7_000_000_000;
+            sample
+        }))
+        .map(|mut sample| {
+            sample.header.stamp_ns += 1_000_000_000_000;
+            sample.velocity[0] = 1.0;
+            sample
+        });
+    let states = run(&mut twin, both);
+    for (i, state) in states.iter().enumerate() {
+        let recording_s = 0.01 * (i % 600) as f64;
+        let session_s = recording_s + if i < 600 { 0.0 } else { 7.0 };
+        let coulomb = if session_s < 9.995 { 1.0 } else { 3.0 };
+        // Without friction the still arm at 0 costs what its acceleration seems to be.
+        let rigid = 1.5 * MASS_KG * LENGTH_M * LENGTH_M * state.acceleration[0];
+        let expected = rigid + coulomb + 10.0 * (-recording_s / 5.0).exp() - 0.25;
+        assert!((state.expected_effort[0] - expected).abs() < 1e-9, "{i}");
+    }
+}
+
+#[test]
+fn a_tool_weighs_on_a_tilted_base_too() {
+    let tilt = r#"[{"effect": "base_tilt", "parameters": {"roll_rad": 0.3, "pitch_rad": 0}}]"#;
+    let mut twin = Twin::new(&Config::default(), setup(), corrected(tilt)).unwrap();
+    let mut with_tool = sample(0.0, 0.0, 0.0, 0.0);
+    with_tool.header.flags |= flags::TOOL;
+    with_tool.tool_mass_kg = 0.7;
+    with_tool.tool_com_m = [0.0, 0.0, -1.0];
+    let states = run(&mut twin, std::iter::once(with_tool));
+    // Rolled by 0.3 about its own axis, the rod hangs as if it were turned by 0.3.
+    let expected = 1.5 * (effort(0.3, 0.0) + 0.7 * GRAVITY_M_S2 * 0.3_f64.sin()) - 0.25;
+    assert!((states[0].expected_effort[0] - expected).abs() < 1e-9);
 }

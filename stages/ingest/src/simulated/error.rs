@@ -110,6 +110,12 @@ pub enum ScenarioError {
         /// The recordings there are.
         known: String,
     },
+    /// An effect that the simulated arm cannot have.
+    #[error("the physics' `{effect}` is not simulated: only what acts in a single joint is")]
+    NotSimulated {
+        /// The effect.
+        effect: &'static str,
+    },
     /// The arm ran away: the controller is unstable with this physics.
     #[error(
         "joint `{joint}` runs away {time_s:.3} s into recording `{recording}`: a stiffer effect than the controller can hold"

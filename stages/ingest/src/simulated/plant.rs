@@ -1,7 +1,7 @@
 //! The arm itself: its URDF, and the physics that the URDF does not tell of.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
-use tauscope_dynamics::terms::{MotionSample, Term, TermSpec};
+use tauscope_dynamics::terms::{Layer, MotionSample, Term, TermSpec};
 use tauscope_dynamics::{
     Data, Model, forward_kinematics, link_jacobian, link_pose, mass_matrix, rnea,
 };
@@ -64,6 +64,9 @@ pub(super) struct Plant {
     velocity: Vec<f64>,
     /// Of the step that led here.
     applied_nm: Vec<f64>,
+    /// Time since the start of the recording, and of the recording since that of the session \[s\].
+    recording_s: f64,
+    session_start_s: f64,
     work: Work,
 }
 
@@ -116,8 +119,16 @@ impl Plant {
             position: position.to_vec(),
             velocity: vec![0.0; n],
             applied_nm: vec![0.0; n],
+            recording_s: 0.0,
+            session_start_s: 0.0,
             work: Work::new(n),
         })
+    }
+
+    /// Sets when the recording starts in its session.
+    pub fn starting_at(mut self, session_start_s: f64) -> Self {
+        self.session_start_s = session_start_s;
+        self
     }
 
     /// \[rad\]
@@ -176,7 +187,11 @@ impl Plant {
         let step = Step {
             position: &self.position,
             before: &self.velocity,
+            load: &work.load,
+            inertia: &work.inertia,
             dt_s,
+            recording_s: self.recording_s,
+            session_s: self.session_start_s + self.recording_s,
         };
         // Once more with the time that passes, so that what has a memory remembers this step.
         self.physics
@@ -186,6 +201,7 @@ impl Plant {
             self.applied_nm[j] = drive.effort(j, velocity).0;
         }
         self.velocity.copy_from_slice(&work.velocity);
+        self.recording_s += dt_s;
     }
 
     /// Brings the new velocity nearer to the solution by a step of Newton's, and gives that step's
@@ -196,7 +212,11 @@ impl Plant {
         let step = Step {
             position: &self.position,
             before: &self.velocity,
+            load: &work.load,
+            inertia: &work.inertia,
             dt_s,
+            recording_s: self.recording_s,
+            session_s: self.session_start_s + self.recording_s,
         };
         for (beside, velocity) in work.beside.iter_mut().zip(&work.velocity) {
             *beside = velocity + SLOPE_STEP;
@@ -264,7 +284,12 @@ struct Step<'a> {
     position: &'a [f64],
     /// The velocity it begins with.
     before: &'a [f64],
+    /// What acts without the physics and without acceleration \[N m\].
+    load: &'a [f64],
+    inertia: &'a DMatrix<f64>,
     dt_s: f64,
+    recording_s: f64,
+    session_s: f64,
 }
 
 /// What the URDF does not tell of.
@@ -272,15 +297,24 @@ struct Step<'a> {
 struct Physics {
     terms: Vec<Box<dyn Term>>,
     acceleration: Vec<f64>,
+    transmitted: Vec<f64>,
 }
 
 impl Physics {
     fn new(model: &Model, specs: &[TermSpec]) -> Result<Self, ScenarioError> {
-        let joint_names: Vec<_> = model.joints().iter().map(|j| j.name.clone()).collect();
-        let terms = specs.iter().map(|spec| spec.build(&joint_names));
+        let terms = specs.iter().map(|spec| {
+            let term = spec.build(model)?;
+            match term.effect().layer {
+                Layer::Joint => Ok(term),
+                _ => Err(ScenarioError::NotSimulated {
+                    effect: term.effect().name,
+                }),
+            }
+        });
         Ok(Self {
-            terms: terms.collect::<Result<_, _>>()?,
+            terms: terms.collect::<Result<_, ScenarioError>>()?,
             acceleration: vec![0.0; model.dof()],
+            transmitted: vec![0.0; model.dof()],
         })
     }
 
@@ -290,15 +324,23 @@ impl Physics {
         for ((acceleration, v), v0) in self.acceleration.iter_mut().zip(velocity).zip(step.before) {
             *acceleration = (v - v0) / step.dt_s;
         }
+        for (j, transmitted) in self.transmitted.iter_mut().enumerate() {
+            let row = step.inertia.row(j);
+            let inertial = row.iter().zip(&self.acceleration).map(|(m, a)| m * a);
+            *transmitted = step.load[j] + inertial.sum::<f64>();
+        }
         effort.fill(0.0);
         let at = MotionSample {
             dt_s: elapsed_s,
+            recording_s: step.recording_s,
+            session_s: step.session_s,
             position: step.position,
             velocity,
             acceleration: &self.acceleration,
+            transmitted: &self.transmitted,
         };
         for term in &mut self.terms {
-            term.add_effort(&at, effort);
+            term.act(&at, effort);
         }
     }
 }

@@ -112,7 +112,8 @@ impl Simulation {
             next_sample: 0,
             rate_hz: scenario.rate_hz,
             controller: Controller::new(&model, &scenario.controller, &joints, start),
-            plant: Plant::new(&model, &scenario.physics, start)?,
+            plant: Plant::new(&model, &scenario.physics, start)?
+                .starting_at(offset_ns as f64 * 1e-9),
             sensors: SensorBank::new(scenario, &joints, rng(2))?,
             trajectory,
             target,

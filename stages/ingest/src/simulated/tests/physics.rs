@@ -176,8 +176,9 @@ fn friction_far_stiffer_than_the_step_neither_chatters_nor_swings_back() {
     // 30 N m over 2 mrad/s on a last joint of 0.001 kg m²: a time constant of 0.07 us.
     let spec = |joint: usize| TermSpec {
         effect: "coulomb_friction".to_owned(),
-        joint: format!("joint{joint}"),
+        joint: Some(format!("joint{joint}")),
         parameters: [("coulomb_nm".to_owned(), 30.0)].into(),
+        ..TermSpec::default()
     };
     let physics: Vec<_> = (1..=N).map(spec).collect();
     let start = [0.0, 0.5, 0.0, 1.0, 0.0, 0.5, 0.0];
