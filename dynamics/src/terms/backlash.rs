@@ -5,12 +5,13 @@ use super::two_masses::{Deviation, Oscillator, Transmission, TwoMasses};
 use super::{Coordinate, Effect, Layer, MotionSample, Parameter, PlaceKind, Scale, Term};
 
 /// Natural frequency \[rad/s\] and damping ratio of the contact on either side of the play: it settles
-/// within some 5 ms and does not bounce.
-const CONTACT_FREQUENCY: f64 = 1000.0;
+/// within some 20 ms and does not bounce. Stiffer contacts only turn the noise of a measured acceleration
+/// into impacts.
+const CONTACT_FREQUENCY: f64 = 300.0;
 const CONTACT_DAMPING: f64 = 0.7;
 
 /// Longest step through the play \[s\].
-const STEP_S: f64 = 5e-4;
+const STEP_S: f64 = 1e-3;
 const MOST_STEPS: f64 = 200.0;
 
 /// Between rotor and link there is a play of a total width; within it nothing comes through, on either

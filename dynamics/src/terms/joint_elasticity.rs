@@ -6,9 +6,9 @@ use super::{Coordinate, Effect, Layer, MotionSample, Parameter, PlaceKind, Scale
 
 /// Share of the critical damping that the link has against a rotor that stands still. It is none of the
 /// parameters: motions of robots do not show it.
-const DAMPING_RATIO: f64 = 0.1;
+const DAMPING_RATIO: f64 = 0.05;
 
-/// A spring between rotor and link, T = -K δ - D δ̇ with the damping D = 2 ζ √(K M), ζ = 0.1, and a rotor of
+/// A spring between rotor and link, T = -K δ - D δ̇ with the damping D = 2 ζ √(K M), ζ = 0.05, and a rotor of
 /// inertia J. The encoder is on the rotor; the link starts at rest against it.
 pub(super) static EFFECT: Effect = Effect {
     name: "joint_elasticity",
