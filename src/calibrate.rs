@@ -95,21 +95,40 @@ impl Job<'_> {
             file.joints.insert(name.clone(), joint);
         }
 
-        let measured = if self.validation.is_empty() {
-            self.fit
-        } else {
-            self.validation
-        };
-        let mut noise = vec![Spread::default(); joint_count];
+        let seen = self.measure(&mut file, self.measured(), &|index, fraction| {
+            progress(self.fit.len() + index, fraction);
+        })?;
+        lost += if self.validation.is_empty() { 0 } else { seen };
+        Ok(Calibrated {
+            file,
+            samples: calibration.samples(),
+            lost,
+        })
+    }
+
+    /// Measures the noise of the residual and the detectors' scores with the corrected twin `file` on
+    /// `recordings`, in which nothing may touch the robot, and writes them into it. Returns what was lost.
+    ///
+    /// # Errors
+    /// If a recording cannot be read, or the twin does not fit the cell.
+    pub fn measure(
+        &self,
+        file: &mut TwinFile,
+        recordings: &[PathBuf],
+        progress: &dyn Fn(usize, f64),
+    ) -> Result<u64, CalibrateError> {
+        let names = &self.cell.facts.joint_names;
+        let mut noise = vec![Spread::default(); names.len()];
         let mut detectors = self
-            .detectors(&file)
+            .detectors(file)
             .map_err(|source| CalibrateError::Recording {
-                recording: measured[0].clone(),
+                recording: recordings.first().cloned().unwrap_or_default(),
                 source,
             })?;
-        for (index, recording) in measured.iter().enumerate() {
-            let step = &mut |fraction| progress(self.fit.len() + index, fraction);
-            let seen = self.each(recording, Some(&file), step, &mut |sample| {
+        let mut lost = 0;
+        for (index, recording) in recordings.iter().enumerate() {
+            let step = &mut |fraction| progress(index, fraction);
+            lost += self.each(recording, Some(file), step, &mut |sample| {
                 for (spread, residual) in noise.iter_mut().zip(sample.residual) {
                     spread.add(residual);
                 }
@@ -120,32 +139,32 @@ impl Job<'_> {
                     }
                 }
             })?;
-            lost += if self.validation.is_empty() { 0 } else { seen };
         }
-        for (name, spread) in self.cell.facts.joint_names.iter().zip(&noise) {
+        for (name, spread) in names.iter().zip(&noise) {
             if let Some(joint) = file.joints.get_mut(name) {
                 // About zero: a standing error of the twin is noise to a detector, too.
-                joint.noise = Some(spread.root_mean_square());
+                joint.noise = (spread.count > 0).then(|| spread.root_mean_square());
             }
         }
         file.scores = (detectors.iter())
+            .filter(|(_, spread)| spread.count > 0)
             .map(|(detector, spread)| (detector.name().to_owned(), spread.statistics()))
             .collect();
-        Ok(Calibrated {
-            file,
-            samples: calibration.samples(),
-            lost,
-        })
+        Ok(lost)
+    }
+
+    /// What noise and scores are measured on.
+    fn measured(&self) -> &[PathBuf] {
+        if self.validation.is_empty() {
+            self.fit
+        } else {
+            self.validation
+        }
     }
 
     /// How many recordings are read, for a progress bar.
     pub fn recordings(&self) -> usize {
-        let measured = if self.validation.is_empty() {
-            self.fit
-        } else {
-            self.validation
-        };
-        self.fit.len() + measured.len()
+        self.fit.len() + self.measured().len()
     }
 
     /// Runs a recording through source and twin and hands over every sample whose filters have
@@ -182,7 +201,7 @@ impl Job<'_> {
     }
 
     /// The twin as far as it is known before the fit.
-    fn file(&self) -> TwinFile {
+    pub fn file(&self) -> TwinFile {
         let facts = &self.cell.facts;
         TwinFile {
             version: tauscope_twin::TWIN_FILE_VERSION,

@@ -2,7 +2,7 @@
 
 use clap::{Parser, Subcommand};
 
-use crate::commands::{calibrate, check, info, repair, replay, run, schema, simulate, stage};
+use crate::commands::{calibrate, check, explain, info, repair, replay, run, schema, simulate, stage};
 
 /// A robot's measured effort beside its digital twin's: stream, detect, record.
 ///
@@ -24,6 +24,7 @@ pub enum Command {
     Schema(schema::Args),
     Replay(replay::Args),
     Calibrate(calibrate::Args),
+    Explain(explain::Args),
     Simulate(simulate::Args),
     Info(info::Args),
     Repair(repair::Args),

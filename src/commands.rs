@@ -2,6 +2,7 @@
 
 pub mod calibrate;
 pub mod check;
+pub mod explain;
 pub mod info;
 pub mod repair;
 pub mod replay;

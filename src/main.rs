@@ -7,6 +7,7 @@ mod calibrate;
 mod cli;
 mod commands;
 mod exit;
+mod explain;
 mod files;
 mod pipeline;
 mod plan;
@@ -49,6 +50,7 @@ fn main() -> ExitCode {
         Command::Schema(args) => commands::schema::run(&args),
         Command::Replay(args) => commands::replay::run(&args),
         Command::Calibrate(args) => commands::calibrate::run(&args),
+        Command::Explain(args) => commands::explain::run(&args),
         Command::Simulate(args) => commands::simulate::run(&args),
         Command::Info(args) => commands::info::run(&args),
         Command::Repair(args) => commands::repair::run(&args),

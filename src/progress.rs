@@ -1,4 +1,4 @@
-//! A progress bar over recordings or sources: on a terminal, none in a pipe.
+//! A progress bar over recordings, sources or the steps of a computation: on a terminal, none in a pipe.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -26,6 +26,32 @@ impl Progress {
             bar,
             done: Mutex::new(vec![0.0; count]),
         }
+    }
+
+    /// A bar over one piece of work that says what it does ([`Progress::doing`]). Nobody knows how long
+    /// its steps take, so it does not say what is left.
+    pub fn of_work() -> Self {
+        let this = Self::new(1);
+        let style = ProgressStyle::with_template("{bar:40} {percent:>3} % {elapsed} {wide_msg}");
+        this.bar
+            .set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        this
+    }
+
+    /// The work has come to `fraction` and goes on with `what`. Where the fraction does not grow from one
+    /// step to the next, the bar creeps on, ever slower, so that it is seen to live.
+    pub fn doing(&self, fraction: f64, what: &str) {
+        const CREEP: f64 = 0.02;
+        let shown = {
+            let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
+            let Some(shown) = done.first_mut() else {
+                return;
+            };
+            *shown = fraction.max(*shown + CREEP * (1.0 - *shown)).min(1.0);
+            *shown
+        };
+        self.bar.set_position((shown * STEPS) as u64);
+        self.bar.set_message(what.to_owned());
     }
 
     /// Recording `index` has come to `fraction`.

@@ -65,7 +65,7 @@ pub struct Args {
     json: bool,
 }
 
-fn joint_constant(text: &str) -> Result<(String, f64), String> {
+pub(super) fn joint_constant(text: &str) -> Result<(String, f64), String> {
     let (joint, constant) = text.split_once('=').ok_or("give it as joint=constant")?;
     match constant.parse::<f64>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok((joint.to_owned(), value)),

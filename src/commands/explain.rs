@@ -1,0 +1,102 @@
+//! `tauscope explain`.
+
+use std::path::PathBuf;
+
+use super::print;
+use crate::exit::{Exit, Failure};
+use crate::explain::{self, Arguments, Kept, Request};
+use crate::pipeline::EffortUnit;
+use crate::progress::Progress;
+
+/// Shares of the bar: reading ends here, and here the engine.
+const READ: f64 = 0.05;
+const EXPLAINED: f64 = 0.95;
+
+/// Say which physics the twin leaves out, model it, and prove on recordings that were never fitted that the
+/// error falls.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A case: robot and recordings. Or name them with the options.
+    #[arg(
+        value_name = "CASE",
+        required_unless_present = "fit",
+        conflicts_with_all = [
+            "robot", "fit", "holdout", "effort_unit", "torque_constant", "twin", "twin_topic", "state_topic"
+        ]
+    )]
+    case: Option<PathBuf>,
+    /// The folder that the report, the corrected twin and the predictions go to.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// The robot's URDF.
+    #[arg(long, value_name = "URDF")]
+    robot: Option<PathBuf>,
+    /// Recordings that may be fitted.
+    #[arg(long, value_name = "RECORDING", num_args = 1..)]
+    fit: Vec<PathBuf>,
+    /// Recordings that nothing is fitted on; without them some of those to fit are held out.
+    #[arg(long, value_name = "RECORDING", num_args = 1..)]
+    holdout: Vec<PathBuf>,
+    /// Unit of the measured effort.
+    #[arg(long, value_enum, default_value_t)]
+    effort_unit: EffortUnit,
+    /// Torque constant of a joint in N m/A, for efforts in A; for all joints or for none.
+    #[arg(long, value_name = "JOINT=CONSTANT", value_parser = super::calibrate::joint_constant)]
+    torque_constant: Vec<(String, f64)>,
+    /// A corrected twin to start from: what is found has changed since.
+    #[arg(long, value_name = "TWIN")]
+    twin: Option<PathBuf>,
+    /// Topic of another twin's effort, which takes the place of the URDF's.
+    #[arg(long, value_name = "TOPIC")]
+    twin_topic: Option<String>,
+    /// Topic of the measured joint states.
+    #[arg(long, value_name = "TOPIC", default_value = "/joint_states")]
+    state_topic: String,
+    /// An effect that is left out of the library; may be given several times.
+    #[arg(long, value_name = "EFFECT")]
+    without: Vec<String>,
+    /// Print the report as `report.json` holds it.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Args {
+    fn request(&self) -> Result<Request, Failure> {
+        let without = explain::without(&self.without)?;
+        let Some(case) = &self.case else {
+            let arguments = Arguments {
+                robot: self.robot.as_deref(),
+                effort_unit: self.effort_unit,
+                torque_constants_nm_per_a: self.torque_constant.iter().cloned().collect(),
+                twin: self.twin.as_deref(),
+                twin_topic: self.twin_topic.as_deref(),
+                state_topic: &self.state_topic,
+                fit: &self.fit,
+                holdout: &self.holdout,
+            };
+            return Ok(explain::from_arguments(&arguments, without)?);
+        };
+        Ok(explain::from_case(case, without)?)
+    }
+}
+
+/// Explains, and writes what was found.
+pub fn run(args: &Args) -> Result<Exit, Failure> {
+    let request = args.request()?;
+    let progress = Progress::of_work();
+    let input = explain::read(&request, &|share, what| progress.doing(READ * share, what))?;
+    explain::prepare(&args.out, &request)?;
+    let kept = Kept::of(&input);
+    let step = |share: f64, what: &str| progress.doing(READ + (EXPLAINED - READ) * share, what);
+    let mut outcome = tauscope_explain::explain(input, &step)
+        .map_err(|error| Failure::rejected(error.to_string()))?;
+    progress.doing(EXPLAINED, "writing");
+    let made = explain::write(&args.out, &request, &kept, &mut outcome)?;
+    drop(progress);
+    if args.json {
+        print(&explain::json(&outcome)?)?;
+    } else {
+        print(&explain::text(&outcome.report, &made))?;
+    }
+    Ok(Exit::from_loss(kept.lost > 0))
+}

@@ -1,0 +1,56 @@
+//! `tauscope explain` around the engine: from a case or arguments to what the engine takes, and from what
+//! it says to files.
+
+mod input;
+mod output;
+mod read;
+mod robot;
+mod twin;
+mod words;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use crate::exit::Failure;
+use crate::provenance;
+use crate::report::Problem;
+
+pub use input::{Arguments, Request, from_arguments, from_case, without};
+pub use output::{json, prepare, write};
+pub use read::{Kept, read};
+pub use words::text;
+
+/// What went in, by name and hash.
+fn provenance_of(request: &Request) -> anyhow::Result<BTreeMap<String, String>> {
+    let version = env!("CARGO_PKG_VERSION").to_owned();
+    let mut all = BTreeMap::from([("tauscope".to_owned(), version)]);
+    if let Some(urdf) = &request.cell.facts.urdf {
+        let hash = provenance::sha256(urdf.as_bytes());
+        all.insert("urdf_sha256".to_owned(), hash);
+    }
+    if let Some(start) = &request.start {
+        all.insert(
+            "twin_sha256".to_owned(),
+            provenance::sha256_of_file(&start.path)?,
+        );
+    }
+    for (role, recordings) in [("fit", &request.fit), ("holdout", &request.holdout)] {
+        for recording in recordings {
+            let hash = provenance::sha256_of_file(&recording.path)?;
+            all.insert(format!("{role}/{}", recording.name), hash);
+        }
+    }
+    Ok(all)
+}
+
+/// Writes a file beside `path` and moves it there once it is whole.
+fn write_whole(path: &Path, content: &[u8]) -> Result<(), Failure> {
+    let mut part = path.as_os_str().to_owned();
+    part.push(".part");
+    let part = PathBuf::from(part);
+    std::fs::write(&part, content)
+        .and_then(|()| std::fs::rename(&part, path))
+        .map_err(|error| {
+            Failure::Rejected(Problem::of_file(path, format!("cannot write: {error}")).into())
+        })
+}

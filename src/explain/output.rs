@@ -1,0 +1,176 @@
+//! What was found, as files.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+use tauscope_explain::Outcome;
+use tauscope_explain::report::Verdict;
+
+use super::input::Request;
+use super::read::Kept;
+use super::{provenance_of, robot, twin, write_whole};
+use crate::exit::Failure;
+use crate::report::{Problem, Report};
+
+const REPORT: &str = "report.json";
+const TWIN: &str = "twin.yaml";
+const ROBOT: &str = "robot.urdf";
+
+/// What was written.
+#[derive(Debug, Default)]
+pub struct Made {
+    /// The files, that which most readers want first.
+    pub files: Vec<PathBuf>,
+    /// What could not be written, and why.
+    pub notes: Vec<String>,
+}
+
+/// Makes the folder `out` ready: what an explanation before has left there must not stand beside a new report.
+///
+/// # Errors
+/// If it cannot be made, or a file of the input would be overwritten.
+pub fn prepare(out: &Path, request: &Request) -> Result<(), Failure> {
+    std::fs::create_dir_all(out)
+        .map_err(|error| Failure::rejected(format!("cannot make {}: {error}", out.display())))?;
+    let mut report = Report::default();
+    let start = request.start.iter().map(|start| &start.path);
+    let robot = request.robot_path.iter();
+    for input in start.chain(robot) {
+        let is_input = |name: &&str| same_file(&out.join(name), input);
+        if let Some(name) = [TWIN, ROBOT].iter().find(|name| is_input(name)) {
+            let title = format!("the result {name} would overwrite {}", input.display());
+            report.push(Problem::new(title).help("give another folder with --out"));
+        }
+    }
+    report.into_result(())?;
+    if out.join(REPORT).is_file() {
+        for name in [REPORT, TWIN, ROBOT] {
+            // One that is not there need not be removed; one that cannot be is found when it is written.
+            let _ = std::fs::remove_file(out.join(name));
+        }
+    }
+    Ok(())
+}
+
+fn same_file(a: &Path, b: &Path) -> bool {
+    match (a.canonicalize(), b.canonicalize()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => false,
+    }
+}
+
+/// Writes everything to `out`, and into the report which prediction is where.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn write(
+    out: &Path,
+    request: &Request,
+    kept: &Kept,
+    outcome: &mut Outcome,
+) -> Result<Made, Failure> {
+    let joints = &request.cell.facts.joint_names;
+    for picture in &mut outcome.pictures {
+        for (joint, name) in picture.joints.iter_mut().zip(joints) {
+            joint.joint.clone_from(name);
+        }
+    }
+    let provenance = provenance_of(request)?;
+    let mut made = Made::default();
+    let mut predictions = Vec::new();
+    for (recording, rows) in &outcome.predictions {
+        let name = format!("{recording}.csv");
+        let path = out.join(&name);
+        write_whole(&path, prediction(rows, joints.len()).as_bytes())?;
+        outcome
+            .report
+            .holdout_predictions
+            .insert(recording.clone(), name);
+        predictions.push(path);
+    }
+    let put = |name: &str, text: &str, made: &mut Made| {
+        let path = out.join(name);
+        write_whole(&path, text.as_bytes())?;
+        made.files.push(path);
+        Ok::<(), Failure>(())
+    };
+    put(REPORT, &json(outcome)?, &mut made)?;
+    if outcome.report.verdict != Verdict::NotEvaluated {
+        let file = twin_text(request, kept, outcome, &provenance, &mut made)?;
+        put(TWIN, &file, &mut made)?;
+        if let Some(urdf) = robot_text(request, kept, outcome, &mut made) {
+            put(ROBOT, &urdf, &mut made)?;
+        }
+    }
+    made.files.append(&mut predictions);
+    Ok(made)
+}
+
+/// The report's content.
+///
+/// # Errors
+/// None that is known.
+pub fn json(outcome: &Outcome) -> anyhow::Result<String> {
+    serde_json::to_string_pretty(&outcome.report).context("cannot encode the report")
+}
+
+/// A row per recorded row, a column per joint; no header.
+fn prediction(rows: &[f64], joints: usize) -> String {
+    let mut text = String::with_capacity(rows.len() * 12);
+    for row in rows.chunks(joints.max(1)) {
+        for (index, value) in row.iter().enumerate() {
+            if index > 0 {
+                text.push(',');
+            }
+            // A hundred-millionth of an A or N m is beyond what any sensor tells.
+            text.push_str(&format!("{value:.8}"));
+        }
+        text.push('\n');
+    }
+    text
+}
+
+fn twin_text(
+    request: &Request,
+    kept: &Kept,
+    outcome: &Outcome,
+    provenance: &BTreeMap<String, String>,
+    made: &mut Made,
+) -> Result<String, Failure> {
+    let (file, unmeasured) = twin::file(request, kept, outcome, provenance);
+    if let Some(error) = unmeasured {
+        let note = format!("{TWIN} holds no noise and no scores: {error}.");
+        made.notes.push(note);
+    }
+    Ok(serde_saphyr::to_string(&file).context("the twin")?)
+}
+
+/// `None` where the URDF alone would not be the corrected twin.
+fn robot_text(
+    request: &Request,
+    kept: &Kept,
+    outcome: &Outcome,
+    made: &mut Made,
+) -> Option<String> {
+    let urdf = request.cell.facts.urdf.as_ref().filter(|_| kept.bodies)?;
+    let start = kept.start.iter();
+    let gains = start
+        .clone()
+        .flat_map(|start| &start.gain)
+        .chain(&outcome.gain);
+    let offsets = start.flat_map(|start| &start.offset);
+    let is_bare = gains.clone().all(|gain| (gain - 1.0).abs() < f64::EPSILON)
+        && offsets.clone().all(|offset| offset.abs() < f64::EPSILON);
+    if !is_bare {
+        return None;
+    }
+    match robot::corrected(urdf, &kept.model, &outcome.terms) {
+        Ok(text) => text,
+        Err(error) => {
+            made.notes
+                .push(format!("{ROBOT} was not written: {error}."));
+            None
+        }
+    }
+}

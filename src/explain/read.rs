@@ -1,0 +1,133 @@
+//! Recordings into what the engine takes.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use tauscope_archive::Recording as Archive;
+use tauscope_dynamics::Model;
+use tauscope_explain::{Input, Recording, RecordingTopics, Start};
+
+use super::input::{Named, Request};
+use crate::report::{Problem, Report};
+
+/// What is known of the input once the engine has taken it.
+#[derive(Debug)]
+pub struct Kept {
+    /// The robot as the engine sees it.
+    pub model: Model,
+    /// Whether its bodies count: not where the twin is a topic.
+    pub bodies: bool,
+    /// What it started from.
+    pub start: Option<Start>,
+    /// By recording, when it begins \[s from the start of the session\].
+    pub begins_s: BTreeMap<String, f64>,
+    /// Rows of data that were lost on reading.
+    pub lost: u64,
+}
+
+impl Kept {
+    /// What is to be kept of `input`.
+    pub fn of(input: &Input) -> Self {
+        let recordings = || input.fit.iter().chain(&input.holdout);
+        let session_ns = recordings()
+            .map(|recording| recording.start_ns)
+            .min()
+            .unwrap_or(0);
+        let begin = |recording: &Recording| {
+            let since_s = (recording.start_ns - session_ns) as f64 * 1e-9;
+            (recording.name.clone(), since_s)
+        };
+        Self {
+            model: input.model.clone(),
+            bodies: input.bodies,
+            start: input.start.clone(),
+            begins_s: recordings().map(begin).collect(),
+            lost: recordings().map(|recording| recording.losses.lost()).sum(),
+        }
+    }
+}
+
+/// The joints of the first message that can be read, in its order.
+pub fn first_joint_names(path: &Path, topic: &str) -> Result<Vec<String>, Report> {
+    let wrong = |title: String| Report::from(Problem::new(title));
+    let archive = Archive::open(path).map_err(|error| wrong(error.to_string()))?;
+    let mut states = archive
+        .joint_states(topic)
+        .map_err(|error| wrong(error.to_string()))?;
+    while let Some(state) = states.next_state() {
+        if let Ok(state) = state
+            && !state.message.name.is_empty()
+        {
+            return Ok(state.message.name.clone());
+        }
+    }
+    let path = path.display();
+    Err(wrong(format!(
+        "{path}: no message on `{topic}` names its joints"
+    )))
+}
+
+/// Reads the recordings of `request`; `progress` is told the share of them that is read, and which is next.
+///
+/// # Errors
+/// All recordings that cannot be used.
+pub fn read(request: &Request, progress: &dyn Fn(f64, &str)) -> Result<Input, Report> {
+    let facts = &request.cell.facts;
+    let topics = RecordingTopics {
+        state: request.state_topic.clone(),
+        reference: request.twin_topic.clone(),
+    };
+    let count = (request.fit.len() + request.holdout.len()) as f64;
+    let mut report = Report::default();
+    let mut done = 0.0;
+    let mut read_all = |recordings: &[Named]| -> Vec<Recording> {
+        let mut all = Vec::new();
+        for Named { name, path } in recordings {
+            progress(done / count, &format!("reading {name}"));
+            done += 1.0;
+            match Recording::read(path, &topics, &facts.joint_names) {
+                Ok(mut recording) => {
+                    recording.name.clone_from(name);
+                    all.push(recording);
+                }
+                Err(error) => report.push(Problem::new(error.to_string())),
+            }
+        }
+        all
+    };
+    let fit = read_all(&request.fit);
+    let holdout = read_all(&request.holdout);
+    // Where the effort is somebody else's twin's, the robot's bodies are in it already.
+    let (model, bodies) = match (&request.cell.model, &request.twin_topic) {
+        (Some(model), None) => (model.clone(), true),
+        _ => (Model::massless(&facts.joint_names), false),
+    };
+    let start = start(request, &mut report);
+    report.into_result(Input {
+        case: request.case.clone(),
+        model,
+        bodies,
+        effort_unit: facts.effort_unit.as_str().to_owned(),
+        torque_constants_nm_per_a: facts.torque_constants_nm_per_a.clone(),
+        fit,
+        holdout,
+        start,
+        without: request.without.clone(),
+    })
+}
+
+fn start(request: &Request, report: &mut Report) -> Option<Start> {
+    let facts = &request.cell.facts;
+    let file = &request.start.as_ref()?.file;
+    match file.resolve(&facts.joint_names, facts.effort_unit.as_str()) {
+        Ok(correction) => Some(Start {
+            terms: correction.terms,
+            gain: correction.joints.iter().map(|joint| joint.gain).collect(),
+            offset: correction.joints.iter().map(|joint| joint.offset).collect(),
+        }),
+        Err(error) => {
+            report.push(Problem::new(error.to_string()));
+            None
+        }
+    }
+}
