@@ -5,6 +5,7 @@
 //! their colours from its style sheet (Okabe and Ito's, which the colour-blind can tell apart).
 
 mod chart;
+mod effects;
 mod findings;
 mod proof;
 mod rivals;
@@ -17,12 +18,15 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use crate::report::{RecordingPicture, Report, Verdict};
 
-use self::words::{effort_unit, percent};
+use self::words::{almost_all, effort_unit};
 
 const STYLE: &str = include_str!("html/style.css");
 
 /// Nothing may be loaded and nothing may run: also if a name in a file tries to.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'";
+
+/// A verdict of more letters than this is set smaller.
+const LONG: usize = 130;
 
 /// The page.
 ///
@@ -135,7 +139,7 @@ fn header(report: &Report) -> Markup {
                 span.badge { span.sign aria-hidden="true" { (sign) } " " (verdict_text(report.verdict)) }
                 span.case { (report.case) }
             }
-            h1 { (report.summary) }
+            h1.long[report.summary.chars().count() > LONG] { (report.summary) }
             @if let Some(reason) = reason { p.reason { "Why: " (reason) } }
             @if !facts.is_empty() {
                 dl.facts {
@@ -164,7 +168,7 @@ fn facts(report: &Report) -> Vec<(String, String)> {
         let share = proof::recovered(&rows);
         if share.is_finite() {
             let text = "of the squared error is gone on held-out data, which was never fitted";
-            facts.push((percent(share.max(0.0)), text.to_owned()));
+            facts.push((almost_all(share.max(0.0)), text.to_owned()));
         }
     }
     let known = rows.iter().filter(|row| row.over_noise().is_finite());

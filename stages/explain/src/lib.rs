@@ -7,6 +7,7 @@ pub mod drive;
 pub mod explain;
 mod findings;
 pub mod fit;
+pub mod html;
 pub mod interval;
 pub mod least_squares;
 pub mod library;

@@ -3,10 +3,8 @@
 use maud::{Markup, html};
 
 use super::chart::{Axis, r};
-use super::words::{
-    confidence, effect_at, effect_meaning, effect_title, number_text, parameter, percent, place,
-    value, with_digits_of,
-};
+use super::effects::{effect_at, effect_meaning, effect_title, place};
+use super::words::{almost_all, number_text, parameter, percent, value, with_digits_of};
 use crate::report::{Finding, Report, Verdict};
 
 /// A card a finding, or that there is none.
@@ -40,14 +38,17 @@ fn card(number: usize, finding: &Finding) -> Markup {
                     span.place { (place) }
                 }
             }
+            div.halves { div {
             p.sentence { (finding.sentence) }
             @if let Some(meaning) = effect_meaning(&finding.effect) { p.meaning { (meaning) } }
             p.figures {
                 span { "Explains " b { (percent(finding.explains)) } " of the mismatch " (meter(finding.explains)) }
-                span { "Confidence " b { (confidence(finding.confidence)) } }
+                span { "Confidence " b { (almost_all(finding.confidence)) } }
                 @if let Some(when) = when { span { (when) } }
             }
+            }
             @if !finding.parameters.is_empty() { (parameters(finding)) }
+            }
             @if !finding.equivalent_to.is_empty() {
                 p.rival {
                     b { "Cannot be told apart from " }
@@ -104,11 +105,14 @@ pub(super) fn meter(share: f64) -> Markup {
 }
 
 fn parameters(finding: &Finding) -> Markup {
+    // A mass says more than where it is.
+    let mut parameters: Vec<_> = finding.parameters.iter().collect();
+    parameters.sort_by_key(|(name, _)| !name.contains("mass"));
     html! {
         table.parameters {
             thead { tr { th { "Parameter" } th.num { "Value" } th.num { "95 % interval" } th {} } }
             tbody {
-                @for (name, given) in &finding.parameters {
+                @for (name, given) in parameters {
                     @let (label, unit) = parameter(name);
                     @let interval = finding.intervals_95.get(name).copied();
                     tr {

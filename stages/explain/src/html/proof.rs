@@ -160,7 +160,7 @@ fn times(ratio: f64) -> String {
     if ratio < 9.95 {
         format!("{} ×", fixed(ratio, 1))
     } else {
-        format!("{} ×", number_text(ratio.round()))
+        format!("{} ×", fixed(ratio, 0))
     }
 }
 
@@ -178,6 +178,7 @@ pub(super) fn before_and_after(report: &Report) -> Option<Markup> {
         p.lead {
             "RMS of measured minus expected effort on held-out data, in " (unit)
             ": not filtered, not trimmed. Nothing was fitted on it."
+            @if report.findings.is_empty() { " There is nothing to correct, so both are the same." }
         }
         p.legend {
             span.key.before { "Twin as it was" }

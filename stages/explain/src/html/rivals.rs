@@ -4,8 +4,9 @@ use std::collections::BTreeSet;
 
 use maud::{Markup, html};
 
+use super::effects::{effect_at, effect_title, place};
 use super::findings::list;
-use super::words::{effect_at, effect_title, number_text, parameter, place};
+use super::words::{number_text, parameter};
 use crate::report::{NextMotion, Rejected, Report, Undetectable, Verdict};
 
 /// How many rejected rivals are shown at once.

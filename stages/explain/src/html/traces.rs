@@ -3,8 +3,9 @@
 use maud::{Markup, html};
 
 use super::chart::{Axis, Panel, bulk, r};
+use super::effects::effect_title;
 use super::proof::{Row, rows};
-use super::words::{effect_title, effort_unit};
+use super::words::effort_unit;
 use crate::report::{Finding, JointPicture, RecordingPicture, Report};
 
 /// How many joints are shown without a click.
@@ -31,8 +32,11 @@ pub(super) fn joints(report: &Report, pictures: &[RecordingPicture]) -> Option<M
         return None;
     }
     order.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
-    let of_interest =
-        |row: &Row<'_>| row.is_changed() || named_at(report, row.joint).next().is_some();
+    let of_interest = |row: &Row<'_>| {
+        row.is_changed()
+            || named_at(report, row.joint).next().is_some()
+            || eventful(report, pictures, row.joint).is_some()
+    };
     let (mut first, mut rest): (Vec<_>, Vec<_>) =
         order.into_iter().partition(|row| of_interest(row));
     if first.is_empty() {
@@ -98,33 +102,47 @@ fn chosen<'a>(
     joint: &str,
 ) -> Vec<&'a RecordingPicture> {
     let gain = |picture: &RecordingPicture| {
-        find(picture, joint).map_or(0.0, |drawn| {
-            let squares = |expected: &[f64]| -> f64 {
-                let residuals = drawn
-                    .measured
-                    .iter()
-                    .zip(expected)
-                    .map(|(m, e)| (m - e).powi(2));
-                residuals.filter(|square| square.is_finite()).sum()
-            };
-            squares(&drawn.before) - squares(&drawn.after)
-        })
+        find(picture, joint).map_or(0.0, |drawn| squares(drawn).0 - squares(drawn).1)
     };
-    let with_joint = || pictures.iter().filter(|p| find(p, joint).is_some());
-    let held_out = with_joint().max_by(|a, b| {
-        (a.held_out, gain(a))
-            .partial_cmp(&(b.held_out, gain(b)))
-            .unwrap_or(std::cmp::Ordering::Equal)
-    });
-    let happened = with_joint()
-        .filter(|picture| {
-            let spans = spans(report, pictures, picture, joint);
-            spans.iter().any(|span| span.here_only)
-        })
-        .max_by(|a, b| gain(a).total_cmp(&gain(b)));
-    let mut chosen: Vec<_> = happened.into_iter().collect();
+    let held_out = pictures
+        .iter()
+        .filter(|picture| find(picture, joint).is_some())
+        .max_by(|a, b| {
+            (a.held_out, gain(a))
+                .partial_cmp(&(b.held_out, gain(b)))
+                .unwrap_or(std::cmp::Ordering::Equal)
+        });
+    let mut chosen: Vec<_> = eventful(report, pictures, joint).into_iter().collect();
     chosen.extend(held_out.filter(|held| chosen.iter().all(|c| c.recording != held.recording)));
     chosen
+}
+
+/// The recording in which something happened to this joint that did not happen in all.
+fn eventful<'a>(
+    report: &Report,
+    pictures: &'a [RecordingPicture],
+    joint: &str,
+) -> Option<&'a RecordingPicture> {
+    pictures
+        .iter()
+        .filter_map(|picture| {
+            let (before, after) = squares(find(picture, joint)?);
+            let spans = spans(report, pictures, picture, joint);
+            let here = spans.iter().any(|span| span.here_only) && before > 1.2 * after;
+            here.then_some((picture, before - after))
+        })
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(picture, _)| picture)
+}
+
+/// Sums of squared residuals, before and after.
+fn squares(drawn: &JointPicture) -> (f64, f64) {
+    let squares = |expected: &[f64]| -> f64 {
+        let residuals = drawn.measured.iter().zip(expected);
+        let squares = residuals.map(|(m, e)| (m - e).powi(2));
+        squares.filter(|square| square.is_finite()).sum()
+    };
+    (squares(&drawn.before), squares(&drawn.after))
 }
 
 /// A time in which a finding acts.
@@ -230,13 +248,13 @@ fn over_time(
     };
     html! {
         figure {
+            figcaption { (picture.recording) " (" (kind) ")" }
             svg.plot viewBox="0 0 960 436" role="img" aria-label={ "effort of " (row.joint) " over time in " (picture.recording) } {
                 (above.frame(10, 5, None, &format!("Effort [{unit}]")))
                 (below.frame(10, 4, Some("Time [s]"), &format!("Residual: measured − expected [{unit}]")))
-                @for (index, span) in spans.iter().enumerate() {
+                @for span in spans {
                     (above.span(span.from_s, span.to_s))
                     (below.span(span.from_s, span.to_s))
-                    text.event x=(r(above.x.px(span.from_s.max(0.0)) + 5.0)) y=(r(39.0 + 14.0 * index as f64)) { (span.title) }
                 }
                 @if row.noise > 0.0 { (below.band("noise", -2.0 * row.noise, 2.0 * row.noise)) }
                 (above.line("line measured", &drawn.time_s, &drawn.measured))
@@ -244,8 +262,10 @@ fn over_time(
                 (above.line("line after", &drawn.time_s, &drawn.after))
                 (below.line("line before", &drawn.time_s, &before))
                 (below.line("line after", &drawn.time_s, &after))
+                @for (index, span) in spans.iter().enumerate() {
+                    text.event x=(r(above.x.px(span.from_s.max(0.0)) + 5.0)) y=(r(39.0 + 14.0 * index as f64)) { (span.title) }
+                }
             }
-            figcaption { (picture.recording) " (" (kind) ")" }
         }
     }
 }
@@ -258,6 +278,9 @@ struct Dot {
     before: f64,
     after: f64,
 }
+
+/// What a dot stands at.
+type Of = fn(&Dot) -> f64;
 
 /// The residual against velocity, position and load: friction, springs and gains each have a shape of their own.
 fn scatters(pictures: &[RecordingPicture], joint: &str, unit: &str) -> Markup {
@@ -278,7 +301,7 @@ fn scatters(pictures: &[RecordingPicture], joint: &str, unit: &str) -> Markup {
     };
     let y = Axis::between(low.min(0.0), high.max(0.0), 214.0, 26.0).padded(0.06);
     let effort = format!("Effort of the twin [{unit}]");
-    let kinds: [(&str, fn(&Dot) -> f64); 3] = [
+    let kinds: [(&str, Of); 3] = [
         ("Velocity [rad/s or m/s]", |dot| dot.velocity),
         ("Position [rad or m]", |dot| dot.position),
         (&effort, |dot| dot.load),

@@ -1,201 +1,9 @@
-//! Canonical names, units and numbers in the words of whoever runs the cell.
+//! Names of parameters, units and numbers in the words of whoever runs the cell.
 
 use serde_json::Value;
 
-/// What an effect is called and what it means at the arm.
-const EFFECTS: [(&str, &str, &str); 30] = [
-    (
-        "viscous_friction",
-        "Viscous friction",
-        "Resistance that grows with speed: grease, seals, gear churning.",
-    ),
-    (
-        "coulomb_friction",
-        "Coulomb friction",
-        "A constant resistance against the motion, whatever the speed: dry friction in gear and bearings.",
-    ),
-    (
-        "stribeck_friction",
-        "Stribeck friction",
-        "Friction that is highest when motion begins and falls with speed: the joint sticks before it slips.",
-    ),
-    (
-        "asymmetric_coulomb",
-        "Direction-dependent friction",
-        "Dry friction that is larger in one direction than in the other.",
-    ),
-    (
-        "load_dependent_friction",
-        "Load-dependent friction",
-        "Friction that grows with the torque through the gear: the joint rubs more the more it carries.",
-    ),
-    (
-        "presliding_hysteresis",
-        "Pre-sliding hysteresis",
-        "The joint gives like a spring before it slips, so that friction lags behind each reversal.",
-    ),
-    (
-        "quadratic_drag",
-        "Quadratic drag",
-        "Resistance that grows with the square of the speed: fast gears in oil.",
-    ),
-    (
-        "temperature_viscous",
-        "Warm-up friction",
-        "Viscous friction that fades while the joint gets warm.",
-    ),
-    (
-        "friction_step",
-        "Friction step",
-        "Friction that changed once and stayed: a brake that drags, a bearing that failed, grease that was renewed.",
-    ),
-    (
-        "rotor_inertia",
-        "Rotor inertia",
-        "Inertia of motor and gear, seen through the gear, that only acceleration shows.",
-    ),
-    (
-        "joint_elasticity",
-        "Joint elasticity",
-        "The gear or its flexspline twists under load, so that the link follows behind the motor.",
-    ),
-    (
-        "backlash",
-        "Backlash",
-        "Play in the gear: for a moment after each reversal the motor turns alone.",
-    ),
-    (
-        "payload",
-        "Payload",
-        "Something is mounted on or held by the tool that the twin does not know of.",
-    ),
-    (
-        "payload_pickup",
-        "Payload for a while",
-        "Something was picked up and put down again that the twin does not know of.",
-    ),
-    (
-        "link_mass",
-        "Link mass",
-        "A link is heavier or lighter than its model says.",
-    ),
-    (
-        "link_com",
-        "Link centre of mass",
-        "A link's mass is distributed otherwise than its model says.",
-    ),
-    (
-        "base_tilt",
-        "Base tilt",
-        "The base does not stand level, or is mounted otherwise than the model says.",
-    ),
-    (
-        "counterbalance_spring",
-        "Counterbalance spring",
-        "A spring or gas strut carries part of the weight.",
-    ),
-    (
-        "cable_spring",
-        "Cable spring",
-        "A cable or hose pulls the joint back to where it hangs freely.",
-    ),
-    (
-        "torque_ripple",
-        "Torque ripple",
-        "A wave in the torque that repeats with each turn of motor or gear.",
-    ),
-    (
-        "torque_gain",
-        "Torque gain",
-        "The torque is reported too large or too small by a factor: sensor gain, torque constant, gear efficiency.",
-    ),
-    (
-        "torque_bias",
-        "Torque offset",
-        "The torque is reported with a constant offset: a sensor that was not zeroed.",
-    ),
-    (
-        "torque_delay",
-        "Torque delay",
-        "The torque is reported late against the position.",
-    ),
-    (
-        "torque_lowpass",
-        "Torque low-pass filter",
-        "The reported torque is smoothed, so that fast changes are missing.",
-    ),
-    (
-        "torque_saturation",
-        "Torque saturation",
-        "The torque stops at a limit: of the sensor's range, or of the drive.",
-    ),
-    (
-        "transmission_coupling",
-        "Transmission coupling",
-        "Torque of one joint shows in another: coupled gears or belts, as in a wrist.",
-    ),
-    (
-        "external_push",
-        "External push",
-        "Something or somebody pushed the arm for a while.",
-    ),
-    (
-        "contact_wall",
-        "Contact with a wall",
-        "The arm pressed against something firm.",
-    ),
-    (
-        "unknown",
-        "Unknown",
-        "Something that no name of the library fits; the correction only describes it.",
-    ),
-    ("contact", "Contact", "The arm touched something."),
-];
-
-/// An effect's name in words.
-pub(super) fn effect_title(effect: &str) -> String {
-    EFFECTS
-        .iter()
-        .find(|(name, ..)| *name == effect)
-        .map_or_else(
-            || sentence_case(effect),
-            |(_, title, _)| (*title).to_owned(),
-        )
-}
-
-/// What an effect is, in a sentence; nothing for one that is not known here.
-pub(super) fn effect_meaning(effect: &str) -> Option<&'static str> {
-    EFFECTS
-        .iter()
-        .find(|(name, ..)| *name == effect)
-        .map(|(.., meaning)| *meaning)
-}
-
-/// An effect and where it is: `Coulomb friction of joint3`.
-pub(super) fn effect_at(effect: &str, joint: Option<&str>, link: Option<&str>) -> String {
-    let title = effect_title(effect);
-    match place(joint, link) {
-        Some(place) => format!("{title}, {place}"),
-        None => title,
-    }
-}
-
-/// `joint3`, `link tool`; nothing for an effect of the whole arm.
-pub(super) fn place(joint: Option<&str>, link: Option<&str>) -> Option<String> {
-    match (joint, link) {
-        (Some(joint), _) if mentions(joint, "joint") => Some(joint.to_owned()),
-        (Some(joint), _) => Some(format!("joint {joint}")),
-        (None, Some(link)) if mentions(link, "link") => Some(link.to_owned()),
-        (None, Some(link)) => Some(format!("link {link}")),
-        (None, None) => None,
-    }
-}
-
-fn mentions(name: &str, word: &str) -> bool {
-    name.to_ascii_lowercase().contains(word)
-}
-
-fn sentence_case(name: &str) -> String {
+/// `some_name` as `Some name`.
+pub(super) fn sentence_case(name: &str) -> String {
     let words = name.replace('_', " ");
     let mut letters = words.chars();
     match letters.next() {
@@ -228,6 +36,23 @@ const UNITS: [(&str, &str); 20] = [
     ("_a", "A"),
 ];
 
+/// Parameters whose names say too little by themselves.
+const USUAL: [(&str, &str); 10] = [
+    ("coulomb", "Coulomb friction"),
+    ("coulomb_positive", "Friction forward"),
+    ("coulomb_negative", "Friction backward"),
+    ("coulomb_before", "Friction before"),
+    ("coulomb_after", "Friction after"),
+    ("static", "Friction before it slips"),
+    ("viscous", "Viscous friction"),
+    ("viscous_warm", "Viscous friction, warm"),
+    ("viscous_extra_cold", "More of it when cold"),
+    (
+        "change_time_session",
+        "Changed at, since the first recording began",
+    ),
+];
+
 /// A parameter's name in words and its unit (empty for a pure number), from its canonical name.
 pub(super) fn parameter(name: &str) -> (String, &'static str) {
     let found = |name: &str| {
@@ -246,6 +71,10 @@ pub(super) fn parameter(name: &str) -> (String, &'static str) {
 }
 
 fn parameter_label(stem: &str) -> String {
+    let usual = USUAL.iter().find(|(name, _)| *name == stem);
+    if let Some((_, label)) = usual {
+        return (*label).to_owned();
+    }
     let mut words: Vec<String> = stem
         .split('_')
         .map(|word| match word {
@@ -289,13 +118,13 @@ pub(super) fn value(value: &Value, interval: Option<[f64; 2]>) -> String {
     }
 }
 
-/// A number with two digits of its interval's half width.
+/// A number with the digits that its interval's half width warrants: 0.19 and 0.05 have two decimals, 0.4 has one.
 pub(super) fn with_digits_of(number: f64, [low, high]: [f64; 2]) -> String {
     let half_width = (high - low).abs() / 2.0;
     if !half_width.is_finite() || half_width == 0.0 || !number.is_finite() {
         return number_text(number);
     }
-    let decimals = 1 - half_width.log10().floor() as i32;
+    let decimals = -(half_width / 3.0).log10().floor() as i32;
     if decimals > 7 || number.abs() >= 1e7 {
         return number_text(number);
     }
@@ -358,12 +187,12 @@ pub(super) fn percent(share: f64) -> String {
     }
 }
 
-/// How sure: never 100 %.
-pub(super) fn confidence(confidence: f64) -> String {
-    if confidence > 0.99 {
+/// How sure, or how much is gone: never 100 %.
+pub(super) fn almost_all(share: f64) -> String {
+    if share > 0.99 {
         "> 99 %".to_owned()
     } else {
-        percent(confidence)
+        percent(share)
     }
 }
 
@@ -374,8 +203,8 @@ mod tests {
     #[test]
     fn units_come_from_canonical_names() {
         let all = [
-            ("coulomb_nm", "Coulomb", "N m"),
-            ("viscous_nms_per_rad", "Viscous", "N m s/rad"),
+            ("coulomb_nm", "Coulomb friction", "N m"),
+            ("viscous_nms_per_rad", "Viscous friction", "N m s/rad"),
             ("drag_nms2_per_rad2", "Drag", "N m s²/rad²"),
             ("stribeck_velocity_rad_s", "Stribeck velocity", "rad/s"),
             ("inertia_kgm2", "Inertia", "kg m²"),
@@ -385,7 +214,11 @@ mod tests {
             ("cycles_per_rev", "Cycles", "per turn"),
             ("cycles_per_rev2", "Cycles (second)", "per turn"),
             ("amplitude2_nm", "Amplitude (second)", "N m"),
-            ("change_time_session_s", "Change time session", "s"),
+            (
+                "change_time_session_s",
+                "Changed at, since the first recording began",
+                "s",
+            ),
             ("stiffness_n_per_m", "Stiffness", "N/m"),
             ("gain", "Gain", ""),
             ("force_x_n", "Force x", "N"),
@@ -400,6 +233,7 @@ mod tests {
     #[test]
     fn numbers_have_the_digits_that_count() {
         assert_eq!(with_digits_of(4.1234, [3.9, 4.3]), "4.12");
+        assert_eq!(with_digits_of(0.012, [0.008, 0.016]), "0.012");
         assert_eq!(with_digits_of(-1234.5, [-1300.0, -1200.0]), "−1234");
         assert_eq!(number_text(0.012_345), "0.0123");
         assert_eq!(number_text(-0.000_001_234), "−1.23 × 10⁻⁶");
