@@ -235,6 +235,17 @@ pub fn record(problem: &Problem, actives: &[Active], mechanical: &[Vec<f64>]) ->
 ///
 /// [`Layer::Record`] terms of `others` are passed through; one that is itself of that layer acts after them.
 pub fn change(problem: &Problem, others: &[Active], efforts: &Efforts, active: &Active) -> Column {
+    change_scaled(problem, others, efforts, active, &efforts.gains)
+}
+
+/// The same, what bodies cost scaled by other gains of the drives.
+fn change_scaled(
+    problem: &Problem,
+    others: &[Active],
+    efforts: &Efforts,
+    active: &Active,
+    gains: &[f64],
+) -> Column {
     let layer = active.hypothesis.effect.layer;
     if is_drive(&active.hypothesis) {
         return scaled_bodies(problem, efforts, active);
@@ -251,9 +262,9 @@ pub fn change(problem: &Problem, others: &[Active], efforts: &Efforts, active: &
         }
     };
     let mut changed = changed;
-    if layer == Layer::Body && efforts.gains.iter().any(|gain| *gain != 1.0) {
+    if layer == Layer::Body && gains.iter().any(|gain| *gain != 1.0) {
         let start = if through { Some(&efforts.mechanical) } else { None };
-        scale_added(&mut changed, start, &efforts.gains);
+        scale_added(&mut changed, start, gains);
     }
     let difference: Vec<Vec<f64>> = match layer {
         Layer::Record => subtract(changed, &efforts.recorded),
@@ -365,21 +376,40 @@ pub fn columns(
     // What a term adds depends on the motion alone, unless it is recorded through something or scales with the load.
     let alike = effect.layer != Layer::Record
         && effect.name != "load_dependent_friction"
-        && (effect.layer != Layer::Body || efforts.gains.iter().all(|gain| *gain == 1.0))
+        && !is_drive(&hypothesis)
         && others.iter().all(|other| other.hypothesis.effect.layer != Layer::Record)
         && problem.rows <= CACHED_ROWS;
     if !alike {
-        return Arc::new(compute_columns(problem, others, efforts, hypothesis, shape));
+        let gains = &efforts.gains;
+        return Arc::new(compute_columns(problem, others, efforts, hypothesis, shape, gains));
     }
+    // Kept as in N m: drives scale what bodies cost.
+    let scaled = |columns: &Arc<Columns>| {
+        if effect.layer != Layer::Body || efforts.gains.iter().all(|gain| *gain == 1.0) {
+            return Arc::clone(columns);
+        }
+        let scale = |column: &Column| {
+            let mut column = column.clone();
+            for (k, value) in column.values.iter_mut().enumerate() {
+                *value *= efforts.gains[column.joint.unwrap_or(k / problem.rows)];
+            }
+            column
+        };
+        Arc::new(Columns {
+            alone: columns.alone.as_ref().map(scale),
+            factors: columns.factors.iter().map(scale).collect(),
+        })
+    };
     let bits = shape.iter().map(|value| value.to_bits()).collect();
     let key: Key = (effect.name, hypothesis.place, bits);
     let lock = || problem.cache.0.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(known) = lock().get(&key) {
-        return Arc::clone(known);
+    if let Some(known) = lock().get(&key).map(Arc::clone) {
+        return scaled(&known);
     }
-    let new = Arc::new(compute_columns(problem, others, efforts, hypothesis, shape));
+    let ones = vec![1.0; problem.joints];
+    let new = Arc::new(compute_columns(problem, others, efforts, hypothesis, shape, &ones));
     lock().insert(key, Arc::clone(&new));
-    new
+    scaled(&new)
 }
 
 fn compute_columns(
@@ -388,6 +418,7 @@ fn compute_columns(
     efforts: &Efforts,
     hypothesis: Hypothesis,
     shape: &[f64],
+    gains: &[f64],
 ) -> Columns {
     let factors = hypothesis.factors();
     let mut coordinates = shape.to_vec();
@@ -396,7 +427,7 @@ fn compute_columns(
     }
     let at = |coordinates: &[f64]| {
         let active = hypothesis.with(coordinates.to_vec());
-        change(problem, others, efforts, &active)
+        change_scaled(problem, others, efforts, &active, gains)
     };
     let alone = at(&coordinates);
     let mut each = Vec::with_capacity(factors.len());

@@ -141,10 +141,12 @@ pub fn explain(
     };
     let found = search.run(moving.fit.actives, moving.penalties);
     progress(0.8, "rivals");
-    let before = Fit::new(&problem, Vec::new());
+    // Where nobody knows the scale of the drives, the twin is only one once they are fitted.
+    let scales = if unscaled { drive::unknown_gains(joints.len()) } else { Vec::new() };
+    let before = Fit::new(&problem, scales).refined(&problem);
     let named = findings::of(&search, &found, &before, &input, &joints);
     progress(0.95, "proof");
-    let proof = setup.proof(&problem, &found)?;
+    let proof = setup.proof(&problem, &before, &found.fit)?;
     let verdict = if found.fit.actives.iter().any(|a| a.curve.is_some()) {
         Verdict::UnknownRemains
     } else if named.findings.is_empty() {
@@ -290,8 +292,8 @@ impl Setup<'_> {
     }
 
     /// The corrected twin's effort over a track, in the recording's unit.
-    fn predict(&self, problem: &Problem, found: &Explanation, track: &Track) -> Vec<f64> {
-        let terms = findings::in_order(&found.fit.actives)
+    fn predict(&self, problem: &Problem, fit: &Fit, track: &Track) -> Vec<f64> {
+        let terms = findings::in_order(&fit.actives)
             .into_iter()
             .map(|active| active.term(problem))
             .collect();
@@ -304,7 +306,7 @@ impl Setup<'_> {
     }
 
     /// The smoothing that predicts the fitted recordings' unfiltered effort best.
-    fn best_smoothing(&self, problem: &Problem, found: &Explanation) -> Result<f64, TermError> {
+    fn best_smoothing(&self, problem: &Problem, found: &Fit) -> Result<f64, TermError> {
         let n = self.unit_nm.len();
         let mut best = (f64::INFINITY, Problem::motion_cutoff_hz(problem.cutoff_hz));
         for share in PREDICTION_CUTOFFS {
@@ -326,7 +328,7 @@ impl Setup<'_> {
         Ok(best.1)
     }
 
-    fn proof(&self, problem: &Problem, found: &Explanation) -> Result<Proof, TermError> {
+    fn proof(&self, problem: &Problem, scaled: &Fit, found: &Fit) -> Result<Proof, TermError> {
         let n = self.unit_nm.len();
         let smoothing_hz = self.best_smoothing(problem, found)?;
         let (mut before, mut after, mut count) = (vec![0.0; n], vec![0.0; n], 0.0);
@@ -336,12 +338,7 @@ impl Setup<'_> {
         for (recording, held_out) in held.chain(fitted) {
             let track = self.track(recording, smoothing_hz)?;
             let predicted = self.predict(problem, found, &track);
-            let rigid: Vec<f64> = track
-                .rigid
-                .iter()
-                .enumerate()
-                .map(|(k, value)| value / self.unit_nm[k % n])
-                .collect();
+            let rigid = self.predict(problem, scaled, &track);
             if held_out {
                 for (k, measured) in recording.effort.iter().enumerate() {
                     before[k % n] += (measured - rigid[k]).powi(2);

@@ -72,6 +72,7 @@ fn rival(input: &Input, joints: &[String], hypothesis: &Hypothesis) -> Rival {
 /// Names everything in `found`.
 pub fn of(search: &Search<'_>, found: &Explanation, before: &Fit, input: &Input, joints: &[String]) -> Named {
     let fit = &found.fit;
+    let efficiency = fit.efficiency(search.problem);
     let spread = covariance(search.problem, fit);
     let total = mismatch(before, fit, before);
     let mut named = Named {
@@ -87,7 +88,7 @@ pub fn of(search: &Search<'_>, found: &Explanation, before: &Fit, input: &Input,
             continue;
         }
         let less = search.less(found, index);
-        let evidence = found.score() - less.score();
+        let evidence = found.ahead_of(&less, &efficiency);
         let contest = contest(search, found, &less, active);
         let (mut parameters, mut intervals) = (BTreeMap::new(), BTreeMap::new());
         let effect = active.hypothesis.effect;
@@ -230,17 +231,13 @@ fn contest(search: &Search<'_>, found: &Explanation, less: &Explanation, active:
     if active.curve.is_some() {
         return result;
     }
-    let evidence = found.score() - less.score();
-    let worse: Vec<usize> = (0..search.problem.joints)
-        .filter(|&j| less.fit.variance[j] > (1.0 + LEAST_SIZE) * found.fit.variance[j])
-        .collect();
-    let proposals = search.proposals(&less.fit, &worse);
+    let efficiency = found.fit.efficiency(search.problem);
+    let evidence = found.ahead_of(less, &efficiency);
+    let proposals = search.rivals(&less.fit, &found.fit, active);
     let rivals = proposals.iter().filter(|p| p.active.hypothesis != active.hypothesis && p.evidence() > 0.0);
     for proposal in rivals.take(RIVALS) {
-        let fit = less.fit.with(search.problem, proposal.active.clone()).refined(search.problem);
-        let penalties = [&less.penalties[..], &[proposal.penalty]].concat();
-        let other = Explanation { fit, penalties };
-        let behind = found.score() - other.score();
+        let other = search.joined(less, proposal);
+        let behind = found.ahead_of(&other, &efficiency);
         let hypothesis = proposal.active.hypothesis;
         if behind < TIE.max(TIE_SHARE * evidence) {
             result.ties.push(hypothesis);

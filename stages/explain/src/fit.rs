@@ -3,13 +3,15 @@
 use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::{CoordinateKind, Layer, Scale};
 
-use crate::active::{Active, Column, Efforts, change, record};
+use crate::active::{Active, Column, Efforts, Hypothesis, change, record};
 use crate::least_squares::Products;
 use crate::problem::Problem;
 
 const MAX_ITERATIONS: usize = 12;
 /// A step that gains less log-likelihood than this is the last.
 const CONVERGED: f64 = 1e-3;
+/// A row is worth at least this share of an independent sample.
+const LEAST_EFFICIENCY: f64 = 0.03;
 /// Step of the difference quotient of a time \[s\].
 const TIME_STEP_S: f64 = 0.01;
 
@@ -48,9 +50,45 @@ impl Fit {
         }
     }
 
-    /// Log-likelihood of what is left, but for a constant: `-n/2 ln(variance)` summed over joints.
+    /// Log-likelihood of what is left as if it were white, but for a constant: `-n/2 ln(variance)` summed over joints.
     pub fn likelihood(&self) -> f64 {
         likelihood(&self.variance, &self.count)
+    }
+
+    /// The joints whose effort a piece of physics changes: one, or all.
+    pub fn joints_of(hypothesis: &Hypothesis, joints: usize) -> Vec<usize> {
+        hypothesis.only_joint().map_or_else(|| (0..joints).collect(), |joint| vec![joint])
+    }
+
+    /// By joint, how many independent samples one row of what is left is worth: `(1 - r) / (1 + r)` with r the
+    /// correlation of neighbours, as for a first-order autoregression.
+    pub fn efficiency(&self, problem: &Problem) -> Vec<f64> {
+        (0..problem.joints)
+            .map(|j| {
+                let first = j * problem.rows;
+                let (mut product, mut square) = (0.0, 0.0);
+                for track in &problem.tracks {
+                    for row in track.rows().skip(1) {
+                        let at = first + row;
+                        if problem.weight[at] > 0.0 && problem.weight[at - 1] > 0.0 {
+                            product += self.residual[at] * self.residual[at - 1];
+                            square += 0.5 * (self.residual[at].powi(2) + self.residual[at - 1].powi(2));
+                        }
+                    }
+                }
+                let r = if square > 0.0 { product / square } else { 0.0 };
+                ((1.0 - r) / (1.0 + r)).clamp(LEAST_EFFICIENCY, 1.0)
+            })
+            .collect()
+    }
+
+    /// Gain of log-likelihood from another fit to this, samples weighted by their `efficiency`.
+    pub fn gain_over(&self, other: &Self, efficiency: &[f64]) -> f64 {
+        (0..self.variance.len())
+            .map(|j| {
+                0.5 * efficiency[j] * self.count[j] * (other.variance[j] / self.variance[j]).ln()
+            })
+            .sum()
     }
 
     /// The coordinates that are free, as (index of the active, index of the coordinate).
@@ -93,14 +131,38 @@ impl Fit {
 
     /// Improves all numbers together.
     #[must_use]
-    pub fn refined(mut self, problem: &Problem) -> Self {
+    pub fn refined(self, problem: &Problem) -> Self {
+        self.refined_at(problem, None)
+    }
+
+    /// Improves the numbers of what touches these joints; all without them.
+    #[must_use]
+    pub fn refined_at(mut self, problem: &Problem, joints: Option<&[usize]>) -> Self {
+        let free: Vec<bool> = self
+            .parameters()
+            .iter()
+            .map(|&(i, _)| {
+                let only = self.actives[i].hypothesis.only_joint();
+                joints.is_none_or(|joints| only.is_none_or(|only| joints.contains(&only)))
+            })
+            .collect();
+        if !free.contains(&true) {
+            return self;
+        }
         let mut damping = 1e-4;
         let mut best = self.likelihood();
         for _ in 0..MAX_ITERATIONS {
-            if self.actives.is_empty() {
-                break;
-            }
-            let jacobian = self.jacobian(problem);
+            let free_parameters: Vec<(usize, usize)> = self
+                .parameters()
+                .into_iter()
+                .zip(&free)
+                .filter(|(_, free)| **free)
+                .map(|(parameter, _)| parameter)
+                .collect();
+            let jacobian: Vec<Column> = free_parameters
+                .iter()
+                .map(|&(i, c)| self.sensitivity(problem, i, c))
+                .collect();
             let columns: Vec<&Column> = jacobian.iter().collect();
             let products = Products::new(problem, &columns, &self.residual, None);
             let ridge = vec![0.0; columns.len()];
@@ -111,7 +173,7 @@ impl Fit {
                     damping *= 10.0;
                     continue;
                 };
-                let next = Self::new(problem, self.moved(problem, &step));
+                let next = Self::new(problem, self.moved(problem, &free_parameters, &step));
                 let likelihood = next.likelihood();
                 if likelihood > best {
                     gained = Some(likelihood - best);
@@ -130,9 +192,14 @@ impl Fit {
     }
 
     /// The physics with its coordinates moved by `step`, within their bounds.
-    fn moved(&self, problem: &Problem, step: &DVector<f64>) -> Vec<Active> {
+    fn moved(
+        &self,
+        problem: &Problem,
+        parameters: &[(usize, usize)],
+        step: &DVector<f64>,
+    ) -> Vec<Active> {
         let mut actives = self.actives.clone();
-        for (&(i, c), step) in self.parameters().iter().zip(step) {
+        for (&(i, c), step) in parameters.iter().zip(step) {
             let (lower, upper) = bounds(problem, &actives[i], c);
             let value = &mut actives[i].coordinates[c];
             *value = (*value + step).clamp(lower, upper);

@@ -1,12 +1,15 @@
 //! What a hypothesis could add to an explanation: its best numbers to first order, and what they gain.
 
 use nalgebra::{DMatrix, DVector};
-use tauscope_dynamics::terms::{CoordinateKind, Scale};
+use tauscope_dynamics::terms::{CoordinateKind, PlaceKind, Scale};
 
 use crate::active::{Active, Column, Hypothesis, columns};
 use crate::fit::{Fit, likelihood, variances};
 use crate::least_squares::Products;
 use crate::problem::Problem;
+
+/// Steps of a shape of all joints.
+const MOST_STEPS_OF_ALL: usize = 12;
 
 /// A hypothesis with numbers, and how it compares with leaving it out.
 #[derive(Debug, Clone)]
@@ -40,6 +43,8 @@ pub struct Base<'a> {
     products: Products,
     /// Keeps shapes from running away in the linear step.
     ridge: Vec<f64>,
+    /// Independent samples per row, by joint.
+    efficiency: Vec<f64>,
     /// Nats that a hypothesis must gain for being one of many.
     pub library: f64,
 }
@@ -73,6 +78,7 @@ impl<'a> Base<'a> {
             jacobian,
             products,
             ridge,
+            efficiency: fit.efficiency(problem),
             library: (hypotheses.max(1) as f64).ln(),
         }
     }
@@ -125,7 +131,9 @@ impl<'a> Base<'a> {
         }
         let squares = products.all_left(&solution);
         let variance = variances(self.problem, &squares, &products.count);
-        let gain = likelihood(&variance, &products.count) - self.fit.likelihood();
+        let worth: Vec<f64> =
+            products.count.iter().zip(&self.efficiency).map(|(n, e)| n * e).collect();
+        let gain = likelihood(&variance, &worth) - likelihood(&self.fit.variance, &worth);
         let size = (0..squares.len())
             .map(|j| (self.fit.squares[j] - squares[j]) / (products.count[j].max(1.0) * variance[j]))
             .fold(0.0, f64::max);
@@ -255,6 +263,9 @@ pub fn shapes(problem: &Problem, hypothesis: Hypothesis) -> Vec<Vec<f64>> {
                         largest * (lower + share * (upper - lower))
                     }
                 };
+                // What all joints share costs the most and is refined well from afar.
+                let all = hypothesis.effect.place == PlaceKind::All;
+                let steps = if all { steps.min(MOST_STEPS_OF_ALL) } else { steps };
                 (0..steps).map(|k| of(k as f64 / (steps - 1).max(1) as f64)).collect()
             }
             _ => vec![0.0],

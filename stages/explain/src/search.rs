@@ -5,11 +5,13 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use tauscope_dynamics::terms::Layer;
+use nalgebra::{DMatrix, DVector};
+use tauscope_dynamics::terms::{CoordinateKind, Layer};
 
-use crate::active::{Active, Hypothesis};
+use crate::active::{Active, Column, Hypothesis};
 use crate::drive::is_drive;
 use crate::fit::Fit;
+use crate::least_squares::Products;
 use crate::problem::Problem;
 use crate::propose::{Base, Proposal};
 use crate::windows::{TimeKind, time_kind};
@@ -32,8 +34,12 @@ const CURVE_EXCESS: f64 = 1.6;
 const CURVE_SIZE: f64 = 1.35;
 /// How many proposals of a round are refined before one is taken.
 const REFINED: usize = 3;
+/// A rival may gain this much less to first order than what it is to replace.
+const COULD_DO_BETTER: f64 = 0.85;
+/// A change of friction smaller than this share of it is what friction does from day to day.
+const LEAST_STEP: f64 = 0.3;
 /// More pieces of physics than this are not looked for.
-const MOST_PIECES: usize = 14;
+const MOST_PIECES: usize = 40;
 /// A joint whose variance is below this many times its white noise is not tried with costly effects.
 const QUIET: f64 = 1.15;
 
@@ -47,9 +53,10 @@ pub struct Explanation {
 }
 
 impl Explanation {
-    /// Log-likelihood less penalties.
-    pub fn score(&self) -> f64 {
-        self.fit.likelihood() - self.penalties.iter().sum::<f64>()
+    /// Evidence for this rather than another \[nats\], rows weighted by their `efficiency`.
+    pub fn ahead_of(&self, other: &Self, efficiency: &[f64]) -> f64 {
+        let penalty = |e: &Self| e.penalties.iter().sum::<f64>();
+        self.fit.gain_over(&other.fit, efficiency) - penalty(self) + penalty(other)
     }
 }
 
@@ -85,11 +92,12 @@ impl Search<'_> {
     fn named(&self, mut best: Explanation) -> Explanation {
         loop {
             best = self.forward(best);
-            let before = best.score();
-            best = self.exchange(best);
-            if best.score() <= before + 0.5 {
-                return best;
+            let efficiency = best.fit.efficiency(self.problem);
+            let exchanged = self.exchange(best.clone());
+            if exchanged.ahead_of(&best, &efficiency) <= 0.5 {
+                return exchanged;
             }
+            best = exchanged;
         }
     }
 
@@ -108,10 +116,12 @@ impl Search<'_> {
         if own.iter().any(|&i| best.fit.actives[i].curve.is_some()) {
             return None;
         }
+        let efficiency = best.fit.efficiency(self.problem);
         let with = |from: &Explanation| {
             let base = Base::new(self.problem, &from.fit, self.hypotheses.len());
             let curve = base.propose_curve(joint)?;
-            let fit = from.fit.with(self.problem, curve.active).refined(self.problem);
+            let fit = from.fit.with(self.problem, curve.active);
+            let fit = fit.refined_at(self.problem, Some(&[joint]));
             let mut penalties = from.penalties.clone();
             penalties.push(curve.penalty);
             Some(Explanation { fit, penalties })
@@ -122,9 +132,10 @@ impl Search<'_> {
                 bare.fit.actives.remove(i);
                 bare.penalties.remove(i);
             }
-            bare.fit = Fit::new(self.problem, bare.fit.actives).refined(self.problem);
+            bare.fit = Fit::new(self.problem, bare.fit.actives);
+            bare.fit = bare.fit.refined_at(self.problem, Some(&[joint]));
             if let Some(instead) = with(&bare)
-                && instead.score() > best.score() + CURVE_EVIDENCE
+                && instead.ahead_of(best, &efficiency) > CURVE_EVIDENCE
             {
                 return Some(instead);
             }
@@ -134,14 +145,29 @@ impl Search<'_> {
         }
         let beside = with(best)?;
         let less = best.fit.variance[joint] / beside.fit.variance[joint];
-        (beside.score() > best.score() + CURVE_EVIDENCE && less > CURVE_SIZE).then_some(beside)
+        (beside.ahead_of(best, &efficiency) > CURVE_EVIDENCE && less > CURVE_SIZE).then_some(beside)
     }
 
     /// Every hypothesis that could change the effort of one of `joints`, beside what `fit` holds, most evidence
     /// first.
     pub fn proposals(&self, fit: &Fit, joints: &[usize]) -> Vec<Proposal> {
+        self.proposals_for(fit, |h| h.only_joint().is_none_or(|joint| joints.contains(&joint)))
+    }
+
+    /// The rivals of one piece of physics, once it is taken out of `without`: friction has rivals in its joint alone.
+    pub fn rivals(&self, without: &Fit, best: &Fit, active: &Active) -> Vec<Proposal> {
+        let worse = worse_joints(without, best);
+        let own = active.hypothesis.only_joint();
+        let friction = active.is_set_valued(&self.problem.model)
+            || active.hypothesis.effect.name == "viscous_friction";
+        self.proposals_for(without, |h| match h.only_joint() {
+            Some(joint) => worse.contains(&joint),
+            None => !(friction && own.is_some()),
+        })
+    }
+
+    fn proposals_for(&self, fit: &Fit, touches: impl Fn(&Hypothesis) -> bool) -> Vec<Proposal> {
         let base = Base::new(self.problem, fit, self.hypotheses.len());
-        let touches = |h: &Hypothesis| h.only_joint().is_none_or(|joint| joints.contains(&joint));
         let wanted: Vec<Hypothesis> = self
             .hypotheses
             .iter()
@@ -205,14 +231,18 @@ impl Search<'_> {
 
     /// Adds pieces of physics while there is evidence for more.
     fn forward(&self, mut best: Explanation) -> Explanation {
-        while best.fit.actives.len() < MOST_PIECES {
+        let pieces = |e: &Explanation| {
+            e.fit.actives.iter().filter(|a| !is_drive(&a.hypothesis)).count()
+        };
+        while pieces(&best) < MOST_PIECES {
             let all: Vec<usize> = (0..self.problem.joints).collect();
             let proposals = self.proposals(&best.fit, &all);
             let Some(next) = self.best_of(&best, &proposals) else { break };
             (self.say)(&format!("+ {}", describe(&next)));
             let next = self.pruned(next);
             // What is added and taken out again would be added for ever.
-            if next.score() < best.score() + LEAST_EVIDENCE {
+            let efficiency = best.fit.efficiency(self.problem);
+            if next.ahead_of(&best, &efficiency) < LEAST_EVIDENCE {
                 break;
             }
             best = next;
@@ -223,27 +253,36 @@ impl Search<'_> {
     /// The best explanation with one of the proposals, if there is evidence enough for any.
     fn best_of(&self, now: &Explanation, proposals: &[Proposal]) -> Option<Explanation> {
         let mut best: Option<Explanation> = None;
+        let efficiency = now.fit.efficiency(self.problem);
         let worthy = proposals.iter().filter(|p| {
             let (evidence, size) = needs(p.active.hypothesis, &now.fit);
             p.evidence() > evidence && p.size > size
         });
         for proposal in worthy.take(REFINED) {
-            let fit = now.fit.with(self.problem, proposal.active.clone()).refined(self.problem);
-            let mut penalties = now.penalties.clone();
-            penalties.push(proposal.penalty);
-            let next = Explanation { fit, penalties };
-            if best.as_ref().is_none_or(|best| next.score() > best.score()) {
+            let next = self.joined(now, proposal);
+            if best.as_ref().is_none_or(|best| next.ahead_of(best, &efficiency) > 0.0) {
                 best = Some(next);
             }
         }
         best
     }
 
+    /// An explanation with a proposal, refined where it touches.
+    pub fn joined(&self, now: &Explanation, proposal: &Proposal) -> Explanation {
+        let joints = Fit::joints_of(&proposal.active.hypothesis, self.problem.joints);
+        let fit = now.fit.with(self.problem, proposal.active.clone());
+        Explanation {
+            fit: fit.refined_at(self.problem, Some(&joints)),
+            penalties: [&now.penalties[..], &[proposal.penalty]].concat(),
+        }
+    }
+
     /// Takes out what is no longer needed.
     fn pruned(&self, mut best: Explanation) -> Explanation {
         'again: loop {
+            let sure = self.sure(&best.fit);
             for index in 0..best.fit.actives.len() {
-                if is_drive(&best.fit.actives[index].hypothesis) {
+                if is_drive(&best.fit.actives[index].hypothesis) || sure[index] {
                     continue;
                 }
                 let less = self.less(&best, index);
@@ -255,7 +294,9 @@ impl Search<'_> {
                     Some(_) => (CURVE_EVIDENCE, CURVE_SIZE - 1.0),
                     None => needs(active.hypothesis, &best.fit),
                 };
-                if less.score() + evidence > best.score() || size < least {
+                let friction_steps = !steps_enough(active);
+                let efficiency = less.fit.efficiency(self.problem);
+                if friction_steps || best.ahead_of(&less, &efficiency) < evidence || size < least {
                     (self.say)(&format!("- {}", best.fit.actives[index].hypothesis.effect.name));
                     best = less;
                     continue 'again;
@@ -265,14 +306,47 @@ impl Search<'_> {
         }
     }
 
+    /// Which pieces are beyond doubt by their own numbers, to first order: Wald's test, with much to spare.
+    fn sure(&self, fit: &Fit) -> Vec<bool> {
+        let wald = wald(self.problem, fit);
+        let efficiency = fit.efficiency(self.problem);
+        let each = fit.actives.iter().zip(wald);
+        each.map(|(active, chi_square)| {
+            let joints = Fit::joints_of(&active.hypothesis, self.problem.joints);
+            let rows: f64 = joints.iter().map(|&j| fit.count[j]).sum();
+            let worth = joints.iter().map(|&j| efficiency[j]).fold(1.0, f64::min);
+            let (evidence, size) = needs(active.hypothesis, fit);
+            steps_enough(active)
+                && active.curve.is_none()
+                && 0.5 * worth * chi_square > 4.0 * evidence + 60.0
+                && chi_square > 4.0 * size * rows
+        })
+        .collect()
+    }
+
     /// The explanation without one of its pieces, refined.
     pub fn less(&self, from: &Explanation, index: usize) -> Explanation {
         let mut penalties = from.penalties.clone();
         penalties.remove(index);
+        let joints = Fit::joints_of(&from.fit.actives[index].hypothesis, self.problem.joints);
         Explanation {
-            fit: from.fit.without(self.problem, index).refined(self.problem),
+            fit: from.fit.without(self.problem, index).refined_at(self.problem, Some(&joints)),
             penalties,
         }
+    }
+
+    /// The best of the proposals that could be better than `best`, by what they gain to first order.
+    fn rival_of(
+        &self,
+        best: &Explanation,
+        without: &Explanation,
+        proposals: &[Proposal],
+    ) -> Option<Explanation> {
+        let efficiency = without.fit.efficiency(self.problem);
+        let gain = best.fit.gain_over(&without.fit, &efficiency);
+        let able: Vec<Proposal> =
+            proposals.iter().filter(|p| p.gain > COULD_DO_BETTER * gain).cloned().collect();
+        self.best_of(without, &able)
     }
 
     /// Takes each piece out, and each two at one joint, and tries all rivals in their place.
@@ -284,14 +358,18 @@ impl Search<'_> {
                 continue;
             }
             let without = self.less(&best, index);
-            let proposals = self.proposals(&without.fit, &worse_joints(&without.fit, &best.fit));
-            if let Some(other) = self.best_of(&without, &proposals)
-                && other.score() > best.score() + 0.5
+            let proposals = self.rivals(&without.fit, &best.fit, &best.fit.actives[index]);
+            let efficiency = best.fit.efficiency(self.problem);
+            if let Some(other) = self.rival_of(&best, &without, &proposals)
+                && other.ahead_of(&best, &efficiency) > 0.5
             {
                 (self.say)(&format!("= {}", describe(&other)));
-                best = self.pruned(other);
-                index = 0;
-                continue;
+                let other = self.pruned(other);
+                if other.ahead_of(&best, &efficiency) > 0.5 {
+                    best = other;
+                    index = 0;
+                    continue;
+                }
             }
             index += 1;
         }
@@ -304,14 +382,18 @@ impl Search<'_> {
             let (a, b) = pair;
             if joint(a, &best).is_some() && joint(a, &best) == joint(b, &best) {
                 let without = self.less(&self.less(&best, b), a);
-                let proposals = self.proposals(&without.fit, &worse_joints(&without.fit, &best.fit));
-                if let Some(other) = self.best_of(&without, &proposals)
-                    && other.score() > best.score() + 0.5
+                let proposals = self.rivals(&without.fit, &best.fit, &best.fit.actives[a]);
+                let efficiency = best.fit.efficiency(self.problem);
+                if let Some(other) = self.rival_of(&best, &without, &proposals)
+                    && other.ahead_of(&best, &efficiency) > 0.5
                 {
                     (self.say)(&format!("== {}", describe(&other)));
-                    best = self.pruned(other);
-                    pair = (0, 1);
-                    continue;
+                    let other = self.pruned(other);
+                    if other.ahead_of(&best, &efficiency) > 0.5 {
+                        best = other;
+                        pair = (0, 1);
+                        continue;
+                    }
                 }
             }
             pair.0 += 1;
@@ -321,6 +403,47 @@ impl Search<'_> {
         }
         best
     }
+}
+
+/// By piece, the square of its factors in units of their covariance, as if what is left were white.
+fn wald(problem: &Problem, fit: &Fit) -> Vec<f64> {
+    let jacobian = fit.jacobian(problem);
+    let columns: Vec<&Column> = jacobian.iter().collect();
+    let products = Products::new(problem, &columns, &fit.residual, None);
+    let (normal, _) = products.normal(&fit.variance, &vec![0.0; columns.len()]);
+    let p = columns.len();
+    let scale: Vec<f64> = (0..p).map(|a| normal[(a, a)].max(1e-300).sqrt()).collect();
+    let mut scaled = DMatrix::from_fn(p, p, |a, b| normal[(a, b)] / (scale[a] * scale[b]));
+    for a in 0..p {
+        scaled[(a, a)] += 1e-9;
+    }
+    let Some(inverse) = scaled.try_inverse() else { return vec![0.0; fit.actives.len()] };
+    let mut first = 0;
+    fit.actives
+        .iter()
+        .map(|active| {
+            let index: Vec<usize> = (0..active.coordinates.len())
+                .filter(|&c| matches!(active.kind(c), CoordinateKind::Factor { .. }))
+                .map(|c| first + c)
+                .collect();
+            let theta = DVector::from_iterator(
+                index.len(),
+                index.iter().map(|&a| active.coordinates[a - first] * scale[a]),
+            );
+            first += active.coordinates.len();
+            let own = DMatrix::from_fn(index.len(), index.len(), |a, b| inverse[(index[a], index[b])]);
+            own.try_inverse().map_or(0.0, |own| (own * &theta).dot(&theta))
+        })
+        .collect()
+}
+
+/// Whether a friction that changes once changes by more than friction does from day to day.
+fn steps_enough(active: &Active) -> bool {
+    if time_kind(active.hypothesis) != TimeKind::Step {
+        return true;
+    }
+    let (before, after) = (active.coordinates[0], active.coordinates[1]);
+    (after - before).abs() > LEAST_STEP * before.abs().max(after.abs())
 }
 
 const ROTOR: &str = "rotor_inertia";
@@ -373,5 +496,5 @@ fn describe(explanation: &Explanation) -> String {
         )
     };
     let all: Vec<String> = explanation.fit.actives.iter().map(one).collect();
-    format!("{:.1}: {}", explanation.score(), all.join("; "))
+    all.join("; ")
 }
