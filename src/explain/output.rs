@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use tauscope_explain::Outcome;
 use tauscope_explain::report::Verdict;
+use tauscope_explain::{Outcome, html};
 
 use super::input::Request;
 use super::read::Kept;
@@ -13,6 +13,7 @@ use super::{provenance_of, robot, twin, write_whole};
 use crate::exit::Failure;
 use crate::report::{Problem, Report};
 
+const PAGE: &str = "report.html";
 const REPORT: &str = "report.json";
 const TWIN: &str = "twin.yaml";
 const ROBOT: &str = "robot.urdf";
@@ -45,7 +46,7 @@ pub fn prepare(out: &Path, request: &Request) -> Result<(), Failure> {
     }
     report.into_result(())?;
     if out.join(REPORT).is_file() {
-        for name in [REPORT, TWIN, ROBOT] {
+        for name in [REPORT, PAGE, TWIN, ROBOT] {
             // One that is not there need not be removed; one that cannot be is found when it is written.
             let _ = std::fs::remove_file(out.join(name));
         }
@@ -95,7 +96,12 @@ pub fn write(
         made.files.push(path);
         Ok::<(), Failure>(())
     };
+    let page = html::page(&outcome.report, &outcome.pictures, &provenance);
+    put(PAGE, &page, &mut made)?;
     put(REPORT, &json(outcome)?, &mut made)?;
+    for (name, text) in &outcome.trajectories {
+        put(name, text, &mut made)?;
+    }
     if outcome.report.verdict != Verdict::NotEvaluated {
         let file = twin_text(request, kept, outcome, &provenance, &mut made)?;
         put(TWIN, &file, &mut made)?;

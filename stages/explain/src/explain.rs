@@ -69,6 +69,8 @@ pub struct Outcome {
     pub predictions: Vec<(String, Vec<f64>)>,
     /// What is drawn.
     pub pictures: Vec<RecordingPicture>,
+    /// Trajectories to record next: file name and CSV text.
+    pub trajectories: Vec<(String, String)>,
 }
 
 /// Explains. `progress` is told the share that is done, 0 to 1, and what is being done.
@@ -184,6 +186,7 @@ pub fn explain(
         gain: drive::gains(&found.fit.actives, unit_nm.len()),
         predictions: proof.predictions,
         pictures: proof.pictures,
+        trajectories: named.trajectories,
     })
 }
 
@@ -219,6 +222,7 @@ fn not_evaluated(input: &Input, joints: Vec<String>, reason: String) -> Outcome 
         gain: Vec::new(),
         predictions: Vec::new(),
         pictures: Vec::new(),
+        trajectories: Vec::new(),
     }
 }
 

@@ -33,6 +33,8 @@ pub struct Named {
     pub rejected: Vec<Rejected>,
     /// For what cannot be told apart.
     pub next_motions: Vec<NextMotion>,
+    /// Their files: name and text.
+    pub trajectories: Vec<(String, String)>,
     /// On the scales of drives.
     pub notes: Vec<String>,
 }
@@ -79,6 +81,7 @@ pub fn of(search: &Search<'_>, found: &Explanation, before: &Fit, input: &Input,
         findings: Vec::new(),
         rejected: Vec::new(),
         next_motions: Vec::new(),
+        trajectories: Vec::new(),
         notes: Vec::new(),
     };
     for (index, active) in fit.actives.iter().enumerate() {
@@ -124,7 +127,12 @@ pub fn of(search: &Search<'_>, found: &Explanation, before: &Fit, input: &Input,
             let effect = hypothesis.effect.name.to_owned();
             named.rejected.push(Rejected { effect, joint, link, reason });
         }
-        if let Some(next) = next_motion::of(&active.hypothesis, &contest.ties, input, joints) {
+        if let Some((next, trajectory)) =
+            next_motion::of(&active.hypothesis, &contest.ties, input, joints)
+        {
+            if let Some(file) = &next.trajectory {
+                named.trajectories.push((file.clone(), trajectory));
+            }
             named.next_motions.push(next);
         }
         named.findings.push(Finding {
