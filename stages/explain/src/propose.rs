@@ -16,7 +16,7 @@ const MOST_STEPS_OF_ALL: usize = 12;
 pub struct Proposal {
     /// The physics.
     pub active: Active,
-    /// Gain of log-likelihood over the fit it would join.
+    /// Gain of log-likelihood over the fit it would join, as if what is left were white.
     pub gain: f64,
     /// What that many free numbers gain by chance.
     pub penalty: f64,
@@ -43,8 +43,7 @@ pub struct Base<'a> {
     products: Products,
     /// Keeps shapes from running away in the linear step.
     ridge: Vec<f64>,
-    /// Independent samples per row, by joint.
-    efficiency: Vec<f64>,
+
     /// Nats that a hypothesis must gain for being one of many.
     pub library: f64,
 }
@@ -78,7 +77,6 @@ impl<'a> Base<'a> {
             jacobian,
             products,
             ridge,
-            efficiency: fit.efficiency(problem),
             library: (hypotheses.max(1) as f64).ln(),
         }
     }
@@ -131,9 +129,7 @@ impl<'a> Base<'a> {
         }
         let squares = products.all_left(&solution);
         let variance = variances(self.problem, &squares, &products.count);
-        let worth: Vec<f64> =
-            products.count.iter().zip(&self.efficiency).map(|(n, e)| n * e).collect();
-        let gain = likelihood(&variance, &worth) - likelihood(&self.fit.variance, &worth);
+        let gain = likelihood(&variance, &products.count) - self.fit.likelihood();
         let size = (0..squares.len())
             .map(|j| (self.fit.squares[j] - squares[j]) / (products.count[j].max(1.0) * variance[j]))
             .fold(0.0, f64::max);

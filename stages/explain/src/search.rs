@@ -234,37 +234,47 @@ impl Search<'_> {
         let pieces = |e: &Explanation| {
             e.fit.actives.iter().filter(|a| !is_drive(&a.hypothesis)).count()
         };
+        let all: Vec<usize> = (0..self.problem.joints).collect();
+        // What is added and taken out again would be added for ever.
+        let mut barred: Vec<Hypothesis> = Vec::new();
         while pieces(&best) < MOST_PIECES {
-            let all: Vec<usize> = (0..self.problem.joints).collect();
-            let proposals = self.proposals(&best.fit, &all);
+            let mut proposals = self.proposals(&best.fit, &all);
+            proposals.retain(|p| !barred.contains(&p.active.hypothesis));
             let Some(next) = self.best_of(&best, &proposals) else { break };
             (self.say)(&format!("+ {}", describe(&next)));
+            let new = next.fit.actives.last().map(|active| active.hypothesis);
             let next = self.pruned(next);
-            // What is added and taken out again would be added for ever.
-            let efficiency = best.fit.efficiency(self.problem);
+            let efficiency = next.fit.efficiency(self.problem);
             if next.ahead_of(&best, &efficiency) < LEAST_EVIDENCE {
-                break;
+                barred.extend(new);
+            } else {
+                best = next;
             }
-            best = next;
         }
         best
     }
 
-    /// The best explanation with one of the proposals, if there is evidence enough for any.
+    /// The best explanation with one of the proposals, if there is evidence enough for any: counted by what rows are
+    /// worth once it is in.
     fn best_of(&self, now: &Explanation, proposals: &[Proposal]) -> Option<Explanation> {
-        let mut best: Option<Explanation> = None;
-        let efficiency = now.fit.efficiency(self.problem);
+        let mut best: Option<(Explanation, Vec<f64>)> = None;
         let worthy = proposals.iter().filter(|p| {
             let (evidence, size) = needs(p.active.hypothesis, &now.fit);
-            p.evidence() > evidence && p.size > size
+            p.evidence() > evidence && p.size > size && steps_enough(&p.active)
         });
         for proposal in worthy.take(REFINED) {
             let next = self.joined(now, proposal);
-            if best.as_ref().is_none_or(|best| next.ahead_of(best, &efficiency) > 0.0) {
-                best = Some(next);
+            let efficiency = next.fit.efficiency(self.problem);
+            let (evidence, _) = needs(proposal.active.hypothesis, &now.fit);
+            if next.ahead_of(now, &efficiency) < evidence {
+                continue;
+            }
+            let better = |(best, worth): &(Explanation, Vec<f64>)| next.ahead_of(best, worth) > 0.0;
+            if best.as_ref().is_none_or(better) {
+                best = Some((next, efficiency));
             }
         }
-        best
+        best.map(|(best, _)| best)
     }
 
     /// An explanation with a proposal, refined where it touches.
@@ -294,9 +304,9 @@ impl Search<'_> {
                     Some(_) => (CURVE_EVIDENCE, CURVE_SIZE - 1.0),
                     None => needs(active.hypothesis, &best.fit),
                 };
-                let friction_steps = !steps_enough(active);
-                let efficiency = less.fit.efficiency(self.problem);
-                if friction_steps || best.ahead_of(&less, &efficiency) < evidence || size < least {
+                let hardly_steps = !steps_enough(active);
+                let efficiency = best.fit.efficiency(self.problem);
+                if hardly_steps || best.ahead_of(&less, &efficiency) < evidence || size < least {
                     (self.say)(&format!("- {}", best.fit.actives[index].hypothesis.effect.name));
                     best = less;
                     continue 'again;
@@ -342,8 +352,7 @@ impl Search<'_> {
         without: &Explanation,
         proposals: &[Proposal],
     ) -> Option<Explanation> {
-        let efficiency = without.fit.efficiency(self.problem);
-        let gain = best.fit.gain_over(&without.fit, &efficiency);
+        let gain = best.fit.likelihood() - without.fit.likelihood();
         let able: Vec<Proposal> =
             proposals.iter().filter(|p| p.gain > COULD_DO_BETTER * gain).cloned().collect();
         self.best_of(without, &able)
