@@ -1,19 +1,20 @@
 //! What is to be explained: from a case file, or from arguments.
 
+mod assembly;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::EFFECTS;
 use tauscope_twin::TwinFile;
 
 use crate::files::CaseFile;
-use crate::pipeline::{Cell, CellFacts, EffortUnit};
+use crate::pipeline::{Cell, EffortUnit};
 use crate::report::{Problem, Report};
 use crate::suggest;
 use crate::yaml::{self, Located, Place};
 
-use super::read;
+use self::assembly::{Assembly, Spot};
 
 /// What is to be explained, everything named looked up; nothing but names has been read from recordings.
 #[derive(Debug)]
@@ -179,234 +180,4 @@ pub fn from_arguments(
         problem: &|_, title| Problem::new(title),
     };
     assembly.request(None, without)
-}
-
-/// Where in the input something stands that may be wrong.
-enum Spot<'a> {
-    Robot,
-    Twin,
-    Constants,
-    Constant(&'a str),
-    Fit(usize),
-    Holdout(usize),
-}
-
-/// The parts of a request, paths resolved, nothing looked up.
-struct Assembly<'a> {
-    robot: Option<PathBuf>,
-    effort_unit: EffortUnit,
-    constants: Option<BTreeMap<String, f64>>,
-    joint_names: Option<Vec<String>>,
-    twin: Option<PathBuf>,
-    twin_topic: Option<String>,
-    state_topic: String,
-    fit: Vec<PathBuf>,
-    holdout: Vec<PathBuf>,
-    problem: &'a dyn Fn(Spot<'_>, String) -> Problem,
-}
-
-impl Assembly<'_> {
-    fn request(self, case: Option<String>, without: BTreeSet<String>) -> Result<Request, Report> {
-        let mut report = Report::default();
-        let (fit, holdout) = self.recordings(&mut report);
-        let robot = self.robot(&mut report);
-        let start = self.start(&mut report);
-        report.into_result(())?;
-
-        let mut report = Report::default();
-        let (urdf, model) = robot.unzip();
-        let joint_names = self.joint_names(model.as_ref(), &fit)?;
-        let constants = self.torque_constants(&joint_names, &mut report);
-        if let Some(start) = &start {
-            self.twin_fits(&start.file, model.as_ref(), &joint_names, &mut report);
-        }
-        let name = case.unwrap_or_else(|| {
-            let of_robot = model.as_ref().map(|model| model.name().to_owned());
-            of_robot
-                .filter(|name| !name.is_empty())
-                .unwrap_or_else(|| "case".to_owned())
-        });
-        let facts = CellFacts {
-            name: name.clone(),
-            urdf,
-            joint_names,
-            effort_unit: self.effort_unit,
-            torque_constants_nm_per_a: constants,
-            tool: None,
-        };
-        report.into_result(Request {
-            case: name,
-            cell: Cell { facts, model },
-            robot_path: self.robot,
-            state_topic: self.state_topic,
-            twin_topic: self.twin_topic,
-            start,
-            fit,
-            holdout,
-            without,
-        })
-    }
-
-    /// The recordings, each once and by a name of its own.
-    fn recordings(&self, report: &mut Report) -> (Vec<Named>, Vec<Named>) {
-        let mut seen = BTreeMap::new();
-        let mut names = BTreeSet::new();
-        let mut named = |paths: &[PathBuf], spot: fn(usize) -> Spot<'static>| {
-            let mut all = Vec::new();
-            for (index, path) in paths.iter().enumerate() {
-                let Ok(canonical) = path.canonicalize() else {
-                    let title = format!("there is no recording {}", path.display());
-                    report.push((self.problem)(spot(index), title));
-                    continue;
-                };
-                if seen.insert(canonical, ()).is_some() {
-                    let title = format!(
-                        "{} is named twice: a recording is fitted or held out, and once",
-                        path.display()
-                    );
-                    report.push((self.problem)(spot(index), title));
-                    continue;
-                }
-                let stem = path
-                    .file_stem()
-                    .unwrap_or(path.as_os_str())
-                    .to_string_lossy();
-                let mut name = stem.clone().into_owned();
-                let mut number = 2;
-                while !names.insert(name.clone()) {
-                    name = format!("{stem}_{number}");
-                    number += 1;
-                }
-                let path = path.clone();
-                all.push(Named { name, path });
-            }
-            all
-        };
-        let fit = named(&self.fit, Spot::Fit);
-        let holdout = named(&self.holdout, Spot::Holdout);
-        (fit, holdout)
-    }
-
-    fn robot(&self, report: &mut Report) -> Option<(String, Model)> {
-        let path = self.robot.as_ref()?;
-        let read = std::fs::read_to_string(path)
-            .map_err(|error| format!("cannot read the URDF {}: {error}", path.display()))
-            .and_then(|text| {
-                let model = Model::from_urdf(&text)
-                    .map_err(|error| format!("cannot use the URDF {}: {error}", path.display()))?;
-                Ok((text, model))
-            });
-        match read {
-            Ok(robot) => Some(robot),
-            Err(title) => {
-                report.push((self.problem)(Spot::Robot, title));
-                None
-            }
-        }
-    }
-
-    fn start(&self, report: &mut Report) -> Option<StartFile> {
-        let path = self.twin.as_ref()?;
-        if !path.exists() {
-            let title = format!("there is no twin {}", path.display());
-            report.push((self.problem)(Spot::Twin, title));
-            return None;
-        }
-        match yaml::load::<TwinFile>(path) {
-            Ok(file) => Some(StartFile {
-                path: path.clone(),
-                file: file.value,
-            }),
-            Err(problems) => {
-                report.append(problems);
-                None
-            }
-        }
-    }
-
-    /// Those of the robot, of the case, or of the first recording's first message, whose order they keep.
-    fn joint_names(&self, model: Option<&Model>, fit: &[Named]) -> Result<Vec<String>, Report> {
-        if let Some(model) = model {
-            return Ok(model.joint_names().map(str::to_owned).collect());
-        }
-        if let Some(names) = &self.joint_names {
-            return Ok(names.clone());
-        }
-        let Some(first) = fit.first() else {
-            return Err(Problem::new("there is no recording to fit").into());
-        };
-        read::first_joint_names(&first.path, &self.state_topic)
-    }
-
-    fn torque_constants(&self, joints: &[String], report: &mut Report) -> Option<Vec<f64>> {
-        let constants = self.constants.as_ref()?;
-        let problem = self.problem;
-        if self.effort_unit == EffortUnit::Nm {
-            let title = "torque constants, but the effort is in Nm".to_owned();
-            let help = "say that the effort unit is A, or leave them out";
-            report.push(problem(Spot::Constants, title).help(help));
-        }
-        for (joint, constant) in constants {
-            if !joints.contains(joint) {
-                let help =
-                    suggest::help(joint, "the joints are", joints.iter().map(String::as_str));
-                let title = format!("the robot has no joint `{joint}`");
-                report.push(problem(Spot::Constant(joint), title).maybe_help(help));
-            }
-            if !(constant.is_finite() && *constant > 0.0) {
-                let title = format!("a torque constant is more than 0, found {constant}");
-                report.push(problem(Spot::Constant(joint), title));
-            }
-        }
-        let is_missing = |joint: &&String| !constants.contains_key(*joint);
-        let missing: Vec<&str> = joints
-            .iter()
-            .filter(is_missing)
-            .map(String::as_str)
-            .collect();
-        if !missing.is_empty() {
-            let title = format!("no torque constant for {}", suggest::list(missing));
-            let help = "torque constants are wanted for all joints or for none";
-            report.push(problem(Spot::Constants, title).help(help));
-        }
-        joints
-            .iter()
-            .map(|joint| constants.get(joint).copied())
-            .collect()
-    }
-
-    /// A twin to start from must be one of this robot, in this unit.
-    fn twin_fits(
-        &self,
-        file: &TwinFile,
-        model: Option<&Model>,
-        joints: &[String],
-        report: &mut Report,
-    ) {
-        let made_for = &file.robot.name;
-        if let Some(model) = model
-            && !made_for.is_empty()
-            && made_for != model.name()
-        {
-            let name = model.name();
-            let title = format!("this twin was made for the robot `{made_for}`, not for `{name}`");
-            report.push((self.problem)(Spot::Twin, title));
-        }
-        if let Err(error) = file.resolve(joints, self.effort_unit.as_str()) {
-            report.push((self.problem)(Spot::Twin, error.to_string()));
-            return;
-        }
-        let stand_in;
-        let model = if let Some(model) = model {
-            model
-        } else {
-            stand_in = Model::massless(joints);
-            &stand_in
-        };
-        for term in &file.terms {
-            if let Err(error) = term.build(model) {
-                report.push((self.problem)(Spot::Twin, error.to_string()));
-            }
-        }
-    }
 }
