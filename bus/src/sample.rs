@@ -37,8 +37,10 @@ pub mod flags {
     pub const FORCE: u32 = 1 << 8;
     /// The commanded velocity is given (else it was differentiated from the position).
     pub const COMMAND_VELOCITY: u32 = 1 << 9;
-    /// A detector sees a contact now.
+    /// A detector sees a contact, or a change of the arm, now.
     pub const ALARM: u32 = 1 << 10;
+    /// What a detection tells of is no contact but a change of the arm, of the size in `size`.
+    pub const CHANGE: u32 = 1 << 11;
 }
 
 /// What every sample begins with.
@@ -193,21 +195,23 @@ pub enum EventKind {
 /// A detector's verdict on one sample. One goes out for every sample that came in.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable, ZeroCopySend)]
-#[type_name("tauscope/Detection/1")]
+#[type_name("tauscope/Detection/2")]
 pub struct Detection {
     /// Stamp, sequence, flags; [`flags::READY`] if the detector judged this sample.
     pub header: Header,
     /// The detector's canonical name, e.g. `twin_regression`.
     pub detector: Name,
-    /// What it says now in its own words: `not_ready`, `free`, `contact`, `collision`, `cooperation`, …
+    /// What it says now in its own words: `not_ready`, `free`, `contact`, `collision`, `cooperation`, …;
+    /// of a change of the arm ([`flags::CHANGE`]) the effect's canonical name, or `unknown`.
     pub state: Name,
-    /// The touched link, empty where not estimated.
+    /// The touched or changed link, empty where not estimated.
     pub link: Name,
     /// The score; its unit is the detector's.
     pub score: f64,
     /// The score from which on it raises an alarm.
     pub threshold: f64,
-    /// Estimated beginning of the contact \[ns since the epoch\], while an alarm lasts ([`flags::ALARM`]).
+    /// Estimated beginning of the contact or change \[ns since the epoch\], while an alarm lasts
+    /// ([`flags::ALARM`]).
     pub contact_ns: i64,
     /// Estimated force on the robot, world frame \[N\]; see [`flags::FORCE`].
     pub force_n: [f64; 3],
@@ -217,6 +221,9 @@ pub struct Detection {
     pub joints: u32,
     /// 0 nothing, 1 the alarm begins, 2 it ends at this sample; read it with [`Detection::event`].
     pub event: u32,
+    /// Size of a change ([`flags::CHANGE`]): \[kg\] for `payload`, a factor for `torque_gain`, else in the
+    /// unit of the effect's parameter \[effort unit, or that per rad/s\]; 0 for `unknown`.
+    pub size: f64,
 }
 
 impl Detection {
@@ -279,7 +286,7 @@ impl SampleKind {
         match self {
             Self::JointState => "tauscope/JointState/1",
             Self::TwinState => "tauscope/TwinState/1",
-            Self::Detection => "tauscope/Detection/1",
+            Self::Detection => "tauscope/Detection/2",
             Self::Health => "tauscope/Health/1",
         }
     }

@@ -35,7 +35,7 @@
 //! | `filtered_expected_effort` | `[f64; 16]` | 800 |
 //! | `residual` | `[f64; 16]` | 928 |
 //!
-//! | `tauscope/Detection/1`, 256 bytes | type | at |
+//! | `tauscope/Detection/2`, 264 bytes | type | at |
 //! | --- | --- | --- |
 //! | `detector` | name | 32 |
 //! | `state` | name | 80 |
@@ -47,6 +47,7 @@
 //! | `point_m` | `[f64; 3]` | 224 |
 //! | `joints` | `u32` | 248 |
 //! | `event` | `u32` | 252 |
+//! | `size` | `f64` | 256 |
 //!
 //! | `tauscope/Health/1`, 112 bytes | type | at |
 //! | --- | --- | --- |
@@ -138,12 +139,12 @@ mod tests {
             )
         );
         assert_eq!(
-            tables["tauscope/Detection/1"],
+            tables["tauscope/Detection/2"],
             (
                 Some(size_of::<Detection>()),
                 rows(
                     layout!(Detection: detector, state, link, score, threshold, contact_ns,
-                    force_n, point_m, joints, event)
+                    force_n, point_m, joints, event, size)
                 )
             )
         );

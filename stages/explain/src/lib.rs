@@ -22,6 +22,7 @@ pub mod smoother;
 mod standstill;
 mod unknown;
 mod wall;
+pub mod watch;
 pub mod windows;
 mod words;
 

@@ -1,0 +1,377 @@
+//! Whether the residual changed, when, and what explains it: for each kind of change the generalised
+//! likelihood ratio over the instant of change (Basseville and Nikiforov, *Detection of Abrupt Changes*,
+//! 1993, section 2.4), in units of what it explains by chance.
+
+use super::blocks::Ring;
+use super::finding::{Cause, Finding};
+use super::moments::{
+    BIAS, COULOMB, Compared, GAIN, JOINT_KINDS, JointScore, Outer, OuterScore, Reference,
+};
+use super::rows::{FORCE, PAYLOAD};
+use super::scale::Scale;
+use super::window::Window;
+
+/// A change is named after so many blocks of motion, and if it is hard to tell from another, after so many.
+const SOONEST: usize = 13;
+const LATEST: usize = 15;
+/// A change is told from so many times what is usual on (about six standard deviations), and from more
+/// while what is usual rests on few windows.
+const BEYOND: f64 = 40.0;
+const INEXPERIENCE: f64 = 4.0;
+/// How much more where the motion is unlike all that the reference has seen.
+const NOVELTY: f64 = 8.0;
+/// Parts of the time since the change that must each hold their share of it.
+const PARTS: usize = 4;
+const SHARE: std::ops::RangeInclusive<f64> = 0.4..=2.2;
+/// A part that holds so little information tells nothing: standard errors of its share.
+const UNCERTAIN: f64 = 0.2;
+/// From this share of a name's gain on, another is hard to tell from it.
+const RIVAL: f64 = 0.92;
+/// A force must explain so much more than a change of the arm to be taken for it.
+const FORCED: f64 = 1.15;
+/// A name that explains less than this share of what joints show by themselves is none.
+const EXPLAINED: f64 = 0.5;
+/// Where a change is beyond doubt, a name needs this share of the evidence.
+const DOUBTLESS: f64 = 0.2;
+/// Of names that explain alike, a constant offset is the last to be believed.
+const OFFSET: f64 = 0.96;
+/// A payload's centre of mass is no further from the body that carries it \[m\].
+const FURTHEST_M: f64 = 0.7;
+/// What the three columns more of a payload explain by chance.
+const COLUMNS_MORE: f64 = 12.0;
+
+/// The best that was found of one kind.
+#[derive(Debug, Clone, Copy, Default)]
+struct Best {
+    gain: f64,
+    size: f64,
+    blocks: usize,
+    back: usize,
+    novel: f64,
+}
+
+/// A kind of change at its place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Name {
+    Joint(usize, usize),
+    Payload,
+}
+
+/// A name with what speaks for it.
+#[derive(Debug, Clone, Copy)]
+struct Candidate {
+    name: Name,
+    best: Best,
+    /// Gain in units of noise, in which all names compare.
+    normal: f64,
+    /// Gain in units of what must be exceeded.
+    score: f64,
+}
+
+/// What is usual, and what must be known to judge.
+pub(super) struct Usual<'a> {
+    pub references: &'a [Reference],
+    pub scales: &'a [[Scale; JOINT_KINDS]],
+    pub floors: &'a [f64],
+    pub noise: &'a [Option<f64>],
+    pub payload: &'a Scale,
+    pub caution: f64,
+    /// Share of joints that lately moved unlike ever before.
+    pub unlike: f64,
+}
+
+impl Usual<'_> {
+    fn threshold(&self, scale: &Scale, novel: f64) -> f64 {
+        BEYOND
+            * self.caution
+            * (1.0 + INEXPERIENCE / scale.independent())
+            * (1.0 + NOVELTY * novel.max(self.unlike))
+    }
+}
+
+/// Searches the newest blocks for a change.
+#[derive(Debug)]
+pub(super) struct Judge {
+    window: Window,
+    scores: Vec<Option<JointScore>>,
+    best: Vec<[Best; JOINT_KINDS]>,
+    payload: Best,
+    payload_change: [f64; PAYLOAD],
+}
+
+impl Judge {
+    pub fn new(joints: usize) -> Self {
+        Self {
+            window: Window::new(joints),
+            scores: vec![None; joints],
+            best: vec![[Best::default(); JOINT_KINDS]; joints],
+            payload: Best::default(),
+            payload_change: [0.0; PAYLOAD],
+        }
+    }
+
+    /// What changed within the ring, if that can be said; and how far the strongest sign of a change is
+    /// beyond what is usual (1: just enough to be told).
+    ///
+    /// What `lasts` is a deviation that is beyond doubt: only its name is sought, and an unlikely one will do.
+    pub fn judge(&mut self, ring: &Ring, usual: &Usual<'_>, lasts: bool) -> (Option<Finding>, f64) {
+        self.search(ring, usual);
+        let Some((first, second, all)) = self.contest(usual) else {
+            return (None, 0.0);
+        };
+        let score = first.score;
+        let rival = second > RIVAL * first.normal;
+        let poor = first.normal < EXPLAINED * all;
+        let soonest = if rival || poor { LATEST } else { SOONEST };
+        let enough = if lasts { DOUBTLESS } else { 1.0 };
+        if score < enough
+            || first.best.blocks < soonest
+            || !self.lasts(ring, usual, &first)
+            || force(ring, usual, first.best.back) > FORCED * first.normal
+        {
+            return (None, score);
+        }
+        let mut finding = self.finding(usual, &first, ring);
+        if poor {
+            finding.cause = Cause::Unknown;
+            finding.size = 0.0;
+            finding.link = None;
+        }
+        (Some(finding), score)
+    }
+
+    /// For each kind, the instant from which on it explains most.
+    fn search(&mut self, ring: &Ring, usual: &Usual<'_>) {
+        self.best.fill([Best::default(); JOINT_KINDS]);
+        self.payload = Best::default();
+        self.window.clear();
+        for back in 0..ring.len() {
+            let block = ring.back(back);
+            if block.excluded {
+                continue;
+            }
+            self.window.add(block);
+            let blocks = self.window.blocks;
+            if blocks < Scale::SHORT {
+                continue;
+            }
+            let novel = |j: usize| self.window.novel[j] as f64 / blocks as f64;
+            let payload = self
+                .window
+                .scores(usual.references, usual.noise, &mut self.scores);
+            for (j, (best, score)) in self.best.iter_mut().zip(&self.scores).enumerate() {
+                let Some(score) = score else { continue };
+                for (kind, best) in best.iter_mut().enumerate() {
+                    if score.gain[kind] > best.gain {
+                        *best = Best {
+                            gain: score.gain[kind],
+                            size: score.size[kind],
+                            blocks,
+                            back,
+                            novel: novel(j),
+                        };
+                    }
+                }
+            }
+            if let Some((change, gain)) = payload.solve()
+                && gain > self.payload.gain
+            {
+                let most = (0..self.scores.len()).map(novel).fold(0.0, f64::max);
+                self.payload = Best {
+                    gain,
+                    size: change[0],
+                    blocks,
+                    back,
+                    novel: most,
+                };
+                self.payload_change = change;
+            }
+        }
+    }
+
+    /// The best name, the gain of the best that is another, and what all joints show by themselves.
+    fn contest(&self, usual: &Usual<'_>) -> Option<(Candidate, f64, f64)> {
+        let mut first: Option<Candidate> = None;
+        let mut second = 0.0;
+        let mut all = 0.0;
+        let mut enter = |candidate: Candidate| match &mut first {
+            Some(best) if candidate.normal <= best.normal => {
+                second = f64::max(second, candidate.normal);
+            }
+            best => {
+                second = best.map_or(0.0, |best| best.normal);
+                *best = Some(candidate);
+            }
+        };
+        for (j, kinds) in self.best.iter().enumerate() {
+            let Some(noise) = usual.noise[j] else {
+                continue;
+            };
+            let mut most: f64 = 0.0;
+            for (kind, best) in kinds.iter().enumerate() {
+                let scale = &usual.scales[j][kind];
+                let Some(value) = scale.usual() else { continue };
+                let candidate = Candidate {
+                    name: Name::Joint(j, kind),
+                    best: *best,
+                    normal: best.gain / noise * if kind == BIAS { OFFSET } else { 1.0 },
+                    score: best.gain
+                        / value.max(usual.floors[j])
+                        / usual.threshold(scale, best.novel),
+                };
+                most = most.max(candidate.normal);
+                enter(candidate);
+            }
+            all += most;
+        }
+        if let Some(value) = usual.payload.usual()
+            && self.is_body()
+        {
+            let gain = (self.payload.gain - COLUMNS_MORE).max(0.0);
+            enter(Candidate {
+                name: Name::Payload,
+                best: self.payload,
+                normal: gain,
+                score: gain / value.max(1.0) / usual.threshold(usual.payload, self.payload.novel),
+            });
+        }
+        first.map(|first| (first, second, all))
+    }
+
+    /// Whether the payload that was found can be one.
+    fn is_body(&self) -> bool {
+        let [mass, x, y, z] = self.payload_change;
+        (x * x + y * y + z * z).sqrt() <= FURTHEST_M * mass.abs()
+    }
+
+    /// Whether each part of the time since the change holds its share of it, the newest too. A contact that
+    /// ended does not, nor one that pushed now here and now there.
+    fn lasts(&mut self, ring: &Ring, usual: &Usual<'_>, first: &Candidate) -> bool {
+        let blocks = (0..=first.best.back).filter(|&back| !ring.back(back).excluded);
+        let per_part = first.best.blocks.div_ceil(PARTS);
+        let mut telling = 0;
+        self.window.clear();
+        for (at, back) in blocks.enumerate() {
+            self.window.add(ring.back(back));
+            if self.window.blocks < per_part && at + 1 < first.best.blocks {
+                continue;
+            }
+            let (share, information, noise) = match first.name {
+                Name::Joint(j, kind) => {
+                    let compared = Compared::new(&self.window.own[j], &usual.references[j]);
+                    let share = compared.map(|compared| compared.share(kind, first.best.size));
+                    let (share, information) = share.unwrap_or((0.0, 0.0));
+                    (share, information, usual.noise[j].unwrap_or(f64::INFINITY))
+                }
+                Name::Payload => {
+                    let score = self
+                        .window
+                        .scores(usual.references, usual.noise, &mut self.scores);
+                    let (share, information) = score.share(&self.payload_change);
+                    (share, information, 1.0)
+                }
+            };
+            if information > noise / (UNCERTAIN * UNCERTAIN) {
+                telling += 1;
+                if !SHARE.contains(&share) {
+                    return false;
+                }
+            }
+            self.window.clear();
+        }
+        telling >= 2
+    }
+
+    fn finding(&self, usual: &Usual<'_>, first: &Candidate, ring: &Ring) -> Finding {
+        let (cause, joints, size) = match first.name {
+            Name::Joint(j, kind) => {
+                let cause = match kind {
+                    BIAS => Cause::TorqueBias,
+                    GAIN => Cause::TorqueGain,
+                    COULOMB => Cause::CoulombFriction,
+                    _ => Cause::ViscousFriction,
+                };
+                let one = if kind == GAIN { 1.0 } else { 0.0 };
+                (cause, 1 << j, one + first.best.size)
+            }
+            Name::Payload => (Cause::Payload, self.shown(usual), first.best.size),
+        };
+        Finding {
+            cause,
+            joints,
+            link: None,
+            since_ns: ring.back(first.best.back).first_ns,
+            size,
+            score: first.score,
+        }
+    }
+
+    /// The joints that show a change of the whole arm.
+    fn shown(&self, usual: &Usual<'_>) -> u32 {
+        let most = |j: usize| {
+            let noise = usual.noise[j].unwrap_or(f64::INFINITY);
+            let gains = self.best[j].iter().map(|best| best.gain);
+            gains.fold(0.0, f64::max) / noise
+        };
+        (0..self.best.len())
+            .filter(|&j| most(j) > BEYOND)
+            .fold(0, |joints, j| joints | 1 << j)
+    }
+}
+
+/// What the best constant force on one of the links explains since a block, in units of noise.
+fn force(ring: &Ring, usual: &Usual<'_>, back: usize) -> f64 {
+    let joints = usual.references.len();
+    let gain = |touched: usize| {
+        let mut whole = OuterScore::<FORCE>::zero();
+        for j in 0..joints {
+            let Some(noise) = usual.noise[j] else {
+                continue;
+            };
+            let mut own = super::moments::Moments::ZERO;
+            let mut outer = Outer::<FORCE>::zero();
+            for back in 0..=back {
+                let block = ring.back(back);
+                if !block.excluded {
+                    own.add(&block.joints[j].own, 1.0);
+                    outer.add(&block.joints[j].force[touched]);
+                }
+            }
+            if let Some(compared) = Compared::new(&own, &usual.references[j]) {
+                whole.add(&compared.outer(&outer), 1.0 / noise);
+            }
+        }
+        whole.solve().map_or(0.0, |(_, gain)| gain)
+    };
+    (0..joints).map(gain).fold(0.0, f64::max)
+}
+
+/// The joint whose child link a constant force between two blocks explains best.
+pub(super) fn touched(
+    ring: &Ring,
+    usual: &Usual<'_>,
+    newest: usize,
+    oldest: usize,
+) -> Option<usize> {
+    let joints = usual.references.len();
+    let gain = |touched: usize| {
+        let mut whole = OuterScore::<FORCE>::zero();
+        for j in 0..joints {
+            let Some(noise) = usual.noise[j] else {
+                continue;
+            };
+            for back in newest..=oldest {
+                let block = &ring.back(back).joints[j];
+                if let Some(compared) = Compared::new(&block.own, &usual.references[j]) {
+                    whole.add(&compared.outer(&block.force[touched]), 1.0 / noise);
+                }
+            }
+        }
+        whole.solve().map_or(0.0, |(_, gain)| gain)
+    };
+    (0..joints)
+        .map(|link| (link, gain(link)))
+        .filter(|(_, gain)| *gain > 0.0)
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(link, _)| link)
+}
