@@ -12,6 +12,9 @@ mod words;
 pub use config::{Config, RerunConfig};
 pub use error::RecordError;
 pub use recorder::Recorder;
+pub use rerun::explanation::{
+    ExplainedEvent, ExplainedJoint, ExplainedRecording, Explanation, write_explanation,
+};
 pub use streams::{CellInfo, StreamInfo};
 pub use tauscope_archive::Compression;
 

@@ -8,6 +8,7 @@
 
 mod blueprint;
 mod detections;
+pub(crate) mod explanation;
 mod file;
 mod live;
 mod painter;

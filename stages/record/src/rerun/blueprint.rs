@@ -1,6 +1,7 @@
 //! How the viewer opens: robot and events on the left, a plot a joint and the detectors on the
 //! right; a tab a cell.
 
+pub(super) mod explanation;
 mod properties;
 
 use rerun::blueprint::{

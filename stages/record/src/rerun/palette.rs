@@ -6,6 +6,12 @@ use rerun::Rgba32;
 pub(super) const MEASURED: Rgba32 = Rgba32::from_rgb(86, 156, 238);
 /// The effort that the twin expects.
 pub(super) const EXPECTED: Rgba32 = Rgba32::from_rgb(255, 176, 66);
+/// The effort that a corrected twin expects, and what is left beside it.
+pub(super) const CORRECTED: Rgba32 = Rgba32::from_rgb(0, 200, 140);
+/// A time in which something acts on the arm.
+pub(super) const EVENT: Rgba32 = Rgba32::from_rgb(204, 121, 167);
+/// The time in which it does not.
+pub(super) const QUIET: Rgba32 = Rgba32::from_rgb(44, 50, 58);
 /// What is between them.
 pub(super) const RESIDUAL: Rgba32 = Rgba32::from_rgb(214, 102, 168);
 /// A detector's score.

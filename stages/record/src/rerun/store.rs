@@ -58,7 +58,7 @@ impl Store {
     pub fn columns(
         &self,
         entity: &EntityPath,
-        times: [TimeColumn; 3],
+        times: impl IntoIterator<Item = TimeColumn>,
         columns: impl Iterator<Item = SerializedComponentColumn>,
     ) -> Result<LogMsg, RecordError> {
         let times = times

@@ -10,7 +10,7 @@ use crate::error::RecordError;
 /// The timelines, named and filled as Rerun's own MCAP importer does, so that what is streamed and
 /// what is imported share an axis. The archive gives the stamp as publish time, so here too.
 pub(super) const LOG_TIME: &str = "message_log_time";
-const PUBLISH_TIME: &str = "message_publish_time";
+pub(super) const PUBLISH_TIME: &str = "message_publish_time";
 /// The timeline that the viewer opens on: the stamp of the measurement.
 pub(super) const STAMP: &str = "ros2_timestamp";
 

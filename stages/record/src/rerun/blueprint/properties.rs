@@ -2,8 +2,10 @@
 //! into the same blueprint, as its Python package does.
 
 use rerun::blueprint::{Blueprint, BlueprintActivation, ContainerLike};
+use rerun::components::Range1D;
 use rerun::external::re_sdk_types::blueprint::archetypes::{
-    Background, EyeControls3D, LineGrid3D, PlotLegend, TextLogColumns, TimeAxis, VisibleTimeRanges,
+    Background, EyeControls3D, LineGrid3D, PlotLegend, ScalarAxis, TextLogColumns, TimeAxis,
+    VisibleTimeRanges,
 };
 use rerun::external::re_sdk_types::blueprint::components::{
     BackgroundKind, Corner2D, LinkAxis, TextLogColumn, TimelineColumn, VisibleTimeRange,
@@ -86,6 +88,12 @@ impl Properties {
             });
             self.set(view, "VisibleTimeRanges", &VisibleTimeRanges::new([range]));
         }
+    }
+
+    /// What a plot shows of the values.
+    pub fn vertical_range(&mut self, view: &ContainerLike, low: f64, high: f64) {
+        let range = ScalarAxis::new().with_range(Range1D::new(low, high));
+        self.set(view, "ScalarAxis", &range);
     }
 
     fn set(&mut self, view: &ContainerLike, name: &str, property: &dyn AsComponents) {

@@ -1,0 +1,304 @@
+//! The picture of an explanation: measured effort beside the twin's before and after its correction, in words what was
+//! found, and when what acts in time did.
+//!
+//! By recording and joint, an entity each: `<recording>/<joint>/effort` (series measured, twin, corrected) and
+//! `<recording>/<joint>/residual` (before, after); by recording and event `<recording>/events/<number>`, told in
+//! `<recording>/log`; and `explanation`, the text. On the importer's timelines, and on `recording_time`, which begins
+//! with each recording, so that all can be laid over each other.
+
+use std::path::Path;
+
+use rerun::archetypes::{
+    Scalars, SeriesLines, StateChange, StateConfiguration, TextDocument, TextLog,
+};
+use rerun::components::MediaType;
+use rerun::{
+    ApplicationId, EntityPath, Rgba32, StoreId, StoreKind, TextLogLevel, TimeColumn, TimePoint,
+    Timeline,
+};
+
+use super::blueprint::explanation::messages;
+use super::file::PictureFile;
+use super::palette::{CORRECTED, EVENT, EXPECTED, MEASURED, QUIET};
+use super::store::{Store, entity, unserializable};
+use super::tracks::{LOG_TIME, PUBLISH_TIME, STAMP};
+use crate::error::RecordError;
+
+/// Seconds from the start of each recording: the timeline that the picture opens on.
+pub(super) const RECORDING_TIME: &str = "recording_time";
+
+/// What the picture of an explanation shows.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Explanation {
+    /// Name of the case.
+    pub case: String,
+    /// Unit of the efforts, `Nm` or `A`.
+    pub effort_unit: String,
+    /// Verdict and findings, in Markdown.
+    pub text_markdown: String,
+    /// The recordings; the first is the one that is shown first.
+    pub recordings: Vec<ExplainedRecording>,
+    /// What acts for a while or from some time on.
+    pub events: Vec<ExplainedEvent>,
+}
+
+/// A recording in the picture of an explanation.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ExplainedRecording {
+    /// Its name: no two have the same.
+    pub name: String,
+    /// Whether nothing was fitted on it.
+    pub held_out: bool,
+    /// Stamp of its first sample \[ns since the epoch\].
+    pub start_ns: i64,
+    /// Its joints, in the order of the plots.
+    pub joints: Vec<ExplainedJoint>,
+}
+
+/// A joint's efforts in a recording, all of the same number of samples; what one series has more is not drawn.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ExplainedJoint {
+    /// Its name.
+    pub name: String,
+    /// Time since the recording's first sample \[s\].
+    pub time_s: Vec<f64>,
+    /// Measured effort \[effort unit\].
+    pub measured: Vec<f64>,
+    /// Effort of the twin as it was.
+    pub twin: Vec<f64>,
+    /// Effort of the corrected twin.
+    pub corrected: Vec<f64>,
+}
+
+/// A finding that has a time.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ExplainedEvent {
+    /// The recording; all if absent.
+    pub recording: Option<String>,
+    /// When it begins, since the recording's first sample \[s\].
+    pub start_s: f64,
+    /// When it ends; with the recording if absent.
+    pub end_s: Option<f64>,
+    /// What it is, in a few words: a label.
+    pub label: String,
+    /// What it is, in a sentence.
+    pub sentence: String,
+}
+
+/// Writes the picture, with its layout, to a Rerun file. It has `.part` at the end of its name until it is whole.
+///
+/// # Errors
+///
+/// If the file cannot be written or Rerun does not take the data.
+pub fn write_explanation(path: &Path, explanation: &Explanation) -> Result<(), RecordError> {
+    let mut file = PictureFile::create(path)?;
+    // The viewer keeps one layout per application: another case, another layout.
+    let application =
+        ApplicationId::new_or_unknown(format!("tauscope explain {}", explanation.case));
+    let store = Store {
+        id: StoreId::random(StoreKind::Recording, application.clone()),
+    };
+    file.write(&store.announcement())?;
+    for message in messages(explanation, &application)? {
+        file.write(&message)?;
+    }
+    let text = TextDocument::new(explanation.text_markdown.as_str())
+        .with_media_type(MediaType::markdown());
+    file.write(&store.always(&text_entity(), &text)?)?;
+    for recording in &explanation.recordings {
+        for joint in &recording.joints {
+            joint.write(recording, &store, &mut file)?;
+        }
+        for (number, event) in events_of(explanation, recording) {
+            event.write(number, recording, &store, &mut file)?;
+        }
+    }
+    file.finish()
+}
+
+/// Where the text is.
+pub(super) fn text_entity() -> EntityPath {
+    entity("explanation", &[])
+}
+
+/// Where a joint's efforts are.
+pub(super) fn effort_entity(recording: &str, joint: &str) -> EntityPath {
+    entity("", &[recording, joint, "effort"])
+}
+
+/// Where its residuals are.
+pub(super) fn residual_entity(recording: &str, joint: &str) -> EntityPath {
+    entity("", &[recording, joint, "residual"])
+}
+
+/// Where an event is.
+pub(super) fn event_entity(recording: &str, number: usize) -> EntityPath {
+    entity("", &[recording, "events", &number.to_string()])
+}
+
+/// Where a recording's events are told.
+pub(super) fn log_entity(recording: &str) -> EntityPath {
+    entity("", &[recording, "log"])
+}
+
+/// The events of a recording with their numbers.
+pub(super) fn events_of<'a>(
+    explanation: &'a Explanation,
+    recording: &'a ExplainedRecording,
+) -> impl Iterator<Item = (usize, &'a ExplainedEvent)> {
+    let here = |event: &ExplainedEvent| match &event.recording {
+        Some(name) => *name == recording.name,
+        None => true,
+    };
+    explanation
+        .events
+        .iter()
+        .enumerate()
+        .filter(move |(_, event)| here(event) && event.start_s.is_finite())
+}
+
+impl ExplainedRecording {
+    /// When it ends \[s\].
+    fn end_s(&self) -> f64 {
+        let times = self.joints.iter().flat_map(|joint| &joint.time_s);
+        times.copied().filter(|t| t.is_finite()).fold(0.0, f64::max)
+    }
+}
+
+impl ExplainedJoint {
+    /// How far a plot of the residuals must reach to both sides \[effort unit\]: not less than a twentieth of the
+    /// effort, so that noise looks like noise.
+    pub(super) fn residual_range(&self) -> Option<f64> {
+        let residuals = |twin: &[f64]| -> f64 {
+            let residuals = self.measured.iter().zip(twin).map(|(m, e)| (m - e).abs());
+            residuals.filter(|r| r.is_finite()).fold(0.0, f64::max)
+        };
+        let efforts = self.measured.iter().map(|m| m.abs());
+        let effort = efforts.filter(|m| m.is_finite()).fold(0.0, f64::max);
+        let residual = residuals(&self.twin).max(residuals(&self.corrected));
+        let half = (1.08 * residual).max(0.05 * effort);
+        (half > 0.0).then_some(half)
+    }
+
+    fn write(
+        &self,
+        recording: &ExplainedRecording,
+        store: &Store,
+        file: &mut PictureFile,
+    ) -> Result<(), RecordError> {
+        let series = self.measured.iter().zip(&self.twin).zip(&self.corrected);
+        let rows: Vec<(i64, [f64; 3])> = self
+            .time_s
+            .iter()
+            .zip(series)
+            .filter(|(t, _)| t.is_finite())
+            .map(|(t, ((measured, twin), corrected))| (nanos(*t), [*measured, *twin, *corrected]))
+            .collect();
+        let times_ns: Vec<i64> = rows.iter().map(|(t_ns, _)| *t_ns).collect();
+        let efforts: Vec<f64> = rows.iter().flat_map(|(_, efforts)| *efforts).collect();
+        let residuals: Vec<f64> = rows
+            .iter()
+            .flat_map(|(_, [measured, twin, corrected])| [measured - twin, measured - corrected])
+            .collect();
+        let effort_series: &[Series] = &[
+            ("measured", MEASURED, 4.0),
+            ("twin", EXPECTED, 1.5),
+            ("corrected", CORRECTED, 1.5),
+        ];
+        let residual_series: &[Series] = &[("before", EXPECTED, 1.5), ("after", CORRECTED, 1.5)];
+        let effort = effort_entity(&recording.name, &self.name);
+        let residual = residual_entity(&recording.name, &self.name);
+        for (entity, series, values) in [
+            (effort, effort_series, efforts),
+            (residual, residual_series, residuals),
+        ] {
+            file.write(&store.always(&entity, &lines(series))?)?;
+            if times_ns.is_empty() {
+                continue;
+            }
+            let columns = Scalars::new(values)
+                .columns(std::iter::repeat_n(series.len(), times_ns.len()))
+                .map_err(unserializable(&entity))?;
+            file.write(&store.columns(&entity, times(recording, &times_ns), columns)?)?;
+        }
+        Ok(())
+    }
+}
+
+/// Name, colour and width of a line.
+type Series = (&'static str, Rgba32, f32);
+
+fn lines(series: &[Series]) -> SeriesLines {
+    SeriesLines::new()
+        .with_names(series.iter().map(|(name, ..)| *name))
+        .with_colors(series.iter().map(|(_, colour, _)| *colour))
+        .with_widths(series.iter().map(|(.., width)| *width))
+}
+
+impl ExplainedEvent {
+    /// As a band, and in words where it begins.
+    fn write(
+        &self,
+        number: usize,
+        recording: &ExplainedRecording,
+        store: &Store,
+        file: &mut PictureFile,
+    ) -> Result<(), RecordError> {
+        const QUIETLY: &str = "-";
+        let entity = event_entity(&recording.name, number);
+        let looks = StateConfiguration::new()
+            .with_values([QUIETLY, &self.label])
+            .with_labels(["", &self.label])
+            .with_colors([QUIET, EVENT]);
+        file.write(&store.always(&entity, &looks)?)?;
+        let end_s = recording.end_s();
+        let start_s = self.start_s.clamp(0.0, end_s);
+        let stop_s = self.end_s.filter(|t| t.is_finite()).unwrap_or(end_s);
+        let mut states = vec![(start_s, self.label.as_str())];
+        if start_s > 0.0 {
+            states.insert(0, (0.0, QUIETLY));
+        }
+        if stop_s < end_s {
+            states.push((stop_s.max(start_s), QUIETLY));
+        }
+        let times_ns: Vec<i64> = states.iter().map(|(t, _)| nanos(*t)).collect();
+        let columns = StateChange::new()
+            .with_state(states.into_iter().map(|(_, state)| state))
+            .columns_of_unit_batches()
+            .map_err(unserializable(&entity))?;
+        file.write(&store.columns(&entity, times(recording, &times_ns), columns)?)?;
+        let words = format!("{}, {start_s:.2} s: {}", recording.name, self.sentence);
+        let told = TextLog::new(words).with_level(TextLogLevel::INFO);
+        let when = time_point(recording, nanos(start_s));
+        file.write(&store.at(when, &log_entity(&recording.name), &told)?)
+    }
+}
+
+fn nanos(seconds: f64) -> i64 {
+    (seconds * 1e9).round() as i64
+}
+
+fn times(recording: &ExplainedRecording, times_ns: &[i64]) -> [TimeColumn; 4] {
+    let stamp = |name| {
+        let stamps = times_ns
+            .iter()
+            .map(|t| recording.start_ns.saturating_add(*t));
+        TimeColumn::new_timestamp_nanos_since_epoch(name, stamps)
+    };
+    [
+        stamp(LOG_TIME),
+        stamp(PUBLISH_TIME),
+        stamp(STAMP),
+        TimeColumn::new_duration_nanos(RECORDING_TIME, times_ns.iter().copied()),
+    ]
+}
+
+fn time_point(recording: &ExplainedRecording, t_ns: i64) -> TimePoint {
+    let stamp_ns = recording.start_ns.saturating_add(t_ns);
+    [LOG_TIME, PUBLISH_TIME, STAMP]
+        .into_iter()
+        .fold(TimePoint::default(), |point, name| {
+            point.with(Timeline::new_timestamp(name), stamp_ns)
+        })
+        .with(Timeline::new_duration(RECORDING_TIME), t_ns)
+}
