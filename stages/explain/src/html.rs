@@ -166,7 +166,7 @@ fn facts(report: &Report) -> Vec<(String, String)> {
         };
         facts.push((count.to_string(), text.to_owned()));
         let share = proof::recovered(&rows);
-        if share.is_finite() {
+        if share.is_finite() && !proof::is_elsewhere(report) {
             let text = "of the squared error is gone on held-out data, which was never fitted";
             facts.push((almost_all(share.max(0.0)), text.to_owned()));
         }

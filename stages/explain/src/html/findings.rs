@@ -105,9 +105,15 @@ pub(super) fn meter(share: f64) -> Markup {
 }
 
 fn parameters(finding: &Finding) -> Markup {
-    // A mass says more than where it is.
+    // A mass says more than where it is, and when comes last.
+    let rank = |name: &str| match name {
+        "coulomb_after_nm" => 2,
+        "t_start_s" | "change_time_session_s" => 3,
+        "t_end_s" => 4,
+        name => usize::from(!name.contains("mass")),
+    };
     let mut parameters: Vec<_> = finding.parameters.iter().collect();
-    parameters.sort_by_key(|(name, _)| !name.contains("mass"));
+    parameters.sort_by_key(|(name, _)| rank(name));
     html! {
         table.parameters {
             thead { tr { th { "Parameter" } th.num { "Value" } th.num { "95 % interval" } th {} } }

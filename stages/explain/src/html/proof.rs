@@ -93,6 +93,15 @@ pub(super) fn recovered(rows: &[Row<'_>]) -> f64 {
     1.0 - after / before
 }
 
+/// Whether all that was found happened in recordings that were fitted, so that held-out data cannot show it.
+pub(super) fn is_elsewhere(report: &Report) -> bool {
+    !report.findings.is_empty()
+        && report.findings.iter().all(|finding| {
+            let name = finding.recording.as_ref();
+            name.is_some_and(|name| !report.holdout_predictions.contains_key(name))
+        })
+}
+
 /// Where, as a table with heat.
 pub(super) fn located(report: &Report) -> Option<Markup> {
     if report.located.is_empty() {
@@ -178,6 +187,9 @@ pub(super) fn before_and_after(report: &Report) -> Option<Markup> {
         p.lead {
             "RMS of measured minus expected effort on held-out data, in " (unit)
             ": not filtered, not trimmed. Nothing was fitted on it."
+            @if is_elsewhere(report) {
+                " What was found happened in other recordings and does not recur here, so little changes; see below, joint by joint."
+            }
             @if report.findings.is_empty() { " There is nothing to correct, so both are the same." }
         }
         p.legend {

@@ -37,7 +37,9 @@ const UNITS: [(&str, &str); 20] = [
 ];
 
 /// Parameters whose names say too little by themselves.
-const USUAL: [(&str, &str); 10] = [
+const USUAL: [(&str, &str); 12] = [
+    ("t_start", "Begins"),
+    ("t_end", "Ends"),
     ("coulomb", "Coulomb friction"),
     ("coulomb_positive", "Friction forward"),
     ("coulomb_negative", "Friction backward"),
@@ -47,10 +49,7 @@ const USUAL: [(&str, &str); 10] = [
     ("viscous", "Viscous friction"),
     ("viscous_warm", "Viscous friction, warm"),
     ("viscous_extra_cold", "More of it when cold"),
-    (
-        "change_time_session",
-        "Changed at, since the first recording began",
-    ),
+    ("change_time_session", "Changed at, in the session"),
 ];
 
 /// A parameter's name in words and its unit (empty for a pure number), from its canonical name.
@@ -214,11 +213,7 @@ mod tests {
             ("cycles_per_rev", "Cycles", "per turn"),
             ("cycles_per_rev2", "Cycles (second)", "per turn"),
             ("amplitude2_nm", "Amplitude (second)", "N m"),
-            (
-                "change_time_session_s",
-                "Changed at, since the first recording began",
-                "s",
-            ),
+            ("change_time_session_s", "Changed at, in the session", "s"),
             ("stiffness_n_per_m", "Stiffness", "N/m"),
             ("gain", "Gain", ""),
             ("force_x_n", "Force x", "N"),
