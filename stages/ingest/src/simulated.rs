@@ -3,15 +3,18 @@
 //!
 //! Effort is the motor's: what the rigid body needs, plus what friction and the like cost, less what
 //! a push does for it (measured - RNEA = friction - Jᵀ F, with F the force on the robot). The same
-//! scenario gives the same numbers every time.
+//! scenario gives the same numbers every time. Positions and velocities are those of the motors.
 
 mod check;
+mod conceal;
 mod controller;
 mod error;
 mod labels;
 mod messages;
+mod plan;
 mod plant;
 mod push;
+mod record;
 mod scenario;
 mod sensors;
 mod simulation;
@@ -19,6 +22,7 @@ mod source;
 mod trajectory;
 mod write;
 
+pub use conceal::{ConcealSpec, Concealed, ConcealedEffect, fit_count};
 pub use error::ScenarioError;
 pub use labels::Labels;
 pub use scenario::{

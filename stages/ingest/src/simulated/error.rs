@@ -110,8 +110,22 @@ pub enum ScenarioError {
         /// The recordings there are.
         known: String,
     },
+    /// Elasticity and play, or two of one, in the same joint.
+    #[error(
+        "joint `{joint}` has more than one of `joint_elasticity` and `backlash`: one at most is simulated"
+    )]
+    TwoTransmissions {
+        /// The joint.
+        joint: String,
+    },
+    /// What cannot be concealed.
+    #[error("conceal: {reason}")]
+    Conceal {
+        /// Why.
+        reason: String,
+    },
     /// An effect that the simulated arm cannot have.
-    #[error("the physics' `{effect}` is not simulated: only what acts in a single joint is")]
+    #[error("the physics' `{effect}` is not simulated")]
     NotSimulated {
         /// The effect.
         effect: &'static str,

@@ -1,28 +1,27 @@
 //! The arm itself: its URDF, and the physics that the URDF does not tell of.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
-use tauscope_dynamics::terms::{Layer, MotionSample, Term, TermSpec};
-use tauscope_dynamics::{
-    Data, Model, forward_kinematics, link_jacobian, link_pose, mass_matrix, rnea,
-};
+use tauscope_dynamics::terms::TermSpec;
+use tauscope_dynamics::{Data, Model, forward_kinematics, link_pose, mass_matrix, rnea};
 
 use super::error::ScenarioError;
+
+mod contact;
+mod physics;
+mod transmission;
+
+pub(super) use contact::Contact;
+use contact::add_contact;
+use physics::{Carried, JointTerms, Loads, Physics, Step};
+use transmission::{Coupling, Rotor};
 
 /// A solution is found once no velocity changes by more than this \[rad/s\].
 const TOLERANCE: f64 = 1e-10;
 const MAX_ITERATIONS: usize = 30;
 /// Step by which slopes of the physics are found \[rad/s\].
 const SLOPE_STEP: f64 = 1e-6;
-
-/// A force that acts on the arm now.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Contact {
-    pub link: usize,
-    /// In the link's frame \[m\].
-    pub point_m: [f64; 3],
-    /// On the robot, world frame \[N\].
-    pub force_n: [f64; 3],
-}
+/// How often the arm is asked what its links bear until they hang as they do at rest.
+const SETTLING_STEPS: usize = 100;
 
 /// What the drives are told: an effort, and a velocity to keep to. Their own loop is fast, so it acts
 /// on the velocity at the end of a step.
@@ -54,12 +53,24 @@ impl Drive<'_> {
 /// The arm and its state.
 ///
 /// Equation of motion: `M(q) qdd + h(q, qd) + physics(q, qd, qdd) = effort + Jᵀ F`, with the physics
-/// as the effort that it costs.
+/// as the effort that it costs. In a joint with elasticity or play the link has only what comes through,
+/// `M qdd + h = T + Jᵀ F`, and the rotor, which carries the encoder, the rest: `J θdd + physics = effort - T`.
 #[derive(Debug)]
 pub(super) struct Plant {
+    /// The arm as it is now, and without what it carries for a while.
     model: Model,
+    empty: Model,
+    carried: Vec<Carried>,
+    /// Which of those are there.
+    there: Vec<bool>,
     data: Data,
-    physics: Physics,
+    loads: Loads,
+    joints: JointTerms,
+    rotors: Vec<Rotor>,
+    /// Of the links.
+    link_position: Vec<f64>,
+    link_velocity: Vec<f64>,
+    /// Where the encoders are.
     position: Vec<f64>,
     velocity: Vec<f64>,
     /// Of the step that led here.
@@ -70,7 +81,8 @@ pub(super) struct Plant {
     work: Work,
 }
 
-/// Memory of a step, used again for the next.
+/// Memory of a step, used again for the next. Velocities are those of the links and, after them, of the
+/// rotors.
 #[derive(Debug)]
 struct Work {
     zero: Vec<f64>,
@@ -81,48 +93,90 @@ struct Work {
     effort: Vec<f64>,
     effort_beside: Vec<f64>,
     effort_at_rest: Vec<f64>,
+    couplings: Vec<Coupling>,
+    /// Where the motor of each joint is among the velocities.
+    motor: Vec<usize>,
     inertia: DMatrix<f64>,
     system: DMatrix<f64>,
     missing: DVector<f64>,
 }
 
 impl Work {
-    fn new(n: usize) -> Self {
+    fn new(n: usize, rotors: &[Rotor]) -> Self {
         let zero = || vec![0.0; n];
+        let all = n + rotors.len();
+        let mut motor: Vec<_> = (0..n).collect();
+        for (k, rotor) in rotors.iter().enumerate() {
+            motor[rotor.joint] = n + k;
+        }
         Self {
-            zero: zero(),
+            zero: vec![0.0; all],
             load: zero(),
-            velocity: zero(),
-            beside: zero(),
+            velocity: vec![0.0; all],
+            beside: vec![0.0; all],
             effort: zero(),
             effort_beside: zero(),
             effort_at_rest: zero(),
+            couplings: vec![Coupling::default(); rotors.len()],
+            motor,
             inertia: DMatrix::zeros(n, n),
-            system: DMatrix::zeros(n, n),
-            missing: DVector::zeros(n),
+            system: DMatrix::zeros(all, all),
+            missing: DVector::zeros(all),
         }
     }
 }
 
 impl Plant {
-    /// An arm at rest.
+    /// An arm at rest, its encoders at `position`, with all of `physics` but what acts on the record.
     pub fn new(
         model: &Model,
         physics: &[TermSpec],
         position: &[f64],
     ) -> Result<Self, ScenarioError> {
         let n = position.len();
-        Ok(Self {
-            physics: Physics::new(model, physics)?,
-            model: model.clone(),
+        let physics = Physics::new(model, physics)?;
+        let mut plant = Self {
             data: Data::new(model),
+            model: physics.model.clone(),
+            empty: physics.model,
+            there: vec![false; physics.carried.len()],
+            carried: physics.carried,
+            loads: physics.loads,
+            joints: physics.joints,
+            work: Work::new(n, &physics.rotors),
+            rotors: physics.rotors,
+            link_position: position.to_vec(),
+            link_velocity: vec![0.0; n],
             position: position.to_vec(),
             velocity: vec![0.0; n],
             applied_nm: vec![0.0; n],
             recording_s: 0.0,
             session_start_s: 0.0,
-            work: Work::new(n),
-        })
+        };
+        plant.pick_up_and_drop();
+        plant.settle();
+        Ok(plant)
+    }
+
+    /// Lets the links hang behind their rotors as they do at rest.
+    fn settle(&mut self) {
+        if self.rotors.is_empty() {
+            return;
+        }
+        for rotor in &mut self.rotors {
+            rotor.position = self.position[rotor.joint];
+        }
+        let zero = &self.work.zero[..self.link_position.len()];
+        for _ in 0..SETTLING_STEPS {
+            let load = rnea(&self.model, &mut self.data, &self.link_position, zero, zero);
+            self.work.load.copy_from_slice(load);
+            let inertia = mass_matrix(&self.model, &mut self.data, &self.link_position);
+            for rotor in &self.rotors {
+                let j = rotor.joint;
+                self.link_position[j] =
+                    rotor.position + rotor.sag(self.work.load[j], inertia[(j, j)]);
+            }
+        }
     }
 
     /// Sets when the recording starts in its session.
@@ -131,12 +185,17 @@ impl Plant {
         self
     }
 
-    /// \[rad\]
+    /// When the recording starts in its session \[s\].
+    pub fn session_start_s(&self) -> f64 {
+        self.session_start_s
+    }
+
+    /// Of the encoders \[rad\].
     pub fn position(&self) -> &[f64] {
         &self.position
     }
 
-    /// \[rad/s\]
+    /// Of the encoders \[rad/s\].
     pub fn velocity(&self) -> &[f64] {
         &self.velocity
     }
@@ -147,7 +206,7 @@ impl Plant {
 
     /// Where a point of a link is in the world \[m\].
     pub fn world_point(&mut self, link: usize, point_m: [f64; 3]) -> [f64; 3] {
-        forward_kinematics(&self.model, &mut self.data, &self.position);
+        forward_kinematics(&self.model, &mut self.data, &self.link_position);
         let pose = link_pose(&self.model, &self.data, link);
         (pose.translation.vector + pose.rotation * Vector3::from(point_m)).into()
     }
@@ -165,15 +224,36 @@ impl Plant {
     /// explicit step could be: its smoothed sign changes within 2 mrad/s. So is a drive's velocity loop
     /// on a light joint.
     pub fn step(&mut self, dt_s: f64, drive: &Drive<'_>, contacts: impl Iterator<Item = Contact>) {
+        self.pick_up_and_drop();
+        let n = self.link_position.len();
         let (model, data, work) = (&self.model, &mut self.data, &mut self.work);
-        let bias = rnea(model, data, &self.position, &self.velocity, &work.zero);
+        let bias = rnea(
+            model,
+            data,
+            &self.link_position,
+            &self.link_velocity,
+            &work.zero[..n],
+        );
         work.load.copy_from_slice(bias);
         for contact in contacts {
-            add_contact(model, data, &self.position, &contact, &mut work.load);
+            add_contact(model, data, &self.link_position, &contact, &mut work.load);
         }
+        let session_s = self.session_start_s + self.recording_s;
+        self.loads.add(
+            &self.link_position,
+            self.recording_s,
+            session_s,
+            &mut work.load,
+        );
         work.inertia
-            .copy_from(mass_matrix(model, data, &self.position));
-        work.velocity.copy_from_slice(&self.velocity);
+            .copy_from(mass_matrix(model, data, &self.link_position));
+        work.velocity[..n].copy_from_slice(&self.link_velocity);
+        for (k, rotor) in self.rotors.iter().enumerate() {
+            let j = rotor.joint;
+            let (q, v) = (self.link_position[j], self.link_velocity[j]);
+            work.couplings[k] = rotor.coupling(q, v, work.inertia[(j, j)], dt_s);
+            work.velocity[n + k] = rotor.velocity;
+        }
         for _ in 0..MAX_ITERATIONS {
             let Some(largest) = self.approach(dt_s, drive) else {
                 self.velocity.fill(f64::NAN);
@@ -185,33 +265,63 @@ impl Plant {
         }
         let work = &mut self.work;
         let step = Step {
-            position: &self.position,
-            before: &self.velocity,
+            position: &self.link_position,
+            before: &self.link_velocity,
+            rotors: &self.rotors,
             load: &work.load,
             inertia: &work.inertia,
             dt_s,
             recording_s: self.recording_s,
-            session_s: self.session_start_s + self.recording_s,
+            session_s,
         };
         // Once more with the time that passes, so that what has a memory remembers this step.
-        self.physics
+        self.joints
             .cost(&step, dt_s, &work.velocity, &mut work.effort);
-        for (j, &velocity) in work.velocity.iter().enumerate() {
-            self.position[j] += dt_s * velocity;
+        let (links, rotors) = work.velocity.split_at(n);
+        for (rotor, &velocity) in self.rotors.iter_mut().zip(rotors) {
+            rotor.position += dt_s * velocity;
+            rotor.velocity = velocity;
+        }
+        for (j, &motor) in work.motor.iter().enumerate() {
+            let velocity = work.velocity[motor];
+            self.link_position[j] += dt_s * links[j];
+            self.velocity[j] = velocity;
+            self.position[j] = match motor.checked_sub(n) {
+                Some(k) => self.rotors[k].position,
+                None => self.link_position[j],
+            };
             self.applied_nm[j] = drive.effort(j, velocity).0;
         }
-        self.velocity.copy_from_slice(&work.velocity);
+        self.link_velocity.copy_from_slice(links);
         self.recording_s += dt_s;
+    }
+
+    /// Makes what is carried now part of the arm.
+    fn pick_up_and_drop(&mut self) {
+        let mut changed = false;
+        for (there, carried) in self.there.iter_mut().zip(&self.carried) {
+            let now = carried.is_there(self.recording_s);
+            changed |= now != *there;
+            *there = now;
+        }
+        if !changed {
+            return;
+        }
+        self.model.clone_from(&self.empty);
+        for (_, carried) in self.there.iter().zip(&self.carried).filter(|(is, _)| **is) {
+            carried.attach(&mut self.model);
+        }
     }
 
     /// Brings the new velocity nearer to the solution by a step of Newton's, and gives that step's
     /// largest change; `None` if there is no such step.
     fn approach(&mut self, dt_s: f64, drive: &Drive<'_>) -> Option<f64> {
-        let n = self.position.len();
+        let n = self.link_position.len();
         let work = &mut self.work;
         let step = Step {
-            position: &self.position,
-            before: &self.velocity,
+            position: &self.link_position,
+            before: &self.link_velocity,
+            rotors: &self.rotors,
             load: &work.load,
             inertia: &work.inertia,
             dt_s,
@@ -221,22 +331,38 @@ impl Plant {
         for (beside, velocity) in work.beside.iter_mut().zip(&work.velocity) {
             *beside = velocity + SLOPE_STEP;
         }
-        self.physics
+        self.joints
             .cost(&step, 0.0, &work.velocity, &mut work.effort);
-        self.physics
+        self.joints
             .cost(&step, 0.0, &work.beside, &mut work.effort_beside);
-        self.physics
+        self.joints
             .cost(&step, 0.0, &work.zero, &mut work.effort_at_rest);
         let mut system = std::mem::replace(&mut work.system, DMatrix::zeros(0, 0));
-        system.copy_from(&work.inertia);
+        system.fill(0.0);
+        system.view_mut((0, 0), (n, n)).copy_from(&work.inertia);
         for j in 0..n {
-            let velocity = work.velocity[j];
-            let (effort, fall) = drive.effort(j, velocity);
-            let mut missing = dt_s * (effort - work.load[j] - work.effort[j]);
+            let mut missing = -dt_s * work.load[j];
             for k in 0..n {
-                missing -= work.inertia[(j, k)] * (work.velocity[k] - self.velocity[k]);
+                missing -= work.inertia[(j, k)] * (work.velocity[k] - self.link_velocity[k]);
             }
             work.missing[j] = missing;
+        }
+        for (k, (rotor, coupling)) in self.rotors.iter().zip(&work.couplings).enumerate() {
+            let (link, motor) = (rotor.joint, n + k);
+            let through = dt_s * coupling.at(work.velocity[motor], work.velocity[link]);
+            work.missing[link] += through;
+            work.missing[motor] =
+                -through - rotor.inertia * (work.velocity[motor] - rotor.velocity);
+            let slope = dt_s * coupling.slope;
+            system[(link, link)] += slope;
+            system[(motor, motor)] = rotor.inertia + slope;
+            system[(link, motor)] = -slope;
+            system[(motor, link)] = -slope;
+        }
+        for (j, &motor) in work.motor.iter().enumerate() {
+            let velocity = work.velocity[motor];
+            let (effort, fall) = drive.effort(j, velocity);
+            work.missing[motor] += dt_s * (effort - work.effort[j]);
             // How fast the physics' effort grows: its slope or, where that is more, the slope of its
             // line through standstill, which keeps a step through the kink of Coulomb friction from
             // going too far.
@@ -246,7 +372,7 @@ impl Plant {
             } else {
                 0.0
             };
-            system[(j, j)] += dt_s * (slope.max(line).max(0.0) + fall);
+            system[(motor, motor)] += dt_s * (slope.max(line).max(0.0) + fall);
         }
         // The mass matrix is positive definite, and this only adds to it.
         let factors = Cholesky::new(system)?;
@@ -256,91 +382,5 @@ impl Plant {
             *velocity += change;
         }
         Some(work.missing.amax())
-    }
-}
-
-/// Takes `Jᵀ F` off the load.
-fn add_contact(
-    model: &Model,
-    data: &mut Data,
-    position: &[f64],
-    contact: &Contact,
-    load: &mut [f64],
-) {
-    forward_kinematics(model, data, position);
-    let pose = link_pose(model, data, contact.link);
-    let force = Vector3::from(contact.force_n);
-    let moment = (pose.rotation * Vector3::from(contact.point_m)).cross(&force);
-    let jacobian = link_jacobian(model, data, contact.link);
-    for (j, load) in load.iter_mut().enumerate() {
-        for k in 0..3 {
-            *load -= jacobian[(k, j)] * force[k] + jacobian[(k + 3, j)] * moment[k];
-        }
-    }
-}
-
-/// The step that is being taken.
-struct Step<'a> {
-    position: &'a [f64],
-    /// The velocity it begins with.
-    before: &'a [f64],
-    /// What acts without the physics and without acceleration \[N m\].
-    load: &'a [f64],
-    inertia: &'a DMatrix<f64>,
-    dt_s: f64,
-    recording_s: f64,
-    session_s: f64,
-}
-
-/// What the URDF does not tell of.
-#[derive(Debug)]
-struct Physics {
-    terms: Vec<Box<dyn Term>>,
-    acceleration: Vec<f64>,
-    transmitted: Vec<f64>,
-}
-
-impl Physics {
-    fn new(model: &Model, specs: &[TermSpec]) -> Result<Self, ScenarioError> {
-        let terms = specs.iter().map(|spec| {
-            let term = spec.build(model)?;
-            match term.effect().layer {
-                Layer::Joint => Ok(term),
-                _ => Err(ScenarioError::NotSimulated {
-                    effect: term.effect().name,
-                }),
-            }
-        });
-        Ok(Self {
-            terms: terms.collect::<Result<_, ScenarioError>>()?,
-            acceleration: vec![0.0; model.dof()],
-            transmitted: vec![0.0; model.dof()],
-        })
-    }
-
-    /// The effort that it costs to end the step with `velocity`. `elapsed_s` passes for what has a
-    /// memory: 0 only tries.
-    fn cost(&mut self, step: &Step<'_>, elapsed_s: f64, velocity: &[f64], effort: &mut [f64]) {
-        for ((acceleration, v), v0) in self.acceleration.iter_mut().zip(velocity).zip(step.before) {
-            *acceleration = (v - v0) / step.dt_s;
-        }
-        for (j, transmitted) in self.transmitted.iter_mut().enumerate() {
-            let row = step.inertia.row(j);
-            let inertial = row.iter().zip(&self.acceleration).map(|(m, a)| m * a);
-            *transmitted = step.load[j] + inertial.sum::<f64>();
-        }
-        effort.fill(0.0);
-        let at = MotionSample {
-            dt_s: elapsed_s,
-            recording_s: step.recording_s,
-            session_s: step.session_s,
-            position: step.position,
-            velocity,
-            acceleration: &self.acceleration,
-            transmitted: &self.transmitted,
-        };
-        for term in &mut self.terms {
-            term.act(&at, effort);
-        }
     }
 }

@@ -7,6 +7,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tauscope_dynamics::terms::TermSpec;
 
+use super::conceal::ConcealSpec;
+
 /// A simulated cell and the recordings it makes. The same file makes the same bytes every time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -42,6 +44,9 @@ pub struct Scenario {
     /// What the real arm has and the URDF does not say.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub physics: Vec<TermSpec>,
+    /// More of that, drawn at random: for somebody to find.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub conceal: Option<ConcealSpec>,
     /// How it is measured.
     #[serde(default)]
     pub sensors: Sensors,

@@ -5,7 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 use tauscope_bus::{JointArray, MAX_JOINTS};
 
 use super::error::ScenarioError;
-use super::scenario::{EffortUnit, Scenario};
+use super::scenario::{EffortUnit, Scenario, Sensors};
 use super::trajectory::JointRange;
 
 /// The sensors of an arm.
@@ -53,14 +53,9 @@ impl SensorBank {
                 }
             }
         }
-        let mut effort_noise_nm = [0.0; MAX_JOINTS];
-        for (noise, joint) in effort_noise_nm.iter_mut().zip(joints) {
-            let share_nm = if joint.effort.is_finite() {
-                sensors.effort_noise_of_limit * joint.effort
-            } else {
-                0.0
-            };
-            *noise = sensors.effort_noise_nm.hypot(share_nm);
+        let mut noise_nm = [0.0; MAX_JOINTS];
+        for (noise, joint) in noise_nm.iter_mut().zip(joints) {
+            *noise = effort_noise_nm(sensors, joint);
         }
         Ok(Self {
             joint_count: joints.len(),
@@ -69,7 +64,7 @@ impl SensorBank {
             velocity_noise_rad_s: sensors.velocity_noise_rad_s,
             velocity_step_rad_s: sensors.velocity_step_rad_s,
             effort_step_nm: sensors.effort_step_nm,
-            effort_noise_nm,
+            effort_noise_nm: noise_nm,
             effort_gain: by_joint("sensors.effort_gain", &sensors.effort_gain, 1.0, joints)?,
             effort_bias_nm: by_joint(
                 "sensors.effort_bias_nm",
@@ -109,6 +104,16 @@ impl SensorBank {
         }
         measured
     }
+}
+
+/// Standard deviation of the noise on a joint's effort \[N m\].
+pub(super) fn effort_noise_nm(sensors: &Sensors, joint: &JointRange) -> f64 {
+    let share_nm = if joint.effort.is_finite() {
+        sensors.effort_noise_of_limit * joint.effort
+    } else {
+        0.0
+    };
+    sensors.effort_noise_nm.hypot(share_nm)
 }
 
 /// `value` rounded to a multiple of `step`, if that is not 0.

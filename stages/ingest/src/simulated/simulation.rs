@@ -1,33 +1,23 @@
 //! One recording of a simulated cell, instant by instant.
 
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use tauscope_bus::{JointArray, MAX_JOINTS};
-use tauscope_dynamics::{Data, Inertia, Model, forward_kinematics, link_pose};
+use tauscope_bus::JointArray;
+use tauscope_dynamics::Model;
 
+use super::conceal;
 use super::controller::Controller;
 use super::error::ScenarioError;
+use super::plan::{self, STEP_NS, offset_ns, whole_steps};
 use super::plant::{Contact, Plant};
-use super::push::{Push, find_link, pushes};
-use super::scenario::{RecordedMotionSpec, RecordingSpec, Scenario};
+use super::push::{Push, pushes};
+use super::record::Record;
+use super::scenario::Scenario;
 use super::sensors::SensorBank;
-use super::trajectory::{Allowed, Fourier, JointRange, Points, Spline, Target, Trajectory};
-use crate::config::{Config, FileConfig, Topics};
-use crate::recorded::RecordedSource;
-use crate::setup::Setup;
+use super::trajectory::{JointRange, Target, Trajectory};
 
-/// The plant is integrated at 4 kHz; its controller runs at 1 kHz.
-const STEP_NS: i64 = 250_000;
+/// The controller runs at 1 kHz.
 const STEPS_PER_CONTROL: i64 = 4;
-/// Between two recordings of a session \[ns\].
-const PAUSE_NS: i64 = 10_000_000_000;
 /// Faster than this and the arm has run away \[rad/s or m/s\].
 const RUNAWAY: f64 = 100.0;
-/// Range of a joint without limits \[rad\], and velocity of one without \[rad/s\].
-const FREE_RANGE: f64 = std::f64::consts::PI;
-const FREE_VELOCITY: f64 = 2.0;
-/// Random streams of one recording.
-const STREAMS: u64 = 8;
 
 /// What the cell publishes at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,6 +67,7 @@ pub struct Simulation {
     target: Target,
     controller: Controller,
     plant: Plant,
+    record: Record,
     sensors: SensorBank,
     pushes: Vec<Push>,
     events: Vec<Event>,
@@ -88,22 +79,19 @@ impl Simulation {
     /// # Errors
     /// If the scenario does not fit the robot, or asks for what cannot be.
     pub fn new(scenario: &Scenario, model: &Model, index: usize) -> Result<Self, ScenarioError> {
+        let (scenario, _) = conceal::add(scenario, model)?;
         let spec = &scenario.recordings[index];
-        let joints = joint_ranges(model)?;
-        let rng = |stream: u64| {
-            let mut rng = ChaCha8Rng::seed_from_u64(scenario.seed);
-            rng.set_stream(index as u64 * STREAMS + stream);
-            rng
-        };
-        let model = with_tool(scenario, model)?;
-        let mut trajectory = trajectory(spec, &model, &joints, rng(0))?;
+        let joints = plan::joint_ranges(model)?;
+        let rng = |stream| plan::random(&scenario, index, stream);
+        let model = plan::with_tool(&scenario, model)?;
+        let mut trajectory = plan::trajectory(spec, &model, &joints, rng(0))?;
         let target = trajectory.at(0.0);
         let start = &target.position[..joints.len()];
         let pushes = pushes(spec, &model, rng(1))?;
-        let offset_ns = scenario.recordings[..index]
-            .iter()
-            .map(|before| whole_steps(before.duration_s) * STEP_NS + PAUSE_NS)
-            .sum::<i64>();
+        let offset_ns = offset_ns(&scenario, index);
+        let plant = Plant::new(&model, &scenario.physics, start)?;
+        let controller = Controller::new(&model, &scenario.controller, &joints, start);
+        let record = Record::new(&model, &scenario.physics)?;
         Ok(Self {
             name: spec.name.clone(),
             start_ns: i64::from(scenario.start_s) * 1_000_000_000 + offset_ns,
@@ -111,10 +99,10 @@ impl Simulation {
             last_step: whole_steps(spec.duration_s),
             next_sample: 0,
             rate_hz: scenario.rate_hz,
-            controller: Controller::new(&model, &scenario.controller, &joints, start),
-            plant: Plant::new(&model, &scenario.physics, start)?
-                .starting_at(offset_ns as f64 * 1e-9),
-            sensors: SensorBank::new(scenario, &joints, rng(2))?,
+            controller,
+            plant: plant.starting_at(offset_ns as f64 * 1e-9),
+            record,
+            sensors: SensorBank::new(&scenario, &joints, rng(2))?,
             trajectory,
             target,
             events: Vec::with_capacity(pushes.len()),
@@ -135,6 +123,11 @@ impl Simulation {
                 let dt_s = (STEPS_PER_CONTROL * STEP_NS) as f64 * 1e-9;
                 self.controller
                     .update(dt_s, &self.target, self.plant.position());
+            }
+            if self.step == 0 {
+                // Before the first step there is no effort but the controller's.
+                let effort_nm = self.controller.drive(0.0).effort_nm;
+                self.record.take(&self.plant, effort_nm, 0.0);
             }
             let due = self.step >= self.next_sample;
             let reading = due.then(|| self.read(time_s));
@@ -161,18 +154,14 @@ impl Simulation {
     }
 
     fn read(&mut self, time_s: f64) -> Reading {
-        let n = self.joints.len();
         // The instants of the rate, each moved to the next step of the plant.
         let index = (time_s * self.rate_hz + 1e-6).floor() + 1.0;
         self.next_sample = (index / self.rate_hz * 1e9 / STEP_NS as f64 - 1e-6).ceil() as i64;
-        // Before the first step there is no effort but the controller's.
-        let effort_nm = match self.step {
-            0 => &self.controller.drive(0.0).effort_nm[..n],
-            _ => self.plant.applied_nm(),
-        };
-        let measured =
-            self.sensors
-                .measure(self.plant.position(), self.plant.velocity(), effort_nm);
+        let measured = self.sensors.measure(
+            self.plant.position(),
+            self.plant.velocity(),
+            self.record.effort_nm(),
+        );
         Reading {
             stamp_ns: self.start_ns + self.step * STEP_NS,
             position: measured.position,
@@ -207,6 +196,7 @@ impl Simulation {
                 time_s,
             });
         }
+        self.record.take(&self.plant, self.plant.applied_nm(), dt_s);
         self.step += 1;
         let now_s = self.time_s();
         for i in 0..self.pushes.len() {
@@ -225,117 +215,4 @@ impl Simulation {
         }
         Ok(())
     }
-}
-
-fn whole_steps(duration_s: f64) -> i64 {
-    (duration_s * 1e9 / STEP_NS as f64).round() as i64
-}
-
-/// What the joints can do, with sensible ranges where the URDF gives none.
-fn joint_ranges(model: &Model) -> Result<Vec<JointRange>, ScenarioError> {
-    if model.dof() > MAX_JOINTS {
-        return Err(ScenarioError::TooManyJoints {
-            found: model.dof(),
-            limit: MAX_JOINTS,
-        });
-    }
-    let ranges = model.joints().iter().map(|joint| {
-        let limits = &joint.limits;
-        JointRange {
-            name: joint.name.clone(),
-            lower: limits.lower.unwrap_or(-FREE_RANGE),
-            upper: limits.upper.unwrap_or(FREE_RANGE),
-            velocity: limits.velocity.unwrap_or(FREE_VELOCITY),
-            effort: limits.effort.unwrap_or(f64::INFINITY),
-        }
-    });
-    Ok(ranges.collect())
-}
-
-fn with_tool(scenario: &Scenario, model: &Model) -> Result<Model, ScenarioError> {
-    let mut model = model.clone();
-    if let Some(tool) = &scenario.tool {
-        let link = find_link(&model, "the tool", &tool.link)?;
-        let inertia = Inertia::new(tool.mass_kg, tool.com_m, tool.inertia_kgm2);
-        model.set_tool(link, inertia);
-    }
-    Ok(model)
-}
-
-fn trajectory(
-    spec: &RecordingSpec,
-    model: &Model,
-    joints: &[JointRange],
-    rng: ChaCha8Rng,
-) -> Result<Trajectory, ScenarioError> {
-    let motion = &spec.motion;
-    match (&motion.points, &motion.fourier, &motion.recorded) {
-        (Some(points), None, None) => {
-            let allowed = above(model.clone(), points.min_height_m);
-            let points = Points::new(points, joints, allowed, rng)?;
-            Ok(Trajectory::Points(Box::new(points)))
-        }
-        (None, Some(fourier), None) => Ok(Trajectory::Fourier(Fourier::new(
-            fourier,
-            joints,
-            spec.duration_s,
-            rng,
-        )?)),
-        (None, None, Some(recorded)) => Ok(Trajectory::Spline(read_motion(recorded, joints)?)),
-        (points, fourier, recorded) => Err(ScenarioError::OneMotion {
-            recording: spec.name.clone(),
-            found: usize::from(points.is_some())
-                + usize::from(fourier.is_some())
-                + usize::from(recorded.is_some()),
-        }),
-    }
-}
-
-/// Says of a position whether every moving link's frame is high enough.
-fn above(model: Model, min_height_m: Option<f64>) -> Allowed {
-    let Some(least_m) = min_height_m else {
-        return Box::new(|_| true);
-    };
-    let mut data = Data::new(&model);
-    Box::new(move |position| {
-        forward_kinematics(&model, &mut data, position);
-        model
-            .joints()
-            .iter()
-            .all(|joint| link_pose(&model, &data, joint.child_link).translation.z >= least_m)
-    })
-}
-
-/// The positions of a recording, seconds from its first.
-fn read_motion(
-    recorded: &RecordedMotionSpec,
-    joints: &[JointRange],
-) -> Result<Spline, ScenarioError> {
-    let file = FileConfig {
-        path: recorded.path.clone(),
-        topics: Topics {
-            state: recorded.topic.clone(),
-            ..Topics::default()
-        },
-    };
-    let setup = Setup {
-        joint_names: joints.iter().map(|joint| joint.name.clone()).collect(),
-        ..Setup::default()
-    };
-    let mut source = RecordedSource::open_file(&file, &Config::default(), &setup)
-        .map_err(|error| ScenarioError::Motion(Box::new(error)))?;
-    let (mut times_s, mut positions) = (Vec::new(), Vec::new());
-    let mut first_ns = None;
-    while let Some(sample) = source
-        .next_packed()
-        .map_err(|error| ScenarioError::Motion(Box::new(error)))?
-    {
-        let first_ns = *first_ns.get_or_insert(sample.header.stamp_ns);
-        let time_s = (sample.header.stamp_ns - first_ns) as f64 * 1e-9;
-        if times_s.last().is_none_or(|last| *last < time_s) {
-            times_s.push(time_s);
-            positions.push(sample.position);
-        }
-    }
-    Ok(Spline::new(times_s, positions, joints.len()))
 }

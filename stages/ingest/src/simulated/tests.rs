@@ -1,4 +1,6 @@
+mod conceal;
 mod files;
+mod layers;
 mod physics;
 mod sensing;
 

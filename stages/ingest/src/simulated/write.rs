@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use tauscope_archive::{Compression, McapWriter, Written, ros};
 use tauscope_dynamics::Model;
 
+use super::conceal;
 use super::error::ScenarioError;
 use super::labels::{Labels, RecordingLabels};
 use super::messages::CellMessages;
@@ -21,10 +22,13 @@ pub struct Simulated {
     pub labels_path: PathBuf,
     /// The labels themselves.
     pub labels: Labels,
+    /// Where it is written what was concealed, for a scenario that conceals.
+    pub concealed_path: Option<PathBuf>,
 }
 
 /// Makes every recording of the scenario in the folder `out`, `<name>.mcap` each with
-/// `/joint_states`, `/joint_commands` and `/contact`, and `labels.json`.
+/// `/joint_states`, `/joint_commands` and `/contact`, and `labels.json`; and, for a scenario that
+/// conceals, what it conceals as `concealed.json`.
 ///
 /// `provenance` is written into each file; `progress` is told how much is done, from 0 to 1, and by
 /// returning `false` ends the work: `None` comes back then, and the recording at hand stays a `.part`.
@@ -39,6 +43,8 @@ pub fn simulate(
     progress: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Option<Simulated>, ScenarioError> {
     check_names(scenario)?;
+    let (open, concealed) = conceal::add(scenario, model)?;
+    let scenario = &*open;
     // Everything is tried before anything is written.
     let simulations = (0..scenario.recordings.len())
         .map(|index| Simulation::new(scenario, model, index))
@@ -65,21 +71,34 @@ pub fn simulate(
         done_s += spec.duration_s;
     }
     let labels_path = out.join("labels.json");
-    let unwritable = |source: std::io::Error| ScenarioError::Labels {
-        path: labels_path.clone(),
-        source,
+    write_json(&labels_path, &labels)?;
+    let concealed_path = match concealed {
+        Some(concealed) => {
+            let path = out.join("concealed.json");
+            write_json(&path, &concealed)?;
+            Some(path)
+        }
+        None => None,
     };
-    let mut text = serde_json::to_vec_pretty(&labels).map_err(|error| unwritable(error.into()))?;
-    text.push(b'\n');
-    // Whole or not at all.
-    let part = out.join("labels.json.part");
-    std::fs::write(&part, text).map_err(unwritable)?;
-    std::fs::rename(&part, &labels_path).map_err(unwritable)?;
     Ok(Some(Simulated {
         recordings,
         labels_path,
         labels,
+        concealed_path,
     }))
+}
+
+/// Writes a file whole or not at all.
+fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), ScenarioError> {
+    let unwritable = |source: std::io::Error| ScenarioError::Labels {
+        path: path.to_owned(),
+        source,
+    };
+    let mut text = serde_json::to_vec_pretty(value).map_err(|error| unwritable(error.into()))?;
+    text.push(b'\n');
+    let part = path.with_extension("json.part");
+    std::fs::write(&part, text).map_err(unwritable)?;
+    std::fs::rename(&part, path).map_err(unwritable)
 }
 
 /// Each recording has a name of its own.

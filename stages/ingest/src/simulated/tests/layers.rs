@@ -1,0 +1,178 @@
+//! Every layer of physics: what is recorded is RNEA and the terms on the recorded motion.
+
+use tauscope_dynamics::terms::{MotionSample, Physics, TermSpec};
+use tauscope_dynamics::{Data, rnea};
+
+use super::*;
+
+/// Root mean square over joints and instants of what `terms` change, and of what the record differs from
+/// RNEA and the terms, which get the mean position and velocity of two readings and the acceleration
+/// between them.
+fn suffered(physics: &str) -> (f64, f64) {
+    let motion = "duration_s: 6, motion: {fourier: {period_s: 3}}";
+    let scenario = ideal(motion, &format!("physics: [{physics}],"));
+    let specs: Vec<TermSpec> = scenario.physics.clone();
+    let (model, mut data) = (arm(), Data::new(&arm()));
+    let mut physics = Physics::build(&specs, &model).unwrap();
+    let readings = readings(&scenario);
+    let (mut changed, mut wrong, mut count) = (0.0, 0.0, 0.0);
+    for (k, pair) in readings.windows(2).enumerate() {
+        let [now, next] = [&pair[0], &pair[1]];
+        let middle =
+            |a: &[f64], b: &[f64]| -> [f64; N] { std::array::from_fn(|j| 0.5 * (a[j] + b[j])) };
+        let position = middle(&now.position, &next.position);
+        let velocity = middle(&now.velocity, &next.velocity);
+        let acceleration: [f64; N] =
+            std::array::from_fn(|j| (next.velocity[j] - now.velocity[j]) * 1e3);
+        let rigid = rnea(&model, &mut data, &position, &velocity, &acceleration).to_vec();
+        let time_s = (k as f64 + 0.5) * 1e-3;
+        let at = MotionSample {
+            dt_s: if k == 0 { 0.0 } else { 1e-3 },
+            recording_s: time_s,
+            session_s: time_s,
+            position: &position,
+            velocity: &velocity,
+            acceleration: &acceleration,
+            transmitted: &rigid,
+        };
+        let mut expected = rigid.clone();
+        physics.act(&at, &mut expected);
+        let effort = middle(&now.effort, &next.effort);
+        // As the recording begins the drives are still finding their efforts.
+        if k < 1000 {
+            continue;
+        }
+        for j in 0..N {
+            changed += (expected[j] - rigid[j]).powi(2);
+            wrong += (effort[j] - expected[j]).powi(2);
+            count += 1.0;
+        }
+    }
+    ((changed / count).sqrt(), (wrong / count).sqrt())
+}
+
+/// What differences between readings of 1 kHz leave over without any physics \[N m\].
+const DISCRETE_NM: f64 = 0.015;
+
+/// The term is felt, and all but this share of what is felt is what the term says.
+fn agrees(physics: &str, share: f64) {
+    let (changed, wrong) = suffered(physics);
+    assert!(changed > 0.05, "{physics} is not felt: {changed}");
+    assert!(
+        wrong < share * changed + DISCRETE_NM,
+        "{physics}: {wrong} of {changed}"
+    );
+}
+
+const PAYLOAD: &str = "mass_kg: 1.2, com_x_m: 0.02, com_y_m: -0.03, com_z_m: 0.08, ixx_kgm2: 0.002, \
+                       iyy_kgm2: 0.003, izz_kgm2: 0.001";
+
+#[test]
+fn bodies_that_last() {
+    agrees(
+        &format!("{{effect: payload, parameters: {{{PAYLOAD}}}}}"),
+        0.02,
+    );
+    agrees(
+        "{effect: link_mass, link: link3, parameters: {delta_mass_kg: 0.8}}",
+        0.02,
+    );
+    agrees(
+        "{effect: link_com, link: link4, parameters: {delta_com_x_m: 0.03, delta_com_y_m: 0.02, \
+          delta_com_z_m: -0.04}}",
+        0.02,
+    );
+    agrees(
+        "{effect: base_tilt, parameters: {roll_rad: 0.1, pitch_rad: -0.05}}",
+        0.02,
+    );
+}
+
+#[test]
+fn bodies_that_come_and_go() {
+    agrees(
+        &format!(
+            "{{effect: payload_pickup, parameters: {{{PAYLOAD}, t_start_s: 2.0, t_end_s: 4.2}}}}"
+        ),
+        0.05,
+    );
+}
+
+#[test]
+fn forces_from_outside() {
+    agrees(
+        "{effect: external_push, link: link5, parameters: {force_x_n: 12, force_y_n: -8, force_z_n: 5, \
+          t_start_s: 2.5, t_end_s: 4}}",
+        0.05,
+    );
+    agrees(
+        "{effect: contact_wall, parameters: {stiffness_n_per_m: 1500, normal_x: 0, normal_y: 1, \
+          normal_z: 0, offset_m: 0.0}}",
+        0.05,
+    );
+}
+
+#[test]
+fn transmissions_that_give_way() {
+    agrees(
+        "{effect: joint_elasticity, joint: joint2, parameters: {stiffness_nm_per_rad: 900, \
+          rotor_inertia_kgm2: 0.15}}",
+        0.1,
+    );
+    agrees(
+        "{effect: backlash, joint: joint4, parameters: {gap_rad: 0.01, rotor_inertia_kgm2: 0.05}}",
+        0.5,
+    );
+}
+
+#[test]
+fn the_record() {
+    agrees(
+        "{effect: torque_gain, joint: joint2, parameters: {gain: 1.2}}",
+        0.02,
+    );
+    agrees(
+        "{effect: torque_bias, joint: joint4, parameters: {bias_nm: -1.5}}",
+        0.02,
+    );
+    agrees("{effect: torque_delay, parameters: {delay_s: 0.02}}", 0.02);
+    agrees("{effect: torque_lowpass, parameters: {cutoff_hz: 4}}", 0.02);
+    agrees(
+        "{effect: torque_saturation, joint: joint2, parameters: {limit_nm: 10}}",
+        0.02,
+    );
+    agrees(
+        "{effect: transmission_coupling, joint: joint6, source_joint: joint4, parameters: \
+          {coefficient: 0.2}}",
+        0.02,
+    );
+}
+
+#[test]
+fn all_layers_together() {
+    agrees(
+        &format!(
+            "{{effect: torque_gain, joint: joint2, parameters: {{gain: 1.1}}}}, \
+             {{effect: viscous_friction, joint: joint2, parameters: {{viscous_nms_per_rad: 4}}}}, \
+             {{effect: rotor_inertia, joint: joint3, parameters: {{inertia_kgm2: 0.4}}}}, \
+             {{effect: torque_delay, parameters: {{delay_s: 0.01}}}}, \
+             {{effect: payload, parameters: {{{PAYLOAD}}}}}"
+        ),
+        0.02,
+    );
+}
+
+#[test]
+fn a_joint_has_one_transmission() {
+    let two = ideal(
+        "duration_s: 1, motion: {fourier: {}}",
+        "physics: [{effect: joint_elasticity, joint: joint2, parameters: {stiffness_nm_per_rad: 900, \
+          rotor_inertia_kgm2: 0.1}}, {effect: backlash, joint: joint2, parameters: {gap_rad: 0.01, \
+          rotor_inertia_kgm2: 0.1}}],",
+    );
+    let error = Simulation::new(&two, &arm(), 0).unwrap_err().to_string();
+    assert!(
+        error.contains("joint `joint2` has more than one of"),
+        "{error}"
+    );
+}
