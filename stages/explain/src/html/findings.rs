@@ -4,6 +4,7 @@ use maud::{Markup, html};
 
 use super::chart::{Axis, r};
 use super::effects::{effect_at, effect_meaning, effect_title, place};
+use super::proof;
 use super::words::{almost_all, number_text, parameter, percent, value, with_digits_of};
 use crate::report::{Finding, Report, Verdict};
 
@@ -14,7 +15,13 @@ pub(super) fn cards(report: &Report) -> Option<Markup> {
     }
     Some(html! {
         @if report.findings.is_empty() {
-            p { "Nothing. What is left between the twin and the recordings is noise, as far as this data shows." }
+            p {
+                @if report.verdict == Verdict::NothingMissing && !proof::rows(report).iter().any(proof::Row::is_left) {
+                    "Nothing. What is left between the twin and the recordings is noise, as far as this data shows."
+                } @else {
+                    "Nothing was named."
+                }
+            }
         }
         @for (index, finding) in report.findings.iter().enumerate() {
             (card(index + 1, finding))

@@ -12,6 +12,9 @@ const ROWS: usize = 10;
 /// A joint at this many times its noise is as good as the noise.
 const QUIET: f64 = 1.3;
 
+/// A joint at more than this many times its noise has something left.
+const LEFT: f64 = 3.0;
+
 /// A joint's errors on held-out data \[effort unit\]; what is not known is not a number.
 #[derive(Debug, Clone)]
 pub(super) struct Row<'a> {
@@ -34,6 +37,11 @@ impl Row<'_> {
     /// Whether nothing but noise is left.
     pub fn is_quiet(&self) -> bool {
         self.over_noise() <= QUIET
+    }
+
+    /// Whether more than noise is left, by so much that it must be said.
+    pub fn is_left(&self) -> bool {
+        self.over_noise() > LEFT
     }
 
     /// Whether the correction made a difference that is worth a picture.
@@ -183,6 +191,17 @@ pub(super) fn before_and_after(report: &Report) -> Option<Markup> {
         return None;
     }
     let unit = effort_unit(&report.effort_unit);
+    let left: Vec<String> = rows
+        .iter()
+        .filter(|row| row.is_left())
+        .map(|row| {
+            format!(
+                "{} at {} its noise floor",
+                row.joint,
+                times(row.over_noise())
+            )
+        })
+        .collect();
     Some(html! {
         p.lead {
             "RMS of measured minus expected effort on held-out data, in " (unit)
@@ -190,7 +209,13 @@ pub(super) fn before_and_after(report: &Report) -> Option<Markup> {
             @if is_elsewhere(report) {
                 " What was found happened in other recordings and does not recur here, so little changes; see below, joint by joint."
             }
-            @if report.findings.is_empty() { " There is nothing to correct, so both are the same." }
+            @if report.findings.is_empty() { " Nothing was corrected, so both are the same." }
+        }
+        @if !left.is_empty() {
+            p.rival {
+                b { "More than noise is left: " }
+                (left.join(", ")) "."
+            }
         }
         p.legend {
             span.key.before { "Twin as it was" }
@@ -233,7 +258,7 @@ fn change(row: &Row<'_>) -> String {
 /// Two bars a joint. Where the joints are of very different strength each is drawn to its own scale, else the small
 /// ones could not be seen.
 fn bars(rows: &[Row<'_>], unit: &str) -> Markup {
-    const LEFT: f64 = 130.0;
+    const START: f64 = 130.0;
     const WIDTH: f64 = 640.0;
     const PITCH: f64 = 46.0;
     let largest = |row: &Row<'_>| {
@@ -260,12 +285,12 @@ fn bars(rows: &[Row<'_>], unit: &str) -> Markup {
                 @for (j, (row, largest)) in rows.iter().zip(&all).enumerate() {
                     @let y = PITCH * j as f64 + 4.0;
                     @let scale = if own_scale { *largest } else { top };
-                    @let noise_px = LEFT + width(row.noise, scale);
-                    text.joint.end x=(r(LEFT - 12.0)) y=(r(y + 23.0)) { (short(row.joint)) }
+                    @let noise_px = START + width(row.noise, scale);
+                    text.joint.end x=(r(START - 12.0)) y=(r(y + 23.0)) { (short(row.joint)) }
                     @for (class, value, y) in [("before", row.before, y), ("after", row.after, y + 19.0)] {
-                        rect class=(class) x=(r(LEFT)) y=(r(y)) width=(r(width(value, scale).max(1.0))) height="16" rx="2" {}
+                        rect class=(class) x=(r(START)) y=(r(y)) width=(r(width(value, scale).max(1.0))) height="16" rx="2" {}
                         @if value.is_finite() {
-                            text.amount x=(r(LEFT + width(value, scale).max(width(row.noise, scale)) + 8.0)) y=(r(y + 12.5)) {
+                            text.amount x=(r(START + width(value, scale).max(width(row.noise, scale)) + 8.0)) y=(r(y + 12.5)) {
                                 (number_text(value)) " " (unit)
                             }
                         }

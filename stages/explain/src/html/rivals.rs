@@ -6,6 +6,7 @@ use maud::{Markup, html};
 
 use super::effects::{effect_at, effect_title, place};
 use super::findings::list;
+use super::proof;
 use super::words::{number_text, parameter};
 use crate::report::{NextMotion, Rejected, Report, Undetectable, Verdict};
 
@@ -54,6 +55,9 @@ fn place_or_all(joint: Option<&str>, link: Option<&str>) -> String {
 pub(super) fn next(report: &Report) -> Option<Markup> {
     if report.next_motions.is_empty() {
         let undecided = report.findings.iter().any(|f| !f.equivalent_to.is_empty());
+        if proof::rows(report).iter().any(proof::Row::is_left) {
+            return None;
+        }
         let text = match report.verdict {
             Verdict::Explained if !undecided => {
                 "Nothing more is needed to name what was found: no rival is left that this data could not tell apart."

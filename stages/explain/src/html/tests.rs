@@ -227,6 +227,16 @@ fn every_verdict_makes_a_page() {
 }
 
 #[test]
+fn what_is_left_is_said_whatever_the_verdict() {
+    let mut report = empty(Verdict::NothingMissing);
+    report.holdout_rms_after = vec![0.1, 2.0];
+    let page = page(&report, &[], &provenance());
+    assert!(page.contains("joint2 at 20 × its noise floor"));
+    assert!(page.contains("Nothing was named."));
+    assert!(!page.contains("is noise, as far as this data shows"));
+}
+
+#[test]
 fn what_is_no_number_does_not_show() {
     let nan = f64::NAN;
     let mut report = full();

@@ -34,6 +34,7 @@ pub(super) fn joints(report: &Report, pictures: &[RecordingPicture]) -> Option<M
     order.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
     let of_interest = |row: &Row<'_>| {
         row.is_changed()
+            || row.is_left()
             || named_at(report, row.joint).next().is_some()
             || eventful(report, pictures, row.joint).is_some()
     };
