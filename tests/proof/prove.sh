@@ -1,0 +1,13 @@
+#!/usr/bin/env bash
+# Explains every case of the committed set (or of the set given) and prints the table of docs/proof.md.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+set=${1:-tests/proof/set}
+out=${2:-out/proof}
+(cd tests/proof/set && sha256sum --check --quiet answers.sha256)
+cargo build --release --quiet
+for case in "$set"/cases/*/case.yaml; do
+    name=$(basename "$(dirname "$case")")
+    cargo run --release --quiet -- explain "$case" --out "$out/$name" >/dev/null
+done
+python3 tests/proof/table.py "$set/answers.json" "$out"
