@@ -334,6 +334,7 @@ impl Setup<'_> {
 
     fn proof(&self, problem: &Problem, scaled: &Fit, found: &Fit) -> Result<Proof, TermError> {
         let n = self.unit_nm.len();
+        let names: Vec<&str> = self.input.model.joint_names().collect();
         let smoothing_hz = self.best_smoothing(problem, found)?;
         let (mut before, mut after, mut count) = (vec![0.0; n], vec![0.0; n], 0.0);
         let (mut predictions, mut pictures) = (Vec::new(), Vec::new());
@@ -356,7 +357,7 @@ impl Setup<'_> {
                 predictions.push((recording.name.clone(), rows.collect()));
             }
             if !recording.effort.is_empty() {
-                pictures.push(picture(recording, held_out, &track, &rigid, &predicted));
+                pictures.push(picture(&names, recording, held_out, &track, &rigid, &predicted));
             }
         }
         let rms = |sums: Vec<f64>| sums.iter().map(|s| (s / count).sqrt()).collect();
@@ -390,6 +391,7 @@ impl Setup<'_> {
 }
 
 fn picture(
+    names: &[&str],
     recording: &Recording,
     held_out: bool,
     track: &Track,
@@ -398,12 +400,12 @@ fn picture(
 ) -> RecordingPicture {
     let n = before.len() / track.len().max(1);
     let stride = track.len().div_ceil(PICTURE_SAMPLES).max(1);
-    let joint = |j: usize| {
+    let joint = |j: usize, name: &str| {
         let thin = |values: &[f64]| -> Vec<f64> {
             (0..track.len()).step_by(stride).map(|k| values[k * n + j]).collect()
         };
         JointPicture {
-            joint: String::new(),
+            joint: name.to_owned(),
             time_s: track.time_s.iter().step_by(stride).copied().collect(),
             position: thin(&track.position),
             velocity: thin(&track.velocity),
@@ -416,6 +418,6 @@ fn picture(
         recording: recording.name.clone(),
         held_out,
         start_ns: recording.start_ns,
-        joints: (0..n).map(joint).collect(),
+        joints: names.iter().enumerate().map(|(j, name)| joint(j, name)).collect(),
     }
 }

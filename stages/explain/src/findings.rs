@@ -22,6 +22,8 @@ const TIE: f64 = 5.0;
 const TIE_SHARE: f64 = 0.01;
 /// How many rivals of a finding are refined, and how many are told.
 const RIVALS: usize = 5;
+/// A time that is known no better than this has no interval \[s\].
+const VAGUE_S: f64 = 5.0;
 /// A known scale needs at least this many times its own deviation.
 const KNOWN_SCALE: f64 = 5.0;
 
@@ -74,7 +76,7 @@ fn rival(input: &Input, joints: &[String], hypothesis: &Hypothesis) -> Rival {
 /// Names everything in `found`.
 pub fn of(search: &Search<'_>, found: &Explanation, before: &Fit, input: &Input, joints: &[String]) -> Named {
     let fit = &found.fit;
-    let efficiency = fit.efficiency(search.problem);
+    let efficiency = &search.problem.worth;
     let spread = covariance(search.problem, fit);
     let total = mismatch(before, fit, before);
     let mut named = Named {
@@ -91,14 +93,16 @@ pub fn of(search: &Search<'_>, found: &Explanation, before: &Fit, input: &Input,
             continue;
         }
         let less = search.less(found, index);
-        let evidence = found.ahead_of(&less, &efficiency);
+        let evidence = found.ahead_of(&less, efficiency);
         let contest = contest(search, found, &less, active);
         let (mut parameters, mut intervals) = (BTreeMap::new(), BTreeMap::new());
         let effect = active.hypothesis.effect;
         let values = active.parameters();
         for ((parameter, value), deviation) in effect.parameters.iter().zip(&values).zip(&deviations) {
             parameters.insert(parameter.name.to_owned(), number(*value));
-            if deviation.is_finite() {
+            // A change between two recordings has no sharper time than that.
+            let vague = parameter.name.contains("time") && *deviation > VAGUE_S;
+            if deviation.is_finite() && !vague {
                 let half = HALF_WIDTH_95 * deviation;
                 let low = (value - half).max(parameter.minimum);
                 intervals.insert(parameter.name.to_owned(), [low, value + half]);
@@ -239,13 +243,13 @@ fn contest(search: &Search<'_>, found: &Explanation, less: &Explanation, active:
     if active.curve.is_some() {
         return result;
     }
-    let efficiency = found.fit.efficiency(search.problem);
-    let evidence = found.ahead_of(less, &efficiency);
+    let efficiency = &search.problem.worth;
+    let evidence = found.ahead_of(less, efficiency);
     let proposals = search.rivals(&less.fit, &found.fit, active);
     let rivals = proposals.iter().filter(|p| p.active.hypothesis != active.hypothesis && p.evidence() > 0.0);
     for proposal in rivals.take(RIVALS) {
         let other = search.joined(less, proposal);
-        let behind = found.ahead_of(&other, &efficiency);
+        let behind = found.ahead_of(&other, efficiency);
         let hypothesis = proposal.active.hypothesis;
         if behind < TIE.max(TIE_SHARE * evidence) {
             result.ties.push(hypothesis);

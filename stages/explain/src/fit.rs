@@ -10,13 +10,6 @@ use crate::problem::Problem;
 const MAX_ITERATIONS: usize = 12;
 /// A step that gains less log-likelihood than this is the last.
 const CONVERGED: f64 = 1e-3;
-/// A row is worth at least this share of an independent sample.
-const LEAST_EFFICIENCY: f64 = 0.03;
-/// Rows of a stretch whose correlation is told by itself.
-const STRETCH_ROWS: usize = 20;
-/// Which of the stretches counts, and how far below the middle it is expected.
-const CALM: f64 = 0.3;
-const CALM_BIAS: f64 = 0.12;
 /// Step of the difference quotient of a time \[s\].
 const TIME_STEP_S: f64 = 0.01;
 
@@ -63,40 +56,6 @@ impl Fit {
     /// The joints whose effort a piece of physics changes: one, or all.
     pub fn joints_of(hypothesis: &Hypothesis, joints: usize) -> Vec<usize> {
         hypothesis.only_joint().map_or_else(|| (0..joints).collect(), |joint| vec![joint])
-    }
-
-    /// By joint, how many independent samples one row of what is left is worth: `(1 - r) / (1 + r)` with r the
-    /// correlation of neighbours, as for a first-order autoregression. It is that of the calmer stretches: what is left
-    /// of a push or of a worn place, and has yet to be named, does not make noise of the rest.
-    pub fn efficiency(&self, problem: &Problem) -> Vec<f64> {
-        (0..problem.joints)
-            .map(|j| {
-                let first = j * problem.rows;
-                let mut stretches: Vec<f64> = Vec::new();
-                for track in &problem.tracks {
-                    let rows: Vec<usize> = track.rows().collect();
-                    for stretch in rows.chunks(STRETCH_ROWS) {
-                        let (mut product, mut square, mut pairs) = (0.0, 0.0, 0);
-                        for pair in stretch.windows(2) {
-                            let (a, b) = (first + pair[0], first + pair[1]);
-                            if problem.weight[a] > 0.0 && problem.weight[b] > 0.0 {
-                                let (a, b) = (self.residual[a], self.residual[b]);
-                                product += a * b;
-                                square += 0.5 * (a * a + b * b);
-                                pairs += 1;
-                            }
-                        }
-                        if pairs >= STRETCH_ROWS / 2 && square > 0.0 {
-                            stretches.push(product / square);
-                        }
-                    }
-                }
-                stretches.sort_by(f64::total_cmp);
-                let calm = stretches.get((CALM * stretches.len() as f64) as usize);
-                let r = calm.map_or(0.0, |r| (r + CALM_BIAS).clamp(0.0, 1.0));
-                ((1.0 - r) / (1.0 + r)).clamp(LEAST_EFFICIENCY, 1.0)
-            })
-            .collect()
     }
 
     /// Gain of log-likelihood from another fit to this, samples weighted by their `efficiency`.

@@ -25,6 +25,7 @@ mod wall;
 pub mod watch;
 pub mod windows;
 mod words;
+mod worth;
 
 pub use explain::{Input, Outcome, Start, explain};
 pub use recording::{Recording, RecordingError, RecordingTopics};

@@ -7,6 +7,7 @@ use crate::active::ColumnCache;
 use crate::recording::{MAX_GAP_S, Recording};
 use crate::smoother::{LowPass, MotionSmoother};
 use crate::standstill;
+use crate::worth::worth;
 
 /// What is compared lies below this frequency, unless the recordings are too slow for it \[Hz\].
 const CUTOFF_HZ: f64 = 8.0;
@@ -206,6 +207,8 @@ pub struct Problem {
     pub largest_effort: Vec<f64>,
     /// Half amplitude of the filter \[Hz\].
     pub cutoff_hz: f64,
+    /// Independent samples that a row of noise is worth, by joint.
+    pub worth: Vec<f64>,
     /// Columns that were computed before.
     pub cache: ColumnCache,
 }
@@ -244,6 +247,7 @@ impl Problem {
             white_noise: vec![0.0; n],
             largest_effort: vec![0.0; n],
             cutoff_hz,
+            worth: Vec::new(),
             cache: ColumnCache::default(),
         };
         let (mut measured, mut weight) = (Vec::new(), Vec::new());
@@ -296,6 +300,7 @@ impl Problem {
             variances[j].sort_by(f64::total_cmp);
             problem.white_noise[j] = variances[j][variances[j].len() / 2].sqrt();
         }
+        problem.worth = worth(&problem);
         problem
     }
 

@@ -11,6 +11,9 @@ use crate::problem::Problem;
 /// Steps of a shape of all joints.
 const MOST_STEPS_OF_ALL: usize = 12;
 
+/// How often the step of a grid is halved about its best value.
+const HALVINGS: usize = 4;
+
 /// A hypothesis with numbers, and how it compares with leaving it out.
 #[derive(Debug, Clone)]
 pub struct Proposal {
@@ -204,6 +207,40 @@ impl<'a> Base<'a> {
                 best = Some(proposal);
             }
         }
+        best.map(|best| self.sharpened(hypothesis, best))
+    }
+
+    /// Halves the grid's step about the best value of a single shape a few times, so that rivals are compared at their
+    /// best.
+    fn sharpened(&self, hypothesis: Hypothesis, mut best: Proposal) -> Proposal {
+        let shapes: Vec<usize> = (0..hypothesis.effect.coordinates.len())
+            .filter(|&c| matches!(hypothesis.effect.coordinates[c].kind, CoordinateKind::Shape { .. }))
+            .collect();
+        let ([c], true) = (&shapes[..], best.evidence() > 0.0) else { return best };
+        let grid: Vec<f64> = shapes_of(self.problem, hypothesis, *c);
+        let at = grid.iter().position(|x| *x == best.active.coordinates[*c]).unwrap_or(0);
+        let (mut below, mut above) =
+            (grid[at.saturating_sub(1)], grid[(at + 1).min(grid.len() - 1)]);
+        for _ in 0..HALVINGS {
+            let centre = best.active.coordinates[*c];
+            let (left, right) = (0.5 * (below + centre), 0.5 * (centre + above));
+            let mut moved = false;
+            for value in [left, right] {
+                let mut shape = vec![0.0; hypothesis.effect.coordinates.len()];
+                shape[*c] = value;
+                if let Some(proposal) = self.propose_at(hypothesis, &shape)
+                    && proposal.gain > best.gain
+                {
+                    best = proposal;
+                    (below, above) = if value < centre { (below, centre) } else { (centre, above) };
+                    moved = true;
+                    break;
+                }
+            }
+            if !moved {
+                (below, above) = (left, right);
+            }
+        }
         best
     }
 
@@ -243,6 +280,11 @@ impl<'a> Base<'a> {
             size,
         })
     }
+}
+
+/// The values of one shape in the grid of a hypothesis.
+fn shapes_of(problem: &Problem, hypothesis: Hypothesis, coordinate: usize) -> Vec<f64> {
+    shapes(problem, hypothesis).iter().map(|shape| shape[coordinate]).collect()
 }
 
 /// The grid of a hypothesis' shapes; factors are 0 in it.

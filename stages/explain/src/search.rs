@@ -14,6 +14,7 @@ use crate::fit::Fit;
 use crate::least_squares::Products;
 use crate::problem::Problem;
 use crate::propose::{Base, Proposal};
+use crate::unknown;
 use crate::windows::{TimeKind, time_kind};
 
 /// Evidence that a piece of physics needs \[nats\].
@@ -34,6 +35,10 @@ const CURVE_EXCESS: f64 = 1.6;
 const CURVE_SIZE: f64 = 1.35;
 /// How many proposals of a round are refined before one is taken.
 const REFINED: usize = 3;
+/// Evidence that needs no account of correlation, if rows counted in full \[nats\].
+const OVERWHELMING: f64 = 40.0;
+/// And what is left over what is then left.
+const FAIR_SHARE: f64 = 1.3;
 /// A rival may gain this much less to first order than what it is to replace.
 const COULD_DO_BETTER: f64 = 0.85;
 /// A change of friction smaller than this share of it is what friction does from day to day.
@@ -53,10 +58,10 @@ pub struct Explanation {
 }
 
 impl Explanation {
-    /// Evidence for this rather than another \[nats\], rows weighted by their `efficiency`.
-    pub fn ahead_of(&self, other: &Self, efficiency: &[f64]) -> f64 {
+    /// Evidence for this rather than another \[nats\], rows weighted by their `worth`.
+    pub fn ahead_of(&self, other: &Self, worth: &[f64]) -> f64 {
         let penalty = |e: &Self| e.penalties.iter().sum::<f64>();
-        self.fit.gain_over(&other.fit, efficiency) - penalty(self) + penalty(other)
+        self.fit.gain_over(&other.fit, worth) - penalty(self) + penalty(other)
     }
 }
 
@@ -92,9 +97,9 @@ impl Search<'_> {
     fn named(&self, mut best: Explanation) -> Explanation {
         loop {
             best = self.forward(best);
-            let efficiency = best.fit.efficiency(self.problem);
+            let worth = &self.problem.worth;
             let exchanged = self.exchange(best.clone());
-            if exchanged.ahead_of(&best, &efficiency) <= 0.5 {
+            if exchanged.ahead_of(&best, worth) <= 0.5 {
                 return exchanged;
             }
             best = exchanged;
@@ -116,12 +121,17 @@ impl Search<'_> {
         if own.iter().any(|&i| best.fit.actives[i].curve.is_some()) {
             return None;
         }
-        let efficiency = best.fit.efficiency(self.problem);
+        // What it explains must be much, so that its rows may count in full.
+        let white = vec![1.0; self.problem.joints];
         let with = |from: &Explanation| {
             let base = Base::new(self.problem, &from.fit, self.hypotheses.len());
             let curve = base.propose_curve(joint)?;
             let fit = from.fit.with(self.problem, curve.active);
-            let fit = fit.refined_at(self.problem, Some(&[joint]));
+            let mut actives = fit.refined_at(self.problem, Some(&[joint])).actives;
+            if let Some(curve) = actives.last_mut() {
+                unknown::keep_what_is_evident(curve);
+            }
+            let fit = Fit::new(self.problem, actives);
             let mut penalties = from.penalties.clone();
             penalties.push(curve.penalty);
             Some(Explanation { fit, penalties })
@@ -135,7 +145,7 @@ impl Search<'_> {
             bare.fit = Fit::new(self.problem, bare.fit.actives);
             bare.fit = bare.fit.refined_at(self.problem, Some(&[joint]));
             if let Some(instead) = with(&bare)
-                && instead.ahead_of(best, &efficiency) > CURVE_EVIDENCE
+                && instead.ahead_of(best, &white) > CURVE_EVIDENCE
             {
                 return Some(instead);
             }
@@ -145,7 +155,7 @@ impl Search<'_> {
         }
         let beside = with(best)?;
         let less = best.fit.variance[joint] / beside.fit.variance[joint];
-        (beside.ahead_of(best, &efficiency) > CURVE_EVIDENCE && less > CURVE_SIZE).then_some(beside)
+        (beside.ahead_of(best, &white) > CURVE_EVIDENCE && less > CURVE_SIZE).then_some(beside)
     }
 
     /// Every hypothesis that could change the effort of one of `joints`, beside what `fit` holds, most evidence
@@ -244,8 +254,8 @@ impl Search<'_> {
             (self.say)(&format!("+ {}", describe(&next)));
             let new = next.fit.actives.last().map(|active| active.hypothesis);
             let next = self.pruned(next);
-            let efficiency = next.fit.efficiency(self.problem);
-            if next.ahead_of(&best, &efficiency) < LEAST_EVIDENCE {
+            let worth = &self.problem.worth;
+            if next.ahead_of(&best, worth) < LEAST_EVIDENCE {
                 barred.extend(new);
             } else {
                 best = next;
@@ -254,27 +264,25 @@ impl Search<'_> {
         best
     }
 
-    /// The best explanation with one of the proposals, if there is evidence enough for any: counted by what rows are
-    /// worth once it is in.
+    /// The best explanation with one of the proposals, if there is evidence enough for any.
     fn best_of(&self, now: &Explanation, proposals: &[Proposal]) -> Option<Explanation> {
-        let mut best: Option<(Explanation, Vec<f64>)> = None;
+        let mut best: Option<Explanation> = None;
+        let worth = &self.problem.worth;
         let worthy = proposals.iter().filter(|p| {
             let (evidence, size) = needs(p.active.hypothesis, &now.fit);
             p.evidence() > evidence && p.size > size && steps_enough(&p.active)
         });
         for proposal in worthy.take(REFINED) {
             let next = self.joined(now, proposal);
-            let efficiency = next.fit.efficiency(self.problem);
             let (evidence, _) = needs(proposal.active.hypothesis, &now.fit);
-            if next.ahead_of(now, &efficiency) < evidence {
+            if next.ahead_of(now, worth) < evidence && !overwhelming(&next, now) {
                 continue;
             }
-            let better = |(best, worth): &(Explanation, Vec<f64>)| next.ahead_of(best, worth) > 0.0;
-            if best.as_ref().is_none_or(better) {
-                best = Some((next, efficiency));
+            if best.as_ref().is_none_or(|best| next.ahead_of(best, worth) > 0.0) {
+                best = Some(next);
             }
         }
-        best.map(|(best, _)| best)
+        best
     }
 
     /// An explanation with a proposal, refined where it touches.
@@ -305,8 +313,10 @@ impl Search<'_> {
                     None => needs(active.hypothesis, &best.fit),
                 };
                 let hardly_steps = !steps_enough(active);
-                let efficiency = best.fit.efficiency(self.problem);
-                if hardly_steps || best.ahead_of(&less, &efficiency) < evidence || size < least {
+                let worth = &self.problem.worth;
+                let weak =
+                    best.ahead_of(&less, worth) < evidence && !overwhelming(&best, &less);
+                if hardly_steps || weak || size < least {
                     (self.say)(&format!("- {}", best.fit.actives[index].hypothesis.effect.name));
                     best = less;
                     continue 'again;
@@ -319,12 +329,12 @@ impl Search<'_> {
     /// Which pieces are beyond doubt by their own numbers, to first order: Wald's test, with much to spare.
     fn sure(&self, fit: &Fit) -> Vec<bool> {
         let wald = wald(self.problem, fit);
-        let efficiency = fit.efficiency(self.problem);
+        let worth = &self.problem.worth;
         let each = fit.actives.iter().zip(wald);
         each.map(|(active, chi_square)| {
             let joints = Fit::joints_of(&active.hypothesis, self.problem.joints);
             let rows: f64 = joints.iter().map(|&j| fit.count[j]).sum();
-            let worth = joints.iter().map(|&j| efficiency[j]).fold(1.0, f64::min);
+            let worth = joints.iter().map(|&j| worth[j]).fold(1.0, f64::min);
             let (evidence, size) = needs(active.hypothesis, fit);
             steps_enough(active)
                 && active.curve.is_none()
@@ -368,13 +378,13 @@ impl Search<'_> {
             }
             let without = self.less(&best, index);
             let proposals = self.rivals(&without.fit, &best.fit, &best.fit.actives[index]);
-            let efficiency = best.fit.efficiency(self.problem);
+            let worth = &self.problem.worth;
             if let Some(other) = self.rival_of(&best, &without, &proposals)
-                && other.ahead_of(&best, &efficiency) > 0.5
+                && other.ahead_of(&best, worth) > 0.5
             {
                 (self.say)(&format!("= {}", describe(&other)));
                 let other = self.pruned(other);
-                if other.ahead_of(&best, &efficiency) > 0.5 {
+                if other.ahead_of(&best, worth) > 0.5 {
                     best = other;
                     index = 0;
                     continue;
@@ -392,13 +402,13 @@ impl Search<'_> {
             if joint(a, &best).is_some() && joint(a, &best) == joint(b, &best) {
                 let without = self.less(&self.less(&best, b), a);
                 let proposals = self.rivals(&without.fit, &best.fit, &best.fit.actives[a]);
-                let efficiency = best.fit.efficiency(self.problem);
+                let worth = &self.problem.worth;
                 if let Some(other) = self.rival_of(&best, &without, &proposals)
-                    && other.ahead_of(&best, &efficiency) > 0.5
+                    && other.ahead_of(&best, worth) > 0.5
                 {
                     (self.say)(&format!("== {}", describe(&other)));
                     let other = self.pruned(other);
-                    if other.ahead_of(&best, &efficiency) > 0.5 {
+                    if other.ahead_of(&best, worth) > 0.5 {
                         best = other;
                         pair = (0, 1);
                         continue;
@@ -412,6 +422,15 @@ impl Search<'_> {
         }
         best
     }
+}
+
+/// Whether an explanation takes away a fair share of what another leaves at some joint, with much evidence if rows counted
+/// in full: however correlated the rest is, that much is no chance.
+fn overwhelming(explanation: &Explanation, other: &Explanation) -> bool {
+    let white = vec![1.0; other.fit.variance.len()];
+    let less = |(with, without): (&f64, &f64)| *without > FAIR_SHARE * with;
+    explanation.ahead_of(other, &white) > OVERWHELMING
+        && explanation.fit.variance.iter().zip(&other.fit.variance).any(less)
 }
 
 /// By piece, the square of its factors in units of their covariance, as if what is left were white.

@@ -8,6 +8,8 @@ use crate::propose::Base;
 
 /// Knots of a curve.
 const KNOTS: usize = 10;
+/// A value of a curve below this share of its largest is taken for zero.
+const EVIDENT: f64 = 0.2;
 
 /// A curve in a joint, and what it gains.
 #[derive(Debug, Clone)]
@@ -71,6 +73,17 @@ impl Base<'_> {
             penalty: self.penalty(knots, Some(joint)),
             size,
         })
+    }
+}
+
+/// Sets the small values of a curve to zero: they are what is left of noise, and where the curve ends they would be held
+/// for ever.
+pub fn keep_what_is_evident(curve: &mut Active) {
+    let largest = curve.coordinates.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    for value in &mut curve.coordinates {
+        if value.abs() < EVIDENT * largest {
+            *value = 0.0;
+        }
     }
 }
 
