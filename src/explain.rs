@@ -3,6 +3,7 @@
 
 mod input;
 mod output;
+mod picture;
 mod read;
 mod robot;
 mod twin;

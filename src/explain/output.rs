@@ -9,11 +9,12 @@ use tauscope_explain::{Outcome, html};
 
 use super::input::Request;
 use super::read::Kept;
-use super::{provenance_of, robot, twin, write_whole};
+use super::{picture, provenance_of, robot, twin, write_whole};
 use crate::exit::Failure;
 use crate::report::{Problem, Report};
 
 const PAGE: &str = "report.html";
+const PICTURE: &str = "explain.rrd";
 const REPORT: &str = "report.json";
 const TWIN: &str = "twin.yaml";
 const ROBOT: &str = "robot.urdf";
@@ -46,7 +47,7 @@ pub fn prepare(out: &Path, request: &Request) -> Result<(), Failure> {
     }
     report.into_result(())?;
     if out.join(REPORT).is_file() {
-        for name in [REPORT, PAGE, TWIN, ROBOT] {
+        for name in [REPORT, PAGE, TWIN, ROBOT, PICTURE] {
             // One that is not there need not be removed; one that cannot be is found when it is written.
             let _ = std::fs::remove_file(out.join(name));
         }
@@ -108,6 +109,10 @@ pub fn write(
         if let Some(urdf) = robot_text(request, kept, outcome, &mut made) {
             put(ROBOT, &urdf, &mut made)?;
         }
+        let path = out.join(PICTURE);
+        let shown = picture::of(&outcome.report, &outcome.pictures, kept);
+        tauscope_record::write_explanation(&path, &shown).context("the picture")?;
+        made.files.push(path);
     }
     made.files.append(&mut predictions);
     Ok(made)

@@ -1,0 +1,75 @@
+//! `explain.rrd`: the same as the page, for the Rerun viewer.
+
+use tauscope_explain::report::{Finding, JointPicture, RecordingPicture, Report};
+use tauscope_record::{ExplainedEvent, ExplainedJoint, ExplainedRecording, Explanation};
+
+use super::read::Kept;
+
+/// What the picture shows.
+pub fn of(report: &Report, pictures: &[RecordingPicture], kept: &Kept) -> Explanation {
+    let events = report
+        .findings
+        .iter()
+        .filter_map(|finding| event(finding, kept));
+    Explanation {
+        case: report.case.clone(),
+        effort_unit: report.effort_unit.clone(),
+        text_markdown: text(report),
+        recordings: pictures.iter().map(recording).collect(),
+        events: events.collect(),
+    }
+}
+
+fn recording(picture: &RecordingPicture) -> ExplainedRecording {
+    let joint = |joint: &JointPicture| ExplainedJoint {
+        name: joint.joint.clone(),
+        time_s: joint.time_s.clone(),
+        measured: joint.measured.clone(),
+        twin: joint.before.clone(),
+        corrected: joint.after.clone(),
+    };
+    ExplainedRecording {
+        name: picture.recording.clone(),
+        held_out: picture.held_out,
+        start_ns: picture.start_ns,
+        joints: picture.joints.iter().map(joint).collect(),
+    }
+}
+
+/// Times without an end count from the start of the session: the recording is the one they fall into.
+fn event(finding: &Finding, kept: &Kept) -> Option<ExplainedEvent> {
+    let mut start_s = finding.t_start?;
+    let mut recording = finding.recording.clone();
+    if finding.t_end.is_none() && recording.is_none() {
+        let before = kept
+            .begins_s
+            .iter()
+            .filter(|(_, begins_s)| **begins_s <= start_s);
+        let (name, begins_s) = before.max_by(|a, b| a.1.total_cmp(b.1))?;
+        recording = Some(name.clone());
+        start_s -= begins_s;
+    }
+    let place = finding.joint.as_ref().or(finding.link.as_ref());
+    let label = match place {
+        Some(place) => format!("{} at {place}", finding.effect),
+        None => finding.effect.clone(),
+    };
+    Some(ExplainedEvent {
+        recording,
+        start_s,
+        end_s: finding.t_end,
+        label,
+        sentence: finding.sentence.clone(),
+    })
+}
+
+fn text(report: &Report) -> String {
+    let mut text = format!("# {}\n\n{}\n", report.case, report.summary);
+    for finding in &report.findings {
+        text.push_str(&format!("\n- {}", finding.sentence));
+    }
+    for note in &report.notes {
+        text.push_str(&format!("\n\n{note}"));
+    }
+    text
+}

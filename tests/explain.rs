@@ -1,0 +1,509 @@
+//! `tauscope explain` through the program: what it says of arms whose secrets are known, what it leaves
+//! behind, and what it makes of bad input.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+mod common;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use common::{Out, root, tauscope, write};
+use serde_json::Value;
+use tauscope_archive::ros::JointState;
+use tauscope_archive::{Compression, McapWriter, Recording};
+
+const STATES: &str = "/joint_states";
+
+/// A case of the small set, made by another engine.
+fn case(name: &str) -> PathBuf {
+    root().join("tests/proof/set/cases").join(name)
+}
+
+fn robot(name: &str) -> PathBuf {
+    let file = format!("tests/proof/set/robots/{name}.urdf");
+    root().join(file)
+}
+
+/// `tauscope explain` with these arguments, its results in `out`.
+fn explain(out: &Path, arguments: &[&str]) -> Out {
+    let mut command = tauscope();
+    command.arg("explain").args(arguments).arg("--out").arg(out);
+    Out::of(command)
+}
+
+/// The same of a case file.
+fn explain_case(out: &Path, case: &Path) -> Out {
+    explain(out, &[case.to_str().unwrap()])
+}
+
+fn report(out: &Path) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(out.join("report.json")).unwrap()).unwrap()
+}
+
+/// Effect and place of every finding.
+fn named(report: &Value) -> Vec<(String, String)> {
+    let text = |value: &Value| value.as_str().map(str::to_owned);
+    let mut all: Vec<_> = report["findings"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|finding| {
+            let place = text(&finding["joint"]).or_else(|| text(&finding["link"]));
+            (text(&finding["effect"]).unwrap(), place.unwrap_or_default())
+        })
+        .collect();
+    all.sort();
+    all
+}
+
+fn pair(effect: &str, place: &str) -> (String, String) {
+    (effect.to_owned(), place.to_owned())
+}
+
+/// Every joint state of a recording with its log time [ns].
+fn states(recording: &Path) -> Vec<(i64, JointState)> {
+    let recording = Recording::open(recording).unwrap();
+    let mut states = recording.joint_states(STATES).unwrap();
+    let mut all = Vec::new();
+    while let Some(state) = states.next_state() {
+        let state = state.unwrap();
+        all.push((state.log_time_ns, state.message.clone()));
+    }
+    all
+}
+
+/// Writes topics of joint states.
+fn record(path: &Path, topics: &[(&str, &[(i64, JointState)])]) {
+    let mut writer = McapWriter::create(path, Compression::None, &BTreeMap::new()).unwrap();
+    for (name, states) in topics {
+        let topic = writer.add_topic::<JointState>(name).unwrap();
+        for (log_ns, state) in *states {
+            writer.write(topic, *log_ns, *log_ns, state).unwrap();
+        }
+    }
+    writer.finish().unwrap();
+}
+
+/// A copy of `name`'s case in `folder` with every row of the recordings in `which` changed; all of them if
+/// that is empty. The function is told the number of the row.
+fn changed(
+    folder: &Path,
+    name: &str,
+    which: &[&str],
+    change: impl Fn(usize, &mut JointState),
+) -> PathBuf {
+    let from = case(name);
+    for entry in std::fs::read_dir(&from).unwrap() {
+        let path = entry.unwrap().path();
+        let to = folder.join(path.file_name().unwrap());
+        let stem = path.file_stem().unwrap().to_str().unwrap().to_owned();
+        if path.extension().is_none_or(|ending| ending != "mcap") {
+            continue;
+        }
+        if which.is_empty() || which.contains(&stem.as_str()) {
+            let mut states = states(&path);
+            for (row, (_, state)) in states.iter_mut().enumerate() {
+                change(row, state);
+            }
+            record(&to, &[(STATES, &states)]);
+        } else {
+            std::fs::copy(&path, &to).unwrap();
+        }
+    }
+    let text = std::fs::read_to_string(from.join("case.yaml")).unwrap();
+    let robots = root().join("tests/proof/set/robots");
+    let text = text.replace("../../robots", robots.to_str().unwrap());
+    write(&folder.join("case.yaml"), &text)
+}
+
+#[test]
+fn a_viscous_joint_is_named_and_everything_is_left_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let done = explain_case(&out, &case("m01/case.yaml"));
+    assert_eq!(done.code, 0, "{}", done.stderr);
+    let report = report(&out);
+    assert_eq!(report["verdict"], "explained");
+    assert_eq!(named(&report), [pair("viscous_friction", "roll")]);
+    assert!(done.stdout.contains("viscous_friction"), "{}", done.stdout);
+    // What was concealed is in the interval, and the error falls to what the noise leaves.
+    let finding = &report["findings"][0];
+    let found = finding["parameters"]["viscous_nms_per_rad"]
+        .as_f64()
+        .unwrap();
+    assert!((found - 1.9236).abs() < 0.02, "{found}");
+    let rms = |key: &str| report[key][5].as_f64().unwrap();
+    assert!(rms("holdout_rms_after") < 0.05 * rms("holdout_rms_before"));
+    // A row per recorded row, a column per joint, finite throughout; what is said of them is so.
+    assert_eq!(report["holdout_predictions"]["rec_03"], "rec_03.csv");
+    let rows: Vec<Vec<f64>> = std::fs::read_to_string(out.join("rec_03.csv"))
+        .unwrap()
+        .lines()
+        .map(|line| {
+            line.split(',')
+                .map(|field| field.parse().unwrap())
+                .collect()
+        })
+        .collect();
+    let measured = states(&case("m01/rec_03.mcap"));
+    assert_eq!(rows.len(), measured.len());
+    let joints: Vec<&str> = report["joints"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|j| j.as_str().unwrap())
+        .collect();
+    let mut squares = vec![0.0; joints.len()];
+    for (row, (_, state)) in rows.iter().zip(&measured) {
+        assert_eq!(row.len(), joints.len());
+        for (j, joint) in joints.iter().enumerate() {
+            let at = state.name.iter().position(|name| name == joint).unwrap();
+            squares[j] += (state.effort[at] - row[j]).powi(2);
+        }
+    }
+    for (j, squares) in squares.iter().enumerate() {
+        let rms = (squares / rows.len() as f64).sqrt();
+        let said = report["holdout_rms_after"][j].as_f64().unwrap();
+        assert!(
+            (rms - said).abs() < 1e-6,
+            "{}: {rms}, said {said}",
+            joints[j]
+        );
+    }
+    // Friction is nothing that a robot's description of bodies can hold.
+    assert!(!out.join("robot.urdf").exists());
+    let page = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(page.contains("roll") && !page.contains("<script"));
+}
+
+#[test]
+fn the_corrected_twin_is_one_that_a_pipeline_loads_and_it_is_better() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let done = explain_case(&out, &case("m01/case.yaml"));
+    assert_eq!(done.code, 0, "{}", done.stderr);
+    let recording = case("m01/rec_03.mcap");
+    let residual = |model: &str| {
+        let text = format!(
+            "version: 1\ncells: {{arm: {{robot: {}}}}}\nstages:\n\
+             - {{name: ingest, ingest: {{file: {{path: {}}}}}}}\n\
+             - {{name: twin, input: ingest, twin: {{{model}}}}}\n",
+            robot("slide").display(),
+            recording.display(),
+        );
+        let pipeline = write(&folder.path().join("pipeline.yaml"), &text);
+        let mut command = tauscope();
+        command
+            .arg("replay")
+            .arg("--json")
+            .arg("--pipeline")
+            .arg(pipeline);
+        let done = Out::of({
+            command.arg(&recording);
+            command
+        });
+        assert_eq!(done.code, 0, "{}", done.stderr);
+        let summary: Value = serde_json::from_str(&done.stdout).unwrap();
+        let joints = summary[0]["twins"][0]["joints"].as_array().unwrap().clone();
+        let roll = joints
+            .iter()
+            .find(|joint| joint["joint"] == "roll")
+            .unwrap();
+        roll["residual_rms"].as_f64().unwrap()
+    };
+    let model = format!("model: {}", out.join("twin.yaml").display());
+    let (before, after) = (residual(""), residual(&model));
+    assert!(after < 0.2 * before, "{before} {after}");
+}
+
+#[test]
+fn a_payload_in_amperes_is_weighed_and_is_in_the_robot() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let done = explain_case(&out, &case("m02/case.yaml"));
+    assert_eq!(done.code, 0, "{}", done.stderr);
+    let report = report(&out);
+    assert_eq!(named(&report), [pair("payload", "tool")]);
+    let mass = report["findings"][0]["parameters"]["mass_kg"]
+        .as_f64()
+        .unwrap();
+    assert!((mass - 0.6661).abs() < 0.02, "{mass}");
+    let urdf = std::fs::read_to_string(out.join("robot.urdf")).unwrap();
+    let original = std::fs::read_to_string(robot("seven")).unwrap();
+    let tool = |text: &str| {
+        let model = tauscope_dynamics::Model::from_urdf(text).unwrap();
+        model.links()[model.link_index("tool").unwrap()].mass_kg()
+    };
+    assert!((tool(&urdf) - tool(&original) - mass).abs() < 1e-9);
+}
+
+#[test]
+fn nothing_is_missing_where_nothing_was_concealed() {
+    let folder = tempfile::tempdir().unwrap();
+    let done = explain_case(folder.path(), &case("m11/case.yaml"));
+    assert_eq!(done.code, 0, "{}", done.stderr);
+    let report = report(folder.path());
+    assert_eq!(report["verdict"], "nothing_missing");
+    assert_eq!(named(&report), []);
+}
+
+#[test]
+fn a_prediction_comes_from_the_motion_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let (first, second) = (folder.path().join("first"), folder.path().join("second"));
+    let done = explain_case(&first, &case("m01/case.yaml"));
+    assert_eq!(done.code, 0, "{}", done.stderr);
+    let emptied = changed(folder.path(), "m01", &["rec_03"], |_, state| {
+        state.effort.clear()
+    });
+    let done = explain_case(&second, &emptied);
+    assert_eq!(done.code, 0, "{}", done.stderr);
+    let prediction = |out: &Path| std::fs::read(out.join("rec_03.csv")).unwrap();
+    assert!(prediction(&first) == prediction(&second));
+    assert!(report(&second)["holdout_rms_after"][0].is_null());
+}
+
+#[test]
+fn a_twin_on_a_topic_is_explained_without_a_robot() {
+    let folder = tempfile::tempdir().unwrap();
+    // Somebody's twin that knows everything but what holds `turn` back.
+    let mut files = Vec::new();
+    for name in ["rec_00", "rec_01", "rec_02", "rec_03"] {
+        let measured = states(&case("m11").join(format!("{name}.mcap")));
+        let mut seed = 1_u32;
+        let twin: Vec<(i64, JointState)> = measured
+            .iter()
+            .map(|(log_ns, state)| {
+                let mut twin = state.clone();
+                for (at, joint) in state.name.iter().enumerate() {
+                    // Noise of its own: a sum of uniform numbers.
+                    let mut noise = 0.0;
+                    for _ in 0..4 {
+                        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                        noise += f64::from(seed >> 8) / f64::from(1 << 24) - 0.5;
+                    }
+                    twin.effort[at] += 0.05 * noise;
+                    if joint == "turn" {
+                        twin.effort[at] -= 3.0 * state.velocity[at];
+                    }
+                }
+                (*log_ns, twin)
+            })
+            .collect();
+        let path = folder.path().join(format!("{name}.mcap"));
+        record(&path, &[(STATES, &measured), ("/twin/joint_states", &twin)]);
+        files.push(path.to_str().unwrap().to_owned());
+    }
+    let out = folder.path().join("out");
+    let mut arguments = vec!["--twin-topic", "/twin/joint_states", "--fit"];
+    arguments.extend(files[..3].iter().map(String::as_str));
+    arguments.extend(["--holdout", &files[3]]);
+    let done = explain(&out, &arguments);
+    assert_eq!(done.code, 0, "{}", done.stderr);
+    let report = report(&out);
+    assert_eq!(named(&report), [pair("viscous_friction", "turn")]);
+    let found = report["findings"][0]["parameters"]["viscous_nms_per_rad"]
+        .as_f64()
+        .unwrap();
+    assert!((found - 3.0).abs() < 0.1, "{found}");
+}
+
+/// What data that allows no verdict gets: a reason, and exit code 0.
+fn not_evaluated(out: &Path, done: &Out, reason: &str) {
+    assert_eq!(done.code, 0, "{}", done.stderr);
+    let report = report(out);
+    assert_eq!(report["verdict"], "not_evaluated");
+    assert_eq!(named(&report), []);
+    let said = report["reason"].as_str().unwrap();
+    assert!(said.contains(reason), "{said}");
+    assert!(done.stdout.contains(reason), "{}", done.stdout);
+    assert!(!out.join("twin.yaml").exists());
+}
+
+#[test]
+fn one_recording_proves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    // Of an explanation before nothing may be left beside a report that names nothing.
+    std::fs::create_dir(&out).unwrap();
+    write(&out.join("report.json"), "{}");
+    write(&out.join("twin.yaml"), "");
+    let (robot, recording) = (robot("slide"), case("m01/rec_00.mcap"));
+    let done = explain(
+        &out,
+        &[
+            "--robot",
+            robot.to_str().unwrap(),
+            "--fit",
+            recording.to_str().unwrap(),
+        ],
+    );
+    not_evaluated(&out, &done, "one recording only");
+}
+
+#[test]
+fn an_arm_at_rest_tells_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let still = changed(folder.path(), "m01", &[], |_, state| {
+        state.position.fill(0.1);
+        state.velocity.fill(0.0);
+    });
+    let out = folder.path().join("out");
+    not_evaluated(&out, &explain_case(&out, &still), "no joint moves");
+}
+
+#[test]
+fn an_effort_that_is_zero_throughout_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let zero = changed(folder.path(), "m01", &[], |_, state| state.effort.fill(0.0));
+    let out = folder.path().join("out");
+    not_evaluated(&out, &explain_case(&out, &zero), "effort is zero");
+}
+
+#[test]
+fn the_wrong_robot_and_the_wrong_unit_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let other = changed(folder.path(), "m01", &[], |_, state| state.effort.reverse());
+    let out = folder.path().join("out");
+    not_evaluated(&out, &explain_case(&out, &other), "another robot");
+
+    let folder = tempfile::tempdir().unwrap();
+    let amperes = changed(folder.path(), "m01", &[], |_, state| {
+        state.effort.iter_mut().for_each(|effort| *effort /= 12.0);
+    });
+    let out = folder.path().join("out");
+    not_evaluated(&out, &explain_case(&out, &amperes), "unit");
+}
+
+#[test]
+fn rows_that_are_lost_are_said_and_end_with_3() {
+    let folder = tempfile::tempdir().unwrap();
+    let holes = changed(folder.path(), "m01", &["rec_00", "rec_03"], |row, state| {
+        if row % 100 == 50 {
+            state.effort[2] = f64::NAN;
+        }
+    });
+    let out = folder.path().join("out");
+    let done = explain_case(&out, &holes);
+    assert_eq!(done.code, 3, "{}", done.stderr);
+    assert!(done.stdout.contains("not finite"), "{}", done.stdout);
+    assert_eq!(named(&report(&out)), [pair("viscous_friction", "roll")]);
+    let rows = std::fs::read_to_string(out.join("rec_03.csv"))
+        .unwrap()
+        .lines()
+        .count();
+    assert_eq!(rows, states(&folder.path().join("rec_03.mcap")).len());
+}
+
+#[test]
+fn a_torn_tail_is_read_up_to_the_tear() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = changed(folder.path(), "m01", &["rec_00"], |_, _| {});
+    let torn = folder.path().join("rec_00.mcap");
+    let bytes = std::fs::read(&torn).unwrap();
+    std::fs::write(&torn, &bytes[..bytes.len() * 8 / 10]).unwrap();
+    let out = folder.path().join("out");
+    let done = explain_case(&out, &whole);
+    assert_eq!(done.code, 3, "{}", done.stderr);
+    assert_eq!(named(&report(&out)), [pair("viscous_friction", "roll")]);
+}
+
+/// Arguments or files that are wrong: exit code 2 and these words.
+fn refused(done: &Out, words: &[&str]) {
+    assert_eq!(done.code, 2, "{}", done.stderr);
+    for word in words {
+        assert!(done.stderr.contains(word), "{word}: {}", done.stderr);
+    }
+}
+
+#[test]
+fn wrong_arguments_and_files_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let m01 = case("m01/case.yaml");
+    let m01 = m01.to_str().unwrap();
+    let done = explain(&out, &[m01, "--without", "coulomb"]);
+    refused(
+        &done,
+        &["no effect `coulomb`", "did you mean `coulomb_friction`?"],
+    );
+    refused(&explain(&out, &[]), &["CASE"]);
+
+    let (robot_file, recording) = (robot("six"), case("m01/rec_00.mcap"));
+    let (robot_file, recording) = (robot_file.to_str().unwrap(), recording.to_str().unwrap());
+    let done = explain(&out, &["--robot", robot_file, "--fit", recording]);
+    refused(&done, &["rec_00.mcap: joint `", "` is not in it"]);
+    let done = explain(
+        &out,
+        &[
+            "--robot",
+            robot_file,
+            "--fit",
+            recording,
+            "--holdout",
+            recording,
+        ],
+    );
+    refused(&done, &["named twice"]);
+    let done = explain(&out, &["--fit", recording]);
+    refused(&done, &["--robot URDF"]);
+
+    let text = "case: x\nrobot: none.urdf\nfit: [a.mcap]\nefort_unit: A\n";
+    let file = write(&folder.path().join("case.yaml"), text);
+    refused(
+        &explain_case(&out, &file),
+        &["did you mean `effort_unit`?", "case.yaml:4"],
+    );
+    let file = write(
+        &folder.path().join("case.yaml"),
+        &text.replace("efort_unit: A\n", ""),
+    );
+    refused(
+        &explain_case(&out, &file),
+        &["case.yaml:2", "case.yaml:3", "no recording"],
+    );
+    assert!(!out.exists());
+}
+
+#[test]
+fn a_joint_that_is_never_a_number_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let never = changed(folder.path(), "m01", &["rec_01"], |_, state| {
+        state.effort[3] = f64::NAN
+    });
+    let out = folder.path().join("out");
+    refused(&explain_case(&out, &never), &["rec_01", "NaN throughout"]);
+}
+
+#[test]
+fn what_it_reads_is_not_overwritten() {
+    let folder = tempfile::tempdir().unwrap();
+    let m01 = case("m01/case.yaml");
+    let out = folder.path().join("out");
+    let done = explain_case(&out, &m01);
+    assert_eq!(done.code, 0, "{}", done.stderr);
+    let text = std::fs::read_to_string(&m01).unwrap();
+    let here = root().join("tests/proof/set");
+    let text = text
+        .replace("../../robots", here.join("robots").to_str().unwrap())
+        .replace("rec_", here.join("cases/m01/rec_").to_str().unwrap());
+    let text = format!("{text}twin: {{model: out/twin.yaml}}\n");
+    let again = write(&folder.path().join("case.yaml"), &text);
+    refused(&explain_case(&out, &again), &["would overwrite"]);
+    // Elsewhere it is fine: nothing has changed since.
+    let other = folder.path().join("other");
+    let done = explain_case(&other, &again);
+    assert_eq!(done.code, 0, "{}", done.stderr);
+    assert_eq!(report(&other)["verdict"], "nothing_missing");
+    let twin = |out: &Path| std::fs::read_to_string(out.join("twin.yaml")).unwrap();
+    let terms = |text: String| {
+        text.split("scores:")
+            .next()
+            .unwrap()
+            .split("terms:")
+            .nth(1)
+            .map(str::to_owned)
+    };
+    assert_eq!(terms(twin(&out)), terms(twin(&other)));
+}
