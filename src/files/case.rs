@@ -27,7 +27,8 @@ pub struct CaseFile {
     /// Torque constant by joint \[N m/A\], for efforts in A; absent where they are not known.
     #[serde(default)]
     pub torque_constants_nm_per_a: Option<BTreeMap<String, f64>>,
-    /// The joints that are recorded; those of the URDF if absent.
+    /// The joints and their order, where there is no URDF that has them; without both, those of the first
+    /// message.
     #[serde(default)]
     pub joint_names: Option<Vec<String>>,
     /// Nominal rate of the recordings \[Hz\], for information: time is in the stamps.
@@ -47,7 +48,7 @@ pub struct CaseFile {
     pub holdout: Vec<PathBuf>,
 }
 
-/// A twin that is not the URDF alone: exactly one of the two.
+/// A twin that is not the URDF alone: one of the two, or both for a corrected twin of a topic.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CaseTwin {
