@@ -61,9 +61,16 @@ impl Hypothesis {
 
     /// Whether its effort jumps where a joint reverses, so that at rest it may be anything in between.
     pub fn is_set_valued(&self, model: &Model) -> bool {
-        let Some(joint) = self.only_joint() else { return false };
+        let Some(joint) = self.only_joint() else {
+            return false;
+        };
         let Whereabouts { source, link, .. } = self.place;
-        let site = Site { model, joint, source, link };
+        let site = Site {
+            model,
+            joint,
+            source,
+            link,
+        };
         let middle = |c: &Coordinate| match c.kind {
             CoordinateKind::Factor { .. } => 1.0,
             CoordinateKind::Shape { lower, upper, .. } => (lower * upper).abs().sqrt(),
@@ -97,7 +104,10 @@ impl Hypothesis {
     pub fn factors(&self) -> Vec<usize> {
         let is_factor = |c: &Coordinate| matches!(c.kind, CoordinateKind::Factor { .. });
         let coordinates = self.effect.coordinates.iter().enumerate();
-        coordinates.filter(|(_, c)| is_factor(c)).map(|(i, _)| i).collect()
+        coordinates
+            .filter(|(_, c)| is_factor(c))
+            .map(|(i, _)| i)
+            .collect()
     }
 }
 
@@ -133,7 +143,14 @@ impl Active {
         };
         let curve = self.curve.as_ref().and_then(|curve| {
             let values = self.coordinates.clone();
-            table(&site, Table { values, ..curve.clone() }).ok()
+            table(
+                &site,
+                Table {
+                    values,
+                    ..curve.clone()
+                },
+            )
+            .ok()
         });
         curve.unwrap_or_else(|| (self.hypothesis.effect.build)(&site, &self.coordinates))
     }
@@ -203,7 +220,11 @@ fn terms_of(problem: &Problem, actives: &[Active], layer: Layer) -> Vec<Box<dyn 
 impl Efforts {
     /// Under the physics of `actives`.
     pub fn new(problem: &Problem, actives: &[Active]) -> Self {
-        let rigid: Vec<Vec<f64>> = problem.tracks.iter().map(|t| t.track.rigid.clone()).collect();
+        let rigid: Vec<Vec<f64>> = problem
+            .tracks
+            .iter()
+            .map(|t| t.track.rigid.clone())
+            .collect();
         let body = run(problem, terms_of(problem, actives, Layer::Body), &rigid);
         let mechanical = run(problem, terms_of(problem, actives, Layer::Joint), &body);
         let recorded = record(problem, actives, &mechanical);
@@ -223,12 +244,18 @@ fn run(problem: &Problem, terms: Vec<Box<dyn Term>>, start: &[Vec<f64>]) -> Vec<
     }
     let mut physics = Physics::new(terms, problem.joints);
     let tracks = problem.tracks.iter().zip(start);
-    tracks.map(|(track, start)| track.track.run(&mut physics, start)).collect()
+    tracks
+        .map(|(track, start)| track.track.run(&mut physics, start))
+        .collect()
 }
 
 /// What is recorded of mechanical efforts.
 pub fn record(problem: &Problem, actives: &[Active], mechanical: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    run(problem, terms_of(problem, actives, Layer::Record), mechanical)
+    run(
+        problem,
+        terms_of(problem, actives, Layer::Record),
+        mechanical,
+    )
 }
 
 /// What `active` alone changes, as a signal: added to the physics that made `efforts`.
@@ -252,7 +279,9 @@ fn change_scaled(
     }
     let mut term = active.term(problem);
     let through = layer != Layer::Record
-        && others.iter().any(|other| other.hypothesis.effect.layer == Layer::Record);
+        && others
+            .iter()
+            .any(|other| other.hypothesis.effect.layer == Layer::Record);
     let changed: Vec<Vec<f64>> = match layer {
         Layer::Record => act_over(problem, &mut *term, &efforts.recorded, &efforts.body),
         _ if through => act_over(problem, &mut *term, &efforts.mechanical, &efforts.body),
@@ -263,7 +292,11 @@ fn change_scaled(
     };
     let mut changed = changed;
     if layer == Layer::Body && gains.iter().any(|gain| *gain != 1.0) {
-        let start = if through { Some(&efforts.mechanical) } else { None };
+        let start = if through {
+            Some(&efforts.mechanical)
+        } else {
+            None
+        };
         scale_added(&mut changed, start, gains);
     }
     let difference: Vec<Vec<f64>> = match layer {
@@ -295,8 +328,11 @@ fn change_scaled(
 fn scaled_bodies(problem: &Problem, efforts: &Efforts, active: &Active) -> Column {
     let joint = active.hypothesis.place.joint;
     let share = active.coordinates[0] / efforts.gains[joint];
-    let scaled: Vec<Vec<f64>> =
-        efforts.body.iter().map(|body| body.iter().map(|x| share * x).collect()).collect();
+    let scaled: Vec<Vec<f64>> = efforts
+        .body
+        .iter()
+        .map(|body| body.iter().map(|x| share * x).collect())
+        .collect();
     let mut values = vec![0.0; problem.rows];
     problem.joint_signal(&scaled, joint, &mut values);
     Column {
@@ -377,11 +413,15 @@ pub fn columns(
     let alike = effect.layer != Layer::Record
         && effect.name != "load_dependent_friction"
         && !is_drive(&hypothesis)
-        && others.iter().all(|other| other.hypothesis.effect.layer != Layer::Record)
+        && others
+            .iter()
+            .all(|other| other.hypothesis.effect.layer != Layer::Record)
         && problem.rows <= CACHED_ROWS;
     if !alike {
         let gains = &efforts.gains;
-        return Arc::new(compute_columns(problem, others, efforts, hypothesis, shape, gains));
+        return Arc::new(compute_columns(
+            problem, others, efforts, hypothesis, shape, gains,
+        ));
     }
     // Kept as in N m: drives scale what bodies cost.
     let scaled = |columns: &Arc<Columns>| {
@@ -402,12 +442,20 @@ pub fn columns(
     };
     let bits = shape.iter().map(|value| value.to_bits()).collect();
     let key: Key = (effect.name, hypothesis.place, bits);
-    let lock = || problem.cache.0.lock().unwrap_or_else(PoisonError::into_inner);
+    let lock = || {
+        problem
+            .cache
+            .0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+    };
     if let Some(known) = lock().get(&key).map(Arc::clone) {
         return scaled(&known);
     }
     let ones = vec![1.0; problem.joints];
-    let new = Arc::new(compute_columns(problem, others, efforts, hypothesis, shape, &ones));
+    let new = Arc::new(compute_columns(
+        problem, others, efforts, hypothesis, shape, &ones,
+    ));
     lock().insert(key, Arc::clone(&new));
     scaled(&new)
 }

@@ -36,10 +36,15 @@ pub fn before(input: &Input) -> Option<String> {
     }
     if input.start.is_none() && (0..n).all(|j| moving_s(&input.fit, j, n) < LEAST_MOTION_S) {
         return Some(
-            "no joint moves for as long as a second: standstill does not tell friction from load".to_owned(),
+            "no joint moves for as long as a second: standstill does not tell friction from load"
+                .to_owned(),
         );
     }
-    if let Some(recording) = input.fit.iter().find(|r| r.len() < 50 || r.duration_s() < 1.0) {
+    if let Some(recording) = input
+        .fit
+        .iter()
+        .find(|r| r.len() < 50 || r.duration_s() < 1.0)
+    {
         return Some(format!(
             "recording {} holds {} samples over {:.2} s, which is too short",
             recording.name,
@@ -58,7 +63,8 @@ fn moving_s(recordings: &[Recording], joint: usize, n: usize) -> f64 {
         let rate = recording.len() as f64 / recording.duration_s().max(1e-3);
         let reach = ((0.1 * rate) as usize).max(1);
         for k in reach..recording.len() {
-            let change = recording.position[k * n + joint] - recording.position[(k - reach) * n + joint];
+            let change =
+                recording.position[k * n + joint] - recording.position[(k - reach) * n + joint];
             let passed = recording.time_s[k] - recording.time_s[k - reach];
             if change.abs() > MOVES * passed {
                 sum += recording.time_s[k] - recording.time_s[k - 1];
@@ -113,7 +119,11 @@ fn regression(problem: &Problem, joint: usize) -> (f64, f64, f64) {
     use nalgebra::{DMatrix, DVector};
     let rows = problem.joint_rows(joint);
     let n = problem.joints;
-    let rigid: Vec<Vec<f64>> = problem.tracks.iter().map(|t| t.track.rigid.clone()).collect();
+    let rigid: Vec<Vec<f64>> = problem
+        .tracks
+        .iter()
+        .map(|t| t.track.rigid.clone())
+        .collect();
     let mut model = vec![0.0; problem.rows];
     problem.joint_signal(&rigid, joint, &mut model);
     let (mut xs, mut ys) = (Vec::new(), Vec::new());
@@ -121,7 +131,11 @@ fn regression(problem: &Problem, joint: usize) -> (f64, f64, f64) {
         for (row, &k) in track.rows().zip(&track.compared) {
             if problem.weight[rows.start + row] > 0.0 {
                 let velocity = track.track.velocity[k * n + joint];
-                let sign = if velocity.abs() < MOVES { 0.0 } else { velocity.signum() };
+                let sign = if velocity.abs() < MOVES {
+                    0.0
+                } else {
+                    velocity.signum()
+                };
                 xs.push([1.0, sign, velocity, model[row]]);
                 ys.push(problem.measured[rows.start + row]);
             }
@@ -154,7 +168,13 @@ pub fn white_noise(recordings: &[Recording], joint: usize, n: usize) -> f64 {
     let mut all: Vec<f64> = recordings
         .iter()
         .map(|recording| {
-            let signal: Vec<f64> = recording.effort.iter().skip(joint).step_by(n).copied().collect();
+            let signal: Vec<f64> = recording
+                .effort
+                .iter()
+                .skip(joint)
+                .step_by(n)
+                .copied()
+                .collect();
             white_variance(&signal).sqrt()
         })
         .collect();
@@ -175,7 +195,10 @@ pub fn losses(input: &Input) -> Vec<String> {
         };
         add(losses.repeated, "rows repeat a stamp");
         add(losses.not_finite, "rows are not finite and were dropped");
-        add(losses.backward, "rows run backwards in time and were dropped");
+        add(
+            losses.backward,
+            "rows run backwards in time and were dropped",
+        );
         add(losses.incomplete, "rows lack a joint and were dropped");
         add(losses.unreadable, "messages could not be read");
         if !parts.is_empty() {

@@ -52,8 +52,15 @@ pub fn is_drive(hypothesis: &Hypothesis) -> bool {
 /// The scale of each joint, 1 at first.
 pub fn unknown_gains(joints: usize) -> Vec<Active> {
     let one = |joint| {
-        let place = Whereabouts { joint, ..Whereabouts::default() };
-        Hypothesis { effect: &DRIVE_GAIN, place }.with(vec![0.0])
+        let place = Whereabouts {
+            joint,
+            ..Whereabouts::default()
+        };
+        Hypothesis {
+            effect: &DRIVE_GAIN,
+            place,
+        }
+        .with(vec![0.0])
     };
     (0..joints).map(one).collect()
 }

@@ -113,7 +113,11 @@ pub fn explain(
     let unscaled = input.effort_unit == "A"
         && input.torque_constants_nm_per_a.is_none()
         && input.start.is_none();
-    let drives = if unscaled { drive::unknown_gains(joints.len()) } else { Vec::new() };
+    let drives = if unscaled {
+        drive::unknown_gains(joints.len())
+    } else {
+        Vec::new()
+    };
     let say = |text: &str| {
         // Nobody knows how many rounds there will be: each takes a share of what is left.
         progress(0.1, text);
@@ -129,9 +133,8 @@ pub fn explain(
     progress(0.6, "standstills");
     let rests_count: Vec<bool> = (0..joints.len())
         .map(|j| {
-            let holds = |a: &Active| {
-                a.hypothesis.only_joint() == Some(j) && a.is_set_valued(&input.model)
-            };
+            let holds =
+                |a: &Active| a.hypothesis.only_joint() == Some(j) && a.is_set_valued(&input.model);
             !moving.fit.actives.iter().any(holds)
         })
         .collect();
@@ -144,7 +147,11 @@ pub fn explain(
     let found = search.run(moving.fit.actives, moving.penalties);
     progress(0.8, "rivals");
     // Where nobody knows the scale of the drives, the twin is only one once they are fitted.
-    let scales = if unscaled { drive::unknown_gains(joints.len()) } else { Vec::new() };
+    let scales = if unscaled {
+        drive::unknown_gains(joints.len())
+    } else {
+        Vec::new()
+    };
     let before = Fit::new(&problem, scales).refined(&problem);
     let named = findings::of(&search, &found, &before, &input, &joints);
     progress(0.95, "proof");
@@ -243,7 +250,10 @@ impl Setup<'_> {
     fn hypotheses(&self) -> Vec<Hypothesis> {
         let input = self.input;
         let mut without = input.without.clone();
-        if input.effort_unit == "A" && input.torque_constants_nm_per_a.is_none() && input.start.is_none() {
+        if input.effort_unit == "A"
+            && input.torque_constants_nm_per_a.is_none()
+            && input.start.is_none()
+        {
             // The scale of each joint is free as it is.
             without.insert("torque_gain".to_owned());
         }
@@ -292,7 +302,14 @@ impl Setup<'_> {
             .map(|recording| self.track(recording, motion_cutoff_hz))
             .collect::<Result<Vec<_>, _>>()?;
         let fit = &self.input.fit;
-        Ok(Problem::new(&self.input.model, fit, tracks, cutoff_hz, self.unit_nm, rests_count))
+        Ok(Problem::new(
+            &self.input.model,
+            fit,
+            tracks,
+            cutoff_hz,
+            self.unit_nm,
+            rests_count,
+        ))
     }
 
     /// The corrected twin's effort over a track, in the recording's unit.
@@ -349,7 +366,11 @@ impl Setup<'_> {
                     before[k % n] += (measured - rigid[k]).powi(2);
                     after[k % n] += (measured - predicted[k]).powi(2);
                 }
-                count += if recording.effort.is_empty() { 0.0 } else { recording.len() as f64 };
+                count += if recording.effort.is_empty() {
+                    0.0
+                } else {
+                    recording.len() as f64
+                };
                 let rows = recording
                     .sample_of_row
                     .iter()
@@ -357,7 +378,9 @@ impl Setup<'_> {
                 predictions.push((recording.name.clone(), rows.collect()));
             }
             if !recording.effort.is_empty() {
-                pictures.push(picture(&names, recording, held_out, &track, &rigid, &predicted));
+                pictures.push(picture(
+                    &names, recording, held_out, &track, &rigid, &predicted,
+                ));
             }
         }
         let rms = |sums: Vec<f64>| sums.iter().map(|s| (s / count).sqrt()).collect();
@@ -371,7 +394,11 @@ impl Setup<'_> {
 
     /// What a corrected twin keeps: not what came and went.
     fn lasting_terms(&self, found: &Explanation) -> Result<Vec<TermSpec>, TermError> {
-        let mut terms = self.input.start.as_ref().map_or_else(Vec::new, |start| start.terms.clone());
+        let mut terms = self
+            .input
+            .start
+            .as_ref()
+            .map_or_else(Vec::new, |start| start.terms.clone());
         let model = &self.input.model;
         for active in &found.fit.actives {
             if drive::is_drive(&active.hypothesis) || !findings::lasts(active.hypothesis) {
@@ -402,7 +429,10 @@ fn picture(
     let stride = track.len().div_ceil(PICTURE_SAMPLES).max(1);
     let joint = |j: usize, name: &str| {
         let thin = |values: &[f64]| -> Vec<f64> {
-            (0..track.len()).step_by(stride).map(|k| values[k * n + j]).collect()
+            (0..track.len())
+                .step_by(stride)
+                .map(|k| values[k * n + j])
+                .collect()
         };
         JointPicture {
             joint: name.to_owned(),
@@ -418,6 +448,10 @@ fn picture(
         recording: recording.name.clone(),
         held_out,
         start_ns: recording.start_ns,
-        joints: names.iter().enumerate().map(|(j, name)| joint(j, name)).collect(),
+        joints: names
+            .iter()
+            .enumerate()
+            .map(|(j, name)| joint(j, name))
+            .collect(),
     }
 }

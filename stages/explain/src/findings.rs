@@ -54,10 +54,16 @@ pub fn in_order(actives: &[Active]) -> Vec<&Active> {
     all
 }
 
-fn place_of(input: &Input, joints: &[String], hypothesis: &Hypothesis) -> (Option<String>, Option<String>) {
+fn place_of(
+    input: &Input,
+    joints: &[String],
+    hypothesis: &Hypothesis,
+) -> (Option<String>, Option<String>) {
     let link = |index: usize| Some(input.model.links()[index].name.clone());
     match hypothesis.effect.place {
-        PlaceKind::Joint | PlaceKind::TwoJoints => (Some(joints[hypothesis.place.joint].clone()), None),
+        PlaceKind::Joint | PlaceKind::TwoJoints => {
+            (Some(joints[hypothesis.place.joint].clone()), None)
+        }
         PlaceKind::Link | PlaceKind::Tool => (None, link(hypothesis.place.link)),
         PlaceKind::Base => (None, link(input.model.base_link())),
         PlaceKind::All => (None, None),
@@ -74,7 +80,13 @@ fn rival(input: &Input, joints: &[String], hypothesis: &Hypothesis) -> Rival {
 }
 
 /// Names everything in `found`.
-pub fn of(search: &Search<'_>, found: &Explanation, before: &Fit, input: &Input, joints: &[String]) -> Named {
+pub fn of(
+    search: &Search<'_>,
+    found: &Explanation,
+    before: &Fit,
+    input: &Input,
+    joints: &[String],
+) -> Named {
     let fit = &found.fit;
     let efficiency = &search.problem.worth;
     let spread = covariance(search.problem, fit);
@@ -98,7 +110,9 @@ pub fn of(search: &Search<'_>, found: &Explanation, before: &Fit, input: &Input,
         let (mut parameters, mut intervals) = (BTreeMap::new(), BTreeMap::new());
         let effect = active.hypothesis.effect;
         let values = active.parameters();
-        for ((parameter, value), deviation) in effect.parameters.iter().zip(&values).zip(&deviations) {
+        for ((parameter, value), deviation) in
+            effect.parameters.iter().zip(&values).zip(&deviations)
+        {
             parameters.insert(parameter.name.to_owned(), number(*value));
             // A change between two recordings has no sharper time than that.
             let vague = parameter.name.contains("time") && *deviation > VAGUE_S;
@@ -124,12 +138,20 @@ pub fn of(search: &Search<'_>, found: &Explanation, before: &Fit, input: &Input,
         let place = joint.clone().or_else(|| link.clone()).unwrap_or_default();
         let when = when(search, active, &mut parameters, &mut intervals);
         let sentence = words::sentence(active, &place, &parameters, &intervals, joints);
-        let equivalent_to: Vec<Rival> =
-            contest.ties.iter().map(|h| rival(input, joints, h)).collect();
+        let equivalent_to: Vec<Rival> = contest
+            .ties
+            .iter()
+            .map(|h| rival(input, joints, h))
+            .collect();
         for (hypothesis, reason) in contest.rejected {
             let (joint, link) = place_of(input, joints, &hypothesis);
             let effect = hypothesis.effect.name.to_owned();
-            named.rejected.push(Rejected { effect, joint, link, reason });
+            named.rejected.push(Rejected {
+                effect,
+                joint,
+                link,
+                reason,
+            });
         }
         if let Some((next, trajectory)) =
             next_motion::of(&active.hypothesis, &contest.ties, input, joints)
@@ -155,7 +177,9 @@ pub fn of(search: &Search<'_>, found: &Explanation, before: &Fit, input: &Input,
         });
     }
     merge_waves(&mut named.findings);
-    named.findings.sort_by(|a, b| b.explains.total_cmp(&a.explains));
+    named
+        .findings
+        .sort_by(|a, b| b.explains.total_cmp(&a.explains));
     named
 }
 
@@ -166,7 +190,11 @@ fn number(value: f64) -> Value {
 /// What `with` explains of what `without` leaves, in units of each joint's final noise.
 fn mismatch(without: &Fit, with: &Fit, count: &Fit) -> f64 {
     (0..with.variance.len())
-        .map(|j| (without.squares[j] - with.squares[j]).max(0.0) / with.variance[j] / count.count[j].max(1.0))
+        .map(|j| {
+            (without.squares[j] - with.squares[j]).max(0.0)
+                / with.variance[j]
+                / count.count[j].max(1.0)
+        })
         .sum::<f64>()
         .max(1e-12)
 }
@@ -190,7 +218,11 @@ fn when(
     parameters: &mut BTreeMap<String, Value>,
     intervals: &mut BTreeMap<String, [f64; 2]>,
 ) -> When {
-    let mut none = When { recording: None, start: None, end: None };
+    let mut none = When {
+        recording: None,
+        start: None,
+        end: None,
+    };
     let known = parameters.clone();
     let get = |name: &str| known.get(name).and_then(Value::as_f64);
     match time_kind(active.hypothesis) {
@@ -204,7 +236,9 @@ fn when(
             none
         }
         TimeKind::Once => {
-            let (Some(start), Some(end)) = (get("t_start_s"), get("t_end_s")) else { return none };
+            let (Some(start), Some(end)) = (get("t_start_s"), get("t_end_s")) else {
+                return none;
+            };
             let middle = 0.5 * (start + end);
             let track = search
                 .problem
@@ -238,15 +272,26 @@ struct Contest {
 }
 
 /// Every rival in the place of one piece of physics.
-fn contest(search: &Search<'_>, found: &Explanation, less: &Explanation, active: &Active) -> Contest {
-    let mut result = Contest { ties: Vec::new(), rejected: Vec::new(), margin: f64::INFINITY };
+fn contest(
+    search: &Search<'_>,
+    found: &Explanation,
+    less: &Explanation,
+    active: &Active,
+) -> Contest {
+    let mut result = Contest {
+        ties: Vec::new(),
+        rejected: Vec::new(),
+        margin: f64::INFINITY,
+    };
     if active.curve.is_some() {
         return result;
     }
     let efficiency = &search.problem.worth;
     let evidence = found.ahead_of(less, efficiency);
     let proposals = search.rivals(&less.fit, &found.fit, active);
-    let rivals = proposals.iter().filter(|p| p.active.hypothesis != active.hypothesis && p.evidence() > 0.0);
+    let rivals = proposals
+        .iter()
+        .filter(|p| p.active.hypothesis != active.hypothesis && p.evidence() > 0.0);
     for proposal in rivals.take(RIVALS) {
         let other = search.joined(less, proposal);
         let behind = found.ahead_of(&other, efficiency);
@@ -292,7 +337,12 @@ fn drive_note(active: &Active, deviation: f64, joints: &[String]) -> String {
 /// Two waves of ripple at one joint are told as one finding, the larger first.
 fn merge_waves(findings: &mut Vec<Finding>) {
     const WAVE: [&str; 3] = ["amplitude_nm", "cycles_per_rev", "phase_rad"];
-    let amplitude = |f: &Finding| f.parameters.get(WAVE[0]).and_then(Value::as_f64).unwrap_or(0.0);
+    let amplitude = |f: &Finding| {
+        f.parameters
+            .get(WAVE[0])
+            .and_then(Value::as_f64)
+            .unwrap_or(0.0)
+    };
     let mut index = 0;
     while index < findings.len() {
         let twin = (index + 1..findings.len()).find(|&other| {
@@ -333,12 +383,17 @@ pub fn summary(verdict: Verdict, findings: &[Finding], before: &[f64], after: &[
         sum(after) / sum(before)
     };
     let proof = if ratio.is_finite() {
-        format!(" On recordings that were not fitted the error falls to {:.0} %.", 100.0 * ratio)
+        format!(
+            " On recordings that were not fitted the error falls to {:.0} %.",
+            100.0 * ratio
+        )
     } else {
         String::new()
     };
     match verdict {
-        Verdict::NothingMissing => "Nothing is missing: what the twin leaves is the noise of the measurement.".to_owned(),
+        Verdict::NothingMissing => {
+            "Nothing is missing: what the twin leaves is the noise of the measurement.".to_owned()
+        }
         Verdict::NotEvaluated => "Nothing was evaluated.".to_owned(),
         Verdict::Explained | Verdict::UnknownRemains => {
             let first = findings.first().map_or("", |f| f.sentence.as_str());
@@ -368,22 +423,50 @@ pub fn undetectable(
             && (factors.len() == 1 || hypothesis.effect.name == "payload")
             && hypothesis.effect.place != PlaceKind::TwoJoints
             && (hypothesis.effect.layer != Layer::Body || hypothesis.effect.name != "drive_gain");
-        let there = found.fit.actives.iter().any(|a| a.hypothesis == *hypothesis);
+        let there = found
+            .fit
+            .actives
+            .iter()
+            .any(|a| a.hypothesis == *hypothesis);
         if !simple || there || hypothesis.effect.name == "link_mass" {
             continue;
         }
-        let Some(shape) = shapes(search.problem, *hypothesis).into_iter().next() else { continue };
-        let columns = columns(search.problem, &found.fit.actives, &found.fit.efforts, *hypothesis, &shape);
-        let Some(column) = columns.factors.first() else { continue };
-        let Some(smallest) = smallest(search, &found.fit, column, base.penalty(1, hypothesis.only_joint())) else {
+        let Some(shape) = shapes(search.problem, *hypothesis).into_iter().next() else {
             continue;
         };
-        let joint = matches!(hypothesis.effect.place, PlaceKind::Joint).then(|| joints[hypothesis.place.joint].clone());
-        let link = matches!(hypothesis.effect.place, PlaceKind::Tool | PlaceKind::Link)
-            .then(|| search.problem.model.links()[hypothesis.place.link].name.clone());
+        let columns = columns(
+            search.problem,
+            &found.fit.actives,
+            &found.fit.efforts,
+            *hypothesis,
+            &shape,
+        );
+        let Some(column) = columns.factors.first() else {
+            continue;
+        };
+        let Some(smallest) = smallest(
+            search,
+            &found.fit,
+            column,
+            base.penalty(1, hypothesis.only_joint()),
+        ) else {
+            continue;
+        };
+        let joint = matches!(hypothesis.effect.place, PlaceKind::Joint)
+            .then(|| joints[hypothesis.place.joint].clone());
+        let link =
+            matches!(hypothesis.effect.place, PlaceKind::Tool | PlaceKind::Link).then(|| {
+                search.problem.model.links()[hypothesis.place.link]
+                    .name
+                    .clone()
+            });
         let parameter = hypothesis.effect.parameters[0].name.to_owned();
         // A gain of 1 does nothing: what counts is how far from it.
-        let name = if parameter == "gain" { "gain_minus_one".to_owned() } else { parameter };
+        let name = if parameter == "gain" {
+            "gain_minus_one".to_owned()
+        } else {
+            parameter
+        };
         all.push(Undetectable {
             effect: hypothesis.effect.name.to_owned(),
             joint,
@@ -399,7 +482,9 @@ fn smallest(search: &Search<'_>, fit: &Fit, column: &Column, penalty: f64) -> Op
     let problem = search.problem;
     let (mut information, mut share) = (0.0, 0.0_f64);
     for j in 0..problem.joints {
-        let Some(values) = column.of_joint(j, problem.rows) else { continue };
+        let Some(values) = column.of_joint(j, problem.rows) else {
+            continue;
+        };
         let weight = &problem.weight[problem.joint_rows(j)];
         let square: f64 = values.iter().zip(weight).map(|(v, w)| w * v * v).sum();
         information += square / fit.variance[j];

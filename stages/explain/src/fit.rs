@@ -35,8 +35,12 @@ impl Fit {
     pub fn new(problem: &Problem, actives: Vec<Active>) -> Self {
         let efforts = Efforts::new(problem, &actives);
         let explained = problem.signal(&efforts.recorded);
-        let residual: Vec<f64> =
-            problem.measured.iter().zip(&explained).map(|(m, e)| m - e).collect();
+        let residual: Vec<f64> = problem
+            .measured
+            .iter()
+            .zip(&explained)
+            .map(|(m, e)| m - e)
+            .collect();
         let products = Products::new(problem, &[], &residual, None);
         Self {
             actives,
@@ -55,7 +59,9 @@ impl Fit {
 
     /// The joints whose effort a piece of physics changes: one, or all.
     pub fn joints_of(hypothesis: &Hypothesis, joints: usize) -> Vec<usize> {
-        hypothesis.only_joint().map_or_else(|| (0..joints).collect(), |joint| vec![joint])
+        hypothesis
+            .only_joint()
+            .map_or_else(|| (0..joints).collect(), |joint| vec![joint])
     }
 
     /// Gain of log-likelihood from another fit to this, samples weighted by their `efficiency`.
@@ -70,7 +76,8 @@ impl Fit {
     /// The coordinates that are free, as (index of the active, index of the coordinate).
     pub fn parameters(&self) -> Vec<(usize, usize)> {
         let all = self.actives.iter().enumerate();
-        all.flat_map(|(i, active)| (0..active.coordinates.len()).map(move |c| (i, c))).collect()
+        all.flat_map(|(i, active)| (0..active.coordinates.len()).map(move |c| (i, c)))
+            .collect()
     }
 
     /// How the explained effort changes with each free coordinate.
@@ -86,14 +93,28 @@ impl Fit {
         let mut there = active.clone();
         there.coordinates[c] += step;
         let layer = active.hypothesis.effect.layer;
-        let recorded = self.actives.iter().any(|a| a.hypothesis.effect.layer == Layer::Record);
+        let recorded = self
+            .actives
+            .iter()
+            .any(|a| a.hypothesis.effect.layer == Layer::Record);
         let (mut column, base) = if layer == Layer::Record {
             let mut all = self.actives.clone();
             all[i] = there;
             let changed = record(problem, &all, &self.efforts.mechanical);
             let values = problem.signal(&changed);
-            let base = problem.measured.iter().zip(&self.residual).map(|(m, r)| m - r).collect();
-            (Column { joint: None, values }, base)
+            let base = problem
+                .measured
+                .iter()
+                .zip(&self.residual)
+                .map(|(m, r)| m - r)
+                .collect();
+            (
+                Column {
+                    joint: None,
+                    values,
+                },
+                base,
+            )
         } else {
             let others: &[Active] = if recorded { &self.actives } else { &[] };
             let base = change(problem, others, &self.efforts, active).values;
@@ -202,20 +223,21 @@ impl Fit {
 
 /// `-n/2 ln(variance)`, summed over joints.
 pub fn likelihood(variance: &[f64], count: &[f64]) -> f64 {
-    variance.iter().zip(count).map(|(v, n)| -0.5 * n * v.ln()).sum()
+    variance
+        .iter()
+        .zip(count)
+        .map(|(v, n)| -0.5 * n * v.ln())
+        .sum()
 }
 
 /// Variances by joint from sums of squares, not below the white noise.
 pub fn variances(problem: &Problem, squares: &[f64], count: &[f64]) -> Vec<f64> {
     let all = squares.iter().zip(count).zip(&problem.white_noise);
-    all.map(|((s, n), noise)| (s / n.max(1.0)).max(noise * noise).max(1e-16)).collect()
+    all.map(|((s, n), noise)| (s / n.max(1.0)).max(noise * noise).max(1e-16))
+        .collect()
 }
 
-fn damped(
-    normal: &DMatrix<f64>,
-    right: &DVector<f64>,
-    damping: f64,
-) -> Option<DVector<f64>> {
+fn damped(normal: &DMatrix<f64>, right: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
     let p = right.len();
     let scale: Vec<f64> = (0..p).map(|a| normal[(a, a)].max(1e-300).sqrt()).collect();
     let mut scaled = DMatrix::from_fn(p, p, |a, b| normal[(a, b)] / (scale[a] * scale[b]));
@@ -232,7 +254,12 @@ fn step_of(problem: &Problem, active: &Active, c: usize) -> f64 {
     let value = active.coordinates[c];
     match active.kind(c) {
         CoordinateKind::Factor { step, .. } => step,
-        CoordinateKind::Shape { lower, upper, scale, .. } => match scale {
+        CoordinateKind::Shape {
+            lower,
+            upper,
+            scale,
+            ..
+        } => match scale {
             Scale::Log => 1e-3 * value.abs().max(lower),
             Scale::Linear => 1e-3 * (upper - lower),
             Scale::OfEffort => {
@@ -247,7 +274,12 @@ fn step_of(problem: &Problem, active: &Active, c: usize) -> f64 {
 fn bounds(problem: &Problem, active: &Active, c: usize) -> (f64, f64) {
     match active.kind(c) {
         CoordinateKind::Factor { minimum, .. } => (minimum, f64::INFINITY),
-        CoordinateKind::Shape { lower, upper, scale, .. } => match scale {
+        CoordinateKind::Shape {
+            lower,
+            upper,
+            scale,
+            ..
+        } => match scale {
             Scale::OfEffort => {
                 let largest = problem.largest_effort[active.hypothesis.place.joint];
                 (lower * largest, 1.1 * upper * largest)

@@ -84,14 +84,19 @@ pub fn covariance(problem: &Problem, fit: &Fit) -> DMatrix<f64> {
 
 /// Standard deviations of the parameters of one piece of physics from the covariance of its coordinates.
 pub fn parameter_deviations(fit: &Fit, covariance: &DMatrix<f64>, index: usize) -> Vec<f64> {
-    let first: usize = fit.actives[..index].iter().map(|a| a.coordinates.len()).sum();
+    let first: usize = fit.actives[..index]
+        .iter()
+        .map(|a| a.coordinates.len())
+        .sum();
     let active = &fit.actives[index];
     let count = active.coordinates.len();
     let own = covariance.view((first, first), (count, count)).into_owned();
     let centre = active.parameters();
     let mut slopes = DMatrix::<f64>::zeros(centre.len(), count);
     for c in 0..count {
-        let step = (1e-3 * own[(c, c)].max(0.0).sqrt()).max(1e-9 * active.coordinates[c].abs()).max(1e-12);
+        let step = (1e-3 * own[(c, c)].max(0.0).sqrt())
+            .max(1e-9 * active.coordinates[c].abs())
+            .max(1e-12);
         if !step.is_finite() {
             return vec![f64::INFINITY; centre.len()];
         }
@@ -107,5 +112,7 @@ pub fn parameter_deviations(fit: &Fit, covariance: &DMatrix<f64>, index: usize) 
         }
     }
     let spread = &slopes * own * slopes.transpose();
-    (0..centre.len()).map(|row| spread[(row, row)].max(0.0).sqrt()).collect()
+    (0..centre.len())
+        .map(|row| spread[(row, row)].max(0.0).sqrt())
+        .collect()
 }

@@ -63,7 +63,9 @@ impl Products {
             }
             products.gram.push(gram);
             products.right.push(right);
-            products.square.push(e.iter().zip(weight).map(|(e, w)| w * e * e).sum());
+            products
+                .square
+                .push(e.iter().zip(weight).map(|(e, w)| w * e * e).sum());
             products.count.push(weight.iter().sum());
         }
         products
@@ -73,8 +75,18 @@ impl Products {
     pub fn without(&self, other: &Self) -> Self {
         let pair = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).collect();
         Self {
-            gram: self.gram.iter().zip(&other.gram).map(|(a, b)| a - b).collect(),
-            right: self.right.iter().zip(&other.right).map(|(a, b)| a - b).collect(),
+            gram: self
+                .gram
+                .iter()
+                .zip(&other.gram)
+                .map(|(a, b)| a - b)
+                .collect(),
+            right: self
+                .right
+                .iter()
+                .zip(&other.right)
+                .map(|(a, b)| a - b)
+                .collect(),
             square: pair(&self.square, &other.square),
             count: pair(&self.count, &other.count),
         }
@@ -88,24 +100,20 @@ impl Products {
 
     /// Sum of squares that `solution` leaves, by joint.
     pub fn all_left(&self, solution: &DVector<f64>) -> Vec<f64> {
-        (0..self.square.len()).map(|j| self.left(j, solution)).collect()
+        (0..self.square.len())
+            .map(|j| self.left(j, solution))
+            .collect()
     }
 
     /// The solution for these variances by joint, with `ridge` added to the diagonal and the columns not in
     /// `used` left at 0. `None` if the columns are not independent even so.
-    pub fn solve(
-        &self,
-        variance: &[f64],
-        ridge: &[f64],
-        used: &[bool],
-    ) -> Option<DVector<f64>> {
+    pub fn solve(&self, variance: &[f64], ridge: &[f64], used: &[bool]) -> Option<DVector<f64>> {
         let (normal, right) = self.normal(variance, ridge);
         let index: Vec<usize> = (0..used.len()).filter(|&i| used[i]).collect();
         let m = index.len();
         let small = DMatrix::from_fn(m, m, |a, b| normal[(index[a], index[b])]);
         let scale: Vec<f64> = (0..m).map(|a| small[(a, a)].max(1e-300).sqrt()).collect();
-        let mut scaled =
-            DMatrix::from_fn(m, m, |a, b| small[(a, b)] / (scale[a] * scale[b]));
+        let mut scaled = DMatrix::from_fn(m, m, |a, b| small[(a, b)] / (scale[a] * scale[b]));
         for a in 0..m {
             scaled[(a, a)] += 1e-10;
         }

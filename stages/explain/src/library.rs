@@ -19,23 +19,38 @@ pub fn hypotheses(model: &Model, bodies: bool, without: &BTreeSet<String>) -> Ve
         let mut add = |place: Whereabouts| all.push(Hypothesis { effect, place });
         match effect.place {
             PlaceKind::Joint if bodies || effect.layer != tauscope_dynamics::terms::Layer::Body => {
-                joints.clone().for_each(|joint| add(Whereabouts { joint, ..Whereabouts::default() }));
+                joints.clone().for_each(|joint| {
+                    add(Whereabouts {
+                        joint,
+                        ..Whereabouts::default()
+                    })
+                });
             }
             PlaceKind::TwoJoints => {
                 for joint in joints.clone() {
                     for source in joints.clone().filter(|source| *source != joint) {
-                        add(Whereabouts { joint, source, link: 0 });
+                        add(Whereabouts {
+                            joint,
+                            source,
+                            link: 0,
+                        });
                     }
                 }
             }
             PlaceKind::Link if bodies => {
                 // The child link of each joint stands for all that is fixed to it.
                 for joint in model.joints() {
-                    add(Whereabouts { link: joint.child_link, ..Whereabouts::default() });
+                    add(Whereabouts {
+                        link: joint.child_link,
+                        ..Whereabouts::default()
+                    });
                 }
             }
             PlaceKind::Tool if bodies => {
-                add(Whereabouts { link: model.tool_link(), ..Whereabouts::default() });
+                add(Whereabouts {
+                    link: model.tool_link(),
+                    ..Whereabouts::default()
+                });
             }
             PlaceKind::Base if bodies => add(Whereabouts::default()),
             PlaceKind::All => add(Whereabouts::default()),

@@ -59,18 +59,31 @@ pub fn located(problem: &Problem, before: &Fit, joints: &[String]) -> Vec<Locate
         };
         let slow = quantile(&samples, |s| s.velocity.abs(), 0.2);
         let fast = quantile(&samples, |s| s.velocity.abs(), 0.8);
-        state(format!("slow and around reversals, |qd| < {slow:.3} rad/s"), &|s| s.velocity.abs() < slow);
-        state(format!("fast, |qd| > {fast:.2} rad/s"), &|s| s.velocity.abs() > fast);
+        state(
+            format!("slow and around reversals, |qd| < {slow:.3} rad/s"),
+            &|s| s.velocity.abs() < slow,
+        );
+        state(format!("fast, |qd| > {fast:.2} rad/s"), &|s| {
+            s.velocity.abs() > fast
+        });
         state("moving forward".to_owned(), &|s| s.velocity > 0.0);
         state("moving backward".to_owned(), &|s| s.velocity < 0.0);
         let hard = quantile(&samples, |s| s.acceleration.abs(), 0.8);
-        state(format!("accelerating hard, |qdd| > {hard:.2} rad/s²"), &|s| s.acceleration.abs() > hard);
+        state(
+            format!("accelerating hard, |qdd| > {hard:.2} rad/s²"),
+            &|s| s.acceleration.abs() > hard,
+        );
         let loaded = quantile(&samples, |s| s.load.abs(), 0.8);
-        state(format!("under high load, |effort| > {loaded:.1} N m"), &|s| s.load.abs() > loaded);
+        state(
+            format!("under high load, |effort| > {loaded:.1} N m"),
+            &|s| s.load.abs() > loaded,
+        );
         for fifth in 0..5 {
             let low = quantile(&samples, |s| s.position, 0.2 * f64::from(fifth));
             let high = quantile(&samples, |s| s.position, 0.2 * f64::from(fifth + 1));
-            state(format!("position {low:.2} to {high:.2} rad"), &|s| s.position >= low && s.position < high);
+            state(format!("position {low:.2} to {high:.2} rad"), &|s| {
+                s.position >= low && s.position < high
+            });
         }
         for (r, track) in problem.tracks.iter().enumerate() {
             let recording = &track.track.name;
@@ -78,9 +91,10 @@ pub fn located(problem: &Problem, before: &Fit, joints: &[String]) -> Vec<Locate
             let end = track.track.time_s.last().copied().unwrap_or(0.0);
             for part in 0..4 {
                 let (from, to) = (end * f64::from(part) / 4.0, end * f64::from(part + 1) / 4.0);
-                state(format!("recording {recording}, {from:.1} to {to:.1} s"), &|s| {
-                    s.recording == r && s.time_s >= from && s.time_s < to
-                });
+                state(
+                    format!("recording {recording}, {from:.1} to {to:.1} s"),
+                    &|s| s.recording == r && s.time_s >= from && s.time_s < to,
+                );
             }
         }
         states.sort_by(|a, b| b.over_noise.total_cmp(&a.over_noise));
@@ -97,7 +111,9 @@ pub fn located(problem: &Problem, before: &Fit, joints: &[String]) -> Vec<Locate
         ));
     }
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
-    all.into_iter().flat_map(|(_, joint, states)| std::iter::once(joint).chain(states)).collect()
+    all.into_iter()
+        .flat_map(|(_, joint, states)| std::iter::once(joint).chain(states))
+        .collect()
 }
 
 struct Row {
@@ -114,5 +130,8 @@ fn quantile(samples: &[Row], of: impl Fn(&Row) -> f64, share: f64) -> f64 {
     let mut values: Vec<f64> = samples.iter().map(of).collect();
     values.sort_by(f64::total_cmp);
     let last = values.len().saturating_sub(1);
-    values.get((share * last as f64).round() as usize).copied().unwrap_or(0.0)
+    values
+        .get((share * last as f64).round() as usize)
+        .copied()
+        .unwrap_or(0.0)
 }

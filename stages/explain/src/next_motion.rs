@@ -40,11 +40,31 @@ impl Excite {
     fn of(winner: &str, rival: &str) -> Self {
         let either = |names: &[&str]| names.contains(&winner) && names.contains(&rival);
         let any = |names: &[&str]| names.contains(&winner) || names.contains(&rival);
-        if either(&["counterbalance_spring", "cable_spring", "torque_bias", "torque_ripple", "torque_gain"]) {
+        if either(&[
+            "counterbalance_spring",
+            "cable_spring",
+            "torque_bias",
+            "torque_ripple",
+            "torque_gain",
+        ]) {
             Self::WholeRange
-        } else if any(&["torque_delay", "torque_lowpass", "rotor_inertia", "joint_elasticity", "backlash"]) {
+        } else if any(&[
+            "torque_delay",
+            "torque_lowpass",
+            "rotor_inertia",
+            "joint_elasticity",
+            "backlash",
+        ]) {
             Self::Fast
-        } else if any(&["payload", "link_mass", "link_com", "base_tilt", "payload_pickup", "external_push", "contact_wall"]) {
+        } else if any(&[
+            "payload",
+            "link_mass",
+            "link_com",
+            "base_tilt",
+            "payload_pickup",
+            "external_push",
+            "contact_wall",
+        ]) {
             Self::AllPoses
         } else {
             Self::AllSpeeds
@@ -103,7 +123,10 @@ fn centre_of(input: &Input) -> Vec<f64> {
     let n = input.model.dof();
     (0..n)
         .map(|j| {
-            let all = input.fit.iter().flat_map(|r| r.position.iter().skip(j).step_by(n));
+            let all = input
+                .fit
+                .iter()
+                .flat_map(|r| r.position.iter().skip(j).step_by(n));
             let (low, high) = all.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(*x), h.max(*x)));
             if low <= high { 0.5 * (low + high) } else { 0.0 }
         })
@@ -133,8 +156,13 @@ fn csv(model: &Model, excite: Excite, joint: usize, centre: &[f64]) -> String {
 fn position(model: &Model, excite: Excite, joint: usize, centre: &[f64], j: usize, t: f64) -> f64 {
     let limits = &model.joints()[j].limits;
     let (lower, upper) = match (limits.lower, limits.upper) {
-        (Some(lower), Some(upper)) if model.joints()[j].kind != JointKind::Continuous => (lower, upper),
-        _ => (centre[j] - DEFAULT_HALF_RANGE, centre[j] + DEFAULT_HALF_RANGE),
+        (Some(lower), Some(upper)) if model.joints()[j].kind != JointKind::Continuous => {
+            (lower, upper)
+        }
+        _ => (
+            centre[j] - DEFAULT_HALF_RANGE,
+            centre[j] + DEFAULT_HALF_RANGE,
+        ),
     };
     let middle = centre[j].clamp(lower, upper);
     let room = RANGE * (upper - middle).min(middle - lower).max(0.0);
@@ -172,7 +200,12 @@ mod tests {
         let urdf = include_str!("../../../tests/data/demo_arm.urdf");
         let model = Model::from_urdf(urdf).unwrap();
         let centre = vec![0.0; model.dof()];
-        for excite in [Excite::WholeRange, Excite::Fast, Excite::AllSpeeds, Excite::AllPoses] {
+        for excite in [
+            Excite::WholeRange,
+            Excite::Fast,
+            Excite::AllSpeeds,
+            Excite::AllPoses,
+        ] {
             for j in 0..model.dof() {
                 let limits = &model.joints()[j].limits;
                 let mut before = position(&model, excite, 1, &centre, j, 0.0);
@@ -181,7 +214,10 @@ mod tests {
                     assert!(limits.lower.is_none_or(|lower| now >= lower));
                     assert!(limits.upper.is_none_or(|upper| now <= upper));
                     let speed = (now - before).abs() / 0.01;
-                    assert!(limits.velocity.is_none_or(|most| speed <= most), "{excite:?} {j}");
+                    assert!(
+                        limits.velocity.is_none_or(|most| speed <= most),
+                        "{excite:?} {j}"
+                    );
                     before = now;
                 }
             }

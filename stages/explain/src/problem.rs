@@ -113,7 +113,9 @@ impl Track {
     /// Keeps the samples of these indices.
     fn thin(&self, keep: &[usize], n: usize) -> Self {
         let rows = |from: &[f64]| -> Vec<f64> {
-            keep.iter().flat_map(|&k| from[k * n..(k + 1) * n].to_vec()).collect()
+            keep.iter()
+                .flat_map(|&k| from[k * n..(k + 1) * n].to_vec())
+                .collect()
         };
         Self {
             name: self.name.clone(),
@@ -143,7 +145,11 @@ impl Track {
         for k in 0..self.len() {
             let row = k * n..(k + 1) * n;
             let at = MotionSample {
-                dt_s: if k == 0 { 0.0 } else { self.time_s[k] - self.time_s[k - 1] },
+                dt_s: if k == 0 {
+                    0.0
+                } else {
+                    self.time_s[k] - self.time_s[k - 1]
+                },
                 recording_s: self.time_s[k],
                 session_s: self.session_s + self.time_s[k],
                 position: &self.position[row.clone()],
@@ -280,7 +286,12 @@ impl Problem {
                 let mut signal: Vec<f64> = kept.iter().map(|&k| signal[k]).collect();
                 filter.apply(&mut signal);
                 measured.push(compared.iter().map(|&k| signal[k]).collect::<Vec<_>>());
-                weight.push(compared.iter().map(|&k| f64::from(counts[k])).collect::<Vec<_>>());
+                weight.push(
+                    compared
+                        .iter()
+                        .map(|&k| f64::from(counts[k]))
+                        .collect::<Vec<_>>(),
+                );
                 filters.push(filter);
             }
             let first_row = problem.rows;
@@ -321,7 +332,12 @@ impl Problem {
     /// The same for one joint.
     pub fn joint_signal(&self, efforts: &[Vec<f64>], joint: usize, into: &mut [f64]) {
         for (track, effort) in self.tracks.iter().zip(efforts) {
-            let one = effort.iter().skip(joint).step_by(self.joints).copied().collect();
+            let one = effort
+                .iter()
+                .skip(joint)
+                .step_by(self.joints)
+                .copied()
+                .collect();
             track.compare(joint, one, &mut into[track.rows()]);
         }
     }

@@ -64,7 +64,12 @@ impl<'a> Base<'a> {
                 let active = &fit.actives[i];
                 let range = match active.kind(c) {
                     CoordinateKind::Factor { .. } => return 0.0,
-                    CoordinateKind::Shape { lower, upper, scale, .. } => match scale {
+                    CoordinateKind::Shape {
+                        lower,
+                        upper,
+                        scale,
+                        ..
+                    } => match scale {
                         Scale::Log => 0.5 * active.coordinates[c].abs().max(lower),
                         Scale::Linear => 0.1 * (upper - lower),
                         Scale::OfEffort => 0.1 * active.coordinates[c].abs().max(1e-6),
@@ -134,7 +139,9 @@ impl<'a> Base<'a> {
         let variance = variances(self.problem, &squares, &products.count);
         let gain = likelihood(&variance, &products.count) - self.fit.likelihood();
         let size = (0..squares.len())
-            .map(|j| (self.fit.squares[j] - squares[j]) / (products.count[j].max(1.0) * variance[j]))
+            .map(|j| {
+                (self.fit.squares[j] - squares[j]) / (products.count[j].max(1.0) * variance[j])
+            })
             .fold(0.0, f64::max);
         Some((solution.rows(p, q).iter().copied().collect(), gain, size))
     }
@@ -155,11 +162,16 @@ impl<'a> Base<'a> {
             let weight = &problem.weight[rows.clone()];
             let mut e = &self.fit.residual[rows];
             let mut gram = DMatrix::zeros(p + q, p + q);
-            gram.view_mut((0, 0), (p, p)).copy_from(&self.products.gram[j]);
+            gram.view_mut((0, 0), (p, p))
+                .copy_from(&self.products.gram[j]);
             let mut right = DVector::zeros(p + q);
             right.rows_mut(0, p).copy_from(&self.products.right[j]);
             let dot = |a: &[f64], b: &[f64]| -> f64 {
-                a.iter().zip(b).zip(weight).map(|((a, b), w)| w * a * b).sum()
+                a.iter()
+                    .zip(b)
+                    .zip(weight)
+                    .map(|((a, b), w)| w * a * b)
+                    .sum()
             };
             if let Some(taken) = alone.and_then(|column| column.of_joint(j, problem.rows)) {
                 for ((less, e), taken) in less.iter_mut().zip(e).zip(taken) {
@@ -174,7 +186,9 @@ impl<'a> Base<'a> {
                 }
             }
             for (a, new) in more.iter().enumerate() {
-                let Some(new) = new.of_joint(j, problem.rows) else { continue };
+                let Some(new) = new.of_joint(j, problem.rows) else {
+                    continue;
+                };
                 right[p + a] = dot(new, e);
                 for (b, own) in self.jacobian.iter().enumerate() {
                     if let Some(own) = own.of_joint(j, problem.rows) {
@@ -214,13 +228,25 @@ impl<'a> Base<'a> {
     /// best.
     fn sharpened(&self, hypothesis: Hypothesis, mut best: Proposal) -> Proposal {
         let shapes: Vec<usize> = (0..hypothesis.effect.coordinates.len())
-            .filter(|&c| matches!(hypothesis.effect.coordinates[c].kind, CoordinateKind::Shape { .. }))
+            .filter(|&c| {
+                matches!(
+                    hypothesis.effect.coordinates[c].kind,
+                    CoordinateKind::Shape { .. }
+                )
+            })
             .collect();
-        let ([c], true) = (&shapes[..], best.evidence() > 0.0) else { return best };
+        let ([c], true) = (&shapes[..], best.evidence() > 0.0) else {
+            return best;
+        };
         let grid: Vec<f64> = shapes_of(self.problem, hypothesis, *c);
-        let at = grid.iter().position(|x| *x == best.active.coordinates[*c]).unwrap_or(0);
-        let (mut below, mut above) =
-            (grid[at.saturating_sub(1)], grid[(at + 1).min(grid.len() - 1)]);
+        let at = grid
+            .iter()
+            .position(|x| *x == best.active.coordinates[*c])
+            .unwrap_or(0);
+        let (mut below, mut above) = (
+            grid[at.saturating_sub(1)],
+            grid[(at + 1).min(grid.len() - 1)],
+        );
         for _ in 0..HALVINGS {
             let centre = best.active.coordinates[*c];
             let (left, right) = (0.5 * (below + centre), 0.5 * (centre + above));
@@ -232,7 +258,11 @@ impl<'a> Base<'a> {
                     && proposal.gain > best.gain
                 {
                     best = proposal;
-                    (below, above) = if value < centre { (below, centre) } else { (centre, above) };
+                    (below, above) = if value < centre {
+                        (below, centre)
+                    } else {
+                        (centre, above)
+                    };
                     moved = true;
                     break;
                 }
@@ -246,8 +276,13 @@ impl<'a> Base<'a> {
 
     /// The best factors of a hypothesis at one shape.
     pub fn propose_at(&self, hypothesis: Hypothesis, shape: &[f64]) -> Option<Proposal> {
-        let columns =
-            columns(self.problem, &self.fit.actives, &self.fit.efforts, hypothesis, shape);
+        let columns = columns(
+            self.problem,
+            &self.fit.actives,
+            &self.fit.efforts,
+            hypothesis,
+            shape,
+        );
         self.propose_columns(hypothesis, shape, columns.alone.as_ref(), &columns.factors)
     }
 
@@ -284,7 +319,10 @@ impl<'a> Base<'a> {
 
 /// The values of one shape in the grid of a hypothesis.
 fn shapes_of(problem: &Problem, hypothesis: Hypothesis, coordinate: usize) -> Vec<f64> {
-    shapes(problem, hypothesis).iter().map(|shape| shape[coordinate]).collect()
+    shapes(problem, hypothesis)
+        .iter()
+        .map(|shape| shape[coordinate])
+        .collect()
 }
 
 /// The grid of a hypothesis' shapes; factors are 0 in it.
@@ -292,7 +330,12 @@ pub fn shapes(problem: &Problem, hypothesis: Hypothesis) -> Vec<Vec<f64>> {
     let mut grid = vec![Vec::new()];
     for coordinate in hypothesis.effect.coordinates {
         let values: Vec<f64> = match coordinate.kind {
-            CoordinateKind::Shape { lower, upper, steps, scale } => {
+            CoordinateKind::Shape {
+                lower,
+                upper,
+                steps,
+                scale,
+            } => {
                 let of = |share: f64| match scale {
                     Scale::Linear => lower + share * (upper - lower),
                     Scale::Log => lower * (upper / lower).powf(share),
@@ -303,18 +346,27 @@ pub fn shapes(problem: &Problem, hypothesis: Hypothesis) -> Vec<Vec<f64>> {
                 };
                 // What all joints share costs the most and is refined well from afar.
                 let all = hypothesis.effect.place == PlaceKind::All;
-                let steps = if all { steps.min(MOST_STEPS_OF_ALL) } else { steps };
-                (0..steps).map(|k| of(k as f64 / (steps - 1).max(1) as f64)).collect()
+                let steps = if all {
+                    steps.min(MOST_STEPS_OF_ALL)
+                } else {
+                    steps
+                };
+                (0..steps)
+                    .map(|k| of(k as f64 / (steps - 1).max(1) as f64))
+                    .collect()
             }
             _ => vec![0.0],
         };
         let longer = |start: &Vec<f64>| {
             let start = start.clone();
-            values.iter().map(move |&value| {
-                let mut longer = start.clone();
-                longer.push(value);
-                longer
-            }).collect::<Vec<_>>()
+            values
+                .iter()
+                .map(move |&value| {
+                    let mut longer = start.clone();
+                    longer.push(value);
+                    longer
+                })
+                .collect::<Vec<_>>()
         };
         grid = grid.iter().flat_map(longer).collect();
     }

@@ -313,20 +313,26 @@ impl Reader<'_> {
             recording.start_ns = stamp_ns;
         }
         self.last_ns = Some(stamp_ns);
-        recording.time_s.push((stamp_ns - recording.start_ns) as f64 * 1e-9);
+        recording
+            .time_s
+            .push((stamp_ns - recording.start_ns) as f64 * 1e-9);
         recording.sample_of_row.push(recording.time_s.len() - 1);
         for &at in &self.order {
             recording.position.push(message.position[at]);
         }
         match velocity {
             Some(velocity) if self.has_velocity => {
-                recording.velocity.extend(self.order.iter().map(|&at| velocity[at]));
+                recording
+                    .velocity
+                    .extend(self.order.iter().map(|&at| velocity[at]));
             }
             _ => self.has_velocity = false,
         }
         match effort {
             Some(effort) if self.has_effort => {
-                recording.effort.extend(self.order.iter().map(|&at| effort[at]));
+                recording
+                    .effort
+                    .extend(self.order.iter().map(|&at| effort[at]));
             }
             _ => self.has_effort = false,
         }

@@ -110,7 +110,8 @@ impl Search<'_> {
     /// of them, if it does better than they.
     fn described(&self, best: &Explanation, joint: usize) -> Option<Explanation> {
         let excess = |fit: &Fit| {
-            fit.variance[joint] / (self.problem.white_noise[joint] * self.problem.white_noise[joint])
+            fit.variance[joint]
+                / (self.problem.white_noise[joint] * self.problem.white_noise[joint])
         };
         let own: Vec<usize> = (0..best.fit.actives.len())
             .filter(|&i| {
@@ -161,7 +162,9 @@ impl Search<'_> {
     /// Every hypothesis that could change the effort of one of `joints`, beside what `fit` holds, most evidence
     /// first.
     pub fn proposals(&self, fit: &Fit, joints: &[usize]) -> Vec<Proposal> {
-        self.proposals_for(fit, |h| h.only_joint().is_none_or(|joint| joints.contains(&joint)))
+        self.proposals_for(fit, |h| {
+            h.only_joint().is_none_or(|joint| joints.contains(&joint))
+        })
     }
 
     /// The rivals of one piece of physics, once it is taken out of `without`: friction has rivals in its joint alone.
@@ -200,7 +203,9 @@ impl Search<'_> {
             let mut found = Vec::new();
             loop {
                 let at = next.fetch_add(1, Ordering::Relaxed);
-                let Some(hypothesis) = wanted.get(at) else { return found };
+                let Some(hypothesis) = wanted.get(at) else {
+                    return found;
+                };
                 found.extend(base.propose_in_time(*hypothesis));
             }
         };
@@ -215,13 +220,19 @@ impl Search<'_> {
         });
         all.sort_by(|a, b| {
             let place = |p: &Proposal| (p.active.hypothesis.effect.name, p.active.hypothesis.place);
-            b.evidence().total_cmp(&a.evidence()).then_with(|| place(a).cmp(&place(b)))
+            b.evidence()
+                .total_cmp(&a.evidence())
+                .then_with(|| place(a).cmp(&place(b)))
         });
         all
     }
 
     fn is_worth_a_try(&self, fit: &Fit, hypothesis: Hypothesis) -> bool {
-        let same = fit.actives.iter().filter(|active| active.hypothesis == hypothesis).count();
+        let same = fit
+            .actives
+            .iter()
+            .filter(|active| active.hypothesis == hypothesis)
+            .count();
         if same >= most_at_one_place(hypothesis) {
             return false;
         }
@@ -242,7 +253,11 @@ impl Search<'_> {
     /// Adds pieces of physics while there is evidence for more.
     fn forward(&self, mut best: Explanation) -> Explanation {
         let pieces = |e: &Explanation| {
-            e.fit.actives.iter().filter(|a| !is_drive(&a.hypothesis)).count()
+            e.fit
+                .actives
+                .iter()
+                .filter(|a| !is_drive(&a.hypothesis))
+                .count()
         };
         let all: Vec<usize> = (0..self.problem.joints).collect();
         // What is added and taken out again would be added for ever.
@@ -250,7 +265,9 @@ impl Search<'_> {
         while pieces(&best) < MOST_PIECES {
             let mut proposals = self.proposals(&best.fit, &all);
             proposals.retain(|p| !barred.contains(&p.active.hypothesis));
-            let Some(next) = self.best_of(&best, &proposals) else { break };
+            let Some(next) = self.best_of(&best, &proposals) else {
+                break;
+            };
             (self.say)(&format!("+ {}", describe(&next)));
             let new = next.fit.actives.last().map(|active| active.hypothesis);
             let next = self.pruned(next);
@@ -278,7 +295,10 @@ impl Search<'_> {
             if next.ahead_of(now, worth) < evidence && !overwhelming(&next, now) {
                 continue;
             }
-            if best.as_ref().is_none_or(|best| next.ahead_of(best, worth) > 0.0) {
+            if best
+                .as_ref()
+                .is_none_or(|best| next.ahead_of(best, worth) > 0.0)
+            {
                 best = Some(next);
             }
         }
@@ -314,10 +334,12 @@ impl Search<'_> {
                 };
                 let hardly_steps = !steps_enough(active);
                 let worth = &self.problem.worth;
-                let weak =
-                    best.ahead_of(&less, worth) < evidence && !overwhelming(&best, &less);
+                let weak = best.ahead_of(&less, worth) < evidence && !overwhelming(&best, &less);
                 if hardly_steps || weak || size < least {
-                    (self.say)(&format!("- {}", best.fit.actives[index].hypothesis.effect.name));
+                    (self.say)(&format!(
+                        "- {}",
+                        best.fit.actives[index].hypothesis.effect.name
+                    ));
                     best = less;
                     continue 'again;
                 }
@@ -350,7 +372,10 @@ impl Search<'_> {
         penalties.remove(index);
         let joints = Fit::joints_of(&from.fit.actives[index].hypothesis, self.problem.joints);
         Explanation {
-            fit: from.fit.without(self.problem, index).refined_at(self.problem, Some(&joints)),
+            fit: from
+                .fit
+                .without(self.problem, index)
+                .refined_at(self.problem, Some(&joints)),
             penalties,
         }
     }
@@ -363,8 +388,11 @@ impl Search<'_> {
         proposals: &[Proposal],
     ) -> Option<Explanation> {
         let gain = best.fit.likelihood() - without.fit.likelihood();
-        let able: Vec<Proposal> =
-            proposals.iter().filter(|p| p.gain > COULD_DO_BETTER * gain).cloned().collect();
+        let able: Vec<Proposal> = proposals
+            .iter()
+            .filter(|p| p.gain > COULD_DO_BETTER * gain)
+            .cloned()
+            .collect();
         self.best_of(without, &able)
     }
 
@@ -394,7 +422,11 @@ impl Search<'_> {
         }
         let joint = |i: usize, best: &Explanation| {
             let hypothesis = &best.fit.actives[i].hypothesis;
-            if is_drive(hypothesis) { None } else { hypothesis.only_joint() }
+            if is_drive(hypothesis) {
+                None
+            } else {
+                hypothesis.only_joint()
+            }
         };
         let mut pair = (0, 1);
         while pair.1 < best.fit.actives.len() {
@@ -430,7 +462,12 @@ fn overwhelming(explanation: &Explanation, other: &Explanation) -> bool {
     let white = vec![1.0; other.fit.variance.len()];
     let less = |(with, without): (&f64, &f64)| *without > FAIR_SHARE * with;
     explanation.ahead_of(other, &white) > OVERWHELMING
-        && explanation.fit.variance.iter().zip(&other.fit.variance).any(less)
+        && explanation
+            .fit
+            .variance
+            .iter()
+            .zip(&other.fit.variance)
+            .any(less)
 }
 
 /// By piece, the square of its factors in units of their covariance, as if what is left were white.
@@ -445,7 +482,9 @@ fn wald(problem: &Problem, fit: &Fit) -> Vec<f64> {
     for a in 0..p {
         scaled[(a, a)] += 1e-9;
     }
-    let Some(inverse) = scaled.try_inverse() else { return vec![0.0; fit.actives.len()] };
+    let Some(inverse) = scaled.try_inverse() else {
+        return vec![0.0; fit.actives.len()];
+    };
     let mut first = 0;
     fit.actives
         .iter()
@@ -456,11 +495,16 @@ fn wald(problem: &Problem, fit: &Fit) -> Vec<f64> {
                 .collect();
             let theta = DVector::from_iterator(
                 index.len(),
-                index.iter().map(|&a| active.coordinates[a - first] * scale[a]),
+                index
+                    .iter()
+                    .map(|&a| active.coordinates[a - first] * scale[a]),
             );
             first += active.coordinates.len();
-            let own = DMatrix::from_fn(index.len(), index.len(), |a, b| inverse[(index[a], index[b])]);
-            own.try_inverse().map_or(0.0, |own| (own * &theta).dot(&theta))
+            let own = DMatrix::from_fn(index.len(), index.len(), |a, b| {
+                inverse[(index[a], index[b])]
+            });
+            own.try_inverse()
+                .map_or(0.0, |own| (own * &theta).dot(&theta))
         })
         .collect()
 }
@@ -512,8 +556,11 @@ fn most_at_one_place(hypothesis: Hypothesis) -> usize {
 fn describe(explanation: &Explanation) -> String {
     let one = |active: &Active| {
         let place = active.hypothesis.place;
-        let values: Vec<String> =
-            active.coordinates.iter().map(|v| format!("{v:.4}")).collect();
+        let values: Vec<String> = active
+            .coordinates
+            .iter()
+            .map(|v| format!("{v:.4}"))
+            .collect();
         format!(
             "{}@{}/{}/{} [{}]",
             active.hypothesis.effect.name,

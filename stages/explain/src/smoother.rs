@@ -32,8 +32,9 @@ impl LowPass {
     /// The same, passing over the samples that are not `used`.
     pub fn weighted(time_s: &[f64], cutoff_hz: f64, used: impl Fn(usize) -> bool) -> Self {
         let n = time_s.len();
-        let weight: Vec<f64> =
-            (0..n).map(|k| if used(k) { 1.0 } else { PASSED_OVER }).collect();
+        let weight: Vec<f64> = (0..n)
+            .map(|k| if used(k) { 1.0 } else { PASSED_OVER })
+            .collect();
         // Rows of A = W + λ Dᵀ D: the diagonal and three bands above it.
         let mut rows: Vec<[f64; 4]> = weight.iter().map(|w| [*w, 0.0, 0.0, 0.0]).collect();
         if n >= 4 {

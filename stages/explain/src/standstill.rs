@@ -61,10 +61,20 @@ mod tests {
         // Creeps at -1 mrad/s, then runs off at 15 rad/s².
         let position: Vec<f64> = time
             .iter()
-            .map(|t| -0.001 * t - if *t > 2.0 { 7.5 * (t - 2.0) * (t - 2.0) } else { 0.0 })
+            .map(|t| {
+                -0.001 * t
+                    - if *t > 2.0 {
+                        7.5 * (t - 2.0) * (t - 2.0)
+                    } else {
+                        0.0
+                    }
+            })
             .collect();
         let mut states = MotionSmoother::new(&time, 16.0).smooth(&position);
-        assert!(states[190..200].iter().any(|s| s.y > 0.0), "the smoother rings");
+        assert!(
+            states[190..200].iter().any(|s| s.y > 0.0),
+            "the smoother rings"
+        );
         resmooth(&time, &position, &mut states);
         for state in &states[5..195] {
             assert!((state.y + 0.001).abs() < 2e-4, "{}", state.y);

@@ -38,9 +38,14 @@ impl Base<'_> {
         let count = candidates.len() as f64;
         let mut best: Option<CurveProposal> = None;
         for curve in candidates {
-            let Some(mut proposal) = self.try_curve(joint, curve) else { continue };
+            let Some(mut proposal) = self.try_curve(joint, curve) else {
+                continue;
+            };
             proposal.penalty += count.ln();
-            if best.as_ref().is_none_or(|best| proposal.evidence() > best.evidence()) {
+            if best
+                .as_ref()
+                .is_none_or(|best| proposal.evidence() > best.evidence())
+            {
                 best = Some(proposal);
             }
         }
@@ -50,7 +55,10 @@ impl Base<'_> {
     fn try_curve(&self, joint: usize, curve: Table) -> Option<CurveProposal> {
         let hypothesis = Hypothesis {
             effect: effect("unknown")?,
-            place: Whereabouts { joint, ..Whereabouts::default() },
+            place: Whereabouts {
+                joint,
+                ..Whereabouts::default()
+            },
         };
         let knots = curve.knots.len();
         let at = |values: Vec<f64>| Active {
@@ -62,7 +70,12 @@ impl Base<'_> {
             .map(|k| {
                 let mut values = vec![0.0; knots];
                 values[k] = 1.0;
-                change(self.problem, &self.fit.actives, &self.fit.efforts, &at(values))
+                change(
+                    self.problem,
+                    &self.fit.actives,
+                    &self.fit.efforts,
+                    &at(values),
+                )
             })
             .collect();
         let minimum = vec![f64::NEG_INFINITY; knots];
@@ -79,7 +92,10 @@ impl Base<'_> {
 /// Sets the small values of a curve to zero: they are what is left of noise, and where the curve ends they would be held
 /// for ever.
 pub fn keep_what_is_evident(curve: &mut Active) {
-    let largest = curve.coordinates.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    let largest = curve
+        .coordinates
+        .iter()
+        .fold(0.0_f64, |most, x| most.max(x.abs()));
     for value in &mut curve.coordinates {
         if value.abs() < EVIDENT * largest {
             *value = 0.0;
@@ -93,12 +109,13 @@ fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
     let mut add = |against: Against, of_joint: usize| {
         let mut values = Vec::new();
         for track in &problem.tracks {
-            track.track.each(|_, at: &MotionSample<'_>| values.push(against.value(at, of_joint)));
+            track
+                .track
+                .each(|_, at: &MotionSample<'_>| values.push(against.value(at, of_joint)));
         }
         values.sort_by(f64::total_cmp);
         let last = values.len() - 1;
-        let mut knots: Vec<f64> =
-            (0..KNOTS).map(|k| values[last * k / (KNOTS - 1)]).collect();
+        let mut knots: Vec<f64> = (0..KNOTS).map(|k| values[last * k / (KNOTS - 1)]).collect();
         let least = 0.02 * (knots[KNOTS - 1] - knots[0]);
         knots.dedup_by(|later, earlier| *later - *earlier <= least);
         if knots.len() < 3 {

@@ -31,8 +31,10 @@ impl Base<'_> {
                 .map(|(_, force)| force)
                 .sum();
             direction = -agreeing.try_normalize(1e-9)?;
-            let mut depths: Vec<f64> =
-                contacts.iter().map(|(point, _)| direction.dot(&point.coords)).collect();
+            let mut depths: Vec<f64> = contacts
+                .iter()
+                .map(|(point, _)| direction.dot(&point.coords))
+                .collect();
             depths.sort_by(f64::total_cmp);
             for quantile in SURFACES {
                 let offset = depths[(quantile * (depths.len() - 1) as f64) as usize] - 0.005;
@@ -53,7 +55,9 @@ impl Base<'_> {
     fn contacts(&self) -> Vec<(Point3<f64>, Vector3<f64>)> {
         let problem = self.problem;
         let n = problem.joints;
-        let Some(last) = problem.model.joints().last() else { return Vec::new() };
+        let Some(last) = problem.model.joints().last() else {
+            return Vec::new();
+        };
         let link = last.child_link;
         let mut data = Data::new(&problem.model);
         let mut found = Vec::new();

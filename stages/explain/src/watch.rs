@@ -21,12 +21,14 @@ mod scale;
 #[cfg(test)]
 mod tests;
 mod window;
+mod words;
 
 use tauscope_bus::{Detection, Emit, Name, Stage, StageError, TwinState, flags};
 use tauscope_dynamics::Model;
 
 pub use config::Config;
 pub use finding::{Cause, Finding};
+pub use words::{amount, in_words};
 
 use monitor::{Monitor, News};
 use rows::Rows;
@@ -98,7 +100,10 @@ impl Stage<TwinState, Detection> for Watch {
         sample: &TwinState,
         out: &mut dyn Emit<Detection>,
     ) -> Result<(), StageError> {
-        let news = self.rows.take(sample).and_then(|row| self.monitor.take(row));
+        let news = self
+            .rows
+            .take(sample)
+            .and_then(|row| self.monitor.take(row));
         let mut event = 0;
         let mut told = self.changed;
         if self.ends {

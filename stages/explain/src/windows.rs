@@ -35,7 +35,10 @@ pub fn time_kind(hypothesis: Hypothesis) -> TimeKind {
         let all = hypothesis.effect.coordinates.iter();
         all.filter(|c| c.kind == kind).count()
     };
-    match (count(CoordinateKind::RecordingTime), count(CoordinateKind::SessionTime)) {
+    match (
+        count(CoordinateKind::RecordingTime),
+        count(CoordinateKind::SessionTime),
+    ) {
         (0, 0) => TimeKind::Always,
         (0, 1) => TimeKind::Step,
         (_, 0) => TimeKind::EveryRecording,
@@ -65,8 +68,13 @@ impl Base<'_> {
         let mut shape = vec![0.0; hypothesis.effect.coordinates.len()];
         let time = time_index(hypothesis)?;
         shape[time] = f64::NEG_INFINITY;
-        let all =
-            columns(problem, &self.fit.actives, &self.fit.efforts, hypothesis, &shape);
+        let all = columns(
+            problem,
+            &self.fit.actives,
+            &self.fit.efforts,
+            hypothesis,
+            &shape,
+        );
         // With the change before everything, the second factor's column is the whole effect.
         let whole = all.factors.last()?;
         let joint = whole.joint?;
@@ -80,15 +88,18 @@ impl Base<'_> {
                 after.values[..first].fill(0.0);
                 let moves = |c: &Column| {
                     let weight = &problem.weight[problem.joint_rows(joint)];
-                    c.values.iter().zip(weight).filter(|(v, w)| **v != 0.0 && **w > 0.0).count()
+                    c.values
+                        .iter()
+                        .zip(weight)
+                        .filter(|(v, w)| **v != 0.0 && **w > 0.0)
+                        .count()
                 };
                 if moves(&before) < 8 || moves(&after) < 8 {
                     continue;
                 }
                 let at = track.compared[first - rows.start];
                 shape[time] = track.track.session_s + track.track.time_s[at];
-                let proposal =
-                    self.propose_columns(hypothesis, &shape, None, &[before, after]);
+                let proposal = self.propose_columns(hypothesis, &shape, None, &[before, after]);
                 if let Some(mut proposal) = proposal
                     && best.as_ref().is_none_or(|best| proposal.gain > best.gain)
                 {
@@ -108,14 +119,21 @@ impl Base<'_> {
         let [start, end] = times[..] else { return None };
         let mut shape = vec![0.0; hypothesis.effect.coordinates.len()];
         (shape[start], shape[end]) = (f64::NEG_INFINITY, f64::INFINITY);
-        let all =
-            columns(problem, &self.fit.actives, &self.fit.efforts, hypothesis, &shape);
+        let all = columns(
+            problem,
+            &self.fit.actives,
+            &self.fit.efforts,
+            hypothesis,
+            &shape,
+        );
         let all = &all.factors;
         let scanned = &all[..all.len().min(SCANNED_FACTORS)];
         let mut best: Option<Proposal> = None;
         for (from_s, to_s) in self.scan(scanned, only) {
-            let masked: Vec<Column> =
-                all.iter().map(|c| self.within(c, from_s, to_s, only)).collect();
+            let masked: Vec<Column> = all
+                .iter()
+                .map(|c| self.within(c, from_s, to_s, only))
+                .collect();
             let session_s = only.map_or(0.0, |track| problem.tracks[track].track.session_s);
             (shape[start], shape[end]) = (session_s + from_s, session_s + to_s);
             if let Some(mut proposal) = self.propose_columns(hypothesis, &shape, None, &masked)
@@ -132,7 +150,11 @@ impl Base<'_> {
     fn within(&self, column: &Column, from_s: f64, to_s: f64, only: Option<usize>) -> Column {
         let problem = self.problem;
         let mut masked = column.clone();
-        let blocks = if column.joint.is_some() { 1 } else { problem.joints };
+        let blocks = if column.joint.is_some() {
+            1
+        } else {
+            problem.joints
+        };
         for (r, track) in problem.tracks.iter().enumerate() {
             for (row, &k) in track.rows().zip(&track.compared) {
                 let t = track.track.time_s[k];
@@ -173,7 +195,8 @@ impl Base<'_> {
                         continue;
                     }
                     let value = |c: &Column| {
-                        c.of_joint(j, problem.rows).map_or(0.0, |values| values[row])
+                        c.of_joint(j, problem.rows)
+                            .map_or(0.0, |values| values[row])
                     };
                     let x: DVector<f64> = DVector::from_iterator(q, columns.iter().map(value));
                     gram[bin].ger(weight, &x, &x, 1.0);
@@ -214,19 +237,26 @@ impl Base<'_> {
                 break;
             }
         }
-        kept.iter().map(|&(from, to)| (from as f64 * bin_s, to as f64 * bin_s)).collect()
+        kept.iter()
+            .map(|&(from, to)| (from as f64 * bin_s, to as f64 * bin_s))
+            .collect()
     }
 }
 
 fn time_indices(hypothesis: Hypothesis) -> Vec<usize> {
     let is_time = |kind| {
-        matches!(kind, CoordinateKind::RecordingTime | CoordinateKind::SessionTime)
+        matches!(
+            kind,
+            CoordinateKind::RecordingTime | CoordinateKind::SessionTime
+        )
     };
     let coordinates = hypothesis.effect.coordinates.iter().enumerate();
-    coordinates.filter(|(_, c)| is_time(c.kind)).map(|(i, _)| i).collect()
+    coordinates
+        .filter(|(_, c)| is_time(c.kind))
+        .map(|(i, _)| i)
+        .collect()
 }
 
 fn time_index(hypothesis: Hypothesis) -> Option<usize> {
     time_indices(hypothesis).first().copied()
 }
-

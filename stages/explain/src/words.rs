@@ -75,60 +75,134 @@ pub fn sentence(
 ) -> String {
     let effect = active.hypothesis.effect.name;
     let with = |parameter: &str| -> String {
-        let value = parameters.get(parameter).and_then(Value::as_f64).unwrap_or(f64::NAN);
-        let between = intervals.get(parameter).map_or_else(String::new, |[low, high]| {
-            format!(" ({} to {})", number(*low), number(*high))
-        });
+        let value = parameters
+            .get(parameter)
+            .and_then(Value::as_f64)
+            .unwrap_or(f64::NAN);
+        let between = intervals
+            .get(parameter)
+            .map_or_else(String::new, |[low, high]| {
+                format!(" ({} to {})", number(*low), number(*high))
+            });
         format!("{} {}{between}", number(value), unit(parameter)).replace("  ", " ")
     };
     let left_out = "that the twin leaves out";
     match effect {
-        "viscous_friction" => format!("Joint {place} has viscous friction of {} {left_out}.", with("viscous_nms_per_rad")),
-        "coulomb_friction" => format!("Joint {place} has Coulomb friction of {} {left_out}.", with("coulomb_nm")),
+        "viscous_friction" => format!(
+            "Joint {place} has viscous friction of {} {left_out}.",
+            with("viscous_nms_per_rad")
+        ),
+        "coulomb_friction" => format!(
+            "Joint {place} has Coulomb friction of {} {left_out}.",
+            with("coulomb_nm")
+        ),
         "stribeck_friction" => format!(
             "Joint {place} has friction that falls from {} at standstill to {} in motion, over {} {left_out}.",
-            with("static_nm"), with("coulomb_nm"), with("stribeck_velocity_rad_s")
+            with("static_nm"),
+            with("coulomb_nm"),
+            with("stribeck_velocity_rad_s")
         ),
         "asymmetric_coulomb" => format!(
             "Joint {place} has Coulomb friction of {} forward and {} backward {left_out}.",
-            with("coulomb_positive_nm"), with("coulomb_negative_nm")
+            with("coulomb_positive_nm"),
+            with("coulomb_negative_nm")
         ),
-        "load_dependent_friction" => format!("The friction of joint {place} grows with the load on its gear, by {} of it.", with("coefficient")),
+        "load_dependent_friction" => format!(
+            "The friction of joint {place} grows with the load on its gear, by {} of it.",
+            with("coefficient")
+        ),
         "presliding_hysteresis" => format!(
             "The friction of joint {place}, {}, builds up over its bristles after each reversal, with {}.",
-            with("coulomb_nm"), with("bristle_stiffness_nm_per_rad")
+            with("coulomb_nm"),
+            with("bristle_stiffness_nm_per_rad")
         ),
-        "quadratic_drag" => format!("Joint {place} has a drag of {} {left_out}.", with("drag_nms2_per_rad2")),
+        "quadratic_drag" => format!(
+            "Joint {place} has a drag of {} {left_out}.",
+            with("drag_nms2_per_rad2")
+        ),
         "temperature_viscous" => format!(
             "The viscous friction of joint {place} falls as it warms up: {} warm and {} more when cold, within {}.",
-            with("viscous_warm_nms_per_rad"), with("viscous_extra_cold_nms_per_rad"), with("time_constant_s")
+            with("viscous_warm_nms_per_rad"),
+            with("viscous_extra_cold_nms_per_rad"),
+            with("time_constant_s")
         ),
         "friction_step" => format!(
             "The Coulomb friction of joint {place} jumped from {} to {}, {} into the session.",
-            with("coulomb_before_nm"), with("coulomb_after_nm"), with("change_time_session_s")
+            with("coulomb_before_nm"),
+            with("coulomb_after_nm"),
+            with("change_time_session_s")
         ),
-        "rotor_inertia" => format!("Joint {place} turns a rotor of {} (armature) {left_out}.", with("inertia_kgm2")),
+        "rotor_inertia" => format!(
+            "Joint {place} turns a rotor of {} (armature) {left_out}.",
+            with("inertia_kgm2")
+        ),
         "joint_elasticity" => format!(
             "Joint {place} is elastic, {}, behind a rotor of {}.",
-            with("stiffness_nm_per_rad"), with("rotor_inertia_kgm2")
+            with("stiffness_nm_per_rad"),
+            with("rotor_inertia_kgm2")
         ),
-        "backlash" => format!("Joint {place} has a play of {} behind a rotor of {}.", with("gap_rad"), with("rotor_inertia_kgm2")),
-        "payload" => format!("The arm carries {} that nobody told the twin of.", with("mass_kg")),
-        "payload_pickup" => format!("The arm carries {} for a while in each recording, from {} to {}.", with("mass_kg"), with("t_start_s"), with("t_end_s")),
-        "link_mass" => format!("Link {place} is heavier than in the URDF by {}.", with("delta_mass_kg")),
+        "backlash" => format!(
+            "Joint {place} has a play of {} behind a rotor of {}.",
+            with("gap_rad"),
+            with("rotor_inertia_kgm2")
+        ),
+        "payload" => format!(
+            "The arm carries {} that nobody told the twin of.",
+            with("mass_kg")
+        ),
+        "payload_pickup" => format!(
+            "The arm carries {} for a while in each recording, from {} to {}.",
+            with("mass_kg"),
+            with("t_start_s"),
+            with("t_end_s")
+        ),
+        "link_mass" => format!(
+            "Link {place} is heavier than in the URDF by {}.",
+            with("delta_mass_kg")
+        ),
         "link_com" => format!(
             "The centre of mass of link {place} is off by ({}, {}, {}) in its frame.",
-            with("delta_com_x_m"), with("delta_com_y_m"), with("delta_com_z_m")
+            with("delta_com_x_m"),
+            with("delta_com_y_m"),
+            with("delta_com_z_m")
         ),
-        "base_tilt" => format!("The base is tilted: roll {}, pitch {}.", with("roll_rad"), with("pitch_rad")),
-        "counterbalance_spring" => format!("A counterbalance of {} acts on joint {place}, at rest at {}.", with("amplitude_nm"), with("rest_angle_rad")),
-        "cable_spring" => format!("A cable or dress pack pulls at joint {place} with {}, at rest at {}.", with("stiffness_nm_per_rad"), with("rest_angle_rad")),
-        "torque_ripple" => format!("The effort of joint {place} ripples by {}, {} times a revolution.", with("amplitude_nm"), with("cycles_per_rev")),
-        "torque_gain" => format!("The effort of joint {place} is recorded {} times too large.", with("gain")),
-        "torque_bias" => format!("The effort of joint {place} is recorded with an offset of {}.", with("bias_nm")),
+        "base_tilt" => format!(
+            "The base is tilted: roll {}, pitch {}.",
+            with("roll_rad"),
+            with("pitch_rad")
+        ),
+        "counterbalance_spring" => format!(
+            "A counterbalance of {} acts on joint {place}, at rest at {}.",
+            with("amplitude_nm"),
+            with("rest_angle_rad")
+        ),
+        "cable_spring" => format!(
+            "A cable or dress pack pulls at joint {place} with {}, at rest at {}.",
+            with("stiffness_nm_per_rad"),
+            with("rest_angle_rad")
+        ),
+        "torque_ripple" => format!(
+            "The effort of joint {place} ripples by {}, {} times a revolution.",
+            with("amplitude_nm"),
+            with("cycles_per_rev")
+        ),
+        "torque_gain" => format!(
+            "The effort of joint {place} is recorded {} times too large.",
+            with("gain")
+        ),
+        "torque_bias" => format!(
+            "The effort of joint {place} is recorded with an offset of {}.",
+            with("bias_nm")
+        ),
         "torque_delay" => format!("The effort is recorded {} late.", with("delay_s")),
-        "torque_lowpass" => format!("The effort is recorded through a low-pass of {}.", with("cutoff_hz")),
-        "torque_saturation" => format!("The recorded effort of joint {place} saturates at {}.", with("limit_nm")),
+        "torque_lowpass" => format!(
+            "The effort is recorded through a low-pass of {}.",
+            with("cutoff_hz")
+        ),
+        "torque_saturation" => format!(
+            "The recorded effort of joint {place} saturates at {}.",
+            with("limit_nm")
+        ),
         "transmission_coupling" => format!(
             "Joint {place} carries {} times the effort of joint {}.",
             with("coefficient"),
@@ -136,9 +210,14 @@ pub fn sentence(
         ),
         "external_push" => format!(
             "Something pushed link {place} with ({}, {}, {}).",
-            with("force_x_n"), with("force_y_n"), with("force_z_n")
+            with("force_x_n"),
+            with("force_y_n"),
+            with("force_z_n")
         ),
-        "contact_wall" => format!("The end of the arm runs into something stiff, {}.", with("stiffness_n_per_m")),
+        "contact_wall" => format!(
+            "The end of the arm runs into something stiff, {}.",
+            with("stiffness_n_per_m")
+        ),
         _ => curve(active, place, joints),
     }
 }
@@ -171,7 +250,11 @@ fn curve(active: &Active, place: &str, joints: &[String]) -> String {
         .zip(&curve.knots)
         .max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
     let peak = most.map_or_else(String::new, |(value, knot)| {
-        format!("; it is largest, {} N m, at {}", number(*value), number(*knot))
+        format!(
+            "; it is largest, {} N m, at {}",
+            number(*value),
+            number(*knot)
+        )
     });
     format!(
         "Joint {place} has an effort that no effect of the library explains: it depends on {against}{direction}{peak}."
@@ -184,9 +267,15 @@ mod tests {
 
     #[test]
     fn three_digits_are_enough() {
-        for (value, text) in
-            [(4.1, "4.1"), (0.023_46, "0.0235"), (21.0, "21"), (1234.5, "1234"), (-0.5, "-0.5"), (0.0, "0"), (100.0, "100")]
-        {
+        for (value, text) in [
+            (4.1, "4.1"),
+            (0.023_46, "0.0235"),
+            (21.0, "21"),
+            (1234.5, "1234"),
+            (-0.5, "-0.5"),
+            (0.0, "0"),
+            (100.0, "100"),
+        ] {
             assert_eq!(number(value), text);
         }
     }

@@ -35,7 +35,17 @@ pub fn worth(problem: &Problem) -> Vec<f64> {
 fn functions(j: usize, at: &MotionSample<'_>, into: &mut Vec<f64>) {
     let (q, qd, s) = (at.position[j], at.velocity[j], sign(at.velocity[j]));
     let load = at.transmitted[j];
-    into.extend([1.0, s, qd, qd * qd.abs(), at.acceleration[j], q, q.sin(), q.cos(), load.abs() * s]);
+    into.extend([
+        1.0,
+        s,
+        qd,
+        qd * qd.abs(),
+        at.acceleration[j],
+        q,
+        q.sin(),
+        q.cos(),
+        load.abs() * s,
+    ]);
     into.extend(STRIBECK_RAD_S.map(|v| (-(qd / v) * (qd / v)).exp() * s));
     into.extend_from_slice(at.transmitted);
 }
@@ -53,7 +63,13 @@ fn left_by_rich_model(problem: &Problem, joint: usize) -> Vec<f64> {
             functions(joint, at, &mut values);
             // What comes late.
             let load = at.transmitted[joint];
-            let rate = before.map_or(0.0, |b| if at.dt_s > 0.0 { (load - b) / at.dt_s } else { 0.0 });
+            let rate = before.map_or(0.0, |b| {
+                if at.dt_s > 0.0 {
+                    (load - b) / at.dt_s
+                } else {
+                    0.0
+                }
+            });
             values.push(rate);
             before = Some(load);
             count = values.len() - first;
@@ -66,10 +82,15 @@ fn left_by_rich_model(problem: &Problem, joint: usize) -> Vec<f64> {
             column.extend(compared);
         }
     }
-    let used: Vec<usize> =
-        (0..problem.rows).filter(|&row| problem.weight[rows.start + row] > 0.0).collect();
+    let used: Vec<usize> = (0..problem.rows)
+        .filter(|&row| problem.weight[rows.start + row] > 0.0)
+        .collect();
     let p = columns.len();
-    let rigid: Vec<Vec<f64>> = problem.tracks.iter().map(|t| t.track.rigid.clone()).collect();
+    let rigid: Vec<Vec<f64>> = problem
+        .tracks
+        .iter()
+        .map(|t| t.track.rigid.clone())
+        .collect();
     let mut left = vec![0.0; problem.rows];
     problem.joint_signal(&rigid, joint, &mut left);
     for (left, measured) in left.iter_mut().zip(&problem.measured[rows]) {
@@ -80,7 +101,13 @@ fn left_by_rich_model(problem: &Problem, joint: usize) -> Vec<f64> {
     }
     let scale: Vec<f64> = columns
         .iter()
-        .map(|c| used.iter().map(|&row| c[row] * c[row]).sum::<f64>().sqrt().max(1e-12))
+        .map(|c| {
+            used.iter()
+                .map(|&row| c[row] * c[row])
+                .sum::<f64>()
+                .sqrt()
+                .max(1e-12)
+        })
         .collect();
     let x = DMatrix::from_fn(used.len(), p, |a, b| columns[b][used[a]] / scale[b]);
     let y = DVector::from_iterator(used.len(), used.iter().map(|&row| left[row]));
@@ -119,5 +146,8 @@ fn calm_correlation(problem: &Problem, joint: usize, left: &[f64]) -> f64 {
         }
     }
     stretches.sort_by(f64::total_cmp);
-    stretches.get((CALM * stretches.len() as f64) as usize).copied().unwrap_or(0.0)
+    stretches
+        .get((CALM * stretches.len() as f64) as usize)
+        .copied()
+        .unwrap_or(0.0)
 }

@@ -18,6 +18,10 @@ const LATEST: usize = 15;
 /// while what is usual rests on few windows.
 const BEYOND: f64 = 40.0;
 const INEXPERIENCE: f64 = 4.0;
+/// Nor is a change what explains less than so many times the most it ever did without one.
+const OVER_LARGEST: f64 = 2.0;
+/// A gain counts among those without a change once so many blocks have passed.
+const DELAY: usize = 22;
 /// How much more where the motion is unlike all that the reference has seen.
 const NOVELTY: f64 = 8.0;
 /// Parts of the time since the change that must each hold their share of it.
@@ -25,6 +29,8 @@ const PARTS: usize = 4;
 const SHARE: std::ops::RangeInclusive<f64> = 0.4..=2.2;
 /// A part that holds so little information tells nothing: standard errors of its share.
 const UNCERTAIN: f64 = 0.2;
+/// Blocks before the change that must be there, and that are looked at, to see that it began.
+const BEFORE: (usize, usize) = (3, 8);
 /// From this share of a name's gain on, another is hard to tell from it.
 const RIVAL: f64 = 0.92;
 /// A force must explain so much more than a change of the arm to be taken for it.
@@ -81,12 +87,26 @@ pub(super) struct Usual<'a> {
 }
 
 impl Usual<'_> {
-    fn threshold(&self, scale: &Scale, novel: f64) -> f64 {
-        BEYOND
+    /// What a change must explain to be told.
+    fn threshold(&self, scale: &Scale, usual: f64, novel: f64) -> f64 {
+        let beyond = usual
+            * BEYOND
             * self.caution
             * (1.0 + INEXPERIENCE / scale.independent())
-            * (1.0 + NOVELTY * novel.max(self.unlike))
+            * (1.0 + NOVELTY * novel.max(self.unlike));
+        beyond.max(OVER_LARGEST * self.caution * scale.largest())
     }
+}
+
+/// What the newest blocks say.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Verdict {
+    /// Nothing that could be said.
+    Nothing,
+    /// The arm changed.
+    Changed(Finding),
+    /// The residual is not what it is as a rule, and nobody saw that begin.
+    Drifted,
 }
 
 /// Searches the newest blocks for a change.
@@ -97,6 +117,11 @@ pub(super) struct Judge {
     best: Vec<[Best; JOINT_KINDS]>,
     payload: Best,
     payload_change: [f64; PAYLOAD],
+    /// What each kind explained at most, of the newest blocks; and the place of the next.
+    past: Vec<Vec<[f64; JOINT_KINDS]>>,
+    past_payload: Vec<f64>,
+    at: usize,
+    filled: usize,
 }
 
 impl Judge {
@@ -107,6 +132,10 @@ impl Judge {
             best: vec![[Best::default(); JOINT_KINDS]; joints],
             payload: Best::default(),
             payload_change: [0.0; PAYLOAD],
+            past: vec![vec![[0.0; JOINT_KINDS]; joints]; DELAY],
+            past_payload: vec![0.0; DELAY],
+            at: 0,
+            filled: 0,
         }
     }
 
@@ -114,10 +143,10 @@ impl Judge {
     /// beyond what is usual (1: just enough to be told).
     ///
     /// What `lasts` is a deviation that is beyond doubt: only its name is sought, and an unlikely one will do.
-    pub fn judge(&mut self, ring: &Ring, usual: &Usual<'_>, lasts: bool) -> (Option<Finding>, f64) {
+    pub fn judge(&mut self, ring: &Ring, usual: &Usual<'_>, lasts: bool) -> (Verdict, f64) {
         self.search(ring, usual);
         let Some((first, second, all)) = self.contest(usual) else {
-            return (None, 0.0);
+            return (Verdict::Nothing, 0.0);
         };
         let score = first.score;
         let rival = second > RIVAL * first.normal;
@@ -129,7 +158,10 @@ impl Judge {
             || !self.lasts(ring, usual, &first)
             || force(ring, usual, first.best.back) > FORCED * first.normal
         {
-            return (None, score);
+            return (Verdict::Nothing, score);
+        }
+        if !self.began(ring, usual, &first) {
+            return (Verdict::Drifted, score);
         }
         let mut finding = self.finding(usual, &first, ring);
         if poor {
@@ -137,7 +169,29 @@ impl Judge {
             finding.size = 0.0;
             finding.link = None;
         }
-        (Some(finding), score)
+        (Verdict::Changed(finding), score)
+    }
+
+    /// Remembers what was found, and lets what is old enough count among what comes without a change.
+    pub fn remember(&mut self, scales: &mut [[Scale; JOINT_KINDS]], payload: &mut Scale) {
+        let (past, past_payload) = (&mut self.past[self.at], &mut self.past_payload[self.at]);
+        if self.filled == DELAY {
+            for (scale, gain) in scales.iter_mut().flatten().zip(past.iter().flatten()) {
+                scale.take_largest(*gain);
+            }
+            payload.take_largest(*past_payload);
+        }
+        for (past, best) in past.iter_mut().zip(&self.best) {
+            *past = best.map(|best| best.gain);
+        }
+        *past_payload = (self.payload.gain - COLUMNS_MORE).max(0.0);
+        self.at = (self.at + 1) % DELAY;
+        self.filled = (self.filled + 1).min(DELAY);
+    }
+
+    /// Forgets what was found.
+    pub fn forget(&mut self) {
+        self.filled = 0;
     }
 
     /// For each kind, the instant from which on it explains most.
@@ -216,8 +270,7 @@ impl Judge {
                     best: *best,
                     normal: best.gain / noise * if kind == BIAS { OFFSET } else { 1.0 },
                     score: best.gain
-                        / value.max(usual.floors[j])
-                        / usual.threshold(scale, best.novel),
+                        / usual.threshold(scale, value.max(usual.floors[j]), best.novel),
                 };
                 most = most.max(candidate.normal);
                 enter(candidate);
@@ -232,7 +285,7 @@ impl Judge {
                 name: Name::Payload,
                 best: self.payload,
                 normal: gain,
-                score: gain / value.max(1.0) / usual.threshold(usual.payload, self.payload.novel),
+                score: gain / usual.threshold(usual.payload, value.max(1.0), self.payload.novel),
             });
         }
         first.map(|first| (first, second, all))
@@ -256,22 +309,7 @@ impl Judge {
             if self.window.blocks < per_part && at + 1 < first.best.blocks {
                 continue;
             }
-            let (share, information, noise) = match first.name {
-                Name::Joint(j, kind) => {
-                    let compared = Compared::new(&self.window.own[j], &usual.references[j]);
-                    let share = compared.map(|compared| compared.share(kind, first.best.size));
-                    let (share, information) = share.unwrap_or((0.0, 0.0));
-                    (share, information, usual.noise[j].unwrap_or(f64::INFINITY))
-                }
-                Name::Payload => {
-                    let score = self
-                        .window
-                        .scores(usual.references, usual.noise, &mut self.scores);
-                    let (share, information) = score.share(&self.payload_change);
-                    (share, information, 1.0)
-                }
-            };
-            if information > noise / (UNCERTAIN * UNCERTAIN) {
+            if let Some(share) = self.share(usual, first) {
                 telling += 1;
                 if !SHARE.contains(&share) {
                     return false;
@@ -280,6 +318,38 @@ impl Judge {
             self.window.clear();
         }
         telling >= 2
+    }
+
+    /// Whether the change was seen to begin: blocks before it hold little of it. Otherwise the reference has
+    /// drifted away from the arm.
+    fn began(&mut self, ring: &Ring, usual: &Usual<'_>, first: &Candidate) -> bool {
+        self.window.clear();
+        for back in first.best.back + 1..ring.len() {
+            let block = ring.back(back);
+            if !block.excluded && self.window.blocks < BEFORE.1 {
+                self.window.add(block);
+            }
+        }
+        let share = self.share(usual, first);
+        self.window.blocks >= BEFORE.0 && share.is_none_or(|share| share < *SHARE.start())
+    }
+
+    /// Share of the change that the window holds; `None` if it tells nothing of it.
+    fn share(&mut self, usual: &Usual<'_>, first: &Candidate) -> Option<f64> {
+        let (share, information, noise) = match first.name {
+            Name::Joint(j, kind) => {
+                let compared = Compared::new(&self.window.own[j], &usual.references[j])?;
+                let (share, information) = compared.share(kind, first.best.size);
+                (share, information, usual.noise[j]?)
+            }
+            Name::Payload => {
+                let window = &self.window;
+                let score = window.scores(usual.references, usual.noise, &mut self.scores);
+                let (share, information) = score.share(&self.payload_change);
+                (share, information, 1.0)
+            }
+        };
+        (information > noise / (UNCERTAIN * UNCERTAIN)).then_some(share)
     }
 
     fn finding(&self, usual: &Usual<'_>, first: &Candidate, ring: &Ring) -> Finding {

@@ -28,6 +28,8 @@ impl Mean {
 pub(super) struct Scale {
     short: Mean,
     long: Mean,
+    /// The most that it explained since any instant of change.
+    largest: f64,
 }
 
 impl Scale {
@@ -42,6 +44,17 @@ impl Scale {
         } else {
             self.long.take(gain);
         }
+    }
+
+    /// Takes the most that the change explains since any instant: a twin that is off in some phases of a
+    /// motion, or an arm that creeps, is no change when it comes back a little stronger.
+    pub fn take_largest(&mut self, gain: f64) {
+        self.largest = (self.largest * (1.0 - PEAK_DECAY)).max(gain);
+    }
+
+    /// See [`Scale::take_largest`].
+    pub fn largest(&self) -> f64 {
+        self.largest
     }
 
     pub fn weigh(&mut self, windows: f64) {

@@ -71,22 +71,6 @@ fn watch(stream: &mut Stream, duration_s: f64) -> Vec<Said> {
 
 #[test]
 #[ignore = "prints"]
-fn one() {
-    for (seed, act) in [
-        (1, Act::Gain(3, 1.08)),
-        (4, Act::Gain(3, 1.08)),
-        (3, Act::Gain(3, 1.08)),
-        (1, Act::Coulomb(1, 1.0)),
-        (1, Act::Gain(1, 1.08)),
-    ] {
-        let mut stream = Stream::new(seed).with(act, 40.0, 1e9);
-        println!("{seed} {act:?}");
-        println!("{:?}", watch(&mut stream, 60.0));
-    }
-}
-
-#[test]
-#[ignore = "prints"]
 fn figures() {
     let end = f64::INFINITY;
     for calibrated in [true, false] {
@@ -119,29 +103,39 @@ fn figures() {
 #[test]
 #[ignore = "prints"]
 fn quiet() {
-    for (calibrated, program_s, rest_s, warm) in [
-        (true, f64::INFINITY, 0.0, 0.4),
-        (true, 300.0, 0.0, 0.4),
-        (false, 300.0, 0.0, 0.4),
-        (true, 60.0, 2.0, 0.4),
+    let hours: f64 = 2.0;
+    let mut total = 0;
+    for (calibrated, program_s, rest_s, noise) in [
+        (true, f64::INFINITY, 0.0, 0.003),
+        (true, f64::INFINITY, 0.0, 0.0005),
+        (false, f64::INFINITY, 1.0, 0.0005),
+        (true, 12.0, 0.0, 0.003),
+        (true, 12.0, 0.5, 0.0005),
+        (false, 12.0, 0.5, 0.0005),
+        (true, 300.0, 0.0, 0.0005),
+        (false, 300.0, 0.0, 0.003),
+        (true, 60.0, 2.0, 0.003),
     ] {
-        for seed in 1..=3 {
+        for seed in 1..=4 {
             let mut stream = Stream::new(seed);
             stream.calibrated = calibrated;
             stream.program_s = program_s;
             stream.rest_s = rest_s;
-            stream.warm_up = warm;
+            stream.warm_up = 0.4;
+            stream.noise = noise;
             stream.rate_hz = 25.0;
-            let said = watch(&mut stream, 3600.0);
+            let said = watch(&mut stream, hours * 3600.0);
             let changes: Vec<String> = (said.iter().filter(|s| s.state != "contact"))
                 .map(Said::text)
                 .collect();
+            total += said.len();
             println!(
-                "{calibrated} {program_s} {seed} contacts {} changes {} {}",
+                "{calibrated} {program_s} {noise} {seed} contacts {} changes {} {}",
                 said.len() - changes.len(),
                 changes.len(),
                 changes[..changes.len().min(6)].join(" | ")
             );
         }
     }
+    println!("{total} words in {} h", 36.0 * hours);
 }

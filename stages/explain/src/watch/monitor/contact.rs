@@ -1,0 +1,124 @@
+//! Loud blocks, and what becomes of a run of them: a contact, a lasting change, or neither.
+
+use super::super::finding::{Cause, Finding};
+use super::super::judge::touched;
+use super::super::moments::{Compared, JOINT_KINDS, Moments};
+use super::{FRESH, Monitor};
+
+/// A contact is over after so many quiet blocks that hold less than this share of it.
+const QUIET: usize = 3;
+const OVER: f64 = 0.3;
+/// A loud run that lasts longer is none \[blocks\].
+const LONGEST_CONTACT: usize = 20;
+
+/// A run of loud blocks.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Run {
+    first_ns: i64,
+    joints: u32,
+    /// Blocks from its first to its newest loud one, those of them that are loud, and quiet ones since.
+    blocks: usize,
+    loud: usize,
+    quiet: usize,
+}
+
+/// What became of a run of loud blocks.
+pub(super) enum Told {
+    Contact(Finding),
+    Lasting(Finding, usize),
+}
+
+impl Monitor {
+    /// Follows loud blocks to their end.
+    pub(super) fn follow_run(&mut self) -> Option<Told> {
+        let newest = self.ring.back(0);
+        let (loud, first_ns) = (newest.loud, newest.first_ns);
+        let run = match (&mut self.run, loud) {
+            (None, 0) => return None,
+            (None, _) => {
+                self.run = Some(Run {
+                    first_ns,
+                    joints: loud,
+                    blocks: 1,
+                    loud: 1,
+                    quiet: 0,
+                });
+                return None;
+            }
+            (Some(run), 0) => {
+                run.quiet += 1;
+                run
+            }
+            (Some(run), _) => {
+                run.blocks += run.quiet + 1;
+                run.loud += 1;
+                run.quiet = 0;
+                run.joints |= loud;
+                run
+            }
+        };
+        let run = *run;
+        let mut finding = Finding {
+            cause: Cause::Contact,
+            joints: run.joints,
+            link: None,
+            since_ns: run.first_ns,
+            size: 0.0,
+            score: self.score,
+        };
+        if run.quiet >= QUIET && self.is_over(&run) {
+            self.run = None;
+            let oldest = (run.quiet + run.blocks - 1).min(self.ring.len() - 1);
+            finding.link = touched(&self.ring, &self.usual(), run.quiet, oldest);
+            // One block around it: its beginning and its end.
+            for back in run.quiet - 1..=(oldest + 1).min(self.ring.len() - 1) {
+                let block = self.ring.back_mut(back);
+                block.excluded = true;
+                for (j, joint) in block.joints.iter().enumerate() {
+                    if joint.own.rows >= 1.0 {
+                        let energy = self.references[j].energy_per_row(&joint.own);
+                        self.loudness[j].grow_used_to(energy);
+                    }
+                }
+            }
+            return Some(Told::Contact(finding));
+        }
+        if run.blocks > LONGEST_CONTACT && 2 * run.loud > run.blocks {
+            finding.cause = Cause::Unknown;
+            return Some(Told::Lasting(finding, run.blocks));
+        }
+        if run.quiet + run.blocks >= FRESH {
+            // Neither over nor lasting: loud now and then. It becomes part of the rule.
+            self.run = None;
+        }
+        None
+    }
+
+    /// Whether the quiet blocks after a run hold nothing of what explains it best at one of its joints.
+    fn is_over(&self, run: &Run) -> bool {
+        let oldest = (run.quiet + run.blocks - 1).min(self.ring.len() - 1);
+        (0..self.references.len())
+            .filter(|j| run.joints & (1 << j) != 0)
+            .all(|j| {
+                let sum = |from: usize, to: usize| {
+                    let mut sum = Moments::ZERO;
+                    (from..=to).for_each(|back| sum.add(&self.ring.back(back).joints[j].own, 1.0));
+                    sum
+                };
+                let (loud, quiet) = (sum(run.quiet, oldest), sum(0, run.quiet - 1));
+                let reference = &self.references[j];
+                let (Some(loud), Some(quiet)) = (
+                    Compared::new(&loud, reference),
+                    Compared::new(&quiet, reference),
+                ) else {
+                    return false;
+                };
+                let score = loud.joint();
+                let best =
+                    (0..JOINT_KINDS).max_by(|&a, &b| score.gain[a].total_cmp(&score.gain[b]));
+                let Some(kind) = best else { return false };
+                let (share, information) = quiet.share(kind, score.size[kind]);
+                information > 10.0 * self.noise[j].unwrap_or(f64::INFINITY) && share < OVER
+            })
+    }
+}

@@ -1,0 +1,189 @@
+//! What the rule is and how far windows stray from it by chance: learned at once, then kept up.
+
+use super::super::blocks::{BLOCK_ROWS, BLOCK_S, Ring};
+use super::super::moments::{Moments, Reference};
+use super::super::scale::Scale;
+use super::{FRESH, LEAST_SHARE, Monitor, News, Phase};
+
+/// The reference forgets with this time constant of motion \[s\].
+const MEMORY_S: f64 = 150.0;
+/// A block whose energy is so many times the median is left out of what is learned.
+const OUTLIER: f64 = 25.0;
+
+impl Monitor {
+    /// Learns the reference once there are blocks enough.
+    pub(super) fn learn(&mut self) -> Option<News> {
+        if self.ring.len() < self.learn {
+            return None;
+        }
+        let Phase::Learning { told } = self.phase else {
+            return None;
+        };
+        self.aside.copy_from_slice(&self.references);
+        self.fit();
+        self.leave_out_outliers();
+        self.fit();
+        self.learn_scales();
+        self.ring.keep(0);
+        self.run = None;
+        self.phase = Phase::Watching;
+        told.then_some(News::Learned)
+    }
+
+    /// The references of what was learned now, and as much of what was known before, which stands aside.
+    fn fit(&mut self) {
+        for j in 0..self.references.len() {
+            let mut moments = Moments::ZERO;
+            for back in 0..self.ring.len() {
+                let block = self.ring.back(back);
+                if !block.excluded {
+                    moments.add(&block.joints[j].own, 1.0);
+                    self.ranges[j].join(&block.joints[j].ranges);
+                }
+            }
+            let mut before = self.aside[j].moments;
+            before.scale((moments.rows / before.rows.max(1.0)).min(1.0));
+            moments.add(&before, 1.0);
+            self.references[j] = Reference::of(moments);
+        }
+    }
+
+    fn leave_out_outliers(&mut self) {
+        for j in 0..self.references.len() {
+            self.energies.clear();
+            let reference = self.references[j];
+            let energy = |ring: &Ring, back: usize| {
+                let own = &ring.back(back).joints[j].own;
+                (own.rows >= 1.0).then(|| reference.energy_per_row(own))
+            };
+            for back in 0..self.ring.len() {
+                self.energies.extend(energy(&self.ring, back));
+            }
+            if self.energies.len() < 8 {
+                continue;
+            }
+            self.energies.sort_unstable_by(f64::total_cmp);
+            let median = self.energies[self.energies.len() / 2];
+            let floor = LEAST_SHARE * LEAST_SHARE * reference.effort_square();
+            for back in 0..self.ring.len() {
+                if energy(&self.ring, back).is_some_and(|e| e > OUTLIER * median.max(floor)) {
+                    self.ring.back_mut(back).excluded = true;
+                }
+            }
+        }
+    }
+
+    /// What is usual, from windows beside a reference that has not seen them.
+    fn learn_scales(&mut self) {
+        self.settle();
+        for blocks in [1, Scale::SHORT, Scale::LONG] {
+            self.leave_out(blocks, true);
+        }
+        self.settle();
+        // In units of the noise, which is known only now.
+        for blocks in [Scale::SHORT, Scale::LONG] {
+            self.leave_out(blocks, false);
+        }
+    }
+
+    /// Leaves out each window of so many blocks in turn, and learns from it.
+    fn leave_out(&mut self, blocks: usize, joints: bool) {
+        for newest in 0..(self.ring.len() + 1).saturating_sub(blocks) {
+            self.window.clear();
+            for back in newest..newest + blocks {
+                let block = self.ring.back(back);
+                if !block.excluded {
+                    self.window.add(block);
+                }
+            }
+            if self.window.blocks < blocks {
+                continue;
+            }
+            for (j, aside) in self.aside.iter_mut().enumerate() {
+                let mut moments = self.references[j].moments;
+                moments.add(&self.window.own[j], -1.0);
+                *aside = Reference::of(moments);
+            }
+            if blocks > 1 {
+                self.learn_window(blocks, joints, !joints);
+                continue;
+            }
+            for (j, loudness) in self.loudness.iter_mut().enumerate() {
+                if self.window.own[j].rows >= 1.0 {
+                    loudness.take(self.aside[j].energy_per_row(&self.window.own[j]));
+                }
+            }
+        }
+    }
+
+    /// Learns from the oldest blocks what is usual, and lets the oldest of all become part of the reference.
+    pub(super) fn learn_oldest(&mut self) {
+        let oldest = self.ring.len() - 1;
+        for blocks in [Scale::SHORT, Scale::LONG] {
+            self.window.clear();
+            for back in oldest + 1 - blocks..=oldest {
+                let block = self.ring.back(back);
+                if block.excluded {
+                    self.window.clear();
+                    break;
+                }
+                self.window.add(block);
+            }
+            if self.window.blocks == blocks {
+                self.aside.copy_from_slice(&self.references);
+                self.learn_window(blocks, true, true);
+            }
+        }
+        let block = self.ring.back(oldest);
+        if block.excluded {
+            return;
+        }
+        for (j, joint) in block.joints.iter().enumerate() {
+            if joint.own.rows < 1.0 {
+                continue;
+            }
+            if !joint.novel {
+                let energy = self.references[j].energy_per_row(&joint.own);
+                self.loudness[j].take(energy);
+            }
+            let moved_s = joint.own.rows / f64::from(BLOCK_ROWS) * BLOCK_S;
+            let mut moments = self.references[j].moments;
+            moments.scale((-moved_s / MEMORY_S).exp());
+            moments.add(&joint.own, 1.0);
+            self.references[j] = Reference::of(moments);
+            self.ranges[j].join(&joint.ranges);
+        }
+        self.settle();
+    }
+
+    /// Learns from the window what is usual beside the references set aside.
+    fn learn_window(&mut self, blocks: usize, joints: bool, payload: bool) {
+        let body = self
+            .window
+            .scores(&self.aside, &self.noise, &mut self.scores);
+        for (j, score) in self.scores.iter().enumerate() {
+            let moves = self.window.own[j].rows >= 0.3 * blocks as f64 * f64::from(BLOCK_ROWS);
+            if let Some(score) = score.filter(|_| joints && moves) {
+                for (scale, gain) in self.scales[j].iter_mut().zip(score.gain) {
+                    scale.take(blocks, gain);
+                }
+            }
+        }
+        if payload && let Some((change, gain)) = body.solve() {
+            self.payload.take(blocks, gain / change.len() as f64);
+        }
+    }
+
+    /// Works out what follows from references and scales.
+    fn settle(&mut self) {
+        for j in 0..self.references.len() {
+            let rows = FRESH as f64 / 2.0 * f64::from(BLOCK_ROWS);
+            let least = LEAST_SHARE * LEAST_SHARE * self.references[j].effort_square();
+            // What a deviation of that size explains in a long window is just enough to be told.
+            self.floors[j] = least * rows / 40.0;
+            let usual = self.scales[j].iter().filter_map(Scale::usual);
+            let (count, sum) = usual.fold((0.0, 0.0), |(n, sum), value| (n + 1.0, sum + value));
+            self.noise[j] = (count > 0.0).then(|| (sum / count).max(self.floors[j]));
+        }
+    }
+}
