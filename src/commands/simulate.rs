@@ -1,9 +1,11 @@
 //! `tauscope simulate`.
 
+mod case;
+
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use anyhow::Context;
+use anyhow::Context as _;
 use tauscope_archive::Written;
 use tauscope_ingest::simulated::{self, ScenarioError};
 
@@ -17,7 +19,8 @@ use crate::provenance;
 pub struct Args {
     /// The scenario file.
     scenario: PathBuf,
-    /// The folder the recordings go to, with `labels.json`.
+    /// The folder the recordings go to, with `labels.json`; for a scenario that conceals also the URDF,
+    /// `case.yaml` to explain, and the answer in `concealed.json`.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Machine-readable.
@@ -29,7 +32,10 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<Exit, Failure> {
     let facts = ScenarioFacts::load(&args.scenario)?;
     let robot = facts.robot().context("cannot use the URDF")?;
-    let scenario = serde_json::to_string(&facts.scenario).context("cannot encode the scenario")?;
+    // What is concealed cannot be had from the recordings.
+    let mut told = facts.scenario.clone();
+    told.conceal = None;
+    let scenario = serde_json::to_string(&told).context("cannot encode the scenario")?;
     let made_of = BTreeMap::from([
         ("tauscope".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
         ("scenario".to_owned(), scenario),
@@ -60,17 +66,28 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
         ) => return Err(Failure::Failed(error.into())),
         Err(error) => return Err(Failure::rejected(error.to_string())),
     };
+    let case = match &made.concealed_path {
+        Some(_) => Some(case::write(&facts, &args.out)?),
+        None => None,
+    };
     let text = if args.json {
         let recordings: Vec<_> = made
             .recordings
             .iter()
             .map(|each| each.path.clone())
             .collect();
-        let value = serde_json::json!({"recordings": recordings, "labels": made.labels_path});
+        let value = serde_json::json!({
+            "recordings": recordings,
+            "labels": made.labels_path,
+            "case": case,
+            "concealed": made.concealed_path,
+        });
         serde_json::to_string_pretty(&value).context("cannot encode the result")?
     } else {
         let mut lines: Vec<String> = made.recordings.iter().map(line).collect();
-        lines.push(made.labels_path.display().to_string());
+        let others = [Some(made.labels_path), made.concealed_path, case];
+        let others = others.into_iter().flatten();
+        lines.extend(others.map(|path| path.display().to_string()));
         lines.join("\n")
     };
     super::print(&text)?;

@@ -110,3 +110,16 @@ fn the_answer_is_beside_the_recordings_and_the_same_again() {
     assert!(first.0 != other.0 && first.1 != other.1);
     assert!(first.0.contains("\"effect\": "), "{}", first.0);
 }
+
+#[test]
+fn the_bundled_scenario_conceals_something() {
+    let path = Path::new(DATA).join("concealed.scenario.yaml");
+    let scenario = scenario(&std::fs::read_to_string(path).unwrap());
+    let (open, concealed) = super::super::conceal::add(&scenario, &arm()).unwrap();
+    assert_eq!(concealed.unwrap().effects.len(), 1);
+    assert!(open.conceal.is_none() && open.physics.len() == 1);
+    let sensed = Simulation::new(&scenario, &arm(), 5)
+        .unwrap()
+        .next_reading();
+    assert!(sensed.unwrap().is_some());
+}

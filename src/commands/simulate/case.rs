@@ -1,0 +1,70 @@
+//! The case that a scenario with something concealed makes: what `tauscope explain` is given.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+use serde::Serialize;
+use tauscope_ingest::simulated::{EffortUnit, fit_count};
+
+use crate::pipeline::ScenarioFacts;
+
+/// As [`crate::files::CaseFile`] reads it.
+#[derive(Debug, Serialize)]
+struct Case<'a> {
+    case: &'a str,
+    robot: PathBuf,
+    effort_unit: EffortUnit,
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    torque_constants_nm_per_a: &'a BTreeMap<String, f64>,
+    topics: Topics,
+    fit: Vec<String>,
+    holdout: Vec<String>,
+    rate_hz: f64,
+    has_velocity: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Topics {
+    state: &'static str,
+    command: &'static str,
+}
+
+/// Writes `case.yaml` and the URDF to the folder of the recordings: all but the last two may be fitted.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn write(facts: &ScenarioFacts, out: &Path) -> anyhow::Result<PathBuf> {
+    let scenario = &facts.scenario;
+    let robot = scenario.robot.file_name().unwrap_or("robot.urdf".as_ref());
+    put(&out.join(robot), &facts.urdf)?;
+    let files = scenario.recordings.iter();
+    let mut fit: Vec<_> = files.map(|each| format!("{}.mcap", each.name)).collect();
+    let holdout = fit.split_off(fit_count(fit.len()).min(fit.len()));
+    let case = Case {
+        case: &scenario.name,
+        robot: robot.into(),
+        effort_unit: scenario.effort_unit,
+        torque_constants_nm_per_a: &scenario.torque_constants_nm_per_a,
+        topics: Topics {
+            state: "/joint_states",
+            command: "/joint_commands",
+        },
+        fit,
+        holdout,
+        rate_hz: scenario.rate_hz,
+        has_velocity: scenario.sensors.velocity,
+    };
+    let path = out.join("case.yaml");
+    let text = serde_saphyr::to_string(&case).context("the case")?;
+    put(&path, &text)?;
+    Ok(path)
+}
+
+/// Writes a file whole or not at all.
+fn put(path: &Path, text: &str) -> anyhow::Result<()> {
+    let mut part = path.as_os_str().to_owned();
+    part.push(".part");
+    let written = std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, path));
+    written.with_context(|| path.display().to_string())
+}
