@@ -18,6 +18,8 @@ const LATEST: usize = 15;
 /// while what is usual rests on few windows.
 const BEYOND: f64 = 40.0;
 const INEXPERIENCE: f64 = 4.0;
+/// From this share of joints on that lately moved unlike ever before, nothing is told that has no name.
+pub(super) const STRANGE: f64 = 0.03;
 /// Nor is a change what explains less than so many times the most it ever did without one.
 const OVER_LARGEST: f64 = 2.0;
 /// A gain counts among those without a change once so many blocks have passed.
@@ -27,6 +29,8 @@ const NOVELTY: f64 = 8.0;
 /// Parts of the time since the change that must each hold their share of it.
 const PARTS: usize = 4;
 const SHARE: std::ops::RangeInclusive<f64> = 0.4..=2.2;
+/// The newest blocks, which by themselves must hold their share, too.
+const NEWEST: usize = 2;
 /// A part that holds so little information tells nothing: standard errors of its share.
 const UNCERTAIN: f64 = 0.2;
 /// Blocks before the change that must be there, and that are looked at, to see that it began.
@@ -160,7 +164,7 @@ impl Judge {
         {
             return (Verdict::Nothing, score);
         }
-        if !self.began(ring, usual, &first) {
+        if !self.began(ring, usual, &first) || (poor && usual.unlike >= STRANGE) {
             return (Verdict::Drifted, score);
         }
         let mut finding = self.finding(usual, &first, ring);
@@ -303,6 +307,16 @@ impl Judge {
         let blocks = (0..=first.best.back).filter(|&back| !ring.back(back).excluded);
         let per_part = first.best.blocks.div_ceil(PARTS);
         let mut telling = 0;
+        self.window.clear();
+        // What has just ended shows in the newest second first.
+        let newest = blocks.clone().take(NEWEST);
+        newest.for_each(|back| self.window.add(ring.back(back)));
+        if self
+            .share(usual, first)
+            .is_some_and(|share| share < *SHARE.start())
+        {
+            return false;
+        }
         self.window.clear();
         for (at, back) in blocks.enumerate() {
             self.window.add(ring.back(back));

@@ -5,7 +5,7 @@ mod learning;
 
 use super::blocks::{BLOCK_ROWS, BLOCK_S, Ranges, Ring};
 use super::finding::Finding;
-use super::judge::{Judge, Usual, Verdict};
+use super::judge::{Judge, STRANGE, Usual, Verdict};
 use super::moments::{JOINT_KINDS, JointScore, Reference};
 use super::rows::Row;
 use super::scale::{Loudness, Scale};
@@ -21,9 +21,8 @@ const SLACK: f64 = 0.1;
 /// Of so many blocks, and when this share of joints moves unlike ever before, the reference is learned anew.
 const PROGRAM: usize = 20;
 const UNLIKE: f64 = 0.4;
-/// The share is remembered over so many blocks; above this one no contact is told.
+/// The share is remembered over so many blocks.
 const UNLIKE_BLOCKS: f64 = 60.0;
-const STRANGE: f64 = 0.05;
 /// After a change what was usual weighs no more than so many windows.
 const AFTER_CHANGE: f64 = 64.0;
 

@@ -8,6 +8,10 @@ use super::{FRESH, Monitor};
 /// A contact is over after so many quiet blocks that hold less than this share of it.
 const QUIET: usize = 3;
 const OVER: f64 = 0.3;
+/// What explains this share of what the best does may be behind a run, and so much information (in units of
+/// noise) tells whether it still is there.
+const LIKELY: f64 = 0.6;
+const TELLING: f64 = 10.0;
 /// A loud run that lasts longer is none \[blocks\].
 const LONGEST_CONTACT: usize = 20;
 
@@ -94,7 +98,7 @@ impl Monitor {
         None
     }
 
-    /// Whether the quiet blocks after a run hold nothing of what explains it best at one of its joints.
+    /// Whether the quiet blocks after a run hold nothing of what explains it at its joints.
     fn is_over(&self, run: &Run) -> bool {
         let oldest = (run.quiet + run.blocks - 1).min(self.ring.len() - 1);
         (0..self.references.len())
@@ -114,11 +118,14 @@ impl Monitor {
                     return false;
                 };
                 let score = loud.joint();
-                let best =
-                    (0..JOINT_KINDS).max_by(|&a, &b| score.gain[a].total_cmp(&score.gain[b]));
-                let Some(kind) = best else { return false };
-                let (share, information) = quiet.share(kind, score.size[kind]);
-                information > 10.0 * self.noise[j].unwrap_or(f64::INFINITY) && share < OVER
+                let most = score.gain.into_iter().fold(0.0, f64::max);
+                // All that may explain it: an effort that is off by a factor is quiet where there is none.
+                let mut likely = (0..JOINT_KINDS).filter(|&kind| score.gain[kind] > LIKELY * most);
+                likely.all(|kind| {
+                    let (share, information) = quiet.share(kind, score.size[kind]);
+                    let known = self.noise[j].is_some_and(|noise| information > TELLING * noise);
+                    known && share < OVER
+                })
             })
     }
 }

@@ -223,8 +223,13 @@ impl Stream {
         effort
     }
 
+    /// Whether some joint moves at the next sample.
+    pub fn is_moving(&self) -> bool {
+        self.motion(self.time_s())[1].iter().any(|v| v.abs() > 0.02)
+    }
+
     /// The next sample.
-    pub fn next(&mut self) -> TwinState {
+    pub fn next_sample(&mut self) -> TwinState {
         let t = self.time_s();
         let motion = self.motion(t);
         let [q, qd, qdd] = &motion;
