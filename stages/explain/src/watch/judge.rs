@@ -157,10 +157,16 @@ impl Judge {
         let poor = first.normal < EXPLAINED * all;
         let soonest = if rival || poor { LATEST } else { SOONEST };
         let enough = if lasts { DOUBTLESS } else { 1.0 };
+        // A payload explains all that its weight would, held still in space, and more.
+        let forced = if first.name == Name::Payload {
+            1.0
+        } else {
+            FORCED
+        };
         if score < enough
             || first.best.blocks < soonest
             || !self.lasts(ring, usual, &first)
-            || force(ring, usual, first.best.back) > FORCED * first.normal
+            || force(ring, usual, first.best.back) > forced * first.normal
         {
             return (Verdict::Nothing, score);
         }
@@ -308,14 +314,18 @@ impl Judge {
         let per_part = first.best.blocks.div_ceil(PARTS);
         let mut telling = 0;
         self.window.clear();
-        // What has just ended shows in the newest second first.
-        let newest = blocks.clone().take(NEWEST);
-        newest.for_each(|back| self.window.add(ring.back(back)));
-        if self
-            .share(usual, first)
-            .is_some_and(|share| share < *SHARE.start())
-        {
-            return false;
+        // What has just ended shows in the newest second first, or in as much as tells.
+        for (at, back) in blocks.clone().enumerate() {
+            self.window.add(ring.back(back));
+            if at + 1 < NEWEST {
+                continue;
+            }
+            match self.share(usual, first) {
+                Some(share) if share < *SHARE.start() => return false,
+                Some(_) => break,
+                None if 2 * at > first.best.blocks => return false,
+                None => {}
+            }
         }
         self.window.clear();
         for (at, back) in blocks.enumerate() {

@@ -12,7 +12,7 @@ const EXPECTED: usize = 1;
 pub(super) const BIAS: usize = 0;
 pub(super) const GAIN: usize = 1;
 pub(super) const COULOMB: usize = 2;
-pub(super) const VISCOUS: usize = 3;
+/// With viscous friction as the last.
 pub(super) const JOINT_KINDS: usize = 4;
 
 /// A direction keeps at least this share of its information beside a reference that is itself uncertain,

@@ -1,6 +1,10 @@
 //! Streams in which something happens, and streams in which nothing does.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(
+    clippy::needless_range_loop,
+    reason = "several arrays have the same index"
+)]
 
 mod stream;
 
@@ -89,7 +93,8 @@ fn texts(said: &[Said]) -> String {
 const FOR_GOOD: f64 = f64::INFINITY;
 
 /// A change, and what it is to be called.
-const CHANGES: [(Act, &str, u32, f64); 6] = [
+const CHANGES: [(Act, &str, u32, f64); 7] = [
+    (Act::Viscous(3, 4.0), "viscous_friction", 0b1000, 4.0),
     (Act::Coulomb(2, 1.0), "coulomb_friction", 0b100, 1.0),
     (Act::Coulomb(1, 1.0), "coulomb_friction", 0b10, 1.0),
     (Act::Coulomb(5, 0.5), "coulomb_friction", 0b10_0000, 0.5),
@@ -245,14 +250,17 @@ fn figures() {
         (6, [14.0, 14.0, 0.0], 8.0),
     ] {
         let mut counts = std::collections::BTreeMap::new();
-        for seed in 1..=20 {
+        for seed in 1..=60 {
             let mut stream =
                 Stream::new(seed).with(Act::Push(link, force), 60.0, 60.0 + duration_s);
             for said in watch(&mut stream, 90.0) {
+                if said.state != "contact" {
+                    println!("seed {seed}: {}", said.text());
+                }
                 *counts.entry(said.state).or_insert(0) += 1;
             }
         }
-        println!("{force:?} N at link {link} for {duration_s} s, 20 runs: {counts:?}");
+        println!("{force:?} N at link {link} for {duration_s} s, 60 runs: {counts:?}");
     }
     let mut stream = Stream::new(1);
     stream.rate_hz = 500.0;
