@@ -201,6 +201,10 @@ pub fn losses(input: &Input) -> Vec<String> {
         );
         add(losses.incomplete, "rows lack a joint and were dropped");
         add(losses.unreadable, "messages could not be read");
+        add(
+            losses.damaged,
+            "parts of the file cannot be read, e.g. a torn tail",
+        );
         if !parts.is_empty() {
             notes.push(format!("{}: {}.", recording.name, parts.join(", ")));
         }

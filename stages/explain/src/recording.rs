@@ -45,12 +45,14 @@ pub struct Losses {
     pub incomplete: u64,
     /// Messages that could not be read.
     pub unreadable: u64,
+    /// Parts of the file that cannot be read, e.g. a torn tail.
+    pub damaged: u64,
 }
 
 impl Losses {
     /// Rows of data that are lost, repeats not counted.
     pub fn lost(&self) -> u64 {
-        self.not_finite + self.backward + self.incomplete + self.unreadable
+        self.not_finite + self.backward + self.incomplete + self.unreadable + self.damaged
     }
 }
 
@@ -137,13 +139,22 @@ impl Recording {
             has_velocity: true,
             has_effort: true,
         };
+        // What is known on opening, and what is found on the way.
+        let mut damage = archive.damage().to_vec();
         let mut states = archive.joint_states(&topics.state)?;
         while let Some(state) = states.next_state() {
             match state {
                 Ok(stamped) => reader.take(stamped.message),
+                Err(ArchiveError::Damaged(part)) => {
+                    if !damage.contains(&part) {
+                        damage.push(part);
+                    }
+                }
                 Err(_) => reader.recording.losses.unreadable += 1,
             }
         }
+        let lost = damage.iter().filter(|part| part.loses_data());
+        reader.recording.losses.damaged = lost.count() as u64;
         let mut recording = reader.finish(&topics.state)?;
         if let Some(topic) = &topics.reference {
             recording.read_reference(&archive, topic, joint_names)?;
