@@ -1,8 +1,11 @@
-//! Says on the terminal what a detector finds, as it finds it.
+//! Says on the terminal what a detector or a watch finds, as it finds it.
 
 use tauscope_bus::{Detection, Emit, EventKind, LinkError, Stage, StageError, TwinState, flags};
+use tauscope_explain::watch;
 
-/// A detect stage whose events are told on standard error. Its stream is untouched.
+use crate::pipeline::CellFacts;
+
+/// A detect or explain stage whose events are told on standard error. Its stream is untouched.
 pub struct Announced<S> {
     stage: S,
     told: Told,
@@ -11,6 +14,7 @@ pub struct Announced<S> {
 /// What has been told so far.
 struct Told {
     joint_names: Vec<String>,
+    effort_unit: &'static str,
     /// Stamp of the first sample, from which times are counted \[ns\].
     start_ns: Option<i64>,
     /// The sample of this event with the largest score.
@@ -18,10 +22,11 @@ struct Told {
 }
 
 impl<S> Announced<S> {
-    /// `stage` in a cell with these joints.
-    pub fn new(stage: S, joint_names: &[String]) -> Self {
+    /// `stage` in a cell.
+    pub fn new(stage: S, cell: &CellFacts) -> Self {
         let told = Told {
-            joint_names: joint_names.to_vec(),
+            joint_names: cell.joint_names.clone(),
+            effort_unit: cell.effort_unit.as_str(),
             start_ns: None,
             strongest: None,
         };
@@ -79,7 +84,14 @@ impl Told {
         if detection.alarm() && self.strongest.as_ref().is_none_or(is_stronger) {
             self.strongest = Some(*detection);
         }
+        let watches = detection.detector.as_str() == watch::NAME;
         match detection.event() {
+            EventKind::Onset if watches => Some(self.change(t, start_ns, detection)),
+            EventKind::Offset if watches => {
+                let told = self.strongest.take()?;
+                let learned = format!("{t:8.3} s  learned: the arm as it is now is the rule");
+                told.header.has(flags::CHANGE).then_some(learned)
+            }
             EventKind::None => None,
             EventKind::Onset => Some(format!("{t:8.3} s  {}", detection.state)),
             EventKind::Offset => {
@@ -87,6 +99,18 @@ impl Told {
                 Some(format!("{t:8.3} s  over{}", self.strength(&strongest)))
             }
         }
+    }
+
+    /// What a watch noticed, which is told once it is sure.
+    fn change(&self, t: f64, start_ns: i64, detection: &Detection) -> String {
+        let since = (detection.contact_ns - start_ns) as f64 * 1e-9;
+        let words = watch::in_words(detection, &self.joint_names, self.effort_unit);
+        let over = if detection.header.has(flags::CHANGE) {
+            ""
+        } else {
+            ", over again"
+        };
+        format!("{t:8.3} s  since {since:.1} s: {words}{over}")
     }
 
     /// Where and how hard, as far as it is known.

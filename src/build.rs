@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use tauscope_bus::{Emit, JointState, LinkError, Progress, SampleKind, Source, StageError};
 use tauscope_detect::Detect;
+use tauscope_explain::watch::{self, Watch};
 use tauscope_ingest::{IngestError, Paced, Rate, SimulatedRobot};
 use tauscope_record::{CellInfo, RecordError, Recorder, StreamInfo};
 use tauscope_twin::{Correction, Twin, TwinFile};
@@ -184,6 +185,22 @@ pub fn detect_setup(
     })
 }
 
+/// A watch over a twin of `cell` with this `model` and low-pass on efforts.
+pub fn watch(
+    config: &watch::Config,
+    model: Option<&TwinFile>,
+    effort_cutoff_hz: f64,
+    cell: &Cell,
+) -> Result<Watch, BuildError> {
+    let joints = detect_setup(model, cell)?.joints;
+    let setup = watch::Setup {
+        model: cell.model.clone(),
+        effort_per_nm: joints.iter().map(|joint| joint.effort_per_nm).collect(),
+        effort_cutoff_hz,
+    };
+    Ok(Watch::new(config, &setup))
+}
+
 /// What a recorder must know of a stream.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct StreamFacts {
@@ -206,6 +223,7 @@ pub fn streams(pipeline: &Pipeline, stages: &[usize]) -> Vec<StreamFacts> {
                 let detector = config.name();
                 detector.map(str::to_owned)
             }
+            Settings::Explain { .. } => Some(watch::NAME.to_owned()),
             _ => None,
         };
         Some(StreamFacts {

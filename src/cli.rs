@@ -2,7 +2,9 @@
 
 use clap::{Parser, Subcommand};
 
-use crate::commands::{calibrate, check, explain, info, repair, replay, run, schema, simulate, stage};
+use crate::commands::{
+    calibrate, check, explain, info, repair, replay, run, schema, simulate, stage,
+};
 
 /// A robot's measured effort beside its digital twin's: stream, detect, record.
 ///

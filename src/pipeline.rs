@@ -89,6 +89,15 @@ pub enum Settings {
         /// The model of the twin it listens to, which holds what its threshold rests on.
         model: Option<TwinFile>,
     },
+    /// A watch over a twin.
+    Explain {
+        /// From the pipeline file.
+        config: tauscope_explain::watch::Config,
+        /// The model of the twin it listens to.
+        model: Option<TwinFile>,
+        /// That twin's low-pass on efforts \[Hz\].
+        effort_cutoff_hz: f64,
+    },
     /// A recorder.
     Record(tauscope_record::Config),
     /// A program that is not ours.

@@ -217,13 +217,30 @@ impl<'a> Replay<'a> {
                     let detect = build::detect(config, model.as_ref(), cell)?;
                     Some(graph.stage(&stage.name, Box::new(detect), &input)?)
                 }
+                (
+                    Settings::Explain {
+                        config,
+                        model,
+                        effort_cutoff_hz,
+                    },
+                    Some(input),
+                ) => {
+                    let watch = build::watch(config, model.as_ref(), *effort_cutoff_hz, cell)?;
+                    Some(graph.stage(&stage.name, Box::new(watch), &input)?)
+                }
                 (Settings::Record(config), _) => {
                     if let Some(config) = redirect(config, out, &stem, &mut files) {
                         self.add_recorder(&mut graph, stage, &config, &streams)?;
                     }
                     None
                 }
-                (Settings::Twin { .. } | Settings::Detect { .. } | Settings::Outside(_), _) => None,
+                (
+                    Settings::Twin { .. }
+                    | Settings::Detect { .. }
+                    | Settings::Explain { .. }
+                    | Settings::Outside(_),
+                    _,
+                ) => None,
             };
             if let Some(stream) = stream {
                 streams.insert(index, stream);

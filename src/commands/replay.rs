@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use anyhow::Context as _;
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
+use tauscope_explain::watch::amount;
 
 use super::print;
 use crate::exit::{Exit, Failure};
@@ -250,7 +251,8 @@ fn table(outcomes: &[Outcome]) -> String {
                 detector.events.len()
             );
             for event in &detector.events {
-                let _ = writeln!(text, "    {}", event_line(event));
+                let line = event_line(event, &outcome.effort_unit);
+                let _ = writeln!(text, "    {line}");
             }
         }
         for file in &outcome.files {
@@ -290,8 +292,11 @@ fn rms_table(outcome: &Outcome, rms: &[JointRms]) -> Table {
     table
 }
 
-fn event_line(event: &Event) -> String {
+fn event_line(event: &Event, effort_unit: &str) -> String {
     let mut line = format!("{:8.3} s to {:8.3} s  {}", event.t, event.t_off, event.kind);
+    if let Some(size) = event.size.filter(|_| event.kind != "unknown") {
+        let _ = write!(line, " {}", amount(&event.kind, size, effort_unit));
+    }
     if let Some(link) = &event.link {
         let _ = write!(line, " at {link}");
     }
@@ -300,6 +305,9 @@ fn event_line(event: &Event) -> String {
     }
     if !event.joints.is_empty() {
         let _ = write!(line, " ({})", event.joints.join(", "));
+    }
+    if event.size.is_some() {
+        let _ = write!(line, ", since {:.1} s", event.t_contact);
     }
     line
 }

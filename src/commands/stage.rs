@@ -53,6 +53,7 @@ pub fn run(_args: &StageArgs) -> ExitCode {
         Ok(Made::Source(mut source)) => child.source(&mut *source),
         Ok(Made::Twin(mut twin)) => child.stage(&mut *twin),
         Ok(Made::Detect(mut detect)) => child.stage(&mut *detect),
+        Ok(Made::Watch(mut watch)) => child.stage(&mut *watch),
         Ok(Made::Record(mut recorder)) => child.sink(&mut *recorder),
         Err(error) => child.fail(&error),
     }
@@ -82,6 +83,7 @@ enum Made {
     Source(Box<dyn tauscope_bus::Source<tauscope_bus::JointState>>),
     Twin(Box<tauscope_twin::Twin>),
     Detect(Box<Announced<tauscope_detect::Detect>>),
+    Watch(Box<Announced<tauscope_explain::watch::Watch>>),
     Record(Box<tauscope_record::Recorder>),
 }
 
@@ -113,7 +115,15 @@ impl Made {
             }
             Settings::Detect { config, model } => {
                 let detect = build::detect(config, model.as_ref(), cell()?)?;
-                Self::Detect(Box::new(Announced::new(detect, &cell()?.facts.joint_names)))
+                Self::Detect(Box::new(Announced::new(detect, &cell()?.facts)))
+            }
+            Settings::Explain {
+                config,
+                model,
+                effort_cutoff_hz,
+            } => {
+                let watch = build::watch(config, model.as_ref(), *effort_cutoff_hz, cell()?)?;
+                Self::Watch(Box::new(Announced::new(watch, &cell()?.facts)))
             }
             Settings::Record(config) => {
                 let cells: Vec<&Cell> = cells.iter().collect();

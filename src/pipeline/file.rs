@@ -131,7 +131,7 @@ impl From<Endpoints> for Vec<String> {
 }
 
 /// A stage: its name, where it runs, what it listens to, and exactly one of `ingest`, `twin`,
-/// `detect`, `record` and `outside`, which says what it is.
+/// `detect`, `explain`, `record` and `outside`, which says what it is.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StageEntry {
@@ -162,6 +162,9 @@ pub struct StageEntry {
     /// A detector of contacts.
     #[serde(default)]
     pub detect: Option<tauscope_detect::Config>,
+    /// A watch over a twin: says when its residual changes character, and which physics changed.
+    #[serde(default)]
+    pub explain: Option<tauscope_explain::watch::Config>,
     /// A recorder: archive and picture.
     #[serde(default)]
     pub record: Option<tauscope_record::Config>,

@@ -115,6 +115,9 @@ impl<'a> Resolver<'a> {
         if let Some(config) = &entry.detect {
             return self.detect(index, &place.key("detect"), config);
         }
+        if let Some(config) = &entry.explain {
+            return self.explain(index, &place.key("explain"), config);
+        }
         if let Some(config) = &entry.record {
             return self.record(&place.key("record"), config);
         }
@@ -324,6 +327,34 @@ impl<'a> Resolver<'a> {
         Some(Settings::Detect {
             config: config.clone(),
             model: model.cloned(),
+        })
+    }
+
+    fn explain(
+        &mut self,
+        index: usize,
+        place: &Place,
+        config: &tauscope_explain::watch::Config,
+    ) -> Option<Settings> {
+        let twin = self.above(index, |role| role == Role::Twin);
+        let model = twin.and_then(|twin| self.models.get(&twin));
+        let twin_config = twin.and_then(|twin| self.entry(twin).twin.clone());
+        let twin_config = twin_config.unwrap_or_default();
+        if twin_config.model.is_some() && model.is_none() {
+            // The twin's model is wrong, which has been said.
+            return None;
+        }
+        let effort_cutoff_hz = twin_config.effort_cutoff_hz;
+        if let Some(cell) = self.cell(index)
+            && let Err(error) = build::watch(config, model, effort_cutoff_hz, cell)
+        {
+            self.report.push(self.file.at_key(place, error.to_string()));
+            return None;
+        }
+        Some(Settings::Explain {
+            config: config.clone(),
+            model: model.cloned(),
+            effort_cutoff_hz,
         })
     }
 

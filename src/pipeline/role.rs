@@ -1,10 +1,10 @@
-//! What a stage is: which of the five, what it takes and what it gives.
+//! What a stage is: which of the six, what it takes and what it gives.
 
 use tauscope_bus::SampleKind;
 
 use super::file::{OutputEntry, StageEntry};
 
-/// Which of the five kinds of stage.
+/// Which of the six kinds of stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// A source of joint states.
@@ -13,6 +13,8 @@ pub enum Role {
     Twin,
     /// A detector.
     Detect,
+    /// A watch over a twin.
+    Explain,
     /// A recorder.
     Record,
     /// A program that is not ours, and what it puts out.
@@ -33,7 +35,7 @@ pub enum Takes {
 }
 
 /// The keys of a stage that say what it is.
-pub const ROLE_KEYS: [&str; 5] = ["ingest", "twin", "detect", "record", "outside"];
+pub const ROLE_KEYS: [&str; 6] = ["ingest", "twin", "detect", "explain", "record", "outside"];
 
 impl Role {
     /// All that `entry` claims to be, with the key that says so. Exactly one in a good file.
@@ -46,6 +48,7 @@ impl Role {
             entry.ingest.as_ref().map(|_| Self::Ingest),
             entry.twin.as_ref().map(|_| Self::Twin),
             entry.detect.as_ref().map(|_| Self::Detect),
+            entry.explain.as_ref().map(|_| Self::Explain),
             entry.record.as_ref().map(|_| Self::Record),
             outside,
         ];
@@ -62,6 +65,7 @@ impl Role {
             Self::Ingest => "ingest",
             Self::Twin => "twin",
             Self::Detect => "detect",
+            Self::Explain => "explain",
             Self::Record => "record",
             Self::Outside(_) => "outside",
         }
@@ -72,7 +76,7 @@ impl Role {
         match self {
             Self::Ingest => Takes::Nothing,
             Self::Twin => Takes::One(SampleKind::JointState),
-            Self::Detect => Takes::One(SampleKind::TwinState),
+            Self::Detect | Self::Explain => Takes::One(SampleKind::TwinState),
             Self::Record | Self::Outside(None) => Takes::Many,
             Self::Outside(Some(_)) => Takes::AnyOne,
         }
@@ -83,7 +87,7 @@ impl Role {
         match self {
             Self::Ingest => Some(SampleKind::JointState),
             Self::Twin => Some(SampleKind::TwinState),
-            Self::Detect => Some(SampleKind::Detection),
+            Self::Detect | Self::Explain => Some(SampleKind::Detection),
             Self::Record => None,
             Self::Outside(output) => output,
         }
@@ -95,7 +99,7 @@ pub fn makers_of(kind: SampleKind) -> &'static str {
     match kind {
         SampleKind::JointState => "an `ingest` stage",
         SampleKind::TwinState => "a `twin` stage",
-        SampleKind::Detection => "a `detect` stage",
+        SampleKind::Detection => "a `detect` or `explain` stage",
         SampleKind::Health => "any stage",
     }
 }

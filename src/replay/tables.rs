@@ -93,7 +93,7 @@ pub fn write_summary(dir: &Path, outcomes: &[Outcome]) -> Result<(), TableError>
 /// Writes `events.parquet`: a row per event.
 pub fn write_events(dir: &Path, outcomes: &[Outcome]) -> Result<(), TableError> {
     let mut text: [Vec<String>; 7] = Default::default();
-    let mut numbers: [Vec<f64>; 7] = Default::default();
+    let mut numbers: [Vec<f64>; 8] = Default::default();
     for outcome in outcomes {
         for detector in &outcome.detectors {
             for event in &detector.events {
@@ -104,9 +104,13 @@ pub fn write_events(dir: &Path, outcomes: &[Outcome]) -> Result<(), TableError> 
                 text[4].push(event.kind.clone());
                 text[5].push(event.link.clone().unwrap_or_default());
                 text[6].push(event.joints.join(" "));
+                let size = [event.size.unwrap_or(f64::NAN)];
                 let force = event.force.unwrap_or([f64::NAN; 3]);
                 let row = [event.t, event.t_off, event.t_contact, event.peak_score];
-                for (column, value) in numbers.iter_mut().zip(row.into_iter().chain(force)) {
+                for (column, value) in numbers
+                    .iter_mut()
+                    .zip(row.into_iter().chain(force).chain(size))
+                {
                     column.push(value);
                 }
             }
@@ -129,6 +133,7 @@ pub fn write_events(dir: &Path, outcomes: &[Outcome]) -> Result<(), TableError> 
         "force_x_n",
         "force_y_n",
         "force_z_n",
+        "size",
     ];
     let columns = (text_names
         .into_iter()

@@ -87,9 +87,9 @@ pub struct Event {
     pub t_off: f64,
     /// Estimated beginning of the contact.
     pub t_contact: f64,
-    /// `contact`, `collision` or `cooperation`.
+    /// `contact`, `collision` or `cooperation`; of a change of the arm the effect's name, or `unknown`.
     pub kind: String,
-    /// The touched link, where estimated.
+    /// The touched or changed link, where estimated.
     pub link: Option<String>,
     /// The joints that detected.
     pub joints: Vec<String>,
@@ -97,6 +97,8 @@ pub struct Event {
     pub force: Option<[f64; 3]>,
     /// The largest score.
     pub peak_score: f64,
+    /// Size of a change of the arm: kg, a factor, or effort unit (per rad/s), by its kind.
+    pub size: Option<f64>,
 }
 
 /// Follows one detector.
@@ -150,6 +152,7 @@ impl DetectionTally {
                     joints: Vec::new(),
                     force: None,
                     peak_score: sample.score,
+                    size: sample.header.has(flags::CHANGE).then_some(sample.size),
                 });
             }
             EventKind::Offset => self.open = false,
@@ -165,8 +168,10 @@ impl DetectionTally {
         if self.open && (event.link.is_none() || sample.score >= event.peak_score) {
             event.peak_score = event.peak_score.max(sample.score);
             event.kind = sample.state.to_string();
-            if sample.header.has(flags::FORCE) {
+            if !sample.link.as_str().is_empty() {
                 event.link = Some(sample.link.to_string());
+            }
+            if sample.header.has(flags::FORCE) {
                 event.force = Some(sample.force_n);
             }
             for (j, name) in self.joint_names.iter().enumerate() {

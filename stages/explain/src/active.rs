@@ -291,7 +291,7 @@ fn change_scaled(
         }
     };
     let mut changed = changed;
-    if layer == Layer::Body && gains.iter().any(|gain| *gain != 1.0) {
+    if layer == Layer::Body && gains.iter().any(|gain| (gain - 1.0).abs() > 0.0) {
         let start = if through {
             Some(&efforts.mechanical)
         } else {
@@ -425,7 +425,8 @@ pub fn columns(
     }
     // Kept as in N m: drives scale what bodies cost.
     let scaled = |columns: &Arc<Columns>| {
-        if effect.layer != Layer::Body || efforts.gains.iter().all(|gain| *gain == 1.0) {
+        if effect.layer != Layer::Body || efforts.gains.iter().all(|gain| (gain - 1.0).abs() <= 0.0)
+        {
             return Arc::clone(columns);
         }
         let scale = |column: &Column| {

@@ -77,6 +77,7 @@ pub struct Outcome {
 ///
 /// # Errors
 /// If a term of the start cannot be built for the robot.
+#[expect(clippy::too_many_lines, reason = "the whole way, step by step")]
 pub fn explain(
     mut input: Input,
     progress: &(dyn Fn(f64, &str) + Sync),
@@ -189,7 +190,7 @@ pub fn explain(
     progress(1.0, "done");
     Ok(Outcome {
         report,
-        terms: setup.lasting_terms(&found)?,
+        terms: setup.lasting_terms(&found),
         gain: drive::gains(&found.fit.actives, unit_nm.len()),
         predictions: proof.predictions,
         pictures: proof.pictures,
@@ -393,7 +394,7 @@ impl Setup<'_> {
     }
 
     /// What a corrected twin keeps: not what came and went.
-    fn lasting_terms(&self, found: &Explanation) -> Result<Vec<TermSpec>, TermError> {
+    fn lasting_terms(&self, found: &Explanation) -> Vec<TermSpec> {
         let mut terms = self
             .input
             .start
@@ -413,7 +414,7 @@ impl Setup<'_> {
             };
             terms.push(TermSpec::of(&*active.term_for(model), &site));
         }
-        Ok(terms)
+        terms
     }
 }
 

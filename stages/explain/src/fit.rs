@@ -284,8 +284,7 @@ fn bounds(problem: &Problem, active: &Active, c: usize) -> (f64, f64) {
                 let largest = problem.largest_effort[active.hypothesis.place.joint];
                 (lower * largest, 1.1 * upper * largest)
             }
-            Scale::Log => (lower, upper),
-            Scale::Linear => (lower, upper),
+            Scale::Log | Scale::Linear => (lower, upper),
         },
         CoordinateKind::RecordingTime | CoordinateKind::SessionTime => {
             (f64::NEG_INFINITY, f64::INFINITY)

@@ -72,6 +72,7 @@ impl Products {
     }
 
     /// The difference of two, over the same columns.
+    #[must_use]
     pub fn without(&self, other: &Self) -> Self {
         let pair = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).collect();
         Self {

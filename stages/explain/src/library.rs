@@ -23,7 +23,7 @@ pub fn hypotheses(model: &Model, bodies: bool, without: &BTreeSet<String>) -> Ve
                     add(Whereabouts {
                         joint,
                         ..Whereabouts::default()
-                    })
+                    });
                 });
             }
             PlaceKind::TwoJoints => {

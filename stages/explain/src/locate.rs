@@ -12,6 +12,10 @@ const CONCENTRATED: f64 = 1.4;
 const LEAST_ROWS: usize = 12;
 
 /// The joints' mismatch over all, and for each the states in which it is concentrated; the largest first.
+#[expect(
+    clippy::too_many_lines,
+    reason = "one state after the other, each a line"
+)]
 pub fn located(problem: &Problem, before: &Fit, joints: &[String]) -> Vec<Located> {
     let n = problem.joints;
     let mut all = Vec::new();

@@ -367,10 +367,10 @@ impl Track {
         if moves {
             let margin = REVERSAL_PERIODS / cutoff_hz;
             let velocity = |k: usize| self.velocity[k * n + joint];
-            for k in 0..time.len() {
+            for (k, &t) in time.iter().enumerate() {
                 let reverses = k > 0 && velocity(k) * velocity(k - 1) < 0.0;
                 if reverses || velocity(k).abs() < STANDSTILL_RAD_S {
-                    spoil(time[k] - margin, time[k] + margin);
+                    spoil(t - margin, t + margin);
                 }
             }
         }

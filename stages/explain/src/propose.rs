@@ -241,7 +241,7 @@ impl<'a> Base<'a> {
         let grid: Vec<f64> = shapes_of(self.problem, hypothesis, *c);
         let at = grid
             .iter()
-            .position(|x| *x == best.active.coordinates[*c])
+            .position(|x| x.to_bits() == best.active.coordinates[*c].to_bits())
             .unwrap_or(0);
         let (mut below, mut above) = (
             grid[at.saturating_sub(1)],

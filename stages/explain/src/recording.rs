@@ -272,17 +272,13 @@ impl Reader<'_> {
         let recording = &mut self.recording;
         if self.order.is_empty() || message.name != self.names {
             self.known = message.name.join(", ");
-            match indices(&message.name, self.joint_names) {
-                Ok(order) => {
-                    self.order = order;
-                    self.names.clone_from(&message.name);
-                }
-                Err(_) => {
-                    recording.losses.incomplete += 1;
-                    self.skip_row();
-                    return;
-                }
-            }
+            let Ok(order) = indices(&message.name, self.joint_names) else {
+                recording.losses.incomplete += 1;
+                self.skip_row();
+                return;
+            };
+            self.order = order;
+            self.names.clone_from(&message.name);
         }
         let stamp_ns = message.header.stamp.ns();
         let count = message.name.len();

@@ -319,8 +319,8 @@ impl Search<'_> {
     fn pruned(&self, mut best: Explanation) -> Explanation {
         'again: loop {
             let sure = self.sure(&best.fit);
-            for index in 0..best.fit.actives.len() {
-                if is_drive(&best.fit.actives[index].hypothesis) || sure[index] {
+            for (index, sure) in sure.iter().enumerate() {
+                if is_drive(&best.fit.actives[index].hypothesis) || *sure {
                     continue;
                 }
                 let less = self.less(&best, index);

@@ -143,10 +143,10 @@ impl MotionSmoother {
         let mut covariance =
             Matrix3::from_diagonal(&Vector3::new(1e4, 1e4 * omega * omega, 1e4 * omega.powi(4)));
         let (mut gains, mut backward) = (Vec::with_capacity(n), Vec::with_capacity(n));
-        for i in 0..n {
+        for (i, &step_s) in steps_s.iter().enumerate() {
             if i > 0 {
-                let f = transition(steps_s[i]);
-                let predicted = f * covariance * f.transpose() + diffusion(steps_s[i], density);
+                let f = transition(step_s);
+                let predicted = f * covariance * f.transpose() + diffusion(step_s, density);
                 let inverse = predicted.try_inverse().unwrap_or_else(Matrix3::zeros);
                 backward.push(covariance * f.transpose() * inverse);
                 covariance = predicted;

@@ -38,7 +38,7 @@ impl Base<'_> {
         let count = candidates.len() as f64;
         let mut best: Option<CurveProposal> = None;
         for curve in candidates {
-            let Some(mut proposal) = self.try_curve(joint, curve) else {
+            let Some(mut proposal) = self.try_curve(joint, &curve) else {
                 continue;
             };
             proposal.penalty += count.ln();
@@ -52,7 +52,7 @@ impl Base<'_> {
         best
     }
 
-    fn try_curve(&self, joint: usize, curve: Table) -> Option<CurveProposal> {
+    fn try_curve(&self, joint: usize, curve: &Table) -> Option<CurveProposal> {
         let hypothesis = Hypothesis {
             effect: effect("unknown")?,
             place: Whereabouts {

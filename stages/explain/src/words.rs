@@ -66,6 +66,7 @@ pub fn name(effect: &str) -> String {
 }
 
 /// A finding in a sentence; `place` is what the joint or link is called.
+#[expect(clippy::too_many_lines, reason = "one sentence per effect")]
 pub fn sentence(
     active: &Active,
     place: &str,

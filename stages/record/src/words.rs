@@ -1,13 +1,13 @@
 //! What a detection says in words, the same in the archive and in the picture.
 
-use tauscope_bus::Detection;
+use tauscope_bus::{Detection, Name, flags};
 
 /// How serious it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Severity {
     /// All is well.
     Ok,
-    /// A contact.
+    /// A contact, or a change of the arm.
     Contact,
     /// A collision.
     Collision,
@@ -38,9 +38,25 @@ pub(crate) fn loaded_joints<'a>(detection: &Detection, joints: &'a [String]) -> 
 /// A detection's state in a few words, e.g. `contact at link5`.
 pub(crate) fn headline(detection: &Detection) -> String {
     let state = detection.state.as_str().replace('_', " ");
+    if detection.header.has(flags::CHANGE) && detection.state.as_str() == "unknown" {
+        return "changed, no name fits".to_owned();
+    }
+    let state = if detection.header.has(flags::CHANGE) {
+        format!("{state} {:.3}", detection.size)
+    } else {
+        state
+    };
     match (detection.alarm(), detection.link.as_str()) {
         (true, link) if !link.is_empty() => format!("{state} at {link}"),
         _ => state,
+    }
+}
+
+/// What it means that an alarm ended which said `state`: a contact is over, a change of the arm was learned.
+pub(crate) fn over(state: &Name) -> &'static str {
+    match state.as_str() {
+        "contact" | "collision" | "cooperation" => "contact ended",
+        _ => "learned: the rule from now on",
     }
 }
 
@@ -66,5 +82,8 @@ mod tests {
         assert_eq!(Severity::of(&detection), Severity::Collision);
         let joints = ["a", "b", "c"].map(str::to_owned);
         assert_eq!(loaded_joints(&detection, &joints), ["a", "c"]);
+        detection.header.flags |= flags::CHANGE;
+        (detection.state, detection.size) = ("torque_gain".into(), 1.08);
+        assert_eq!(headline(&detection), "torque gain 1.080 at link5");
     }
 }

@@ -129,6 +129,9 @@ fn event(
         if !detection.link.as_str().is_empty() {
             values.push(("link", detection.link.to_string()));
         }
+        if detection.header.has(flags::CHANGE) {
+            values.push(("size", detection.size.to_string()));
+        }
     }
     if detection.header.has(flags::FORCE) {
         values.push(("force_n", triple(detection.force_n)));

@@ -11,7 +11,7 @@ use super::store::{Out, Store, entity};
 use super::tracks::{ForceTrack, RowTrack, ScalarTrack, StateTrack, norm};
 use crate::error::RecordError;
 use crate::streams::{Stream, Streams};
-use crate::words::{Severity, headline, loaded_joints};
+use crate::words::{Severity, headline, loaded_joints, over};
 
 /// The arrow and the colour follow at most so often \[ns\]: a viewer shows no more.
 const FORCE_PERIOD_NS: u64 = 20_000_000;
@@ -102,6 +102,7 @@ impl DetectionTracks {
             self.score.push(header, &[detection.score]);
         }
         self.threshold.push(header, &[detection.threshold]);
+        let before = self.told.map(|(state, _)| state).unwrap_or_default();
         let as_told = |(state, told_ns): (Name, i64)| {
             state == detection.state && header.stamp_ns.abs_diff(told_ns) < STATE_PERIOD_NS
         };
@@ -110,7 +111,7 @@ impl DetectionTracks {
             self.state.push(header, detection.state.as_str());
         }
         if detection.event() != EventKind::None {
-            self.tell(detection, start_ns, joints, store)?;
+            self.tell(detection, &before, start_ns, joints, store)?;
         }
         self.draw_force(detection);
         if let Some(robot) = robot {
@@ -142,6 +143,7 @@ impl DetectionTracks {
     fn tell(
         &mut self,
         detection: &Detection,
+        before: &Name,
         start_ns: i64,
         joints: &[String],
         store: &Store,
@@ -149,7 +151,7 @@ impl DetectionTracks {
         let header = &detection.header;
         let ended = detection.event() == EventKind::Offset;
         let what = if ended {
-            "contact ended".to_owned()
+            over(before).to_owned()
         } else {
             headline(detection)
         };

@@ -18,6 +18,8 @@ pub(super) const RESIDUAL: Rgba32 = Rgba32::from_rgb(214, 102, 168);
 pub(super) const SCORE: Rgba32 = Rgba32::from_rgb(94, 200, 178);
 /// What has to do with a contact: its threshold, the touched link, the force, the state.
 pub(super) const CONTACT: Rgba32 = Rgba32::from_rgb(232, 76, 76);
+/// A change of the arm.
+const CHANGE: Rgba32 = Rgba32::from_rgb(232, 148, 58);
 /// A link.
 pub(super) const LINK: Rgba32 = Rgba32::from_rgb(176, 184, 196);
 /// Every second link, so that one sees where one ends.
@@ -29,10 +31,16 @@ pub(super) const BACKGROUND: Rgba32 = Rgba32::from_rgb(22, 25, 30);
 pub(super) const GRID: Rgba32 = Rgba32::from_unmultiplied_rgba(150, 160, 175, 40);
 
 /// How a detector's states look: state, words, colour.
-pub(super) const STATES: [(&str, &str, Rgba32); 5] = [
+pub(super) const STATES: [(&str, &str, Rgba32); 11] = [
     ("not_ready", "not ready", Rgba32::from_rgb(96, 100, 108)),
     ("free", "free", Rgba32::from_rgb(58, 132, 84)),
     ("contact", "contact", CONTACT),
     ("cooperation", "cooperation", Rgba32::from_rgb(78, 118, 196)),
     ("collision", "collision", Rgba32::from_rgb(176, 30, 96)),
+    ("coulomb_friction", "Coulomb friction", CHANGE),
+    ("viscous_friction", "viscous friction", CHANGE),
+    ("torque_gain", "torque gain", CHANGE),
+    ("torque_bias", "torque bias", CHANGE),
+    ("payload", "payload", CHANGE),
+    ("unknown", "no name fits", CHANGE),
 ];
