@@ -252,7 +252,7 @@ fn a_prediction_comes_from_the_motion_alone() {
     let done = explain_case(&first, &case("m01/case.yaml"));
     assert_eq!(done.code, 0, "{}", done.stderr);
     let emptied = changed(folder.path(), "m01", &["rec_03"], |_, state| {
-        state.effort.clear()
+        state.effort.clear();
     });
     let done = explain_case(&second, &emptied);
     assert_eq!(done.code, 0, "{}", done.stderr);
@@ -362,7 +362,10 @@ fn an_effort_that_is_zero_throughout_is_none() {
 fn the_wrong_robot_and_the_wrong_unit_are_told() {
     let folder = tempfile::tempdir().unwrap();
     let other = changed(folder.path(), "m01", &[], |_, state| {
-        state.effort.iter_mut().for_each(|effort| *effort = -*effort);
+        state
+            .effort
+            .iter_mut()
+            .for_each(|effort| *effort = -*effort);
     });
     let out = folder.path().join("out");
     not_evaluated(&out, &explain_case(&out, &other), "another robot");
@@ -469,7 +472,7 @@ fn wrong_arguments_and_files_are_refused() {
 fn a_joint_that_is_never_a_number_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let never = changed(folder.path(), "m01", &["rec_01"], |_, state| {
-        state.effort[3] = f64::NAN
+        state.effort[3] = f64::NAN;
     });
     let out = folder.path().join("out");
     refused(&explain_case(&out, &never), &["rec_01", "NaN throughout"]);

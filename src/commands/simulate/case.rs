@@ -10,6 +10,7 @@ use tauscope_ingest::simulated::{EffortUnit, fit_count};
 use crate::pipeline::ScenarioFacts;
 
 /// As [`crate::files::CaseFile`] reads it.
+#[expect(clippy::struct_field_names, reason = "the key is the file's")]
 #[derive(Debug, Serialize)]
 struct Case<'a> {
     case: &'a str,

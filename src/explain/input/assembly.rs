@@ -105,7 +105,7 @@ impl Assembly<'_> {
 
     /// The recordings, each once and by a name of its own.
     fn recordings(&self, report: &mut Report) -> (Vec<Named>, Vec<Named>) {
-        let mut seen = BTreeMap::new();
+        let mut seen = BTreeSet::new();
         let mut names = BTreeSet::new();
         let mut named = |paths: &[PathBuf], spot: fn(usize) -> Spot<'static>| {
             let mut all = Vec::new();
@@ -115,7 +115,7 @@ impl Assembly<'_> {
                     report.push((self.problem)(spot(index), title));
                     continue;
                 };
-                if seen.insert(canonical, ()).is_some() {
+                if !seen.insert(canonical) {
                     let title = format!(
                         "{} is named twice: a recording is fitted or held out, and once",
                         path.display()
