@@ -142,6 +142,9 @@ impl DetectionTally {
         self.judged += u64::from(sample.header.has(flags::READY));
         match sample.event() {
             EventKind::Onset => {
+                if let Some(last) = self.events.last_mut().filter(|_| self.open) {
+                    last.t_off = seconds(sample.header.stamp_ns);
+                }
                 self.open = true;
                 self.events.push(Event {
                     t: seconds(sample.header.stamp_ns),

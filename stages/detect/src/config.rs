@@ -45,7 +45,7 @@ impl Config {
     /// # Errors
     /// If there is none, or more than one.
     pub fn detector(&self, setup: &Setup) -> Result<Box<dyn Detector>, ConfigError> {
-        let mut configured = self.detectors(setup);
+        let mut configured = self.detectors(setup)?;
         match (configured.pop(), configured.len()) {
             (Some(detector), 0) => Ok(detector),
             (None, _) => Err(ConfigError::OneDetector { found: 0 }),
@@ -55,13 +55,22 @@ impl Config {
 
     /// The canonical name of the detector that is configured, if it is one.
     pub fn name(&self) -> Option<&'static str> {
-        self.detector(&Setup::default())
-            .ok()
-            .map(|detector| detector.name())
+        let given = [
+            (self.twin_regression.is_some(), twin_regression::NAME),
+            (self.naive_difference.is_some(), naive_difference::NAME),
+        ];
+        let mut names = given
+            .iter()
+            .filter(|(given, _)| *given)
+            .map(|(_, name)| *name);
+        names.next().filter(|_| names.next().is_none())
     }
 
-    /// Every detector with its usual settings.
-    pub fn every(setup: &Setup) -> Vec<Box<dyn Detector>> {
+    /// Every detector that only a threshold is wanting to, with its usual settings.
+    ///
+    /// # Errors
+    /// If `setup` lacks what one of them needs.
+    pub fn every(setup: &Setup) -> Result<Vec<Box<dyn Detector>>, ConfigError> {
         let all = Self {
             twin_regression: Some(twin_regression::Settings::default()),
             naive_difference: Some(naive_difference::Settings::default()),
@@ -71,16 +80,15 @@ impl Config {
     }
 
     /// A line a detector.
-    fn detectors(&self, setup: &Setup) -> Vec<Box<dyn Detector>> {
-        [
-            self.twin_regression.as_ref().map(twin_regression::build),
-            self.naive_difference
-                .as_ref()
-                .map(|settings| naive_difference::build(settings, setup)),
-        ]
-        .into_iter()
-        .flatten()
-        .collect()
+    fn detectors(&self, setup: &Setup) -> Result<Vec<Box<dyn Detector>>, ConfigError> {
+        let mut all: Vec<Box<dyn Detector>> = Vec::new();
+        if let Some(settings) = &self.twin_regression {
+            all.push(twin_regression::build(settings));
+        }
+        if let Some(settings) = &self.naive_difference {
+            all.push(naive_difference::build(settings, setup));
+        }
+        Ok(all)
     }
 }
 
@@ -128,6 +136,20 @@ pub enum ConfigError {
     OneDetector {
         /// How many were given.
         found: usize,
+    },
+    /// A threshold for a detector with rules of its own.
+    #[error(
+        "{detector} decides by rules of its own: leave `threshold` out and see its own settings"
+    )]
+    OwnThreshold {
+        /// The detector.
+        detector: &'static str,
+    },
+    /// A detector that needs the robot, behind a twin that is a topic alone.
+    #[error("{detector} needs the robot's model: give the cell a `robot` (URDF)")]
+    NoModel {
+        /// The detector.
+        detector: &'static str,
     },
     /// Both kinds of threshold.
     #[error("`threshold` takes either `sigmas` or `score`, not both")]

@@ -9,6 +9,32 @@ pub struct Judgement {
     pub score: f64,
     /// Whether it can be trusted: the twin's and the detector's own filters have settled.
     pub ready: bool,
+    /// What the detector decided by rules of its own; `None` leaves it to the threshold.
+    pub verdict: Option<Verdict>,
+}
+
+/// What a detector decided by rules of its own. A detector that decides so does for every sample that
+/// it is ready for, and says so by [`Detector::threshold`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Verdict {
+    /// The detector's state in its own words. While an alarm lasts it is the kind of the event:
+    /// `contact`, `collision` or `cooperation`.
+    pub state: &'static str,
+    /// The contact it sees, if it sees one.
+    pub contact: Option<Seen>,
+}
+
+/// A contact that a detector sees. One event is as long as its kind and its beginning stay the same:
+/// a change of either begins another event.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Seen {
+    /// Estimated beginning \[ns since the epoch\].
+    pub contact_ns: i64,
+    /// The joints that detected, bit j for joint j; `None` leaves it to the residuals' size.
+    pub joints: Option<u32>,
+    /// The touched link, an index into the model's links, and the force on the robot in the world
+    /// frame \[N\] with the point where it is taken to act \[m\]; `None` leaves it to the residual's pattern.
+    pub place: Option<crate::Contact>,
 }
 
 /// Scores every sample of a twin. Pure: time is in the samples; nothing is allocated per sample.
@@ -18,4 +44,10 @@ pub trait Detector: Send {
 
     /// The score of the next sample.
     fn judge(&mut self, sample: &TwinState) -> Judgement;
+
+    /// The score from which on a detector with rules of its own sees a contact. `None`: the frame
+    /// holds the score against the configured threshold.
+    fn threshold(&self) -> Option<f64> {
+        None
+    }
 }

@@ -85,6 +85,27 @@ impl Alarm {
     }
 }
 
+/// The events of a detector with rules of its own: one is as long as its kind and its beginning stay.
+#[derive(Debug, Default)]
+pub(crate) struct OwnEvents {
+    /// Kind and beginning, while one lasts.
+    open: Option<(&'static str, i64)>,
+}
+
+impl OwnEvents {
+    /// Takes what the detector says of the next sample: its state, and where the contact began.
+    pub fn step(&mut self, state: Option<&'static str>, contact_ns: Option<i64>) -> Step {
+        let now = state.zip(contact_ns);
+        let before = std::mem::replace(&mut self.open, now);
+        match now {
+            Some((_, contact_ns)) if before == now => Step::Contact { contact_ns },
+            Some((_, contact_ns)) => Step::Onset { contact_ns },
+            None if before.is_some() => Step::Offset,
+            None => Step::Free,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -124,6 +145,20 @@ mod tests {
         assert_eq!(steps[5], Step::Contact { contact_ns: 0 });
         assert_eq!(steps[6], Step::Offset);
         assert_eq!(steps[7], Step::Free);
+    }
+
+    #[test]
+    fn an_event_of_ones_own_ends_where_its_kind_or_its_beginning_changes() {
+        let mut events = OwnEvents::default();
+        let onset = |contact_ns| Step::Onset { contact_ns };
+        assert_eq!(events.step(Some("free"), None), Step::Free);
+        assert_eq!(events.step(Some("collision"), Some(1)), onset(1));
+        let on = events.step(Some("collision"), Some(1));
+        assert_eq!(on, Step::Contact { contact_ns: 1 });
+        assert_eq!(events.step(Some("cooperation"), Some(1)), onset(1));
+        assert_eq!(events.step(Some("cooperation"), Some(9)), onset(9));
+        assert_eq!(events.step(None, None), Step::Offset);
+        assert_eq!(events.step(None, None), Step::Free);
     }
 
     #[test]

@@ -9,11 +9,13 @@ pub mod config;
 mod detector;
 mod events;
 mod isolation;
+mod lesson;
 pub mod naive_difference;
 mod stage;
 pub mod twin_regression;
 
 pub use config::{Config, ConfigError, Threshold};
-pub use detector::{Detector, Judgement};
+pub use detector::{Detector, Judgement, Seen, Verdict};
 pub use isolation::{Contact, Isolation};
+pub use lesson::{ContactKind, LabelledContact, LearnError, Lesson, Lessons};
 pub use stage::{Detect, JointSetup, ScoreStatistics, Setup};

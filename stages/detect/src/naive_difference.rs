@@ -11,6 +11,9 @@ use tauscope_bus::{MAX_JOINTS, TwinState, flags};
 use crate::detector::{Detector, Judgement};
 use crate::stage::Setup;
 
+/// Canonical name.
+pub(crate) const NAME: &str = "naive_difference";
+
 /// Settings of `naive_difference`: none, its filters are the twin's.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -32,7 +35,7 @@ struct NaiveDifference {
 
 impl Detector for NaiveDifference {
     fn name(&self) -> &'static str {
-        "naive_difference"
+        NAME
     }
 
     fn judge(&mut self, sample: &TwinState) -> Judgement {
@@ -52,6 +55,7 @@ impl Detector for NaiveDifference {
         Judgement {
             score,
             ready: sample.header.has(flags::READY),
+            verdict: None,
         }
     }
 }

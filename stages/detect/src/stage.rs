@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use tauscope_bus::{Detection, Emit, Name, Stage, StageError, TwinState, flags};
 use tauscope_dynamics::Model;
 
-use crate::config::{Config, ConfigError};
+use crate::config::{Config, ConfigError, Threshold};
 use crate::detector::Detector;
-use crate::events::{Alarm, Step};
+use crate::events::{Alarm, OwnEvents, Step};
 use crate::isolation::Isolation;
 
 /// What a detector must know of its cell and its twin.
@@ -44,11 +44,28 @@ pub struct ScoreStatistics {
     pub standard_deviation: f64,
 }
 
+/// Who says when an alarm is raised.
+enum Rule {
+    /// A threshold on the score.
+    Threshold(Alarm),
+    /// The detector, from this score on.
+    Own { threshold: f64, events: OwnEvents },
+}
+
+impl Rule {
+    fn threshold(&self) -> f64 {
+        match self {
+            Self::Threshold(alarm) => alarm.threshold(),
+            Self::Own { threshold, .. } => *threshold,
+        }
+    }
+}
+
 /// The detect stage: one detector and what all of them share.
 pub struct Detect {
     detector: Box<dyn Detector>,
     name: Name,
-    alarm: Alarm,
+    rule: Rule,
     isolation: Isolation,
 }
 
@@ -59,18 +76,31 @@ impl Detect {
     /// If the configuration names no or several detectors, or no threshold can be had.
     pub fn new(config: &Config, setup: Setup) -> Result<Self, ConfigError> {
         let detector = config.detector(&setup)?;
-        let threshold = config.threshold.resolve(detector.name(), &setup)?;
-        // The usual range of the score: one standard deviation above its mean.
-        let low = setup
-            .scores
-            .get(detector.name())
-            .map_or(0.5 * threshold, |score| {
-                score.mean + score.standard_deviation
-            });
+        let rule = match detector.threshold() {
+            Some(_) if config.threshold != Threshold::default() => {
+                let detector = detector.name();
+                return Err(ConfigError::OwnThreshold { detector });
+            }
+            Some(threshold) => Rule::Own {
+                threshold,
+                events: OwnEvents::default(),
+            },
+            None => {
+                let threshold = config.threshold.resolve(detector.name(), &setup)?;
+                // The usual range of the score: one standard deviation above its mean.
+                let low = setup
+                    .scores
+                    .get(detector.name())
+                    .map_or(0.5 * threshold, |score| {
+                        score.mean + score.standard_deviation
+                    });
+                Rule::Threshold(Alarm::new(threshold, low, config.hold_s))
+            }
+        };
         Ok(Self {
             name: Name::new(detector.name()),
             detector,
-            alarm: Alarm::new(threshold, low, config.hold_s),
+            rule,
             isolation: Isolation::new(setup),
         })
     }
@@ -83,22 +113,37 @@ impl Stage<TwinState, Detection> for Detect {
         out: &mut dyn Emit<Detection>,
     ) -> Result<(), StageError> {
         let judgement = self.detector.judge(sample);
-        let step = self.alarm.step(
-            sample.header.stamp_ns,
-            judgement.ready.then_some(judgement.score),
-        );
-        let (state, event, contact_ns) = match step {
-            Step::Free if judgement.ready => ("free", 0, None),
-            Step::Free => ("not_ready", 0, None),
+        let stamp_ns = sample.header.stamp_ns;
+        let score = judgement.ready.then_some(judgement.score);
+        let verdict = judgement.verdict.filter(|_| judgement.ready);
+        let seen = verdict.and_then(|verdict| verdict.contact);
+        let step = match &mut self.rule {
+            Rule::Threshold(alarm) => alarm.step(stamp_ns, score),
+            Rule::Own { events, .. } => events.step(
+                verdict.map(|verdict| verdict.state),
+                seen.map(|s| s.contact_ns),
+            ),
+        };
+        let (usual, event, contact_ns) = match step {
+            Step::Free => ("free", 0, None),
             Step::Onset { contact_ns } => ("contact", Detection::ONSET, Some(contact_ns)),
             Step::Contact { contact_ns } => ("contact", 0, Some(contact_ns)),
             Step::Offset => ("free", Detection::OFFSET, None),
         };
+        let state = match verdict {
+            Some(verdict) => verdict.state,
+            None if judgement.ready || contact_ns.is_some() || event != 0 => usual,
+            None => "not_ready",
+        };
         let mut joints = 0;
         let mut contact = None;
         if contact_ns.is_some() {
-            joints = self.isolation.loaded_joints(&sample.residual);
-            contact = self.isolation.locate(sample);
+            joints = seen
+                .and_then(|seen| seen.joints)
+                .unwrap_or_else(|| self.isolation.loaded_joints(&sample.residual));
+            contact = seen
+                .and_then(|seen| seen.place)
+                .or_else(|| self.isolation.locate(sample));
         }
         out.emit(&mut |slot| {
             slot.header = sample.header;
@@ -109,7 +154,7 @@ impl Stage<TwinState, Detection> for Detect {
             slot.detector = self.name;
             slot.state = Name::new(state);
             slot.score = judgement.score;
-            slot.threshold = self.alarm.threshold();
+            slot.threshold = self.rule.threshold();
             slot.joints = joints;
             slot.event = event;
             if let Some(contact_ns) = contact_ns {

@@ -12,6 +12,9 @@ use tauscope_bus::{TwinState, flags};
 
 use crate::detector::{Detector, Judgement};
 
+/// Canonical name.
+pub(crate) const NAME: &str = "twin_regression";
+
 /// Settings of `twin_regression`: none, its filters are the twin's.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -26,7 +29,7 @@ struct TwinRegression;
 
 impl Detector for TwinRegression {
     fn name(&self) -> &'static str {
-        "twin_regression"
+        NAME
     }
 
     fn judge(&mut self, sample: &TwinState) -> Judgement {
@@ -35,6 +38,7 @@ impl Detector for TwinRegression {
             // Equation 5.
             score: sample.residual[..joint_count].iter().map(|r| r * r).sum(),
             ready: sample.header.has(flags::READY),
+            verdict: None,
         }
     }
 }
