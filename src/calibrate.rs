@@ -74,12 +74,34 @@ impl Job<'_> {
     /// # Errors
     /// If a recording cannot be read, or all are too short.
     pub fn run(&self, progress: &dyn Fn(usize, f64)) -> Result<Calibrated, CalibrateError> {
+        let mut calibrated = self.fit(&|_, _| true, progress)?;
+        let lost = self.measure(&mut calibrated.file, self.measured(), &|index, fraction| {
+            progress(self.fit.len() + index, fraction);
+        })?;
+        calibrated.lost += if self.validation.is_empty() { 0 } else { lost };
+        Ok(calibrated)
+    }
+
+    /// Fits gain and offset on the samples of which `is_free`, told the recording and the stamp, says that
+    /// nothing touches the robot.
+    ///
+    /// # Errors
+    /// If a recording cannot be read, or all are too short.
+    pub fn fit(
+        &self,
+        is_free: &(dyn Fn(&Path, i64) -> bool + Sync),
+        progress: &dyn Fn(usize, f64),
+    ) -> Result<Calibrated, CalibrateError> {
         let joint_count = self.cell.facts.joint_names.len();
         let mut lost = 0;
         let mut calibration = Calibration::new(joint_count);
         for (index, recording) in self.fit.iter().enumerate() {
             let step = &mut |fraction| progress(index, fraction);
-            lost += self.each(recording, None, step, &mut |sample| calibration.add(sample))?;
+            lost += self.each(recording, None, step, &mut |sample| {
+                if is_free(recording, sample.header.stamp_ns) {
+                    calibration.add(sample);
+                }
+            })?;
         }
         let Some(fits) = calibration.fit() else {
             return Err(CalibrateError::TooShort);
@@ -94,11 +116,6 @@ impl Job<'_> {
             };
             file.joints.insert(name.clone(), joint);
         }
-
-        let seen = self.measure(&mut file, self.measured(), &|index, fraction| {
-            progress(self.fit.len() + index, fraction);
-        })?;
-        lost += if self.validation.is_empty() { 0 } else { seen };
         Ok(Calibrated {
             file,
             samples: calibration.samples(),

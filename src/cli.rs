@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    calibrate, check, explain, info, repair, replay, run, schema, simulate, stage,
+    calibrate, check, evaluate, explain, info, repair, replay, run, schema, simulate, stage,
 };
 
 /// A robot's measured effort beside its digital twin's: stream, detect, record.
@@ -27,6 +27,7 @@ pub enum Command {
     Replay(replay::Args),
     Calibrate(calibrate::Args),
     Explain(explain::Args),
+    Evaluate(evaluate::Args),
     Simulate(simulate::Args),
     Info(info::Args),
     Repair(repair::Args),

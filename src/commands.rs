@@ -2,6 +2,7 @@
 
 pub mod calibrate;
 pub mod check;
+pub mod evaluate;
 pub mod explain;
 pub mod info;
 pub mod repair;

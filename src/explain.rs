@@ -45,7 +45,7 @@ fn provenance_of(request: &Request) -> anyhow::Result<BTreeMap<String, String>> 
 }
 
 /// Writes a file beside `path` and moves it there once it is whole.
-fn write_whole(path: &Path, content: &[u8]) -> Result<(), Failure> {
+pub fn write_whole(path: &Path, content: &[u8]) -> Result<(), Failure> {
     let mut part = path.as_os_str().to_owned();
     part.push(".part");
     let part = PathBuf::from(part);

@@ -6,6 +6,7 @@ mod build;
 mod calibrate;
 mod cli;
 mod commands;
+mod evaluate;
 mod exit;
 mod explain;
 mod files;
@@ -51,6 +52,7 @@ fn main() -> ExitCode {
         Command::Replay(args) => commands::replay::run(&args),
         Command::Calibrate(args) => commands::calibrate::run(&args),
         Command::Explain(args) => commands::explain::run(&args),
+        Command::Evaluate(args) => commands::evaluate::run(&args),
         Command::Simulate(args) => commands::simulate::run(&args),
         Command::Info(args) => commands::info::run(&args),
         Command::Repair(args) => commands::repair::run(&args),

@@ -3,7 +3,7 @@
 
 mod graph;
 mod observe;
-mod tables;
+pub mod tables;
 mod tally;
 
 use std::collections::BTreeMap;

@@ -87,7 +87,7 @@ pub fn write_summary(dir: &Path, outcomes: &[Outcome]) -> Result<(), TableError>
             .zip(numbers)
             .map(|(n, c)| (n, floats(c))),
     );
-    write(&dir.join("summary.parquet"), columns)
+    write_table(&dir.join("summary.parquet"), columns)
 }
 
 /// Writes `events.parquet`: a row per event.
@@ -145,23 +145,26 @@ pub fn write_events(dir: &Path, outcomes: &[Outcome]) -> Result<(), TableError> 
             .zip(numbers)
             .map(|(n, c)| (n, floats(c))),
     );
-    write(&dir.join("events.parquet"), columns)
+    write_table(&dir.join("events.parquet"), columns)
 }
 
-fn strings(column: Vec<String>) -> ArrayRef {
+/// A column of texts.
+pub fn strings(column: Vec<String>) -> ArrayRef {
     Arc::new(StringArray::from(column))
 }
 
-fn integers(column: Vec<u64>) -> ArrayRef {
+/// A column of counts.
+pub fn integers(column: Vec<u64>) -> ArrayRef {
     Arc::new(UInt64Array::from(column))
 }
 
-fn floats(column: Vec<f64>) -> ArrayRef {
+/// A column of numbers.
+pub fn floats(column: Vec<f64>) -> ArrayRef {
     Arc::new(Float64Array::from(column))
 }
 
 /// Writes the columns beside `path` and moves them there once they are whole.
-fn write(
+pub fn write_table(
     path: &Path,
     columns: impl Iterator<Item = (&'static str, ArrayRef)>,
 ) -> Result<(), TableError> {

@@ -132,6 +132,13 @@ impl DetectionTally {
         }
     }
 
+    /// Counts seconds from this stamp on instead of the first sample's \[ns since the epoch\].
+    #[must_use]
+    pub fn since(mut self, start_ns: i64) -> Self {
+        self.start_ns = Some(start_ns);
+        self
+    }
+
     pub fn add(&mut self, sample: &Detection) {
         let start_ns = *self.start_ns.get_or_insert(sample.header.stamp_ns);
         let seconds = |ns: i64| (ns - start_ns) as f64 * 1e-9;

@@ -1,0 +1,130 @@
+//! `tauscope evaluate`.
+
+use std::path::PathBuf;
+
+use anyhow::Context as _;
+use serde::Serialize;
+
+use super::print;
+use crate::evaluate::{self, Evaluation, Judged, Options, Table};
+use crate::exit::{Exit, Failure};
+use crate::progress::Progress;
+
+/// Train, threshold and score detectors on a labelled set; print the papers' tables.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The set: robot, recordings, labels.
+    #[arg(value_name = "SET")]
+    set: PathBuf,
+    /// The folder for events, scores, tables and the page.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Which detectors, separated by commas; without it those that fit the set, `all` for all.
+    #[arg(long, value_name = "DETECTORS", value_delimiter = ',')]
+    detectors: Vec<String>,
+    /// Behind which twin: `rigid`, `regression`, `topic`, or the path of a twin.yaml; may be given several
+    /// times. Without it `topic` where the set names one, else `regression`.
+    #[arg(long, value_name = "TWIN")]
+    twin: Vec<String>,
+    /// Low-pass on the velocity before it is differentiated, in Hz; without it the twin's own.
+    #[arg(long, value_name = "HZ", value_parser = cutoff)]
+    velocity_cutoff_hz: Option<f64>,
+    /// Low-pass on measured and expected effort, in Hz; without it the twin's own.
+    #[arg(long, value_name = "HZ", value_parser = cutoff)]
+    effort_cutoff_hz: Option<f64>,
+    /// How many detectors are worked on at once.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
+    jobs: u16,
+    /// Machine-readable.
+    #[arg(long)]
+    json: bool,
+}
+
+fn cutoff(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (0.01..=10_000.0).contains(&value) => Ok(value),
+        _ => Err("it is a number from 0.01 to 10000".to_owned()),
+    }
+}
+
+/// Evaluates, and writes what came of it.
+pub fn run(args: &Args) -> Result<Exit, Failure> {
+    let options = Options {
+        detectors: args.detectors.clone(),
+        twins: args.twin.clone(),
+        cutoffs_hz: [args.velocity_cutoff_hz, args.effort_cutoff_hz],
+        jobs: usize::from(args.jobs),
+    };
+    let request = evaluate::load(&args.set, &options)?;
+    evaluate::make(&args.out)?;
+    let progress = Progress::of_work();
+    let result = evaluate::run(request, &args.out, &|share, what| {
+        progress.doing(share, what)
+    });
+    let evaluation = result.map_err(|error| {
+        if error.is_input() {
+            Failure::rejected(error.to_string())
+        } else {
+            Failure::Failed(error.into())
+        }
+    })?;
+    progress.doing(1.0, "writing");
+    let judged = Judged::all(&evaluation);
+    let tables = evaluate::tables(&evaluation, &judged);
+    let files = evaluate::write(&args.out, &evaluation, &judged, &tables)?;
+    drop(progress);
+    if args.json {
+        let summary = Summary::of(&evaluation, &judged, &tables, &files);
+        print(&serde_json::to_string_pretty(&summary).context("the results")?)?;
+    } else {
+        print(&evaluate::text(&tables, &evaluation.notes))?;
+        for file in &files {
+            print(&format!("wrote {}", file.display()))?;
+        }
+    }
+    Ok(Exit::from_loss(evaluation.lost > 0))
+}
+
+/// For machines.
+#[derive(Debug, Serialize)]
+struct Summary<'a> {
+    set: &'a str,
+    lost: u64,
+    notes: &'a [String],
+    detectors: Vec<Detector<'a>>,
+    tables: &'a [Table],
+    files: &'a [PathBuf],
+}
+
+#[derive(Debug, Serialize)]
+struct Detector<'a> {
+    detector: &'a str,
+    twin: &'a str,
+    threshold: f64,
+    /// Over the labelled test recordings, by seed; `null` where nothing was scored.
+    seeds: &'a [evaluate::Numbers],
+}
+
+impl<'a> Summary<'a> {
+    fn of(
+        evaluation: &'a Evaluation,
+        judged: &'a [Judged<'a>],
+        tables: &'a [Table],
+        files: &'a [PathBuf],
+    ) -> Self {
+        let detectors = judged.iter().map(|judged| Detector {
+            detector: judged.run.first().entry.name,
+            twin: &evaluation.twins[judged.run.twin].name,
+            threshold: judged.run.first().threshold,
+            seeds: &judged.numbers,
+        });
+        Self {
+            set: &evaluation.request.set.set,
+            lost: evaluation.lost,
+            notes: &evaluation.notes,
+            detectors: detectors.collect(),
+            tables,
+            files,
+        }
+    }
+}

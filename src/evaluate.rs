@@ -1,0 +1,365 @@
+//! `tauscope evaluate`: trains, thresholds and scores detectors on a labelled set.
+
+mod files;
+mod input;
+mod judged;
+mod labels;
+mod metrics;
+mod parquet;
+mod registry;
+mod runner;
+mod session;
+mod tables;
+mod twin;
+
+use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use tauscope_detect::{LearnError, Lesson, Lessons};
+
+use self::input::{Named, Role};
+use self::registry::{Entry, SEEDS, Task};
+use self::runner::Runner;
+use self::twin::Prepared;
+use crate::build::BuildError;
+use crate::calibrate::CalibrateError;
+use crate::replay::ReplayError;
+
+pub use files::{make, write};
+pub use input::{Options, Request, load};
+pub use judged::Judged;
+pub use metrics::Numbers;
+pub use tables::{Table, all as tables, text};
+
+/// Why an evaluation gives nothing.
+#[derive(Debug, thiserror::Error)]
+pub enum EvaluateError {
+    /// A recording cannot be run through the stages.
+    #[error("{recording}: {source}")]
+    Recording {
+        /// The recording.
+        recording: String,
+        /// Why.
+        source: ReplayError,
+    },
+    /// The twin cannot be calibrated.
+    #[error(transparent)]
+    Calibrate(#[from] CalibrateError),
+    /// A stage cannot be built.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    /// No recordings to fit the twin on.
+    #[error(
+        "twin `{twin}` is fitted on contact-free recordings, and the set names none under `train`; use --twin rigid, or a twin.yaml"
+    )]
+    NothingToFit {
+        /// The twin.
+        twin: String,
+    },
+    /// Every sample is in a contact, or before the filters have settled.
+    #[error(
+        "the validation recordings (the train recordings, if there are none) hold no sample in which nothing touches the robot and the twin's filters have settled: no threshold can be set"
+    )]
+    NothingFree,
+    /// A detector cannot learn from this set.
+    #[error("{source}")]
+    Learn {
+        /// The detector.
+        detector: &'static str,
+        /// Why.
+        source: LearnError,
+    },
+    /// Every detector was left out.
+    #[error("no detector can learn from this set: {why}")]
+    NoDetector {
+        /// What each said.
+        why: String,
+    },
+    /// A detector says nothing.
+    #[error(
+        "{detector} was not ready at any sample of the recordings that its threshold is set on"
+    )]
+    NeverReady {
+        /// The detector.
+        detector: &'static str,
+    },
+}
+
+impl EvaluateError {
+    /// Whether the arguments or files are wrong (exit code 2), rather than what happened since.
+    pub fn is_input(&self) -> bool {
+        match self {
+            Self::Recording { source, .. } => source.is_input(),
+            Self::Calibrate(error) => error.is_input(),
+            _ => true,
+        }
+    }
+}
+
+/// A detector behind a twin, with each of its seeds.
+pub struct Run {
+    /// The twin, a place in [`Evaluation::twins`].
+    pub twin: usize,
+    /// One per seed; a detector without chance has one.
+    pub seeds: Vec<Runner>,
+}
+
+/// What came of it all.
+pub struct Evaluation {
+    /// What was asked for.
+    pub request: Request,
+    /// The twins.
+    pub twins: Vec<Prepared>,
+    /// By twin and detector.
+    pub runs: Vec<Run>,
+    /// Samples that were lost or refused.
+    pub lost: u64,
+    /// What the reader should know.
+    pub notes: Vec<String>,
+}
+
+/// How far it is, 0 to 1, and what it does.
+pub type Progress<'a> = dyn Fn(f64, &str) + Sync + 'a;
+
+/// Evaluates. Trained weights go to `out`.
+///
+/// # Errors
+/// If nothing can be learnt or read. A detector that nobody asked for by name and that cannot learn from
+/// this set is left out and noted instead.
+pub fn run(
+    request: Request,
+    out: &Path,
+    progress: &Progress<'_>,
+) -> Result<Evaluation, EvaluateError> {
+    let mut evaluation = Evaluation {
+        notes: request.notes.clone(),
+        twins: Vec::new(),
+        runs: Vec::new(),
+        lost: 0,
+        request,
+    };
+    let count = evaluation.request.twins.len() as f64;
+    for index in 0..evaluation.request.twins.len() {
+        let from = index as f64 / count;
+        let step = |share: f64, what: &str| progress(from + share / count, what);
+        evaluation.behind(index, out, &step)?;
+    }
+    Ok(evaluation)
+}
+
+impl Evaluation {
+    /// All detectors behind one twin.
+    fn behind(
+        &mut self,
+        index: usize,
+        out: &Path,
+        progress: &Progress<'_>,
+    ) -> Result<(), EvaluateError> {
+        const FITTED: f64 = 0.1;
+        const LEARNT: f64 = 0.6;
+        let request = &self.request;
+        let name = &request.twins[index].name;
+        let count = request.recordings.len() as f64;
+        let what = format!("{name}: fitting the twin");
+        let mut twin = Prepared::new(request, &request.twins[index], &|at, fraction| {
+            progress(FITTED * (at as f64 + fraction) / count, &what);
+        })?;
+        let mut session = twin.session(request)?;
+        let failed = |recording: &Named, source| EvaluateError::Recording {
+            recording: recording.path.display().to_string(),
+            source,
+        };
+        let (mut train, mut validation) = (Vec::new(), Vec::new());
+        let mut heard = Heard::default();
+        for recording in &request.recordings {
+            let lessons = match recording.role {
+                Role::Train => &mut train,
+                Role::Validation => &mut validation,
+                Role::Test => continue,
+            };
+            let what = format!("{name}: reading {}", recording.name);
+            let played = session
+                .play(recording, &mut |_| progress(FITTED, &what))
+                .map_err(|source| failed(recording, source))?;
+            heard.add(recording, &played);
+            lessons.push(session::lesson(recording, played.samples));
+        }
+        let measured: &[Lesson] = if validation.is_empty() {
+            &train
+        } else {
+            &validation
+        };
+        twin.measure(request, measured)?;
+        let lessons = Lessons {
+            train: &train,
+            validation: &validation,
+        };
+        let (mut runners, notes) = learn(request, &twin, lessons, out, &|share, what| {
+            progress(
+                FITTED + (LEARNT - FITTED) * share,
+                &format!("{name}: {what}"),
+            );
+        })?;
+        for (at, recording) in request.recordings.iter().enumerate() {
+            let played;
+            let samples = match recording.role {
+                Role::Train => continue,
+                Role::Validation => validation
+                    .iter()
+                    .find(|l| l.name == recording.name)
+                    .map(|l| &l.samples),
+                Role::Test => {
+                    played = session
+                        .play(recording, &mut |_| {})
+                        .map_err(|source| failed(recording, source))?;
+                    heard.add(recording, &played);
+                    Some(&played.samples)
+                }
+            };
+            let Some(samples) = samples else { continue };
+            let joints = &request.cell.facts.joint_names;
+            let results = in_parallel(request.jobs, runners.iter_mut().collect(), |runner| {
+                runner.pass(recording, samples, joints)
+            });
+            for result in results {
+                result.map_err(|source| failed(recording, source.into()))?;
+            }
+            let share = LEARNT + (1.0 - LEARNT) * (at + 1) as f64 / count;
+            progress(share, &format!("{name}: {}", recording.name));
+        }
+        self.lost += heard.lost;
+        for note in notes.into_iter().chain(heard.notes) {
+            if !self.notes.contains(&note) {
+                self.notes.push(note);
+            }
+        }
+        for runner in runners {
+            match self.runs.last_mut() {
+                Some(run) if run.twin == index && run.seeds[0].entry.name == runner.entry.name => {
+                    run.seeds.push(runner);
+                }
+                _ => self.runs.push(Run {
+                    twin: index,
+                    seeds: vec![runner],
+                }),
+            }
+        }
+        self.twins.push(twin);
+        Ok(())
+    }
+}
+
+/// What was odd in the recordings.
+#[derive(Debug, Default)]
+struct Heard {
+    lost: u64,
+    notes: Vec<String>,
+}
+
+impl Heard {
+    fn add(&mut self, recording: &Named, played: &session::Played) {
+        let name = &recording.name;
+        self.lost += played.lost;
+        if played.lost > 0 {
+            self.notes.push(format!(
+                "{name}: {} samples were lost or refused",
+                played.lost
+            ));
+        }
+        if played.gaps > 0 {
+            self.notes.push(format!(
+                "{name}: {} gap(s) in time; {} of {} samples passed over while the filters settled",
+                played.gaps,
+                played.unsettled,
+                played.samples.len()
+            ));
+        }
+    }
+}
+
+/// Lets every detector learn. Those that cannot are noted, unless somebody asked for just them.
+fn learn(
+    request: &Request,
+    twin: &Prepared,
+    lessons: Lessons<'_>,
+    out: &Path,
+    progress: &Progress<'_>,
+) -> Result<(Vec<Runner>, Vec<String>), EvaluateError> {
+    let setup = twin.setup(request)?;
+    let seeds = |entry: &Entry| if entry.random { SEEDS } else { 1 };
+    let pupils: Vec<(&'static Entry, u64)> = (request.detectors.iter())
+        .flat_map(|entry| (0..seeds(entry)).map(move |seed| (*entry, seed)))
+        .collect();
+    let (count, done) = (pupils.len() as f64, AtomicUsize::new(0));
+    let results = in_parallel(request.jobs, pupils, |(entry, seed)| {
+        let share = done.load(Ordering::Relaxed) as f64 / count;
+        progress(share, &format!("{} learns", entry.name));
+        let file = format!("{}.{}.{seed}", twin.name, entry.name);
+        let task = Task {
+            set: &request.set,
+            setup: &setup,
+            lessons,
+            seed,
+            weights: out.join("models").join(file),
+        };
+        let runner = Runner::new(entry, &task);
+        done.fetch_add(1, Ordering::Relaxed);
+        runner
+    });
+    let (mut runners, mut notes) = (Vec::new(), Vec::new());
+    for result in results {
+        match result {
+            Ok(runner) => runners.push(runner),
+            Err(EvaluateError::Learn { detector, source }) if !request.explicit => {
+                notes.push(format!("{detector} is left out: {source}"));
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    if runners.is_empty() {
+        let why = notes.join("; ");
+        return Err(EvaluateError::NoDetector { why });
+    }
+    Ok((runners, notes))
+}
+
+/// What `work` makes of each item, in their order, at most `jobs` at once.
+fn in_parallel<T: Send, R: Send>(
+    jobs: usize,
+    items: Vec<T>,
+    work: impl Fn(T) -> R + Sync,
+) -> Vec<R> {
+    let next = AtomicUsize::new(0);
+    let waiting: Vec<Mutex<Option<T>>> = items.into_iter().map(|i| Mutex::new(Some(i))).collect();
+    let results: Vec<Mutex<Option<R>>> = waiting.iter().map(|_| Mutex::new(None)).collect();
+    let take = |slot: &Mutex<Option<T>>| {
+        let mut slot = slot
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        slot.take()
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..jobs.min(waiting.len()) {
+            scope.spawn(|| {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(item) = waiting.get(index).and_then(take) else {
+                        break;
+                    };
+                    let result = work(item);
+                    *results[index]
+                        .lock()
+                        .unwrap_or_else(std::sync::PoisonError::into_inner) = Some(result);
+                }
+            });
+        }
+    });
+    results
+        .into_iter()
+        .filter_map(|slot| {
+            slot.into_inner()
+                .unwrap_or_else(std::sync::PoisonError::into_inner)
+        })
+        .collect()
+}

@@ -1,0 +1,375 @@
+//! What is to be evaluated: the set file and the arguments, everything named looked up.
+
+use std::path::{Path, PathBuf};
+
+use tauscope_archive::Recording;
+use tauscope_dynamics::Model;
+use tauscope_ingest::Topics;
+use tauscope_twin::TwinFile;
+
+use super::labels::{self, LabelsFile, Truth};
+use super::registry::{self, Entry, Facts};
+use crate::files::SetFile;
+use crate::pipeline::Cell;
+use crate::replay::stem;
+use crate::report::{Problem, Report};
+use crate::suggest;
+use crate::yaml::{self, Located, Place};
+
+/// What a recording is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// To train on.
+    Train,
+    /// To choose thresholds on.
+    Validation,
+    /// To be scored.
+    Test,
+}
+
+impl Role {
+    /// As the labels and tables have it.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Train => "train",
+            Self::Validation => "validation",
+            Self::Test => "test",
+        }
+    }
+}
+
+/// A recording of the set.
+#[derive(Debug, Clone)]
+pub struct Named {
+    /// The file's stem, which no other of the set has.
+    pub name: String,
+    /// Where it lies.
+    pub path: PathBuf,
+    /// What it is for.
+    pub role: Role,
+    /// Stamp of its first joint state \[ns since the epoch\]: where its seconds begin.
+    pub start_ns: i64,
+    /// What touched the robot; `None` if nobody has said.
+    pub truth: Option<Truth>,
+}
+
+/// Where the expected effort comes from.
+#[derive(Debug, Clone)]
+pub enum TwinSource {
+    /// The robot's model as the URDF has it.
+    Rigid,
+    /// The same with a gain and an offset per joint, fitted on the set's train recordings.
+    Regression,
+    /// Somebody else's twin on a topic, with a gain and an offset per joint.
+    Topic,
+    /// A corrected twin out of a file.
+    File(Box<TwinFile>),
+}
+
+/// A twin to evaluate detectors behind.
+#[derive(Debug, Clone)]
+pub struct TwinChoice {
+    /// What it goes by in tables and folders.
+    pub name: String,
+    /// What it is.
+    pub source: TwinSource,
+}
+
+/// What is to be evaluated.
+#[derive(Debug)]
+pub struct Request {
+    /// The set.
+    pub set: SetFile,
+    /// The file it came from.
+    pub path: PathBuf,
+    /// The arm.
+    pub cell: Cell,
+    /// In the order of the session: train, validation, test.
+    pub recordings: Vec<Named>,
+    /// What runs.
+    pub detectors: Vec<&'static Entry>,
+    /// Whether somebody asked for just these: then one that cannot run is an error.
+    pub explicit: bool,
+    /// Behind which twins.
+    pub twins: Vec<TwinChoice>,
+    /// Low-pass on the velocity and on the efforts \[Hz\], where not the twin's own.
+    pub cutoffs_hz: [Option<f64>; 2],
+    /// How many detectors run at once.
+    pub jobs: usize,
+    /// What the reader of the tables should know.
+    pub notes: Vec<String>,
+}
+
+/// What the command line says beside the set.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// Names of detectors; empty for those that fit the set, `all` for all.
+    pub detectors: Vec<String>,
+    /// `rigid`, `regression`, `topic`, or paths of twins; empty for the usual one.
+    pub twins: Vec<String>,
+    /// See [`Request::cutoffs_hz`].
+    pub cutoffs_hz: [Option<f64>; 2],
+    /// See [`Request::jobs`].
+    pub jobs: usize,
+}
+
+impl Request {
+    /// Topics of the recordings, with the other twin's where `reference`.
+    pub fn topics(&self, reference: bool) -> Topics {
+        let topics = &self.set.topics;
+        Topics {
+            state: topics.state.clone(),
+            command: topics.command.clone(),
+            twin: topics.twin.clone().filter(|_| reference),
+            tool: None,
+        }
+    }
+
+    /// Where a link stands along the arm: the place of the joint that moves it. Of links that are fixed to
+    /// each other all have the same.
+    pub fn place(&self, link: &str) -> Option<usize> {
+        let model: &Model = self.cell.model.as_ref()?;
+        model.links()[model.link_index(link)?].joint
+    }
+
+    /// How long after a contact's end an alarm is no false one: a real robot has stopped \[s\].
+    pub fn rest_s(&self) -> f64 {
+        // A cyclic machine has stopped; an arm under impedance control swings back.
+        match (&self.set.cycle_s, &self.set.impedance) {
+            (Some(_), _) => 6.0,
+            (None, Some(_)) => 0.3,
+            (None, None) => 0.15,
+        }
+    }
+}
+
+/// Reads the set at `path` and looks up everything that it and the command line name.
+///
+/// # Errors
+/// Everything that is wrong with them.
+pub fn load(path: &Path, options: &Options) -> Result<Request, Report> {
+    let file: Located<SetFile> = yaml::load(path)?;
+    let set = file.value.clone();
+    let root = Place::root();
+    let mut report = Report::default();
+    let mut notes = Vec::new();
+    let constants = set.torque_constants_nm_per_a.clone().unwrap_or_default();
+    let cell = Cell::from_urdf(&file.resolve(&set.robot), set.effort_unit, &constants)?;
+    if let Some(link) = &set.tool_link
+        && (cell.model.as_ref()).is_some_and(|model| model.link_index(link).is_none())
+    {
+        let title = format!("the robot has no link `{link}`");
+        report.push(file.at(&root.key("tool_link"), title));
+    }
+    let labels = find_labels(&file, &mut notes, &mut report);
+    let recordings = recordings(&file, labels.as_ref(), &mut report);
+    if set.test.is_empty() && set.validation.is_empty() {
+        let problem = file.at_key(&root, "neither `test` nor `validation` recordings");
+        report.push(problem.help("name the recordings that are to be scored under `test`"));
+    }
+    let facts = Facts::of(&set, &recordings);
+    let detectors = detectors(&options.detectors, &facts, &mut report);
+    let twins = twins(&set, &cell, &options.twins, &mut report);
+    report.into_result(Request {
+        set,
+        path: path.to_owned(),
+        cell,
+        recordings,
+        detectors,
+        explicit: !(options.detectors.is_empty() || options.detectors == ["all"]),
+        twins,
+        cutoffs_hz: options.cutoffs_hz,
+        jobs: options.jobs.max(1),
+        notes,
+    })
+}
+
+/// `labels:` in the file, else `labels.json`, else `labels_train.json` beside it.
+fn find_labels(
+    file: &Located<SetFile>,
+    notes: &mut Vec<String>,
+    report: &mut Report,
+) -> Option<LabelsFile> {
+    const TRAIN: &str = "labels_train.json";
+    let named = file.value.labels.as_ref().map(|path| file.resolve(path));
+    let beside = |name: &str| Some(file.resolve(Path::new(name))).filter(|path| path.is_file());
+    let place = Place::root().key("labels");
+    let path = match named {
+        Some(path) if path.is_file() => path,
+        Some(path) => {
+            let Some(train) = beside(TRAIN) else {
+                let title = format!("there is no file {}", path.display());
+                report.push(file.at(&place, title));
+                return None;
+            };
+            notes.push(format!(
+                "{} is not there; the labels are those of {}",
+                path.display(),
+                train.display()
+            ));
+            train
+        }
+        None => beside("labels.json").or_else(|| beside(TRAIN))?,
+    };
+    match labels::read(&path) {
+        Ok(labels) => Some(labels),
+        Err(wrong) => {
+            report.push(Problem::of_file(&path, wrong));
+            None
+        }
+    }
+}
+
+/// The set's recordings with what touched the robot in them.
+fn recordings(
+    file: &Located<SetFile>,
+    labels: Option<&LabelsFile>,
+    report: &mut Report,
+) -> Vec<Named> {
+    let set = &file.value;
+    let mut all: Vec<Named> = Vec::new();
+    for (role, paths) in [
+        (Role::Train, &set.train),
+        (Role::Validation, &set.validation),
+        (Role::Test, &set.test),
+    ] {
+        for (index, path) in paths.iter().enumerate() {
+            let place = Place::root().key(role.as_str()).index(index);
+            let path = file.resolve(path);
+            let name = stem(&path);
+            if all.iter().any(|other| other.name == name) {
+                let problem = file.at(&place, format!("a second recording named `{name}`"));
+                report.push(problem.help("results and labels go by the name: give each its own"));
+                continue;
+            }
+            let contact = set.topics.contact.as_deref().filter(|_| labels.is_none());
+            match open(&path, &set.topics.state, contact) {
+                Ok((start_ns, flagged)) => {
+                    let labelled = labels.and_then(|labels| labels.recordings.get(&name));
+                    all.push(Named {
+                        truth: labelled.cloned().or(flagged),
+                        name,
+                        path,
+                        role,
+                        start_ns,
+                    });
+                }
+                Err(wrong) => report.push(file.at(&place, wrong)),
+            }
+        }
+    }
+    all
+}
+
+/// The stamp of a recording's first joint state, and what its topic of contacts says.
+fn open(path: &Path, state: &str, contact: Option<&str>) -> Result<(i64, Option<Truth>), String> {
+    let wrong = |error: tauscope_archive::ArchiveError| error.to_string();
+    let recording = Recording::open(path).map_err(wrong)?;
+    let mut states = recording.joint_states(state).map_err(wrong)?;
+    let (start_ns, start_log_ns) = loop {
+        match states.next_state() {
+            Some(Ok(first)) => break (first.message.header.stamp.ns(), first.log_time_ns),
+            Some(Err(_)) => {}
+            None => return Err(format!("{}: nothing on `{state}`", path.display())),
+        }
+    };
+    let truth = match contact {
+        Some(topic) => labels::from_topic(&recording, topic, start_log_ns).map_err(wrong)?,
+        None => None,
+    };
+    Ok((start_ns, truth))
+}
+
+fn detectors(names: &[String], facts: &Facts, report: &mut Report) -> Vec<&'static Entry> {
+    if names.is_empty() {
+        let usual = registry::ENTRIES
+            .iter()
+            .filter(|entry| (entry.usual)(facts));
+        return usual.collect();
+    }
+    if names == ["all"] {
+        return registry::ENTRIES.iter().collect();
+    }
+    let mut found: Vec<&'static Entry> = Vec::new();
+    for name in names {
+        match registry::ENTRIES.iter().find(|entry| entry.name == name) {
+            Some(entry) if found.iter().any(|other| other.name == entry.name) => {}
+            Some(entry) => found.push(entry),
+            None => {
+                let known = registry::ENTRIES.iter().map(|entry| entry.name);
+                let help = suggest::help(name, "the detectors are", known);
+                let title = format!("--detectors: there is no detector `{name}`");
+                report.push(Problem::new(title).maybe_help(help));
+            }
+        }
+    }
+    found
+}
+
+fn twins(set: &SetFile, cell: &Cell, names: &[String], report: &mut Report) -> Vec<TwinChoice> {
+    let usual = if set.topics.twin.is_some() {
+        "topic"
+    } else {
+        "regression"
+    };
+    let usual = [usual.to_owned()];
+    let names = if names.is_empty() { &usual } else { names };
+    let mut all: Vec<TwinChoice> = Vec::new();
+    for name in names {
+        let source = match name.as_str() {
+            "rigid" => TwinSource::Rigid,
+            "regression" => TwinSource::Regression,
+            "topic" if set.topics.twin.is_some() => TwinSource::Topic,
+            "topic" => {
+                let problem = Problem::new("--twin topic: the set names no `topics.twin`");
+                report.push(problem.help("use --twin rigid or --twin regression"));
+                continue;
+            }
+            path => match twin_file(Path::new(path), cell) {
+                Ok(file) => TwinSource::File(Box::new(file)),
+                Err(problems) => {
+                    report.append(problems);
+                    continue;
+                }
+            },
+        };
+        let path = Path::new(name);
+        // `explain` calls all of them twin.yaml: then the folder tells them apart.
+        let mut short = match &source {
+            TwinSource::File(_) if stem(path) == "twin" => {
+                path.parent().and_then(Path::file_name).map_or_else(
+                    || "twin".to_owned(),
+                    |name| name.to_string_lossy().into_owned(),
+                )
+            }
+            TwinSource::File(_) => stem(path),
+            _ => name.clone(),
+        };
+        let alike = all.iter().filter(|other| other.name == short).count();
+        if alike > 0 {
+            short = format!("{short}_{}", all.len() + 1);
+        }
+        all.push(TwinChoice {
+            name: short,
+            source,
+        });
+    }
+    all
+}
+
+fn twin_file(path: &Path, cell: &Cell) -> Result<TwinFile, Report> {
+    if !path.is_file() {
+        let known = ["rigid", "regression", "topic"];
+        let title = format!("--twin: there is no file {}", path.display());
+        let help = "give rigid, regression, topic, or the path of a twin.yaml".to_owned();
+        let near = suggest::nearest(&path.to_string_lossy(), known);
+        let help = near.map_or(help, |near| format!("did you mean `{near}`?"));
+        return Err(Problem::new(title).help(help).into());
+    }
+    let file: Located<TwinFile> = yaml::load(path)?;
+    let facts = &cell.facts;
+    (file.value)
+        .resolve(&facts.joint_names, facts.effort_unit.as_str())
+        .map_err(|error| Problem::of_file(path, error.to_string()))?;
+    Ok(file.value)
+}

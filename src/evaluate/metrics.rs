@@ -1,0 +1,9 @@
+//! What an evaluation counts, each number by one rule.
+
+pub mod events;
+pub mod numbers;
+pub mod samples;
+pub mod statistics;
+
+pub use events::Matched;
+pub use numbers::{Numbers, Scored};

@@ -1,0 +1,103 @@
+//! Which detectors there are, and how each comes to its settings: a line a detector.
+
+use std::path::PathBuf;
+
+use tauscope_detect::{Config, LearnError, Lessons, Setup};
+
+use super::input::{Named, Role};
+use crate::files::SetFile;
+
+/// A detector that can be evaluated.
+#[derive(Debug)]
+pub struct Entry {
+    /// Its canonical name.
+    pub name: &'static str,
+    /// Whether chance has a part in its training: then it is trained with [`SEEDS`] seeds.
+    pub random: bool,
+    /// How many samples it judges at once, for one that judges windows.
+    pub window: Option<usize>,
+    /// Whether it runs on a set where nobody names detectors.
+    pub usual: fn(&Facts) -> bool,
+    /// Trains or tunes it: what its part of a pipeline file would be.
+    pub learn: fn(&Task<'_>) -> Result<Config, LearnError>,
+}
+
+/// How many seeds a random detector is trained with.
+pub const SEEDS: u64 = 5;
+
+/// What there is to learn from.
+#[derive(Debug)]
+pub struct Task<'a> {
+    /// The set.
+    pub set: &'a SetFile,
+    /// The cell and its twin.
+    pub setup: &'a Setup,
+    /// Train and validation recordings behind the twin.
+    pub lessons: Lessons<'a>,
+    /// For what is drawn by chance.
+    pub seed: u64,
+    /// Where trained weights go; the ending is the detector's.
+    pub weights: PathBuf,
+}
+
+/// What kind of set it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Facts {
+    /// The train recordings tell collisions from cooperations.
+    pub kinds: bool,
+    /// The same cycle is repeated.
+    pub cyclic: bool,
+}
+
+impl Facts {
+    /// Of a set and its labels.
+    pub fn of(set: &SetFile, recordings: &[Named]) -> Self {
+        let train = (recordings.iter()).filter(|recording| recording.role == Role::Train);
+        let events = train.filter_map(|recording| recording.truth.as_ref());
+        let kinds: Vec<&str> = events
+            .flat_map(|truth| &truth.events)
+            .map(|event| event.kind.as_str())
+            .collect();
+        Self {
+            kinds: kinds.contains(&"collision") && kinds.contains(&"cooperation"),
+            cyclic: set.cycle_s.is_some(),
+        }
+    }
+
+    /// Neither: a robot on ever new paths.
+    pub fn is_plain(&self) -> bool {
+        !self.kinds && !self.cyclic
+    }
+}
+
+fn always(_: &Facts) -> bool {
+    true
+}
+
+/// All of them, in the order of the tables.
+pub static ENTRIES: &[Entry] = &[
+    Entry {
+        name: "naive_difference",
+        random: false,
+        window: None,
+        usual: always,
+        learn: |_| {
+            Ok(Config {
+                naive_difference: Some(Default::default()),
+                ..Config::default()
+            })
+        },
+    },
+    Entry {
+        name: "twin_regression",
+        random: false,
+        window: None,
+        usual: always,
+        learn: |_| {
+            Ok(Config {
+                twin_regression: Some(Default::default()),
+                ..Config::default()
+            })
+        },
+    },
+];

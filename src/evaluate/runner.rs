@@ -1,0 +1,180 @@
+//! One detector over the session: it learns, its threshold is set on the validation recordings, and then
+//! every sample of validation and test passes through the same stage that a pipeline runs.
+
+use std::time::Instant;
+
+use tauscope_bus::{Detection, Emit, LinkError, Stage as _, StageError, TwinState, flags};
+use tauscope_detect::{Config, Detect, Lesson, ScoreStatistics, Setup};
+
+use super::EvaluateError;
+use super::input::{Named, Role};
+use super::registry::{Entry, Task};
+use super::twin::is_free_of;
+use crate::replay::{DetectionTally, Event};
+
+/// What a detector made of one recording.
+#[derive(Debug, Clone)]
+pub struct Output {
+    /// The recording.
+    pub recording: String,
+    /// What it is for.
+    pub role: Role,
+    /// Stamps \[s from the first joint state\].
+    pub t: Vec<f64>,
+    /// The score of each sample; where the detector was not ready, the lowest of the validation recordings.
+    pub scores: Vec<f64>,
+    /// What it found.
+    pub events: Vec<Event>,
+    /// How long it took \[s\].
+    pub took_s: f64,
+}
+
+/// A detector that has learnt, on its way through the session.
+pub struct Runner {
+    /// Which it is.
+    pub entry: &'static Entry,
+    /// Its seed.
+    pub seed: u64,
+    /// Its part of a pipeline file.
+    pub config: Config,
+    /// How long it learnt \[s\].
+    pub training_s: f64,
+    /// What its score does on the validation recordings while nothing touches the robot.
+    pub statistics: ScoreStatistics,
+    /// Its score from which on it raises an alarm.
+    pub threshold: f64,
+    /// What it has said so far.
+    pub outputs: Vec<Output>,
+    stage: Detect,
+    lowest: f64,
+}
+
+impl Runner {
+    /// Lets the detector learn and sets its threshold: mean + 4 standard deviations of its score on the
+    /// contact-free part of the validation recordings (of the train recordings if there are none), unless
+    /// it has rules of its own.
+    ///
+    /// # Errors
+    /// If it cannot learn from these recordings.
+    pub fn new(entry: &'static Entry, task: &Task<'_>) -> Result<Self, EvaluateError> {
+        let failed = |source| EvaluateError::Learn {
+            detector: entry.name,
+            source,
+        };
+        let began = Instant::now();
+        let config = (entry.learn)(task).map_err(failed)?;
+        let training_s = began.elapsed().as_secs_f64();
+        let measured = match task.lessons.validation {
+            [] => task.lessons.train,
+            some => some,
+        };
+        let mut setup = task.setup.clone();
+        let (statistics, lowest) = statistics(&config, &setup, measured)
+            .map_err(|error| failed(error.into()))?
+            .ok_or(EvaluateError::NeverReady {
+                detector: entry.name,
+            })?;
+        setup.scores.insert(entry.name.to_owned(), statistics);
+        let stage = Detect::new(&config, setup).map_err(|error| failed(error.into()))?;
+        Ok(Self {
+            entry,
+            seed: task.seed,
+            config,
+            training_s,
+            statistics,
+            threshold: f64::NAN,
+            outputs: Vec::new(),
+            stage,
+            lowest,
+        })
+    }
+
+    /// Lets the next recording of the session pass through.
+    ///
+    /// # Errors
+    /// If the stage fails.
+    pub fn pass(
+        &mut self,
+        recording: &Named,
+        samples: &[TwinState],
+        joint_names: &[String],
+    ) -> Result<(), StageError> {
+        let mut last = Last(Detection::default());
+        let mut tally = DetectionTally::new(self.entry.name, joint_names).since(recording.start_ns);
+        let mut scores = Vec::with_capacity(samples.len());
+        let began = Instant::now();
+        for sample in samples {
+            self.stage.accept(sample, &mut last)?;
+            let said = &last.0;
+            let judged = said.header.has(flags::READY) && said.score.is_finite();
+            scores.push(if judged { said.score } else { self.lowest });
+            tally.add(said);
+        }
+        let took_s = began.elapsed().as_secs_f64();
+        if !samples.is_empty() {
+            self.threshold = last.0.threshold;
+        }
+        let seconds =
+            |sample: &TwinState| (sample.header.stamp_ns - recording.start_ns) as f64 / 1e9;
+        self.outputs.push(Output {
+            recording: recording.name.clone(),
+            role: recording.role,
+            t: samples.iter().map(seconds).collect(),
+            scores,
+            events: tally.events,
+            took_s,
+        });
+        Ok(())
+    }
+}
+
+/// Keeps the newest sample only.
+struct Last(Detection);
+
+impl Emit<Detection> for Last {
+    fn emit(&mut self, write: &mut dyn FnMut(&mut Detection)) -> Result<(), LinkError> {
+        self.0 = Detection::default();
+        write(&mut self.0);
+        Ok(())
+    }
+}
+
+/// What the score does on the contact-free part of `lessons`, and the lowest of all; samples that the
+/// detector is not ready for count with that. `None` if it never is.
+fn statistics(
+    config: &Config,
+    setup: &Setup,
+    lessons: &[Lesson],
+) -> Result<Option<(ScoreStatistics, f64)>, tauscope_detect::ConfigError> {
+    let mut detector = config.detector(setup)?;
+    let mut scores = Vec::new();
+    let mut missed = 0_u64;
+    let mut lowest = f64::INFINITY;
+    for lesson in lessons {
+        for sample in &lesson.samples {
+            let judgement = detector.judge(sample);
+            let judged = judgement.ready && judgement.score.is_finite();
+            if judged {
+                lowest = lowest.min(judgement.score);
+            }
+            if is_free_of(lesson, sample.header.stamp_ns) {
+                match judged {
+                    true => scores.push(judgement.score),
+                    false => missed += 1,
+                }
+            }
+        }
+    }
+    if scores.is_empty() {
+        return Ok(None);
+    }
+    let count = scores.len() as f64 + missed as f64;
+    let mean = (scores.iter().sum::<f64>() + lowest * missed as f64) / count;
+    let squares: f64 = scores.iter().map(|score| (score - mean).powi(2)).sum();
+    let variance = (squares + missed as f64 * (lowest - mean).powi(2)) / count;
+    let statistics = ScoreStatistics {
+        mean,
+        standard_deviation: variance.sqrt(),
+    };
+    Ok(Some((statistics, lowest)))
+}
