@@ -182,6 +182,8 @@ pub fn detect_setup(
         joints: joints.collect(),
         model: cell.model.clone(),
         scores: scores.collect(),
+        tool_link: cell.tool_link(),
+        contact_point_on_tool_m: cell.contact_point_on_tool_m(),
     })
 }
 

@@ -101,6 +101,11 @@ impl Cell {
             .as_ref()?
             .link_index(&self.facts.tool.as_ref()?.link)
     }
+
+    /// The point of the tool that touches things, in its link's frame \[m\].
+    pub fn contact_point_on_tool_m(&self) -> Option<[f64; 3]> {
+        self.facts.tool.as_ref()?.contact_point_m
+    }
 }
 
 /// Looks up every cell; those in which something is wrong are left out and reported.

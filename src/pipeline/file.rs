@@ -90,6 +90,9 @@ pub struct ToolEntry {
     /// Its inertia about its centre of mass, axes of the link: xx, xy, xz, yy, yz, zz \[kg m²\].
     #[serde(default)]
     pub inertia_kgm2: [f64; 6],
+    /// The point of it that touches things, in the link's frame \[m\]. By default the link's origin.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contact_point_m: Option<[f64; 3]>,
 }
 
 /// How a host is reached by the others.

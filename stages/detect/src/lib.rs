@@ -6,13 +6,17 @@
 //! pipeline file, and one line in [`config`].
 
 pub mod config;
+pub mod contact_signals;
 mod detector;
 mod events;
 mod isolation;
 mod lesson;
+pub mod momentum;
 pub mod naive_difference;
+pub mod sliding_dft;
 mod stage;
 pub mod twin_regression;
+pub mod wrench;
 
 pub use config::{Config, ConfigError, Threshold};
 pub use detector::{Detector, Judgement, Seen, Verdict};

@@ -19,6 +19,10 @@ pub struct Setup {
     pub model: Option<Model>,
     /// By detector, what its score did on contact-free data.
     pub scores: BTreeMap<String, ScoreStatistics>,
+    /// The link that holds the tool, an index into the model's links; else the model says which.
+    pub tool_link: Option<usize>,
+    /// The point of the tool that touches things, in that link's frame \[m\]; else its origin.
+    pub contact_point_on_tool_m: Option<[f64; 3]>,
 }
 
 /// What a detector must know of a joint.

@@ -40,6 +40,7 @@ fn setup() -> Setup {
         joints: vec![joint(); 3],
         model: Some(Model::from_urdf(ARM).unwrap()),
         scores: BTreeMap::from([("twin_regression".to_owned(), score)]),
+        ..Setup::default()
     }
 }
 

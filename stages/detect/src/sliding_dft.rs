@@ -1,0 +1,293 @@
+//! The frequency content of a vector over a sliding window (Salt Ducaju et al., section II-B).
+//!
+//! Bin k of the discrete Fourier transform of the newest N samples, at k / (N h), follows every sample
+//! by one addition: what enters counts with the phase of its place in the cycle of N samples, and what
+//! leaves, N samples later, with the same phase. So it is taken out to the last bit but for the
+//! rounding of sums, and of one bin after the other the sum is begun anew with each cycle: the error
+//! stays that of a few cycles for ever. Only lengths are asked for, so that the cycle's own phase does
+//! not matter.
+//!
+//! The paper leaves the normalisation out. Here it is 2/N: a sine of amplitude A at a bin's frequency
+//! gives A.
+
+use std::f64::consts::TAU;
+use std::ops::RangeInclusive;
+
+/// Directions.
+const AXES: usize = 3;
+
+/// Why a band cannot be had.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum BandError {
+    /// Below what the window resolves.
+    #[error(
+        "a band from {min_hz} Hz needs a window longer than 1/{min_hz} s, and {window} samples at {rate_hz:.1} Hz last {seconds:.3} s: take more samples or a higher lower limit"
+    )]
+    TooLow {
+        /// Lower limit \[Hz\].
+        min_hz: f64,
+        /// Samples in the window.
+        window: usize,
+        /// Samples per second.
+        rate_hz: f64,
+        /// Length of the window \[s\].
+        seconds: f64,
+    },
+    /// Above half the rate.
+    #[error(
+        "a band up to {max_hz} Hz needs more than {needed} samples a second, and there are {rate_hz:.1}: take a lower upper limit"
+    )]
+    TooHigh {
+        /// Upper limit \[Hz\].
+        max_hz: f64,
+        /// Twice that.
+        needed: f64,
+        /// Samples per second.
+        rate_hz: f64,
+    },
+    /// No bin between the limits.
+    #[error(
+        "no bin lies between {min_hz} and {max_hz} Hz: {window} samples at {rate_hz:.1} Hz have one every {spacing_hz:.2} Hz; take a wider band or more samples"
+    )]
+    Empty {
+        /// Lower limit \[Hz\].
+        min_hz: f64,
+        /// Upper limit \[Hz\].
+        max_hz: f64,
+        /// Samples in the window.
+        window: usize,
+        /// Samples per second.
+        rate_hz: f64,
+        /// Distance of the bins \[Hz\].
+        spacing_hz: f64,
+    },
+}
+
+/// The bins of a window of `window` samples, `period_s` apart, whose frequencies are within the band
+/// \[Hz\]: from no less than 1/(N h) to no more than 1/(2 h).
+///
+/// # Errors
+/// If the window cannot resolve a limit, or no bin is left.
+pub fn bins(
+    window: usize,
+    period_s: f64,
+    [min_hz, max_hz]: [f64; 2],
+) -> Result<RangeInclusive<usize>, BandError> {
+    // Clocks are as good as a part in a thousand.
+    let slack = 1.0 + 1e-3;
+    let rate_hz = 1.0 / period_s;
+    let spacing_hz = rate_hz / window as f64;
+    if min_hz * slack < spacing_hz {
+        let seconds = window as f64 * period_s;
+        return Err(BandError::TooLow {
+            min_hz,
+            window,
+            rate_hz,
+            seconds,
+        });
+    }
+    if max_hz > 0.5 * rate_hz * slack {
+        let needed = 2.0 * max_hz;
+        return Err(BandError::TooHigh {
+            max_hz,
+            needed,
+            rate_hz,
+        });
+    }
+    let first = (min_hz / slack / spacing_hz).ceil() as usize;
+    let last = ((max_hz * slack / spacing_hz).floor() as usize).min(window / 2);
+    if first > last {
+        return Err(BandError::Empty {
+            min_hz,
+            max_hz,
+            window,
+            rate_hz,
+            spacing_hz,
+        });
+    }
+    Ok(first..=last)
+}
+
+/// The transform of a window of vectors over some bins. Nothing is allocated after
+/// [`SlidingDft::new`] unless [`SlidingDft::set_bins`] asks for more bins than there were.
+#[derive(Debug, Clone)]
+pub struct SlidingDft {
+    /// The window as a ring; zeros before it has filled.
+    ring: Vec<[f64; AXES]>,
+    at: usize,
+    /// By bin, e^(-2πi k/N) and that to the power of `at`.
+    turn: Vec<[f64; 2]>,
+    phase: Vec<[f64; 2]>,
+    /// By bin and direction, real and imaginary part.
+    sums: Vec<[[f64; 2]; AXES]>,
+    /// The bin whose sum is begun anew in this cycle, and that sum.
+    renewed: usize,
+    fresh: [[f64; 2]; AXES],
+}
+
+impl SlidingDft {
+    /// An empty window of `window` samples, at least one, over no bin.
+    pub fn new(window: usize) -> Self {
+        Self {
+            ring: vec![[0.0; AXES]; window.max(1)],
+            at: 0,
+            turn: Vec::new(),
+            phase: Vec::new(),
+            sums: Vec::new(),
+            renewed: 0,
+            fresh: [[0.0; 2]; AXES],
+        }
+    }
+
+    /// Empties the window and takes up these bins.
+    pub fn set_bins(&mut self, bins: RangeInclusive<usize>) {
+        self.ring.fill([0.0; AXES]);
+        self.at = 0;
+        self.turn.clear();
+        let n = self.ring.len() as f64;
+        self.turn.extend(bins.map(|k| {
+            let (sin, cos) = (TAU * k as f64 / n).sin_cos();
+            [cos, -sin]
+        }));
+        self.phase.clear();
+        self.phase.resize(self.turn.len(), [1.0, 0.0]);
+        self.sums.clear();
+        self.sums.resize(self.turn.len(), [[0.0; 2]; AXES]);
+        self.renewed = 0;
+        self.fresh = [[0.0; 2]; AXES];
+    }
+
+    /// Takes the newest value; the oldest leaves.
+    pub fn push(&mut self, value: [f64; AXES]) {
+        let old = std::mem::replace(&mut self.ring[self.at], value);
+        let change: [f64; AXES] = std::array::from_fn(|i| value[i] - old[i]);
+        if let Some(&[re, im]) = self.phase.get(self.renewed) {
+            for (sum, value) in self.fresh.iter_mut().zip(value) {
+                sum[0] += value * re;
+                sum[1] += value * im;
+            }
+        }
+        let bins = self.phase.iter_mut().zip(&self.turn).zip(&mut self.sums);
+        for ((phase, turn), sums) in bins {
+            let [re, im] = *phase;
+            for (sum, change) in sums.iter_mut().zip(change) {
+                sum[0] += change * re;
+                sum[1] += change * im;
+            }
+            *phase = [re * turn[0] - im * turn[1], re * turn[1] + im * turn[0]];
+        }
+        self.at += 1;
+        if self.at == self.ring.len() {
+            // A cycle is over: every cycle sees the same phases, bit for bit.
+            self.at = 0;
+            self.phase.fill([1.0, 0.0]);
+            let fresh = std::mem::take(&mut self.fresh);
+            if let Some(sums) = self.sums.get_mut(self.renewed) {
+                *sums = fresh;
+                self.renewed = (self.renewed + 1) % self.sums.len();
+            }
+        }
+    }
+
+    /// By direction, the largest length of any bin (the L∞-norm over the band) times 2/N; 0 over no bin.
+    pub fn norms(&self) -> [f64; AXES] {
+        let mut most = [0.0_f64; AXES];
+        for sums in &self.sums {
+            for (most, [re, im]) in most.iter_mut().zip(sums) {
+                *most = most.max(re * re + im * im);
+            }
+        }
+        most.map(|squared| squared.sqrt() * 2.0 / self.ring.len() as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn plain(window: &[[f64; AXES]], bins: RangeInclusive<usize>) -> [f64; AXES] {
+        let n = window.len() as f64;
+        std::array::from_fn(|axis| {
+            let lengths = bins.clone().map(|k| {
+                let (mut re, mut im) = (0.0, 0.0);
+                for (m, value) in window.iter().enumerate() {
+                    let (sin, cos) = (TAU * (k * m) as f64 / n).sin_cos();
+                    re += value[axis] * cos;
+                    im -= value[axis] * sin;
+                }
+                f64::hypot(re, im) * 2.0 / n
+            });
+            lengths.fold(0.0, f64::max)
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn it_equals_the_plain_transform_of_the_window(
+            values in prop::collection::vec(prop::array::uniform3(-50.0..50.0_f64), 40..160),
+            window in 8..40_usize,
+        ) {
+            let bins = 1..=window / 2;
+            let mut dft = SlidingDft::new(window);
+            dft.set_bins(bins.clone());
+            for (i, &value) in values.iter().enumerate() {
+                dft.push(value);
+                if i + 1 >= window {
+                    let wanted = plain(&values[i + 1 - window..=i], bins.clone());
+                    for (got, wanted) in dft.norms().into_iter().zip(wanted) {
+                        prop_assert!((got - wanted).abs() < 1e-10);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_sine_at_a_bin_gives_its_amplitude() {
+        let mut dft = SlidingDft::new(500);
+        dft.set_bins(5..=50);
+        for i in 0..700 {
+            let at = TAU * 20.0 * f64::from(i) * 1e-3;
+            dft.push([3.0 * at.sin(), 40.0, 0.5 * at.cos()]);
+        }
+        let norms = dft.norms();
+        assert!((norms[0] - 3.0).abs() < 1e-9);
+        assert!(norms[1].abs() < 1e-9, "a constant has nothing in the band");
+        assert!((norms[2] - 0.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn rounding_does_not_add_up() {
+        let mut dft = SlidingDft::new(50);
+        dft.set_bins(1..=20);
+        // A blow that leaves nothing but rounding behind, then a million quiet samples.
+        for i in 0..50 {
+            dft.push([1e9 * f64::from(i).sin(); AXES]);
+        }
+        for _ in 0..1_000_000 {
+            dft.push([0.0; AXES]);
+        }
+        assert!(dft.norms().iter().all(|&norm| norm < 1e-12));
+    }
+
+    #[test]
+    fn a_band_is_held_against_window_and_rate() {
+        assert_eq!(bins(500, 1e-3, [10.0, 100.0]), Ok(5..=50));
+        assert_eq!(bins(500, 1.01e-3, [10.0, 100.0]), Ok(6..=50));
+        assert_eq!(bins(500, 1e-3, [2.0, 500.0]), Ok(1..=250));
+        assert!(matches!(
+            bins(50, 1e-3, [10.0, 100.0]),
+            Err(BandError::TooLow { .. })
+        ));
+        assert!(matches!(
+            bins(500, 1e-2, [10.0, 100.0]),
+            Err(BandError::TooHigh { .. })
+        ));
+        assert!(matches!(
+            bins(500, 1e-3, [10.5, 11.5]),
+            Err(BandError::Empty { .. })
+        ));
+    }
+}
