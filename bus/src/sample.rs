@@ -41,6 +41,8 @@ pub mod flags {
     pub const ALARM: u32 = 1 << 10;
     /// What a detection tells of is no contact but a change of the arm, of the size in `size`.
     pub const CHANGE: u32 = 1 << 11;
+    /// Somebody asks the detectors to learn the robot's usual behaviour anew, from this sample on.
+    pub const LEARN: u32 = 1 << 12;
 }
 
 /// What every sample begins with.

@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use tauscope_detect::{Config, LearnError, Lessons, Setup};
+use tauscope_detect::{
+    Config, LearnError, Lessons, Setup, virtual_collision_sensor, virtual_collision_sensor_basic,
+};
 
 use super::input::{Named, Role};
 use crate::files::SetFile;
@@ -96,6 +98,35 @@ pub static ENTRIES: &[Entry] = &[
         learn: |_| {
             Ok(Config {
                 twin_regression: Some(Default::default()),
+                ..Config::default()
+            })
+        },
+    },
+    Entry {
+        name: "virtual_collision_sensor_basic",
+        random: false,
+        window: None,
+        usual: |facts| facts.cyclic,
+        learn: |task| {
+            let settings = Default::default();
+            let settings =
+                virtual_collision_sensor_basic::learn(&settings, task.setup, &task.lessons)?;
+            Ok(Config {
+                virtual_collision_sensor_basic: Some(settings),
+                ..Config::default()
+            })
+        },
+    },
+    Entry {
+        name: "virtual_collision_sensor",
+        random: false,
+        window: None,
+        usual: |facts| facts.cyclic,
+        learn: |task| {
+            let settings = Default::default();
+            let settings = virtual_collision_sensor::learn(&settings, task.setup, &task.lessons)?;
+            Ok(Config {
+                virtual_collision_sensor: Some(settings),
                 ..Config::default()
             })
         },

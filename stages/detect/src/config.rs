@@ -5,7 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::detector::Detector;
 use crate::stage::Setup;
-use crate::{naive_difference, twin_regression};
+use crate::{
+    naive_difference, twin_regression, virtual_collision_sensor, virtual_collision_sensor_basic,
+};
 
 /// The papers' k, where the file names no threshold.
 const DEFAULT_SIGMAS: f64 = 4.0;
@@ -20,6 +22,13 @@ pub struct Config {
     /// The same without the regression: gain 1, offset 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub naive_difference: Option<naive_difference::Settings>,
+    /// Collisions from measured and expected effort alone, with a constant bias (Indri, Trapani and
+    /// Lazzero).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub virtual_collision_sensor_basic: Option<virtual_collision_sensor_basic::Settings>,
+    /// The same with a bias that is learnt and adapts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub virtual_collision_sensor: Option<virtual_collision_sensor::Settings>,
     /// When the alarm is raised.
     pub threshold: Threshold,
     /// An alarm ends once the score has stayed below the threshold for this long \[s\].
@@ -32,6 +41,8 @@ impl Default for Config {
         Self {
             twin_regression: None,
             naive_difference: None,
+            virtual_collision_sensor_basic: None,
+            virtual_collision_sensor: None,
             threshold: Threshold::default(),
             // Bridges the dip between two swings of one contact.
             hold_s: 0.1,
@@ -58,6 +69,14 @@ impl Config {
         let given = [
             (self.twin_regression.is_some(), twin_regression::NAME),
             (self.naive_difference.is_some(), naive_difference::NAME),
+            (
+                self.virtual_collision_sensor_basic.is_some(),
+                virtual_collision_sensor_basic::NAME,
+            ),
+            (
+                self.virtual_collision_sensor.is_some(),
+                virtual_collision_sensor::NAME,
+            ),
         ];
         let mut names = given
             .iter()
@@ -87,6 +106,14 @@ impl Config {
         }
         if let Some(settings) = &self.naive_difference {
             all.push(naive_difference::build(settings, setup));
+        }
+        if let Some(settings) = &self.virtual_collision_sensor_basic {
+            let sensor = virtual_collision_sensor_basic::build(settings, setup, self.hold_s)?;
+            all.push(Box::new(sensor));
+        }
+        if let Some(settings) = &self.virtual_collision_sensor {
+            let sensor = virtual_collision_sensor::build(settings, setup, self.hold_s)?;
+            all.push(Box::new(sensor));
         }
         Ok(all)
     }
@@ -150,6 +177,32 @@ pub enum ConfigError {
     NoModel {
         /// The detector.
         detector: &'static str,
+    },
+    /// A sensor without its first bias.
+    #[error(
+        "{detector} has no `bias`: give the smallest effort that is a collision, joint by joint in URDF order and in the effort's unit, or let `tauscope evaluate` learn it from contact-free recordings"
+    )]
+    NoBias {
+        /// The detector.
+        detector: &'static str,
+    },
+    /// A bias that does not fit.
+    #[error("`bias` of {detector} {reason}: give one number above 0 for each joint")]
+    Bias {
+        /// The detector.
+        detector: &'static str,
+        /// What is wrong with it, as a clause.
+        reason: String,
+    },
+    /// Learnt state that does not fit.
+    #[error(
+        "what {detector} has learnt {reason}: leave it out, or remove its file, and let it learn anew"
+    )]
+    LearntState {
+        /// The detector.
+        detector: &'static str,
+        /// What is wrong with it, as a clause.
+        reason: String,
     },
     /// Both kinds of threshold.
     #[error("`threshold` takes either `sigmas` or `score`, not both")]

@@ -2,6 +2,8 @@
 
 use tauscope_bus::TwinState;
 
+use crate::virtual_collision_sensor::Learnt;
+
 /// What a detector makes of one sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Judgement {
@@ -48,6 +50,11 @@ pub trait Detector: Send {
     /// The score from which on a detector with rules of its own sees a contact. `None`: the frame
     /// holds the score against the configured threshold.
     fn threshold(&self) -> Option<f64> {
+        None
+    }
+
+    /// What it has learnt while running, to be kept for its next life; `None` if it learns nothing.
+    fn learnt(&self) -> Option<Learnt> {
         None
     }
 }

@@ -16,6 +16,8 @@ pub mod naive_difference;
 pub mod sliding_dft;
 mod stage;
 pub mod twin_regression;
+pub mod virtual_collision_sensor;
+pub mod virtual_collision_sensor_basic;
 pub mod wrench;
 
 pub use config::{Config, ConfigError, Threshold};

@@ -1,0 +1,125 @@
+//! The virtual collision sensor block of one joint (section 5, figure 12b).
+
+use super::bias::Bias;
+use super::model_error::ModelError;
+use super::phase::{Phase, PhaseMachine};
+use super::trend::{NoiseBounds, Trend};
+
+/// What a joint's block works with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Tuning {
+    /// Cutoff of the low-pass on both currents \[Hz\].
+    pub cutoff_hz: f64,
+    /// Time between two updates of the model error in the steady state, `T_s` \[s\].
+    pub period_s: f64,
+    /// Weight of equation 9.
+    pub delta: f64,
+    /// Factor of equation 17.
+    pub alpha: f64,
+    /// Time constant of the adaptation, equation 14 \[s\].
+    pub time_constant_s: f64,
+}
+
+/// What a joint's block makes of a sample.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Reading {
+    /// What the currents are doing.
+    pub phase: Phase,
+    /// |R|, equation 1 \[effort unit\].
+    pub residue: f64,
+    /// Estimated model error \[effort unit\].
+    pub model_error: f64,
+    /// `S_coll`, equations 4 and 17 \[effort unit\].
+    pub threshold: f64,
+}
+
+impl Reading {
+    /// |R| as a share of the threshold, whether the test is made or not.
+    pub fn ratio(&self) -> f64 {
+        // A joint that has no current at all has no threshold either.
+        self.residue / self.threshold.max(f64::MIN_POSITIVE)
+    }
+
+    /// Equation 3, which is not asked in the safe state.
+    pub fn collides(&self) -> bool {
+        self.phase.is_tested() && self.residue > self.threshold
+    }
+}
+
+/// One joint.
+#[derive(Debug, Clone)]
+pub(super) struct Joint {
+    tuning: Tuning,
+    measured: Trend,
+    expected: Trend,
+    noise: NoiseBounds,
+    machine: PhaseMachine,
+    model_error: ModelError,
+    /// Learning and adaptation.
+    pub bias: Bias,
+}
+
+impl Joint {
+    pub fn new(tuning: Tuning, bias: Bias) -> Self {
+        Self {
+            tuning,
+            measured: Trend::new(tuning.cutoff_hz),
+            expected: Trend::new(tuning.cutoff_hz),
+            noise: NoiseBounds::default(),
+            machine: PhaseMachine::default(),
+            model_error: ModelError::new(tuning.period_s, tuning.delta),
+            bias,
+        }
+    }
+
+    /// Starts anew at these currents. What was learnt is of the robot, and stays.
+    pub fn reset(&mut self, measured: f64, expected: f64) {
+        self.measured.reset(measured);
+        self.expected.reset(expected);
+        self.noise = NoiseBounds::default();
+        self.machine = PhaseMachine::default();
+        self.model_error.reset();
+    }
+
+    /// Takes the next currents, `dt_s` seconds after the ones before.
+    pub fn update(&mut self, dt_s: f64, measured: f64, expected: f64) -> Reading {
+        self.measured.update(dt_s, measured);
+        self.expected.update(dt_s, expected);
+        let omega = std::f64::consts::TAU * self.tuning.cutoff_hz;
+        let phase = self
+            .machine
+            .update(&self.measured, &self.expected, &self.noise, omega);
+        self.noise
+            .update(dt_s, self.measured.rate - self.expected.rate);
+        // Equation 1.
+        let residue = (self.measured.value - self.expected.value).abs();
+        let model_error = self
+            .model_error
+            .update(dt_s, residue, phase == Phase::Steady);
+        self.bias.advance(dt_s);
+        let bias = self.bias.value(self.tuning.time_constant_s);
+        Reading {
+            phase,
+            residue,
+            model_error,
+            threshold: self.tuning.alpha * (model_error + bias),
+        }
+    }
+
+    /// The service Init of the learning machine.
+    pub fn init_bias(&mut self) {
+        self.bias.init(self.tuning.time_constant_s);
+    }
+
+    /// The bias estimation block, which runs beside the collision test.
+    pub fn estimate_bias(&mut self, reading: &Reading) {
+        if reading.phase.is_tested() {
+            self.bias.observe(
+                reading.residue,
+                reading.model_error,
+                reading.threshold,
+                self.tuning.time_constant_s,
+            );
+        }
+    }
+}

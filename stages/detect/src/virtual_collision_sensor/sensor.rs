@@ -1,0 +1,240 @@
+//! The whole sensor: the joints' blocks one by one (section 5), the request for learning, and the
+//! alarm over all of them.
+
+use tauscope_bus::{TwinState, flags};
+use tauscope_dynamics::lowpass::Butterworth2;
+
+use super::bias::{Bias, LearningState, Service};
+use super::joint::{Joint, Reading, Tuning};
+use super::learnt::Learnt;
+use super::validity::Validity;
+use crate::detector::{Detector, Judgement, Seen, Verdict};
+
+/// A ratio from here on may already belong to a collision: where the search for its beginning stops.
+const LOW_RATIO: f64 = 0.5;
+
+/// What the sensor says while nothing is the matter.
+const FREE: &str = "free";
+/// What it says while it learns and nothing is the matter.
+const LEARNING: &str = "learning";
+/// A collision.
+const COLLISION: &str = "collision";
+/// An alarm that is no collision: the expected current does not belong to this robot as it is now.
+const MODEL_ERROR: &str = "model_error";
+
+/// How the adaptive version learns; the basic one does not.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Learning {
+    /// How long learning takes \[s\].
+    pub duration_s: f64,
+    /// Whether it is asked for as the first sample comes.
+    pub at_start: bool,
+}
+
+/// An alarm that lasts.
+#[derive(Debug, Clone, Copy)]
+struct Alarm {
+    state: &'static str,
+    contact_ns: i64,
+    newest_ns: i64,
+    joints: u32,
+}
+
+/// The sensor.
+pub(crate) struct Sensor {
+    name: &'static str,
+    joints: Vec<Joint>,
+    validity: Vec<Validity>,
+    learning: Option<Learning>,
+    state: LearningState,
+    asked: bool,
+    settling_s: f64,
+    hold_ns: i64,
+    /// Stamp of the sample before, and how long ago everything began anew.
+    previous_ns: Option<i64>,
+    elapsed_s: f64,
+    newest_low_ns: Option<i64>,
+    alarm: Option<Alarm>,
+}
+
+impl Sensor {
+    /// A sensor with the first bias of each joint, and what an earlier life has learnt.
+    pub(crate) fn new(
+        name: &'static str,
+        tuning: Tuning,
+        first: &[f64],
+        learnt: Option<&Learnt>,
+        learning: Option<Learning>,
+        hold_s: f64,
+    ) -> Self {
+        let joint = |(j, &first): (usize, &f64)| {
+            let learnt = learnt.and_then(|learnt| learnt.joints.get(j));
+            Joint::new(tuning, learnt.map_or(Bias::new(first), Bias::resume))
+        };
+        Self {
+            name,
+            joints: first.iter().enumerate().map(joint).collect(),
+            validity: first.iter().map(|&first| Validity::new(first)).collect(),
+            learning,
+            state: LearningState::default(),
+            asked: learning.is_some_and(|learning| learning.at_start) && learnt.is_none(),
+            settling_s: Butterworth2::new(tuning.cutoff_hz).settling_time_s() + tuning.period_s,
+            hold_ns: (hold_s * 1e9) as i64,
+            previous_ns: None,
+            elapsed_s: 0.0,
+            newest_low_ns: None,
+            alarm: None,
+        }
+    }
+
+    /// Asks for learning anew (`AdaptReq`); the basic version does not listen.
+    pub fn request_learning(&mut self) {
+        self.asked = self.learning.is_some();
+    }
+
+    /// Clears what belongs to the signals; what was learnt stays.
+    fn reset(&mut self, sample: &TwinState) {
+        for (j, joint) in self.joints.iter_mut().enumerate() {
+            joint.reset(sample.effort[j], sample.expected_effort[j]);
+        }
+        for validity in &mut self.validity {
+            validity.reset();
+        }
+        self.elapsed_s = 0.0;
+        self.newest_low_ns = None;
+        self.alarm = None;
+    }
+
+    /// The step of the learning machine.
+    fn learn(&mut self, dt_s: f64) {
+        let Some(learning) = self.learning else {
+            return;
+        };
+        let asked = std::mem::take(&mut self.asked);
+        let service = self.state.step(dt_s, learning.duration_s, asked);
+        for joint in &mut self.joints {
+            match service {
+                Service::None => {}
+                Service::Init => joint.init_bias(),
+                Service::Set => joint.bias.set(),
+                Service::Adapt => joint.bias.adapt(),
+            }
+        }
+    }
+
+    /// The alarm after the sample at `stamp_ns`, on which the joints `colliding` detected and the
+    /// model does not hold for the joints `wrong`.
+    fn alarm(&mut self, stamp_ns: i64, colliding: u32, wrong: u32) -> Option<Alarm> {
+        let (state, joints) = match self.alarm {
+            // A collision stays one until it is over.
+            Some(alarm) if alarm.state == COLLISION && colliding != 0 => (COLLISION, colliding),
+            _ if wrong != 0 => (MODEL_ERROR, wrong),
+            _ if colliding != 0 => (COLLISION, colliding),
+            Some(alarm)
+                if alarm.state == COLLISION && stamp_ns - alarm.newest_ns < self.hold_ns =>
+            {
+                return self.alarm;
+            }
+            _ => {
+                self.alarm = None;
+                return None;
+            }
+        };
+        let open = self.alarm.filter(|alarm| alarm.state == state);
+        self.alarm = Some(Alarm {
+            state,
+            contact_ns: open.map_or(self.newest_low_ns.unwrap_or(stamp_ns), |a| a.contact_ns),
+            newest_ns: stamp_ns,
+            joints: joints | open.map_or(0, |alarm| alarm.joints),
+        });
+        self.alarm
+    }
+}
+
+impl Detector for Sensor {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn threshold(&self) -> Option<f64> {
+        Some(1.0)
+    }
+
+    fn learnt(&self) -> Option<Learnt> {
+        self.learning?;
+        let joints = self.joints.iter().map(|joint| joint.bias.learnt());
+        Some(Learnt {
+            joints: joints.collect(),
+        })
+    }
+
+    fn judge(&mut self, sample: &TwinState) -> Judgement {
+        let stamp_ns = sample.header.stamp_ns;
+        let dt_s = self
+            .previous_ns
+            .replace(stamp_ns)
+            .map(|before| (stamp_ns - before) as f64 * 1e-9);
+        let dt_s = match dt_s {
+            Some(dt_s) if dt_s >= 0.0 && !sample.header.has(flags::RESET) => dt_s,
+            _ => {
+                self.reset(sample);
+                0.0
+            }
+        };
+        if sample.header.has(flags::LEARN) {
+            self.request_learning();
+        }
+        self.elapsed_s += dt_s;
+        // Remark 2: at first filters and averages say nothing.
+        let ready = self.elapsed_s >= self.settling_s && sample.header.has(flags::READY);
+        if ready {
+            self.learn(dt_s);
+        }
+
+        let (mut score, mut ratio) = (0.0_f64, 0.0_f64);
+        let (mut colliding, mut wrong) = (0, 0);
+        for (j, joint) in self.joints.iter_mut().enumerate() {
+            let reading: Reading = joint.update(dt_s, sample.effort[j], sample.expected_effort[j]);
+            ratio = ratio.max(reading.ratio());
+            if reading.phase.is_tested() {
+                score = score.max(reading.ratio());
+            }
+            if self.validity[j].update(dt_s, reading.residue) {
+                wrong |= 1 << j;
+            }
+            if ready {
+                colliding |= u32::from(reading.collides()) << j;
+                joint.estimate_bias(&reading);
+            }
+        }
+        if !ready {
+            self.alarm = None;
+            self.newest_low_ns = None;
+            return Judgement {
+                score,
+                ready,
+                verdict: None,
+            };
+        }
+        let alarm = self.alarm(stamp_ns, colliding, wrong);
+        if ratio < LOW_RATIO || self.newest_low_ns.is_none() {
+            self.newest_low_ns = Some(stamp_ns);
+        }
+        let usual = match self.state {
+            LearningState::Init | LearningState::Learning(_) => LEARNING,
+            LearningState::Idle | LearningState::Adapt => FREE,
+        };
+        Judgement {
+            score,
+            ready,
+            verdict: Some(Verdict {
+                state: alarm.map_or(usual, |alarm| alarm.state),
+                contact: alarm.map(|alarm| Seen {
+                    contact_ns: alarm.contact_ns,
+                    joints: Some(alarm.joints),
+                    place: None,
+                }),
+            }),
+        }
+    }
+}
