@@ -13,6 +13,9 @@ use crate::detector::{Detector, Judgement, Seen, Verdict};
 /// A ratio from here on may already belong to a collision: where the search for its beginning stops.
 const LOW_RATIO: f64 = 0.5;
 
+/// For so long after an alarm nothing is learnt: the model error still remembers it \[ns\].
+const AFTER_ALARM_NS: i64 = 2_000_000_000;
+
 /// What the sensor says while nothing is the matter.
 const FREE: &str = "free";
 /// What it says while it learns and nothing is the matter.
@@ -55,6 +58,7 @@ pub(crate) struct Sensor {
     elapsed_s: f64,
     newest_low_ns: Option<i64>,
     alarm: Option<Alarm>,
+    newest_alarm_ns: Option<i64>,
 }
 
 impl Sensor {
@@ -84,6 +88,7 @@ impl Sensor {
             elapsed_s: 0.0,
             newest_low_ns: None,
             alarm: None,
+            newest_alarm_ns: None,
         }
     }
 
@@ -103,6 +108,7 @@ impl Sensor {
         self.elapsed_s = 0.0;
         self.newest_low_ns = None;
         self.alarm = None;
+        self.newest_alarm_ns = None;
     }
 
     /// The step of the learning machine.
@@ -122,19 +128,22 @@ impl Sensor {
         }
     }
 
-    /// The alarm after the sample at `stamp_ns`, on which the joints `colliding` detected and the
-    /// model does not hold for the joints `wrong`.
-    fn alarm(&mut self, stamp_ns: i64, colliding: u32, wrong: u32) -> Option<Alarm> {
+    /// The alarm after the sample at `stamp_ns`, on which the joints `colliding` detected, the model
+    /// does not hold for the joints `wrong`, and is doubtful for any.
+    fn alarm(
+        &mut self,
+        stamp_ns: i64,
+        colliding: u32,
+        wrong: u32,
+        doubtful: bool,
+    ) -> Option<Alarm> {
         let (state, joints) = match self.alarm {
             // A collision stays one until it is over.
             Some(alarm) if alarm.state == COLLISION && colliding != 0 => (COLLISION, colliding),
-            _ if wrong != 0 => (MODEL_ERROR, wrong),
+            _ if wrong != 0 => (MODEL_ERROR, wrong | colliding),
+            _ if doubtful && colliding != 0 => (MODEL_ERROR, colliding),
             _ if colliding != 0 => (COLLISION, colliding),
-            Some(alarm)
-                if alarm.state == COLLISION && stamp_ns - alarm.newest_ns < self.hold_ns =>
-            {
-                return self.alarm;
-            }
+            Some(alarm) if stamp_ns - alarm.newest_ns < self.hold_ns => return self.alarm,
             _ => {
                 self.alarm = None;
                 return None;
@@ -191,20 +200,27 @@ impl Detector for Sensor {
             self.learn(dt_s);
         }
 
+        // An alarm is no usual behaviour, nor what the arm does right after it.
+        let usual = self
+            .newest_alarm_ns
+            .is_none_or(|newest| stamp_ns - newest > AFTER_ALARM_NS);
         let (mut score, mut ratio) = (0.0_f64, 0.0_f64);
-        let (mut colliding, mut wrong) = (0, 0);
+        let (mut colliding, mut wrong, mut doubtful) = (0, 0, false);
         for (j, joint) in self.joints.iter_mut().enumerate() {
             let reading: Reading = joint.update(dt_s, sample.effort[j], sample.expected_effort[j]);
             ratio = ratio.max(reading.ratio());
             if reading.phase.is_tested() {
                 score = score.max(reading.ratio());
             }
-            if self.validity[j].update(dt_s, reading.residue) {
-                wrong |= 1 << j;
-            }
             if ready {
+                let validity = &mut self.validity[j];
+                validity.update(dt_s, reading.residue);
+                doubtful |= validity.is_doubtful();
+                wrong |= u32::from(validity.is_wrong()) << j;
                 colliding |= u32::from(reading.collides()) << j;
-                joint.estimate_bias(&reading);
+                if usual {
+                    joint.estimate_bias(&reading);
+                }
             }
         }
         if !ready {
@@ -216,11 +232,14 @@ impl Detector for Sensor {
                 verdict: None,
             };
         }
-        let alarm = self.alarm(stamp_ns, colliding, wrong);
+        let alarm = self.alarm(stamp_ns, colliding, wrong, doubtful);
         if ratio < LOW_RATIO || self.newest_low_ns.is_none() {
             self.newest_low_ns = Some(stamp_ns);
         }
-        let usual = match self.state {
+        if alarm.is_some() {
+            self.newest_alarm_ns = Some(stamp_ns);
+        }
+        let quiet = match self.state {
             LearningState::Init | LearningState::Learning(_) => LEARNING,
             LearningState::Idle | LearningState::Adapt => FREE,
         };
@@ -228,7 +247,7 @@ impl Detector for Sensor {
             score,
             ready,
             verdict: Some(Verdict {
-                state: alarm.map_or(usual, |alarm| alarm.state),
+                state: alarm.map_or(quiet, |alarm| alarm.state),
                 contact: alarm.map(|alarm| Seen {
                     contact_ns: alarm.contact_ns,
                     joints: Some(alarm.joints),
