@@ -9,6 +9,7 @@ use crate::config::{Config, ConfigError, Threshold};
 use crate::detector::Detector;
 use crate::events::{Alarm, OwnEvents, Step};
 use crate::isolation::Isolation;
+use crate::virtual_collision_sensor::Learnt;
 
 /// What a detector must know of its cell and its twin.
 #[derive(Debug, Clone, Default)]
@@ -107,6 +108,12 @@ impl Detect {
             rule,
             isolation: Isolation::new(setup),
         })
+    }
+
+    /// What the detector has learnt while running, to be given to its next life; `None` if it learns
+    /// nothing.
+    pub fn learnt(&self) -> Option<Learnt> {
+        self.detector.learnt()
     }
 }
 

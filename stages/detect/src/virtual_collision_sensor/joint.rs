@@ -123,3 +123,50 @@ impl Joint {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn reading(phase: Phase, residue: f64) -> Reading {
+        Reading {
+            phase,
+            residue,
+            model_error: 1.0,
+            threshold: 2.0,
+        }
+    }
+
+    #[test]
+    fn nothing_is_tested_while_moving() {
+        assert!(!reading(Phase::Moving, 50.0).collides());
+        for phase in [
+            Phase::Steady,
+            Phase::Reversing,
+            Phase::ReversingDm,
+            Phase::Impulse,
+        ] {
+            assert!(reading(phase, 2.1).collides());
+            // Equation 3: a collision is what is above the threshold.
+            assert!(!reading(phase, 2.0).collides());
+        }
+    }
+
+    #[test]
+    fn the_threshold_is_alpha_times_model_error_and_bias() {
+        let tuning = Tuning {
+            cutoff_hz: 15.0,
+            period_s: 0.2,
+            delta: 0.5,
+            alpha: 1.1,
+            time_constant_s: 60.0,
+        };
+        let mut joint = Joint::new(tuning, Bias::new(0.5));
+        joint.reset(3.0, 1.0);
+        let reading = joint.update(0.002, 3.0, 1.0);
+        assert_eq!(reading.phase, Phase::Steady);
+        assert!((reading.residue - 2.0).abs() < 1e-12);
+        assert!((reading.model_error - 2.0).abs() < 1e-12);
+        assert!((reading.threshold - 1.1 * 2.5).abs() < 1e-12);
+    }
+}

@@ -92,11 +92,6 @@ impl Sensor {
         }
     }
 
-    /// Asks for learning anew (`AdaptReq`); the basic version does not listen.
-    pub fn request_learning(&mut self) {
-        self.asked = self.learning.is_some();
-    }
-
     /// Clears what belongs to the signals; what was learnt stays.
     fn reset(&mut self, sample: &TwinState) {
         for (j, joint) in self.joints.iter_mut().enumerate() {
@@ -191,7 +186,8 @@ impl Detector for Sensor {
             }
         };
         if sample.header.has(flags::LEARN) {
-            self.request_learning();
+            // The paper's AdaptReq.
+            self.asked = true;
         }
         self.elapsed_s += dt_s;
         // Remark 2: at first filters and averages say nothing.

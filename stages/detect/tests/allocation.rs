@@ -1,0 +1,110 @@
+//! The light detectors allocate nothing per sample.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+use tauscope_bus::{Detection, Emit, Header, LinkError, Stage, TwinState, flags};
+use tauscope_detect::{
+    Config, Detect, JointSetup, Setup, virtual_collision_sensor, virtual_collision_sensor_basic,
+};
+
+/// The system's allocator, counting per thread.
+struct Counting;
+
+thread_local! {
+    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
+}
+
+fn count() {
+    ALLOCATIONS.with(|allocations| allocations.set(allocations.get() + 1));
+}
+
+// SAFETY: every call is passed on to the system's allocator as it came.
+#[allow(
+    unsafe_code,
+    reason = "a global allocator is unsafe by its nature; test only"
+)]
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count();
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        unsafe { System.dealloc(pointer, layout) }
+    }
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        count();
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+struct Nowhere;
+
+impl Emit<Detection> for Nowhere {
+    fn emit(&mut self, write: &mut dyn FnMut(&mut Detection)) -> Result<(), LinkError> {
+        write(&mut Detection::default());
+        Ok(())
+    }
+}
+
+#[test]
+fn nothing_is_allocated_per_sample() {
+    let joint = JointSetup {
+        gain: 1.0,
+        offset: 0.0,
+        noise: Some(0.1),
+        effort_per_nm: 1.0,
+    };
+    let setup = Setup {
+        joints: vec![joint; 7],
+        ..Setup::default()
+    };
+    let bias = Some(vec![0.5; 7]);
+    let configs = [
+        Config {
+            virtual_collision_sensor_basic: Some(virtual_collision_sensor_basic::Settings {
+                bias: bias.clone(),
+                ..Default::default()
+            }),
+            ..Config::default()
+        },
+        Config {
+            virtual_collision_sensor: Some(virtual_collision_sensor::Settings {
+                bias,
+                learn: virtual_collision_sensor::Learn::AtStart,
+                learning_s: 1.0,
+                ..Default::default()
+            }),
+            ..Config::default()
+        },
+    ];
+    for config in configs {
+        let mut detect = Detect::new(&config, setup.clone()).unwrap();
+        let before = ALLOCATIONS.with(Cell::get);
+        for i in 0..2000_i32 {
+            let mut sample = TwinState {
+                header: Header {
+                    stamp_ns: i64::from(i) * 2_000_000,
+                    flags: flags::READY,
+                    joint_count: 7,
+                    ..Header::default()
+                },
+                ..TwinState::default()
+            };
+            for j in 0..7 {
+                let t = f64::from(i) * 0.002;
+                sample.expected_effort[j] = (3.0 * t).sin();
+                // Now and then a collision.
+                let push = if i % 700 > 600 { 5.0 } else { 0.0 };
+                sample.effort[j] = (3.1 * t).sin() + push;
+            }
+            detect.accept(&sample, &mut Nowhere).unwrap();
+        }
+        assert_eq!(ALLOCATIONS.with(Cell::get), before, "{config:?}");
+    }
+}
