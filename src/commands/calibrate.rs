@@ -91,6 +91,7 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
         command: args.command_topic.clone(),
         twin: args.twin_topic.clone(),
         tool: None,
+        learn: None,
     };
     if args.motion == Motion::Commanded && args.command_topic.is_none() {
         return Err(Failure::rejected(

@@ -122,6 +122,7 @@ impl Request {
             command: topics.command.clone(),
             twin: topics.twin.clone().filter(|_| reference),
             tool: None,
+            learn: None,
         }
     }
 

@@ -27,6 +27,7 @@ pub fn file(
         command: None,
         twin: request.twin_topic.clone(),
         tool: None,
+        learn: None,
     };
     let expected = match request.twin_topic {
         Some(_) => Expected::Topic,

@@ -122,6 +122,9 @@ pub struct Topics {
     /// The attached tool (`geometry_msgs/msg/InertiaStamped`); mass 0 when it is put down.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tool: Option<String>,
+    /// Requests that the detectors learn the robot's usual behaviour anew (`std_msgs/msg/Bool`, true).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub learn: Option<String>,
 }
 
 impl Default for Topics {
@@ -131,6 +134,7 @@ impl Default for Topics {
             command: None,
             twin: None,
             tool: None,
+            learn: None,
         }
     }
 }

@@ -61,6 +61,8 @@ pub struct Packer {
     references: Side<JointArray>,
     tools: Side<Option<Tool>>,
     fixed_tool: Option<Tool>,
+    /// Somebody has asked for learning since the newest sample.
+    learning_asked: bool,
     pending: VecDeque<JointState>,
     newest_ns: Option<i64>,
     flushed: bool,
@@ -109,6 +111,7 @@ impl Packer {
             references: Side::default(),
             tools: Side::default(),
             fixed_tool: setup.tool,
+            learning_asked: false,
             pending: VecDeque::new(),
             newest_ns: None,
             flushed: false,
@@ -191,6 +194,12 @@ impl Packer {
         let stamp_ns = stamp_of(&message.header, received_ns);
         self.tools
             .push(stamp_ns, (tool.mass_kg > 0.0).then_some(tool));
+    }
+
+    /// Takes a request that the detectors learn anew: it belongs to the state that comes next, for it
+    /// has no stamp of its own.
+    pub fn learn(&mut self, message: ros::Bool) {
+        self.learning_asked |= message.data;
     }
 
     /// Gives out the next sample that need not wait any longer; `now_ns` is the present on the clock
@@ -300,6 +309,9 @@ impl Packer {
         );
         if differentiated.restarted && self.counts.packed + self.pending.len() as u64 > 0 {
             flags |= flags::RESET;
+        }
+        if std::mem::take(&mut self.learning_asked) {
+            flags |= flags::LEARN;
         }
         self.pending.push_back(JointState {
             header: Header {

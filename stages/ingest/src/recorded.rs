@@ -23,6 +23,7 @@ enum Role {
     Command,
     Reference,
     Tool,
+    Learn,
 }
 
 /// A source that reads a recording, once, from its beginning to its end. Memory is bounded whatever
@@ -36,6 +37,7 @@ pub struct RecordedSource {
     first: Option<JointState>,
     message: ros::JointState,
     tool: ros::InertiaStamped,
+    learn: ros::Bool,
     log_times_ns: (i64, i64),
     now_ns: i64,
     ended: bool,
@@ -105,6 +107,7 @@ impl RecordedSource {
             first: None,
             message: ros::JointState::default(),
             tool: ros::InertiaStamped::default(),
+            learn: ros::Bool::default(),
             log_times_ns,
             now_ns: log_times_ns.0,
             ended: false,
@@ -198,6 +201,7 @@ impl RecordedSource {
         let decoded = match role {
             None => return Ok(()),
             Some(Role::Tool) => message.decode_into(&mut self.tool),
+            Some(Role::Learn) => message.decode_into(&mut self.learn),
             Some(_) => message.decode_into(&mut self.message),
         };
         if let Err(error) = decoded {
@@ -214,6 +218,7 @@ impl RecordedSource {
             Some(Role::Command) => packer.command(&self.message, now_ns),
             Some(Role::Reference) => packer.reference(&self.message, now_ns),
             Some(Role::Tool) => packer.tool(&self.tool, now_ns),
+            Some(Role::Learn) => packer.learn(self.learn),
             None => {}
         }
         Ok(())
@@ -230,6 +235,7 @@ fn roles<'a>(
         (&topics.command, Role::Command),
         (&topics.twin, Role::Reference),
         (&topics.tool, Role::Tool),
+        (&topics.learn, Role::Learn),
     ] {
         wanted.extend(topic.as_deref().map(|name| (name, role)));
     }
@@ -237,6 +243,7 @@ fn roles<'a>(
     for &(name, role) in &wanted {
         let topic = match role {
             Role::Tool => recording.topic_of::<ros::InertiaStamped>(name)?,
+            Role::Learn => recording.topic_of::<ros::Bool>(name)?,
             _ => recording.topic_of::<ros::JointState>(name)?,
         };
         if let Some(index) = recording.topics().iter().position(|each| each == topic) {

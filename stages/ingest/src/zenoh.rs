@@ -56,6 +56,7 @@ pub struct ZenohSource {
     hashes: keys::HashWatch,
     message: ros::JointState,
     tool: ros::InertiaStamped,
+    learn: ros::Bool,
     counts: ZenohCounts,
 }
 
@@ -84,11 +85,13 @@ impl ZenohSource {
             (topics.command.as_ref(), Role::Command),
             (topics.twin.as_ref(), Role::Reference),
             (topics.tool.as_ref(), Role::Tool),
+            (topics.learn.as_ref(), Role::Learn),
         ];
         for (topic, role) in named {
             let Some(topic) = topic else { continue };
             let key = match role {
                 Role::Tool => scheme.key(topic, &ros::InertiaStamped::dds_type()),
+                Role::Learn => scheme.key(topic, &ros::Bool::dds_type()),
                 _ => scheme.key(topic, &ros::JointState::dds_type()),
             };
             subscribe(&session, &key, role, &queue)?;
@@ -108,6 +111,7 @@ impl ZenohSource {
             hashes: keys::HashWatch::new(&scheme),
             message: ros::JointState::default(),
             tool: ros::InertiaStamped::default(),
+            learn: ros::Bool::default(),
             counts: ZenohCounts::default(),
         })
     }
@@ -132,6 +136,26 @@ impl ZenohSource {
         info.peers_zid().wait().next().is_some() || info.routers_zid().wait().next().is_some()
     }
 
+    /// Reads a message into the place of its role.
+    fn decode(&mut self, waiting: &Waiting, payload: &[u8]) -> Result<(), ros::DecodeError> {
+        let (hash, decoded) = match waiting.role {
+            Role::Tool => (
+                ros::InertiaStamped::TYPE_HASH,
+                ros::decode_into(payload, &mut self.tool),
+            ),
+            Role::Learn => (
+                ros::Bool::TYPE_HASH,
+                ros::decode_into(payload, &mut self.learn),
+            ),
+            Role::State | Role::Command | Role::Reference => (
+                ros::JointState::TYPE_HASH,
+                ros::decode_into(payload, &mut self.message),
+            ),
+        };
+        self.hashes.compare(&waiting.key, hash);
+        decoded
+    }
+
     fn take(&mut self, waiting: &Waiting) {
         self.counts.received += 1;
         if let Some(attachment) = waiting.attachment {
@@ -140,14 +164,9 @@ impl ZenohSource {
         let payload = waiting.payload.to_bytes();
         let decoded = if payload.len() > MAX_PAYLOAD_BYTES {
             Err(format!("{} bytes are too many", payload.len()))
-        } else if waiting.role == Role::Tool {
-            self.hashes
-                .compare(&waiting.key, ros::InertiaStamped::TYPE_HASH);
-            ros::decode_into(&payload, &mut self.tool).map_err(|error| error.to_string())
         } else {
-            self.hashes
-                .compare(&waiting.key, ros::JointState::TYPE_HASH);
-            ros::decode_into(&payload, &mut self.message).map_err(|error| error.to_string())
+            self.decode(waiting, &payload)
+                .map_err(|error| error.to_string())
         };
         if let Err(reason) = decoded {
             if self.counts.undecodable == 0 {
@@ -162,6 +181,7 @@ impl ZenohSource {
             Role::Command => packer.command(&self.message, received_ns),
             Role::Reference => packer.reference(&self.message, received_ns),
             Role::Tool => packer.tool(&self.tool, received_ns),
+            Role::Learn => packer.learn(self.learn),
         }
     }
 }

@@ -52,9 +52,9 @@ impl ModelError {
 /// Equations 7 and 8, since the steady state began.
 #[derive(Debug, Clone)]
 struct Steady {
-    /// err_ss: the largest |R| so far.
+    /// `err_ss`: the largest |R| so far.
     largest: f64,
-    /// |R(t_ss)| and the sum of err_ss, and how many summands that are.
+    /// `|R(t_ss)|` and the sum of `err_ss`, and how many summands that are.
     sum: f64,
     count: f64,
     since_update_s: f64,
@@ -63,7 +63,7 @@ struct Steady {
 }
 
 impl Steady {
-    /// `before`: the last |R| before the steady state, |R(t_ss)|.
+    /// `before`: the last |R| before the steady state, `|R(t_ss)|`.
     fn new(before: f64) -> Self {
         Self {
             largest: 0.0,
@@ -92,11 +92,11 @@ impl Steady {
 /// begins anew.
 #[derive(Debug, Clone)]
 struct Unsteady {
-    /// err_us: the largest |R| since this unsteady state began.
+    /// `err_us`: the largest |R| since this unsteady state began.
     largest: f64,
     /// Whether a steady state has come between.
     left: bool,
-    /// err_us and the square of its distance from the mean at its time.
+    /// `err_us` and the square of its distance from the mean at its time.
     buffer: [(f64, f64); BUFFER],
     filled: usize,
     next: usize,
@@ -104,7 +104,7 @@ struct Unsteady {
     sum: f64,
     squares: f64,
     since_sample_s: f64,
-    /// est_err of equation 10.
+    /// `est_err` of equation 10.
     estimate: f64,
 }
 
@@ -139,7 +139,7 @@ impl Unsteady {
         delta * self.estimate + (1.0 - delta) * self.largest
     }
 
-    /// Puts err_us into the buffer and works out equations 11 and 10.
+    /// Puts `err_us` into the buffer and works out equations 11 and 10.
     fn sample(&mut self) {
         let (out, out_square) = self.buffer[self.next];
         self.filled = (self.filled + 1).min(BUFFER);

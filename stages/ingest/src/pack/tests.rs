@@ -317,3 +317,18 @@ fn waiting_samples_are_bounded() {
     packer.flush();
     assert_eq!(drain(&mut packer).len(), MAX_PENDING - 1);
 }
+
+#[test]
+fn a_request_for_learning_belongs_to_the_next_state_alone() {
+    let mut packer = packer();
+    packer.state(&message(1000, "a b c", &[1.0, 2.0, 3.0]), 2000);
+    packer.learn(ros::Bool { data: true });
+    packer.learn(ros::Bool { data: false });
+    // A repeated state is no sample, and takes nothing away.
+    packer.state(&message(1000, "a b c", &[1.0, 2.0, 3.0]), 2001);
+    packer.state(&message(1002, "a b c", &[1.0, 2.0, 3.0]), 2002);
+    packer.state(&message(1003, "a b c", &[1.0, 2.0, 3.0]), 2003);
+    let asked = drain(&mut packer);
+    let asked: Vec<bool> = asked.iter().map(|s| s.header.has(flags::LEARN)).collect();
+    assert_eq!(asked, [false, true, false]);
+}

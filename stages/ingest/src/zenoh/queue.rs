@@ -16,6 +16,7 @@ pub(super) enum Role {
     Command,
     Reference,
     Tool,
+    Learn,
 }
 
 /// A message as it came.
