@@ -10,6 +10,7 @@ mod evaluate;
 mod exit;
 mod explain;
 mod files;
+mod learnt_state;
 mod pipeline;
 mod plan;
 mod progress;

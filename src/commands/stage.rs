@@ -9,7 +9,9 @@ use tauscope_ingest::SimulatedRobot;
 
 use crate::announce::Announced;
 use crate::build::{self, BuildError};
+use crate::learnt_state::{self, Kept};
 use crate::pipeline::{Cell, ScenarioFacts, Settings};
+use crate::report::Report;
 use crate::supervisor::Instructions;
 
 /// A stage of ours: its seat stands on standard input.
@@ -33,6 +35,8 @@ enum SeatError {
     NoCell,
     #[error("an outside stage was started as one of ours")]
     Outside,
+    #[error("what was learnt cannot be read:\n{0}")]
+    LearntState(Report),
     #[error(transparent)]
     Model(#[from] tauscope_dynamics::ModelError),
     #[error(transparent)]
@@ -82,7 +86,7 @@ fn no_seat(error: &ChildError) -> ExitCode {
 enum Made {
     Source(Box<dyn tauscope_bus::Source<tauscope_bus::JointState>>),
     Twin(Box<tauscope_twin::Twin>),
-    Detect(Box<Announced<tauscope_detect::Detect>>),
+    Detect(Box<Announced<Kept>>),
     Watch(Box<Announced<tauscope_explain::watch::Watch>>),
     Record(Box<tauscope_record::Recorder>),
 }
@@ -114,7 +118,10 @@ impl Made {
                 Self::Twin(Box::new(build::twin(config, model.as_ref(), cell()?)?))
             }
             Settings::Detect { config, model } => {
-                let detect = build::detect(config, model.as_ref(), cell()?)?;
+                let mut config = config.clone();
+                let path = learnt_state::resume(&mut config).map_err(SeatError::LearntState)?;
+                let detect = build::detect(&config, model.as_ref(), cell()?)?;
+                let detect = Kept::new(detect, path);
                 Self::Detect(Box::new(Announced::new(detect, &cell()?.facts)))
             }
             Settings::Explain {

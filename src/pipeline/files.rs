@@ -1,5 +1,6 @@
 //! What the stages' own parts of the file name: recordings, twins, programs, outputs.
 
+mod detector;
 mod model_fits;
 mod outputs;
 
@@ -303,31 +304,6 @@ impl<'a> Resolver<'a> {
                 self.report.push(problem);
             }
         }
-    }
-
-    fn detect(
-        &mut self,
-        index: usize,
-        place: &Place,
-        config: &tauscope_detect::Config,
-    ) -> Option<Settings> {
-        let twin = self.above(index, |role| role == Role::Twin);
-        let model = twin.and_then(|twin| self.models.get(&twin));
-        let twin_config = twin.and_then(|twin| self.entry(twin).twin.as_ref());
-        if twin_config.is_some_and(|twin| twin.model.is_some()) && model.is_none() {
-            // The twin's model is wrong, which has been said.
-            return None;
-        }
-        if let Some(cell) = self.cell(index)
-            && let Err(error) = build::detect(config, model, cell)
-        {
-            self.report.push(self.file.at_key(place, error.to_string()));
-            return None;
-        }
-        Some(Settings::Detect {
-            config: config.clone(),
-            model: model.cloned(),
-        })
     }
 
     fn explain(

@@ -1,10 +1,13 @@
 //! The detector's part of the pipeline file, and the list of detectors.
 
+use std::path::PathBuf;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::detector::Detector;
 use crate::stage::Setup;
+use crate::virtual_collision_sensor::Learnt;
 use crate::{
     naive_difference, twin_regression, virtual_collision_sensor, virtual_collision_sensor_basic,
 };
@@ -83,6 +86,19 @@ impl Config {
             .filter(|(given, _)| *given)
             .map(|(_, name)| *name);
         names.next().filter(|_| names.next().is_none())
+    }
+
+    /// The file that keeps what the detector learns, where the configuration names one. The program reads
+    /// and writes it.
+    pub fn state_mut(&mut self) -> Option<&mut PathBuf> {
+        self.virtual_collision_sensor.as_mut()?.state.as_mut()
+    }
+
+    /// Lets the detector go on from what an earlier life has learnt.
+    pub fn resume(&mut self, learnt: Learnt) {
+        if let Some(settings) = &mut self.virtual_collision_sensor {
+            settings.learnt = Some(learnt);
+        }
     }
 
     /// Every detector that only a threshold is wanting to, with its usual settings.
