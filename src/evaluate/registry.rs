@@ -108,7 +108,7 @@ pub static ENTRIES: &[Entry] = &[
         window: None,
         usual: |facts| facts.cyclic,
         learn: |task| {
-            let settings = Default::default();
+            let settings = virtual_collision_sensor_basic::Settings::default();
             let settings =
                 virtual_collision_sensor_basic::learn(&settings, task.setup, &task.lessons)?;
             Ok(Config {
@@ -123,7 +123,7 @@ pub static ENTRIES: &[Entry] = &[
         window: None,
         usual: |facts| facts.cyclic,
         learn: |task| {
-            let settings = Default::default();
+            let settings = virtual_collision_sensor::Settings::default();
             let settings = virtual_collision_sensor::learn(&settings, task.setup, &task.lessons)?;
             Ok(Config {
                 virtual_collision_sensor: Some(settings),
