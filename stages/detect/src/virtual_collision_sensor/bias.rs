@@ -33,7 +33,7 @@ impl Bias {
         }
     }
 
-    /// What an later life goes on from.
+    /// What a later life goes on from.
     pub fn learnt(&self) -> LearntJoint {
         LearntJoint {
             ident: self.ident,
