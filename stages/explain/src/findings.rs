@@ -1,27 +1,29 @@
 //! From the winning explanation to what is said: findings with intervals, rivals, what could have hidden.
 
+mod contest;
+mod undetectable;
+mod waves;
+
 use std::collections::BTreeMap;
 
 use serde_json::Value;
-use tauscope_dynamics::terms::{Layer, PlaceKind};
+use tauscope_dynamics::terms::PlaceKind;
 
-use crate::active::{Active, Column, Hypothesis, columns};
+use crate::active::{Active, Hypothesis};
 use crate::drive::is_drive;
 use crate::explain::Input;
 use crate::fit::Fit;
 use crate::interval::{HALF_WIDTH_95, covariance, parameter_deviations};
 use crate::next_motion;
-use crate::propose::{Base, shapes};
-use crate::report::{Finding, NextMotion, Rejected, Rival, Undetectable, Verdict};
-use crate::search::{Explanation, LEAST_EVIDENCE, LEAST_SIZE, Search};
+use crate::report::{Finding, NextMotion, Rejected, Rival, Verdict};
+use crate::search::{Explanation, Search};
 use crate::windows::{TimeKind, time_kind};
 use crate::words;
 
-/// A rival this close \[nats\], or within this share of the winner's evidence, cannot be told apart from it.
-const TIE: f64 = 5.0;
-const TIE_SHARE: f64 = 0.01;
-/// How many rivals of a finding are refined, and how many are told.
-const RIVALS: usize = 5;
+use contest::contest;
+pub use undetectable::undetectable;
+use waves::merge_waves;
+
 /// A time that is known no better than this has no interval \[s\].
 const VAGUE_S: f64 = 5.0;
 /// A known scale needs at least this many times its own deviation.
@@ -264,56 +266,6 @@ fn when(
     }
 }
 
-struct Contest {
-    ties: Vec<Hypothesis>,
-    rejected: Vec<(Hypothesis, String)>,
-    /// Evidence for the winner over the best rival that is no tie \[nats\].
-    margin: f64,
-}
-
-/// Every rival in the place of one piece of physics.
-fn contest(
-    search: &Search<'_>,
-    found: &Explanation,
-    less: &Explanation,
-    active: &Active,
-) -> Contest {
-    let mut result = Contest {
-        ties: Vec::new(),
-        rejected: Vec::new(),
-        margin: f64::INFINITY,
-    };
-    if active.curve.is_some() {
-        return result;
-    }
-    let efficiency = &search.problem.worth;
-    let evidence = found.ahead_of(less, efficiency);
-    let proposals = search.rivals(&less.fit, &found.fit, active);
-    let rivals = proposals
-        .iter()
-        .filter(|p| p.active.hypothesis != active.hypothesis && p.evidence() > 0.0);
-    for proposal in rivals.take(RIVALS) {
-        let other = search.joined(less, proposal);
-        let behind = found.ahead_of(&other, efficiency);
-        let hypothesis = proposal.active.hypothesis;
-        if behind < TIE.max(TIE_SHARE * evidence) {
-            result.ties.push(hypothesis);
-            continue;
-        }
-        result.margin = result.margin.min(behind);
-        let share = ((other.fit.likelihood() - less.fit.likelihood())
-            / (found.fit.likelihood() - less.fit.likelihood()).max(1e-9))
-        .clamp(0.0, 1.0);
-        let reason = format!(
-            "in the place of {} it gains {:.0} % of the log-likelihood and is {behind:.0} nats behind",
-            words::name(active.hypothesis.effect.name),
-            100.0 * share
-        );
-        result.rejected.push((hypothesis, reason));
-    }
-    result
-}
-
 fn drive_note(active: &Active, deviation: f64, joints: &[String]) -> String {
     let gain = 1.0 + active.coordinates[0];
     let joint = &joints[active.hypothesis.place.joint];
@@ -334,47 +286,8 @@ fn drive_note(active: &Active, deviation: f64, joints: &[String]) -> String {
     )
 }
 
-/// Two waves of ripple at one joint are told as one finding, the larger first.
-fn merge_waves(findings: &mut Vec<Finding>) {
-    const WAVE: [&str; 3] = ["amplitude_nm", "cycles_per_rev", "phase_rad"];
-    let amplitude = |f: &Finding| {
-        f.parameters
-            .get(WAVE[0])
-            .and_then(Value::as_f64)
-            .unwrap_or(0.0)
-    };
-    let mut index = 0;
-    while index < findings.len() {
-        let twin = (index + 1..findings.len()).find(|&other| {
-            findings[index].effect == "torque_ripple"
-                && findings[other].effect == "torque_ripple"
-                && findings[index].joint == findings[other].joint
-        });
-        if let Some(other) = twin {
-            let mut second = findings.remove(other);
-            if amplitude(&second) > amplitude(&findings[index]) {
-                std::mem::swap(&mut second, &mut findings[index]);
-            }
-            let first = &mut findings[index];
-            for name in WAVE {
-                let (stem, unit) = name.split_once('_').unwrap_or((name, ""));
-                let renamed = match name {
-                    "cycles_per_rev" => "cycles_per_rev2".to_owned(),
-                    _ => format!("{stem}2_{unit}"),
-                };
-                if let Some(value) = second.parameters.remove(name) {
-                    first.parameters.insert(renamed.clone(), value);
-                }
-                if let Some(interval) = second.intervals_95.remove(name) {
-                    first.intervals_95.insert(renamed, interval);
-                }
-            }
-            first.explains = (first.explains + second.explains).min(1.0);
-            first.sentence = format!("{} {}", first.sentence, second.sentence);
-        }
-        index += 1;
-    }
-}
+/// From this share of the error on, it is said to have stayed as it was.
+const UNCHANGED: f64 = 0.98;
 
 /// The verdict in a sentence.
 pub fn summary(verdict: Verdict, findings: &[Finding], before: &[f64], after: &[f64]) -> String {
@@ -382,13 +295,15 @@ pub fn summary(verdict: Verdict, findings: &[Finding], before: &[f64], after: &[
         let sum = |all: &[f64]| all.iter().map(|x| x * x).sum::<f64>().sqrt();
         sum(after) / sum(before)
     };
-    let proof = if ratio.is_finite() {
+    let proof = if !ratio.is_finite() {
+        String::new()
+    } else if ratio < UNCHANGED {
         format!(
             " On recordings that were not fitted the error falls to {:.0} %.",
             100.0 * ratio
         )
     } else {
-        String::new()
+        " On recordings that were not fitted it makes no difference.".to_owned()
     };
     match verdict {
         Verdict::NothingMissing => {
@@ -405,95 +320,4 @@ pub fn summary(verdict: Verdict, findings: &[Finding], before: &[f64], after: &[
             format!("{first}{more}{proof}")
         }
     }
-}
-
-/// The smallest effects of one factor that would have been named, for each joint and the tool.
-pub fn undetectable(
-    search: &Search<'_>,
-    found: &Explanation,
-    joints: &[String],
-    unit_nm: &[f64],
-) -> Vec<Undetectable> {
-    let _ = unit_nm;
-    let base = Base::new(search.problem, &found.fit, search.hypotheses.len());
-    let mut all = Vec::new();
-    for hypothesis in search.hypotheses {
-        let factors = hypothesis.factors();
-        let simple = factors.len() == hypothesis.effect.coordinates.len()
-            && (factors.len() == 1 || hypothesis.effect.name == "payload")
-            && hypothesis.effect.place != PlaceKind::TwoJoints
-            && (hypothesis.effect.layer != Layer::Body || hypothesis.effect.name != "drive_gain");
-        let there = found
-            .fit
-            .actives
-            .iter()
-            .any(|a| a.hypothesis == *hypothesis);
-        if !simple || there || hypothesis.effect.name == "link_mass" {
-            continue;
-        }
-        let Some(shape) = shapes(search.problem, *hypothesis).into_iter().next() else {
-            continue;
-        };
-        let columns = columns(
-            search.problem,
-            &found.fit.actives,
-            &found.fit.efforts,
-            *hypothesis,
-            &shape,
-        );
-        let Some(column) = columns.factors.first() else {
-            continue;
-        };
-        let Some(smallest) = smallest(
-            search,
-            &found.fit,
-            column,
-            base.penalty(1, hypothesis.only_joint()),
-        ) else {
-            continue;
-        };
-        let joint = matches!(hypothesis.effect.place, PlaceKind::Joint)
-            .then(|| joints[hypothesis.place.joint].clone());
-        let link =
-            matches!(hypothesis.effect.place, PlaceKind::Tool | PlaceKind::Link).then(|| {
-                search.problem.model.links()[hypothesis.place.link]
-                    .name
-                    .clone()
-            });
-        let parameter = hypothesis.effect.parameters[0].name.to_owned();
-        // A gain of 1 does nothing: what counts is how far from it.
-        let name = if parameter == "gain" {
-            "gain_minus_one".to_owned()
-        } else {
-            parameter
-        };
-        all.push(Undetectable {
-            effect: hypothesis.effect.name.to_owned(),
-            joint,
-            link,
-            smallest_findable: BTreeMap::from([(name, smallest)]),
-        });
-    }
-    all
-}
-
-/// The factor of a column at which both evidence and size suffice.
-fn smallest(search: &Search<'_>, fit: &Fit, column: &Column, penalty: f64) -> Option<f64> {
-    let problem = search.problem;
-    let (mut information, mut share) = (0.0, 0.0_f64);
-    for j in 0..problem.joints {
-        let Some(values) = column.of_joint(j, problem.rows) else {
-            continue;
-        };
-        let weight = &problem.weight[problem.joint_rows(j)];
-        let square: f64 = values.iter().zip(weight).map(|(v, w)| w * v * v).sum();
-        information += square / fit.variance[j];
-        share = share.max(square / fit.variance[j] / fit.count[j].max(1.0));
-    }
-    if information <= 0.0 {
-        return None;
-    }
-    let by_evidence = (2.0 * (LEAST_EVIDENCE + penalty) / information).sqrt();
-    let by_size = (LEAST_SIZE / share).sqrt();
-    Some(by_evidence.max(by_size))
 }

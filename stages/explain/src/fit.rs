@@ -82,9 +82,24 @@ impl Fit {
 
     /// How the explained effort changes with each free coordinate.
     pub fn jacobian(&self, problem: &Problem) -> Vec<Column> {
-        let parameters = self.parameters();
-        let one = |&(i, c): &(usize, usize)| self.sensitivity(problem, i, c);
-        parameters.iter().map(one).collect()
+        self.jacobian_at(problem, None)
+    }
+
+    /// How the explained effort changes with each free coordinate of what touches these joints; all without them.
+    pub fn jacobian_at(&self, problem: &Problem, joints: Option<&[usize]>) -> Vec<Column> {
+        let touching = self.parameters_at(joints).into_iter();
+        touching
+            .map(|(i, c)| self.sensitivity(problem, i, c))
+            .collect()
+    }
+
+    /// The coordinates that are free of what touches these joints.
+    fn parameters_at(&self, joints: Option<&[usize]>) -> Vec<(usize, usize)> {
+        let touches = |&(i, _): &(usize, usize)| {
+            let only = self.actives[i].hypothesis.only_joint();
+            joints.is_none_or(|joints| only.is_none_or(|only| joints.contains(&only)))
+        };
+        self.parameters().into_iter().filter(touches).collect()
     }
 
     fn sensitivity(&self, problem: &Problem, i: usize, c: usize) -> Column {
@@ -135,28 +150,14 @@ impl Fit {
     /// Improves the numbers of what touches these joints; all without them.
     #[must_use]
     pub fn refined_at(mut self, problem: &Problem, joints: Option<&[usize]>) -> Self {
-        let free: Vec<bool> = self
-            .parameters()
-            .iter()
-            .map(|&(i, _)| {
-                let only = self.actives[i].hypothesis.only_joint();
-                joints.is_none_or(|joints| only.is_none_or(|only| joints.contains(&only)))
-            })
-            .collect();
-        if !free.contains(&true) {
+        let free = self.parameters_at(joints);
+        if free.is_empty() {
             return self;
         }
         let mut damping = 1e-4;
         let mut best = self.likelihood();
         for _ in 0..MAX_ITERATIONS {
-            let free_parameters: Vec<(usize, usize)> = self
-                .parameters()
-                .into_iter()
-                .zip(&free)
-                .filter(|(_, free)| **free)
-                .map(|(parameter, _)| parameter)
-                .collect();
-            let jacobian: Vec<Column> = free_parameters
+            let jacobian: Vec<Column> = free
                 .iter()
                 .map(|&(i, c)| self.sensitivity(problem, i, c))
                 .collect();
@@ -170,7 +171,7 @@ impl Fit {
                     damping *= 10.0;
                     continue;
                 };
-                let next = Self::new(problem, self.moved(problem, &free_parameters, &step));
+                let next = Self::new(problem, self.moved(problem, &free, &step));
                 let likelihood = next.likelihood();
                 if likelihood > best {
                     gained = Some(likelihood - best);

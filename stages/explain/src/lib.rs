@@ -1,8 +1,10 @@
 //! Why a twin and a recording differ: locate the mismatch, name the physics that was left out, model it and prove it
 //! on recordings that were never fitted.
 
+mod across;
 pub mod active;
 mod audit;
+mod columns;
 pub mod drive;
 pub mod explain;
 mod findings;
@@ -14,6 +16,7 @@ pub mod library;
 mod locate;
 mod next_motion;
 pub mod problem;
+mod proof;
 pub mod propose;
 pub mod recording;
 pub mod report;

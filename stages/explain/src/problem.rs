@@ -3,7 +3,7 @@
 use tauscope_dynamics::terms::{MotionSample, Physics};
 use tauscope_dynamics::{Data, Model, rnea};
 
-use crate::active::ColumnCache;
+use crate::columns::ColumnCache;
 use crate::recording::{MAX_GAP_S, Recording};
 use crate::smoother::{LowPass, MotionSmoother};
 use crate::standstill;

@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::{CoordinateKind, PlaceKind, Scale};
 
-use crate::active::{Active, Column, Hypothesis, columns};
+use crate::active::{Active, Column, Hypothesis};
+use crate::columns::columns;
 use crate::fit::{Fit, likelihood, variances};
 use crate::least_squares::Products;
 use crate::problem::Problem;

@@ -3,30 +3,27 @@
 //! Forward, one piece at a time, always the one with the most evidence; after each the earlier ones must prove
 //! themselves again; in the end each is taken out and every rival tried in its place.
 
+mod evidence;
+mod exchange;
+
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use nalgebra::{DMatrix, DVector};
-use tauscope_dynamics::terms::{CoordinateKind, Layer};
+use tauscope_dynamics::terms::Layer;
 
-use crate::active::{Active, Column, Hypothesis};
+use crate::across::carries_over;
+use crate::active::{Active, Hypothesis};
 use crate::drive::is_drive;
 use crate::fit::Fit;
-use crate::least_squares::Products;
 use crate::problem::Problem;
 use crate::propose::{Base, Proposal};
 use crate::unknown;
-use crate::windows::{TimeKind, time_kind};
 
-/// Evidence that a piece of physics needs \[nats\].
-pub const LEAST_EVIDENCE: f64 = 8.0;
-/// Least share of what is then left at some joint that a piece of physics must explain: less is in reach of what
-/// differentiation and filters leave.
-pub const LEAST_SIZE: f64 = 0.12;
-/// The same for what lasts only for an interval, which must have this much more evidence.
-const LEAST_SIZE_OF_INTERVAL: f64 = 0.03;
-const INTERVAL_EVIDENCE: f64 = 40.0;
-/// Least share beside a curve without a name in the same joint, which the name may only patch.
-const LEAST_SIZE_BESIDE_CURVE: f64 = 1.0;
+pub use evidence::{Explanation, LEAST_EVIDENCE, LEAST_SIZE};
+use evidence::{
+    ROTOR, describe, has_rotor, most_at_one_place, needs, overwhelming, steps_enough, wald,
+    worse_joints,
+};
+
 /// Evidence that a curve without a name needs \[nats\].
 const CURVE_EVIDENCE: f64 = 25.0;
 /// A curve is not looked for at a joint whose variance is below this many times its white noise.
@@ -35,35 +32,10 @@ const CURVE_EXCESS: f64 = 1.6;
 const CURVE_SIZE: f64 = 1.35;
 /// How many proposals of a round are refined before one is taken.
 const REFINED: usize = 3;
-/// Evidence that needs no account of correlation, if rows counted in full \[nats\].
-const OVERWHELMING: f64 = 40.0;
-/// And what is left over what is then left.
-const FAIR_SHARE: f64 = 1.3;
-/// A rival may gain this much less to first order than what it is to replace.
-const COULD_DO_BETTER: f64 = 0.85;
-/// A change of friction smaller than this share of it is what friction does from day to day.
-const LEAST_STEP: f64 = 0.3;
 /// More pieces of physics than this are not looked for.
 const MOST_PIECES: usize = 40;
 /// A joint whose variance is below this many times its white noise is not tried with costly effects.
 const QUIET: f64 = 1.15;
-
-/// A fit and the evidence for it, all penalties counted.
-#[derive(Debug, Clone)]
-pub struct Explanation {
-    /// The fit.
-    pub fit: Fit,
-    /// Penalty by active.
-    pub penalties: Vec<f64>,
-}
-
-impl Explanation {
-    /// Evidence for this rather than another \[nats\], rows weighted by their `worth`.
-    pub fn ahead_of(&self, other: &Self, worth: &[f64]) -> f64 {
-        let penalty = |e: &Self| e.penalties.iter().sum::<f64>();
-        self.fit.gain_over(&other.fit, worth) - penalty(self) + penalty(other)
-    }
-}
 
 /// What can be tried, and on what.
 pub struct Search<'a> {
@@ -135,7 +107,8 @@ impl Search<'_> {
             let fit = Fit::new(self.problem, actives);
             let mut penalties = from.penalties.clone();
             penalties.push(curve.penalty);
-            Some(Explanation { fit, penalties })
+            carries_over(self.problem, &fit, &from.fit, &[joint])
+                .then_some(Explanation { fit, penalties })
         };
         if !own.is_empty() {
             let mut bare = best.clone();
@@ -283,26 +256,26 @@ impl Search<'_> {
 
     /// The best explanation with one of the proposals, if there is evidence enough for any.
     fn best_of(&self, now: &Explanation, proposals: &[Proposal]) -> Option<Explanation> {
-        let mut best: Option<Explanation> = None;
         let worth = &self.problem.worth;
         let worthy = proposals.iter().filter(|p| {
             let (evidence, size) = needs(p.active.hypothesis, &now.fit);
             p.evidence() > evidence && p.size > size && steps_enough(&p.active)
         });
+        let mut able: Vec<(Explanation, &Proposal)> = Vec::new();
         for proposal in worthy.take(REFINED) {
             let next = self.joined(now, proposal);
             let (evidence, _) = needs(proposal.active.hypothesis, &now.fit);
-            if next.ahead_of(now, worth) < evidence && !overwhelming(&next, now) {
-                continue;
-            }
-            if best
-                .as_ref()
-                .is_none_or(|best| next.ahead_of(best, worth) > 0.0)
-            {
-                best = Some(next);
+            if next.ahead_of(now, worth) >= evidence || overwhelming(&next, now) {
+                able.push((next, proposal));
             }
         }
-        best
+        able.sort_by(|(a, _), (b, _)| b.ahead_of(a, worth).total_cmp(&0.0));
+        let mut able = able.into_iter();
+        able.find(|(next, proposal)| {
+            let joints = Fit::joints_of(&proposal.active.hypothesis, self.problem.joints);
+            carries_over(self.problem, &next.fit, &now.fit, &joints)
+        })
+        .map(|(next, _)| next)
     }
 
     /// An explanation with a proposal, refined where it touches.
@@ -379,197 +352,4 @@ impl Search<'_> {
             penalties,
         }
     }
-
-    /// The best of the proposals that could be better than `best`, by what they gain to first order.
-    fn rival_of(
-        &self,
-        best: &Explanation,
-        without: &Explanation,
-        proposals: &[Proposal],
-    ) -> Option<Explanation> {
-        let gain = best.fit.likelihood() - without.fit.likelihood();
-        let able: Vec<Proposal> = proposals
-            .iter()
-            .filter(|p| p.gain > COULD_DO_BETTER * gain)
-            .cloned()
-            .collect();
-        self.best_of(without, &able)
-    }
-
-    /// Takes each piece out, and each two at one joint, and tries all rivals in their place.
-    fn exchange(&self, mut best: Explanation) -> Explanation {
-        let mut index = 0;
-        while index < best.fit.actives.len() {
-            if is_drive(&best.fit.actives[index].hypothesis) {
-                index += 1;
-                continue;
-            }
-            let without = self.less(&best, index);
-            let proposals = self.rivals(&without.fit, &best.fit, &best.fit.actives[index]);
-            let worth = &self.problem.worth;
-            if let Some(other) = self.rival_of(&best, &without, &proposals)
-                && other.ahead_of(&best, worth) > 0.5
-            {
-                (self.say)(&format!("= {}", describe(&other)));
-                let other = self.pruned(other);
-                if other.ahead_of(&best, worth) > 0.5 {
-                    best = other;
-                    index = 0;
-                    continue;
-                }
-            }
-            index += 1;
-        }
-        let joint = |i: usize, best: &Explanation| {
-            let hypothesis = &best.fit.actives[i].hypothesis;
-            if is_drive(hypothesis) {
-                None
-            } else {
-                hypothesis.only_joint()
-            }
-        };
-        let mut pair = (0, 1);
-        while pair.1 < best.fit.actives.len() {
-            let (a, b) = pair;
-            if joint(a, &best).is_some() && joint(a, &best) == joint(b, &best) {
-                let without = self.less(&self.less(&best, b), a);
-                let proposals = self.rivals(&without.fit, &best.fit, &best.fit.actives[a]);
-                let worth = &self.problem.worth;
-                if let Some(other) = self.rival_of(&best, &without, &proposals)
-                    && other.ahead_of(&best, worth) > 0.5
-                {
-                    (self.say)(&format!("== {}", describe(&other)));
-                    let other = self.pruned(other);
-                    if other.ahead_of(&best, worth) > 0.5 {
-                        best = other;
-                        pair = (0, 1);
-                        continue;
-                    }
-                }
-            }
-            pair.0 += 1;
-            if pair.0 == pair.1 {
-                pair = (0, pair.1 + 1);
-            }
-        }
-        best
-    }
-}
-
-/// Whether an explanation takes away a fair share of what another leaves at some joint, with much evidence if rows counted
-/// in full: however correlated the rest is, that much is no chance.
-fn overwhelming(explanation: &Explanation, other: &Explanation) -> bool {
-    let white = vec![1.0; other.fit.variance.len()];
-    let less = |(with, without): (&f64, &f64)| *without > FAIR_SHARE * with;
-    explanation.ahead_of(other, &white) > OVERWHELMING
-        && explanation
-            .fit
-            .variance
-            .iter()
-            .zip(&other.fit.variance)
-            .any(less)
-}
-
-/// By piece, the square of its factors in units of their covariance, as if what is left were white.
-fn wald(problem: &Problem, fit: &Fit) -> Vec<f64> {
-    let jacobian = fit.jacobian(problem);
-    let columns: Vec<&Column> = jacobian.iter().collect();
-    let products = Products::new(problem, &columns, &fit.residual, None);
-    let (normal, _) = products.normal(&fit.variance, &vec![0.0; columns.len()]);
-    let p = columns.len();
-    let scale: Vec<f64> = (0..p).map(|a| normal[(a, a)].max(1e-300).sqrt()).collect();
-    let mut scaled = DMatrix::from_fn(p, p, |a, b| normal[(a, b)] / (scale[a] * scale[b]));
-    for a in 0..p {
-        scaled[(a, a)] += 1e-9;
-    }
-    let Some(inverse) = scaled.try_inverse() else {
-        return vec![0.0; fit.actives.len()];
-    };
-    let mut first = 0;
-    fit.actives
-        .iter()
-        .map(|active| {
-            let index: Vec<usize> = (0..active.coordinates.len())
-                .filter(|&c| matches!(active.kind(c), CoordinateKind::Factor { .. }))
-                .map(|c| first + c)
-                .collect();
-            let theta = DVector::from_iterator(
-                index.len(),
-                index
-                    .iter()
-                    .map(|&a| active.coordinates[a - first] * scale[a]),
-            );
-            first += active.coordinates.len();
-            let own = DMatrix::from_fn(index.len(), index.len(), |a, b| {
-                inverse[(index[a], index[b])]
-            });
-            own.try_inverse()
-                .map_or(0.0, |own| (own * &theta).dot(&theta))
-        })
-        .collect()
-}
-
-/// Whether a friction that changes once changes by more than friction does from day to day.
-fn steps_enough(active: &Active) -> bool {
-    if time_kind(active.hypothesis) != TimeKind::Step {
-        return true;
-    }
-    let (before, after) = (active.coordinates[0], active.coordinates[1]);
-    (after - before).abs() > LEAST_STEP * before.abs().max(after.abs())
-}
-
-const ROTOR: &str = "rotor_inertia";
-
-/// Whether an effect splits a joint in rotor and link: those are costly to try.
-fn has_rotor(hypothesis: &Hypothesis) -> bool {
-    matches!(hypothesis.effect.name, "joint_elasticity" | "backlash")
-}
-
-/// Evidence and size that a piece of physics needs beside what `fit` holds.
-fn needs(hypothesis: Hypothesis, fit: &Fit) -> (f64, f64) {
-    let joint = hypothesis.only_joint();
-    let curve = |a: &Active| a.curve.is_some() && a.hypothesis.only_joint() == joint;
-    if joint.is_some() && fit.actives.iter().any(curve) {
-        return (LEAST_EVIDENCE, LEAST_SIZE_BESIDE_CURVE);
-    }
-    match time_kind(hypothesis) {
-        TimeKind::Once => (INTERVAL_EVIDENCE, LEAST_SIZE_OF_INTERVAL),
-        _ => (LEAST_EVIDENCE, LEAST_SIZE),
-    }
-}
-
-/// The joints at which `fit` leaves clearly more than `better`.
-fn worse_joints(fit: &Fit, better: &Fit) -> Vec<usize> {
-    let worse = |&j: &usize| fit.variance[j] > (1.0 + LEAST_SIZE) * better.variance[j];
-    (0..fit.variance.len()).filter(worse).collect()
-}
-
-/// How many of one effect there may be at one place.
-fn most_at_one_place(hypothesis: Hypothesis) -> usize {
-    match hypothesis.effect.name {
-        "external_push" => 8,
-        "torque_ripple" => 2,
-        _ => 1,
-    }
-}
-
-fn describe(explanation: &Explanation) -> String {
-    let one = |active: &Active| {
-        let place = active.hypothesis.place;
-        let values: Vec<String> = active
-            .coordinates
-            .iter()
-            .map(|v| format!("{v:.4}"))
-            .collect();
-        format!(
-            "{}@{}/{}/{} [{}]",
-            active.hypothesis.effect.name,
-            place.joint,
-            place.source,
-            place.link,
-            values.join(", ")
-        )
-    };
-    let all: Vec<String> = explanation.fit.actives.iter().map(one).collect();
-    all.join("; ")
 }

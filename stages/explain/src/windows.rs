@@ -4,7 +4,8 @@
 use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::CoordinateKind;
 
-use crate::active::{Column, Hypothesis, columns};
+use crate::active::{Column, Hypothesis};
+use crate::columns::columns;
 use crate::propose::{Base, Proposal};
 
 /// Shortest interval that is looked for \[s\].

@@ -21,6 +21,17 @@ pub fn number(value: f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
+/// How much likelier something is that is ahead by so many nats, e.g. `40`, `10^17`.
+pub fn odds(nats: f64) -> String {
+    /// From here on powers of ten are easier to read.
+    const MANY: f64 = 1000.0;
+    let odds = nats.max(0.0).exp();
+    if odds < MANY {
+        return format!("{odds:.0}");
+    }
+    format!("10^{:.0}", nats / std::f64::consts::LN_10)
+}
+
 /// Unit of a parameter, from its canonical name.
 pub fn unit(parameter: &str) -> &'static str {
     for (ending, unit) in [
@@ -279,6 +290,13 @@ mod tests {
         ] {
             assert_eq!(number(value), text);
         }
+    }
+
+    #[test]
+    fn odds_are_told_in_powers_of_ten_where_they_are_long() {
+        assert_eq!(odds(0.0), "1");
+        assert_eq!(odds(3.0), "20");
+        assert_eq!(odds(100.0), "10^43");
     }
 
     #[test]

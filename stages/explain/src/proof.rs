@@ -1,0 +1,149 @@
+//! The proof: the corrected twin on recordings that were never fitted.
+
+use tauscope_dynamics::terms::{Physics, TermError};
+
+use crate::explain::Setup;
+use crate::findings;
+use crate::fit::Fit;
+use crate::problem::{Problem, Track};
+use crate::recording::Recording;
+use crate::report::{JointPicture, RecordingPicture};
+
+/// Motion of a prediction is smoothed with the best of these, as shares of the fit's cutoff.
+const PREDICTION_CUTOFFS: [f64; 5] = [0.75, 1.0, 1.4, 2.0, 3.0];
+/// Samples of a picture, at most.
+const PICTURE_SAMPLES: usize = 2000;
+
+/// The hold-out's errors and what is drawn of them.
+pub struct Proof {
+    /// RMS error of the twin as it was, by joint \[effort unit\].
+    pub before: Vec<f64>,
+    /// The same of the corrected twin.
+    pub after: Vec<f64>,
+    /// The corrected twin's effort by hold-out recording.
+    pub predictions: Vec<(String, Vec<f64>)>,
+    /// What is drawn, hold-out recordings first.
+    pub pictures: Vec<RecordingPicture>,
+}
+
+impl Setup<'_> {
+    /// The corrected twin's effort over a track, in the recording's unit.
+    fn predict(&self, problem: &Problem, fit: &Fit, track: &Track) -> Vec<f64> {
+        let terms = findings::in_order(&fit.actives)
+            .into_iter()
+            .map(|active| active.term(problem))
+            .collect();
+        let mut physics = Physics::new(terms, self.unit_nm.len());
+        let mut effort = track.run(&mut physics, &track.rigid);
+        for (k, value) in effort.iter_mut().enumerate() {
+            *value /= self.unit_nm[k % self.unit_nm.len()];
+        }
+        effort
+    }
+
+    /// The smoothing that predicts the fitted recordings' unfiltered effort best.
+    fn best_smoothing(&self, problem: &Problem, found: &Fit) -> Result<f64, TermError> {
+        let n = self.unit_nm.len();
+        let mut best = (f64::INFINITY, Problem::motion_cutoff_hz(problem.cutoff_hz));
+        for share in PREDICTION_CUTOFFS {
+            let mut sum = vec![0.0; n];
+            let mut count = 0.0;
+            for recording in &self.input.fit {
+                let track = self.track(recording, share * problem.cutoff_hz)?;
+                let predicted = self.predict(problem, found, &track);
+                for (k, (p, m)) in predicted.iter().zip(&recording.effort).enumerate() {
+                    sum[k % n] += (m - p) * (m - p);
+                }
+                count += recording.len() as f64;
+            }
+            let likelihood: f64 = sum.iter().map(|s| (s / count).max(1e-16).ln()).sum();
+            if likelihood < best.0 {
+                best = (likelihood, share * problem.cutoff_hz);
+            }
+        }
+        Ok(best.1)
+    }
+
+    /// Runs the corrected twin over the hold-out recordings.
+    pub fn proof(&self, problem: &Problem, scaled: &Fit, found: &Fit) -> Result<Proof, TermError> {
+        let n = self.unit_nm.len();
+        let names: Vec<&str> = self.input.model.joint_names().collect();
+        let smoothing_hz = self.best_smoothing(problem, found)?;
+        let (mut before, mut after, mut count) = (vec![0.0; n], vec![0.0; n], 0.0);
+        let (mut predictions, mut pictures) = (Vec::new(), Vec::new());
+        let held = self.input.holdout.iter().map(|recording| (recording, true));
+        let fitted = self.input.fit.iter().map(|recording| (recording, false));
+        for (recording, held_out) in held.chain(fitted) {
+            let track = self.track(recording, smoothing_hz)?;
+            let predicted = self.predict(problem, found, &track);
+            let rigid = self.predict(problem, scaled, &track);
+            if held_out {
+                for (k, measured) in recording.effort.iter().enumerate() {
+                    before[k % n] += (measured - rigid[k]).powi(2);
+                    after[k % n] += (measured - predicted[k]).powi(2);
+                }
+                count += if recording.effort.is_empty() {
+                    0.0
+                } else {
+                    recording.len() as f64
+                };
+                let rows = recording
+                    .sample_of_row
+                    .iter()
+                    .flat_map(|&k| predicted[k * n..(k + 1) * n].iter().copied());
+                predictions.push((recording.name.clone(), rows.collect()));
+            }
+            if !recording.effort.is_empty() {
+                pictures.push(picture(
+                    &names, recording, held_out, &track, &rigid, &predicted,
+                ));
+            }
+        }
+        let rms = |sums: Vec<f64>| sums.iter().map(|s| (s / count).sqrt()).collect();
+        Ok(Proof {
+            before: rms(before),
+            after: rms(after),
+            predictions,
+            pictures,
+        })
+    }
+}
+
+fn picture(
+    names: &[&str],
+    recording: &Recording,
+    held_out: bool,
+    track: &Track,
+    before: &[f64],
+    after: &[f64],
+) -> RecordingPicture {
+    let n = before.len() / track.len().max(1);
+    let stride = track.len().div_ceil(PICTURE_SAMPLES).max(1);
+    let joint = |j: usize, name: &str| {
+        let thin = |values: &[f64]| -> Vec<f64> {
+            (0..track.len())
+                .step_by(stride)
+                .map(|k| values[k * n + j])
+                .collect()
+        };
+        JointPicture {
+            joint: name.to_owned(),
+            time_s: track.time_s.iter().step_by(stride).copied().collect(),
+            position: thin(&track.position),
+            velocity: thin(&track.velocity),
+            measured: thin(&recording.effort),
+            before: thin(before),
+            after: thin(after),
+        }
+    };
+    RecordingPicture {
+        recording: recording.name.clone(),
+        held_out,
+        start_ns: recording.start_ns,
+        joints: names
+            .iter()
+            .enumerate()
+            .map(|(j, name)| joint(j, name))
+            .collect(),
+    }
+}

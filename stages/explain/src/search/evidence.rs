@@ -1,0 +1,162 @@
+//! What counts as evidence for a piece of physics, and how much of it is asked for.
+
+use nalgebra::{DMatrix, DVector};
+use tauscope_dynamics::terms::CoordinateKind;
+
+use crate::active::{Active, Column, Hypothesis};
+use crate::fit::Fit;
+use crate::least_squares::Products;
+use crate::problem::Problem;
+use crate::windows::{TimeKind, time_kind};
+
+/// Evidence that a piece of physics needs \[nats\].
+pub const LEAST_EVIDENCE: f64 = 8.0;
+/// Least share of what is then left at some joint that a piece of physics must explain: less is in reach of what
+/// differentiation and filters leave.
+pub const LEAST_SIZE: f64 = 0.12;
+/// The same for what lasts only for an interval, which must have this much more evidence.
+const LEAST_SIZE_OF_INTERVAL: f64 = 0.03;
+const INTERVAL_EVIDENCE: f64 = 40.0;
+/// Least share beside a curve without a name in the same joint, which the name may only patch.
+const LEAST_SIZE_BESIDE_CURVE: f64 = 1.0;
+/// Evidence that needs no account of correlation, if rows counted in full \[nats\].
+const OVERWHELMING: f64 = 40.0;
+/// And what is left over what is then left.
+const FAIR_SHARE: f64 = 1.3;
+/// A change of friction smaller than this share of it is what friction does from day to day.
+const LEAST_STEP: f64 = 0.3;
+
+/// A fit and the evidence for it, all penalties counted.
+#[derive(Debug, Clone)]
+pub struct Explanation {
+    /// The fit.
+    pub fit: Fit,
+    /// Penalty by active.
+    pub penalties: Vec<f64>,
+}
+
+impl Explanation {
+    /// Evidence for this rather than another \[nats\], rows weighted by their `worth`.
+    pub fn ahead_of(&self, other: &Self, worth: &[f64]) -> f64 {
+        let penalty = |e: &Self| e.penalties.iter().sum::<f64>();
+        self.fit.gain_over(&other.fit, worth) - penalty(self) + penalty(other)
+    }
+}
+
+/// Whether an explanation takes away a fair share of what another leaves at some joint, with much evidence if rows counted
+/// in full: however correlated the rest is, that much is no chance.
+pub fn overwhelming(explanation: &Explanation, other: &Explanation) -> bool {
+    let white = vec![1.0; other.fit.variance.len()];
+    let less = |(with, without): (&f64, &f64)| *without > FAIR_SHARE * with;
+    explanation.ahead_of(other, &white) > OVERWHELMING
+        && explanation
+            .fit
+            .variance
+            .iter()
+            .zip(&other.fit.variance)
+            .any(less)
+}
+
+/// By piece, the square of its factors in units of their covariance, as if what is left were white.
+pub fn wald(problem: &Problem, fit: &Fit) -> Vec<f64> {
+    let jacobian = fit.jacobian(problem);
+    let columns: Vec<&Column> = jacobian.iter().collect();
+    let products = Products::new(problem, &columns, &fit.residual, None);
+    let (normal, _) = products.normal(&fit.variance, &vec![0.0; columns.len()]);
+    let p = columns.len();
+    let scale: Vec<f64> = (0..p).map(|a| normal[(a, a)].max(1e-300).sqrt()).collect();
+    let mut scaled = DMatrix::from_fn(p, p, |a, b| normal[(a, b)] / (scale[a] * scale[b]));
+    for a in 0..p {
+        scaled[(a, a)] += 1e-9;
+    }
+    let Some(inverse) = scaled.try_inverse() else {
+        return vec![0.0; fit.actives.len()];
+    };
+    let mut first = 0;
+    fit.actives
+        .iter()
+        .map(|active| {
+            let index: Vec<usize> = (0..active.coordinates.len())
+                .filter(|&c| matches!(active.kind(c), CoordinateKind::Factor { .. }))
+                .map(|c| first + c)
+                .collect();
+            let theta = DVector::from_iterator(
+                index.len(),
+                index
+                    .iter()
+                    .map(|&a| active.coordinates[a - first] * scale[a]),
+            );
+            first += active.coordinates.len();
+            let own = DMatrix::from_fn(index.len(), index.len(), |a, b| {
+                inverse[(index[a], index[b])]
+            });
+            own.try_inverse()
+                .map_or(0.0, |own| (own * &theta).dot(&theta))
+        })
+        .collect()
+}
+
+/// Whether a friction that changes once changes by more than friction does from day to day.
+pub fn steps_enough(active: &Active) -> bool {
+    if time_kind(active.hypothesis) != TimeKind::Step {
+        return true;
+    }
+    let (before, after) = (active.coordinates[0], active.coordinates[1]);
+    (after - before).abs() > LEAST_STEP * before.abs().max(after.abs())
+}
+
+pub const ROTOR: &str = "rotor_inertia";
+
+/// Whether an effect splits a joint in rotor and link: those are costly to try.
+pub fn has_rotor(hypothesis: &Hypothesis) -> bool {
+    matches!(hypothesis.effect.name, "joint_elasticity" | "backlash")
+}
+
+/// Evidence and size that a piece of physics needs beside what `fit` holds.
+pub fn needs(hypothesis: Hypothesis, fit: &Fit) -> (f64, f64) {
+    let joint = hypothesis.only_joint();
+    let curve = |a: &Active| a.curve.is_some() && a.hypothesis.only_joint() == joint;
+    if joint.is_some() && fit.actives.iter().any(curve) {
+        return (LEAST_EVIDENCE, LEAST_SIZE_BESIDE_CURVE);
+    }
+    match time_kind(hypothesis) {
+        TimeKind::Once => (INTERVAL_EVIDENCE, LEAST_SIZE_OF_INTERVAL),
+        _ => (LEAST_EVIDENCE, LEAST_SIZE),
+    }
+}
+
+/// The joints at which `fit` leaves clearly more than `better`.
+pub fn worse_joints(fit: &Fit, better: &Fit) -> Vec<usize> {
+    let worse = |&j: &usize| fit.variance[j] > (1.0 + LEAST_SIZE) * better.variance[j];
+    (0..fit.variance.len()).filter(worse).collect()
+}
+
+/// How many of one effect there may be at one place.
+pub fn most_at_one_place(hypothesis: Hypothesis) -> usize {
+    match hypothesis.effect.name {
+        "external_push" => 8,
+        "torque_ripple" => 2,
+        _ => 1,
+    }
+}
+
+pub fn describe(explanation: &Explanation) -> String {
+    let one = |active: &Active| {
+        let place = active.hypothesis.place;
+        let values: Vec<String> = active
+            .coordinates
+            .iter()
+            .map(|v| format!("{v:.4}"))
+            .collect();
+        format!(
+            "{}@{}/{}/{} [{}]",
+            active.hypothesis.effect.name,
+            place.joint,
+            place.source,
+            place.link,
+            values.join(", ")
+        )
+    };
+    let all: Vec<String> = explanation.fit.actives.iter().map(one).collect();
+    all.join("; ")
+}
