@@ -184,6 +184,7 @@ pub fn detect_setup(
         scores: scores.collect(),
         tool_link: cell.tool_link(),
         contact_point_on_tool_m: cell.contact_point_on_tool_m(),
+        impedance: cell.facts.impedance,
     })
 }
 

@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use tauscope_detect::{
-    Config, LearnError, Lessons, Setup, virtual_collision_sensor, virtual_collision_sensor_basic,
+    Config, LearnError, Lessons, Setup, contact_classifier, fisher_discriminant,
+    frequency_classifier, virtual_collision_sensor, virtual_collision_sensor_basic,
 };
 
 use super::input::{Named, Role};
@@ -76,6 +77,10 @@ fn always(_: &Facts) -> bool {
     true
 }
 
+fn tells_kinds(facts: &Facts) -> bool {
+    facts.kinds
+}
+
 /// All of them, in the order of the tables.
 pub static ENTRIES: &[Entry] = &[
     Entry {
@@ -118,6 +123,23 @@ pub static ENTRIES: &[Entry] = &[
         },
     },
     Entry {
+        name: "contact_classifier",
+        random: false,
+        window: None,
+        usual: tells_kinds,
+        learn: |task| {
+            let settings = contact_classifier::Settings::default();
+            Ok(Config {
+                contact_classifier: Some(contact_classifier::learn(
+                    &settings,
+                    task.setup,
+                    &task.lessons,
+                )?),
+                ..Config::default()
+            })
+        },
+    },
+    Entry {
         name: "virtual_collision_sensor",
         random: false,
         window: None,
@@ -127,6 +149,40 @@ pub static ENTRIES: &[Entry] = &[
             let settings = virtual_collision_sensor::learn(&settings, task.setup, &task.lessons)?;
             Ok(Config {
                 virtual_collision_sensor: Some(settings),
+                ..Config::default()
+            })
+        },
+    },
+    Entry {
+        name: "fisher_discriminant",
+        random: false,
+        window: None,
+        usual: tells_kinds,
+        learn: |task| {
+            let settings = fisher_discriminant::Settings::default();
+            Ok(Config {
+                fisher_discriminant: Some(fisher_discriminant::learn(
+                    &settings,
+                    task.setup,
+                    &task.lessons,
+                )?),
+                ..Config::default()
+            })
+        },
+    },
+    Entry {
+        name: "frequency_classifier",
+        random: false,
+        window: None,
+        usual: tells_kinds,
+        learn: |task| {
+            let settings = frequency_classifier::Settings::default();
+            Ok(Config {
+                frequency_classifier: Some(frequency_classifier::learn(
+                    &settings,
+                    task.setup,
+                    &task.lessons,
+                )?),
                 ..Config::default()
             })
         },

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use tauscope_bus::flags;
-use tauscope_detect::{Lesson, Setup};
+use tauscope_detect::{Impedance, Lesson, Setup};
 use tauscope_twin::{Expected, JointCorrection, TwinFile};
 
 use super::EvaluateError;
@@ -145,7 +145,18 @@ impl Prepared {
     /// # Errors
     /// If it does not fit the robot.
     pub fn setup(&self, request: &Request) -> Result<Setup, EvaluateError> {
-        Ok(build::detect_setup(Some(&self.file), &request.cell)?)
+        let (set, model) = (&request.set, request.cell.model.as_ref());
+        let link = (set.tool_link.as_ref()).and_then(|link| model?.link_index(link));
+        let impedance = set.impedance.as_ref().map(|impedance| Impedance {
+            translational_n_per_m: impedance.translational_n_per_m,
+            rotational_nm_per_rad: impedance.rotational_nm_per_rad,
+        });
+        Ok(Setup {
+            tool_link: link,
+            contact_point_on_tool_m: set.contact_point_on_tool_m,
+            impedance,
+            ..build::detect_setup(Some(&self.file), &request.cell)?
+        })
     }
 }
 

@@ -36,6 +36,8 @@ pub struct CellFacts {
     pub torque_constants_nm_per_a: Option<Vec<f64>>,
     /// The tool.
     pub tool: Option<ToolEntry>,
+    /// The impedance that a Cartesian controller holds the tool with.
+    pub impedance: Option<tauscope_detect::Impedance>,
 }
 
 impl Cell {
@@ -88,6 +90,7 @@ impl Cell {
             effort_unit,
             torque_constants_nm_per_a: by_joint,
             tool: None,
+            impedance: None,
         };
         report.into_result(Self {
             facts,
@@ -147,6 +150,7 @@ impl Resolver<'_> {
             effort_unit: self.entry.effort_unit,
             torque_constants_nm_per_a: constants,
             tool: self.entry.tool.clone(),
+            impedance: self.entry.impedance,
         };
         report.into_result(Cell { facts, model })
     }

@@ -48,6 +48,9 @@ pub struct CellEntry {
     /// The tool, where the URDF has it not.
     #[serde(default)]
     pub tool: Option<ToolEntry>,
+    /// The impedance that a Cartesian controller holds the tool with, where there is one.
+    #[serde(default)]
+    pub impedance: Option<tauscope_detect::Impedance>,
 }
 
 /// Unit of a measured effort.

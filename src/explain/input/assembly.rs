@@ -89,6 +89,7 @@ impl Assembly<'_> {
             effort_unit: self.effort_unit,
             torque_constants_nm_per_a: constants,
             tool: None,
+            impedance: None,
         };
         report.into_result(Request {
             case: name,

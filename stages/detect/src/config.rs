@@ -9,7 +9,8 @@ use crate::detector::Detector;
 use crate::stage::Setup;
 use crate::virtual_collision_sensor::Learnt;
 use crate::{
-    naive_difference, twin_regression, virtual_collision_sensor, virtual_collision_sensor_basic,
+    contact_classifier, fisher_discriminant, frequency_classifier, naive_difference,
+    twin_regression, virtual_collision_sensor, virtual_collision_sensor_basic,
 };
 
 /// The papers' k, where the file names no threshold.
@@ -32,6 +33,15 @@ pub struct Config {
     /// The same with a bias that is learnt and adapts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub virtual_collision_sensor: Option<virtual_collision_sensor::Settings>,
+    /// Collision or cooperation, by the force's frequency content and direction (Salt Ducaju et al.).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contact_classifier: Option<contact_classifier::Settings>,
+    /// The same detection, told apart by Fisher's linear discriminant.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fisher_discriminant: Option<fisher_discriminant::Settings>,
+    /// The same detection, told apart by the frequency content alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frequency_classifier: Option<frequency_classifier::Settings>,
     /// When the alarm is raised.
     pub threshold: Threshold,
     /// An alarm ends once the score has stayed below the threshold for this long \[s\].
@@ -46,6 +56,9 @@ impl Default for Config {
             naive_difference: None,
             virtual_collision_sensor_basic: None,
             virtual_collision_sensor: None,
+            contact_classifier: None,
+            fisher_discriminant: None,
+            frequency_classifier: None,
             threshold: Threshold::default(),
             // Bridges the dip between two swings of one contact.
             hold_s: 0.1,
@@ -79,6 +92,15 @@ impl Config {
             (
                 self.virtual_collision_sensor.is_some(),
                 virtual_collision_sensor::NAME,
+            ),
+            (self.contact_classifier.is_some(), contact_classifier::NAME),
+            (
+                self.fisher_discriminant.is_some(),
+                fisher_discriminant::NAME,
+            ),
+            (
+                self.frequency_classifier.is_some(),
+                frequency_classifier::NAME,
             ),
         ];
         let mut names = given
@@ -114,6 +136,12 @@ impl Config {
         all.detectors(setup)
     }
 
+    /// What speaks against running this detector in this cell, though it can.
+    pub fn warning(&self, setup: &Setup) -> Option<String> {
+        let settings = self.contact_classifier.as_ref()?;
+        contact_classifier::warning(settings, setup)
+    }
+
     /// A line a detector.
     fn detectors(&self, setup: &Setup) -> Result<Vec<Box<dyn Detector>>, ConfigError> {
         let mut all: Vec<Box<dyn Detector>> = Vec::new();
@@ -130,6 +158,15 @@ impl Config {
         if let Some(settings) = &self.virtual_collision_sensor {
             let sensor = virtual_collision_sensor::build(settings, setup, self.hold_s)?;
             all.push(Box::new(sensor));
+        }
+        if let Some(settings) = &self.contact_classifier {
+            all.push(contact_classifier::build(settings, setup)?);
+        }
+        if let Some(settings) = &self.fisher_discriminant {
+            all.push(fisher_discriminant::build(settings, setup)?);
+        }
+        if let Some(settings) = &self.frequency_classifier {
+            all.push(frequency_classifier::build(settings, setup)?);
         }
         Ok(all)
     }
@@ -219,6 +256,12 @@ pub enum ConfigError {
         detector: &'static str,
         /// What is wrong with it, as a clause.
         reason: String,
+    },
+    /// A detector that must have learnt from labelled recordings.
+    #[error("{detector} has learnt nothing yet: `tauscope evaluate` tunes it on a labelled set")]
+    NotLearnt {
+        /// The detector.
+        detector: &'static str,
     },
     /// Both kinds of threshold.
     #[error("`threshold` takes either `sigmas` or `score`, not both")]

@@ -57,4 +57,9 @@ pub trait Detector: Send {
     fn learnt(&self) -> Option<Learnt> {
         None
     }
+
+    /// Why it can never judge this stream, once that shows: the stage ends with it.
+    fn fault(&self) -> Option<String> {
+        None
+    }
 }

@@ -6,9 +6,14 @@
 //! pipeline file, and one line in [`config`].
 
 pub mod config;
+pub mod contact_classifier;
+pub mod contact_machine;
 pub mod contact_signals;
+pub mod contact_tuning;
 mod detector;
 mod events;
+pub mod fisher_discriminant;
+pub mod frequency_classifier;
 mod isolation;
 mod lesson;
 pub mod momentum;
@@ -24,4 +29,4 @@ pub use config::{Config, ConfigError, Threshold};
 pub use detector::{Detector, Judgement, Seen, Verdict};
 pub use isolation::{Contact, Isolation};
 pub use lesson::{ContactKind, LabelledContact, LearnError, Lesson, Lessons};
-pub use stage::{Detect, JointSetup, ScoreStatistics, Setup};
+pub use stage::{Detect, Impedance, JointSetup, ScoreStatistics, Setup};

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use tauscope_bus::{Detection, Emit, Name, Stage, StageError, TwinState, flags};
 use tauscope_dynamics::Model;
 
@@ -24,6 +26,18 @@ pub struct Setup {
     pub tool_link: Option<usize>,
     /// The point of the tool that touches things, in that link's frame \[m\]; else its origin.
     pub contact_point_on_tool_m: Option<[f64; 3]>,
+    /// The impedance that a Cartesian controller holds the tool with, where it is known.
+    pub impedance: Option<Impedance>,
+}
+
+/// What a Cartesian impedance controller holds the tool with (Salt Ducaju et al., equation 1).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Impedance {
+    /// Translational stiffness \[N/m\].
+    pub translational_n_per_m: f64,
+    /// Rotational stiffness \[N m/rad\].
+    pub rotational_nm_per_rad: f64,
 }
 
 /// What a detector must know of a joint.
@@ -124,6 +138,10 @@ impl Stage<TwinState, Detection> for Detect {
         out: &mut dyn Emit<Detection>,
     ) -> Result<(), StageError> {
         let judgement = self.detector.judge(sample);
+        if let Some(fault) = self.detector.fault() {
+            let detector = self.detector.name();
+            return Err(StageError::failed(format!("{detector}: {fault}")));
+        }
         let stamp_ns = sample.header.stamp_ns;
         let score = judgement.ready.then_some(judgement.score);
         let verdict = judgement.verdict.filter(|_| judgement.ready);

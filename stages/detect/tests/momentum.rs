@@ -1,6 +1,7 @@
 //! The momentum observer on simulated arms.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::float_cmp, reason = "tests compare what must be the same bits")]
 
 use tauscope_bus::{Header, TwinState, flags};
 use tauscope_detect::momentum::MomentumObserver;
@@ -81,9 +82,9 @@ impl Arm {
             let answer =
                 forward_dynamics(&self.model, &mut self.data, &self.q, &self.qd, &total, &[]);
             qdd.copy_from_slice(answer);
-            for j in 0..3 {
-                self.q[j] += dt * (self.qd[j] + 0.5 * dt * qdd[j]);
-                self.qd[j] += dt * qdd[j];
+            for (j, qdd) in qdd.iter().enumerate() {
+                self.q[j] += dt * (self.qd[j] + 0.5 * dt * qdd);
+                self.qd[j] += dt * qdd;
             }
         }
         self.ns += dt_ns;
