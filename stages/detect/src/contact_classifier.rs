@@ -24,6 +24,9 @@ use crate::stage::{Impedance, Setup};
 /// Canonical name.
 pub(crate) const NAME: &str = "contact_classifier";
 
+/// The paper's γ.
+const PAPERS_GAMMA: f64 = 6.2;
+
 /// Settings of `contact_classifier`; the defaults are the paper's.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -48,7 +51,7 @@ impl Default for Settings {
         Self {
             signals: SignalSettings::default(),
             detection: MachineSettings::default(),
-            gamma: 6.2,
+            gamma: PAPERS_GAMMA,
             standstill_m_per_s: 0.005,
             tuned_impedance: None,
         }
@@ -116,7 +119,7 @@ pub(crate) fn length(vector: &[f64; 3]) -> f64 {
 
 /// Tunes `F_th` and γ on labelled recordings, and notes the impedance. `F_th` is a tenth above the largest norm of
 /// contact-free motion: nothing false first, then all that can be found. γ has the largest 2 specificity + sensitivity,
-/// half-way (in ratio) between the contacts that limit it.
+/// of equal ones the largest ("conservatively high"), though none above the paper's where that will do.
 ///
 /// # Errors
 /// If the training recordings name no collisions and cooperations, or hold none of one kind or no
@@ -127,7 +130,8 @@ pub fn learn(
     lessons: &Lessons<'_>,
 ) -> Result<Settings, LearnError> {
     let (mut learnt, _, class) = tune(settings, setup, lessons)?;
-    learnt.gamma = contact_tuning::best(&class);
+    let [low, high] = contact_tuning::best(&class);
+    learnt.gamma = high.min(low.max(PAPERS_GAMMA));
     learnt.tuned_impedance = setup.impedance;
     Ok(learnt)
 }
@@ -165,7 +169,7 @@ fn tune(settings: &Settings, setup: &Setup, lessons: &Lessons<'_>) -> Result<Tun
     let ratios: Vec<_> = (found.iter())
         .map(|found| (found.kind, ratio(&found.contact).unwrap_or(f64::INFINITY)))
         .collect();
-    let class = contact_tuning::sweep_class(&ratios, Settings::default().gamma);
+    let class = contact_tuning::sweep_class(&ratios, PAPERS_GAMMA);
     Ok((learnt, tracks, class))
 }
 

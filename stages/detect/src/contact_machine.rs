@@ -4,8 +4,8 @@
 //! What the paper leaves open, and what is done here:
 //!
 //! - *Contact time*, "a backwards search in the external force signal": back from the detection the force
-//!   along the direction has come from its last trough; swings smaller than [`SWING`] thresholds are no
-//!   trough. Of the rise from there, the contact begins where [`BEGUN`] of it were reached. Both senses
+//!   along the direction has come from its last trough; swings smaller than half a threshold
+//!   ([`SWING`]) are no trough. Of the rise from there, the contact begins where [`BEGUN`] of it were reached. Both senses
 //!   are tried, and the larger rise counts.
 //! - *Derivative of the force*: its change from the contact time to the detection. Only its direction
 //!   matters, and a difference over the whole rise has the least noise.
@@ -21,8 +21,8 @@ use crate::detector::{Detector, Judgement, Seen, Verdict};
 use crate::isolation::Contact;
 use crate::lesson::ContactKind;
 
-/// A fall of the force by this many thresholds parts one rise from another.
-const SWING: f64 = 3.0;
+/// A fall of the force by this share of the threshold parts one rise from another.
+const SWING: f64 = 0.5;
 /// A contact has begun at this share of its rise.
 const BEGUN: f64 = 0.15;
 
@@ -42,7 +42,8 @@ impl Default for MachineSettings {
     fn default() -> Self {
         Self {
             force_threshold_n: 0.85,
-            release_s: 0.05,
+            // One time constant of the observer.
+            release_s: 0.01,
         }
     }
 }

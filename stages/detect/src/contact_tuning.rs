@@ -388,23 +388,22 @@ pub(crate) fn sweep_class(ratios: &[(ContactKind, f64)], at_least: f64) -> Vec<C
     sweep.collect()
 }
 
-/// The bound with the largest 2 specificity + sensitivity: a collision taken for a cooperation does more
-/// harm than the reverse. Bounds between two contacts are equal; the one half-way in ratio keeps most
-/// distance to both. Where no cooperation limits it, the highest.
-pub(crate) fn best(sweep: &[ClassSweep]) -> f64 {
+/// The bounds, from the first to the last, with the largest 2 specificity + sensitivity: a collision taken for
+/// a cooperation does more harm than the reverse. Those between two contacts are equal.
+pub(crate) fn best(sweep: &[ClassSweep]) -> [f64; 2] {
     let worth = |at: &ClassSweep| 2.0 * at.specificity + at.sensitivity;
-    let places = (0..sweep.len()).max_by(|&a, &b| worth(&sweep[a]).total_cmp(&worth(&sweep[b])));
-    match places {
-        None => f64::INFINITY,
-        Some(at) if at == 0 || at + 1 == sweep.len() => sweep[at].bound,
-        Some(at) => {
-            let (low, high) = (sweep[at - 1].bound, sweep[at].bound);
-            high.signum() * (low * high).abs().sqrt()
-        }
-    }
+    let most = (0..sweep.len()).max_by(|&a, &b| worth(&sweep[a]).total_cmp(&worth(&sweep[b])));
+    most.map_or([f64::NEG_INFINITY, f64::INFINITY], |at| {
+        [sweep[at.saturating_sub(1)].bound, sweep[at].bound]
+    })
 }
 
 #[cfg(test)]
+#[allow(
+    clippy::float_cmp,
+    clippy::unwrap_used,
+    reason = "tests compare what must be the same bits, and fail where they cannot go on"
+)]
 mod tests {
     use super::*;
 
@@ -412,7 +411,7 @@ mod tests {
     const COOPERATION: ContactKind = ContactKind::Cooperation;
 
     #[test]
-    fn the_bound_lies_half_way_between_the_kinds() {
+    fn the_best_bounds_are_those_that_part_the_kinds() {
         let ratios = [
             (COLLISION, 1.2),
             (COLLISION, 2.0),
@@ -420,12 +419,14 @@ mod tests {
             (COOPERATION, f64::INFINITY),
         ];
         let sweep = sweep_class(&ratios, 6.2);
-        assert!((best(&sweep) - 4.0).abs() < 1e-12);
-        let at = |bound: f64| sweep.iter().find(|at| at.bound >= bound).unwrap();
-        assert!((at(2.0).specificity - 0.5).abs() < 1e-12);
-        assert!((at(8.0).specificity - 1.0).abs() < 1e-12);
-        assert!((at(8.0).sensitivity - 1.0).abs() < 1e-12);
-        assert!((at(8.1).sensitivity - 0.5).abs() < 1e-12);
+        assert_eq!(best(&sweep), [2.0, 8.0]);
+        let shares = |bound: f64| {
+            let at = sweep.iter().find(|at| at.bound >= bound).unwrap();
+            [at.specificity, at.sensitivity]
+        };
+        assert_eq!(shares(2.0), [0.5, 1.0]);
+        assert_eq!(shares(8.0), [1.0, 1.0]);
+        assert_eq!(shares(8.1), [1.0, 0.5]);
     }
 
     #[test]
@@ -434,14 +435,14 @@ mod tests {
             (COLLISION, 1.0),
             (COOPERATION, 2.0),
             (COLLISION, 3.0),
-            (COOPERATION, 27.0),
+            (COOPERATION, 48.0),
         ];
-        assert!((best(&sweep_class(&ratios, 6.2)) - 9.0).abs() < 1e-12);
+        assert_eq!(best(&sweep_class(&ratios, 6.2)), [3.0, 48.0]);
     }
 
     #[test]
-    fn a_bound_that_no_cooperation_limits_is_no_lower_than_the_papers() {
+    fn bounds_that_no_cooperation_limits_reach_at_least_to_the_given_one() {
         let ratios = [(COLLISION, 1.5), (COOPERATION, f64::INFINITY)];
-        assert!((best(&sweep_class(&ratios, 6.2)) - 6.2).abs() < 1e-12);
+        assert_eq!(best(&sweep_class(&ratios, 6.2)), [1.5, 6.2]);
     }
 }

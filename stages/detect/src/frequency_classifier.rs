@@ -169,7 +169,8 @@ pub fn learn(
         .iter()
         .map(|found| (found.kind, -found.largest_norm_n(decide_ns)))
         .collect();
-    let bound = contact_tuning::best(&contact_tuning::sweep_class(&norms, f64::NEG_INFINITY));
-    learnt.collision_threshold_n = (-bound).max(learnt.detection.force_threshold_n);
+    let [low, high] = contact_tuning::best(&contact_tuning::sweep_class(&norms, f64::NEG_INFINITY));
+    // Half-way, in ratio, between the contacts on either side.
+    learnt.collision_threshold_n = (low * high).sqrt().max(learnt.detection.force_threshold_n);
     Ok(learnt)
 }
