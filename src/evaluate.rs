@@ -1,6 +1,7 @@
 //! `tauscope evaluate`: trains, thresholds and scores detectors on a labelled set.
 
 mod files;
+mod html;
 mod input;
 mod judged;
 mod labels;
@@ -26,7 +27,7 @@ use crate::build::BuildError;
 use crate::calibrate::CalibrateError;
 use crate::replay::ReplayError;
 
-pub use files::{make, write};
+pub use files::{prepare, write};
 pub use input::{Options, Request, load};
 pub use judged::Judged;
 pub use metrics::Numbers;

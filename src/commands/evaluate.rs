@@ -56,10 +56,10 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
         jobs: usize::from(args.jobs),
     };
     let request = evaluate::load(&args.set, &options)?;
-    evaluate::make(&args.out)?;
+    evaluate::prepare(&args.out, &request)?;
     let progress = Progress::of_work();
     let result = evaluate::run(request, &args.out, &|share, what| {
-        progress.doing(share, what)
+        progress.doing(share, what);
     });
     let evaluation = result.map_err(|error| {
         if error.is_input() {
@@ -91,13 +91,13 @@ struct Summary<'a> {
     set: &'a str,
     lost: u64,
     notes: &'a [String],
-    detectors: Vec<Detector<'a>>,
+    detectors: Vec<Numbered<'a>>,
     tables: &'a [Table],
     files: &'a [PathBuf],
 }
 
 #[derive(Debug, Serialize)]
-struct Detector<'a> {
+struct Numbered<'a> {
     detector: &'a str,
     twin: &'a str,
     threshold: f64,
@@ -112,7 +112,7 @@ impl<'a> Summary<'a> {
         tables: &'a [Table],
         files: &'a [PathBuf],
     ) -> Self {
-        let detectors = judged.iter().map(|judged| Detector {
+        let detectors = judged.iter().map(|judged| Numbered {
             detector: judged.run.first().entry.name,
             twin: &evaluation.twins[judged.run.twin].name,
             threshold: judged.run.first().threshold,

@@ -1,18 +1,24 @@
 //! What an evaluation leaves behind.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use serde::Serialize;
+use tauscope_detect::Config;
+use tauscope_twin::ScoreStatistics;
 
+use super::input::Request;
 use super::judged::Judged;
 use super::runner::{Output, Runner};
 use super::tables::Table;
-use super::{Evaluation, parquet};
+use super::twin::Prepared;
+use super::{Evaluation, Run, html, parquet};
 use crate::exit::Failure;
 use crate::explain::write_whole;
 use crate::replay::Event;
+use crate::report::Problem;
 
 /// One recording and detector, as the scorer reads it.
 #[derive(Debug, Serialize)]
@@ -37,7 +43,7 @@ pub fn write(
     out: &Path,
     evaluation: &Evaluation,
     judged: &[Judged<'_>],
-    _tables: &[Table],
+    tables: &[Table],
 ) -> Result<Vec<PathBuf>, Failure> {
     for run in &evaluation.runs {
         let (runner, twin) = (run.first(), &evaluation.twins[run.twin].name);
@@ -51,17 +57,74 @@ pub fn write(
             write_output(&folder, &detector, twin, runner, output)?;
         }
     }
+    for (index, twin) in evaluation.twins.iter().enumerate() {
+        let folder = if index == 0 {
+            out.to_owned()
+        } else {
+            out.join(&twin.name)
+        };
+        let own = || evaluation.runs.iter().filter(move |run| run.twin == index);
+        write_twin(&folder, twin, own().map(Run::first))?;
+        let learnt: BTreeMap<&str, &Config> = own()
+            .map(|run| (run.first().entry.name, &run.first().config))
+            .collect();
+        let text = serde_saphyr::to_string(&learnt).context("what was learnt")?;
+        write_whole(&folder.join("learnt.yaml"), text.as_bytes())?;
+    }
     parquet::write_results(&out.join("results.parquet"), evaluation).context("the results")?;
     parquet::write_events(&out.join("events.parquet"), judged).context("the events")?;
-    let names = ["results.parquet", "events.parquet"];
+    let page = html::page(evaluation, judged, tables).context("the page")?;
+    write_whole(&out.join("report.html"), page.as_bytes())?;
+    let names = ["report.html", "results.parquet", "events.parquet"];
     Ok(names.map(|name| out.join(name)).to_vec())
 }
 
-/// Makes a folder for results.
+/// The twin as a pipeline loads it, with the statistics that thresholds are made from.
+fn write_twin<'a>(
+    folder: &Path,
+    twin: &Prepared,
+    runners: impl Iterator<Item = &'a Runner>,
+) -> Result<(), Failure> {
+    let mut file = twin.file.clone();
+    for runner in runners {
+        let statistics = ScoreStatistics {
+            mean: runner.statistics.mean,
+            standard_deviation: runner.statistics.standard_deviation,
+            samples: runner.counted,
+        };
+        file.scores.insert(runner.entry.name.to_owned(), statistics);
+    }
+    let text = serde_saphyr::to_string(&file).context("the twin")?;
+    write_whole(&folder.join("twin.yaml"), text.as_bytes())
+}
+
+/// Makes the folder for results.
 ///
 /// # Errors
-/// If it cannot be made.
-pub fn make(folder: &Path) -> Result<(), Failure> {
+/// If it cannot be made, or a twin that was given would be overwritten.
+pub fn prepare(out: &Path, request: &Request) -> Result<(), Failure> {
+    make(out)?;
+    for (index, twin) in request.twins.iter().enumerate() {
+        let folder = if index == 0 {
+            out.to_owned()
+        } else {
+            out.join(&twin.name)
+        };
+        let result = folder.join("twin.yaml").canonicalize().ok();
+        let mut given = request.twins.iter().filter_map(|twin| twin.path.as_ref());
+        if result.is_some() && given.any(|path| path.canonicalize().ok() == result) {
+            let title = format!(
+                "the result {}/twin.yaml would overwrite the twin",
+                folder.display()
+            );
+            let problem = Problem::new(title).help("give another folder with --out");
+            return Err(Failure::Rejected(problem.into()));
+        }
+    }
+    Ok(())
+}
+
+fn make(folder: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder)
         .map_err(|error| Failure::rejected(format!("cannot make {}: {error}", folder.display())))
 }

@@ -73,6 +73,8 @@ pub struct TwinChoice {
     pub name: String,
     /// What it is.
     pub source: TwinSource,
+    /// The file it came from.
+    pub path: Option<PathBuf>,
 }
 
 /// What is to be evaluated.
@@ -169,7 +171,7 @@ pub fn load(path: &Path, options: &Options) -> Result<Request, Report> {
         report.push(problem.help("name the recordings that are to be scored under `test`"));
     }
     let facts = Facts::of(&set, &recordings);
-    let detectors = detectors(&options.detectors, &facts, &mut report);
+    let detectors = detectors(&options.detectors, facts, &mut report);
     let twins = twins(&set, &cell, &options.twins, &mut report);
     report.into_result(Request {
         set,
@@ -281,7 +283,7 @@ fn open(path: &Path, state: &str, contact: Option<&str>) -> Result<(i64, Option<
     Ok((start_ns, truth))
 }
 
-fn detectors(names: &[String], facts: &Facts, report: &mut Report) -> Vec<&'static Entry> {
+fn detectors(names: &[String], facts: Facts, report: &mut Report) -> Vec<&'static Entry> {
     if names.is_empty() {
         let usual = registry::ENTRIES
             .iter()
@@ -350,8 +352,10 @@ fn twins(set: &SetFile, cell: &Cell, names: &[String], report: &mut Report) -> V
         if alike > 0 {
             short = format!("{short}_{}", all.len() + 1);
         }
+        let from_file = matches!(source, TwinSource::File(_));
         all.push(TwinChoice {
             name: short,
+            path: from_file.then(|| path.to_owned()),
             source,
         });
     }

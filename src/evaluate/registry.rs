@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use tauscope_detect::{
     Config, LearnError, Lessons, Setup, contact_classifier, fisher_discriminant,
-    frequency_classifier, virtual_collision_sensor, virtual_collision_sensor_basic,
+    frequency_classifier, naive_difference, twin_regression, virtual_collision_sensor,
+    virtual_collision_sensor_basic,
 };
 
 use super::input::{Named, Role};
@@ -20,7 +21,7 @@ pub struct Entry {
     /// How many samples it judges at once, for one that judges windows.
     pub window: Option<usize>,
     /// Whether it runs on a set where nobody names detectors.
-    pub usual: fn(&Facts) -> bool,
+    pub usual: fn(Facts) -> bool,
     /// Trains or tunes it: what its part of a pipeline file would be.
     pub learn: fn(&Task<'_>) -> Result<Config, LearnError>,
 }
@@ -66,14 +67,9 @@ impl Facts {
             cyclic: set.cycle_s.is_some(),
         }
     }
-
-    /// Neither: a robot on ever new paths.
-    pub fn is_plain(&self) -> bool {
-        !self.kinds && !self.cyclic
-    }
 }
 
-fn always(_: &Facts) -> bool {
+fn always(_: Facts) -> bool {
     true
 }
 
@@ -90,7 +86,7 @@ pub static ENTRIES: &[Entry] = &[
         usual: always,
         learn: |_| {
             Ok(Config {
-                naive_difference: Some(Default::default()),
+                naive_difference: Some(naive_difference::Settings::default()),
                 ..Config::default()
             })
         },
@@ -102,7 +98,7 @@ pub static ENTRIES: &[Entry] = &[
         usual: always,
         learn: |_| {
             Ok(Config {
-                twin_regression: Some(Default::default()),
+                twin_regression: Some(twin_regression::Settings::default()),
                 ..Config::default()
             })
         },

@@ -21,7 +21,9 @@ pub struct Output {
     pub role: Role,
     /// Stamps \[s from the first joint state\].
     pub t: Vec<f64>,
-    /// The score of each sample; where the detector was not ready, the lowest of the validation recordings.
+    /// The score of each sample. One that the detector was not ready for cannot raise an alarm: it stands with
+    /// the lowest score of the validation recordings, and within these with their mean, so that it does
+    /// not move the threshold.
     pub scores: Vec<f64>,
     /// What it found.
     pub events: Vec<Event>,
@@ -41,6 +43,8 @@ pub struct Runner {
     pub training_s: f64,
     /// What its score does on the validation recordings while nothing touches the robot.
     pub statistics: ScoreStatistics,
+    /// Over how many samples.
+    pub counted: u64,
     /// Its score from which on it raises an alarm.
     pub threshold: f64,
     /// What it has said so far.
@@ -69,7 +73,7 @@ impl Runner {
             some => some,
         };
         let mut setup = task.setup.clone();
-        let (statistics, lowest) = statistics(&config, &setup, measured)
+        let (statistics, lowest, counted) = statistics(&config, &setup, measured)
             .map_err(|error| failed(error.into()))?
             .ok_or(EvaluateError::NeverReady {
                 detector: entry.name,
@@ -82,6 +86,7 @@ impl Runner {
             config,
             training_s,
             statistics,
+            counted,
             threshold: f64::NAN,
             outputs: Vec::new(),
             stage,
@@ -102,12 +107,16 @@ impl Runner {
         let mut last = Last(Detection::default());
         let mut tally = DetectionTally::new(self.entry.name, joint_names).since(recording.start_ns);
         let mut scores = Vec::with_capacity(samples.len());
+        let not_ready = match recording.role {
+            Role::Test => self.lowest,
+            Role::Train | Role::Validation => self.statistics.mean,
+        };
         let began = Instant::now();
         for sample in samples {
             self.stage.accept(sample, &mut last)?;
             let said = &last.0;
             let judged = said.header.has(flags::READY) && said.score.is_finite();
-            scores.push(if judged { said.score } else { self.lowest });
+            scores.push(if judged { said.score } else { not_ready });
             tally.add(said);
         }
         let took_s = began.elapsed().as_secs_f64();
@@ -139,16 +148,15 @@ impl Emit<Detection> for Last {
     }
 }
 
-/// What the score does on the contact-free part of `lessons`, and the lowest of all; samples that the
-/// detector is not ready for count with that. `None` if it never is.
+/// What the score does on the contact-free part of `lessons`, the lowest of all, and how many samples were
+/// counted; those that the detector is not ready for count with the mean. `None` if it never is ready.
 fn statistics(
     config: &Config,
     setup: &Setup,
     lessons: &[Lesson],
-) -> Result<Option<(ScoreStatistics, f64)>, tauscope_detect::ConfigError> {
+) -> Result<Option<(ScoreStatistics, f64, u64)>, tauscope_detect::ConfigError> {
     let mut detector = config.detector(setup)?;
-    let mut scores = Vec::new();
-    let mut missed = 0_u64;
+    let (mut scores, mut count) = (Vec::new(), 0_u64);
     let mut lowest = f64::INFINITY;
     for lesson in lessons {
         for sample in &lesson.samples {
@@ -158,23 +166,19 @@ fn statistics(
                 lowest = lowest.min(judgement.score);
             }
             if is_free_of(lesson, sample.header.stamp_ns) {
-                match judged {
-                    true => scores.push(judgement.score),
-                    false => missed += 1,
-                }
+                count += 1;
+                scores.extend(judged.then_some(judgement.score));
             }
         }
     }
     if scores.is_empty() {
         return Ok(None);
     }
-    let count = scores.len() as f64 + missed as f64;
-    let mean = (scores.iter().sum::<f64>() + lowest * missed as f64) / count;
+    let mean = scores.iter().sum::<f64>() / scores.len() as f64;
     let squares: f64 = scores.iter().map(|score| (score - mean).powi(2)).sum();
-    let variance = (squares + missed as f64 * (lowest - mean).powi(2)) / count;
     let statistics = ScoreStatistics {
         mean,
-        standard_deviation: variance.sqrt(),
+        standard_deviation: (squares / count as f64).sqrt(),
     };
-    Ok(Some((statistics, lowest)))
+    Ok(Some((statistics, lowest, count)))
 }

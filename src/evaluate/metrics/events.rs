@@ -38,8 +38,8 @@ pub struct Matching<'a> {
 }
 
 impl<'a> Matching<'a> {
-    /// A detection belongs to the latest-starting event with t_on - [`TOLERANCE_S`] <= t <= t_off +
-    /// [`AFTER_S`]. The first of an event is its hit, later ones count for nothing. One that belongs to no
+    /// A detection belongs to the latest-starting event that lasts at the alarm's instant, widened by [`TOLERANCE_S`]
+    /// before and [`AFTER_S`] behind. The first of an event is its hit, later ones count for nothing. One that belongs to no
     /// event is a false alarm, unless it comes within `rest_s` of the end of one, or within [`MERGE_S`] of the
     /// last false alarm that was counted.
     pub fn of(truth: &'a Truth, detections: &'a [Event], rest_s: f64) -> Self {

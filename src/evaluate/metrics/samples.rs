@@ -1,5 +1,7 @@
 //! Scores sample by sample: F1, the best of the thresholds of Tajiri and Iwamoto's section IV-C, and AUC.
 
+use std::cmp::Ordering;
+
 use crate::evaluate::labels::Truth;
 
 /// Scores and whether each is a positive.
@@ -124,7 +126,7 @@ impl Labelled {
         let mut before = f64::NAN;
         for index in order {
             // The same score, or the other zero.
-            if steps.is_empty() || self.scores[index] != before {
+            if self.scores[index].partial_cmp(&before) != Some(Ordering::Equal) {
                 steps.push((0.0, 0.0));
                 before = self.scores[index];
             }

@@ -126,7 +126,7 @@ fn scores(numbers: &[Numbers], of: impl Fn(&Numbers) -> Option<&SampleNumbers>) 
     [
         over_seeds(&column(|n| n.f1), 3),
         over_seeds(&column(|n| n.best_f1), 3),
-        number(sigmas, if sigmas < 1.0 { 1 } else { 0 }),
+        number(sigmas, usize::from(sigmas < 1.0)),
         over_seeds(&column(|n| n.auc), 3),
     ]
 }

@@ -4,7 +4,7 @@
 //! Everything that comes from a file or a name is escaped by the template; the pictures are SVG in the page and take
 //! their colours from its style sheet (Okabe and Ito's, which the colour-blind can tell apart).
 
-mod chart;
+pub mod chart;
 mod effects;
 mod findings;
 mod proof;
@@ -20,10 +20,11 @@ use crate::report::{RecordingPicture, Report, Verdict};
 
 use self::words::{almost_all, effort_unit};
 
-const STYLE: &str = include_str!("html/style.css");
+/// The style sheet of our pages.
+pub const STYLE: &str = include_str!("html/style.css");
 
 /// Nothing may be loaded and nothing may run: also if a name in a file tries to.
-const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'";
+pub const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'";
 
 /// A verdict of more letters than this is set smaller.
 const LONG: usize = 130;

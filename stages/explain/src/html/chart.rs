@@ -8,7 +8,7 @@ use super::words::fixed;
 
 /// A range of values, laid over a range of pixels.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Axis {
+pub struct Axis {
     low: f64,
     high: f64,
     from_px: f64,
@@ -45,6 +45,7 @@ impl Axis {
     }
 
     /// The same with some room at both ends.
+    #[must_use]
     pub fn padded(mut self, share: f64) -> Self {
         let room = share * (self.high - self.low);
         self.low -= room;
@@ -90,8 +91,10 @@ impl Axis {
 
 /// A rectangle with values along both sides.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Panel {
+pub struct Panel {
+    /// Along the lower side.
     pub x: Axis,
+    /// Along the left side.
     pub y: Axis,
 }
 
@@ -182,7 +185,7 @@ impl Panel {
 }
 
 /// A pixel to a tenth.
-pub(super) fn r(value: f64) -> String {
+pub fn r(value: f64) -> String {
     px(tenths(value))
 }
 
@@ -201,7 +204,7 @@ fn px(tenths: i64) -> String {
 
 /// A range that leaves out the outermost `share` at both ends, so that a few wild points do not squeeze all
 /// others; `None` where nothing is finite.
-pub(super) fn bulk(values: impl IntoIterator<Item = f64>, share: f64) -> Option<[f64; 2]> {
+pub fn bulk(values: impl IntoIterator<Item = f64>, share: f64) -> Option<[f64; 2]> {
     let mut values: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
     values.sort_by(f64::total_cmp);
     let out = (share * values.len() as f64) as usize;
