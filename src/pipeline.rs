@@ -15,7 +15,7 @@ use tauscope_bus::Keep;
 use tauscope_twin::TwinFile;
 
 pub use cells::{Cell, CellFacts};
-pub use file::{EffortUnit, HostEntry, KeepEntry, OutsideEntry, PipelineFile};
+pub use file::{EffortUnit, HostEntry, KeepEntry, OutsideEntry, PipelineFile, ToolEntry};
 pub use role::{Role, words_for};
 pub use scenario::ScenarioFacts;
 

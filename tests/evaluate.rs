@@ -127,7 +127,7 @@ fn every_contact_of_the_bundled_set_is_found_and_scored() {
     assert_eq!(first["force"].as_array().unwrap().len(), 3);
     let scores = std::fs::read_to_string(out.join("demo.twin_regression.csv")).unwrap();
     assert!(scores.starts_with("t,score\n0,"), "{}", &scores[..30]);
-    assert_eq!(scores.lines().count(), 1 + 3000);
+    assert_eq!(scores.lines().count(), 1 + 3001);
     assert!(out.join("demo_validation.twin_regression.json").is_file());
     let page = std::fs::read_to_string(out.join("report.html")).unwrap();
     assert!(page.contains("<svg") && !page.contains("<script") && !page.contains("http"));

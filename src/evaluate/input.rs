@@ -10,7 +10,7 @@ use tauscope_twin::TwinFile;
 use super::labels::{self, LabelsFile, Truth};
 use super::registry::{self, Entry, Facts};
 use crate::files::SetFile;
-use crate::pipeline::Cell;
+use crate::pipeline::{Cell, ToolEntry};
 use crate::replay::stem;
 use crate::report::{Problem, Report};
 use crate::suggest;
@@ -157,13 +157,21 @@ pub fn load(path: &Path, options: &Options) -> Result<Request, Report> {
     let mut report = Report::default();
     let mut notes = Vec::new();
     let constants = set.torque_constants_nm_per_a.clone().unwrap_or_default();
-    let cell = Cell::from_urdf(&file.resolve(&set.robot), set.effort_unit, &constants)?;
+    let mut cell = Cell::from_urdf(&file.resolve(&set.robot), set.effort_unit, &constants)?;
     if let Some(link) = &set.tool_link
         && (cell.model.as_ref()).is_some_and(|model| model.link_index(link).is_none())
     {
         let title = format!("the robot has no link `{link}`");
         report.push(file.at(&root.key("tool_link"), title));
     }
+    cell.facts.tool = set.tool_link.clone().map(|link| ToolEntry {
+        link,
+        // What it weighs is in the URDF.
+        mass_kg: 0.0,
+        com_m: [0.0; 3],
+        inertia_kgm2: [0.0; 6],
+        contact_point_m: set.contact_point_on_tool_m,
+    });
     let labels = find_labels(&file, &mut notes, &mut report);
     let recordings = recordings(&file, labels.as_ref(), &mut report);
     if set.test.is_empty() && set.validation.is_empty() {

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use tauscope_detect::{
     Config, LearnError, Lessons, Setup, contact_classifier, fisher_discriminant,
-    frequency_classifier, naive_difference, twin_regression, virtual_collision_sensor,
-    virtual_collision_sensor_basic,
+    frequency_classifier, momentum_observer, naive_difference, twin_regression,
+    virtual_collision_sensor, virtual_collision_sensor_basic,
 };
 
 use super::input::{Named, Role};
@@ -87,6 +87,18 @@ pub static ENTRIES: &[Entry] = &[
         learn: |_| {
             Ok(Config {
                 naive_difference: Some(naive_difference::Settings::default()),
+                ..Config::default()
+            })
+        },
+    },
+    Entry {
+        name: "momentum_observer",
+        random: false,
+        window: None,
+        usual: always,
+        learn: |_| {
+            Ok(Config {
+                momentum_observer: Some(momentum_observer::Settings::default()),
                 ..Config::default()
             })
         },

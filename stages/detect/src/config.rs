@@ -9,8 +9,8 @@ use crate::detector::Detector;
 use crate::stage::Setup;
 use crate::virtual_collision_sensor::Learnt;
 use crate::{
-    contact_classifier, fisher_discriminant, frequency_classifier, naive_difference,
-    twin_regression, virtual_collision_sensor, virtual_collision_sensor_basic,
+    contact_classifier, fisher_discriminant, frequency_classifier, momentum_observer,
+    naive_difference, twin_regression, virtual_collision_sensor, virtual_collision_sensor_basic,
 };
 
 /// The papers' k, where the file names no threshold.
@@ -42,6 +42,10 @@ pub struct Config {
     /// The same detection, told apart by the frequency content alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frequency_classifier: Option<frequency_classifier::Settings>,
+    /// Squared length of the external torque that a momentum observer of the rigid body estimates (Tajiri
+    /// and Iwamoto).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub momentum_observer: Option<momentum_observer::Settings>,
     /// When the alarm is raised.
     pub threshold: Threshold,
     /// An alarm ends once the score has stayed below the threshold for this long \[s\].
@@ -59,6 +63,7 @@ impl Default for Config {
             contact_classifier: None,
             fisher_discriminant: None,
             frequency_classifier: None,
+            momentum_observer: None,
             threshold: Threshold::default(),
             // Bridges the dip between two swings of one contact.
             hold_s: 0.1,
@@ -102,6 +107,7 @@ impl Config {
                 self.frequency_classifier.is_some(),
                 frequency_classifier::NAME,
             ),
+            (self.momentum_observer.is_some(), momentum_observer::NAME),
         ];
         let mut names = given
             .iter()
@@ -131,6 +137,7 @@ impl Config {
         let all = Self {
             twin_regression: Some(twin_regression::Settings::default()),
             naive_difference: Some(naive_difference::Settings::default()),
+            momentum_observer: (setup.model.is_some()).then(momentum_observer::Settings::default),
             ..Self::default()
         };
         all.detectors(setup)
@@ -158,6 +165,8 @@ impl Config {
         if let Some(settings) = &self.virtual_collision_sensor {
             let sensor = virtual_collision_sensor::build(settings, setup, self.hold_s)?;
             all.push(Box::new(sensor));
+        if let Some(settings) = &self.momentum_observer {
+            all.push(momentum_observer::build(settings, setup)?);
         }
         if let Some(settings) = &self.contact_classifier {
             all.push(contact_classifier::build(settings, setup)?);

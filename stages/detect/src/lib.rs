@@ -17,6 +17,7 @@ pub mod frequency_classifier;
 mod isolation;
 mod lesson;
 pub mod momentum;
+pub mod momentum_observer;
 pub mod naive_difference;
 pub mod sliding_dft;
 mod stage;

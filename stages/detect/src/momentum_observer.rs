@@ -1,0 +1,109 @@
+//! `momentum_observer`: Tajiri and Iwamoto, section IV-B 2 ("Naive MOB"): the squared length of the external
+//! torque that the [momentum observer](crate::momentum) estimates.
+//!
+//! The observer is that of the rigid body: like [`naive_difference`](crate::naive_difference) it undoes the
+//! twin's gain and offset. The paper gives all methods low-pass filtered data; the observer is linear in the
+//! efforts, so the same low-pass stands behind it.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tauscope_bus::{MAX_JOINTS, TwinState, flags};
+use tauscope_dynamics::lowpass::Butterworth2;
+
+use crate::config::ConfigError;
+use crate::detector::{Detector, Judgement};
+use crate::momentum::{DEFAULT_GAIN_PER_S, MomentumObserver};
+use crate::stage::Setup;
+
+/// Canonical name.
+pub(crate) const NAME: &str = "momentum_observer";
+
+/// Settings of `momentum_observer`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Settings {
+    /// The observer's gain \[1/s\].
+    #[schemars(range(min = 0.01, max = 100_000.0))]
+    pub gain_per_s: f64,
+    /// Low-pass on the observed torques \[Hz\].
+    #[schemars(range(min = 0.01, max = 10_000.0))]
+    pub cutoff_hz: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            gain_per_s: DEFAULT_GAIN_PER_S,
+            // The twin's on efforts; the paper does not give its own.
+            cutoff_hz: 4.0,
+        }
+    }
+}
+
+/// The detector behind a twin with the gains and offsets of `setup`.
+pub(crate) fn build(settings: &Settings, setup: &Setup) -> Result<Box<dyn Detector>, ConfigError> {
+    let mut regression = [(1.0, 0.0); MAX_JOINTS];
+    for (own, joint) in regression.iter_mut().zip(&setup.joints) {
+        *own = (joint.gain, joint.offset);
+    }
+    let filter = Butterworth2::new(settings.cutoff_hz);
+    Ok(Box::new(Naive {
+        observer: MomentumObserver::new(setup, settings.gain_per_s, NAME)?,
+        regression,
+        settling_ns: (filter.settling_time_s() * 1e9) as i64,
+        filters: vec![filter; setup.joints.len()],
+        previous_ns: None,
+        started_ns: 0,
+    }))
+}
+
+struct Naive {
+    observer: MomentumObserver,
+    /// Gain and offset by joint, as the twin applied them.
+    regression: [(f64, f64); MAX_JOINTS],
+    /// By joint, on the observed torque.
+    filters: Vec<Butterworth2>,
+    settling_ns: i64,
+    previous_ns: Option<i64>,
+    started_ns: i64,
+}
+
+impl Detector for Naive {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn judge(&mut self, sample: &TwinState) -> Judgement {
+        let stamp_ns = sample.header.stamp_ns;
+        let mut plain = *sample;
+        for (effort, (gain, offset)) in plain.expected_effort.iter_mut().zip(&self.regression) {
+            // A gain of zero has wiped the model's effort out: nothing is left to compare with.
+            *effort = if *gain == 0.0 {
+                0.0
+            } else {
+                (*effort - offset) / gain
+            };
+        }
+        let torque_nm = self.observer.update(&plain);
+        let previous_ns =
+            (self.previous_ns.replace(stamp_ns)).filter(|_| !sample.header.has(flags::RESET));
+        if previous_ns.is_none() {
+            self.started_ns = stamp_ns;
+            for (filter, torque) in self.filters.iter_mut().zip(torque_nm) {
+                filter.reset(*torque);
+            }
+        }
+        let dt_s = previous_ns.map_or(0.0, |before| (stamp_ns - before) as f64 * 1e-9);
+        let torques = self.filters.iter_mut().zip(torque_nm);
+        let score = torques
+            .map(|(filter, torque)| filter.update(dt_s, *torque).powi(2))
+            .sum();
+        Judgement {
+            score,
+            ready: sample.header.has(flags::READY)
+                && self.observer.settled()
+                && stamp_ns - self.started_ns >= self.settling_ns,
+            verdict: None,
+        }
+    }
+}
