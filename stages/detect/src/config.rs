@@ -165,6 +165,7 @@ impl Config {
         if let Some(settings) = &self.virtual_collision_sensor {
             let sensor = virtual_collision_sensor::build(settings, setup, self.hold_s)?;
             all.push(Box::new(sensor));
+        }
         if let Some(settings) = &self.momentum_observer {
             all.push(momentum_observer::build(settings, setup)?);
         }
