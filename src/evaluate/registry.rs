@@ -73,7 +73,7 @@ fn always(_: Facts) -> bool {
     true
 }
 
-fn tells_kinds(facts: &Facts) -> bool {
+fn tells_kinds(facts: Facts) -> bool {
     facts.kinds
 }
 
