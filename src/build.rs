@@ -13,6 +13,7 @@ use tauscope_twin::{Correction, Twin, TwinFile};
 
 use crate::pipeline::{Cell, EffortUnit, Pipeline, Settings};
 use crate::provenance;
+use crate::trained;
 
 /// Why a stage cannot be built.
 #[derive(Debug, thiserror::Error)]
@@ -26,6 +27,9 @@ pub enum BuildError {
     /// The detector.
     #[error(transparent)]
     Detect(#[from] tauscope_detect::ConfigError),
+    /// The file of a trained detector.
+    #[error(transparent)]
+    Trained(#[from] trained::TrainedFileError),
 }
 
 /// What a source of `cell` must know of it.
@@ -142,7 +146,9 @@ pub fn detect(
     model: Option<&TwinFile>,
     cell: &Cell,
 ) -> Result<Detect, BuildError> {
-    Ok(Detect::new(config, detect_setup(model, cell)?)?)
+    let mut setup = detect_setup(model, cell)?;
+    trained::read(config, &mut setup)?;
+    Ok(Detect::new(config, setup)?)
 }
 
 /// What a detector behind a twin of `cell` with this `model` must know.
@@ -185,6 +191,7 @@ pub fn detect_setup(
         tool_link: cell.tool_link(),
         contact_point_on_tool_m: cell.contact_point_on_tool_m(),
         impedance: cell.facts.impedance,
+        trained: BTreeMap::new(),
     })
 }
 

@@ -19,6 +19,7 @@ mod replay;
 mod report;
 mod suggest;
 mod supervisor;
+mod trained;
 mod yaml;
 
 use std::io::IsTerminal;

@@ -4,12 +4,14 @@ use std::path::PathBuf;
 
 use tauscope_detect::{
     Config, LearnError, Lessons, Setup, contact_classifier, fisher_discriminant,
-    frequency_classifier, momentum_observer, naive_difference, twin_regression,
-    virtual_collision_sensor, virtual_collision_sensor_basic,
+    frequency_classifier, lstm_momentum_observer, momentum_observer, naive_difference,
+    point_autoencoder, point_ocsvm, twin_regression, virtual_collision_sensor,
+    virtual_collision_sensor_basic, window_autoencoder, window_ocsvm,
 };
 
 use super::input::{Named, Role};
 use crate::files::SetFile;
+use crate::trained;
 
 /// A detector that can be evaluated.
 #[derive(Debug)]
@@ -73,6 +75,11 @@ fn always(_: Facts) -> bool {
     true
 }
 
+/// Neither kinds nor a cycle: a robot on ever new paths.
+fn is_plain(facts: Facts) -> bool {
+    !facts.kinds && !facts.cyclic
+}
+
 fn tells_kinds(facts: Facts) -> bool {
     facts.kinds
 }
@@ -111,6 +118,101 @@ pub static ENTRIES: &[Entry] = &[
         learn: |_| {
             Ok(Config {
                 twin_regression: Some(twin_regression::Settings::default()),
+                ..Config::default()
+            })
+        },
+    },
+    Entry {
+        name: point_ocsvm::NAME,
+        random: false,
+        window: None,
+        usual: is_plain,
+        learn: |task| {
+            let mut settings = point_ocsvm::Settings::default();
+            let trained =
+                point_ocsvm::train(&settings, task.setup, &task.lessons, task.seed, &mut |_| ())?;
+            settings.model = Some(trained::write(&task.weights, &task.lessons, trained)?);
+            Ok(Config {
+                point_ocsvm: Some(settings),
+                ..Config::default()
+            })
+        },
+    },
+    Entry {
+        name: point_autoencoder::NAME,
+        random: true,
+        window: None,
+        usual: is_plain,
+        learn: |task| {
+            let mut settings = point_autoencoder::Settings::default();
+            let trained = point_autoencoder::train(
+                &settings,
+                task.setup,
+                &task.lessons,
+                task.seed,
+                &mut |_| (),
+            )?;
+            settings.model = Some(trained::write(&task.weights, &task.lessons, trained)?);
+            Ok(Config {
+                point_autoencoder: Some(settings),
+                ..Config::default()
+            })
+        },
+    },
+    Entry {
+        name: lstm_momentum_observer::NAME,
+        random: true,
+        window: None,
+        usual: is_plain,
+        learn: |task| {
+            let mut settings = lstm_momentum_observer::Settings::default();
+            let trained = lstm_momentum_observer::train(
+                &settings,
+                task.setup,
+                &task.lessons,
+                task.seed,
+                &mut |_| (),
+            )?;
+            settings.model = Some(trained::write(&task.weights, &task.lessons, trained)?);
+            Ok(Config {
+                lstm_momentum_observer: Some(settings),
+                ..Config::default()
+            })
+        },
+    },
+    Entry {
+        name: window_ocsvm::NAME,
+        random: false,
+        window: Some(16),
+        usual: is_plain,
+        learn: |task| {
+            let mut settings = window_ocsvm::Settings::default();
+            let trained =
+                window_ocsvm::train(&settings, task.setup, &task.lessons, task.seed, &mut |_| ())?;
+            settings.model = Some(trained::write(&task.weights, &task.lessons, trained)?);
+            Ok(Config {
+                window_ocsvm: Some(settings),
+                ..Config::default()
+            })
+        },
+    },
+    Entry {
+        name: window_autoencoder::NAME,
+        random: true,
+        window: Some(16),
+        usual: is_plain,
+        learn: |task| {
+            let mut settings = window_autoencoder::Settings::default();
+            let trained = window_autoencoder::train(
+                &settings,
+                task.setup,
+                &task.lessons,
+                task.seed,
+                &mut |_| (),
+            )?;
+            settings.model = Some(trained::write(&task.weights, &task.lessons, trained)?);
+            Ok(Config {
+                window_autoencoder: Some(settings),
                 ..Config::default()
             })
         },

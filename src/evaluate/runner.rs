@@ -10,7 +10,9 @@ use super::EvaluateError;
 use super::input::{Named, Role};
 use super::registry::{Entry, Task};
 use super::twin::is_free_of;
+use crate::build::BuildError;
 use crate::replay::{DetectionTally, Event};
+use crate::trained;
 
 /// What a detector made of one recording.
 #[derive(Debug, Clone)]
@@ -73,6 +75,7 @@ impl Runner {
             some => some,
         };
         let mut setup = task.setup.clone();
+        trained::read(&config, &mut setup).map_err(BuildError::from)?;
         let (statistics, lowest, counted) = statistics(&config, &setup, measured)
             .map_err(|error| failed(error.into()))?
             .ok_or(EvaluateError::NeverReady {

@@ -26,6 +26,17 @@ impl Resolver<'_> {
         if let Some(path) = config.state_mut() {
             *path = self.file.resolve(path);
         }
+        for (name, path) in config.trained_files_mut() {
+            *path = self.file.resolve(path);
+            if !path.exists() {
+                let place = place.key(name).key("model");
+                let title = format!("there is no trained detector {}", path.display());
+                let problem = self.file.at(&place, title);
+                let help = "`tauscope evaluate` trains one";
+                self.report.push(problem.help(help));
+                return None;
+            }
+        }
         let mut resumed = config.clone();
         if self.is_here(index)
             && let Err(problems) = learnt_state::resume(&mut resumed)

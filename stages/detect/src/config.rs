@@ -6,11 +6,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::detector::Detector;
+use crate::learned::TrainedError;
 use crate::stage::Setup;
 use crate::virtual_collision_sensor::Learnt;
 use crate::{
-    contact_classifier, fisher_discriminant, frequency_classifier, momentum_observer,
-    naive_difference, twin_regression, virtual_collision_sensor, virtual_collision_sensor_basic,
+    contact_classifier, fisher_discriminant, frequency_classifier, lstm_momentum_observer,
+    momentum_observer, naive_difference, point_autoencoder, point_ocsvm, twin_regression,
+    virtual_collision_sensor, virtual_collision_sensor_basic, window_autoencoder, window_ocsvm,
 };
 
 /// The papers' k, where the file names no threshold.
@@ -26,8 +28,7 @@ pub struct Config {
     /// The same without the regression: gain 1, offset 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub naive_difference: Option<naive_difference::Settings>,
-    /// Collisions from measured and expected effort alone, with a constant bias (Indri, Trapani and
-    /// Lazzero).
+    /// Collisions from both efforts alone, with a constant bias (Indri, Trapani and Lazzero).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub virtual_collision_sensor_basic: Option<virtual_collision_sensor_basic::Settings>,
     /// The same with a bias that is learnt and adapts.
@@ -42,10 +43,24 @@ pub struct Config {
     /// The same detection, told apart by the frequency content alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frequency_classifier: Option<frequency_classifier::Settings>,
-    /// Squared length of the external torque that a momentum observer of the rigid body estimates (Tajiri
-    /// and Iwamoto).
+    /// Squared length of the external torque that a momentum observer of the rigid body sees.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub momentum_observer: Option<momentum_observer::Settings>,
+    /// One-class support vector machine over the external torques of one sample (Tajiri and Iwamoto).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub point_ocsvm: Option<point_ocsvm::Settings>,
+    /// Autoencoder over the external torques of one sample (Tajiri and Iwamoto).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub point_autoencoder: Option<point_autoencoder::Settings>,
+    /// Momentum observer less what an LSTM expects of it (Tajiri and Iwamoto, after Lim et al.).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lstm_momentum_observer: Option<lstm_momentum_observer::Settings>,
+    /// `point_ocsvm` over windows (after Park et al.).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub window_ocsvm: Option<window_ocsvm::Settings>,
+    /// `point_autoencoder` over windows (after Park et al.).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub window_autoencoder: Option<window_autoencoder::Settings>,
     /// When the alarm is raised.
     pub threshold: Threshold,
     /// An alarm ends once the score has stayed below the threshold for this long \[s\].
@@ -64,6 +79,11 @@ impl Default for Config {
             fisher_discriminant: None,
             frequency_classifier: None,
             momentum_observer: None,
+            point_ocsvm: None,
+            point_autoencoder: None,
+            lstm_momentum_observer: None,
+            window_ocsvm: None,
+            window_autoencoder: None,
             threshold: Threshold::default(),
             // Bridges the dip between two swings of one contact.
             hold_s: 0.1,
@@ -108,6 +128,14 @@ impl Config {
                 frequency_classifier::NAME,
             ),
             (self.momentum_observer.is_some(), momentum_observer::NAME),
+            (self.point_ocsvm.is_some(), point_ocsvm::NAME),
+            (self.point_autoencoder.is_some(), point_autoencoder::NAME),
+            (
+                self.lstm_momentum_observer.is_some(),
+                lstm_momentum_observer::NAME,
+            ),
+            (self.window_ocsvm.is_some(), window_ocsvm::NAME),
+            (self.window_autoencoder.is_some(), window_autoencoder::NAME),
         ];
         let mut names = given
             .iter()
@@ -178,7 +206,55 @@ impl Config {
         if let Some(settings) = &self.frequency_classifier {
             all.push(frequency_classifier::build(settings, setup)?);
         }
+        if self.point_ocsvm.is_some() {
+            all.push(point_ocsvm::build(setup)?);
+        }
+        if self.point_autoencoder.is_some() {
+            all.push(point_autoencoder::build(setup)?);
+        }
+        if self.lstm_momentum_observer.is_some() {
+            all.push(lstm_momentum_observer::build(setup)?);
+        }
+        if self.window_ocsvm.is_some() {
+            all.push(window_ocsvm::build(setup)?);
+        }
+        if self.window_autoencoder.is_some() {
+            all.push(window_autoencoder::build(setup)?);
+        }
         Ok(all)
+    }
+
+    /// The files of trained detectors that are to be read into [`Setup::trained`], by detector.
+    pub fn trained_files_mut(&mut self) -> impl Iterator<Item = (&'static str, &mut PathBuf)> {
+        let files = [
+            (
+                point_ocsvm::NAME,
+                self.point_ocsvm.as_mut().and_then(|s| s.model.as_mut()),
+            ),
+            (
+                point_autoencoder::NAME,
+                self.point_autoencoder
+                    .as_mut()
+                    .and_then(|s| s.model.as_mut()),
+            ),
+            (
+                lstm_momentum_observer::NAME,
+                self.lstm_momentum_observer
+                    .as_mut()
+                    .and_then(|s| s.model.as_mut()),
+            ),
+            (
+                window_ocsvm::NAME,
+                self.window_ocsvm.as_mut().and_then(|s| s.model.as_mut()),
+            ),
+            (
+                window_autoencoder::NAME,
+                self.window_autoencoder
+                    .as_mut()
+                    .and_then(|s| s.model.as_mut()),
+            ),
+        ];
+        (files.into_iter()).filter_map(|(name, file)| file.map(|file| (name, file)))
     }
 }
 
@@ -192,7 +268,6 @@ pub struct Threshold {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigmas: Option<f64>,
     /// This score.
-    #[schemars(range(min = 0.0))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub score: Option<f64>,
 }
@@ -209,7 +284,7 @@ impl Threshold {
             (None, Some(score)) => Ok(score),
             (sigmas, None) => {
                 let sigmas = sigmas.unwrap_or(DEFAULT_SIGMAS);
-                match setup.scores.get(detector) {
+                match setup.statistics(detector) {
                     Some(score) => Ok(score.mean + sigmas * score.standard_deviation),
                     None => Err(ConfigError::NoStatistics { detector, sigmas }),
                 }
@@ -272,6 +347,42 @@ pub enum ConfigError {
     NotLearnt {
         /// The detector.
         detector: &'static str,
+    },
+    /// A detector that must be trained, and is not.
+    #[error(
+        "{detector} must be trained: `tauscope evaluate` does it on a set of recordings; give the file as its `model`"
+    )]
+    NotTrained {
+        /// The detector.
+        detector: &'static str,
+    },
+    /// The trained detector is another one.
+    #[error("the `model` of {detector} is a trained {found}")]
+    OtherDetector {
+        /// The detector in the pipeline file.
+        detector: &'static str,
+        /// The one in the file.
+        found: String,
+    },
+    /// The trained detector was trained for other joints.
+    #[error(
+        "the `model` of {detector} was trained for the joints {trained}, but the cell has {cell}: train it for this robot"
+    )]
+    OtherJoints {
+        /// The detector.
+        detector: &'static str,
+        /// The joints that it was trained for.
+        trained: String,
+        /// The cell's joints.
+        cell: String,
+    },
+    /// The file of the trained detector is damaged.
+    #[error("the `model` of {detector}: {source}")]
+    Trained {
+        /// The detector.
+        detector: &'static str,
+        /// What is wrong with it.
+        source: TrainedError,
     },
     /// Both kinds of threshold.
     #[error("`threshold` takes either `sigmas` or `score`, not both")]

@@ -1,6 +1,8 @@
 //! What a detector learns from: recordings behind the twin, and what touched the robot in them.
 
-use tauscope_bus::TwinState;
+use std::path::PathBuf;
+
+use tauscope_bus::{TwinState, flags};
 
 /// The recordings that a detector learns from.
 #[derive(Debug, Clone, Copy)]
@@ -20,6 +22,24 @@ pub struct Lesson {
     pub samples: Vec<TwinState>,
     /// What touched the robot; empty if nothing did, `None` if nobody has said.
     pub contacts: Option<Vec<LabelledContact>>,
+}
+
+impl Lesson {
+    /// Whether a labelled contact lasts at this instant \[ns since the epoch\].
+    pub fn touches(&self, stamp_ns: i64) -> bool {
+        let mut contacts = self.contacts.iter().flatten();
+        contacts.any(|contact| (contact.on_ns..=contact.off_ns).contains(&stamp_ns))
+    }
+
+    /// Every sample, the first of them a new beginning.
+    pub(crate) fn anew(&self) -> impl Iterator<Item = TwinState> {
+        let mut begin = flags::RESET;
+        self.samples.iter().map(move |sample| {
+            let mut sample = *sample;
+            sample.header.flags |= std::mem::take(&mut begin);
+            sample
+        })
+    }
 }
 
 /// A contact that somebody labelled.
@@ -66,6 +86,30 @@ pub enum LearnError {
         wanted: String,
         /// How much there is.
         found: String,
+    },
+    /// A setting of the training is out of range.
+    #[error("{detector} cannot be trained so: {what}")]
+    Setting {
+        /// The detector.
+        detector: &'static str,
+        /// What the setting must be.
+        what: &'static str,
+    },
+    /// What computes the training failed.
+    #[error("{detector} could not be trained: {reason}")]
+    Failed {
+        /// The detector.
+        detector: &'static str,
+        /// Why.
+        reason: String,
+    },
+    /// What was trained cannot be written.
+    #[error("the trained detector {} cannot be written: {reason}", path.display())]
+    NotKept {
+        /// Where it should have gone.
+        path: PathBuf,
+        /// Why not.
+        reason: String,
     },
     /// The settings do not fit.
     #[error(transparent)]

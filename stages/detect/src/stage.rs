@@ -1,6 +1,7 @@
 //! The detector as a stage: twin states in, a verdict for each out.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -11,6 +12,7 @@ use crate::config::{Config, ConfigError, Threshold};
 use crate::detector::Detector;
 use crate::events::{Alarm, OwnEvents, Step};
 use crate::isolation::Isolation;
+use crate::learned::Trained;
 use crate::virtual_collision_sensor::Learnt;
 
 /// What a detector must know of its cell and its twin.
@@ -28,6 +30,16 @@ pub struct Setup {
     pub contact_point_on_tool_m: Option<[f64; 3]>,
     /// The impedance that a Cartesian controller holds the tool with, where it is known.
     pub impedance: Option<Impedance>,
+    /// By detector, those that were trained.
+    pub trained: BTreeMap<String, Arc<Trained>>,
+}
+
+impl Setup {
+    /// What the score of `detector` does on contact-free data, as the twin says or else its training.
+    pub fn statistics(&self, detector: &str) -> Option<ScoreStatistics> {
+        let trained = || self.trained.get(detector).map(|trained| trained.score());
+        self.scores.get(detector).copied().or_else(trained)
+    }
 }
 
 /// What a Cartesian impedance controller holds the tool with (Salt Ducaju et al., equation 1).
@@ -108,8 +120,7 @@ impl Detect {
                 let threshold = config.threshold.resolve(detector.name(), &setup)?;
                 // The usual range of the score: one standard deviation above its mean.
                 let low = setup
-                    .scores
-                    .get(detector.name())
+                    .statistics(detector.name())
                     .map_or(0.5 * threshold, |score| {
                         score.mean + score.standard_deviation
                     });
