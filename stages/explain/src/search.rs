@@ -107,8 +107,10 @@ impl Search<'_> {
             let fit = Fit::new(self.problem, actives);
             let mut penalties = from.penalties.clone();
             penalties.push(curve.penalty);
-            carries_over(self.problem, &fit, &from.fit, &[joint])
-                .then_some(Explanation { fit, penalties })
+            let with = Explanation { fit, penalties };
+            let evident = with.ahead_of(from, &self.problem.worth) > CURVE_EVIDENCE
+                || overwhelming(&with, from);
+            (evident && carries_over(self.problem, &with.fit, &from.fit, &[joint])).then_some(with)
         };
         if !own.is_empty() {
             let mut bare = best.clone();

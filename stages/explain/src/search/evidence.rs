@@ -21,8 +21,9 @@ const INTERVAL_EVIDENCE: f64 = 40.0;
 const LEAST_SIZE_BESIDE_CURVE: f64 = 1.0;
 /// Evidence that needs no account of correlation, if rows counted in full \[nats\].
 const OVERWHELMING: f64 = 40.0;
-/// And what is left over what is then left.
+/// And what is left over what is then left; a curve, which bends to any slow noise, must do much more.
 const FAIR_SHARE: f64 = 1.3;
+const FAIR_SHARE_OF_CURVE: f64 = 3.0;
 /// A change of friction smaller than this share of it is what friction does from day to day.
 const LEAST_STEP: f64 = 0.3;
 
@@ -47,7 +48,13 @@ impl Explanation {
 /// in full: however correlated the rest is, that much is no chance.
 pub fn overwhelming(explanation: &Explanation, other: &Explanation) -> bool {
     let white = vec![1.0; other.fit.variance.len()];
-    let less = |(with, without): (&f64, &f64)| *without > FAIR_SHARE * with;
+    let curves = |e: &Explanation| e.fit.actives.iter().filter(|a| a.curve.is_some()).count();
+    let share = if curves(explanation) > curves(other) {
+        FAIR_SHARE_OF_CURVE
+    } else {
+        FAIR_SHARE
+    };
+    let less = |(with, without): (&f64, &f64)| *without > share * with;
     explanation.ahead_of(other, &white) > OVERWHELMING
         && explanation
             .fit
