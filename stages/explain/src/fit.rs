@@ -4,11 +4,13 @@ use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::{CoordinateKind, Layer, Scale};
 
 use crate::active::{Active, Column, Efforts, Hypothesis, change, record};
+use crate::columns::columns;
+use crate::drive::is_drive;
 use crate::least_squares::Products;
 use crate::problem::Problem;
 
 const MAX_ITERATIONS: usize = 12;
-/// A step that gains less log-likelihood than this is the last.
+/// A step that gains less log-likelihood than this is the last \[nats\].
 const CONVERGED: f64 = 1e-3;
 /// Step of the difference quotient of a time \[s\].
 const TIME_STEP_S: f64 = 0.01;
@@ -112,6 +114,16 @@ impl Fit {
             .actives
             .iter()
             .any(|a| a.hypothesis.effect.layer == Layer::Record);
+        let count = active.coordinates.len();
+        let linear = active.curve.is_none()
+            && !is_drive(&active.hypothesis)
+            && active.hypothesis.factors().len() == count;
+        if linear && !recorded {
+            // What a coordinate adds is the same wherever all are.
+            let zero = vec![0.0; count];
+            let columns = columns(problem, &[], &self.efforts, active.hypothesis, &zero);
+            return columns.factors[c].clone();
+        }
         let (mut column, base) = if layer == Layer::Record {
             let mut all = self.actives.clone();
             all[i] = there;

@@ -15,8 +15,10 @@ const CUTOFF_HZ: f64 = 8.0;
 const CUTOFF_OF_RATE: f64 = 0.1;
 /// Motion is smoothed this many times higher, so that its filter does not show below the cutoff.
 const MOTION_CUTOFF_RATIO: f64 = 2.0;
-/// Recordings faster than this are thinned for the fit \[Hz\].
-const FIT_RATE_HZ: f64 = 130.0;
+/// Recordings faster than this are thinned for the fit \[Hz\]; where there are many samples down to the lower.
+const FIT_RATE_HZ: [f64; 2] = [50.0, 130.0];
+/// From how many samples on.
+const FIT_SAMPLES: f64 = 8000.0;
 /// Below this speed a joint stands: its friction is any value up to breakaway \[rad/s\].
 pub const STANDSTILL_RAD_S: f64 = 0.01;
 /// Samples nearer than this to an end of the recording are left out, in periods of the cutoff.
@@ -258,10 +260,12 @@ impl Problem {
         };
         let (mut measured, mut weight) = (Vec::new(), Vec::new());
         let mut variances = vec![Vec::new(); n];
+        let total_s: f64 = recordings.iter().map(Recording::duration_s).sum();
+        let fit_rate_hz = (FIT_SAMPLES / total_s).clamp(FIT_RATE_HZ[0], FIT_RATE_HZ[1]);
         let tracks: Vec<(Track, Track, Vec<usize>)> = tracks
             .into_iter()
             .map(|full| {
-                let kept = thinned(&full.time_s, 1.0 / FIT_RATE_HZ);
+                let kept = thinned(&full.time_s, 1.0 / fit_rate_hz);
                 (full.thin(&kept, n), full, kept)
             })
             .collect();

@@ -7,6 +7,9 @@ use crate::propose::Proposal;
 /// A rival may gain this much less to first order than what it is to replace.
 const COULD_DO_BETTER: f64 = 0.85;
 
+/// Beyond so many pieces of physics they are no longer exchanged two at a time: that grows with the square of them.
+const MOST_PAIRED: usize = 12;
+
 impl Search<'_> {
     /// The best of the proposals that could be better than `best`, by what they gain to first order.
     fn rival_of(
@@ -57,6 +60,9 @@ impl Search<'_> {
             }
         };
         let mut pair = (0, 1);
+        if best.fit.actives.len() > MOST_PAIRED {
+            return best;
+        }
         while pair.1 < best.fit.actives.len() {
             let (a, b) = pair;
             if joint(a, &best).is_some() && joint(a, &best) == joint(b, &best) {
