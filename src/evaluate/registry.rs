@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use tauscope_detect::{
     Config, LearnError, Lessons, Setup, contact_classifier, fisher_discriminant,
     frequency_classifier, lstm_momentum_observer, momentum_observer, naive_difference,
-    point_autoencoder, point_ocsvm, twin_regression, virtual_collision_sensor,
+    point_autoencoder, point_ocsvm, tauscope, twin_regression, virtual_collision_sensor,
     virtual_collision_sensor_basic, window_autoencoder, window_ocsvm,
 };
 
@@ -293,6 +293,19 @@ pub static ENTRIES: &[Entry] = &[
                     task.setup,
                     &task.lessons,
                 )?),
+                ..Config::default()
+            })
+        },
+    },
+    Entry {
+        name: "tauscope",
+        random: false,
+        window: None,
+        usual: always,
+        learn: |task| {
+            let settings = tauscope::learn(&tauscope::Settings::default(), &task.lessons)?;
+            Ok(Config {
+                tauscope: Some(settings),
                 ..Config::default()
             })
         },

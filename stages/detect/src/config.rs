@@ -11,7 +11,7 @@ use crate::stage::Setup;
 use crate::virtual_collision_sensor::Learnt;
 use crate::{
     contact_classifier, fisher_discriminant, frequency_classifier, lstm_momentum_observer,
-    momentum_observer, naive_difference, point_autoencoder, point_ocsvm, twin_regression,
+    momentum_observer, naive_difference, point_autoencoder, point_ocsvm, tauscope, twin_regression,
     virtual_collision_sensor, virtual_collision_sensor_basic, window_autoencoder, window_ocsvm,
 };
 
@@ -61,6 +61,9 @@ pub struct Config {
     /// `point_autoencoder` over windows (after Park et al.).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub window_autoencoder: Option<window_autoencoder::Settings>,
+    /// The residual held against what it usually is: our own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tauscope: Option<tauscope::Settings>,
     /// When the alarm is raised.
     pub threshold: Threshold,
     /// An alarm ends once the score has stayed below the threshold for this long \[s\].
@@ -84,6 +87,7 @@ impl Default for Config {
             lstm_momentum_observer: None,
             window_ocsvm: None,
             window_autoencoder: None,
+            tauscope: None,
             threshold: Threshold::default(),
             // Bridges the dip between two swings of one contact.
             hold_s: 0.1,
@@ -118,6 +122,7 @@ impl Config {
                 self.virtual_collision_sensor.is_some(),
                 virtual_collision_sensor::NAME,
             ),
+            (self.tauscope.is_some(), tauscope::NAME),
             (self.contact_classifier.is_some(), contact_classifier::NAME),
             (
                 self.fisher_discriminant.is_some(),
@@ -220,6 +225,9 @@ impl Config {
         }
         if self.window_autoencoder.is_some() {
             all.push(window_autoencoder::build(setup)?);
+        }
+        if let Some(settings) = &self.tauscope {
+            all.push(tauscope::build(settings, setup)?);
         }
         Ok(all)
     }

@@ -25,6 +25,7 @@ pub mod point_autoencoder;
 pub mod point_ocsvm;
 pub mod sliding_dft;
 mod stage;
+pub mod tauscope;
 pub mod twin_regression;
 pub mod virtual_collision_sensor;
 pub mod virtual_collision_sensor_basic;

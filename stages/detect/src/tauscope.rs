@@ -1,0 +1,226 @@
+//! `tauscope`: the residual held against what it usually is.
+//!
+//! The noise of a residual is not the same in every joint, at every speed and over every length of time:
+//! friction is least certain where a joint turns round, joints err together, and what is small beside
+//! one sample is large beside the mean of thirty. All of that is learnt from contact-free recordings
+//! ([`Learnt`]). The score is the largest, over three windows, of the Mahalanobis length of the mean residual, in
+//! units of what that window's length reaches at most in one of a thousand contact-free samples. Slow drift (warming up)
+//! is followed while nothing touches the robot.
+//!
+//! The threshold is set by a wish: so many false alarms an hour. How often the score exceeds what by chance is
+//! extrapolated from its peaks in contact-free data ([`Tail`]).
+//!
+//! The touched link is the one whose force explains the whitened residual best, the point of contact
+//! sought along the link (Haddadin, De Luca and Albu-Schäffer, "Robot Collisions: A Survey on Detection,
+//! Isolation, and Identification", 2017, sections V and VI).
+
+mod learnt;
+mod place;
+mod tail;
+mod windows;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tauscope_bus::{TwinState, flags};
+
+use crate::config::ConfigError;
+use crate::detector::{Detector, Judgement, Seen, Verdict};
+use crate::lesson::{LearnError, Lessons};
+use crate::stage::Setup;
+pub use learnt::{Learnt, LearntJoint, LearntWindow};
+use place::Place;
+pub use tail::Tail;
+use windows::Windows;
+
+/// Canonical name.
+pub(crate) const NAME: &str = "tauscope";
+
+/// An alarm ends where the score has stayed below this share of the threshold.
+const RELEASE: f64 = 0.35;
+/// For so long \[s\].
+const HOLD_S: f64 = 0.1;
+/// Another contact on top of one: the score rises to this many times what it has been \[-\], which is
+/// followed with this time constant, not sooner than this after the last alarm \[s\].
+const RISE: f64 = 3.0;
+const FOLLOW_S: f64 = 0.15;
+const AGAIN_S: f64 = 0.25;
+/// A score from this share of the threshold on may already belong to a contact.
+const LOW: f64 = 0.3;
+
+/// Settings of `tauscope`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Settings {
+    /// How many false alarms an hour are put up with; at most one a week is 0.006. Sets the threshold.
+    #[schemars(range(min = 1e-6, max = 3600.0))]
+    pub false_alarms_per_hour: f64,
+    /// Time constant with which slow drift of the residual is followed \[s\].
+    #[schemars(range(min = 1.0, max = 86_400.0))]
+    pub drift_s: f64,
+    /// The mean residual of so many seconds after each start is taken for an offset, in which nothing may touch
+    /// the robot \[s\]; 0 for none.
+    #[schemars(range(min = 0.0, max = 60.0))]
+    pub offset_from_first_s: f64,
+    /// What contact-free recordings have taught; `tauscope evaluate` writes it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub learnt: Option<Learnt>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            false_alarms_per_hour: 5.0,
+            drift_s: 20.0,
+            offset_from_first_s: 0.0,
+            learnt: None,
+        }
+    }
+}
+
+/// The detector.
+///
+/// # Errors
+/// If nothing has been learnt, or for a robot with another number of joints.
+pub(crate) fn build(settings: &Settings, setup: &Setup) -> Result<Box<dyn Detector>, ConfigError> {
+    let Some(learnt) = &settings.learnt else {
+        return Err(ConfigError::NotLearnt { detector: NAME });
+    };
+    let joint_count = setup.joints.len();
+    if learnt.joints.len() != joint_count {
+        let reason = format!(
+            "is of a robot with {} joints, not {joint_count}",
+            learnt.joints.len()
+        );
+        return Err(ConfigError::LearntState {
+            detector: NAME,
+            reason,
+        });
+    }
+    Ok(Box::new(Tauscope {
+        windows: Windows::new(learnt, settings.drift_s, settings.offset_from_first_s),
+        place: Place::new(setup),
+        threshold: learnt.tail.threshold(settings.false_alarms_per_hour),
+        alarm: None,
+        newest_low_ns: None,
+    }))
+}
+
+/// Learns from contact-free stretches of all recordings.
+///
+/// # Errors
+/// If they hold too little.
+pub fn learn(settings: &Settings, lessons: &Lessons<'_>) -> Result<Settings, LearnError> {
+    let learnt = Learnt::new(lessons, settings.drift_s)?;
+    Ok(Settings {
+        learnt: Some(learnt),
+        ..settings.clone()
+    })
+}
+
+struct Tauscope {
+    windows: Windows,
+    place: Place,
+    threshold: f64,
+    alarm: Option<Alarm>,
+    /// Newest sample whose score was usual.
+    newest_low_ns: Option<i64>,
+}
+
+/// An alarm that lasts.
+struct Alarm {
+    contact_ns: i64,
+    raised_ns: i64,
+    newest_high_ns: i64,
+    /// The score as it has been.
+    usual: f64,
+    newest_ns: i64,
+}
+
+impl Detector for Tauscope {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn threshold(&self) -> Option<f64> {
+        Some(self.threshold)
+    }
+
+    fn judge(&mut self, sample: &TwinState) -> Judgement {
+        if sample.header.has(flags::RESET) {
+            self.windows.reset();
+            self.alarm = None;
+            self.newest_low_ns = None;
+        }
+        let free = self.alarm.is_none();
+        let score = self
+            .windows
+            .score(sample, free.then_some(LOW * self.threshold));
+        let ready = self.windows.ready() && sample.header.has(flags::READY);
+        if !ready {
+            self.alarm = None;
+            return Judgement {
+                score,
+                ready,
+                verdict: None,
+            };
+        }
+        let contact = self
+            .step(sample.header.stamp_ns, score)
+            .map(|contact_ns| Seen {
+                contact_ns,
+                joints: Some(self.place.loaded(&self.windows)),
+                place: self.place.locate(sample, &self.windows),
+            });
+        Judgement {
+            score,
+            ready,
+            verdict: Some(Verdict {
+                state: if contact.is_some() { "contact" } else { "free" },
+                contact,
+            }),
+        }
+    }
+}
+
+impl Tauscope {
+    /// Takes the next score; gives the beginning of the contact, if there is one.
+    fn step(&mut self, now_ns: i64, score: f64) -> Option<i64> {
+        let high = score >= self.threshold;
+        let ns = |seconds: f64| (seconds * 1e9) as i64;
+        match &mut self.alarm {
+            None if high => {
+                self.alarm = Some(Alarm {
+                    contact_ns: self.newest_low_ns.unwrap_or(now_ns),
+                    raised_ns: now_ns,
+                    newest_high_ns: now_ns,
+                    usual: score,
+                    newest_ns: now_ns,
+                });
+            }
+            None => {}
+            Some(alarm) => {
+                if score >= RELEASE * self.threshold {
+                    alarm.newest_high_ns = now_ns;
+                }
+                let dt_s = (now_ns - alarm.newest_ns) as f64 * 1e-9;
+                alarm.newest_ns = now_ns;
+                let again =
+                    high && score > RISE * alarm.usual && now_ns - alarm.raised_ns > ns(AGAIN_S);
+                if again {
+                    alarm.contact_ns = now_ns;
+                    alarm.raised_ns = now_ns;
+                    alarm.usual = score;
+                } else {
+                    alarm.usual += (score - alarm.usual) * (1.0 - (-dt_s / FOLLOW_S).exp());
+                }
+                if now_ns - alarm.newest_high_ns >= ns(HOLD_S) {
+                    self.alarm = None;
+                }
+            }
+        }
+        if score < LOW * self.threshold || self.newest_low_ns.is_none() {
+            self.newest_low_ns = Some(now_ns);
+        }
+        self.alarm.as_ref().map(|alarm| alarm.contact_ns)
+    }
+}

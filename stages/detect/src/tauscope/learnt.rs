@@ -1,0 +1,279 @@
+//! What contact-free recordings teach of a residual.
+
+use nalgebra::DMatrix;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tauscope_bus::{MAX_JOINTS, TwinState, flags};
+
+use super::NAME;
+use super::tail::{BLOCK_S, Tail};
+use super::windows::{Means, WINDOWS_S, Windows};
+use crate::lesson::{LearnError, Lesson, Lessons};
+
+/// Where speeds are divided, as shares of a joint's usual highest speed.
+const EDGES: [f64; BINS - 1] = [0.02, 0.05, 0.12, 0.3];
+/// How many classes of speed there are.
+const BINS: usize = 5;
+/// A joint's usual highest speed: this share of its samples is slower.
+const FAST: f64 = 0.95;
+/// Speed below which a joint is not taken to move at all \[rad/s\].
+const LEAST_FAST_RAD_S: f64 = 0.01;
+/// The noise of a class of speed is taken for the joint's where it has no more samples than this.
+const PRIOR_SAMPLES: f64 = 200.0;
+/// Correlations are believed to this share.
+const BELIEVED: f64 = 0.95;
+/// The share of contact-free samples that stays below the unit of a window's score.
+const USUAL: f64 = 0.999;
+/// So much around a labelled contact is left out \[ns\].
+const BEFORE_NS: i64 = 50_000_000;
+const AFTER_NS: i64 = 1_000_000_000;
+/// The least that can be learnt from \[samples\].
+const LEAST_SAMPLES: usize = 1000;
+
+/// What contact-free recordings taught.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Learnt {
+    /// By joint in URDF order.
+    pub joints: Vec<LearntJoint>,
+    /// By window.
+    pub windows: Vec<LearntWindow>,
+    /// How often the score exceeds what by chance.
+    pub tail: Tail,
+}
+
+/// A joint's speeds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LearntJoint {
+    /// Its usual highest speed \[rad/s\], by which speeds are classed.
+    pub fast_rad_s: f64,
+}
+
+/// The mean residual over one window.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LearntWindow {
+    /// Root mean square by joint and class of speed \[effort unit\].
+    pub noise: Vec<Vec<f64>>,
+    /// Inverse of the joints' correlation, row by row.
+    pub inverse_correlation: Vec<f64>,
+    /// Squared Mahalanobis length that one of a thousand contact-free samples exceeds.
+    pub usual: f64,
+}
+
+/// The class of a speed.
+pub(crate) fn bin(joint: &LearntJoint, speed_rad_s: f64) -> usize {
+    let share = speed_rad_s / joint.fast_rad_s;
+    EDGES.iter().filter(|edge| share >= **edge).count()
+}
+
+impl Learnt {
+    /// From the contact-free stretches of all recordings.
+    ///
+    /// # Errors
+    /// If they hold too little.
+    pub(crate) fn new(lessons: &Lessons<'_>, drift_s: f64) -> Result<Self, LearnError> {
+        let all: Vec<&Lesson> = lessons.train.iter().chain(lessons.validation).collect();
+        let count: usize = all.iter().map(|lesson| free(lesson).count()).sum();
+        let Some(first) = all.iter().find_map(|lesson| lesson.samples.first()) else {
+            return Err(too_little(0));
+        };
+        if count < LEAST_SAMPLES {
+            return Err(too_little(count));
+        }
+        let n = first.header.joint_count as usize;
+        let mut learnt = Self {
+            joints: speeds(&all, n),
+            windows: Vec::new(),
+            tail: Tail {
+                level: 0.0,
+                per_hour: 1.0,
+                scale: 1.0,
+                shape: 0.0,
+            },
+        };
+        learnt.windows = learnt.noise(&all, drift_s);
+        learnt.correlate(&all, drift_s);
+        learnt.measure_usual(&all, drift_s);
+        learnt.tail = Tail::new(learnt.peaks(&all, drift_s));
+        Ok(learnt)
+    }
+
+    fn fast(&self) -> [f64; MAX_JOINTS] {
+        let mut fast = [0.0; MAX_JOINTS];
+        for (fast, joint) in fast.iter_mut().zip(&self.joints) {
+            *fast = joint.fast_rad_s;
+        }
+        fast
+    }
+
+    /// Root mean square of the means by window, joint and class of speed.
+    fn noise(&self, all: &[&Lesson], drift_s: f64) -> Vec<LearntWindow> {
+        let n = self.joints.len();
+        let mut sums = vec![vec![[(0.0, 0.0); BINS]; n]; WINDOWS_S.len()];
+        for lesson in all {
+            let mut means = Means::new(self.fast(), drift_s, 0.0);
+            for (sample, is_free) in marked(lesson) {
+                restart(&mut means, sample);
+                means.push(sample, is_free);
+                if !(is_free && means.ready()) {
+                    continue;
+                }
+                for (w, sums) in sums.iter_mut().enumerate() {
+                    for j in 0..n {
+                        let (square, count) = &mut sums[j][bin(&self.joints[j], means.slow[j])];
+                        *square += means.mean(w, j).powi(2);
+                        *count += 1.0;
+                    }
+                }
+            }
+        }
+        let one = |bins: &[(f64, f64); BINS]| -> Vec<f64> {
+            let (square, count) = bins
+                .iter()
+                .fold((0.0, 0.0), |(s, c), (square, n)| (s + square, c + n));
+            let overall = square / f64::max(count, 1.0);
+            let of = |(square, count): &(f64, f64)| {
+                ((square + PRIOR_SAMPLES * overall) / (count + PRIOR_SAMPLES))
+                    .sqrt()
+                    .max(1e-9)
+            };
+            bins.iter().map(of).collect()
+        };
+        sums.iter()
+            .map(|joints| LearntWindow {
+                noise: joints.iter().map(one).collect(),
+                inverse_correlation: DMatrix::identity(n, n).as_slice().to_vec(),
+                usual: 1.0,
+            })
+            .collect()
+    }
+
+    /// Runs over the contact-free samples, and hands the windows out at each.
+    fn each(
+        &self,
+        all: &[&Lesson],
+        drift_s: f64,
+        mut visit: impl FnMut(&TwinState, &Windows, f64),
+    ) {
+        for lesson in all {
+            let mut windows = Windows::new(self, drift_s, 0.0);
+            for (sample, is_free) in marked(lesson) {
+                if sample.header.has(flags::RESET) {
+                    windows.reset();
+                }
+                let score = windows.score(sample, is_free.then_some(f64::INFINITY));
+                if is_free && windows.ready() {
+                    visit(sample, &windows, score);
+                }
+            }
+        }
+    }
+
+    fn correlate(&mut self, all: &[&Lesson], drift_s: f64) {
+        let n = self.joints.len();
+        let mut products = vec![DMatrix::<f64>::zeros(n, n); WINDOWS_S.len()];
+        self.each(all, drift_s, |_, windows, _| {
+            for (w, product) in products.iter_mut().enumerate() {
+                let z: Vec<f64> = (0..n)
+                    .map(|j| windows.mean(w, j) / windows.noise(w, j))
+                    .collect();
+                for a in 0..n {
+                    for b in 0..n {
+                        product[(a, b)] += z[a] * z[b];
+                    }
+                }
+            }
+        });
+        for (window, product) in self.windows.iter_mut().zip(&products) {
+            let correlation = DMatrix::from_fn(n, n, |a, b| {
+                let scale = (product[(a, a)] * product[(b, b)]).sqrt();
+                if a == b || scale <= 0.0 {
+                    f64::from(u8::from(a == b))
+                } else {
+                    BELIEVED * product[(a, b)] / scale
+                }
+            });
+            if let Some(inverse) = correlation.try_inverse() {
+                window.inverse_correlation = inverse.as_slice().to_vec();
+            }
+        }
+    }
+
+    fn measure_usual(&mut self, all: &[&Lesson], drift_s: f64) {
+        let mut lengths = vec![Vec::new(); WINDOWS_S.len()];
+        self.each(all, drift_s, |_, windows, _| {
+            for (w, lengths) in lengths.iter_mut().enumerate() {
+                lengths.push(windows.length(w));
+            }
+        });
+        for (window, mut lengths) in self.windows.iter_mut().zip(lengths) {
+            window.usual = quantile(&mut lengths, USUAL).max(1e-9);
+        }
+    }
+
+    /// The largest score of each block of contact-free time.
+    fn peaks(&self, all: &[&Lesson], drift_s: f64) -> Vec<f64> {
+        let mut peaks: Vec<(i64, f64)> = Vec::new();
+        let length_ns = (BLOCK_S * 1e9) as i64;
+        self.each(all, drift_s, |sample, _, score| {
+            let block = sample.header.stamp_ns.div_euclid(length_ns);
+            match peaks.last_mut() {
+                Some((last, peak)) if *last == block => *peak = peak.max(score),
+                _ => peaks.push((block, score)),
+            }
+        });
+        peaks.into_iter().map(|(_, peak)| peak).collect()
+    }
+}
+
+fn too_little(found: usize) -> LearnError {
+    LearnError::TooLittle {
+        detector: NAME,
+        wanted: format!("{LEAST_SAMPLES} contact-free samples"),
+        found: found.to_string(),
+    }
+}
+
+fn restart(means: &mut Means, sample: &TwinState) {
+    if sample.header.has(flags::RESET) {
+        means.reset();
+    }
+}
+
+fn speeds(all: &[&Lesson], n: usize) -> Vec<LearntJoint> {
+    (0..n)
+        .map(|j| {
+            let samples = all.iter().flat_map(|lesson| &lesson.samples);
+            let mut speeds: Vec<f64> = samples.map(|sample| sample.velocity[j].abs()).collect();
+            LearntJoint {
+                fast_rad_s: quantile(&mut speeds, FAST).max(LEAST_FAST_RAD_S),
+            }
+        })
+        .collect()
+}
+
+/// The value below which a share of all is; 0 of none.
+fn quantile(values: &mut [f64], share: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let last = values.len().saturating_sub(1);
+    let at = (last as f64 * share).round() as usize;
+    values.get(at).copied().unwrap_or(0.0)
+}
+
+/// Settled samples of a recording, and whether nothing touched the robot then.
+fn marked(lesson: &Lesson) -> impl Iterator<Item = (&TwinState, bool)> {
+    let settled = lesson.samples.iter().filter(|s| s.header.has(flags::READY));
+    settled.map(|sample| {
+        let stamp = sample.header.stamp_ns;
+        let touched = lesson.contacts.iter().flatten().any(|contact| {
+            stamp >= contact.on_ns - BEFORE_NS && stamp <= contact.off_ns + AFTER_NS
+        });
+        (sample, !touched)
+    })
+}
+
+fn free(lesson: &Lesson) -> impl Iterator<Item = &TwinState> {
+    marked(lesson).filter_map(|(sample, is_free)| is_free.then_some(sample))
+}

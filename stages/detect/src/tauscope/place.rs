@@ -1,0 +1,128 @@
+//! Which link was touched, where, and how hard: the force that explains the whitened residual best.
+
+use nalgebra::{Matrix3, SMatrix, Vector3};
+use tauscope_bus::{MAX_JOINTS, TwinState};
+use tauscope_dynamics::{Data, Model, forward_kinematics, link_jacobian, link_pose};
+
+use super::windows::Windows;
+use crate::isolation::Contact;
+use crate::stage::Setup;
+
+/// A joint counts as loaded from this many times its usual residual on.
+const LOADED: f64 = 4.0;
+/// Weight of a small force against a good fit, relative to what the joints tell: keeps directions that no
+/// joint feels at zero.
+const DAMPING: f64 = 1e-3;
+/// The twin is believed to this share of the residual: a strong force is told no better than that.
+const MODEL_ERROR: f64 = 0.05;
+/// Where along a link contacts are sought, as shares of the way from its joint to the next.
+const ALONG: [f64; 3] = [0.0, 0.5, 1.0];
+
+/// Finds contacts on one robot. No allocation per call.
+#[derive(Debug)]
+pub(crate) struct Place {
+    model: Option<(Model, Data)>,
+    effort_per_nm: Vec<f64>,
+    /// Where the tool is touched: its link and the point in its frame.
+    tool: Option<(usize, Vector3<f64>)>,
+}
+
+impl Place {
+    pub fn new(setup: &Setup) -> Self {
+        let known = setup
+            .joints
+            .iter()
+            .all(|joint| joint.effort_per_nm.is_finite());
+        Self {
+            model: setup.model.clone().filter(|_| known).map(|model| {
+                let data = Data::new(&model);
+                (model, data)
+            }),
+            effort_per_nm: setup
+                .joints
+                .iter()
+                .map(|joint| joint.effort_per_nm)
+                .collect(),
+            tool: setup.tool_link.map(|link| {
+                let point = setup.contact_point_on_tool_m.unwrap_or_default();
+                (link, Vector3::from(point))
+            }),
+        }
+    }
+
+    /// The joints that are loaded: bit j for joint j.
+    pub fn loaded(&self, windows: &Windows) -> u32 {
+        let w = windows.most;
+        (0..windows.joints())
+            .filter(|&j| windows.mean(w, j).abs() > LOADED * windows.noise(w, j))
+            .fold(0, |mask, j| mask | 1 << j)
+    }
+
+    /// The contact that leaves least unexplained.
+    pub fn locate(&mut self, sample: &TwinState, windows: &Windows) -> Option<Contact> {
+        let (model, data) = self.model.as_mut()?;
+        let n = windows.joints();
+        let w = windows.most;
+        forward_kinematics(model, data, &sample.position[..n]);
+        let (mut z, mut scale) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
+        for j in 0..n {
+            let mean = windows.mean(w, j);
+            let noise = windows.noise(w, j).hypot(MODEL_ERROR * mean);
+            z[j] = mean / noise;
+            scale[j] = self.effort_per_nm[j] / noise;
+        }
+        let inverse = windows.inverse_correlation(w);
+        let mut best: Option<(f64, Contact)> = None;
+        for joint in 0..n {
+            let link = model.joints()[joint].child_link;
+            let pose = link_pose(model, data, link);
+            let origin = pose.translation.vector;
+            let end = if joint + 1 < n {
+                let next = model.joints()[joint + 1].child_link;
+                link_pose(model, data, next).translation.vector
+            } else if let Some((tool, point)) = self.tool {
+                let tool = link_pose(model, data, tool);
+                tool.translation.vector + tool.rotation * point
+            } else {
+                origin + pose.rotation * Vector3::from(model.links()[link].com_m())
+            };
+            let com = pose.rotation * Vector3::from(model.links()[link].com_m());
+            let jacobian = link_jacobian(model, data, link);
+            let along = ALONG.map(|share| (end - origin) * share);
+            for arm in along.into_iter().chain([com]) {
+                // residual = -Jᵀ F, in units of the noise.
+                let mut rows = SMatrix::<f64, MAX_JOINTS, 3>::zeros();
+                for j in 0..n {
+                    let column = jacobian.column(j);
+                    let angular = column.fixed_rows::<3>(3).into_owned();
+                    let row = (column.fixed_rows::<3>(0) + angular.cross(&arm)) * -scale[j];
+                    rows.set_row(j, &row.transpose());
+                }
+                let (mut information, mut pull) = (Matrix3::zeros(), Vector3::zeros());
+                for a in 0..n {
+                    for b in 0..n {
+                        let weight = inverse[a * n + b];
+                        information += rows.row(a).transpose() * rows.row(b) * weight;
+                        pull += rows.row(a).transpose() * (weight * z[b]);
+                    }
+                }
+                let ridge = DAMPING * information.trace() + 1e-12;
+                let damped = information + Matrix3::identity() * ridge;
+                let Some(solver) = damped.try_inverse() else {
+                    continue;
+                };
+                let force = solver * pull;
+                let explained = 2.0 * pull.dot(&force) - force.dot(&(information * force));
+                if best.is_none_or(|(most, _)| explained > most) {
+                    let contact = Contact {
+                        link,
+                        force_n: force.into(),
+                        point_m: (origin + arm).into(),
+                    };
+                    best = Some((explained, contact));
+                }
+            }
+        }
+        best.map(|(_, contact)| contact)
+    }
+}

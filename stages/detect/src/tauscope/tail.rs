@@ -1,0 +1,107 @@
+//! How often a score exceeds what by chance.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Length of the blocks whose largest score counts \[s\].
+pub(crate) const BLOCK_S: f64 = 1.0;
+/// Share of the blocks above the level from which the tail is told.
+const ABOVE: f64 = 0.15;
+/// Bounds of the tail's shape: 0 is exponential, above 0 the tail is heavier.
+const SHAPE: [f64; 2] = [0.0, 0.3];
+
+/// The tail of a score's distribution: the square roots of the largest scores of blocks of one second, above a level,
+/// follow a generalised Pareto distribution (Coles, "An Introduction to Statistical Modeling of Extreme Values", 2001, section 4.2).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Tail {
+    /// The level, as a square root of a score.
+    pub level: f64,
+    /// Blocks above it an hour.
+    pub per_hour: f64,
+    /// Scale of what is above.
+    pub scale: f64,
+    /// Shape of it.
+    pub shape: f64,
+}
+
+impl Tail {
+    /// From the largest score of each block.
+    pub(crate) fn new(mut blocks: Vec<f64>) -> Self {
+        for score in &mut blocks {
+            *score = score.max(0.0).sqrt();
+        }
+        blocks.sort_by(f64::total_cmp);
+        let count = blocks.len();
+        let above = ((count as f64 * ABOVE) as usize).clamp(1, count.max(1));
+        let level = blocks
+            .get(count.saturating_sub(above + 1))
+            .copied()
+            .unwrap_or(0.0);
+        let excess: Vec<f64> = blocks[count - above.min(count)..]
+            .iter()
+            .map(|score| score - level)
+            .collect();
+        // Probability-weighted moments (Hosking and Wallis 1987): a0 = E X, a1 = E X (1 - F).
+        let n = excess.len().max(1) as f64;
+        let a0 = excess.iter().sum::<f64>() / n;
+        let weighted = excess.iter().enumerate();
+        let a1 = weighted
+            .map(|(i, x)| x * (1.0 - (i as f64 + 0.65) / n))
+            .sum::<f64>()
+            / n;
+        let shape = if a0 > 2.0 * a1 + 1e-12 {
+            (2.0 - a0 / (a0 - 2.0 * a1)).clamp(SHAPE[0], SHAPE[1])
+        } else {
+            SHAPE[1]
+        };
+        Self {
+            level,
+            per_hour: above as f64 / count.max(1) as f64 * 3600.0 / BLOCK_S,
+            scale: (a0 * (1.0 - shape)).max(1e-9),
+            shape,
+        }
+    }
+
+    /// The score that is exceeded by chance in so many blocks an hour.
+    pub fn threshold(&self, per_hour: f64) -> f64 {
+        let ratio = (self.per_hour / per_hour).max(1.0);
+        let above = if self.shape < 1e-6 {
+            ratio.ln()
+        } else {
+            (ratio.powf(self.shape) - 1.0) / self.shape
+        };
+        (self.level + self.scale * above).powi(2)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Blocks whose roots are exponential above 1 with scale 0.5.
+    fn exponential(count: usize) -> Vec<f64> {
+        (0..count)
+            .map(|i| {
+                let survival = 1.0 - (i as f64 + 0.5) / count as f64;
+                (1.0 - 0.5 * survival.ln()).powi(2)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_threshold_is_exceeded_as_often_as_was_wished() {
+        let tail = Tail::new(exponential(3600));
+        // One in 3600 blocks: 1 + 0.5 ln 3600.
+        let expected = (1.0 + 0.5 * 3600.0_f64.ln()).powi(2);
+        let found = tail.threshold(1.0);
+        assert!((found / expected - 1.0).abs() < 0.1, "{found} {expected}");
+    }
+
+    #[test]
+    fn a_stricter_wish_gives_a_higher_threshold() {
+        let tail = Tail::new(exponential(600));
+        assert!(tail.threshold(0.006) > tail.threshold(1.0));
+        assert!(tail.threshold(1.0) > tail.threshold(60.0));
+    }
+}

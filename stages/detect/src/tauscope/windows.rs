@@ -1,0 +1,215 @@
+//! Means of the residual over windows that end at the newest sample, and how unusual they are.
+
+use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
+
+use super::learnt::{Learnt, bin};
+
+/// Lengths of the windows \[s\].
+pub(crate) const WINDOWS_S: [f64; 3] = [0.01, 0.03, 0.1];
+/// How long a joint that was slow counts as slow \[s\].
+const SLOW_MEMORY_S: f64 = 0.3;
+/// Most samples of a window; after as many, sums are formed anew so that rounding does not add up.
+const CAPACITY: usize = 1024;
+
+/// Running means over each window.
+#[derive(Debug)]
+pub(crate) struct Means {
+    rows: Vec<(i64, JointArray)>,
+    /// Rows that have come in since the beginning, and the first of each window.
+    head: usize,
+    tails: [usize; WINDOWS_S.len()],
+    sums: [JointArray; WINDOWS_S.len()],
+    /// The slow part of the residual.
+    offset: JointArray,
+    drift_s: f64,
+    offset_from_first_s: f64,
+    /// Smallest speed of late, by joint.
+    pub slow: JointArray,
+    fast: JointArray,
+    start_ns: i64,
+}
+
+impl Means {
+    /// For joints whose usual speeds go up to `fast` \[rad/s\].
+    pub fn new(fast: JointArray, drift_s: f64, offset_from_first_s: f64) -> Self {
+        Self {
+            rows: vec![(0, [0.0; MAX_JOINTS]); CAPACITY],
+            head: 0,
+            tails: [0; WINDOWS_S.len()],
+            sums: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
+            offset: [0.0; MAX_JOINTS],
+            drift_s,
+            offset_from_first_s,
+            slow: [0.0; MAX_JOINTS],
+            fast,
+            start_ns: 0,
+        }
+    }
+
+    pub fn reset(&mut self) {
+        self.head = 0;
+        self.tails = [0; WINDOWS_S.len()];
+        self.sums = [[0.0; MAX_JOINTS]; WINDOWS_S.len()];
+        self.offset = [0.0; MAX_JOINTS];
+    }
+
+    /// Whether the longest window is full, and the offset known.
+    pub fn ready(&self) -> bool {
+        let newest = self.rows[(self.head.max(1) - 1) % CAPACITY].0;
+        let longest = WINDOWS_S[WINDOWS_S.len() - 1];
+        (newest - self.start_ns) as f64 * 1e-9 >= longest.max(self.offset_from_first_s)
+    }
+
+    /// Takes a sample; slow drift is followed if `follow`.
+    pub fn push(&mut self, sample: &TwinState, follow: bool) {
+        let n = sample.header.joint_count as usize;
+        let now = sample.header.stamp_ns;
+        if self.head == 0 {
+            self.start_ns = now;
+            self.slow = sample.velocity.map(f64::abs);
+        }
+        let before = self.rows[(self.head.max(1) - 1) % CAPACITY].0;
+        let dt_s = if self.head == 0 {
+            0.0
+        } else {
+            (now - before) as f64 * 1e-9
+        };
+        let since_s = (now - self.start_ns) as f64 * 1e-9;
+        let first = since_s < self.offset_from_first_s;
+        let mut row = [0.0; MAX_JOINTS];
+        for j in 0..n {
+            let residual = sample.effort[j] - sample.expected_effort[j];
+            if first {
+                // The mean of the first seconds, as it grows.
+                let share = dt_s / (since_s + dt_s).max(1e-9);
+                self.offset[j] += share * (residual - self.offset[j]);
+            } else if follow {
+                let share = 1.0 - (-dt_s / self.drift_s).exp();
+                self.offset[j] += share * (residual - self.offset[j]);
+            }
+            row[j] = residual - self.offset[j];
+            let recovered = self.slow[j] + dt_s / SLOW_MEMORY_S * self.fast[j];
+            self.slow[j] = recovered.min(sample.velocity[j].abs());
+        }
+        self.rows[self.head % CAPACITY] = (now, row);
+        self.head += 1;
+        for (w, length_s) in WINDOWS_S.iter().enumerate() {
+            for j in 0..n {
+                self.sums[w][j] += row[j];
+            }
+            let begin = now - (length_s * 1e9) as i64;
+            while self.tails[w] + 1 < self.head {
+                let (stamp, old) = &self.rows[self.tails[w] % CAPACITY];
+                if *stamp > begin && self.head - self.tails[w] < CAPACITY {
+                    break;
+                }
+                for j in 0..n {
+                    self.sums[w][j] -= old[j];
+                }
+                self.tails[w] += 1;
+            }
+        }
+        if self.head.is_multiple_of(CAPACITY) {
+            self.sum_anew(n);
+        }
+    }
+
+    fn sum_anew(&mut self, n: usize) {
+        for (sum, &tail) in self.sums.iter_mut().zip(&self.tails) {
+            *sum = [0.0; MAX_JOINTS];
+            for k in tail..self.head {
+                let row = &self.rows[k % CAPACITY].1;
+                for j in 0..n {
+                    sum[j] += row[j];
+                }
+            }
+        }
+    }
+
+    /// Mean residual of a joint over a window \[effort unit\].
+    pub fn mean(&self, window: usize, joint: usize) -> f64 {
+        self.sums[window][joint] / (self.head - self.tails[window]).max(1) as f64
+    }
+}
+
+/// Means of the residual, whitened.
+#[derive(Debug)]
+pub(crate) struct Windows {
+    means: Means,
+    learnt: Learnt,
+    /// The window whose mean is most unusual, by how much, and the noise of it by joint.
+    pub most: usize,
+    score: f64,
+}
+
+impl Windows {
+    pub fn new(learnt: &Learnt, drift_s: f64, offset_from_first_s: f64) -> Self {
+        let mut fast = [0.0; MAX_JOINTS];
+        for (fast, joint) in fast.iter_mut().zip(&learnt.joints) {
+            *fast = joint.fast_rad_s;
+        }
+        Self {
+            means: Means::new(fast, drift_s, offset_from_first_s),
+            learnt: learnt.clone(),
+            most: 0,
+            score: 0.0,
+        }
+    }
+
+    pub fn reset(&mut self) {
+        self.means.reset();
+        self.score = 0.0;
+    }
+
+    pub fn ready(&self) -> bool {
+        self.means.ready()
+    }
+
+    /// The score of the next sample: the most unusual window's; below `usual`, drift is followed.
+    pub fn score(&mut self, sample: &TwinState, usual: Option<f64>) -> f64 {
+        let follow = usual.is_some_and(|usual| self.score < usual);
+        self.means.push(sample, follow);
+        self.score = 0.0;
+        for w in 0..WINDOWS_S.len() {
+            let score = self.length(w) / self.learnt.windows[w].usual;
+            if score > self.score {
+                self.score = score;
+                self.most = w;
+            }
+        }
+        self.score
+    }
+
+    /// Squared Mahalanobis length of the mean residual over a window.
+    pub fn length(&self, window: usize) -> f64 {
+        let n = self.learnt.joints.len();
+        let mut z = [0.0; MAX_JOINTS];
+        for (j, z) in z.iter_mut().enumerate().take(n) {
+            *z = self.mean(window, j) / self.noise(window, j);
+        }
+        let inverse = &self.learnt.windows[window].inverse_correlation;
+        let row = |a: usize| -> f64 { (0..n).map(|b| inverse[a * n + b] * z[b]).sum() };
+        (0..n).map(|a| z[a] * row(a)).sum()
+    }
+
+    /// Mean residual of a joint over a window \[effort unit\].
+    pub fn mean(&self, window: usize, joint: usize) -> f64 {
+        self.means.mean(window, joint)
+    }
+
+    /// Its usual size at the joint's present speed \[effort unit\].
+    pub fn noise(&self, window: usize, joint: usize) -> f64 {
+        let bin = bin(&self.learnt.joints[joint], self.means.slow[joint]);
+        self.learnt.windows[window].noise[joint][bin]
+    }
+
+    /// Inverse of the correlation of the joints' means over a window, row by row.
+    pub fn inverse_correlation(&self, window: usize) -> &[f64] {
+        &self.learnt.windows[window].inverse_correlation
+    }
+
+    /// How many joints there are.
+    pub fn joints(&self) -> usize {
+        self.learnt.joints.len()
+    }
+}
