@@ -298,7 +298,6 @@ fn learn(
         progress(share, &format!("{} learns", entry.name));
         let file = format!("{}.{}.{seed}", twin.name, entry.name);
         let task = Task {
-            set: &request.set,
             setup: &setup,
             lessons,
             seed,

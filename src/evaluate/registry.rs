@@ -34,8 +34,6 @@ pub const SEEDS: u64 = 5;
 /// What there is to learn from.
 #[derive(Debug)]
 pub struct Task<'a> {
-    /// The set.
-    pub set: &'a SetFile,
     /// The cell and its twin.
     pub setup: &'a Setup,
     /// Train and validation recordings behind the twin.
