@@ -168,7 +168,7 @@ impl Detector for Tauscope {
             .step(sample.header.stamp_ns, score)
             .map(|contact_ns| Seen {
                 contact_ns,
-                joints: Some(self.place.loaded(&self.windows)),
+                joints: Some(Place::loaded(&self.windows)),
                 place: self.place.locate(sample, &self.windows),
             });
         Judgement {

@@ -1,4 +1,4 @@
-//! The autoencoder: dense layers that narrow and widen again, ReLU behind each middle layer, the
+//! The autoencoder: dense layers that narrow and widen again, `ReLU` behind each middle layer, the
 //! output as it is. It learns to give back its input; what it cannot give back is unlike its training.
 
 use candle_core::{Device, Tensor, Var};

@@ -286,7 +286,7 @@ impl LstmScorer {
 }
 
 impl Scorer for LstmScorer {
-    /// |τ_ext - τ̂_ext|² \[(N m)²\].
+    /// `|τ_ext - τ̂_ext|²` \[(N m)²\].
     fn score(&mut self, signal: &Signal) -> Option<f64> {
         let mut input = input(signal, self.net.joints);
         self.net.input_scaling.apply(&mut input);

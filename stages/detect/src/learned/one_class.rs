@@ -85,7 +85,7 @@ impl OneClass {
 }
 
 impl VectorModel for OneClass {
-    /// ρ - Σ α_i k(x_i, x): positive outside of the boundary.
+    /// `ρ - Σ α_i k(x_i, x)`: positive outside of the boundary.
     fn score(&mut self, x: &[f64]) -> f64 {
         let vectors = self.vectors.chunks_exact(self.dimensions);
         let inside: f64 = (self.alpha.iter().zip(vectors))

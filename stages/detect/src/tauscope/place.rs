@@ -51,7 +51,7 @@ impl Place {
     }
 
     /// The joints that are loaded: bit j for joint j.
-    pub fn loaded(&self, windows: &Windows) -> u32 {
+    pub fn loaded(windows: &Windows) -> u32 {
         let w = windows.most;
         (0..windows.joints())
             .filter(|&j| windows.mean(w, j).abs() > LOADED * windows.noise(w, j))
@@ -92,10 +92,10 @@ impl Place {
             for arm in along.into_iter().chain([com]) {
                 // residual = -Jᵀ F, in units of the noise.
                 let mut rows = SMatrix::<f64, MAX_JOINTS, 3>::zeros();
-                for j in 0..n {
+                for (j, scale) in scale.iter().enumerate().take(n) {
                     let column = jacobian.column(j);
                     let angular = column.fixed_rows::<3>(3).into_owned();
-                    let row = (column.fixed_rows::<3>(0) + angular.cross(&arm)) * -scale[j];
+                    let row = (column.fixed_rows::<3>(0) + angular.cross(&arm)) * -scale;
                     rows.set_row(j, &row.transpose());
                 }
                 let (mut information, mut pull) = (Matrix3::zeros(), Vector3::zeros());
