@@ -4,7 +4,7 @@
 //! A one-class support vector machine with a Gaussian kernel over the external torques that the momentum
 //! observer sees at 16 samples in a row
 //! (Park et al. 2021), scaled by equation 8, ν = 0.1. The score is
-//! ρ - Σ α_i k(x_i, x): positive outside of the boundary that holds all but a share ν of the training data.
+//! `ρ - Σ α_i k(x_i, x)`: positive outside of the boundary that holds all but a share ν of the training data.
 
 use std::path::PathBuf;
 

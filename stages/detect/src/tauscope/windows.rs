@@ -77,7 +77,7 @@ impl Means {
         let since_s = (now - self.start_ns) as f64 * 1e-9;
         let first = since_s < self.offset_from_first_s;
         let mut row = [0.0; MAX_JOINTS];
-        for j in 0..n {
+        for (j, value) in row.iter_mut().enumerate().take(n) {
             let residual = sample.effort[j] - sample.expected_effort[j];
             if first {
                 // The mean of the first seconds, as it grows.
@@ -87,15 +87,15 @@ impl Means {
                 let share = 1.0 - (-dt_s / self.drift_s).exp();
                 self.offset[j] += share * (residual - self.offset[j]);
             }
-            row[j] = residual - self.offset[j];
+            *value = residual - self.offset[j];
             let recovered = self.slow[j] + dt_s / SLOW_MEMORY_S * self.fast[j];
             self.slow[j] = recovered.min(sample.velocity[j].abs());
         }
         self.rows[self.head % CAPACITY] = (now, row);
         self.head += 1;
         for (w, length_s) in WINDOWS_S.iter().enumerate() {
-            for j in 0..n {
-                self.sums[w][j] += row[j];
+            for (sum, value) in self.sums[w].iter_mut().zip(&row) {
+                *sum += value;
             }
             let begin = now - (length_s * 1e9) as i64;
             while self.tails[w] + 1 < self.head {
@@ -103,8 +103,8 @@ impl Means {
                 if *stamp > begin && self.head - self.tails[w] < CAPACITY {
                     break;
                 }
-                for j in 0..n {
-                    self.sums[w][j] -= old[j];
+                for (sum, value) in self.sums[w].iter_mut().zip(old) {
+                    *sum -= value;
                 }
                 self.tails[w] += 1;
             }
