@@ -85,7 +85,7 @@ pub enum Settings {
     /// A detector.
     Detect {
         /// From the pipeline file.
-        config: tauscope_detect::Config,
+        config: Box<tauscope_detect::Config>,
         /// The model of the twin it listens to, which holds what its threshold rests on.
         model: Option<TwinFile>,
     },

@@ -51,7 +51,7 @@ impl Resolver<'_> {
             return None;
         }
         Some(Settings::Detect {
-            config,
+            config: Box::new(config),
             model: model.cloned(),
         })
     }
