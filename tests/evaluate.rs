@@ -130,7 +130,7 @@ fn every_contact_of_the_bundled_set_is_found_and_scored() {
     assert_eq!(scores.lines().count(), 1 + 3001);
     assert!(out.join("demo_validation.twin_regression.json").is_file());
     let page = std::fs::read_to_string(out.join("report.html")).unwrap();
-    assert!(page.contains("<svg") && !page.contains("<script") && !page.contains("http"));
+    assert!(page.contains("<svg") && !page.contains("<script") && !page.contains("://"));
     assert!(out.join("results.parquet").is_file() && out.join("events.parquet").is_file());
 }
 

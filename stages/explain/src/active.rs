@@ -348,7 +348,8 @@ fn scale_added(changed: &mut [Vec<f64>], start: Option<&Vec<Vec<f64>>>, gains: &
     }
 }
 
-fn act_over(
+/// What a term adds to `start` over all tracks, `transmitted` by the gears.
+pub fn act_over(
     problem: &Problem,
     term: &mut dyn Term,
     start: &[Vec<f64>],
@@ -370,7 +371,8 @@ fn act_over(
     out
 }
 
-fn subtract(mut from: Vec<Vec<f64>>, what: &[Vec<f64>]) -> Vec<Vec<f64>> {
+/// The difference of two efforts.
+pub fn subtract(mut from: Vec<Vec<f64>>, what: &[Vec<f64>]) -> Vec<Vec<f64>> {
     for (from, what) in from.iter_mut().zip(what) {
         for (a, b) in from.iter_mut().zip(what) {
             *a -= b;

@@ -5,7 +5,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use tauscope_dynamics::terms::{CoordinateKind, Layer};
 
-use crate::active::{Active, Column, Efforts, Hypothesis, Whereabouts, change_scaled};
+use crate::active::{
+    Active, Column, Efforts, Hypothesis, Whereabouts, act_over, change_scaled, subtract,
+};
 use crate::drive::is_drive;
 use crate::problem::Problem;
 
@@ -20,12 +22,18 @@ pub struct Columns {
 
 /// Columns that were computed before, by hypothesis and shape. They are those of a grid, so their number is bounded.
 #[derive(Debug, Default)]
-pub struct ColumnCache(Mutex<HashMap<Key, Arc<Columns>>>);
+pub struct ColumnCache {
+    columns: Mutex<HashMap<Key, Arc<Columns>>>,
+    bodies: Mutex<HashMap<(&'static str, Whereabouts, usize), BodyEffort>>,
+}
+
+/// An effort by track, row-major, one number per joint and sample \[N m\].
+type BodyEffort = Arc<Vec<Vec<f64>>>;
 
 type Key = (&'static str, Whereabouts, Vec<u64>);
 
 /// Problems with more rows than this do without the cache: memory stays bounded.
-const CACHED_ROWS: usize = 12_000;
+pub const CACHED_ROWS: usize = 12_000;
 
 /// The columns of a hypothesis at some shape, beside the physics `others` that made `efforts`.
 pub fn columns(
@@ -73,7 +81,7 @@ pub fn columns(
     let lock = || {
         problem
             .cache
-            .0
+            .columns
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
     };
@@ -86,6 +94,45 @@ pub fn columns(
     ));
     lock().insert(key, Arc::clone(&new));
     scaled(&new)
+}
+
+/// What a factor of a [`Layer::Body`] effect adds to the bodies' effort per unit, before drives and recording.
+pub fn body_effort(
+    problem: &Problem,
+    efforts: &Efforts,
+    hypothesis: Hypothesis,
+    coordinate: usize,
+) -> BodyEffort {
+    let key = (hypothesis.effect.name, hypothesis.place, coordinate);
+    let lock = || {
+        problem
+            .cache
+            .bodies
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+    };
+    if let Some(known) = lock().get(&key).map(Arc::clone) {
+        return known;
+    }
+    let step = match hypothesis.effect.coordinates[coordinate].kind {
+        CoordinateKind::Factor { step, .. } => step,
+        _ => 1.0,
+    };
+    let mut coordinates = vec![0.0; hypothesis.effect.coordinates.len()];
+    let silent: Vec<Vec<f64>> = efforts.body.iter().map(|b| vec![0.0; b.len()]).collect();
+    let at = |coordinates: &[f64]| {
+        let mut term = hypothesis.with(coordinates.to_vec()).term(problem);
+        act_over(problem, &mut *term, &silent, &efforts.body)
+    };
+    let base = at(&coordinates);
+    coordinates[coordinate] = step;
+    let mut unit = subtract(at(&coordinates), &base);
+    for value in unit.iter_mut().flatten() {
+        *value /= step;
+    }
+    let unit = Arc::new(unit);
+    lock().insert(key, Arc::clone(&unit));
+    unit
 }
 
 fn compute_columns(

@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::{CoordinateKind, Layer, Scale};
 
-use crate::active::{Active, Column, Efforts, Hypothesis, change, record};
-use crate::columns::columns;
+use crate::active::{Active, Column, Efforts, Hypothesis, change, record, subtract};
+use crate::columns::{CACHED_ROWS, body_effort, columns};
 use crate::drive::is_drive;
 use crate::least_squares::Products;
 use crate::problem::Problem;
@@ -123,6 +123,24 @@ impl Fit {
             let zero = vec![0.0; count];
             let columns = columns(problem, &[], &self.efforts, active.hypothesis, &zero);
             return columns.factors[c].clone();
+        }
+        if linear && layer == Layer::Body && problem.rows <= CACHED_ROWS {
+            let unit = body_effort(problem, &self.efforts, active.hypothesis, c);
+            let mut changed = self.efforts.mechanical.clone();
+            for (changed, unit) in changed.iter_mut().zip(unit.iter()) {
+                for (k, (value, unit)) in changed.iter_mut().zip(unit).enumerate() {
+                    *value += step * self.efforts.gains[k % problem.joints] * unit;
+                }
+            }
+            let recorded = record(problem, &self.actives, &changed);
+            let mut values = problem.signal(&subtract(recorded, &self.efforts.recorded));
+            for value in &mut values {
+                *value /= step;
+            }
+            return Column {
+                joint: None,
+                values,
+            };
         }
         let (mut column, base) = if layer == Layer::Record {
             let mut all = self.actives.clone();
