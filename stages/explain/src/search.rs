@@ -33,7 +33,7 @@ const CURVE_SIZE: f64 = 1.35;
 /// How many proposals of a round are refined before one is taken.
 const REFINED: usize = 3;
 /// More pieces of physics than this are not looked for.
-const MOST_PIECES: usize = 20;
+const MOST_PIECES: usize = 12;
 /// A joint whose variance is below this many times its white noise is not tried with costly effects.
 const QUIET: f64 = 1.15;
 
