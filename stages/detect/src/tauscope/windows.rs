@@ -137,8 +137,9 @@ impl Means {
 pub(crate) struct Windows {
     means: Means,
     learnt: Learnt,
-    /// The window whose mean is most unusual, by how much, and the noise of it by joint.
+    /// The window whose mean is most unusual.
     pub most: usize,
+    /// How unusual: the newest score.
     score: f64,
 }
 
