@@ -43,6 +43,10 @@ pub mod flags {
     pub const CHANGE: u32 = 1 << 11;
     /// Somebody asks the detectors to learn the robot's usual behaviour anew, from this sample on.
     pub const LEARN: u32 = 1 << 12;
+    /// `content_n` of a detection holds the force's frequency content.
+    pub const CONTENT: u32 = 1 << 13;
+    /// `rise_direction` and `motion_direction` of a detection hold unit vectors.
+    pub const DIRECTIONS: u32 = 1 << 14;
 }
 
 /// What every sample begins with.
@@ -197,7 +201,7 @@ pub enum EventKind {
 /// A detector's verdict on one sample. One goes out for every sample that came in.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable, ZeroCopySend)]
-#[type_name("tauscope/Detection/2")]
+#[type_name("tauscope/Detection/3")]
 pub struct Detection {
     /// Stamp, sequence, flags; [`flags::READY`] if the detector judged this sample.
     pub header: Header,
@@ -226,6 +230,15 @@ pub struct Detection {
     /// Size of a change ([`flags::CHANGE`]): \[kg\] for `payload`, a factor for `torque_gain`, else in the
     /// unit of the effect's parameter \[effort unit, or that per rad/s\]; 0 for `unknown`.
     pub size: f64,
+    /// By direction of the world frame, how much of the external force lies in the band that the detector
+    /// watches \[N\]; see [`flags::CONTENT`].
+    pub content_n: [f64; 3],
+    /// Unit vector of the external force's change as the contact was detected, world frame; zeros for a force
+    /// that did not change. See [`flags::DIRECTIONS`].
+    pub rise_direction: [f64; 3],
+    /// Unit vector of the tool's velocity as the contact began, world frame; zeros for a tool that stood
+    /// still. See [`flags::DIRECTIONS`].
+    pub motion_direction: [f64; 3],
 }
 
 impl Detection {
@@ -288,7 +301,7 @@ impl SampleKind {
         match self {
             Self::JointState => "tauscope/JointState/1",
             Self::TwinState => "tauscope/TwinState/1",
-            Self::Detection => "tauscope/Detection/2",
+            Self::Detection => "tauscope/Detection/3",
             Self::Health => "tauscope/Health/1",
         }
     }

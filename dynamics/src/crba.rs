@@ -1,57 +1,83 @@
 //! The joint-space mass matrix.
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use crate::data::check_lengths;
+use crate::inertia::symmetric;
+use crate::kinematics::forward_kinematics;
 use crate::{Data, Model};
 
+/// A subtree's mass, first moment and pseudo-inertia ∫ r rᵀ dm about the world's origin, along its axes.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Composite {
+    mass: f64,
+    first_moment: Vector3<f64>,
+    pseudo_inertia: Matrix3<f64>,
+}
+
 /// The mass matrix \[kg m², kg m, kg\] at `q`, tool included: n x n, symmetric, both triangles filled,
-/// by the composite-rigid-body algorithm (RBDA section 6.2).
+/// by the composite-rigid-body algorithm (RBDA section 6.2). [`link_pose`](crate::link_pose) and
+/// [`link_jacobian`](crate::link_jacobian) answer from it too.
+///
+/// In the world's frame, in which the inertias of a subtree add up and every axis is met by the same force.
 ///
 /// # Panics
 /// If `q` is not one number per joint, or `data` was made for a model with another number of joints.
 pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &[f64]) -> &'d DMatrix<f64> {
     check_lengths(model, data, &[q]);
+    forward_kinematics(model, data, q);
     let Data {
         slots, mass_matrix, ..
     } = data;
     for (body, slot) in model.bodies.iter().zip(&mut slots[1..]) {
-        body.place(q[body.joint], slot);
-        slot.composite = body.inertia();
+        let (load, rotation, p) = (&body.load, &slot.world_rotation, &slot.world_translation);
+        let h = rotation * load.first_moment;
+        // ∫ (R r + p)(R r + p)ᵀ dm.
+        let shift = p * (h + p * (0.5 * load.mass)).transpose();
+        let turned = rotation * load.pseudo_inertia;
+        let entry = |i, j| turned.row(i).dot(&rotation.row(j)) + shift[(i, j)] + shift[(j, i)];
+        slot.composite = Composite {
+            mass: load.mass,
+            first_moment: h + p * load.mass,
+            pseudo_inertia: symmetric([
+                entry(0, 0),
+                entry(0, 1),
+                entry(0, 2),
+                entry(1, 1),
+                entry(1, 2),
+                entry(2, 2),
+            ]),
+        };
     }
     // Joints on different branches do not feel each other.
-    mass_matrix.fill(0.0);
+    let n = model.dof();
+    let entries = mass_matrix.as_mut_slice();
+    entries.fill(0.0);
     for (i, body) in model.bodies.iter().enumerate().rev() {
         let slot = &slots[i + 1];
-        let composite = slot.composite;
-        // What a unit acceleration along the axis takes.
-        let z = Vector3::z();
-        let (mut force, mut moment) = if body.prismatic {
-            (z * composite.mass, composite.first_moment.cross(&z))
-        } else {
-            (
-                z.cross(&composite.first_moment),
-                composite.rotational.column(2).into(),
-            )
-        };
+        let (angular, linear) = (slot.angular, slot.linear_at_origin);
+        let Composite {
+            mass,
+            first_moment,
+            pseudo_inertia,
+        } = slot.composite;
+        // What a unit acceleration of the joint takes; the moment is about the world's origin.
+        let force = linear * mass + angular.cross(&first_moment);
+        let moment = angular * pseudo_inertia.trace() - pseudo_inertia * angular
+            + first_moment.cross(&linear);
         let mut at = i + 1;
-        loop {
-            let here = &model.bodies[at - 1];
-            let value = if here.prismatic { force.z } else { moment.z };
-            mass_matrix[(here.joint, body.joint)] = value;
-            mass_matrix[(body.joint, here.joint)] = value;
-            if here.parent == 0 {
-                break;
-            }
-            let slot = &slots[at];
-            force = slot.rotation * force;
-            moment = slot.rotation * moment + slot.translation.cross(&force);
+        while at > 0 {
+            let (here, slot) = (&model.bodies[at - 1], &slots[at]);
+            let value = slot.angular.dot(&moment) + slot.linear_at_origin.dot(&force);
+            entries[here.joint * n + body.joint] = value;
+            entries[body.joint * n + here.joint] = value;
             at = here.parent;
         }
         if body.parent > 0 {
-            let slot = &slots[i + 1];
-            let moved = composite.moved(&slot.rotation, &slot.translation);
-            slots[body.parent].composite += moved;
+            let parent = &mut slots[body.parent].composite;
+            parent.mass += mass;
+            parent.first_moment += first_moment;
+            parent.pseudo_inertia += pseudo_inertia;
         }
     }
     mass_matrix

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, Matrix3, Matrix6, Matrix6xX, Vector3, Vector6};
 
 use crate::Model;
+use crate::crba::Composite;
 use crate::regressor::PARAMETERS_PER_BODY;
 
 /// Working memory and results for one [`Model`] (or any other with the same tree). Each algorithm
@@ -39,8 +40,12 @@ pub(crate) struct Slot {
     /// Pose in the world.
     pub world_rotation: Matrix3<f64>,
     pub world_translation: Vector3<f64>,
+    /// What the joint's unit velocity does to the world about it: angular velocity, and the velocity of what
+    /// is at the world's origin.
+    pub angular: Vector3<f64>,
+    pub linear_at_origin: Vector3<f64>,
     /// Inertia of the subtree from here on.
-    pub composite: crate::Inertia,
+    pub composite: Composite,
 }
 
 /// One body in the articulated-body algorithm; spatial vectors are (angular, linear).

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix6xX, Rotation3, UnitQuaternion, Vector3};
 
-use crate::data::check_lengths;
+use crate::data::{Slot, check_lengths};
 use crate::{Data, Model};
 
 /// Computes the pose of every link at the positions `q` \[rad or m\]; [`link_pose`] and
@@ -19,6 +19,12 @@ pub fn forward_kinematics(model: &Model, data: &mut Data, q: &[f64]) {
         slot.world_rotation = parent.world_rotation * slot.rotation;
         slot.world_translation =
             parent.world_translation + parent.world_rotation * slot.translation;
+        let axis: Vector3<f64> = slot.world_rotation.column(2).into();
+        (slot.angular, slot.linear_at_origin) = if body.prismatic {
+            (Vector3::zeros(), axis)
+        } else {
+            (axis, slot.world_translation.cross(&axis))
+        };
     }
 }
 
@@ -50,26 +56,59 @@ pub(crate) fn link_origin(model: &Model, data: &Data, link: usize) -> Vector3<f6
 /// # Panics
 /// If `link` is not an index into [`Model::links`].
 pub fn link_jacobian<'d>(model: &Model, data: &'d mut Data, link: usize) -> &'d Matrix6xX<f64> {
-    let frame = &model.frames[link];
     let Data {
         slots, jacobian, ..
     } = data;
-    jacobian.fill(0.0);
+    jacobian.as_mut_slice().fill(0.0);
+    columns(
+        model,
+        slots,
+        link,
+        &Vector3::zeros(),
+        |j, linear, angular| {
+            let mut column = jacobian.fixed_columns_mut::<1>(j);
+            column.fixed_rows_mut::<3>(0).copy_from(&linear);
+            column.fixed_rows_mut::<3>(3).copy_from(&angular);
+        },
+    );
+    jacobian
+}
+
+/// Where the point `point_m` \[m, in the link's frame\] of a link is in the world \[m\], after
+/// [`forward_kinematics`]. `column` is given the columns of its Jacobian other than zero: joint, linear
+/// velocity of the point, angular velocity, along the world's axes.
+///
+/// # Panics
+/// If `link` is not an index into [`Model::links`].
+#[inline]
+pub fn point_jacobian(
+    model: &Model,
+    data: &Data,
+    link: usize,
+    point_m: &Vector3<f64>,
+    column: impl FnMut(usize, Vector3<f64>, Vector3<f64>),
+) -> Vector3<f64> {
+    columns(model, &data.slots, link, point_m, column)
+}
+
+#[inline]
+fn columns(
+    model: &Model,
+    slots: &[Slot],
+    link: usize,
+    point_m: &Vector3<f64>,
+    mut column: impl FnMut(usize, Vector3<f64>, Vector3<f64>),
+) -> Vector3<f64> {
+    let frame = &model.frames[link];
     let carrier = &slots[frame.slot];
-    let point = carrier.world_translation + carrier.world_rotation * frame.translation;
+    let on_carrier = frame.translation + frame.rotation * point_m;
+    let point = carrier.world_translation + carrier.world_rotation * on_carrier;
     let mut at = frame.slot;
     while at > 0 {
         let (body, slot) = (&model.bodies[at - 1], &slots[at]);
-        let axis: Vector3<f64> = slot.world_rotation.column(2).into();
-        let mut column = jacobian.column_mut(body.joint);
-        if body.prismatic {
-            column.fixed_rows_mut::<3>(0).copy_from(&axis);
-        } else {
-            let lever = point - slot.world_translation;
-            column.fixed_rows_mut::<3>(0).copy_from(&axis.cross(&lever));
-            column.fixed_rows_mut::<3>(3).copy_from(&axis);
-        }
+        let linear = slot.linear_at_origin + slot.angular.cross(&point);
+        column(body.joint, linear, slot.angular);
         at = body.parent;
     }
-    jacobian
+    point
 }

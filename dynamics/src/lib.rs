@@ -51,7 +51,7 @@ pub use aba::{Wrench, forward_dynamics};
 pub use crba::mass_matrix;
 pub use data::Data;
 pub use inertia::Inertia;
-pub use kinematics::{forward_kinematics, link_jacobian, link_pose};
+pub use kinematics::{forward_kinematics, link_jacobian, link_pose, point_jacobian};
 pub use model::{Geometry, Joint, JointKind, Limits, Link, Model, ModelError, Shape};
 pub use regressor::{PARAMETERS_PER_BODY, regressor};
 pub use rnea::{gravity_effort, rnea};

@@ -14,6 +14,8 @@ const SETTLED: f64 = 0.01;
 #[derive(Debug, Clone)]
 pub struct Butterworth2 {
     cutoff_rad_s: f64,
+    /// How far the output is behind a ramp: √2 / ωc.
+    lag_s: f64,
     state: Option<State>,
     step: Step,
 }
@@ -30,9 +32,10 @@ struct State {
 #[derive(Debug, Clone, Copy)]
 struct Step {
     dt_s: f64,
-    /// e^(-a dt) cos(a dt), e^(-a dt) sin(a dt) with a = ωc/√2.
+    /// e^(-a dt) cos(a dt), e^(-a dt) sin(a dt) with a = ωc/√2, and the latter over a.
     cos: f64,
     sin: f64,
+    sin_over_a_s: f64,
 }
 
 impl Butterworth2 {
@@ -48,11 +51,13 @@ impl Butterworth2 {
         );
         Self {
             cutoff_rad_s: 2.0 * PI * cutoff_hz,
+            lag_s: SQRT_2 / (2.0 * PI * cutoff_hz),
             state: None,
             step: Step {
                 dt_s: 0.0,
                 cos: 1.0,
                 sin: 0.0,
+                sin_over_a_s: 0.0,
             },
         }
     }
@@ -70,6 +75,7 @@ impl Butterworth2 {
     /// not above zero the last output is returned and `x` passed over.
     ///
     /// A `NaN` stays in the filter until [`Butterworth2::reset`].
+    #[inline]
     pub fn update(&mut self, dt_s: f64, x: f64) -> f64 {
         self.advance(dt_s, x).output
     }
@@ -85,6 +91,7 @@ impl Butterworth2 {
         (SQRT_2 / SETTLED).ln() * SQRT_2 / self.cutoff_rad_s
     }
 
+    #[inline]
     fn advance(&mut self, dt_s: f64, x: f64) -> State {
         let Some(before) = self.state else {
             self.reset(x);
@@ -105,17 +112,23 @@ impl Butterworth2 {
                 dt_s,
                 cos: decay * cos,
                 sin: decay * sin,
+                sin_over_a_s: decay * sin / a,
             };
         }
         // On a ramp the output follows at a fixed distance; what deviates from that decays freely.
         let slope = (x - before.input) / dt_s;
-        let lag = slope * SQRT_2 / self.cutoff_rad_s;
+        let lag = slope * self.lag_s;
         let deviation = before.output - (before.input - lag);
         let drift = before.rate - slope;
-        let Step { cos, sin, .. } = self.step;
+        let Step {
+            cos,
+            sin,
+            sin_over_a_s,
+            ..
+        } = self.step;
         let state = State {
             input: x,
-            output: x - lag + (cos + sin) * deviation + sin / a * drift,
+            output: x - lag + (cos + sin) * deviation + sin_over_a_s * drift,
             rate: slope + (cos - sin) * drift - 2.0 * a * sin * deviation,
         };
         self.state = Some(state);

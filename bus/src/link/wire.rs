@@ -35,7 +35,7 @@
 //! | `filtered_expected_effort` | `[f64; 16]` | 800 |
 //! | `residual` | `[f64; 16]` | 928 |
 //!
-//! | `tauscope/Detection/2`, 264 bytes | type | at |
+//! | `tauscope/Detection/3`, 336 bytes | type | at |
 //! | --- | --- | --- |
 //! | `detector` | name | 32 |
 //! | `state` | name | 80 |
@@ -48,6 +48,9 @@
 //! | `joints` | `u32` | 248 |
 //! | `event` | `u32` | 252 |
 //! | `size` | `f64` | 256 |
+//! | `content_n` | `[f64; 3]` | 264 |
+//! | `rise_direction` | `[f64; 3]` | 288 |
+//! | `motion_direction` | `[f64; 3]` | 312 |
 //!
 //! | `tauscope/Health/1`, 112 bytes | type | at |
 //! | --- | --- | --- |
@@ -139,12 +142,12 @@ mod tests {
             )
         );
         assert_eq!(
-            tables["tauscope/Detection/2"],
+            tables["tauscope/Detection/3"],
             (
                 Some(size_of::<Detection>()),
                 rows(
                     layout!(Detection: detector, state, link, score, threshold, contact_ns,
-                    force_n, point_m, joints, event, size)
+                    force_n, point_m, joints, event, size, content_n, rise_direction, motion_direction)
                 )
             )
         );

@@ -113,7 +113,7 @@ pub fn misalignment(contact: &NewContact, standstill_m_per_s: f64) -> Option<f64
     ratio.is_finite().then_some(ratio)
 }
 
-pub(crate) fn length(vector: &[f64; 3]) -> f64 {
+fn length(vector: &[f64; 3]) -> f64 {
     vector.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use tauscope_bus::TwinState;
 
 use crate::contact_signals::{Instant, SignalSettings, Signals};
-use crate::detector::{Detector, Judgement, Seen, Verdict};
+use crate::detector::{Details, Detector, Judgement, Seen, Verdict};
 use crate::isolation::Contact;
 use crate::lesson::ContactKind;
 
@@ -81,6 +81,8 @@ pub struct Machine {
     newest: usize,
     length: usize,
     ongoing: Ongoing,
+    /// The contact that was detected last.
+    contact: Option<NewContact>,
     /// Directions of the collision that goes on.
     active: [bool; 3],
     /// Stamp at which a norm was last above the threshold.
@@ -104,6 +106,7 @@ impl Machine {
             newest: 0,
             length: 0,
             ongoing: None,
+            contact: None,
             active: [false; 3],
             high_ns: 0,
         }
@@ -139,6 +142,7 @@ impl Machine {
             let contact = self.contact(instant, new);
             let kind = rule.classify(&contact);
             self.ongoing = Some((kind, contact.contact_ns));
+            self.contact = Some(contact);
         }
         let collides = matches!(self.ongoing, Some((ContactKind::Collision, _)));
         self.active = above.map(|above| above && collides);
@@ -146,6 +150,15 @@ impl Machine {
             self.ongoing = None;
         }
         self.ongoing
+    }
+
+    /// What the detector saw at the newest instant.
+    pub(crate) fn details(&self) -> Option<Details> {
+        (self.length > 0).then(|| Details {
+            content_n: self.past(0).norms_n,
+            directions: (self.contact.filter(|_| self.ongoing.is_some()))
+                .map(|contact| [contact.rise_n, contact.velocity_m_per_s].map(unit)),
+        })
     }
 
     /// The instant `back` before the newest one.
@@ -199,6 +212,12 @@ impl Machine {
         }
         best
     }
+}
+
+/// The unit vector; zeros for one without length.
+pub(crate) fn unit(vector: [f64; 3]) -> [f64; 3] {
+    let length = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
+    vector.map(|x| if length > 0.0 { x / length } else { 0.0 })
 }
 
 /// A detector made of the signals, Algorithm 1 and a rule.
@@ -276,6 +295,10 @@ impl<R: Rule> Detector for ContactDetector<R> {
 
     fn threshold(&self) -> Option<f64> {
         Some(self.machine.settings.force_threshold_n)
+    }
+
+    fn details(&self) -> Option<Details> {
+        self.machine.details()
     }
 
     fn fault(&self) -> Option<String> {

@@ -135,13 +135,8 @@ impl Signals {
         if before_ns.is_some_and(|before| stamp_ns <= before) {
             return self.newest;
         }
-        let torque = *self.observer.update(sample);
-        let observer = &self.observer;
-        let at = self
-            .tool
-            .at(&sample.position, &sample.velocity, &torque, |j| {
-                observer.knows(j)
-            });
+        self.observer.update(sample);
+        let at = self.tool.at(&self.observer, &sample.velocity);
         let mut velocity_m_per_s = [0.0; 3];
         for (axis, filter) in self.velocity.iter_mut().enumerate() {
             let value = at.velocity_m_per_s[axis];

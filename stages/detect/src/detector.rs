@@ -39,6 +39,16 @@ pub struct Seen {
     pub place: Option<crate::Contact>,
 }
 
+/// What a detector saw on the way to its newest judgement. World frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Details {
+    /// By direction, how much of the external force lies in the band that is watched \[N\].
+    pub content_n: [f64; 3],
+    /// Of the contact that goes on, unit vectors of the force's change at its detection and of the tool's
+    /// velocity at its beginning; zeros for one without length.
+    pub directions: Option<[[f64; 3]; 2]>,
+}
+
 /// Scores every sample of a twin. Pure: time is in the samples; nothing is allocated per sample.
 pub trait Detector: Send {
     /// Canonical name, as in the pipeline file and in the archive.
@@ -50,6 +60,11 @@ pub trait Detector: Send {
     /// The score from which on a detector with rules of its own sees a contact. `None`: the frame
     /// holds the score against the configured threshold.
     fn threshold(&self) -> Option<f64> {
+        None
+    }
+
+    /// What it saw on the way to its newest judgement; `None` where there is no more than that.
+    fn details(&self) -> Option<Details> {
         None
     }
 

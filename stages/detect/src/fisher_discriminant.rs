@@ -12,8 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::config::ConfigError;
-use crate::contact_classifier::length;
-use crate::contact_machine::{ContactDetector, MachineSettings, NewContact, Rule};
+use crate::contact_machine::{ContactDetector, MachineSettings, NewContact, Rule, unit};
 use crate::contact_signals::{SignalSettings, Signals};
 use crate::contact_tuning;
 use crate::detector::Detector;
@@ -81,12 +80,10 @@ pub(crate) fn build(settings: &Settings, setup: &Setup) -> Result<Box<dyn Detect
 /// Both unit vectors; zeros for one without length.
 fn measurements(contact: &NewContact) -> Vector6<f64> {
     let mut all = Vector6::zeros();
-    for (at, vector) in [(0, &contact.rise_n), (3, &contact.velocity_m_per_s)] {
-        let length = length(vector);
-        for i in (0..3).filter(|_| length > 0.0) {
-            all[at + i] = vector[i] / length;
-        }
-    }
+    all.fixed_rows_mut::<3>(0)
+        .copy_from_slice(&unit(contact.rise_n));
+    all.fixed_rows_mut::<3>(3)
+        .copy_from_slice(&unit(contact.velocity_m_per_s));
     all
 }
 

@@ -15,7 +15,7 @@ use crate::config::ConfigError;
 use crate::contact_machine::{Machine, MachineSettings, NewContact, Ongoing, Rule, judgement};
 use crate::contact_signals::{Instant, SignalSettings, Signals};
 use crate::contact_tuning;
-use crate::detector::{Detector, Judgement};
+use crate::detector::{Details, Detector, Judgement};
 use crate::lesson::{ContactKind, LearnError, Lessons};
 use crate::stage::Setup;
 
@@ -84,6 +84,10 @@ impl Detector for FrequencyClassifier {
 
     fn threshold(&self) -> Option<f64> {
         Some(self.by_content.force_threshold_n)
+    }
+
+    fn details(&self) -> Option<Details> {
+        self.by_content.machine.details()
     }
 
     fn fault(&self) -> Option<String> {

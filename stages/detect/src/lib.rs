@@ -34,7 +34,7 @@ pub mod window_ocsvm;
 pub mod wrench;
 
 pub use config::{Config, ConfigError, Threshold};
-pub use detector::{Detector, Judgement, Seen, Verdict};
+pub use detector::{Details, Detector, Judgement, Seen, Verdict};
 pub use isolation::{Contact, Isolation};
 pub use learned::{Trained, TrainedError};
 pub use lesson::{ContactKind, LabelledContact, LearnError, Lesson, Lessons};

@@ -28,8 +28,8 @@ use crate::stage::Setup;
 /// The papers' gain \[1/s\].
 pub const DEFAULT_GAIN_PER_S: f64 = 100.0;
 
-/// Share of a step that is still missing when the observer counts as settled.
-const SETTLED: f64 = 0.01;
+/// The observer counts as settled after so many of its time constants: 1 % of a step is missing still.
+const SETTLED: f64 = 4.605_170_185_988_092;
 
 /// The observer of one robot. No allocation per sample.
 #[derive(Debug, Clone)]
@@ -39,21 +39,16 @@ pub struct MomentumObserver {
     data: Data,
     /// Effort unit per N m by joint; 0 where that is not known.
     effort_per_nm: Vec<f64>,
-    before: Option<Before>,
-    /// Mass matrix of the sample before.
+    /// Stamp of the sample before, and its velocity, τ - n \[N m\] and mass matrix.
+    before_ns: Option<i64>,
+    velocity: JointArray,
+    driving: JointArray,
     mass: DMatrix<f64>,
+    /// Step \[s\], and the share of a change that is followed in it; kept, for clocks are often even.
+    step: (f64, f64),
     /// Estimate by joint \[N m\].
     torque_nm: JointArray,
     started_ns: i64,
-}
-
-/// What the next step needs of the sample before.
-#[derive(Debug, Clone, Copy)]
-struct Before {
-    stamp_ns: i64,
-    velocity: JointArray,
-    /// τ - n \[N m\].
-    driving: JointArray,
 }
 
 impl MomentumObserver {
@@ -79,8 +74,11 @@ impl MomentumObserver {
                 .map(|joint| Some(joint.effort_per_nm).filter(|&per_nm| known(per_nm)))
                 .map(Option::unwrap_or_default)
                 .collect(),
-            before: None,
+            before_ns: None,
+            velocity: [0.0; MAX_JOINTS],
+            driving: [0.0; MAX_JOINTS],
             mass: DMatrix::zeros(n, n),
+            step: (0.0, 0.0),
             torque_nm: [0.0; MAX_JOINTS],
             started_ns: 0,
         })
@@ -90,51 +88,66 @@ impl MomentumObserver {
     /// at a joint whose effort cannot be turned into a torque ([`MomentumObserver::knows`]). After
     /// [`flags::RESET`] it begins anew at 0; a repeated stamp changes nothing.
     pub fn update(&mut self, sample: &TwinState) -> &JointArray {
+        self.update_beside(sample, &sample.expected_effort)
+    }
+
+    /// As [`MomentumObserver::update`] beside another twin's `expected_effort`.
+    pub fn update_beside(
+        &mut self,
+        sample: &TwinState,
+        expected_effort: &JointArray,
+    ) -> &JointArray {
         let n = self.effort_per_nm.len();
         let stamp_ns = sample.header.stamp_ns;
-        let before = self.before.filter(|_| !sample.header.has(flags::RESET));
-        if before.is_some_and(|before| stamp_ns <= before.stamp_ns) {
+        let before_ns = self.before_ns.filter(|_| !sample.header.has(flags::RESET));
+        if before_ns.is_some_and(|before_ns| stamp_ns <= before_ns) {
             return &self.torque_nm;
         }
         let mass = mass_matrix(&self.model, &mut self.data, &sample.position[..n]);
-        let mut driving = [0.0; MAX_JOINTS];
-        for (j, driving) in driving[..n].iter_mut().enumerate() {
-            if self.effort_per_nm[j] != 0.0 {
-                let excess = sample.effort[j] - sample.expected_effort[j];
-                let row = mass.column(j);
-                let inertial = row.iter().zip(&sample.acceleration).map(|(m, a)| m * a);
-                *driving = excess / self.effort_per_nm[j] + inertial.sum::<f64>();
+        let (mass, mass_before) = (mass.as_slice(), self.mass.as_mut_slice());
+        // M q̈ now, and twice the mean mass matrix times the change of velocity.
+        let (mut inertial, mut momentum) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
+        for k in 0..n {
+            let acceleration = sample.acceleration[k];
+            let change = sample.velocity[k] - self.velocity[k];
+            // Symmetric: a row is a column.
+            let rows = mass[k * n..].iter().zip(&mass_before[k * n..]);
+            let sums = inertial[..n].iter_mut().zip(&mut momentum[..n]);
+            for ((inertial, momentum), (now, then)) in sums.zip(rows) {
+                *inertial += now * acceleration;
+                *momentum += (now + then) * change;
             }
         }
-        match before {
-            None => {
-                self.torque_nm = [0.0; MAX_JOINTS];
-                self.started_ns = stamp_ns;
-            }
-            Some(before) => {
-                let dt_s = (stamp_ns - before.stamp_ns) as f64 * 1e-9;
-                let approach = -(-self.gain_per_s * dt_s).exp_m1();
-                let mut change = [0.0; MAX_JOINTS];
-                for (k, change) in change[..n].iter_mut().enumerate() {
-                    *change = (sample.velocity[k] - before.velocity[k]) / (2.0 * dt_s);
-                }
-                for j in (0..n).filter(|&j| self.effort_per_nm[j] != 0.0) {
-                    let (now, then) = (mass.column(j), self.mass.column(j));
-                    let masses = now.iter().zip(&then);
-                    let momentum: f64 = (masses.zip(&change))
-                        .map(|((now, then), change)| (now + then) * change)
-                        .sum();
-                    let input = momentum - 0.5 * (driving[j] + before.driving[j]);
-                    self.torque_nm[j] += approach * (input - self.torque_nm[j]);
-                }
+        mass_before.copy_from_slice(mass);
+        self.velocity[..n].copy_from_slice(&sample.velocity[..n]);
+        let dt_s = before_ns.map(|before_ns| (stamp_ns - before_ns) as f64 * 1e-9);
+        if let Some(dt_s) = dt_s.filter(|dt_s| dt_s.to_bits() != self.step.0.to_bits()) {
+            self.step = (dt_s, -(-self.gain_per_s * dt_s).exp_m1());
+        }
+        for j in (0..n).filter(|&j| self.effort_per_nm[j] != 0.0) {
+            let excess = sample.effort[j] - expected_effort[j];
+            let driving = excess / self.effort_per_nm[j] + inertial[j];
+            let before = std::mem::replace(&mut self.driving[j], driving);
+            if let Some(dt_s) = dt_s {
+                let input = 0.5 * (momentum[j] / dt_s - (driving + before));
+                self.torque_nm[j] += self.step.1 * (input - self.torque_nm[j]);
             }
         }
-        self.mass.copy_from(mass);
-        self.before = Some(Before {
-            stamp_ns,
-            velocity: sample.velocity,
-            driving,
-        });
+        if dt_s.is_none() {
+            self.torque_nm = [0.0; MAX_JOINTS];
+            self.started_ns = stamp_ns;
+        }
+        self.before_ns = Some(stamp_ns);
+        &self.torque_nm
+    }
+
+    /// The robot, and where its links were at the newest sample.
+    pub(crate) fn robot(&self) -> (&Model, &Data) {
+        (&self.model, &self.data)
+    }
+
+    /// What the last update returned.
+    pub fn torque_nm(&self) -> &JointArray {
         &self.torque_nm
     }
 
@@ -145,9 +158,9 @@ impl MomentumObserver {
 
     /// Whether what was assumed at the start has been forgotten: all but 1 % of it.
     pub fn settled(&self) -> bool {
-        self.before.is_some_and(|before| {
-            let since_s = (before.stamp_ns - self.started_ns) as f64 * 1e-9;
-            (-self.gain_per_s * since_s).exp() <= SETTLED
+        self.before_ns.is_some_and(|before_ns| {
+            let since_s = (before_ns - self.started_ns) as f64 * 1e-9;
+            self.gain_per_s * since_s >= SETTLED
         })
     }
 }

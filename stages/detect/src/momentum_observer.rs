@@ -42,14 +42,12 @@ impl Default for Settings {
 
 /// The detector behind a twin with the gains and offsets of `setup`.
 pub(crate) fn build(settings: &Settings, setup: &Setup) -> Result<Box<dyn Detector>, ConfigError> {
-    let mut regression = [(1.0, 0.0); MAX_JOINTS];
-    for (own, joint) in regression.iter_mut().zip(&setup.joints) {
-        *own = (joint.gain, joint.offset);
-    }
     let filter = Butterworth2::new(settings.cutoff_hz);
     Ok(Box::new(Naive {
         observer: MomentumObserver::new(setup, settings.gain_per_s, NAME)?,
-        regression,
+        regression: (setup.joints.iter())
+            .map(|joint| (joint.gain, joint.offset))
+            .collect(),
         settling_ns: (filter.settling_time_s() * 1e9) as i64,
         filters: vec![filter; setup.joints.len()],
         previous_ns: None,
@@ -60,7 +58,7 @@ pub(crate) fn build(settings: &Settings, setup: &Setup) -> Result<Box<dyn Detect
 struct Naive {
     observer: MomentumObserver,
     /// Gain and offset by joint, as the twin applied them.
-    regression: [(f64, f64); MAX_JOINTS],
+    regression: Vec<(f64, f64)>,
     /// By joint, on the observed torque.
     filters: Vec<Butterworth2>,
     settling_ns: i64,
@@ -75,16 +73,15 @@ impl Detector for Naive {
 
     fn judge(&mut self, sample: &TwinState) -> Judgement {
         let stamp_ns = sample.header.stamp_ns;
-        let mut plain = *sample;
-        for (effort, (gain, offset)) in plain.expected_effort.iter_mut().zip(&self.regression) {
+        let mut plain = [0.0; MAX_JOINTS];
+        let corrected = sample.expected_effort.iter().zip(&self.regression);
+        for (plain, (effort, (gain, offset))) in plain.iter_mut().zip(corrected) {
             // A gain of zero has wiped the model's effort out: nothing is left to compare with.
-            *effort = if *gain == 0.0 {
-                0.0
-            } else {
-                (*effort - offset) / gain
-            };
+            if *gain != 0.0 {
+                *plain = (effort - offset) / gain;
+            }
         }
-        let torque_nm = self.observer.update(&plain);
+        let torque_nm = self.observer.update_beside(sample, &plain);
         let previous_ns =
             (self.previous_ns.replace(stamp_ns)).filter(|_| !sample.header.has(flags::RESET));
         if previous_ns.is_none() {

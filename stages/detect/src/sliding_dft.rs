@@ -115,14 +115,73 @@ pub struct SlidingDft {
     /// The window as a ring; zeros before it has filled.
     ring: Vec<[f64; AXES]>,
     at: usize,
-    /// By bin, e^(-2πi k/N) and that to the power of `at`.
-    turn: Vec<[f64; 2]>,
-    phase: Vec<[f64; 2]>,
-    /// By bin and direction, real and imaginary part.
-    sums: Vec<[[f64; 2]; AXES]>,
+    bins: Bins,
     /// The bin whose sum is begun anew in this cycle, and that sum.
     renewed: usize,
     fresh: [[f64; 2]; AXES],
+}
+
+/// What belongs to the bins: by number, bin by bin, so that several are followed at once.
+#[derive(Debug, Clone, Default)]
+struct Bins {
+    /// e^(-2πi k/N), and that to the power of the place in the cycle: real and imaginary parts.
+    turn: [Vec<f64>; 2],
+    phase: [Vec<f64>; 2],
+    /// By direction, real and imaginary parts.
+    sums: [[Vec<f64>; 2]; AXES],
+}
+
+impl Bins {
+    fn len(&self) -> usize {
+        self.turn[0].len()
+    }
+
+    /// Phases as at the beginning of a cycle.
+    fn rewind(&mut self) {
+        self.phase[0].fill(1.0);
+        self.phase[1].fill(0.0);
+    }
+
+    /// Adds `change` in the present phase, and goes on to the next.
+    fn push(&mut self, change: [f64; AXES]) {
+        let n = self.len();
+        let [phase_re, phase_im] = &mut self.phase;
+        let (phase_re, phase_im) = (&mut phase_re[..n], &mut phase_im[..n]);
+        for ([re, im], change) in self.sums.iter_mut().zip(change) {
+            let (re, im) = (&mut re[..n], &mut im[..n]);
+            for k in 0..n {
+                re[k] += change * phase_re[k];
+                im[k] += change * phase_im[k];
+            }
+        }
+        let [turn_re, turn_im] = &self.turn;
+        let (turn_re, turn_im) = (&turn_re[..n], &turn_im[..n]);
+        for k in 0..n {
+            let (re, im) = (phase_re[k], phase_im[k]);
+            phase_re[k] = re * turn_re[k] - im * turn_im[k];
+            phase_im[k] = re * turn_im[k] + im * turn_re[k];
+        }
+    }
+
+    /// By direction, the largest squared length of any bin; 0 over no bin.
+    fn most(&self) -> [f64; AXES] {
+        // Four at a time, for a single running maximum waits for itself.
+        const LANES: usize = 4;
+        let larger = |a: f64, b: f64| if a > b { a } else { b };
+        std::array::from_fn(|axis| {
+            let [re, im] = &self.sums[axis];
+            let (mut re, mut im) = (re.chunks_exact(LANES), im.chunks_exact(LANES));
+            let mut most = [0.0; LANES];
+            for (re, im) in re.by_ref().zip(im.by_ref()) {
+                for (lane, most) in most.iter_mut().enumerate() {
+                    *most = larger(re[lane] * re[lane] + im[lane] * im[lane], *most);
+                }
+            }
+            let rest = re.remainder().iter().zip(im.remainder());
+            let rest = rest.map(|(re, im)| re * re + im * im);
+            rest.chain(most).fold(0.0, larger)
+        })
+    }
 }
 
 impl SlidingDft {
@@ -131,9 +190,7 @@ impl SlidingDft {
         Self {
             ring: vec![[0.0; AXES]; window.max(1)],
             at: 0,
-            turn: Vec::new(),
-            phase: Vec::new(),
-            sums: Vec::new(),
+            bins: Bins::default(),
             renewed: 0,
             fresh: [[0.0; 2]; AXES],
         }
@@ -143,61 +200,54 @@ impl SlidingDft {
     pub fn set_bins(&mut self, bins: RangeInclusive<usize>) {
         self.ring.fill([0.0; AXES]);
         self.at = 0;
-        self.turn.clear();
-        let n = self.ring.len() as f64;
-        self.turn.extend(bins.map(|k| {
-            let (sin, cos) = (TAU * k as f64 / n).sin_cos();
-            [cos, -sin]
-        }));
-        self.phase.clear();
-        self.phase.resize(self.turn.len(), [1.0, 0.0]);
-        self.sums.clear();
-        self.sums.resize(self.turn.len(), [[0.0; 2]; AXES]);
         self.renewed = 0;
         self.fresh = [[0.0; 2]; AXES];
+        let n = self.ring.len() as f64;
+        let Bins { turn, phase, sums } = &mut self.bins;
+        turn.iter_mut().for_each(Vec::clear);
+        for k in bins {
+            let (sin, cos) = (TAU * k as f64 / n).sin_cos();
+            turn[0].push(cos);
+            turn[1].push(-sin);
+        }
+        let count = turn[0].len();
+        for numbers in phase.iter_mut().chain(sums.as_flattened_mut()) {
+            numbers.clear();
+            numbers.resize(count, 0.0);
+        }
+        self.bins.rewind();
     }
 
     /// Takes the newest value; the oldest leaves.
     pub fn push(&mut self, value: [f64; AXES]) {
         let old = std::mem::replace(&mut self.ring[self.at], value);
-        let change: [f64; AXES] = std::array::from_fn(|i| value[i] - old[i]);
-        if let Some(&[re, im]) = self.phase.get(self.renewed) {
+        if self.renewed < self.bins.len() {
+            let [re, im] = [0, 1].map(|part: usize| self.bins.phase[part][self.renewed]);
             for (sum, value) in self.fresh.iter_mut().zip(value) {
                 sum[0] += value * re;
                 sum[1] += value * im;
             }
         }
-        let bins = self.phase.iter_mut().zip(&self.turn).zip(&mut self.sums);
-        for ((phase, turn), sums) in bins {
-            let [re, im] = *phase;
-            for (sum, change) in sums.iter_mut().zip(change) {
-                sum[0] += change * re;
-                sum[1] += change * im;
-            }
-            *phase = [re * turn[0] - im * turn[1], re * turn[1] + im * turn[0]];
-        }
+        self.bins.push(std::array::from_fn(|i| value[i] - old[i]));
         self.at += 1;
         if self.at == self.ring.len() {
             // A cycle is over: every cycle sees the same phases, bit for bit.
             self.at = 0;
-            self.phase.fill([1.0, 0.0]);
+            self.bins.rewind();
             let fresh = std::mem::take(&mut self.fresh);
-            if let Some(sums) = self.sums.get_mut(self.renewed) {
-                *sums = fresh;
-                self.renewed = (self.renewed + 1) % self.sums.len();
+            if self.renewed < self.bins.len() {
+                for ([re, im], fresh) in self.bins.sums.iter_mut().zip(fresh) {
+                    (re[self.renewed], im[self.renewed]) = (fresh[0], fresh[1]);
+                }
+                self.renewed = (self.renewed + 1) % self.bins.len();
             }
         }
     }
 
     /// By direction, the largest length of any bin (the L∞-norm over the band) times 2/N; 0 over no bin.
     pub fn norms(&self) -> [f64; AXES] {
-        let mut most = [0.0_f64; AXES];
-        for sums in &self.sums {
-            for (most, [re, im]) in most.iter_mut().zip(sums) {
-                *most = most.max(re * re + im * im);
-            }
-        }
-        most.map(|squared| squared.sqrt() * 2.0 / self.ring.len() as f64)
+        let n = self.ring.len() as f64;
+        self.bins.most().map(|squared| squared.sqrt() * 2.0 / n)
     }
 }
 

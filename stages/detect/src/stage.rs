@@ -185,6 +185,7 @@ impl Stage<TwinState, Detection> for Detect {
                 .and_then(|seen| seen.place)
                 .or_else(|| self.isolation.locate(sample));
         }
+        let details = self.detector.details().filter(|_| judgement.ready);
         out.emit(&mut |slot| {
             slot.header = sample.header;
             slot.header.flags = sample.header.flags & flags::RESET;
@@ -206,6 +207,15 @@ impl Stage<TwinState, Detection> for Detect {
                 slot.link = Name::new(self.isolation.link_name(contact.link));
                 slot.force_n = contact.force_n;
                 slot.point_m = contact.point_m;
+            }
+            if let Some(details) = details {
+                slot.header.flags |= flags::CONTENT;
+                slot.content_n = details.content_n;
+                if let Some([rise, motion]) = details.directions {
+                    slot.header.flags |= flags::DIRECTIONS;
+                    slot.rise_direction = rise;
+                    slot.motion_direction = motion;
+                }
             }
         })?;
         Ok(())

@@ -2,9 +2,11 @@
 //! (Salt Ducaju et al., equation 9, which prints J⁺; the pseudo-inverse that undoes equation 2 is that
 //! of Jᵀ, and it is the one taken here).
 
-use nalgebra::{Matrix6, Point3, Vector3, Vector6};
+use nalgebra::{Matrix3, Vector3};
 use tauscope_bus::JointArray;
-use tauscope_dynamics::{Data, Model, forward_kinematics, link_jacobian, link_pose};
+use tauscope_dynamics::{Model, point_jacobian};
+
+use crate::momentum::MomentumObserver;
 
 /// Damping λ of the inverse, (J Jᵀ + λ² 1)⁻¹ J (Nakamura and Hanafusa, "Inverse Kinematic Solutions with
 /// Singularity Robustness", 1986), in m for forces and rad for moments. Half of a direction that the
@@ -15,11 +17,9 @@ const DAMPING: f64 = 0.01;
 /// allocation per call.
 #[derive(Debug, Clone)]
 pub struct ToolPoint {
-    model: Model,
-    data: Data,
     link: usize,
     /// In the link's frame \[m\].
-    point: Point3<f64>,
+    point: Vector3<f64>,
 }
 
 /// What a [`ToolPoint`] says of one instant. World frame.
@@ -31,8 +31,6 @@ pub struct AtTool {
     pub velocity_m_per_s: Vector3<f64>,
     /// External force on the robot \[N\].
     pub force_n: Vector3<f64>,
-    /// External moment on the robot about the point \[N m\].
-    pub moment_nm: Vector3<f64>,
 }
 
 impl ToolPoint {
@@ -42,8 +40,6 @@ impl ToolPoint {
         Self {
             link: link.unwrap_or_else(|| model.tool_link()),
             point: point_m.unwrap_or_default().into(),
-            data: Data::new(model),
-            model: model.clone(),
         }
     }
 
@@ -52,49 +48,38 @@ impl ToolPoint {
         self.link
     }
 
-    /// The point at `position` \[rad\] and `velocity` \[rad/s\], and the wrench of least squares that the
-    /// external joint torques `torque_nm` amount to; joints for which `knows` is false are passed over.
-    pub fn at(
-        &mut self,
-        position: &JointArray,
-        velocity: &JointArray,
-        torque_nm: &JointArray,
-        knows: impl Fn(usize) -> bool,
-    ) -> AtTool {
-        let Self {
-            model,
-            data,
-            link,
-            point,
-        } = self;
-        let n = model.dof();
-        forward_kinematics(model, data, &position[..n]);
-        let pose = link_pose(model, data, *link);
-        let arm = pose.rotation * point.coords;
-        let jacobian = link_jacobian(model, data, *link);
-        let (mut twist, mut pull, mut gram) =
-            (Vector3::zeros(), Vector6::zeros(), Matrix6::zeros());
-        for j in 0..n {
-            let mut column: Vector6<f64> = jacobian.column(j).into();
-            let angular: Vector3<f64> = column.fixed_rows::<3>(3).into();
-            let linear = column.fixed_rows::<3>(0) + angular.cross(&arm);
-            column.fixed_rows_mut::<3>(0).copy_from(&linear);
-            twist += linear * velocity[j];
-            if knows(j) {
-                pull += column * torque_nm[j];
-                gram += column * column.transpose();
+    /// The point at the observer's newest sample and at `velocity` \[rad/s\], and the force in the wrench of
+    /// least squares that the observed joint torques amount to; joints whose effort cannot be turned into a
+    /// torque are passed over.
+    pub fn at(&self, observer: &MomentumObserver, velocity: &JointArray) -> AtTool {
+        let ((model, data), torque_nm) = (observer.robot(), observer.torque_nm());
+        let mut velocity_m_per_s = Vector3::zeros();
+        // J Jᵀ + λ² 1 and J τ by blocks: forces, forces against moments, moments.
+        let damped = Matrix3::from_diagonal_element(DAMPING * DAMPING);
+        let (mut forces, mut mixed, mut moments) = (damped, Matrix3::zeros(), damped);
+        let (mut pull, mut twist) = (Vector3::zeros(), Vector3::zeros());
+        let add = |j: usize, linear: Vector3<f64>, angular: Vector3<f64>| {
+            velocity_m_per_s += linear * velocity[j];
+            if observer.knows(j) {
+                pull += linear * torque_nm[j];
+                twist += angular * torque_nm[j];
+                forces += linear * linear.transpose();
+                mixed += linear * angular.transpose();
+                moments += angular * angular.transpose();
             }
-        }
-        gram += Matrix6::identity() * (DAMPING * DAMPING);
-        // Positive definite by its damping.
-        let wrench = gram
-            .cholesky()
-            .map_or_else(Vector6::zeros, |gram| gram.solve(&pull));
+        };
+        let position_m = point_jacobian(model, data, self.link, &self.point, add);
+        // The moment is eliminated. Both inverses exist: the damped matrix is positive definite, and so
+        // are its last block and what remains of the first.
+        let force_n = moments.try_inverse().and_then(|inverse| {
+            let through = mixed * inverse;
+            let rest = forces - through * mixed.transpose();
+            Some(rest.try_inverse()? * (pull - through * twist))
+        });
         AtTool {
-            position_m: pose.translation.vector + arm,
-            velocity_m_per_s: twist,
-            force_n: wrench.fixed_rows::<3>(0).into(),
-            moment_nm: wrench.fixed_rows::<3>(3).into(),
+            position_m,
+            velocity_m_per_s,
+            force_n: force_n.unwrap_or_default(),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Which link was touched, where, and how hard: the force that explains the whitened residual best.
 
-use nalgebra::{Matrix3, SMatrix, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use tauscope_bus::{MAX_JOINTS, TwinState};
 use tauscope_dynamics::{Data, Model, forward_kinematics, link_jacobian, link_pose};
 
@@ -72,6 +72,10 @@ impl Place {
             scale[j] = self.effort_per_nm[j] / noise;
         }
         let inverse = windows.inverse_correlation(w);
+        let weighted_z: [f64; MAX_JOINTS] = std::array::from_fn(|a| {
+            let row = inverse.iter().skip(a * n).take(n);
+            row.zip(&z).map(|(weight, z)| weight * z).sum()
+        });
         let mut best: Option<(f64, Contact)> = None;
         for joint in 0..n {
             let link = model.joints()[joint].child_link;
@@ -91,20 +95,25 @@ impl Place {
             let along = ALONG.map(|share| (end - origin) * share);
             for arm in along.into_iter().chain([com]) {
                 // residual = -Jᵀ F, in units of the noise.
-                let mut rows = SMatrix::<f64, MAX_JOINTS, 3>::zeros();
+                let mut rows = [Vector3::zeros(); MAX_JOINTS];
                 for (j, scale) in scale.iter().enumerate().take(n) {
                     let column = jacobian.column(j);
                     let angular = column.fixed_rows::<3>(3).into_owned();
-                    let row = (column.fixed_rows::<3>(0) + angular.cross(&arm)) * -scale;
-                    rows.set_row(j, &row.transpose());
+                    rows[j] = (column.fixed_rows::<3>(0) + angular.cross(&arm)) * -scale;
                 }
                 let (mut information, mut pull) = (Matrix3::zeros(), Vector3::zeros());
                 for a in 0..n {
-                    for b in 0..n {
-                        let weight = inverse[a * n + b];
-                        information += rows.row(a).transpose() * rows.row(b) * weight;
-                        pull += rows.row(a).transpose() * (weight * z[b]);
+                    let row = rows[a];
+                    // A force on a link loads only the joints between it and the base.
+                    if row == Vector3::zeros() {
+                        continue;
                     }
+                    let mut weighted = Vector3::zeros();
+                    for b in 0..n {
+                        weighted += rows[b] * inverse[a * n + b];
+                    }
+                    information += row * weighted.transpose();
+                    pull += row * weighted_z[a];
                 }
                 let ridge = DAMPING * information.trace() + 1e-12;
                 let damped = information + Matrix3::identity() * ridge;

@@ -23,6 +23,8 @@ pub(crate) struct Means {
     offset: JointArray,
     drift_s: f64,
     offset_from_first_s: f64,
+    /// Step \[s\], and how much of the residual's drift is followed in it; kept, for clocks are often even.
+    step: (f64, f64),
     /// Smallest speed of late, by joint.
     pub slow: JointArray,
     fast: JointArray,
@@ -40,6 +42,7 @@ impl Means {
             offset: [0.0; MAX_JOINTS],
             drift_s,
             offset_from_first_s,
+            step: (0.0, 0.0),
             slow: [0.0; MAX_JOINTS],
             fast,
             start_ns: 0,
@@ -76,6 +79,11 @@ impl Means {
         };
         let since_s = (now - self.start_ns) as f64 * 1e-9;
         let first = since_s < self.offset_from_first_s;
+        if dt_s.to_bits() != self.step.0.to_bits() {
+            self.step = (dt_s, 1.0 - (-dt_s / self.drift_s).exp());
+        }
+        let drift = self.step.1;
+        let recovery = dt_s / SLOW_MEMORY_S;
         let mut row = [0.0; MAX_JOINTS];
         for (j, value) in row.iter_mut().enumerate().take(n) {
             let residual = sample.effort[j] - sample.expected_effort[j];
@@ -84,17 +92,17 @@ impl Means {
                 let share = dt_s / (since_s + dt_s).max(1e-9);
                 self.offset[j] += share * (residual - self.offset[j]);
             } else if follow {
-                let share = 1.0 - (-dt_s / self.drift_s).exp();
-                self.offset[j] += share * (residual - self.offset[j]);
+                self.offset[j] += drift * (residual - self.offset[j]);
             }
             *value = residual - self.offset[j];
-            let recovered = self.slow[j] + dt_s / SLOW_MEMORY_S * self.fast[j];
+            let recovered = self.slow[j] + recovery * self.fast[j];
             self.slow[j] = recovered.min(sample.velocity[j].abs());
         }
         self.rows[self.head % CAPACITY] = (now, row);
         self.head += 1;
         for (w, length_s) in WINDOWS_S.iter().enumerate() {
-            for (sum, value) in self.sums[w].iter_mut().zip(&row) {
+            let sums = &mut self.sums[w][..n];
+            for (sum, value) in sums.iter_mut().zip(&row) {
                 *sum += value;
             }
             let begin = now - (length_s * 1e9) as i64;
@@ -103,7 +111,7 @@ impl Means {
                 if *stamp > begin && self.head - self.tails[w] < CAPACITY {
                     break;
                 }
-                for (sum, value) in self.sums[w].iter_mut().zip(old) {
+                for (sum, value) in sums.iter_mut().zip(old) {
                     *sum -= value;
                 }
                 self.tails[w] += 1;
@@ -137,6 +145,8 @@ impl Means {
 pub(crate) struct Windows {
     means: Means,
     learnt: Learnt,
+    /// Class of each joint's present speed.
+    bins: [usize; MAX_JOINTS],
     /// The window whose mean is most unusual.
     pub most: usize,
     /// How unusual: the newest score.
@@ -152,6 +162,7 @@ impl Windows {
         Self {
             means: Means::new(fast, drift_s, offset_from_first_s),
             learnt: learnt.clone(),
+            bins: [0; MAX_JOINTS],
             most: 0,
             score: 0.0,
         }
@@ -170,6 +181,9 @@ impl Windows {
     pub fn score(&mut self, sample: &TwinState, usual: Option<f64>) -> f64 {
         let follow = usual.is_some_and(|usual| self.score < usual);
         self.means.push(sample, follow);
+        for (j, joint) in self.learnt.joints.iter().enumerate() {
+            self.bins[j] = bin(joint, self.means.slow[j]);
+        }
         self.score = 0.0;
         for w in 0..WINDOWS_S.len() {
             let score = self.length(w) / self.learnt.windows[w].usual;
@@ -189,8 +203,14 @@ impl Windows {
             *z = self.mean(window, j) / self.noise(window, j);
         }
         let inverse = &self.learnt.windows[window].inverse_correlation;
-        let row = |a: usize| -> f64 { (0..n).map(|b| inverse[a * n + b] * z[b]).sum() };
-        (0..n).map(|a| z[a] * row(a)).sum()
+        // Symmetric: a row is a column.
+        let mut products = [0.0; MAX_JOINTS];
+        for (column, z) in inverse.chunks_exact(n).zip(&z) {
+            for (product, entry) in products.iter_mut().zip(column) {
+                *product += entry * z;
+            }
+        }
+        (0..n).map(|a| z[a] * products[a]).sum()
     }
 
     /// Mean residual of a joint over a window \[effort unit\].
@@ -200,8 +220,7 @@ impl Windows {
 
     /// Its usual size at the joint's present speed \[effort unit\].
     pub fn noise(&self, window: usize, joint: usize) -> f64 {
-        let bin = bin(&self.learnt.joints[joint], self.means.slow[joint]);
-        self.learnt.windows[window].noise[joint][bin]
+        self.learnt.windows[window].noise[joint][self.bins[joint]]
     }
 
     /// Inverse of the correlation of the joints' means over a window, row by row.

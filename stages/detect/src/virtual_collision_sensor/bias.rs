@@ -51,6 +51,8 @@ impl Bias {
     pub fn value(&self, time_constant_s: f64) -> f64 {
         match self.adapt_s {
             None => self.start,
+            // Arrived.
+            Some(_) if self.start.to_bits() == self.ident.to_bits() => self.ident,
             Some(t) => self.ident + (-t / time_constant_s).exp() * (self.start - self.ident),
         }
     }

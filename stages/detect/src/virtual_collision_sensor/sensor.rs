@@ -204,9 +204,10 @@ impl Detector for Sensor {
         let (mut colliding, mut wrong, mut doubtful) = (0, 0, false);
         for (j, joint) in self.joints.iter_mut().enumerate() {
             let reading: Reading = joint.update(dt_s, sample.effort[j], sample.expected_effort[j]);
-            ratio = ratio.max(reading.ratio());
+            let of_joint = reading.ratio();
+            ratio = ratio.max(of_joint);
             if reading.phase.is_tested() {
-                score = score.max(reading.ratio());
+                score = score.max(of_joint);
             }
             if ready {
                 let validity = &mut self.validity[j];

@@ -69,13 +69,15 @@ pub(super) enum Band {
 pub(super) struct NoiseBounds {
     mean: f64,
     variance: f64,
+    /// Its root.
+    sigma: f64,
     elapsed_s: f64,
 }
 
 impl NoiseBounds {
     /// Standard deviation of the error \[effort unit/s\].
     pub fn sigma(&self) -> f64 {
-        self.variance.sqrt()
+        self.sigma
     }
 
     /// `Th_min` and `Th_max` \[effort unit/s\].
@@ -117,6 +119,7 @@ impl NoiseBounds {
         }
         self.mean += share * off;
         self.variance += share * ((1.0 - share) * off * off - self.variance);
+        self.sigma = self.variance.sqrt();
     }
 }
 
