@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::log::{Chunk, LogMsg};
 use synthetic::{arm, cell, motion, streams};
-use tauscope_bus::Sink;
+use tauscope_bus::{Sink, flags};
 use tauscope_record::{CellInfo, Config, RecordError, Recorder, RerunConfig, StreamInfo};
 
 fn recorder(
@@ -129,6 +129,39 @@ fn the_file_holds_efforts_robot_and_detections_on_the_importers_paths_and_timeli
             .any(|path| path.ends_with("/EyeControls3D"))
     );
     assert!(blueprint.contains("/viewport"));
+}
+
+#[test]
+fn the_forces_content_its_states_and_both_directions_are_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("demo.rrd");
+    let cells = [cell("demo", Some(arm(false)))];
+    let mut recorder = recorder(to_file(&path), &cells, &streams("demo", "")).unwrap();
+    let mut instants = motion(5.0);
+    let ready = |instant: &synthetic::Instant| instant.detection.header.has(flags::READY);
+    for instant in instants.iter_mut().filter(|instant| ready(instant)) {
+        let detection = &mut instant.detection;
+        detection.header.flags |= flags::CONTENT;
+        detection.content_n = [0.1, 0.2, 0.3];
+        if detection.alarm() {
+            detection.state = "collision".into();
+            detection.header.flags |= flags::DIRECTIONS;
+            detection.rise_direction = [1.0, 0.0, 0.0];
+            detection.motion_direction = [-1.0, 0.0, 0.0];
+        }
+    }
+    for instant in &instants {
+        instant.feed(&mut recorder, "");
+    }
+    recorder.finish().unwrap();
+    let (recording, _) = read(&path);
+    let content = "/detections/twin_regression/content";
+    assert_eq!(rows(&recording[&format!("{content}/norms")]), 1050);
+    // Not ready, free, collision, free: every 20 ms and at each change, not at every sample.
+    let bands = rows(&recording[&format!("{content}/bands")]);
+    assert!((200..230).contains(&bands), "{bands}");
+    let directions = &recording["/external_wrench/twin_regression/directions"];
+    assert!(rows(directions) > 2);
 }
 
 #[test]

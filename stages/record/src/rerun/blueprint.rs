@@ -15,9 +15,11 @@ use rerun::{Rgba32, SeriesLines};
 use tauscope_bus::SampleKind;
 
 use self::properties::Properties;
-use super::detections::{events_entity, score_entity, state_entity, threshold_entity};
+use super::detections::{
+    content_entity, events_entity, norms_entity, score_entity, state_entity, threshold_entity,
+};
 use super::painter::Painter;
-use super::palette::{CONTACT, EXPECTED, MEASURED, RESIDUAL, SCORE};
+use super::palette::{AXES, CONTACT, EXPECTED, MEASURED, RESIDUAL, SCORE};
 use super::store::entity;
 use super::tracks::STAMP;
 use crate::error::RecordError;
@@ -120,7 +122,10 @@ impl Layout<'_> {
         }
         let scores = self.scores(cell);
         if !scores.is_empty() {
-            right_shares.push(1.0);
+            let contents = (0..self.streams.all.len()).any(|stream| {
+                self.streams.all[stream].cell == cell && self.painter.has_content(stream)
+            });
+            right_shares.push(if contents { 1.8 } else { 1.0 });
             right.push(
                 if scores.len() == 1 {
                     scores
@@ -197,23 +202,33 @@ impl Layout<'_> {
         plots
     }
 
-    /// A plot a detector: its score and its threshold.
+    /// A plot a detector: its score and its threshold, or what the score is the largest of.
     fn scores(&mut self, cell: usize) -> Vec<ContainerLike> {
-        let detectors: Vec<_> = self
-            .of(cell, SampleKind::Detection)
-            .map(|stream| {
-                (
-                    stream.label.clone(),
-                    score_entity(stream),
-                    threshold_entity(stream),
-                )
-            })
-            .collect();
         let mut plots = Vec::new();
-        for (label, score, threshold) in detectors {
-            let view = TimeSeriesView::new(format!("Score of {label}"))
-                .with_contents([score.to_string(), threshold.to_string()])
-                .with_override(score, &line("score", SCORE))
+        let detectors = self.streams.all.iter().enumerate();
+        let detectors =
+            detectors.filter(|(_, s)| s.cell == cell && s.kind == SampleKind::Detection);
+        for (index, stream) in detectors {
+            let (score, threshold) = (score_entity(stream), threshold_entity(stream));
+            let label = &stream.label;
+            let view = if self.painter.has_content(index) {
+                let norms = norms_entity(stream);
+                let looks = SeriesLines::new()
+                    .with_names(["x", "y", "z"])
+                    .with_colors(AXES)
+                    .with_widths([1.5_f32; 3]);
+                TimeSeriesView::new(format!("Force in the band by direction [N], {label}"))
+                    .with_contents([
+                        format!("{}/**", content_entity(stream)),
+                        threshold.to_string(),
+                    ])
+                    .with_override(norms, &looks)
+            } else {
+                TimeSeriesView::new(format!("Score of {label}"))
+                    .with_contents([score.to_string(), threshold.to_string()])
+                    .with_override(score, &line("score", SCORE))
+            };
+            let view = view
                 .with_override(threshold, &line("threshold", CONTACT))
                 .into();
             self.properties.plot(&view, true, self.window_ns());

@@ -1,20 +1,24 @@
 //! What a detector's stream draws: score and threshold, its state as a band, events in words, the
-//! touched link's colour and the force.
+//! touched link's colour and the force. And where the detector tells of them the force's frequency content, with
+//! the state behind it, and the directions of force and motion (figures 1 and 2 of Salt Ducaju et al., "Fast
+//! Contact Detection and Classification for Kinesthetic Teaching in Robots using only Embedded Sensors", 2022).
 
 use rerun::archetypes::{StateConfiguration, TextLog};
 use rerun::{EntityPath, TextLogLevel};
 use tauscope_bus::{Detection, EventKind, Name, flags};
 
-use super::palette::{CONTACT, LINK, STATES};
+use super::palette::{CONTACT, LINK, MOTION, RISE, STATES};
 use super::robot::Robot;
 use super::store::{Out, Store, entity};
-use super::tracks::{ForceTrack, RowTrack, ScalarTrack, StateTrack, norm};
+use super::tracks::{Arrow, ArrowTrack, BandTrack, RowTrack, ScalarTrack, StateTrack, norm};
 use crate::error::RecordError;
 use crate::streams::{Stream, Streams};
 use crate::words::{Severity, headline, loaded_joints, over};
 
-/// The arrow and the colour follow at most so often \[ns\]: a viewer shows no more.
-const FORCE_PERIOD_NS: u64 = 20_000_000;
+/// Length of a force's arrow: 100 N to the metre, so that a push by hand is as long as a forearm.
+const M_PER_N: f64 = 0.01;
+/// Length of a unit vector's arrow \[m\].
+const DIRECTION_M: f64 = 0.3;
 
 /// A state that stays is told again after this time \[ns\], for a viewer that came late.
 const STATE_PERIOD_NS: u64 = 1_000_000_000;
@@ -27,11 +31,42 @@ pub(super) struct DetectionTracks {
     state: StateTrack,
     events: RowTrack,
     events_entity: EntityPath,
-    force: ForceTrack,
+    force: ArrowTrack,
+    directions: ArrowTrack,
+    /// From the first sample that has it.
+    content: Option<Content>,
     /// State that was told last, and when.
     told: Option<(Name, i64)>,
-    /// Stamp of the arrow that is shown now.
-    shown_ns: Option<i64>,
+}
+
+/// The force's frequency content, and the states behind it.
+#[derive(Debug)]
+struct Content {
+    norms: ScalarTrack,
+    bands: BandTrack,
+}
+
+impl Content {
+    fn new(stream: &Stream, store: &Store, out: &mut Out<'_>) -> Result<Self, RecordError> {
+        let bands = content_entity(stream).join(&EntityPath::from_single_string("bands"));
+        Ok(Self {
+            norms: ScalarTrack::new(norms_entity(stream), &["x", "y", "z"], store, out)?,
+            bands: BandTrack::new(bands, "state", store, out)?,
+        })
+    }
+
+    fn push(&mut self, detection: &Detection) {
+        self.norms.push(&detection.header, &detection.content_n);
+        let state = detection.state.as_str();
+        let known = STATES.iter().find(|(value, ..)| *value == state);
+        let colour = known.map_or(LINK, |(.., colour)| *colour);
+        self.bands.push(&detection.header, colour);
+    }
+
+    fn flush(&mut self, store: &Store, out: &mut Out<'_>) -> Result<(), RecordError> {
+        self.bands.flush(store, out)?;
+        self.norms.flush(store, out)
+    }
 }
 
 /// Where a detector's score is drawn.
@@ -42,6 +77,16 @@ pub(super) fn score_entity(stream: &Stream) -> EntityPath {
 /// Where its threshold is drawn.
 pub(super) fn threshold_entity(stream: &Stream) -> EntityPath {
     entity(&stream.topic, &[&stream.label, "threshold"])
+}
+
+/// Where the force's frequency content is drawn, and the states behind it.
+pub(super) fn content_entity(stream: &Stream) -> EntityPath {
+    entity(&stream.topic, &[&stream.label, "content"])
+}
+
+/// Where the content by direction is drawn. The viewer draws in the order of names: in front of the bands.
+pub(super) fn norms_entity(stream: &Stream) -> EntityPath {
+    entity(&stream.topic, &[&stream.label, "content", "norms"])
 }
 
 /// Where its state is drawn.
@@ -67,31 +112,37 @@ impl DetectionTracks {
             .with_colors(STATES.map(|(_, _, color)| color));
         out(store.always(&state_entity(stream), &states)?)?;
         let wrench = format!("{}/external_wrench", streams.prefix(stream.cell));
-        let wrench = entity(&wrench, &[&stream.label]);
-        Robot::prepare_force(
-            &streams.cells[stream.cell],
-            &streams.prefix(stream.cell),
-            &wrench,
-            store,
-            out,
-        )?;
+        let (force, directions) = (
+            entity(&wrench, &[&stream.label]),
+            entity(&wrench, &[&stream.label, "directions"]),
+        );
+        let cell = &streams.cells[stream.cell];
+        let prefix = streams.prefix(stream.cell);
+        Robot::prepare_arrows(cell, &prefix, &force, &[CONTACT], store, out)?;
+        Robot::prepare_arrows(cell, &prefix, &directions, &[RISE, MOTION], store, out)?;
         Ok(Self {
             score: ScalarTrack::new(score_entity(stream), &["score"], store, out)?,
             threshold: ScalarTrack::new(threshold_entity(stream), &["threshold"], store, out)?,
             state: StateTrack::new(state_entity(stream)),
             events: RowTrack::default(),
             events_entity: events_entity(stream),
-            force: ForceTrack::new(wrench),
+            force: ArrowTrack::new(force),
+            directions: ArrowTrack::new(directions),
+            content: None,
             told: None,
-            shown_ns: None,
         })
+    }
+
+    /// Whether the detector tells of the force's frequency content.
+    pub fn has_content(&self) -> bool {
+        self.content.is_some()
     }
 
     /// Takes a detection of the stream number `index`; the recording began at `start_ns`.
     pub fn accept(
         &mut self,
         detection: &Detection,
-        index: usize,
+        (index, stream): (usize, &Stream),
         start_ns: i64,
         joints: &[String],
         robot: Option<&mut Robot>,
@@ -113,7 +164,19 @@ impl DetectionTracks {
         if detection.event() != EventKind::None {
             self.tell(detection, &before, start_ns, joints, store)?;
         }
-        self.draw_force(detection);
+        self.draw_arrows(detection);
+        if header.has(flags::CONTENT) {
+            if self.content.is_none() {
+                let mut keep = |message| {
+                    self.events.push_message(message);
+                    Ok(())
+                };
+                self.content = Some(Content::new(stream, store, &mut keep)?);
+            }
+            if let Some(content) = &mut self.content {
+                content.push(detection);
+            }
+        }
         if let Some(robot) = robot {
             let touched = detection.alarm().then_some(detection.link.as_str());
             robot.touch(header, index, touched);
@@ -121,23 +184,32 @@ impl DetectionTracks {
         Ok(())
     }
 
-    fn draw_force(&mut self, detection: &Detection) {
+    fn draw_arrows(&mut self, detection: &Detection) {
         let header = &detection.header;
-        let force = header
-            .has(flags::FORCE)
-            .then_some((detection.force_n, detection.point_m));
-        match (force, self.shown_ns) {
-            (None, None) => {}
-            (None, Some(_)) => {
-                self.force.push(header, None);
-                self.shown_ns = None;
-            }
-            (Some(_), Some(shown)) if header.stamp_ns.abs_diff(shown) < FORCE_PERIOD_NS => {}
-            (Some(_), _) => {
-                self.force.push(header, force);
-                self.shown_ns = Some(header.stamp_ns);
-            }
-        }
+        let point_m = detection.point_m;
+        // The force ends where it acts; directions begin there.
+        let force = header.has(flags::FORCE).then(|| {
+            let vector_m = detection.force_n.map(|newton| newton * M_PER_N);
+            [Arrow {
+                origin_m: std::array::from_fn(|i| point_m[i] - vector_m[i]),
+                vector_m,
+                label: format!("{:.0} N", norm(detection.force_n)),
+            }]
+        });
+        self.force.push(header, force);
+        let both = header.has(flags::FORCE | flags::DIRECTIONS);
+        let directions = both.then(|| {
+            let named = [
+                (detection.rise_direction, "force rose"),
+                (detection.motion_direction, "tool moved"),
+            ];
+            named.map(|(direction, label)| Arrow {
+                origin_m: point_m,
+                vector_m: direction.map(|share| share * DIRECTION_M),
+                label: label.to_owned(),
+            })
+        });
+        self.directions.push(header, directions);
     }
 
     fn tell(
@@ -183,6 +255,12 @@ impl DetectionTracks {
         self.threshold.flush(store, out)?;
         self.state.flush(store, out)?;
         self.force.flush(store, out)?;
-        self.events.flush(out)
+        self.directions.flush(store, out)?;
+        // Events hold the looks of the content, too.
+        self.events.flush(out)?;
+        match &mut self.content {
+            Some(content) => content.flush(store, out),
+            None => Ok(()),
+        }
     }
 }

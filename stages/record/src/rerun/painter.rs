@@ -116,6 +116,11 @@ impl Painter {
         self.robots[cell].as_ref()
     }
 
+    /// Whether the detector of a stream has told of the force's frequency content.
+    pub fn has_content(&self, stream: usize) -> bool {
+        matches!(&self.tracks[stream], Tracks::Detection(tracks) if tracks.has_content())
+    }
+
     /// Takes a sample of the stream number `index`.
     pub fn accept(
         &mut self,
@@ -127,14 +132,19 @@ impl Painter {
         let cell = streams.all[index].cell;
         let robot = self.robots[cell].as_mut();
         let stamp_ns = sample.header().stamp_ns;
-        let start_ns = *self.start_ns.get_or_insert(stamp_ns);
+        // A report on how a stage fares may overtake the stage's first samples.
+        if sample.kind() != SampleKind::Health {
+            self.start_ns.get_or_insert(stamp_ns);
+        }
+        let start_ns = self.start_ns.unwrap_or(stamp_ns);
         match (sample, &mut self.tracks[index]) {
             (SampleRef::Health(health), _) => self.report(index, health)?,
             (SampleRef::JointState(state), tracks) => tracks.joint_state(state, robot),
             (SampleRef::TwinState(state), tracks) => tracks.twin_state(state, robot),
             (SampleRef::Detection(detection), Tracks::Detection(tracks)) => {
                 let joints = &streams.cells[cell].joint_names;
-                tracks.accept(detection, index, start_ns, joints, robot, &self.store)?;
+                let of = (index, &streams.all[index]);
+                tracks.accept(detection, of, start_ns, joints, robot, &self.store)?;
             }
             // `Streams::find` lets only samples of the announced type through.
             (SampleRef::Detection(_), _) => {}

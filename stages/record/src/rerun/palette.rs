@@ -18,6 +18,16 @@ pub(super) const RESIDUAL: Rgba32 = Rgba32::from_rgb(214, 102, 168);
 pub(super) const SCORE: Rgba32 = Rgba32::from_rgb(94, 200, 178);
 /// What has to do with a contact: its threshold, the touched link, the force, the state.
 pub(super) const CONTACT: Rgba32 = Rgba32::from_rgb(232, 76, 76);
+/// Along the axes x, y and z.
+pub(super) const AXES: [Rgba32; 3] = [
+    Rgba32::from_rgb(255, 128, 110),
+    Rgba32::from_rgb(130, 220, 120),
+    Rgba32::from_rgb(120, 180, 255),
+];
+/// Where a force grew to.
+pub(super) const RISE: Rgba32 = Rgba32::from_rgb(255, 176, 66);
+/// Where the tool went.
+pub(super) const MOTION: Rgba32 = Rgba32::from_rgb(86, 156, 238);
 /// A change of the arm.
 const CHANGE: Rgba32 = Rgba32::from_rgb(232, 148, 58);
 /// A link.

@@ -110,21 +110,22 @@ impl Robot {
         Ok(robot)
     }
 
-    /// Gives the entity of a detector's force the robot's frame, and its looks.
-    pub fn prepare_force(
+    /// Gives an entity of arrows the robot's frame, and their looks.
+    pub fn prepare_arrows(
         cell: &CellInfo,
         prefix: &str,
-        force: &EntityPath,
+        arrows: &EntityPath,
+        colours: &[Rgba32],
         store: &Store,
         out: &mut Out<'_>,
     ) -> Result<(), RecordError> {
         if cell.model.is_some() {
-            out(store.always(force, &CoordinateFrame::new(frame(prefix, cell.root())))?)?;
+            out(store.always(arrows, &CoordinateFrame::new(frame(prefix, cell.root())))?)?;
         }
         let looks = Arrows3D::update_fields()
-            .with_colors([CONTACT])
+            .with_colors(colours.iter().copied())
             .with_radii([0.012_f32]);
-        out(store.always(force, &looks)?)
+        out(store.always(arrows, &looks)?)
     }
 
     /// The entity that all links lie under.

@@ -1,7 +1,7 @@
 //! Columns that grow until they are sent: one track an entity.
 
 use rerun::archetypes::{Arrows3D, Scalars, SeriesLines, StateChange, Transform3D};
-use rerun::{AsComponents, EntityPath, TimeColumn, TimePoint, Timeline};
+use rerun::{AsComponents, EntityPath, Rgba32, TimeColumn, TimePoint, Timeline};
 use tauscope_bus::Header;
 
 use super::store::{Out, Store, unserializable};
@@ -147,22 +147,32 @@ impl PoseTrack {
     }
 }
 
-/// A force on the robot, as an arrow that ends where it acts; a row without an arrow ends it.
+/// An arrow in the root's frame \[m\].
 #[derive(Debug)]
-pub(super) struct ForceTrack {
+pub(super) struct Arrow {
+    pub origin_m: [f64; 3],
+    pub vector_m: [f64; 3],
+    pub label: String,
+}
+
+/// Arrows that move; a row without any ends them. They follow at most every [`ARROW_PERIOD_NS`].
+#[derive(Debug)]
+pub(super) struct ArrowTrack {
     entity: EntityPath,
     times: Times,
-    /// 1 for a row with an arrow, 0 for one without.
+    /// Arrows by row.
     lengths: Vec<usize>,
     origins: Vec<[f32; 3]>,
     vectors: Vec<[f32; 3]>,
     labels: Vec<String>,
+    /// Stamp of the arrows that are shown now.
+    shown_ns: Option<i64>,
 }
 
-impl ForceTrack {
-    /// Length of the arrow: 100 N to the metre, so that a push by hand is as long as a forearm.
-    const M_PER_N: f64 = 0.01;
+/// A viewer shows no more than 50 pictures a second \[ns\].
+const ARROW_PERIOD_NS: u64 = 20_000_000;
 
+impl ArrowTrack {
     pub fn new(entity: EntityPath) -> Self {
         let (times, lengths, labels) = Default::default();
         Self {
@@ -172,19 +182,25 @@ impl ForceTrack {
             origins: Vec::new(),
             vectors: Vec::new(),
             labels,
+            shown_ns: None,
         }
     }
 
-    /// The force \[N\] and the point \[m\] it acts at, in the root's frame; `None` for no force.
-    pub fn push(&mut self, header: &Header, force: Option<([f64; 3], [f64; 3])>) {
+    /// The arrows from now on.
+    pub fn push<const N: usize>(&mut self, header: &Header, arrows: Option<[Arrow; N]>) {
+        let just_now = |shown: i64| header.stamp_ns.abs_diff(shown) < ARROW_PERIOD_NS;
+        match (&arrows, self.shown_ns) {
+            (None, None) => return,
+            (Some(_), Some(shown)) if just_now(shown) => return,
+            _ => {}
+        }
+        self.shown_ns = arrows.as_ref().map(|_| header.stamp_ns);
         self.times.push(header);
-        self.lengths.push(usize::from(force.is_some()));
-        if let Some((force_n, point_m)) = force {
-            let vector = force_n.map(|newton| newton * Self::M_PER_N);
-            self.origins
-                .push(std::array::from_fn(|i| (point_m[i] - vector[i]) as f32));
-            self.vectors.push(vector.map(|metre| metre as f32));
-            self.labels.push(format!("{:.0} N", norm(force_n)));
+        self.lengths.push(arrows.as_ref().map_or(0, |_| N));
+        for arrow in arrows.into_iter().flatten() {
+            self.origins.push(arrow.origin_m.map(|metre| metre as f32));
+            self.vectors.push(arrow.vector_m.map(|metre| metre as f32));
+            self.labels.push(arrow.label);
         }
     }
 
@@ -242,6 +258,78 @@ impl StateTrack {
     }
 }
 
+/// A state as bands of its colour along the foot of a plot, behind its lines: a thick line that changes its
+/// colour. (The viewer rounds its ends: one as thick as the plot is high would cover its neighbours.)
+#[derive(Debug)]
+pub(super) struct BandTrack {
+    entity: EntityPath,
+    times: Times,
+    colours: Vec<Rgba32>,
+    /// Colour and stamp of the newest row.
+    shown: Option<(Rgba32, i64)>,
+}
+
+impl BandTrack {
+    /// Points.
+    const THICKNESS: f32 = 14.0;
+    /// A band that lasts is drawn on at least so often \[ns\].
+    const PERIOD_NS: u64 = 20_000_000;
+
+    /// Bands, and the message that gives them their looks.
+    pub fn new(
+        entity: EntityPath,
+        name: &str,
+        store: &Store,
+        out: &mut Out<'_>,
+    ) -> Result<Self, RecordError> {
+        let looks = SeriesLines::update_fields()
+            .with_names([name])
+            .with_widths([Self::THICKNESS]);
+        out(store.always(&entity, &looks)?)?;
+        let (times, colours) = Default::default();
+        Ok(Self {
+            entity,
+            times,
+            colours,
+            shown: None,
+        })
+    }
+
+    /// The colour from now on.
+    pub fn push(&mut self, header: &Header, colour: Rgba32) {
+        let just_now = |shown_ns: i64| header.stamp_ns.abs_diff(shown_ns) < Self::PERIOD_NS;
+        match self.shown {
+            Some((before, shown_ns)) if before == colour && just_now(shown_ns) => return,
+            // Up to here.
+            Some((before, _)) if before != colour => {
+                self.times.push(header);
+                self.colours.push(before);
+            }
+            _ => {}
+        }
+        self.shown = Some((colour, header.stamp_ns));
+        self.times.push(header);
+        self.colours.push(colour);
+    }
+
+    pub fn flush(&mut self, store: &Store, out: &mut Out<'_>) -> Result<(), RecordError> {
+        if self.colours.is_empty() {
+            return Ok(());
+        }
+        let failed = unserializable(&self.entity);
+        let colours = std::mem::take(&mut self.colours);
+        // Along the axis: norms are not below zero.
+        let values = Scalars::new(std::iter::repeat_n(0.0, colours.len()))
+            .columns_of_unit_batches()
+            .map_err(&failed)?;
+        let colours = SeriesLines::update_fields()
+            .with_colors(colours)
+            .columns_of_unit_batches()
+            .map_err(&failed)?;
+        out(store.columns(&self.entity, self.times.take(), values.chain(colours))?)
+    }
+}
+
 /// Rows that are rare, each sent as it is with the next flush.
 #[derive(Debug, Default)]
 pub(super) struct RowTrack {
@@ -249,6 +337,11 @@ pub(super) struct RowTrack {
 }
 
 impl RowTrack {
+    /// Takes a message as it is.
+    pub fn push_message(&mut self, message: rerun::log::LogMsg) {
+        self.rows.push(message);
+    }
+
     pub fn push(
         &mut self,
         store: &Store,
