@@ -3,6 +3,7 @@
 
 mod delays;
 mod roc;
+mod tuning;
 
 use std::collections::BTreeMap;
 
@@ -38,6 +39,7 @@ pub fn page(
             roc::section(judged),
         ),
         ("delays", "Detection delays", delays::section(judged)),
+        ("tuning", "Tuning", tuning::section(judged)),
         ("tables", "Tables", Some(self::tables(tables))),
         ("notes", "Notes", notes(&evaluation.notes)),
     ];
@@ -140,10 +142,14 @@ fn verdict(judged: &[Judged<'_>]) -> String {
         .unwrap_or(best);
     let numbers = found.first();
     format!(
-        "{} tells contact from free motion best (AUC {:.3}); {} finds most: {} of {} contacts with {} false alarms",
+        "{} tells contact from free motion best (AUC {:.3}){} finds most: {} of {} contacts with {} false alarms",
         best.label,
         best.first().samples.auc,
-        found.label,
+        if std::ptr::eq(best, found) {
+            " and".to_owned()
+        } else {
+            format!("; {}", found.label)
+        },
         numbers.found,
         numbers.events,
         numbers.false_alarms

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use tauscope_detect::contact_tuning::Sweeps;
 use tauscope_detect::{
     Config, LearnError, Lessons, Setup, contact_classifier, fisher_discriminant,
     frequency_classifier, lstm_momentum_observer, momentum_observer, naive_difference,
@@ -26,7 +27,12 @@ pub struct Entry {
     pub usual: fn(Facts) -> bool,
     /// Trains or tunes it: what its part of a pipeline file would be.
     pub learn: fn(&Task<'_>) -> Result<Config, LearnError>,
+    /// The curves behind what it has learnt, where it was tuned by some.
+    pub sweeps: Option<Sweep>,
 }
+
+/// The curves behind learnt settings.
+pub type Sweep = fn(&Config, &Task<'_>) -> Result<Option<Sweeps>, LearnError>;
 
 /// How many seeds a random detector is trained with.
 pub const SEEDS: u64 = 5;
@@ -82,230 +88,114 @@ fn tells_kinds(facts: Facts) -> bool {
     facts.kinds
 }
 
+/// A detector without chance that judges sample by sample and runs on every set.
+const fn entry(name: &'static str, learn: fn(&Task<'_>) -> Result<Config, LearnError>) -> Entry {
+    Entry {
+        name,
+        random: false,
+        window: None,
+        usual: always,
+        learn,
+        sweeps: None,
+    }
+}
+
+/// A detector by the name of its module, which is its own: `given` has nothing to learn, `tuned` learns its
+/// settings, `trained` weights that go to a file.
+macro_rules! detector {
+    (given $name:ident) => {
+        entry(stringify!($name), |_| {
+            Ok(Config {
+                $name: Some($name::Settings::default()),
+                ..Config::default()
+            })
+        })
+    };
+    (tuned $name:ident) => {
+        entry(stringify!($name), |task| {
+            let settings = $name::Settings::default();
+            let settings = $name::learn(&settings, task.setup, &task.lessons)?;
+            Ok(Config {
+                $name: Some(settings),
+                ..Config::default()
+            })
+        })
+    };
+    (trained $name:ident) => {
+        entry(stringify!($name), |task| {
+            let mut settings = $name::Settings::default();
+            let (lessons, seed) = (&task.lessons, task.seed);
+            let trained = $name::train(&settings, task.setup, lessons, seed, &mut |_| ())?;
+            settings.model = Some(trained::write(&task.weights, lessons, trained)?);
+            Ok(Config {
+                $name: Some(settings),
+                ..Config::default()
+            })
+        })
+    };
+}
+
 /// All of them, in the order of the tables.
 pub static ENTRIES: &[Entry] = &[
+    detector!(given naive_difference),
+    detector!(given momentum_observer),
+    detector!(given twin_regression),
     Entry {
-        name: "naive_difference",
-        random: false,
-        window: None,
-        usual: always,
-        learn: |_| {
-            Ok(Config {
-                naive_difference: Some(naive_difference::Settings::default()),
-                ..Config::default()
-            })
-        },
-    },
-    Entry {
-        name: "momentum_observer",
-        random: false,
-        window: None,
-        usual: always,
-        learn: |_| {
-            Ok(Config {
-                momentum_observer: Some(momentum_observer::Settings::default()),
-                ..Config::default()
-            })
-        },
-    },
-    Entry {
-        name: "twin_regression",
-        random: false,
-        window: None,
-        usual: always,
-        learn: |_| {
-            Ok(Config {
-                twin_regression: Some(twin_regression::Settings::default()),
-                ..Config::default()
-            })
-        },
-    },
-    Entry {
-        name: point_ocsvm::NAME,
-        random: false,
-        window: None,
         usual: is_plain,
-        learn: |task| {
-            let mut settings = point_ocsvm::Settings::default();
-            let trained =
-                point_ocsvm::train(&settings, task.setup, &task.lessons, task.seed, &mut |_| ())?;
-            settings.model = Some(trained::write(&task.weights, &task.lessons, trained)?);
-            Ok(Config {
-                point_ocsvm: Some(settings),
-                ..Config::default()
-            })
-        },
+        ..detector!(trained point_ocsvm)
     },
     Entry {
-        name: point_autoencoder::NAME,
         random: true,
-        window: None,
         usual: is_plain,
-        learn: |task| {
-            let mut settings = point_autoencoder::Settings::default();
-            let trained = point_autoencoder::train(
-                &settings,
-                task.setup,
-                &task.lessons,
-                task.seed,
-                &mut |_| (),
-            )?;
-            settings.model = Some(trained::write(&task.weights, &task.lessons, trained)?);
-            Ok(Config {
-                point_autoencoder: Some(settings),
-                ..Config::default()
-            })
-        },
+        ..detector!(trained point_autoencoder)
     },
     Entry {
-        name: lstm_momentum_observer::NAME,
         random: true,
-        window: None,
         usual: is_plain,
-        learn: |task| {
-            let mut settings = lstm_momentum_observer::Settings::default();
-            let trained = lstm_momentum_observer::train(
-                &settings,
-                task.setup,
-                &task.lessons,
-                task.seed,
-                &mut |_| (),
-            )?;
-            settings.model = Some(trained::write(&task.weights, &task.lessons, trained)?);
-            Ok(Config {
-                lstm_momentum_observer: Some(settings),
-                ..Config::default()
-            })
-        },
+        ..detector!(trained lstm_momentum_observer)
     },
     Entry {
-        name: window_ocsvm::NAME,
-        random: false,
         window: Some(16),
         usual: is_plain,
-        learn: |task| {
-            let mut settings = window_ocsvm::Settings::default();
-            let trained =
-                window_ocsvm::train(&settings, task.setup, &task.lessons, task.seed, &mut |_| ())?;
-            settings.model = Some(trained::write(&task.weights, &task.lessons, trained)?);
-            Ok(Config {
-                window_ocsvm: Some(settings),
-                ..Config::default()
-            })
-        },
+        ..detector!(trained window_ocsvm)
     },
     Entry {
-        name: window_autoencoder::NAME,
         random: true,
         window: Some(16),
         usual: is_plain,
-        learn: |task| {
-            let mut settings = window_autoencoder::Settings::default();
-            let trained = window_autoencoder::train(
-                &settings,
-                task.setup,
-                &task.lessons,
-                task.seed,
-                &mut |_| (),
-            )?;
-            settings.model = Some(trained::write(&task.weights, &task.lessons, trained)?);
-            Ok(Config {
-                window_autoencoder: Some(settings),
-                ..Config::default()
-            })
-        },
+        ..detector!(trained window_autoencoder)
     },
     Entry {
-        name: "virtual_collision_sensor_basic",
-        random: false,
-        window: None,
         usual: |facts| facts.cyclic,
-        learn: |task| {
-            let settings = virtual_collision_sensor_basic::Settings::default();
-            let settings =
-                virtual_collision_sensor_basic::learn(&settings, task.setup, &task.lessons)?;
-            Ok(Config {
-                virtual_collision_sensor_basic: Some(settings),
-                ..Config::default()
-            })
-        },
+        ..detector!(tuned virtual_collision_sensor_basic)
     },
     Entry {
-        name: "contact_classifier",
-        random: false,
-        window: None,
         usual: tells_kinds,
-        learn: |task| {
-            let settings = contact_classifier::Settings::default();
-            Ok(Config {
-                contact_classifier: Some(contact_classifier::learn(
-                    &settings,
-                    task.setup,
-                    &task.lessons,
-                )?),
-                ..Config::default()
-            })
-        },
+        sweeps: Some(|config, task| {
+            let learnt = config.contact_classifier.as_ref();
+            learnt
+                .map(|learnt| contact_classifier::sweeps(learnt, task.setup, &task.lessons))
+                .transpose()
+        }),
+        ..detector!(tuned contact_classifier)
     },
     Entry {
-        name: "virtual_collision_sensor",
-        random: false,
-        window: None,
         usual: |facts| facts.cyclic,
-        learn: |task| {
-            let settings = virtual_collision_sensor::Settings::default();
-            let settings = virtual_collision_sensor::learn(&settings, task.setup, &task.lessons)?;
-            Ok(Config {
-                virtual_collision_sensor: Some(settings),
-                ..Config::default()
-            })
-        },
+        ..detector!(tuned virtual_collision_sensor)
     },
     Entry {
-        name: "fisher_discriminant",
-        random: false,
-        window: None,
         usual: tells_kinds,
-        learn: |task| {
-            let settings = fisher_discriminant::Settings::default();
-            Ok(Config {
-                fisher_discriminant: Some(fisher_discriminant::learn(
-                    &settings,
-                    task.setup,
-                    &task.lessons,
-                )?),
-                ..Config::default()
-            })
-        },
+        ..detector!(tuned fisher_discriminant)
     },
     Entry {
-        name: "frequency_classifier",
-        random: false,
-        window: None,
         usual: tells_kinds,
-        learn: |task| {
-            let settings = frequency_classifier::Settings::default();
-            Ok(Config {
-                frequency_classifier: Some(frequency_classifier::learn(
-                    &settings,
-                    task.setup,
-                    &task.lessons,
-                )?),
-                ..Config::default()
-            })
-        },
+        ..detector!(tuned frequency_classifier)
     },
-    Entry {
-        name: "tauscope",
-        random: false,
-        window: None,
-        usual: always,
-        learn: |task| {
-            let settings = tauscope::learn(&tauscope::Settings::default(), &task.lessons)?;
-            Ok(Config {
-                tauscope: Some(settings),
-                ..Config::default()
-            })
-        },
-    },
+    entry("tauscope", |task| {
+        let settings = tauscope::learn(&tauscope::Settings::default(), &task.lessons)?;
+        Ok(Config {
+            tauscope: Some(settings),
+            ..Config::default()
+        })
+    }),
 ];

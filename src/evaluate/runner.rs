@@ -4,6 +4,7 @@
 use std::time::Instant;
 
 use tauscope_bus::{Detection, Emit, LinkError, Stage as _, StageError, TwinState, flags};
+use tauscope_detect::contact_tuning::Sweeps;
 use tauscope_detect::{Config, Detect, Lesson, ScoreStatistics, Setup};
 
 use super::EvaluateError;
@@ -41,7 +42,9 @@ pub struct Runner {
     pub seed: u64,
     /// Its part of a pipeline file.
     pub config: Config,
-    /// How long it learnt \[s\].
+    /// The curves behind what it has learnt.
+    pub sweeps: Option<Sweeps>,
+    /// How long it learnt \[s\], without the curves.
     pub training_s: f64,
     /// What its score does on the validation recordings while nothing touches the robot.
     pub statistics: ScoreStatistics,
@@ -70,6 +73,10 @@ impl Runner {
         let began = Instant::now();
         let config = (entry.learn)(task).map_err(failed)?;
         let training_s = began.elapsed().as_secs_f64();
+        let sweeps = match entry.sweeps {
+            Some(sweeps) => sweeps(&config, task).map_err(failed)?,
+            None => None,
+        };
         let measured = match task.lessons.validation {
             [] => task.lessons.train,
             some => some,
@@ -87,6 +94,7 @@ impl Runner {
             entry,
             seed: task.seed,
             config,
+            sweeps,
             training_s,
             statistics,
             counted,

@@ -78,7 +78,9 @@ fn histogram(
     html! {
         figure {
             figcaption {
-                b { (judged.label) } ": " (format!("{:.0} ± {:.0} ms, p50 {:.0}, p99 {:.0}", of.mean, of.sd, of.p50, of.p99))
+                b { (judged.label) }
+                br;
+                (format!("{:.0} ± {:.0}, p50 {:.0}, p99 {:.0} ms", of.mean, of.sd, of.p50, of.p99))
             }
             svg.plot viewBox="0 0 320 208" role="img" aria-label={ "delays of " (judged.label) } {
                 (panel.frame(4, 4, Some("Delay [ms]"), "Contacts"))

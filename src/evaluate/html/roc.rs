@@ -37,11 +37,14 @@ pub(super) fn section(judged: &[Judged<'_>]) -> Option<Markup> {
                     }
                 }
                 p.legend {
-                    @for (index, judged, _) in &curves {
+                    @for (at, (index, judged, curve)) in curves.iter().enumerate() {
+                        @let covered = curves[at + 1..].iter().find(|(.., later)| later == curve);
                         span class={ "key own " (line_class(*index)) } {
                             (judged.label) " (" (format!("{:.3}", judged.first().samples.auc)) ")"
+                            @if let Some((_, by, _)) = covered { ", under " (by.label) }
                         }
                     }
+                    span.key.chance { "chance (0.5)" }
                 }
             }
         }

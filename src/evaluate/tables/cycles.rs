@@ -74,7 +74,7 @@ fn detector(judged: &Judged<'_>, groups: &[Group], joints: &[String]) -> Table {
             judged.label
         ),
         "Axes: in how many of the found collisions each joint detected.",
-        &["test", "found", "DT [ms]", "p95"],
+        &["test", "found", "DT [ms]", "p95 [ms]"],
     );
     table
         .head

@@ -148,9 +148,9 @@ pub fn events(judged: &[Judged<'_>]) -> Table {
             "per hour",
             "free time in alarm",
             "delay [ms]",
-            "p50",
-            "p90",
-            "p99",
+            "p50 [ms]",
+            "p90 [ms]",
+            "p99 [ms]",
         ],
     );
     for judged in judged {
@@ -183,8 +183,8 @@ pub fn places(judged: &[Judged<'_>]) -> Table {
             "link exact",
             "within one",
             "force [deg]",
-            "p50",
-            "p90",
+            "p50 [deg]",
+            "p90 [deg]",
         ],
     );
     for judged in judged {
