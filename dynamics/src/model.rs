@@ -254,7 +254,7 @@ impl Model {
     }
 
     /// The same robot with nothing but `inertia`, in the frame of `link`: what it alone costs.
-    pub(crate) fn ghost(&self, link: usize, inertia: Inertia) -> Self {
+    pub fn ghost(&self, link: usize, inertia: Inertia) -> Self {
         let mut ghost = self.clone();
         for body in &mut ghost.bodies {
             body.own = Inertia::zero();

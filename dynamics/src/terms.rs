@@ -13,6 +13,7 @@ mod cable_spring;
 mod contact_wall;
 mod coulomb_friction;
 mod counterbalance_spring;
+mod expansion;
 mod external_push;
 mod friction_step;
 mod ghost;
@@ -43,8 +44,11 @@ mod transmission_coupling;
 mod two_masses;
 mod viscous_friction;
 
+use std::sync::Arc;
+
 use crate::{Inertia, Model};
 
+pub use expansion::Expansion;
 pub use physics::Physics;
 pub use spec::{TermError, TermSpec};
 pub use table::{Against, Table, TableSpec, table};
@@ -330,6 +334,10 @@ pub trait Term: std::fmt::Debug + Send {
     /// terms find the effort of all that came before them and transform it, others add to it. Does not
     /// allocate.
     fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]);
+
+    /// Takes what bodies cost along the motion that the following calls of [`Term::act`] go through, sample by sample
+    /// and over any [`Term::reset`]: for terms that move a link by a little, which need not ask for it then.
+    fn expand(&mut self, _along: &Arc<Expansion>) {}
 
     /// Makes the change part of the model where it is one of rigid bodies or of gravity; `false` if it
     /// is not.

@@ -1,8 +1,10 @@
 //! A joint whose transmission has play.
 
+use std::sync::Arc;
+
 use super::law::array;
 use super::two_masses::{Deviation, Oscillator, Transmission, TwoMasses};
-use super::{Coordinate, Effect, Layer, MotionSample, Parameter, PlaceKind, Scale, Term};
+use super::{Coordinate, Effect, Expansion, Layer, MotionSample, Parameter, PlaceKind, Scale, Term};
 
 /// Natural frequency \[rad/s\] and damping ratio of the contact on either side of the play: it settles
 /// within some 20 ms and does not bounce. Stiffer contacts only turn the noise of a measured acceleration
@@ -117,6 +119,10 @@ impl Term for Backlash {
 
     fn coordinates(&self) -> &[f64] {
         &self.values
+    }
+
+    fn expand(&mut self, along: &Arc<Expansion>) {
+        self.masses.expand(along);
     }
 
     fn reset(&mut self) {

@@ -1,8 +1,10 @@
 //! A joint whose transmission gives way like a spring.
 
+use std::sync::Arc;
+
 use super::law::array;
 use super::two_masses::{Deviation, Oscillator, Transmission, TwoMasses};
-use super::{Coordinate, Effect, Layer, MotionSample, Parameter, PlaceKind, Scale, Term};
+use super::{Coordinate, Effect, Expansion, Layer, MotionSample, Parameter, PlaceKind, Scale, Term};
 
 /// Share of the critical damping that the link has against a rotor that stands still. It is none of the
 /// parameters: motions of robots do not show it.
@@ -73,6 +75,10 @@ impl Term for JointElasticity {
 
     fn coordinates(&self) -> &[f64] {
         &self.values
+    }
+
+    fn expand(&mut self, along: &Arc<Expansion>) {
+        self.masses.expand(along);
     }
 
     fn reset(&mut self) {

@@ -3,7 +3,8 @@
 use super::law::joint_law;
 use super::{Coordinate, Effect, Layer, Parameter, PlaceKind, Scale};
 
-/// Effort (Fw + Fx exp(-t/T)) qd, t since the start of the recording: the joint is cold then.
+/// Effort (Fw + Fx exp(-t/T)) qd, t since the start of the recording: the joint is cold then. No gearbox warms up within
+/// seconds: T is searched from a quarter of a minute on.
 pub(super) static EFFECT: Effect = Effect {
     name: "temperature_viscous",
     place: PlaceKind::Joint,
@@ -16,7 +17,7 @@ pub(super) static EFFECT: Effect = Effect {
     coordinates: &[
         Coordinate::positive_factor("viscous_warm_nms_per_rad"),
         Coordinate::positive_factor("viscous_extra_cold_nms_per_rad"),
-        Coordinate::shape("time_constant_s", 3.0, 600.0, 16, Scale::Log),
+        Coordinate::shape("time_constant_s", 15.0, 900.0, 14, Scale::Log),
     ],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,

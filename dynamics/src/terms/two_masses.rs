@@ -12,7 +12,9 @@
 //! M to be the mean of both. The effort of the motor is J θ̈ + T, that of the other joints the rigid body's with the
 //! link's motion.
 
-use super::{MotionSample, Site};
+use std::sync::Arc;
+
+use super::{Expansion, MotionSample, Site};
 use crate::{Data, Model, rnea};
 
 /// The link is not followed further from its rotor than this \[rad\]: no transmission bears it.
@@ -58,6 +60,10 @@ pub(super) struct TwoMasses {
     velocity: Vec<f64>,
     acceleration: Vec<f64>,
     before: Option<Before>,
+    /// Effort with the link where it was last asked for.
+    link: Vec<f64>,
+    /// What bodies cost along the motion, where that is known, and the sample that comes next.
+    along: Option<(Arc<Expansion>, usize)>,
 }
 
 /// The sample before.
@@ -82,7 +88,14 @@ impl TwoMasses {
             velocity: vec![0.0; n],
             acceleration: vec![0.0; n],
             before: None,
+            link: vec![0.0; n],
+            along: None,
         }
+    }
+
+    /// What bodies cost along the motion that is to come.
+    pub fn expand(&mut self, along: &Arc<Expansion>) {
+        self.along = Some((Arc::clone(along), 0));
     }
 
     pub fn reset(&mut self) {
@@ -96,13 +109,25 @@ impl TwoMasses {
         transmission: &impl Transmission,
         effort: &mut [f64],
     ) {
+        self.follow(at, transmission, effort);
+        if let Some((_, next)) = &mut self.along {
+            *next += 1;
+        }
+    }
+
+    fn follow(
+        &mut self,
+        at: &MotionSample<'_>,
+        transmission: &impl Transmission,
+        effort: &mut [f64],
+    ) {
         let j = self.joint;
         let rotor_acceleration = at.acceleration[j];
         self.position.copy_from_slice(at.position);
         self.velocity.copy_from_slice(at.velocity);
         self.acceleration.copy_from_slice(at.acceleration);
         self.effort(Deviation::default(), at, rotor_acceleration);
-        self.rigid.copy_from_slice(&self.data.effort);
+        self.rigid.copy_from_slice(&self.link);
         let faster = self.effort(Deviation::default(), at, rotor_acceleration + 1.0);
         let inertia = faster - self.rigid[j];
         if inertia < LEAST_INERTIA {
@@ -121,8 +146,7 @@ impl TwoMasses {
         }
         let link_acceleration = transmission.acceleration(inertia, deviation) - rest / inertia;
         self.effort(deviation, at, link_acceleration);
-        let link = &self.data.effort;
-        for ((effort, link), rigid) in effort.iter_mut().zip(link).zip(&self.rigid) {
+        for ((effort, link), rigid) in effort.iter_mut().zip(&self.link).zip(&self.rigid) {
             *effort += link - rigid;
         }
     }
@@ -187,14 +211,21 @@ impl TwoMasses {
     }
 
     /// Effort of the rigid body at the joint with the link where `deviation` has it; that of all joints
-    /// is left in `data`.
+    /// is left in `link`.
     fn effort(&mut self, deviation: Deviation, at: &MotionSample<'_>, acceleration: f64) -> f64 {
         let j = self.joint;
+        if let Some((along, k)) = &self.along {
+            let off = [deviation.angle, deviation.rate, acceleration - at.acceleration[j]];
+            along.effort(*k, off, &mut self.link);
+            return self.link[j];
+        }
         self.position[j] = at.position[j] + deviation.angle;
         self.velocity[j] = at.velocity[j] + deviation.rate;
         self.acceleration[j] = acceleration;
         let (q, qd, qdd) = (&self.position, &self.velocity, &self.acceleration);
-        rnea(&self.model, &mut self.data, q, qd, qdd)[j]
+        let effort = rnea(&self.model, &mut self.data, q, qd, qdd);
+        self.link.copy_from_slice(effort);
+        self.link[j]
     }
 }
 

@@ -34,7 +34,7 @@ pub fn carries_over(problem: &Problem, with: &Fit, without: &Fit, joints: &[usiz
 /// Sum of squares by joint that a fit leaves in each recording with the numbers of the others.
 fn left_where_not_fitted(problem: &Problem, fit: &Fit, joints: &[usize]) -> Vec<f64> {
     let jacobian = fit.jacobian_at(problem, Some(joints));
-    let columns: Vec<&Column> = jacobian.iter().collect();
+    let columns: Vec<&Column> = jacobian.iter().map(AsRef::as_ref).collect();
     let all = Products::new(problem, &columns, &fit.residual, None);
     let (normal, _) = all.normal(&fit.variance, &vec![0.0; columns.len()]);
     let ridge: Vec<f64> = normal.diagonal().iter().map(|d| DAMPING * d).collect();

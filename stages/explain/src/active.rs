@@ -1,13 +1,13 @@
-//! A piece of physics that is part of an explanation, and what it does to the recordings.
+//! A piece of physics that is part of an explanation: what, where, and its numbers.
 
 use tauscope_dynamics::terms::{
-    Coordinate, CoordinateKind, Effect, Layer, MotionSample, Physics, PlaceKind, Site, Table, Term,
+    Against, Coordinate, CoordinateKind, Effect, Layer, MotionSample, PlaceKind, Site, Table, Term,
     table,
 };
 
 use tauscope_dynamics::Model;
 
-use crate::drive::{gains, is_drive};
+use crate::drive::is_drive;
 use crate::problem::Problem;
 
 /// Where an effect is: indices into the model's joints and links; what its kind of place does not ask for is 0.
@@ -97,6 +97,16 @@ impl Hypothesis {
         jump > 0.5 * at(1.0).abs().max(1e-12)
     }
 
+    /// Whether it depends on what the gear transmits.
+    pub fn needs_load(&self) -> bool {
+        self.effect.name == "load_dependent_friction"
+    }
+
+    /// Whether all its coordinates are factors.
+    pub fn is_linear(&self) -> bool {
+        self.factors().len() == self.effect.coordinates.len()
+    }
+
     /// Indices of the coordinates that are factors.
     pub fn factors(&self) -> Vec<usize> {
         let is_factor = |c: &Coordinate| matches!(c.kind, CoordinateKind::Factor { .. });
@@ -160,6 +170,33 @@ impl Active {
         }
     }
 
+    /// Whether it depends on what the gear transmits.
+    pub fn needs_load(&self) -> bool {
+        match &self.curve {
+            Some(curve) => curve.against == Against::Load,
+            None => self.hypothesis.needs_load(),
+        }
+    }
+
+    /// Whether it is a part of the recording that is changed, not only added to: see [`Layer::Record`].
+    pub fn is_of_record(&self) -> bool {
+        self.hypothesis.effect.layer == Layer::Record
+    }
+
+    /// Whether through it one joint's recording feels another's.
+    pub fn is_coupling(&self) -> bool {
+        self.hypothesis.effect.place == PlaceKind::TwoJoints
+    }
+
+    /// Its coordinates with the factors at zero.
+    pub fn shape(&self) -> Vec<f64> {
+        let mut shape = self.coordinates.clone();
+        for i in self.hypothesis.factors() {
+            shape[i] = 0.0;
+        }
+        shape
+    }
+
     /// How a coordinate enters.
     pub fn kind(&self, coordinate: usize) -> CoordinateKind {
         let of_effect = self.hypothesis.effect.coordinates.get(coordinate);
@@ -189,194 +226,4 @@ impl Column {
             None => Some(&self.values[joint * rows..(joint + 1) * rows]),
         }
     }
-}
-
-/// Efforts of all tracks under some physics, unfiltered and row-major, one `Vec` per track.
-#[derive(Debug, Clone)]
-pub struct Efforts {
-    /// Rigid body and [`Layer::Body`] terms: what the gears transmit.
-    pub body: Vec<Vec<f64>>,
-    /// With the [`Layer::Joint`] terms.
-    pub mechanical: Vec<Vec<f64>>,
-    /// With the [`Layer::Record`] terms: what is recorded.
-    pub recorded: Vec<Vec<f64>>,
-    /// Scale of each joint's drive.
-    pub gains: Vec<f64>,
-}
-
-fn terms_of(problem: &Problem, actives: &[Active], layer: Layer) -> Vec<Box<dyn Term>> {
-    let mut of_layer: Vec<&Active> = actives
-        .iter()
-        .filter(|active| active.hypothesis.effect.layer == layer)
-        .collect();
-    // The scale of a drive is that of all bodies.
-    of_layer.sort_by_key(|active| is_drive(&active.hypothesis));
-    of_layer.iter().map(|active| active.term(problem)).collect()
-}
-
-impl Efforts {
-    /// Under the physics of `actives`.
-    pub fn new(problem: &Problem, actives: &[Active]) -> Self {
-        let rigid: Vec<Vec<f64>> = problem
-            .tracks
-            .iter()
-            .map(|t| t.track.rigid.clone())
-            .collect();
-        let body = run(problem, terms_of(problem, actives, Layer::Body), &rigid);
-        let mechanical = run(problem, terms_of(problem, actives, Layer::Joint), &body);
-        let recorded = record(problem, actives, &mechanical);
-        Self {
-            body,
-            mechanical,
-            recorded,
-            gains: gains(actives, problem.joints),
-        }
-    }
-}
-
-/// Efforts with terms of one layer added.
-fn run(problem: &Problem, terms: Vec<Box<dyn Term>>, start: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    if terms.is_empty() {
-        return start.to_vec();
-    }
-    let mut physics = Physics::new(terms, problem.joints);
-    let tracks = problem.tracks.iter().zip(start);
-    tracks
-        .map(|(track, start)| track.track.run(&mut physics, start))
-        .collect()
-}
-
-/// What is recorded of mechanical efforts.
-pub fn record(problem: &Problem, actives: &[Active], mechanical: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    run(
-        problem,
-        terms_of(problem, actives, Layer::Record),
-        mechanical,
-    )
-}
-
-/// What `active` alone changes, as a signal: added to the physics that made `efforts`.
-///
-/// [`Layer::Record`] terms of `others` are passed through; one that is itself of that layer acts after them.
-pub fn change(problem: &Problem, others: &[Active], efforts: &Efforts, active: &Active) -> Column {
-    change_scaled(problem, others, efforts, active, &efforts.gains)
-}
-
-/// The same, what bodies cost scaled by other gains of the drives.
-pub fn change_scaled(
-    problem: &Problem,
-    others: &[Active],
-    efforts: &Efforts,
-    active: &Active,
-    gains: &[f64],
-) -> Column {
-    let layer = active.hypothesis.effect.layer;
-    if is_drive(&active.hypothesis) {
-        return scaled_bodies(problem, efforts, active);
-    }
-    let mut term = active.term(problem);
-    let through = layer != Layer::Record
-        && others
-            .iter()
-            .any(|other| other.hypothesis.effect.layer == Layer::Record);
-    let changed: Vec<Vec<f64>> = match layer {
-        Layer::Record => act_over(problem, &mut *term, &efforts.recorded, &efforts.body),
-        _ if through => act_over(problem, &mut *term, &efforts.mechanical, &efforts.body),
-        _ => {
-            let zero: Vec<Vec<f64>> = efforts.body.iter().map(|b| vec![0.0; b.len()]).collect();
-            act_over(problem, &mut *term, &zero, &efforts.body)
-        }
-    };
-    let mut changed = changed;
-    if layer == Layer::Body && gains.iter().any(|gain| (gain - 1.0).abs() > 0.0) {
-        let start = if through {
-            Some(&efforts.mechanical)
-        } else {
-            None
-        };
-        scale_added(&mut changed, start, gains);
-    }
-    let difference: Vec<Vec<f64>> = match layer {
-        Layer::Record => subtract(changed, &efforts.recorded),
-        _ if through => subtract(record(problem, others, &changed), &efforts.recorded),
-        _ => changed,
-    };
-    let coupled = through
-        && others
-            .iter()
-            .any(|other| other.hypothesis.effect.place == PlaceKind::TwoJoints);
-    match active.hypothesis.only_joint() {
-        Some(joint) if !coupled => {
-            let mut values = vec![0.0; problem.rows];
-            problem.joint_signal(&difference, joint, &mut values);
-            Column {
-                joint: Some(joint),
-                values,
-            }
-        }
-        _ => Column {
-            joint: None,
-            values: problem.signal(&difference),
-        },
-    }
-}
-
-/// What the scale of one drive changes: its joint's share of the bodies' effort.
-fn scaled_bodies(problem: &Problem, efforts: &Efforts, active: &Active) -> Column {
-    let joint = active.hypothesis.place.joint;
-    let share = active.coordinates[0] / efforts.gains[joint];
-    let scaled: Vec<Vec<f64>> = efforts
-        .body
-        .iter()
-        .map(|body| body.iter().map(|x| share * x).collect())
-        .collect();
-    let mut values = vec![0.0; problem.rows];
-    problem.joint_signal(&scaled, joint, &mut values);
-    Column {
-        joint: Some(joint),
-        values,
-    }
-}
-
-/// Scales what was added to `start` (or to nothing) by the drives.
-fn scale_added(changed: &mut [Vec<f64>], start: Option<&Vec<Vec<f64>>>, gains: &[f64]) {
-    for (r, changed) in changed.iter_mut().enumerate() {
-        for (k, value) in changed.iter_mut().enumerate() {
-            let before = start.map_or(0.0, |start| start[r][k]);
-            *value = before + gains[k % gains.len()] * (*value - before);
-        }
-    }
-}
-
-/// What a term adds to `start` over all tracks, `transmitted` by the gears.
-pub fn act_over(
-    problem: &Problem,
-    term: &mut dyn Term,
-    start: &[Vec<f64>],
-    transmitted: &[Vec<f64>],
-) -> Vec<Vec<f64>> {
-    let n = problem.joints;
-    let mut out = start.to_vec();
-    for ((track, effort), transmitted) in problem.tracks.iter().zip(&mut out).zip(transmitted) {
-        term.reset();
-        track.track.each(|k, at| {
-            let row = k * n..(k + 1) * n;
-            let at = MotionSample {
-                transmitted: &transmitted[row.clone()],
-                ..*at
-            };
-            term.act(&at, &mut effort[row]);
-        });
-    }
-    out
-}
-
-/// The difference of two efforts.
-pub fn subtract(mut from: Vec<Vec<f64>>, what: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    for (from, what) in from.iter_mut().zip(what) {
-        for (a, b) in from.iter_mut().zip(what) {
-            *a -= b;
-        }
-    }
-    from
 }

@@ -1,12 +1,17 @@
 //! All numbers of an explanation fitted at once: Gauss-Newton with Levenberg's damping on the filtered effort.
 
-use nalgebra::{DMatrix, DVector};
-use tauscope_dynamics::terms::{CoordinateKind, Layer, Scale};
+use std::sync::{Arc, OnceLock};
 
-use crate::active::{Active, Column, Efforts, Hypothesis, change, record, subtract};
-use crate::columns::{CACHED_ROWS, body_effort, columns};
+use nalgebra::{DMatrix, DVector};
+use tauscope_dynamics::terms::{CoordinateKind, Layer, PlaceKind, Scale};
+
+use crate::active::{Active, Column, Hypothesis};
+use crate::bodies::TrackEfforts;
+use crate::columns::columns;
 use crate::drive::is_drive;
+use crate::efforts::{Efforts, change, column, record, transmitted};
 use crate::least_squares::Products;
+use crate::parts::{Parts, is_kept};
 use crate::problem::Problem;
 
 const MAX_ITERATIONS: usize = 12;
@@ -20,8 +25,10 @@ const TIME_STEP_S: f64 = 0.01;
 pub struct Fit {
     /// The physics.
     pub actives: Vec<Active>,
-    /// What it says of the recordings, unfiltered.
-    pub efforts: Efforts,
+    /// What each piece adds to the recordings.
+    pub parts: Parts,
+    /// What it says of the recordings, unfiltered; where it was asked for.
+    efforts: OnceLock<Arc<Efforts>>,
     /// Measured minus explained, a signal \[N m or N\].
     pub residual: Vec<f64>,
     /// Variance of what is left, by joint; not below the white noise.
@@ -35,22 +42,59 @@ pub struct Fit {
 impl Fit {
     /// Evaluates an explanation as it is.
     pub fn new(problem: &Problem, actives: Vec<Active>) -> Self {
-        let efforts = Efforts::new(problem, &actives);
-        let explained = problem.signal(&efforts.recorded);
-        let residual: Vec<f64> = problem
-            .measured
-            .iter()
-            .zip(&explained)
-            .map(|(m, e)| m - e)
-            .collect();
-        let products = Products::new(problem, &[], &residual, None);
-        Self {
+        Self::beside(problem, actives, None)
+    }
+
+    /// The same, where much is as in the fit `before`.
+    fn beside(problem: &Problem, actives: Vec<Active>, before: Option<&Self>) -> Self {
+        let known = before.map(|before| (&before.actives[..], &before.parts));
+        let parts = Parts::new(problem, &actives, known);
+        let mut fit = Self {
             actives,
-            efforts,
-            residual,
-            variance: variances(problem, &products.square, &products.count),
-            squares: products.square,
-            count: products.count,
+            parts,
+            efforts: OnceLock::new(),
+            residual: problem.measured.clone(),
+            variance: Vec::new(),
+            squares: Vec::new(),
+            count: Vec::new(),
+        };
+        let mut residual = std::mem::take(&mut fit.residual);
+        for joint in 0..problem.joints {
+            let explained = if fit.parts.transformed[joint] {
+                let mut signal = vec![0.0; problem.rows];
+                problem.joint_signal(&fit.efforts(problem).recorded, joint, &mut signal);
+                signal
+            } else {
+                fit.parts.recorded(problem, &fit.actives, joint)
+            };
+            for (left, explained) in residual[problem.joint_rows(joint)].iter_mut().zip(&explained) {
+                *left -= explained;
+            }
+        }
+        fit.residual = residual;
+        let products = Products::new(problem, &[], &fit.residual, None);
+        fit.variance = variances(problem, &products.square, &products.count);
+        fit.squares = products.square;
+        fit.count = products.count;
+        fit
+    }
+
+    /// What it says of the recordings, unfiltered.
+    pub fn efforts(&self, problem: &Problem) -> &Efforts {
+        self.efforts.get_or_init(|| {
+            let body = match self.parts.load() {
+                Some(load) => Arc::clone(load),
+                None => Arc::new(transmitted(problem, &self.actives)),
+            };
+            Arc::new(Efforts::new(problem, &self.actives, body))
+        })
+    }
+
+    /// What the gears transmit, unfiltered.
+    pub fn load(&self, problem: &Problem) -> Arc<TrackEfforts> {
+        match self.parts.load() {
+            Some(load) => Arc::clone(load),
+            None => Arc::clone(&self.efforts(problem).body),
         }
     }
 
@@ -82,93 +126,126 @@ impl Fit {
             .collect()
     }
 
+    /// What a piece of physics would add.
+    pub fn added(&self, problem: &Problem, active: &Active) -> Column {
+        let gains = &self.parts.gains;
+        let joint = active.hypothesis.only_joint();
+        if self.parts.is_plain(&active.hypothesis) && joint.is_some() {
+            let efforts = if active.needs_load() {
+                &Efforts::of_bodies(self.load(problem), problem.joints)
+            } else {
+                problem.bare()
+            };
+            return column(problem, &change(problem, &[], efforts, active, gains), joint);
+        }
+        let joint = joint.filter(|_| !self.parts.is_coupled());
+        let changed = change(problem, &self.actives, self.efforts(problem), active, gains);
+        column(problem, &changed, joint)
+    }
+
     /// How the explained effort changes with each free coordinate.
-    pub fn jacobian(&self, problem: &Problem) -> Vec<Column> {
+    pub fn jacobian(&self, problem: &Problem) -> Vec<Arc<Column>> {
         self.jacobian_at(problem, None)
     }
 
     /// How the explained effort changes with each free coordinate of what touches these joints; all without them.
-    pub fn jacobian_at(&self, problem: &Problem, joints: Option<&[usize]>) -> Vec<Column> {
-        let touching = self.parameters_at(joints).into_iter();
+    pub fn jacobian_at(&self, problem: &Problem, joints: Option<&[usize]>) -> Vec<Arc<Column>> {
+        let free = self.parameters_at(joints);
+        let of = |i: usize| free.iter().filter(move |(active, _)| *active == i).map(|(_, c)| *c);
+        let touching = (0..self.actives.len()).filter(|&i| of(i).next().is_some());
         touching
-            .map(|(i, c)| self.sensitivity(problem, i, c))
+            .flat_map(|i| self.sensitivities(problem, i, &of(i).collect::<Vec<_>>()))
             .collect()
     }
 
-    /// The coordinates that are free of what touches these joints.
-    fn parameters_at(&self, joints: Option<&[usize]>) -> Vec<(usize, usize)> {
-        let touches = |&(i, _): &(usize, usize)| {
-            let only = self.actives[i].hypothesis.only_joint();
-            joints.is_none_or(|joints| only.is_none_or(|only| joints.contains(&only)))
-        };
-        self.parameters().into_iter().filter(touches).collect()
+    fn touches(&self, index: usize, joints: Option<&[usize]>) -> bool {
+        let only = self.actives[index].hypothesis.only_joint();
+        joints.is_none_or(|joints| only.is_none_or(|only| joints.contains(&only)))
     }
 
-    fn sensitivity(&self, problem: &Problem, i: usize, c: usize) -> Column {
-        let active = &self.actives[i];
+    /// The coordinates that are free of what touches these joints: of what touches all joints but belongs to others, only
+    /// the factors. Its shape is dear and hardly moves.
+    fn parameters_at(&self, joints: Option<&[usize]>) -> Vec<(usize, usize)> {
+        let mut all = self.parameters();
+        all.retain(|&(i, c)| self.touches(i, joints) && (self.is_factor(i, c) || self.belongs(i, joints)));
+        all
+    }
+
+    fn is_factor(&self, index: usize, c: usize) -> bool {
+        matches!(self.actives[index].kind(c), CoordinateKind::Factor { .. })
+    }
+
+    fn belongs(&self, index: usize, joints: Option<&[usize]>) -> bool {
+        let hypothesis = self.actives[index].hypothesis;
+        let at_joint = matches!(hypothesis.effect.place, PlaceKind::Joint | PlaceKind::TwoJoints);
+        joints.is_none_or(|joints| {
+            joints.len() == self.variance.len() || (at_joint && joints.contains(&hypothesis.place.joint))
+        })
+    }
+
+    /// How the explained effort changes with some coordinates of an active.
+    fn sensitivities(&self, problem: &Problem, index: usize, of: &[usize]) -> Vec<Arc<Column>> {
+        let active = &self.actives[index];
+        let hypothesis = active.hypothesis;
+        if is_drive(&hypothesis) {
+            let joint = hypothesis.place.joint;
+            let values = self.parts.bodies(problem, &self.actives, joint);
+            let joint = Some(joint);
+            return vec![Arc::new(Column { joint, values })];
+        }
+        // What a factor adds is the same wherever all factors are.
+        let alike = is_kept(problem, active) && !active.is_of_record();
+        let known = alike.then(|| columns(problem, self, hypothesis, &active.shape()));
+        let factors = hypothesis.factors();
+        let one = |&c: &usize| {
+            let at = factors.iter().position(|&factor| factor == c);
+            match (&known, at) {
+                (Some(known), Some(at)) => Arc::clone(&known.factors[at]),
+                _ => Arc::new(self.sensitivity(problem, index, c)),
+            }
+        };
+        of.iter().map(one).collect()
+    }
+
+    /// The difference quotient of one coordinate.
+    fn sensitivity(&self, problem: &Problem, index: usize, c: usize) -> Column {
+        let active = &self.actives[index];
+        let hypothesis = active.hypothesis;
         let step = step_of(problem, active, c);
         let mut there = active.clone();
         there.coordinates[c] += step;
-        let layer = active.hypothesis.effect.layer;
-        let recorded = self
-            .actives
-            .iter()
-            .any(|a| a.hypothesis.effect.layer == Layer::Record);
-        let count = active.coordinates.len();
-        let linear = active.curve.is_none()
-            && !is_drive(&active.hypothesis)
-            && active.hypothesis.factors().len() == count;
-        if linear && !recorded {
-            // What a coordinate adds is the same wherever all are.
-            let zero = vec![0.0; count];
-            let columns = columns(problem, &[], &self.efforts, active.hypothesis, &zero);
-            return columns.factors[c].clone();
-        }
-        if linear && layer == Layer::Body && problem.rows <= CACHED_ROWS {
-            let unit = body_effort(problem, &self.efforts, active.hypothesis, c);
-            let mut changed = self.efforts.mechanical.clone();
-            for (changed, unit) in changed.iter_mut().zip(unit.iter()) {
-                for (k, (value, unit)) in changed.iter_mut().zip(unit).enumerate() {
-                    *value += step * self.efforts.gains[k % problem.joints] * unit;
+        let (mut values, base, joint);
+        if let Some(here) = self.parts.of(index)
+            && self.parts.is_plain(&hypothesis)
+        {
+            let mut column = self.parts.part(problem, &there);
+            if hypothesis.effect.layer == Layer::Body {
+                for (j, gain) in self.parts.gains.iter().enumerate() {
+                    column.values[problem.joint_rows(j)]
+                        .iter_mut()
+                        .zip(&here.values[problem.joint_rows(j)])
+                        .for_each(|(there, here)| *there = here + gain * (*there - here));
                 }
             }
-            let recorded = record(problem, &self.actives, &changed);
-            let mut values = problem.signal(&subtract(recorded, &self.efforts.recorded));
-            for value in &mut values {
-                *value /= step;
-            }
-            return Column {
-                joint: None,
-                values,
-            };
-        }
-        let (mut column, base) = if layer == Layer::Record {
+            (values, base, joint) = (column.values, here.values.clone(), column.joint);
+        } else if active.is_of_record() {
             let mut all = self.actives.clone();
-            all[i] = there;
-            let changed = record(problem, &all, &self.efforts.mechanical);
-            let values = problem.signal(&changed);
-            let base = problem
-                .measured
-                .iter()
-                .zip(&self.residual)
-                .map(|(m, r)| m - r)
-                .collect();
-            (
-                Column {
-                    joint: None,
-                    values,
-                },
-                base,
-            )
+            all[index] = there;
+            let changed = record(problem, &all, &self.efforts(problem).mechanical);
+            joint = hypothesis.only_joint().filter(|_| !self.parts.is_coupled());
+            values = column(problem, &changed, joint).values;
+            let rows = joint.map_or(0..problem.joints * problem.rows, |j| problem.joint_rows(j));
+            let explained = problem.measured[rows.clone()].iter().zip(&self.residual[rows]);
+            base = explained.map(|(m, r)| m - r).collect();
         } else {
-            let others: &[Active] = if recorded { &self.actives } else { &[] };
-            let base = change(problem, others, &self.efforts, active).values;
-            (change(problem, others, &self.efforts, &there), base)
-        };
-        for (value, base) in column.values.iter_mut().zip(&base) {
+            let there = self.added(problem, &there);
+            joint = there.joint;
+            (values, base) = (there.values, self.added(problem, active).values);
+        }
+        for (value, base) in values.iter_mut().zip(&base) {
             *value = (*value - base) / step;
         }
-        column
+        Column { joint, values }
     }
 
     /// Improves all numbers together.
@@ -187,11 +264,8 @@ impl Fit {
         let mut damping = 1e-4;
         let mut best = self.likelihood();
         for _ in 0..MAX_ITERATIONS {
-            let jacobian: Vec<Column> = free
-                .iter()
-                .map(|&(i, c)| self.sensitivity(problem, i, c))
-                .collect();
-            let columns: Vec<&Column> = jacobian.iter().collect();
+            let jacobian = self.jacobian_at(problem, joints);
+            let columns: Vec<&Column> = jacobian.iter().map(AsRef::as_ref).collect();
             let products = Products::new(problem, &columns, &self.residual, None);
             let ridge = vec![0.0; columns.len()];
             let (normal, right) = products.normal(&self.variance, &ridge);
@@ -201,7 +275,8 @@ impl Fit {
                     damping *= 10.0;
                     continue;
                 };
-                let next = Self::new(problem, self.moved(problem, &free, &step));
+                let moved = self.moved(problem, &free, &step);
+                let next = Self::beside(problem, moved, Some(&self));
                 let likelihood = next.likelihood();
                 if likelihood > best {
                     gained = Some(likelihood - best);
@@ -240,7 +315,7 @@ impl Fit {
     pub fn without(&self, problem: &Problem, index: usize) -> Self {
         let mut actives = self.actives.clone();
         actives.remove(index);
-        Self::new(problem, actives)
+        Self::beside(problem, actives, Some(self))
     }
 
     /// The fit with one more, not refined.
@@ -248,7 +323,7 @@ impl Fit {
     pub fn with(&self, problem: &Problem, active: Active) -> Self {
         let mut actives = self.actives.clone();
         actives.push(active);
-        Self::new(problem, actives)
+        Self::beside(problem, actives, Some(self))
     }
 }
 

@@ -2,7 +2,6 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::active::Column;
 use crate::fit::Fit;
 use crate::problem::Problem;
 
@@ -26,7 +25,7 @@ pub fn covariance(problem: &Problem, fit: &Fit) -> DMatrix<f64> {
         let touching: Vec<(usize, &[f64])> = jacobian
             .iter()
             .enumerate()
-            .filter_map(|(a, column): (usize, &Column)| {
+            .filter_map(|(a, column)| {
                 Some((a, column.of_joint(j, problem.rows)?))
             })
             .collect();

@@ -1,9 +1,13 @@
 //! The data of a fit: smoothed motion, rigid-body effort and filtered measured effort of the recordings.
 
-use tauscope_dynamics::terms::{MotionSample, Physics};
+use std::sync::{Arc, OnceLock};
+
+use tauscope_dynamics::terms::{Expansion, MotionSample, Physics};
 use tauscope_dynamics::{Data, Model, rnea};
 
+use crate::bodies::UnitCosts;
 use crate::columns::ColumnCache;
+use crate::efforts::Efforts;
 use crate::recording::{MAX_GAP_S, Recording};
 use crate::smoother::{LowPass, MotionSmoother};
 use crate::standstill;
@@ -219,6 +223,11 @@ pub struct Problem {
     pub worth: Vec<f64>,
     /// Columns that were computed before.
     pub cache: ColumnCache,
+    /// What unit bodies cost.
+    pub units: UnitCosts,
+    bare: OnceLock<Efforts>,
+    rigid: OnceLock<Vec<f64>>,
+    expansions: Vec<OnceLock<Arc<Expansion>>>,
 }
 
 impl Problem {
@@ -257,6 +266,10 @@ impl Problem {
             cutoff_hz,
             worth: Vec::new(),
             cache: ColumnCache::default(),
+            units: UnitCosts::default(),
+            bare: OnceLock::new(),
+            rigid: OnceLock::new(),
+            expansions: vec![OnceLock::new(); n],
         };
         let (mut measured, mut weight) = (Vec::new(), Vec::new());
         let mut variances = vec![Vec::new(); n];
@@ -317,6 +330,33 @@ impl Problem {
         }
         problem.worth = worth(&problem);
         problem
+    }
+
+    /// What the twin says without any physics beside it.
+    pub fn bare(&self) -> &Efforts {
+        self.bare.get_or_init(|| {
+            let rigid = self.tracks.iter().map(|t| t.track.rigid.clone()).collect();
+            Efforts::of_bodies(Arc::new(rigid), self.joints)
+        })
+    }
+
+    /// The same as a signal.
+    pub fn rigid(&self) -> &[f64] {
+        self.rigid.get_or_init(|| self.signal(&self.bare().body))
+    }
+
+    /// What bodies cost as a joint's link leaves the motion, over all tracks.
+    pub fn expansion(&self, joint: usize) -> &Arc<Expansion> {
+        self.expansions[joint].get_or_init(|| {
+            let (model, mut data) = (&self.model, Data::new(&self.model));
+            let mut all = Expansion::new(model, joint);
+            for track in &self.tracks {
+                track.track.each(|_, at| {
+                    all.push(model, &mut data, at.position, at.velocity, at.acceleration);
+                });
+            }
+            Arc::new(all)
+        })
     }
 
     /// The part of a signal that is joint `joint`'s.

@@ -1,5 +1,8 @@
 //! What a hypothesis could add to an explanation: its best numbers to first order, and what they gain.
 
+use std::borrow::Borrow;
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::{CoordinateKind, PlaceKind, Scale};
 
@@ -43,7 +46,7 @@ pub struct Base<'a> {
     /// What is explained already.
     pub fit: &'a Fit,
     /// How the fit changes with its own numbers.
-    jacobian: Vec<Column>,
+    jacobian: Vec<Arc<Column>>,
     products: Products,
     /// Keeps shapes from running away in the linear step.
     ridge: Vec<f64>,
@@ -56,7 +59,7 @@ impl<'a> Base<'a> {
     /// Prepares `fit`; `hypotheses` is how many are in the contest.
     pub fn new(problem: &'a Problem, fit: &'a Fit, hypotheses: usize) -> Self {
         let jacobian = fit.jacobian(problem);
-        let references: Vec<&Column> = jacobian.iter().collect();
+        let references: Vec<&Column> = jacobian.iter().map(AsRef::as_ref).collect();
         let products = Products::new(problem, &references, &fit.residual, None);
         let ridge = fit
             .parameters()
@@ -101,10 +104,10 @@ impl<'a> Base<'a> {
 
     /// Tries `columns` as additional factors, after `alone` is taken off the residual. Gives the factors, the
     /// gain of log-likelihood and the size of it; `minimum` bounds the factors.
-    pub fn try_columns(
+    pub fn try_columns<C: Borrow<Column>>(
         &self,
         alone: Option<&Column>,
-        columns: &[Column],
+        columns: &[C],
         minimum: &[f64],
     ) -> Option<(Vec<f64>, f64, f64)> {
         let products = self.augmented(alone, columns);
@@ -148,7 +151,7 @@ impl<'a> Base<'a> {
     }
 
     /// The products of the fit's own columns and more, with the residual less `alone`.
-    fn augmented(&self, alone: Option<&Column>, more: &[Column]) -> Products {
+    fn augmented<C: Borrow<Column>>(&self, alone: Option<&Column>, more: &[C]) -> Products {
         let problem = self.problem;
         let (p, q) = (self.jacobian.len(), more.len());
         let mut out = Products {
@@ -187,7 +190,7 @@ impl<'a> Base<'a> {
                 }
             }
             for (a, new) in more.iter().enumerate() {
-                let Some(new) = new.of_joint(j, problem.rows) else {
+                let Some(new) = new.borrow().of_joint(j, problem.rows) else {
                     continue;
                 };
                 right[p + a] = dot(new, e);
@@ -199,7 +202,7 @@ impl<'a> Base<'a> {
                     }
                 }
                 for (b, other) in more.iter().enumerate().skip(a) {
-                    if let Some(other) = other.of_joint(j, problem.rows) {
+                    if let Some(other) = other.borrow().of_joint(j, problem.rows) {
                         let product = dot(new, other);
                         gram[(p + a, p + b)] = product;
                         gram[(p + b, p + a)] = product;
@@ -279,8 +282,7 @@ impl<'a> Base<'a> {
     pub fn propose_at(&self, hypothesis: Hypothesis, shape: &[f64]) -> Option<Proposal> {
         let columns = columns(
             self.problem,
-            &self.fit.actives,
-            &self.fit.efforts,
+            &self.fit,
             hypothesis,
             shape,
         );
@@ -288,12 +290,12 @@ impl<'a> Base<'a> {
     }
 
     /// The same with the columns given.
-    pub fn propose_columns(
+    pub fn propose_columns<C: Borrow<Column>>(
         &self,
         hypothesis: Hypothesis,
         shape: &[f64],
         alone: Option<&Column>,
-        columns: &[Column],
+        columns: &[C],
     ) -> Option<Proposal> {
         let factors = hypothesis.factors();
         let minimum: Vec<f64> = factors

@@ -6,21 +6,20 @@
 mod evidence;
 mod exchange;
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use tauscope_dynamics::terms::Layer;
 
 use crate::across::carries_over;
 use crate::active::{Active, Hypothesis};
 use crate::drive::is_drive;
 use crate::fit::Fit;
+use crate::parallel;
 use crate::problem::Problem;
 use crate::propose::{Base, Proposal};
 use crate::unknown;
 
-pub use evidence::{Explanation, LEAST_EVIDENCE, LEAST_SIZE};
+pub use evidence::{Explanation, LEAST_EVIDENCE, LEAST_SIZE, has_rotor};
 use evidence::{
-    ROTOR, describe, has_rotor, most_at_one_place, needs, overwhelming, steps_enough, wald,
+    ROTOR, describe, most_at_one_place, needs, overwhelming, steps_enough, wald,
     worse_joints,
 };
 
@@ -33,7 +32,11 @@ const CURVE_SIZE: f64 = 1.35;
 /// How many proposals of a round are refined before one is taken.
 const REFINED: usize = 3;
 /// More pieces of physics than this are not looked for.
-const MOST_PIECES: usize = 12;
+const MOST_PIECES: usize = 24;
+/// An exchange must gain this \[nats\].
+const LEAST_GAIN: f64 = 0.5;
+/// So often pieces are added and all exchanged again.
+const MOST_ROUNDS: usize = 4;
 /// A joint whose variance is below this many times its white noise is not tried with costly effects.
 const QUIET: f64 = 1.15;
 
@@ -67,15 +70,17 @@ impl Search<'_> {
 
     /// Adds and exchanges names until nothing is gained.
     fn named(&self, mut best: Explanation) -> Explanation {
-        loop {
+        for _ in 0..MOST_ROUNDS {
             best = self.forward(best);
             let worth = &self.problem.worth;
             let exchanged = self.exchange(best.clone());
-            if exchanged.ahead_of(&best, worth) <= 0.5 {
-                return exchanged;
-            }
+            let gained = exchanged.ahead_of(&best, worth) > LEAST_GAIN;
             best = exchanged;
+            if !gained {
+                break;
+            }
         }
+        best
     }
 
     /// The explanation with a curve in a joint, where names do not do: beside the names, if much is left, or in place
@@ -173,26 +178,10 @@ impl Search<'_> {
             .into_iter()
             .filter(|h| !has_rotor(h) || rotor(h.place.joint))
             .collect();
-        let next = AtomicUsize::new(0);
-        let work = || {
-            let mut found = Vec::new();
-            loop {
-                let at = next.fetch_add(1, Ordering::Relaxed);
-                let Some(hypothesis) = wanted.get(at) else {
-                    return found;
-                };
-                found.extend(base.propose_in_time(*hypothesis));
-            }
-        };
-        let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        let mut all: Vec<Proposal> = std::thread::scope(|scope| {
-            let workers: Vec<_> = (1..threads).map(|_| scope.spawn(work)).collect();
-            let mut all = work();
-            for worker in workers {
-                all.extend(worker.join().unwrap_or_default());
-            }
-            all
-        });
+        let mut all: Vec<Proposal> = parallel::map(&wanted, |h| base.propose_in_time(*h))
+            .into_iter()
+            .flatten()
+            .collect();
         all.sort_by(|a, b| {
             let place = |p: &Proposal| (p.active.hypothesis.effect.name, p.active.hypothesis.place);
             b.evidence()
@@ -264,8 +253,9 @@ impl Search<'_> {
             p.evidence() > evidence && p.size > size && steps_enough(&p.active)
         });
         let mut able: Vec<(Explanation, &Proposal)> = Vec::new();
-        for proposal in worthy.take(REFINED) {
-            let next = self.joined(now, proposal);
+        let worthy: Vec<&Proposal> = worthy.take(REFINED).collect();
+        let joined = parallel::map(&worthy, |proposal| self.joined(now, proposal));
+        for (next, proposal) in joined.into_iter().zip(worthy) {
             let (evidence, _) = needs(proposal.active.hypothesis, &now.fit);
             if next.ahead_of(now, worth) >= evidence || overwhelming(&next, now) {
                 able.push((next, proposal));
@@ -294,23 +284,14 @@ impl Search<'_> {
     fn pruned(&self, mut best: Explanation) -> Explanation {
         'again: loop {
             let sure = self.sure(&best.fit);
-            for (index, sure) in sure.iter().enumerate() {
-                if is_drive(&best.fit.actives[index].hypothesis) || *sure {
-                    continue;
-                }
-                let less = self.less(&best, index);
-                let size = (0..self.problem.joints)
-                    .map(|j| (less.fit.variance[j] - best.fit.variance[j]) / best.fit.variance[j])
-                    .fold(0.0, f64::max);
-                let active = &best.fit.actives[index];
-                let (evidence, least) = match active.curve {
-                    Some(_) => (CURVE_EVIDENCE, CURVE_SIZE - 1.0),
-                    None => needs(active.hypothesis, &best.fit),
-                };
-                let hardly_steps = !steps_enough(active);
-                let worth = &self.problem.worth;
-                let weak = best.ahead_of(&less, worth) < evidence && !overwhelming(&best, &less);
-                if hardly_steps || weak || size < least {
+            let doubtful = |&i: &usize| !sure[i] && !is_drive(&best.fit.actives[i].hypothesis);
+            let doubtful: Vec<usize> = (0..sure.len()).filter(doubtful).collect();
+            for some in doubtful.chunks(parallel::threads()) {
+                let without = parallel::map(some, |&index| self.less(&best, index));
+                for (&index, less) in some.iter().zip(without) {
+                    if self.is_needed(&best, &less, index) {
+                        continue;
+                    }
                     (self.say)(&format!(
                         "- {}",
                         best.fit.actives[index].hypothesis.effect.name
@@ -321,6 +302,21 @@ impl Search<'_> {
             }
             return best;
         }
+    }
+
+    /// Whether one of the pieces is needed, to judge by the explanation without it.
+    fn is_needed(&self, best: &Explanation, less: &Explanation, index: usize) -> bool {
+        let size = (0..self.problem.joints)
+            .map(|j| (less.fit.variance[j] - best.fit.variance[j]) / best.fit.variance[j])
+            .fold(0.0, f64::max);
+        let active = &best.fit.actives[index];
+        let (evidence, least) = match active.curve {
+            Some(_) => (CURVE_EVIDENCE, CURVE_SIZE - 1.0),
+            None => needs(active.hypothesis, &best.fit),
+        };
+        let worth = &self.problem.worth;
+        let strong = best.ahead_of(less, worth) >= evidence || overwhelming(best, less);
+        steps_enough(active) && strong && size >= least
     }
 
     /// Which pieces are beyond doubt by their own numbers, to first order: Wald's test, with much to spare.

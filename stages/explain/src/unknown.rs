@@ -2,7 +2,7 @@
 
 use tauscope_dynamics::terms::{Against, MotionSample, Table, effect};
 
-use crate::active::{Active, Column, Hypothesis, Whereabouts, change};
+use crate::active::{Active, Column, Hypothesis, Whereabouts};
 use crate::problem::Problem;
 use crate::propose::Base;
 
@@ -70,12 +70,7 @@ impl Base<'_> {
             .map(|k| {
                 let mut values = vec![0.0; knots];
                 values[k] = 1.0;
-                change(
-                    self.problem,
-                    &self.fit.actives,
-                    &self.fit.efforts,
-                    &at(values),
-                )
+                self.fit.added(self.problem, &at(values))
             })
             .collect();
         let minimum = vec![f64::NEG_INFINITY; knots];

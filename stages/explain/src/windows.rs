@@ -1,6 +1,8 @@
 //! Effects in time: a change point, an interval within every recording, an interval in one of them. Found by
 //! scanning all of them with running sums, then tried exactly.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::CoordinateKind;
 
@@ -71,8 +73,7 @@ impl Base<'_> {
         shape[time] = f64::NEG_INFINITY;
         let all = columns(
             problem,
-            &self.fit.actives,
-            &self.fit.efforts,
+            &self.fit,
             hypothesis,
             &shape,
         );
@@ -84,7 +85,7 @@ impl Base<'_> {
             let rows = track.rows();
             let stride = (rows.len() / STEPS).max(1);
             for first in rows.clone().step_by(stride) {
-                let (mut before, mut after) = (whole.clone(), whole.clone());
+                let (mut before, mut after) = (Column::clone(whole), Column::clone(whole));
                 before.values[first..].fill(0.0);
                 after.values[..first].fill(0.0);
                 let moves = |c: &Column| {
@@ -122,8 +123,7 @@ impl Base<'_> {
         (shape[start], shape[end]) = (f64::NEG_INFINITY, f64::INFINITY);
         let all = columns(
             problem,
-            &self.fit.actives,
-            &self.fit.efforts,
+            &self.fit,
             hypothesis,
             &shape,
         );
@@ -170,7 +170,7 @@ impl Base<'_> {
     }
 
     /// The most promising intervals \[s of recording time\], what the fit already holds left out of account.
-    fn scan(&self, columns: &[Column], only: Option<usize>) -> Vec<(f64, f64)> {
+    fn scan(&self, columns: &[Arc<Column>], only: Option<usize>) -> Vec<(f64, f64)> {
         let problem = self.problem;
         let q = columns.len();
         let tracks: Vec<usize> = match only {
@@ -195,7 +195,7 @@ impl Base<'_> {
                     if weight == 0.0 {
                         continue;
                     }
-                    let value = |c: &Column| {
+                    let value = |c: &Arc<Column>| {
                         c.of_joint(j, problem.rows)
                             .map_or(0.0, |values| values[row])
                     };

@@ -38,8 +38,7 @@ pub fn undetectable(
         };
         let columns = columns(
             search.problem,
-            &found.fit.actives,
-            &found.fit.efforts,
+            &found.fit,
             *hypothesis,
             &shape,
         );

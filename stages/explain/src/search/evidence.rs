@@ -67,7 +67,7 @@ pub fn overwhelming(explanation: &Explanation, other: &Explanation) -> bool {
 /// By piece, the square of its factors in units of their covariance, as if what is left were white.
 pub fn wald(problem: &Problem, fit: &Fit) -> Vec<f64> {
     let jacobian = fit.jacobian(problem);
-    let columns: Vec<&Column> = jacobian.iter().collect();
+    let columns: Vec<&Column> = jacobian.iter().map(AsRef::as_ref).collect();
     let products = Products::new(problem, &columns, &fit.residual, None);
     let (normal, _) = products.normal(&fit.variance, &vec![0.0; columns.len()]);
     let p = columns.len();

@@ -1,6 +1,7 @@
 //! Each piece of physics is taken out in turn, and every rival tried in its place.
 
-use super::{Explanation, Search, describe};
+use super::{Explanation, LEAST_GAIN, Search, describe};
+use crate::active::Hypothesis;
 use crate::drive::is_drive;
 use crate::propose::Proposal;
 
@@ -27,65 +28,66 @@ impl Search<'_> {
         self.best_of(without, &able)
     }
 
-    /// Takes each piece out, and each two at one joint, and tries all rivals in their place.
+    /// Takes each piece out, and each two at one joint, and tries all rivals in their place: once over all of them.
     pub(super) fn exchange(&self, mut best: Explanation) -> Explanation {
-        let mut index = 0;
-        while index < best.fit.actives.len() {
-            if is_drive(&best.fit.actives[index].hypothesis) {
-                index += 1;
-                continue;
-            }
-            let without = self.less(&best, index);
-            let proposals = self.rivals(&without.fit, &best.fit, &best.fit.actives[index]);
-            let worth = &self.problem.worth;
-            if let Some(other) = self.rival_of(&best, &without, &proposals)
-                && other.ahead_of(&best, worth) > 0.5
-            {
-                (self.say)(&format!("= {}", describe(&other)));
-                let other = self.pruned(other);
-                if other.ahead_of(&best, worth) > 0.5 {
-                    best = other;
-                    index = 0;
-                    continue;
-                }
-            }
-            index += 1;
-        }
-        let joint = |i: usize, best: &Explanation| {
-            let hypothesis = &best.fit.actives[i].hypothesis;
-            if is_drive(hypothesis) {
-                None
-            } else {
-                hypothesis.only_joint()
-            }
+        let own = |best: &Explanation| -> Vec<Hypothesis> {
+            let named = best.fit.actives.iter().map(|a| a.hypothesis);
+            named.filter(|h| !is_drive(h)).collect()
         };
-        let mut pair = (0, 1);
-        if best.fit.actives.len() > MOST_PAIRED {
+        for piece in own(&best) {
+            let Some(index) = place_of(&best, piece) else {
+                continue;
+            };
+            let without = self.less(&best, index);
+            if let Some(better) = self.replaced(&best, &without, index) {
+                (self.say)(&format!("= {}", describe(&better)));
+                best = better;
+            }
+        }
+        let all = own(&best);
+        if all.len() > MOST_PAIRED {
             return best;
         }
-        while pair.1 < best.fit.actives.len() {
-            let (a, b) = pair;
-            if joint(a, &best).is_some() && joint(a, &best) == joint(b, &best) {
-                let without = self.less(&self.less(&best, b), a);
-                let proposals = self.rivals(&without.fit, &best.fit, &best.fit.actives[a]);
-                let worth = &self.problem.worth;
-                if let Some(other) = self.rival_of(&best, &without, &proposals)
-                    && other.ahead_of(&best, worth) > 0.5
-                {
-                    (self.say)(&format!("== {}", describe(&other)));
-                    let other = self.pruned(other);
-                    if other.ahead_of(&best, worth) > 0.5 {
-                        best = other;
-                        pair = (0, 1);
-                        continue;
-                    }
+        for (i, a) in all.iter().enumerate() {
+            for b in &all[..i] {
+                let one_joint = a.only_joint().is_some() && a.only_joint() == b.only_joint();
+                let (Some(first), Some(second)) = (place_of(&best, *a), place_of(&best, *b)) else {
+                    continue;
+                };
+                if !one_joint || first == second {
+                    continue;
                 }
-            }
-            pair.0 += 1;
-            if pair.0 == pair.1 {
-                pair = (0, pair.1 + 1);
+                let (low, high) = (first.min(second), first.max(second));
+                let without = self.less(&self.less(&best, high), low);
+                if let Some(better) = self.replaced(&best, &without, low) {
+                    (self.say)(&format!("== {}", describe(&better)));
+                    best = better;
+                }
             }
         }
         best
     }
+
+    /// The better explanation that a rival makes in place of what `without` lacks, if one does; one of the pieces taken
+    /// out is at `index`.
+    fn replaced(
+        &self,
+        best: &Explanation,
+        without: &Explanation,
+        index: usize,
+    ) -> Option<Explanation> {
+        let worth = &self.problem.worth;
+        let proposals = self.rivals(&without.fit, &best.fit, &best.fit.actives[index]);
+        let other = self.rival_of(best, without, &proposals)?;
+        if other.ahead_of(best, worth) <= LEAST_GAIN {
+            return None;
+        }
+        let other = self.pruned(other);
+        (other.ahead_of(best, worth) > LEAST_GAIN).then_some(other)
+    }
+}
+
+/// Where a piece is in an explanation, if it still is.
+fn place_of(explanation: &Explanation, piece: Hypothesis) -> Option<usize> {
+    explanation.fit.actives.iter().position(|a| a.hypothesis == piece)
 }

@@ -1,0 +1,108 @@
+//! What bodies cost over the recordings of a problem, from that of unit inertias and unit gravity: computed once.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use tauscope_dynamics::{Data, Inertia, Model, gravity_effort, rnea};
+
+use crate::active::Active;
+use crate::efforts::act_over;
+use crate::search::has_rotor;
+use crate::columns::CACHED_ROWS;
+use crate::problem::Problem;
+
+/// An effort by track, row-major, one number per joint and sample \[N m or N\].
+pub type TrackEfforts = Vec<Vec<f64>>;
+
+/// What each unit of something costs; effort is linear in them.
+type Units = Arc<Vec<TrackEfforts>>;
+
+/// Where a unit is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Unit {
+    /// The ten inertial parameters at a link's frame, see [`Inertia::parameters`].
+    Inertia(usize),
+    /// Gravity along the base's axes \[m/s²\].
+    Gravity,
+}
+
+/// Costs of units that were computed before: at most one set for each link.
+#[derive(Debug, Default)]
+pub struct UnitCosts(Mutex<HashMap<Unit, Units>>);
+
+/// Adds what a piece of physics of bodies costs to efforts over all tracks; `rigid` is what the twin says of the motion.
+pub fn add(problem: &Problem, active: &Active, rigid: &[Vec<f64>], into: &mut [Vec<f64>]) {
+    let hypothesis = active.hypothesis;
+    let mut term = active.term(problem);
+    let cached = problem.rows <= CACHED_ROWS;
+    let mut altered = problem.model.clone();
+    if cached && let Some((link, inertia)) = term.inertia() {
+        add_units(&units(problem, Unit::Inertia(link)), &inertia.parameters(), into);
+    } else if cached && term.alter(&mut altered) {
+        let (before, after) = (problem.model.gravity(), altered.gravity());
+        let change: [f64; 3] = std::array::from_fn(|i| after[i] - before[i]);
+        add_units(&units(problem, Unit::Gravity), &change, into);
+    } else {
+        if cached && has_rotor(&hypothesis) {
+            term.expand(problem.expansion(hypothesis.place.joint));
+        }
+        let silent: TrackEfforts = rigid.iter().map(|r| vec![0.0; r.len()]).collect();
+        let added = act_over(problem, &mut *term, &silent, rigid);
+        add_units(&[added], &[1.0], into);
+    }
+}
+
+fn add_units(units: &[TrackEfforts], factors: &[f64], into: &mut [Vec<f64>]) {
+    for (unit, factor) in units.iter().zip(factors).filter(|(_, f)| **f != 0.0) {
+        for (into, unit) in into.iter_mut().zip(unit) {
+            for (into, unit) in into.iter_mut().zip(unit) {
+                *into += factor * unit;
+            }
+        }
+    }
+}
+
+fn units(problem: &Problem, unit: Unit) -> Units {
+    let lock = || problem.units.0.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(known) = lock().get(&unit) {
+        return Arc::clone(known);
+    }
+    let one = |k: usize| match unit {
+        Unit::Inertia(link) => {
+            let mut parameters = [0.0; 10];
+            parameters[k] = 1.0;
+            let model = problem.model.ghost(link, Inertia::from_parameters(parameters));
+            over_tracks(problem, &model, true)
+        }
+        Unit::Gravity => {
+            let mut gravity = [0.0; 3];
+            gravity[k] = 1.0;
+            let mut model = problem.model.clone();
+            model.set_gravity(gravity);
+            over_tracks(problem, &model, false)
+        }
+    };
+    let count = match unit {
+        Unit::Inertia(_) => 10,
+        Unit::Gravity => 3,
+    };
+    let new = Arc::new((0..count).map(one).collect::<Vec<_>>());
+    Arc::clone(lock().entry(unit).or_insert(new))
+}
+
+/// What a model costs over the motion of all tracks, or what holds it still there.
+fn over_tracks(problem: &Problem, model: &Model, moving: bool) -> TrackEfforts {
+    let mut data = Data::new(model);
+    let mut of = |track: &crate::problem::FitTrack| {
+        let mut effort = Vec::with_capacity(track.track.position.len());
+        track.track.each(|_, at| {
+            effort.extend_from_slice(if moving {
+                rnea(model, &mut data, at.position, at.velocity, at.acceleration)
+            } else {
+                gravity_effort(model, &mut data, at.position)
+            });
+        });
+        effort
+    };
+    problem.tracks.iter().map(&mut of).collect()
+}
