@@ -87,6 +87,13 @@ fn the_bundled_files_pass_the_check() {
             &std::fs::read_to_string(bundled().join(file)).unwrap(),
         );
     }
+    for name in ["assembly", "cyclic", "paths"] {
+        let file = root().join(format!("examples/scenarios/{name}.yaml"));
+        let mut command = tauscope();
+        command.args(["check", "--kind", "scenario"]).arg(file);
+        let out = Out::of(command);
+        assert_eq!(out.code, 0, "{name}: {}", out.stderr);
+    }
     let mut command = tauscope();
     command.current_dir(root()).arg("check");
     assert_eq!(Out::of(command).code, 0);

@@ -9,8 +9,11 @@ mod check;
 mod conceal;
 mod controller;
 mod error;
+mod inverse;
 mod labels;
+mod link_point;
 mod messages;
+mod obstacle;
 mod plan;
 mod plant;
 mod push;
@@ -26,8 +29,10 @@ pub use conceal::{ConcealSpec, Concealed, ConcealedEffect, fit_count};
 pub use error::ScenarioError;
 pub use labels::Labels;
 pub use scenario::{
-    ContactSpec, ControllerSettings, EffortUnit, FourierSpec, HandsSpec, MotionSpec, PointsSpec,
-    RecordedMotionSpec, RecordingSpec, Role, Scenario, Sensors, ToolSpec,
+    BoxSpec, ContactKind, ContactSpec, ControllerSettings, Damps, EffortUnit, FourierSpec,
+    HandsSpec, ImpedanceSpec, LabelSpec, MotionSpec, ObstacleSpec, PlaneSpec, PointsSpec, Profile,
+    ReachSpec, RecordedMotionSpec, RecordingSpec, Role, Scenario, Sensors, SphereSpec, ToolSpec,
+    WithinSpec,
 };
 pub use simulation::{Event, Reading, Simulation};
 pub use source::SimulatedCell;

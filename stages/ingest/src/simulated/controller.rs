@@ -1,104 +1,68 @@
-//! The controller that drives the arm: PD, an integral part, and the nominal model's effort ahead.
-//!
-//! As in a real arm, the position loop is slow and the drives' velocity loops are fast: the former is
-//! taken at its instants, the latter without delay, so that it is stable however light a joint is.
+//! The controllers that drive the arm. They know the URDF and the tool, and none of the physics beyond.
 
-use tauscope_bus::{JointArray, MAX_JOINTS};
-use tauscope_dynamics::{Data, Model, mass_matrix, rnea};
+mod impedance;
+mod joint;
 
+use tauscope_dynamics::Model;
+
+use super::error::ScenarioError;
 use super::plant::Drive;
 use super::scenario::ControllerSettings;
 use super::trajectory::{JointRange, Target};
+use impedance::ImpedanceController;
+use joint::JointController;
 
-/// The integral part may use this share of a joint's effort limit.
-const INTEGRAL_SHARE: f64 = 0.5;
-/// Motors are chosen such that they could accelerate their own rotor like this \[rad/s²\]; gains are
-/// made for that inertia where it is more than the arm's.
-const MOTOR_ACCELERATION: f64 = 30.0;
-
-/// A controller for one arm. It knows the URDF and the tool, and none of the physics beyond.
+/// A controller for one arm.
 #[derive(Debug)]
-pub(super) struct Controller {
-    model: Model,
-    data: Data,
-    stiffness: JointArray,
-    damping: JointArray,
-    integral_gain: JointArray,
-    integral: JointArray,
-    limit: JointArray,
-    target: Target,
-    effort_nm: JointArray,
-    velocity_target: JointArray,
+pub(super) enum Controller {
+    /// Keeps each joint where it should be.
+    Joint(Box<JointController>),
+    /// Keeps the tool where it should be, as softly as it is told.
+    Impedance(Box<ImpedanceController>),
 }
 
 impl Controller {
-    /// A controller whose gains give each joint the wished frequency and damping where the arm is at
-    /// `position`.
+    /// The controller that the settings choose, for an arm that begins at `position`.
     pub fn new(
         model: &Model,
         settings: &ControllerSettings,
         joints: &[JointRange],
         position: &[f64],
-    ) -> Self {
-        let mut controller = Self {
-            model: model.clone(),
-            data: Data::new(model),
-            stiffness: [0.0; MAX_JOINTS],
-            damping: [0.0; MAX_JOINTS],
-            integral_gain: [0.0; MAX_JOINTS],
-            integral: [0.0; MAX_JOINTS],
-            limit: [f64::INFINITY; MAX_JOINTS],
-            target: Target::default(),
-            effort_nm: [0.0; MAX_JOINTS],
-            velocity_target: [0.0; MAX_JOINTS],
+    ) -> Result<Self, ScenarioError> {
+        let Some(impedance) = &settings.impedance else {
+            let joint = JointController::new(model, settings, joints, position);
+            return Ok(Self::Joint(Box::new(joint)));
         };
-        let omega = std::f64::consts::TAU * settings.natural_hz;
-        let inertia = mass_matrix(&controller.model, &mut controller.data, position);
-        for (j, joint) in joints.iter().enumerate() {
-            let mut inertia = inertia[(j, j)];
-            if joint.effort.is_finite() {
-                inertia = inertia.max(joint.effort / MOTOR_ACCELERATION);
-            }
-            controller.stiffness[j] = inertia * omega * omega;
-            controller.damping[j] = 2.0 * settings.damping * inertia * omega;
-            if settings.integral_time_s > 0.0 {
-                controller.integral_gain[j] = controller.stiffness[j] / settings.integral_time_s;
-            }
-            controller.limit[j] = joint.effort;
+        let alone = ControllerSettings {
+            impedance: Some(impedance.clone()),
+            ..ControllerSettings::default()
+        };
+        if *settings != alone {
+            return Err(ScenarioError::Range {
+                what: "controller",
+                reason:
+                    "`natural_hz`, `damping` and `integral_time_s` are of the joint controller, \
+                         `impedance` takes its place: leave out the one or the others"
+                        .to_owned(),
+            });
         }
-        controller
+        let impedance = ImpedanceController::new(model, impedance, joints)?;
+        Ok(Self::Impedance(Box::new(impedance)))
     }
 
-    /// Takes a new target, `dt_s` after the one before.
-    pub fn update(&mut self, dt_s: f64, target: &Target, position: &[f64]) {
-        let n = position.len();
-        let ahead = rnea(
-            &self.model,
-            &mut self.data,
-            &target.position[..n],
-            &target.velocity[..n],
-            &target.acceleration[..n],
-        );
-        for j in 0..n {
-            let error = target.position[j] - position[j];
-            let most = INTEGRAL_SHARE * self.limit[j];
-            self.integral[j] =
-                (self.integral[j] + self.integral_gain[j] * error * dt_s).clamp(-most, most);
-            self.effort_nm[j] = ahead[j] + self.stiffness[j] * error + self.integral[j];
+    /// Takes a new target, `dt_s` after the one before, and what the encoders say.
+    pub fn update(&mut self, dt_s: f64, target: &Target, position: &[f64], velocity: &[f64]) {
+        match self {
+            Self::Joint(joint) => joint.update(dt_s, target, position),
+            Self::Impedance(impedance) => impedance.update(target, position, velocity),
         }
-        self.target = *target;
     }
 
     /// What it tells the drives, `elapsed_s` after the target.
     pub fn drive(&mut self, elapsed_s: f64) -> Drive<'_> {
-        for (j, velocity) in self.velocity_target.iter_mut().enumerate() {
-            *velocity = self.target.velocity[j] + elapsed_s * self.target.acceleration[j];
-        }
-        Drive {
-            effort_nm: &self.effort_nm,
-            damping: &self.damping,
-            velocity: &self.velocity_target,
-            limit_nm: &self.limit,
+        match self {
+            Self::Joint(joint) => joint.drive(elapsed_s),
+            Self::Impedance(impedance) => impedance.drive(),
         }
     }
 }

@@ -3,6 +3,8 @@
 use tauscope_archive::WriteError;
 use tauscope_dynamics::terms::TermError;
 
+use super::inverse::{Goal, Missed};
+
 /// Why a scenario cannot be simulated.
 #[derive(Debug, thiserror::Error)]
 pub enum ScenarioError {
@@ -73,6 +75,27 @@ pub enum ScenarioError {
         lower: f64,
         /// Its upper limit.
         upper: f64,
+    },
+    /// A place that no position of the joints reaches.
+    #[error(
+        "{what}: link `{link}` cannot reach [{}, {}, {}] m{}: at best it is {distance_m:.4} m and {angle_rad:.4} rad off. Move the point, start from another `reach.posture`{}",
+        place_m[0], place_m[1], place_m[2],
+        if *oriented { " with its posture's orientation" } else { "" },
+        if *oriented { ", or allow `reach.any_orientation: true`" } else { "" },
+    )]
+    OutOfReach {
+        /// The key in the file.
+        what: String,
+        /// The link.
+        link: String,
+        /// The place in the world \[m\].
+        place_m: [f64; 3],
+        /// Whether the orientation matters.
+        oriented: bool,
+        /// How far the link stays away \[m\].
+        distance_m: f64,
+        /// How far it stays turned \[rad\].
+        angle_rad: f64,
     },
     /// No random point is high enough.
     #[error(
@@ -156,4 +179,18 @@ pub enum ScenarioError {
         /// What the operating system says.
         source: std::io::Error,
     },
+}
+
+impl ScenarioError {
+    /// A goal that was missed.
+    pub(super) fn out_of_reach(what: String, link: &str, goal: &Goal, missed: Missed) -> Self {
+        Self::OutOfReach {
+            what,
+            link: link.to_owned(),
+            place_m: goal.place.into(),
+            oriented: goal.orientation.is_some(),
+            distance_m: missed.distance_m,
+            angle_rad: missed.angle_rad,
+        }
+    }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::scenario::{RecordingSpec, Role};
+use super::scenario::{ContactKind, LabelSpec, RecordingSpec, Role};
 use super::simulation::Event;
 
 /// Weaker pushes are too weak to count \[N\].
@@ -26,6 +26,9 @@ pub struct RecordingLabels {
     role: Role,
     duration: f64,
     rate: f64,
+    /// Length of a cycle of the motion \[s\], if it repeats itself exactly.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cycle_s: Option<f64>,
     events: Vec<EventLabel>,
 }
 
@@ -33,37 +36,59 @@ pub struct RecordingLabels {
 struct EventLabel {
     t_on: f64,
     t_off: f64,
-    kind: String,
+    kind: ContactKind,
     link: String,
+    /// Those between the base and the link, and the torque that the force does in each at its peak.
+    joints: Vec<String>,
+    joint_torques: Vec<f64>,
     point: [f64; 3],
     force: [f64; 3],
     peak_force: f64,
     direction: [f64; 3],
     ignore: bool,
+    /// The kind of contact it came on top of.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    during: Option<ContactKind>,
+    #[serde(flatten)]
+    label: LabelSpec,
 }
 
 impl RecordingLabels {
-    pub(super) fn new(spec: &RecordingSpec, rate_hz: f64, events: &[Event]) -> Self {
-        let events = events.iter().map(|event| {
-            let peak_n = event.force_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+    pub(super) fn new(
+        spec: &RecordingSpec,
+        rate_hz: f64,
+        cycle_s: Option<f64>,
+        events: &[Event],
+    ) -> Self {
+        let mut events: Vec<&Event> = events.iter().collect();
+        events.sort_by(|a, b| a.on_s.total_cmp(&b.on_s));
+        let labels = events.iter().enumerate().map(|(i, event)| {
+            let peak_n = event.peak_n();
             let length_n = peak_n.max(f64::MIN_POSITIVE);
+            let before = events[..i].iter().rev();
+            let under = before.copied().find(|other| event.on_s < other.off_s);
             EventLabel {
                 t_on: round(event.on_s),
-                t_off: round(event.off_s),
-                kind: event.kind.clone(),
+                t_off: round(event.off_s.min(spec.duration_s)),
+                kind: event.kind,
                 link: event.link.clone(),
+                joints: event.joints.iter().map(|(name, _)| name.clone()).collect(),
+                joint_torques: event.joints.iter().map(|(_, nm)| round(*nm)).collect(),
                 point: event.point_m.map(round),
                 force: event.force_n.map(round),
                 peak_force: round(peak_n),
                 direction: event.force_n.map(|f| round(f / length_n)),
                 ignore: peak_n < WEAK_N,
+                during: under.map(|other| other.kind),
+                label: event.label.clone(),
             }
         });
         Self {
             role: spec.role,
             duration: spec.duration_s,
             rate: rate_hz,
-            events: events.collect(),
+            cycle_s: cycle_s.map(round),
+            events: labels.collect(),
         }
     }
 }

@@ -86,7 +86,8 @@ pub(super) fn trajectory(
     match (&motion.points, &motion.fourier, &motion.recorded) {
         (Some(points), None, None) => {
             let allowed = above(model.clone(), points.min_height_m);
-            let points = Points::new(points, joints, allowed, rng)?;
+            let points = Points::new(points, model, joints, allowed, rng)?;
+            points.check_fit(&spec.name, spec.duration_s)?;
             Ok(Trajectory::Points(Box::new(points)))
         }
         (None, Some(fourier), None) => Ok(Trajectory::Fourier(Fourier::new(

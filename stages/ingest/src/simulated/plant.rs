@@ -1,17 +1,20 @@
 //! The arm itself: its URDF, and the physics that the URDF does not tell of.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
+use nalgebra::{Cholesky, DMatrix, DVector, LU};
 use tauscope_dynamics::terms::TermSpec;
-use tauscope_dynamics::{Data, Model, forward_kinematics, link_pose, mass_matrix, rnea};
+use tauscope_dynamics::{Data, Model, mass_matrix, rnea};
 
 use super::error::ScenarioError;
 
 mod contact;
+mod drive;
 mod physics;
 mod transmission;
 
 pub(super) use contact::Contact;
 use contact::add_contact;
+use drive::Motors;
+pub(super) use drive::{Damping, Drive};
 use physics::{Carried, JointTerms, Loads, Physics, Step};
 use transmission::{Coupling, Rotor};
 
@@ -22,33 +25,6 @@ const MAX_ITERATIONS: usize = 30;
 const SLOPE_STEP: f64 = 1e-6;
 /// How often the arm is asked what its links bear until they hang as they do at rest.
 const SETTLING_STEPS: usize = 100;
-
-/// What the drives are told: an effort, and a velocity to keep to. Their own loop is fast, so it acts
-/// on the velocity at the end of a step.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Drive<'a> {
-    /// \[N m\]
-    pub effort_nm: &'a [f64],
-    /// Effort by velocity error \[N m s/rad\].
-    pub damping: &'a [f64],
-    /// The velocity to keep to \[rad/s\].
-    pub velocity: &'a [f64],
-    /// The most a drive can give, either way \[N m\].
-    pub limit_nm: &'a [f64],
-}
-
-impl Drive<'_> {
-    /// The effort of joint `j` at `velocity`, and how fast it falls with it.
-    fn effort(&self, j: usize, velocity: f64) -> (f64, f64) {
-        let free = self.effort_nm[j] + self.damping[j] * (self.velocity[j] - velocity);
-        let limit = self.limit_nm[j];
-        if free.abs() > limit {
-            (limit.copysign(free), 0.0)
-        } else {
-            (free, self.damping[j])
-        }
-    }
-}
 
 /// The arm and its state.
 ///
@@ -204,13 +180,6 @@ impl Plant {
         &self.model.links()[link].name
     }
 
-    /// Where a point of a link is in the world \[m\].
-    pub fn world_point(&mut self, link: usize, point_m: [f64; 3]) -> [f64; 3] {
-        forward_kinematics(&self.model, &mut self.data, &self.link_position);
-        let pose = link_pose(&self.model, &self.data, link);
-        (pose.translation.vector + pose.rotation * Vector3::from(point_m)).into()
-    }
-
     /// Effort of the drives in the step that led here \[N m\].
     pub fn applied_nm(&self) -> &[f64] {
         &self.applied_nm
@@ -290,7 +259,10 @@ impl Plant {
                 Some(k) => self.rotors[k].position,
                 None => self.link_position[j],
             };
-            self.applied_nm[j] = drive.effort(j, velocity).0;
+        }
+        let motors = Motors(&work.motor, &work.velocity);
+        for (j, applied_nm) in self.applied_nm.iter_mut().enumerate() {
+            *applied_nm = drive.effort(j, motors).0;
         }
         self.link_velocity.copy_from_slice(links);
         self.recording_s += dt_s;
@@ -359,9 +331,10 @@ impl Plant {
             system[(link, motor)] = -slope;
             system[(motor, link)] = -slope;
         }
+        let mut one_sided = false;
         for (j, &motor) in work.motor.iter().enumerate() {
             let velocity = work.velocity[motor];
-            let (effort, fall) = drive.effort(j, velocity);
+            let (effort, limited) = drive.effort(j, Motors(&work.motor, &work.velocity));
             work.missing[motor] += dt_s * (effort - work.effort[j]);
             // How fast the physics' effort grows: its slope or, where that is more, the slope of its
             // line through standstill, which keeps a step through the kink of Coulomb friction from
@@ -372,12 +345,28 @@ impl Plant {
             } else {
                 0.0
             };
+            let fall = if limited { 0.0 } else { drive.damping.of(j) };
             system[(motor, motor)] += dt_s * (slope.max(line).max(0.0) + fall);
+            if let (Damping::Coupled(damping), false) = (drive.damping, limited) {
+                for (k, &other) in work.motor.iter().enumerate().filter(|(k, _)| *k != j) {
+                    system[(motor, other)] += dt_s * damping[(j, k)];
+                }
+            }
+            one_sided |= limited && matches!(drive.damping, Damping::Coupled(_));
         }
-        // The mass matrix is positive definite, and this only adds to it.
-        let factors = Cholesky::new(system)?;
-        factors.solve_mut(&mut work.missing);
-        work.system = factors.unpack_dirty();
+        if one_sided {
+            // A joint at its limit does not feel the others' velocities, but they feel its own.
+            let factors = LU::new(system);
+            if !factors.solve_mut(&mut work.missing) {
+                return None;
+            }
+            work.system = DMatrix::zeros(work.velocity.len(), work.velocity.len());
+        } else {
+            // The mass matrix is positive definite, and this only adds to it.
+            let factors = Cholesky::new(system)?;
+            factors.solve_mut(&mut work.missing);
+            work.system = factors.unpack_dirty();
+        }
         for (velocity, change) in work.velocity.iter_mut().zip(&work.missing) {
             *velocity += change;
         }

@@ -1,4 +1,6 @@
-//! Contacts: forces on links for a while.
+//! Pushes: forces on links for a while.
+
+use std::f64::consts::PI;
 
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -7,7 +9,8 @@ use tauscope_dynamics::Model;
 
 use super::check;
 use super::error::ScenarioError;
-use super::scenario::{HandsSpec, RecordingSpec, default_kind, default_rise_s};
+use super::plant::Contact;
+use super::scenario::{ContactKind, HandsSpec, LabelSpec, Profile, RecordingSpec};
 
 /// A hand takes hold within this distance of a link's centre of mass, along each axis \[m\].
 const REACH_M: f64 = 0.03;
@@ -24,16 +27,34 @@ pub(super) struct Push {
     pub on_s: f64,
     pub off_s: f64,
     pub rise_s: f64,
-    pub kind: String,
+    pub profile: Profile,
+    pub kind: ContactKind,
+    pub label: LabelSpec,
 }
 
 impl Push {
-    /// The share of its peak that the force has, 0 to 1: half cosines up and down.
+    /// The share of its peak that the force has, 0 to 1.
     pub fn share(&self, t_s: f64) -> f64 {
         let rise_s = self.rise_s.min(0.5 * (self.off_s - self.on_s));
         let inside_s = (t_s - self.on_s).min(self.off_s - t_s);
         let u = (inside_s / rise_s).clamp(0.0, 1.0);
-        0.5 - 0.5 * (std::f64::consts::PI * u).cos()
+        match self.profile {
+            Profile::Smooth => 0.5 - 0.5 * (PI * u).cos(),
+            Profile::Trapezoid => u,
+            Profile::HalfSine => {
+                let share = (t_s - self.on_s) / (self.off_s - self.on_s);
+                (PI * share.clamp(0.0, 1.0)).sin()
+            }
+        }
+    }
+
+    /// Its force, at a share of the peak.
+    pub fn contact(&self, share: f64) -> Contact {
+        Contact {
+            link: self.link,
+            point_m: self.point_m,
+            force_n: self.force_n.map(|f| share * f),
+        }
     }
 
     /// Whether there is a force.
@@ -74,7 +95,9 @@ pub(super) fn pushes(
             on_s: contact.t_on_s,
             off_s: contact.t_off_s,
             rise_s: contact.rise_s,
-            kind: contact.kind.clone(),
+            profile: contact.profile,
+            kind: contact.kind,
+            label: contact.label.clone(),
         });
     }
     if let Some(hands) = &spec.hands {
@@ -132,8 +155,10 @@ fn draw(
             force_n: direction.map(|d| force_n * d),
             on_s,
             off_s: on_s + lasts_s,
-            rise_s: default_rise_s(),
-            kind: default_kind(),
+            rise_s: hands.rise_s,
+            profile: hands.profile,
+            kind: hands.kind,
+            label: hands.label.clone(),
         }
     });
     Ok(pushes.collect())

@@ -9,6 +9,17 @@ use tauscope_dynamics::terms::TermSpec;
 
 use super::conceal::ConcealSpec;
 
+mod contacts;
+mod controller;
+mod motion;
+
+pub use contacts::{
+    BoxSpec, ContactKind, ContactSpec, HandsSpec, LabelSpec, ObstacleSpec, PlaneSpec, Profile,
+    SphereSpec,
+};
+pub use controller::{ControllerSettings, Damps, ImpedanceSpec};
+pub use motion::{FourierSpec, MotionSpec, PointsSpec, ReachSpec, RecordedMotionSpec, WithinSpec};
+
 /// A simulated cell and the recordings it makes. The same file makes the same bytes every time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -168,31 +179,6 @@ impl Default for Sensors {
     }
 }
 
-/// How the arm is driven: PD, an integral part, and the effort of the nominal model ahead.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct ControllerSettings {
-    /// Natural frequency of the position loop \[Hz\].
-    #[schemars(range(min = 0.1, max = 50.0))]
-    pub natural_hz: f64,
-    /// Its damping ratio.
-    #[schemars(range(min = 0.1, max = 5.0))]
-    pub damping: f64,
-    /// Time in which the integral part takes over a lasting error; 0 for no integral part \[s\].
-    #[schemars(range(min = 0.0, max = 100.0))]
-    pub integral_time_s: f64,
-}
-
-impl Default for ControllerSettings {
-    fn default() -> Self {
-        Self {
-            natural_hz: 5.0,
-            damping: 1.0,
-            integral_time_s: 0.5,
-        }
-    }
-}
-
 /// One recording.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -211,6 +197,9 @@ pub struct RecordingSpec {
     /// Pushes at chosen times.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub contacts: Vec<ContactSpec>,
+    /// What stands in the way.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub obstacles: Vec<ObstacleSpec>,
     /// Pushes at random times.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hands: Option<HandsSpec>,
@@ -227,173 +216,4 @@ pub enum Role {
     Validation,
     /// To be judged on.
     Test,
-}
-
-/// How the arm moves: exactly one of the three.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct MotionSpec {
-    /// From point to point, with rests.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub points: Option<PointsSpec>,
-    /// Periodic excitation of all joints at once, as for identification.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub fourier: Option<FourierSpec>,
-    /// The motion of a recording.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub recorded: Option<RecordedMotionSpec>,
-}
-
-/// Motion from point to point along quintic polynomials, all joints at once.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct PointsSpec {
-    /// The points, visited in this order again and again \[rad\]. Without them each point is drawn at random.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub through: Vec<Vec<f64>>,
-    /// Highest velocity, as a share of each joint's limit.
-    #[schemars(range(min = 0.001, max = 1.0))]
-    pub speed: f64,
-    /// Highest acceleration \[rad/s²\].
-    #[schemars(range(min = 0.001, max = 1000.0))]
-    pub acceleration_rad_s2: f64,
-    /// Shortest and longest rest at a point \[s\].
-    pub rest_s: [f64; 2],
-    /// Random points lie within this share of each joint's range, about its middle.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub range: f64,
-    /// Random points keep every moving link's frame this high above the base \[m\].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub min_height_m: Option<f64>,
-}
-
-impl Default for PointsSpec {
-    fn default() -> Self {
-        Self {
-            through: Vec::new(),
-            speed: 0.4,
-            acceleration_rad_s2: 3.0,
-            rest_s: [0.2, 0.6],
-            range: 0.6,
-            min_height_m: None,
-        }
-    }
-}
-
-/// A sum of sines with random coefficients, the same for each period. It begins and ends at rest.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct FourierSpec {
-    /// The period \[s\].
-    #[schemars(range(min = 0.1, max = 1000.0))]
-    pub period_s: f64,
-    /// How many harmonics of it.
-    #[schemars(range(min = 1, max = 50))]
-    pub harmonics: u32,
-    /// Highest velocity, as a share of each joint's limit.
-    #[schemars(range(min = 0.001, max = 1.0))]
-    pub speed: f64,
-    /// Highest acceleration \[rad/s²\].
-    #[schemars(range(min = 0.001, max = 1000.0))]
-    pub acceleration_rad_s2: f64,
-    /// Share of each joint's range that it keeps within.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub range: f64,
-    /// The position it swings about \[rad\]; by default the middle of each joint's range.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub about: Option<Vec<f64>>,
-}
-
-impl Default for FourierSpec {
-    fn default() -> Self {
-        Self {
-            period_s: 10.0,
-            harmonics: 5,
-            speed: 0.5,
-            acceleration_rad_s2: 4.0,
-            range: 0.6,
-            about: None,
-        }
-    }
-}
-
-/// The positions of a recording, joined by cubic splines.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct RecordedMotionSpec {
-    /// The recording; relative to this file.
-    pub path: PathBuf,
-    /// Its topic (`sensor_msgs/msg/JointState`).
-    #[serde(default = "default_motion_topic")]
-    pub topic: String,
-}
-
-fn default_motion_topic() -> String {
-    "/joint_states".to_owned()
-}
-
-/// A push at a chosen time.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ContactSpec {
-    /// The link that is touched.
-    pub link: String,
-    /// Where, in the link's frame \[m\]; by default at its centre of mass.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub point_m: Option<[f64; 3]>,
-    /// Force on the robot at its peak, world frame \[N\].
-    pub force_n: [f64; 3],
-    /// When it begins \[s from the start of the recording\].
-    #[schemars(range(min = 0.0))]
-    pub t_on_s: f64,
-    /// When it has ended \[s from the start of the recording\].
-    pub t_off_s: f64,
-    /// How long the force takes to rise, and to fall \[s\].
-    #[serde(default = "default_rise_s")]
-    #[schemars(range(min = 0.001))]
-    pub rise_s: f64,
-    /// What it is called in the labels.
-    #[serde(default = "default_kind")]
-    pub kind: String,
-}
-
-pub(super) fn default_rise_s() -> f64 {
-    0.08
-}
-
-pub(super) fn default_kind() -> String {
-    "contact".to_owned()
-}
-
-/// Pushes by a hand: one in each of `count` equal parts of the recording.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct HandsSpec {
-    /// How many.
-    #[schemars(range(max = 100_000))]
-    pub count: u32,
-    /// Weakest and strongest force \[N\].
-    #[serde(default = "default_force_n")]
-    pub force_n: [f64; 2],
-    /// Shortest and longest \[s\].
-    #[serde(default = "default_hand_duration_s")]
-    pub duration_s: [f64; 2],
-    /// Links that are touched; by default all that move.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub links: Vec<String>,
-    /// None earlier than this \[s from the start of the recording\].
-    #[serde(default = "default_after_s")]
-    pub after_s: f64,
-}
-
-fn default_force_n() -> [f64; 2] {
-    [10.0, 30.0]
-}
-
-fn default_hand_duration_s() -> [f64; 2] {
-    [0.4, 1.2]
-}
-
-fn default_after_s() -> f64 {
-    2.0
 }

@@ -6,11 +6,12 @@ use tauscope_dynamics::Model;
 use super::conceal;
 use super::controller::Controller;
 use super::error::ScenarioError;
+use super::obstacle::{Obstacle, obstacles};
 use super::plan::{self, STEP_NS, offset_ns, whole_steps};
 use super::plant::{Contact, Plant};
 use super::push::{Push, pushes};
 use super::record::Record;
-use super::scenario::Scenario;
+use super::scenario::{ContactKind, LabelSpec, Scenario};
 use super::sensors::SensorBank;
 use super::trajectory::{JointRange, Target, Trajectory};
 
@@ -32,11 +33,11 @@ pub struct Reading {
     pub effort: JointArray,
     /// Commanded position \[rad\].
     pub command_position: JointArray,
-    /// Whether a push acts.
+    /// Whether something touches the arm.
     pub contact: bool,
 }
 
-/// A push as the labels tell of it.
+/// A contact as the labels tell of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Event {
     /// When it begins \[s from the first reading\].
@@ -44,13 +45,25 @@ pub struct Event {
     /// When it has ended \[s from the first reading\].
     pub off_s: f64,
     /// What it is called.
-    pub kind: String,
+    pub kind: ContactKind,
     /// The link that is touched.
     pub link: String,
     /// Where, at its peak, in the world frame \[m\].
     pub point_m: [f64; 3],
     /// Force on the robot at its peak, world frame \[N\].
     pub force_n: [f64; 3],
+    /// The joints between the base and the link, and the torque that the force does in each of them at
+    /// its peak, `Jᵀ F` \[N m\].
+    pub joints: Vec<(String, f64)>,
+    /// What else is said of it.
+    pub label: LabelSpec,
+}
+
+impl Event {
+    /// Size of its force \[N\].
+    pub fn peak_n(&self) -> f64 {
+        self.force_n.iter().map(|f| f * f).sum::<f64>().sqrt()
+    }
 }
 
 /// A recording in the making.
@@ -70,6 +83,9 @@ pub struct Simulation {
     record: Record,
     sensors: SensorBank,
     pushes: Vec<Push>,
+    obstacles: Vec<Obstacle>,
+    /// The force of each obstacle in this step.
+    touches: Vec<Option<Contact>>,
     events: Vec<Event>,
 }
 
@@ -89,8 +105,12 @@ impl Simulation {
         let start = &target.position[..joints.len()];
         let pushes = pushes(spec, &model, rng(1))?;
         let offset_ns = offset_ns(&scenario, index);
-        let plant = Plant::new(&model, &scenario.physics, start)?;
-        let controller = Controller::new(&model, &scenario.controller, &joints, start);
+        let mut plant = Plant::new(&model, &scenario.physics, start)?;
+        let obstacles = obstacles(spec, &model)?;
+        for obstacle in &obstacles {
+            obstacle.check_start(&mut plant)?;
+        }
+        let controller = Controller::new(&model, &scenario.controller, &joints, start)?;
         let record = Record::new(&model, &scenario.physics)?;
         Ok(Self {
             name: spec.name.clone(),
@@ -107,6 +127,8 @@ impl Simulation {
             target,
             events: Vec::with_capacity(pushes.len()),
             pushes,
+            touches: vec![None; obstacles.len()],
+            obstacles,
             joints,
         })
     }
@@ -121,8 +143,9 @@ impl Simulation {
             if self.step % STEPS_PER_CONTROL == 0 {
                 self.target = self.trajectory.at(time_s);
                 let dt_s = (STEPS_PER_CONTROL * STEP_NS) as f64 * 1e-9;
+                let (position, velocity) = (self.plant.position(), self.plant.velocity());
                 self.controller
-                    .update(dt_s, &self.target, self.plant.position());
+                    .update(dt_s, &self.target, position, velocity);
             }
             if self.step == 0 {
                 // Before the first step there is no effort but the controller's.
@@ -136,12 +159,20 @@ impl Simulation {
                 return Ok(reading);
             }
         }
+        self.events
+            .extend(self.obstacles.iter_mut().filter_map(Obstacle::rest));
         Ok(None)
     }
 
-    /// The pushes that have passed their peak so far.
+    /// The pushes that have passed their peak so far, and the obstacles that were run into and left; at
+    /// the end also those that are still touched.
     pub fn events(&self) -> &[Event] {
         &self.events
+    }
+
+    /// Length of a cycle of the motion \[s\], if it repeats itself exactly.
+    pub fn cycle_s(&self) -> Option<f64> {
+        self.trajectory.cycle_s()
     }
 
     /// How much of the recording has been made, 0 to 1.
@@ -168,22 +199,21 @@ impl Simulation {
             velocity: measured.velocity,
             effort: measured.effort,
             command_position: self.sensors.in_steps(&self.target.position),
-            contact: self.pushes.iter().any(|push| push.acts(time_s)),
+            contact: self.pushes.iter().any(|push| push.acts(time_s))
+                || self.obstacles.iter().any(Obstacle::touching),
         }
     }
 
     /// Moves the plant on by one step.
     fn advance(&mut self, time_s: f64) -> Result<(), ScenarioError> {
         let n = self.joints.len();
-        let contacts = self.pushes.iter().filter(|push| push.acts(time_s));
-        let contacts = contacts.map(|push| {
-            let share = push.share(time_s);
-            Contact {
-                link: push.link,
-                point_m: push.point_m,
-                force_n: push.force_n.map(|f| share * f),
-            }
-        });
+        for (touch, obstacle) in self.touches.iter_mut().zip(&self.obstacles) {
+            *touch = obstacle.contact(time_s, &mut self.plant);
+        }
+        let pushes = self.pushes.iter().filter(|push| push.acts(time_s));
+        let contacts = pushes
+            .map(|push| push.contact(push.share(time_s)))
+            .chain(self.touches.iter().flatten().copied());
         let dt_s = STEP_NS as f64 * 1e-9;
         let since_target = self.step % STEPS_PER_CONTROL + 1;
         let drive = self.controller.drive(since_target as f64 * dt_s);
@@ -199,19 +229,16 @@ impl Simulation {
         self.record.take(&self.plant, self.plant.applied_nm(), dt_s);
         self.step += 1;
         let now_s = self.time_s();
-        for i in 0..self.pushes.len() {
-            let push = &self.pushes[i];
+        for push in &self.pushes {
             if time_s < push.peak_s() && push.peak_s() <= now_s {
-                let event = Event {
-                    on_s: push.on_s,
-                    off_s: push.off_s,
-                    kind: push.kind.clone(),
-                    link: self.plant.link_name(push.link).to_owned(),
-                    point_m: self.plant.world_point(push.link, push.point_m),
-                    force_n: push.force_n,
-                };
+                let (times_s, peak) = ([push.on_s, push.off_s], push.contact(1.0));
+                let event = self.plant.event_of(&peak, times_s, push.kind, &push.label);
                 self.events.push(event);
             }
+        }
+        for (touch, obstacle) in self.touches.iter().zip(&mut self.obstacles) {
+            let ended = obstacle.note(time_s, now_s, touch.as_ref(), &mut self.plant);
+            self.events.extend(ended);
         }
         Ok(())
     }

@@ -1,7 +1,11 @@
 mod conceal;
 mod files;
+mod impedance;
 mod layers;
+mod obstacles;
+mod papers;
 mod physics;
+mod points;
 mod sensing;
 
 use std::path::Path;
@@ -14,7 +18,7 @@ const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data");
 /// Joints of the demo arm.
 const N: usize = 7;
 
-fn arm() -> Model {
+pub(super) fn arm() -> Model {
     let urdf = std::fs::read_to_string(Path::new(DATA).join("demo_arm.urdf")).unwrap();
     Model::from_urdf(&urdf).unwrap()
 }

@@ -3,12 +3,14 @@
 mod fourier;
 mod points;
 mod spline;
+mod teach;
 
 use tauscope_bus::JointArray;
 
 pub(super) use fourier::Fourier;
-pub(super) use points::{Allowed, Points};
+pub(super) use points::Points;
 pub(super) use spline::Spline;
+pub(super) use teach::Allowed;
 
 /// What a joint can do, for those who plan its motion.
 #[derive(Debug, Clone, PartialEq)]
@@ -64,6 +66,14 @@ impl Trajectory {
             Self::Points(points) => points.at(t_s),
             Self::Fourier(fourier) => fourier.at(t_s),
             Self::Spline(spline) => spline.at(t_s),
+        }
+    }
+
+    /// Length of a cycle \[s\], of a motion that goes through points again and again.
+    pub fn cycle_s(&self) -> Option<f64> {
+        match self {
+            Self::Points(points) => points.cycle_s(),
+            _ => None,
         }
     }
 }

@@ -66,7 +66,10 @@ pub fn simulate(
             return Ok(None);
         };
         recordings.push(written);
-        let label = RecordingLabels::new(spec, scenario.rate_hz, simulation.events());
+        let label = {
+            let cycle_s = simulation.cycle_s();
+            RecordingLabels::new(spec, scenario.rate_hz, cycle_s, simulation.events())
+        };
         labels.recordings.insert(spec.name.clone(), label);
         done_s += spec.duration_s;
     }

@@ -4,7 +4,7 @@ use tauscope_bus::MAX_JOINTS;
 use tauscope_dynamics::terms::TermSpec;
 use tauscope_dynamics::{Data, forward_kinematics, gravity_effort, link_pose, rnea};
 
-use super::super::plant::{Drive, Plant};
+use super::super::plant::{Damping, Drive, Plant};
 use super::*;
 
 #[test]
@@ -131,7 +131,7 @@ fn a_push_shows_as_minus_the_external_torque() {
 fn constant(effort_nm: &[f64; N]) -> Drive<'_> {
     Drive {
         effort_nm,
-        damping: &[0.0; N],
+        damping: Damping::Joints(&[0.0; N]),
         velocity: &[0.0; N],
         limit_nm: &[f64::INFINITY; N],
     }

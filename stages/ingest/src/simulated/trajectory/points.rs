@@ -2,25 +2,26 @@
 
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
-use tauscope_bus::{JointArray, MAX_JOINTS};
+use tauscope_bus::JointArray;
+use tauscope_dynamics::Model;
 
+use super::teach::{Allowed, Teach};
 use super::{JointRange, QUINTIC_PEAK_ACCELERATION, QUINTIC_PEAK_VELOCITY, Target, quintic};
+use crate::simulated::check;
 use crate::simulated::error::ScenarioError;
 use crate::simulated::scenario::PointsSpec;
 
-/// Random points that are tried before it is given up.
-const TRIES: usize = 1000;
-
-/// Says whether the arm may stand at a point.
-pub(in crate::simulated) type Allowed = Box<dyn FnMut(&[f64]) -> bool + Send>;
+/// Time goes on even if the points are the same and there is no rest \[s\].
+const STILL_S: f64 = 1e-3;
 
 /// The motion; points are drawn as they are needed, so it can go on for ever.
 pub(in crate::simulated) struct Points {
     spec: PointsSpec,
     joints: Vec<JointRange>,
-    allowed: Allowed,
+    teach: Teach,
     rng: ChaCha8Rng,
-    next_given: usize,
+    /// Moves that are still to be made; `None` for no end.
+    moves_left: Option<u64>,
     from: JointArray,
     to: JointArray,
     start_s: f64,
@@ -37,38 +38,79 @@ impl std::fmt::Debug for Points {
 }
 
 impl Points {
-    /// Begins with a rest at the first point.
+    /// Begins with a rest at the first point; `model` is with the tool.
     pub fn new(
         spec: &PointsSpec,
+        model: &Model,
         joints: &[JointRange],
         allowed: Allowed,
-        rng: ChaCha8Rng,
+        mut rng: ChaCha8Rng,
     ) -> Result<Self, ScenarioError> {
-        for point in &spec.through {
-            super::super::check::position("motion.points.through", point, joints)?;
-        }
-        super::super::check::order("motion.points.rest_s", spec.rest_s)?;
+        check::order("motion.points.rest_s", spec.rest_s)?;
+        let mut teach = Teach::new(spec, model, joints, allowed, &mut rng)?;
+        let moves_left = match (spec.cycles, teach.list()) {
+            (None, _) => None,
+            (Some(cycles), Some(list)) if list.len() > 1 => {
+                Some(u64::from(cycles) * list.len() as u64)
+            }
+            (Some(_), _) => {
+                return Err(ScenarioError::Range {
+                    what: "motion.points.cycles",
+                    reason: "a cycle needs a list of two points or more: give `through`, \
+                             `through_m` or `within.count`"
+                        .to_owned(),
+                });
+            }
+        };
+        let Some(first) = teach.next(&mut rng) else {
+            return Err(teach.no_point(spec));
+        };
         let mut points = Self {
             spec: spec.clone(),
             joints: joints.to_vec(),
-            allowed,
+            teach,
             rng,
-            next_given: 0,
-            from: [0.0; MAX_JOINTS],
-            to: [0.0; MAX_JOINTS],
+            moves_left,
+            from: first,
+            to: first,
             start_s: 0.0,
             move_s: 0.0,
             end_s: 0.0,
         };
-        let Some(first) = points.draw() else {
-            return Err(ScenarioError::NoPoint {
-                tries: TRIES,
-                min_height_m: spec.min_height_m.unwrap_or(0.0),
-            });
-        };
-        (points.from, points.to) = (first, first);
         points.end_s = points.rest();
         Ok(points)
+    }
+
+    /// Length of a cycle, if there is a list of points and the rests are all of one length \[s\].
+    pub fn cycle_s(&self) -> Option<f64> {
+        let [shortest, longest] = self.spec.rest_s;
+        let list = self.teach.list().filter(|list| list.len() > 1)?;
+        (shortest >= longest).then(|| self.shortest_cycle_s(list))
+    }
+
+    /// Refuses cycles that do not fit into a recording.
+    pub fn check_fit(&self, recording: &str, duration_s: f64) -> Result<(), ScenarioError> {
+        let (Some(cycles), Some(list)) = (self.spec.cycles, self.teach.list()) else {
+            return Ok(());
+        };
+        let needed_s = self.spec.rest_s[0] + f64::from(cycles) * self.shortest_cycle_s(list);
+        if needed_s <= duration_s {
+            return Ok(());
+        }
+        Err(ScenarioError::Range {
+            what: "motion.points.cycles",
+            reason: format!(
+                "{cycles} cycles take at least {needed_s:.3} s, the `duration_s` of recording \
+                 `{recording}` is {duration_s} s: make it longer, or take fewer cycles"
+            ),
+        })
+    }
+
+    fn shortest_cycle_s(&self, list: &[JointArray]) -> f64 {
+        let ways = list.iter().zip(list.iter().cycle().skip(1));
+        let moves =
+            ways.map(|(from, to)| (self.move_s(from, to) + self.spec.rest_s[0]).max(STILL_S));
+        moves.sum()
     }
 
     pub fn at(&mut self, t_s: f64) -> Target {
@@ -94,41 +136,37 @@ impl Points {
     /// Plans the move from where the last one ended, and the rest after it.
     fn go_on(&mut self) {
         self.from = self.to;
+        self.start_s = self.end_s;
+        match &mut self.moves_left {
+            Some(0) => {
+                self.move_s = 0.0;
+                self.end_s = f64::INFINITY;
+                return;
+            }
+            Some(left) => *left -= 1,
+            None => {}
+        }
         // A first point was found, so staying there is always possible.
-        self.to = self.draw().unwrap_or(self.from);
+        self.to = self.teach.next(&mut self.rng).unwrap_or(self.from);
+        self.move_s = self.move_s(&self.from, &self.to);
+        self.end_s = self.start_s + (self.move_s + self.rest()).max(STILL_S);
+    }
+
+    /// The shortest time for a way \[s\].
+    fn move_s(&self, from: &JointArray, to: &JointArray) -> f64 {
         let mut move_s = 0.0_f64;
         for (j, joint) in self.joints.iter().enumerate() {
-            let way = (self.to[j] - self.from[j]).abs();
+            let way = (to[j] - from[j]).abs();
             let by_velocity = QUINTIC_PEAK_VELOCITY * way / (self.spec.speed * joint.velocity);
             let by_acceleration =
                 (QUINTIC_PEAK_ACCELERATION * way / self.spec.acceleration_rad_s2).sqrt();
             move_s = move_s.max(by_velocity).max(by_acceleration);
         }
-        self.start_s = self.end_s;
-        self.move_s = move_s;
-        // Time goes on even if the points are the same and there is no rest.
-        self.end_s = self.start_s + (move_s + self.rest()).max(1e-3);
+        move_s
     }
 
     fn rest(&mut self) -> f64 {
         let [shortest, longest] = self.spec.rest_s;
         shortest + (longest - shortest) * self.rng.random::<f64>()
-    }
-
-    fn draw(&mut self) -> Option<JointArray> {
-        let mut point = [0.0; MAX_JOINTS];
-        let n = self.joints.len();
-        if !self.spec.through.is_empty() {
-            point[..n].copy_from_slice(&self.spec.through[self.next_given]);
-            self.next_given = (self.next_given + 1) % self.spec.through.len();
-            return Some(point);
-        }
-        (0..TRIES).find_map(|_| {
-            for (value, joint) in point.iter_mut().zip(&self.joints) {
-                let share = self.spec.range * (2.0 * self.rng.random::<f64>() - 1.0);
-                *value = joint.middle() + share * joint.half();
-            }
-            (self.allowed)(&point[..n]).then_some(point)
-        })
     }
 }

@@ -7,6 +7,7 @@ use tauscope_bus::MAX_JOINTS;
 
 use super::*;
 use crate::simulated::scenario::{FourierSpec, PointsSpec};
+use crate::simulated::tests::arm;
 
 fn joints() -> Vec<JointRange> {
     (0..3)
@@ -55,7 +56,7 @@ fn check(trajectory: &mut Trajectory, duration_s: f64, velocity: f64, accelerati
 fn points_are_joined_smoothly_within_the_limits() {
     let spec = PointsSpec::default();
     let rng = ChaCha8Rng::seed_from_u64(1);
-    let points = Points::new(&spec, &joints(), Box::new(|_| true), rng).unwrap();
+    let points = Points::new(&spec, &arm(), &joints(), Box::new(|_| true), rng).unwrap();
     let mut trajectory = Trajectory::Points(Box::new(points));
     check(&mut trajectory, 20.0, 0.4 * 2.0, 3.0);
 }
@@ -69,7 +70,7 @@ fn given_points_are_visited_in_order() {
         ..PointsSpec::default()
     };
     let rng = ChaCha8Rng::seed_from_u64(1);
-    let mut points = Points::new(&spec, &joints(), Box::new(|_| true), rng).unwrap();
+    let mut points = Points::new(&spec, &arm(), &joints(), Box::new(|_| true), rng).unwrap();
     let mut rests = Vec::new();
     for i in 0..2000 {
         let now = points.at(f64::from(i) * 0.01);
@@ -88,7 +89,7 @@ fn given_points_are_visited_in_order() {
 fn a_point_that_is_nowhere_allowed_is_an_error() {
     let rng = ChaCha8Rng::seed_from_u64(1);
     let spec = PointsSpec::default();
-    let error = Points::new(&spec, &joints(), Box::new(|_| false), rng).unwrap_err();
+    let error = Points::new(&spec, &arm(), &joints(), Box::new(|_| false), rng).unwrap_err();
     assert!(
         error.to_string().contains("none of 1000 random points"),
         "{error}"

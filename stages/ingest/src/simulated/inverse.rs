@@ -1,0 +1,181 @@
+//! Inverse kinematics: joint positions that bring a point of a link somewhere.
+//!
+//! Levenberg and Marquardt's damped least squares on the pose error, as Sugihara (2011) and Nakamura and
+//! Hanafusa (1986) propose it for arms, kept within the joints' limits: a joint at its limit does not take
+//! part in a step that would lead beyond.
+
+use nalgebra::{DMatrix, DVector, Isometry3, UnitQuaternion, Vector3};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use tauscope_bus::{JointArray, MAX_JOINTS};
+use tauscope_dynamics::{Data, Model, forward_kinematics};
+
+use super::link_point::LinkPoint;
+use super::trajectory::JointRange;
+
+/// Near enough \[m\], \[rad\].
+const NEAR: f64 = 1e-6;
+/// Steps from one start.
+const STEPS: usize = 200;
+/// Other starts, at random, for a point that must be reached.
+const OTHER_STARTS: usize = 30;
+/// A radian counts as this many metres.
+const METRES_PER_RADIAN: f64 = 0.3;
+/// Damping at the start, and when no step is of use any more.
+const FIRST_DAMPING: f64 = 1e-3;
+const LAST_DAMPING: f64 = 1e6;
+
+/// Where the point of a link ought to be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Goal {
+    /// World frame \[m\].
+    pub place: Vector3<f64>,
+    /// Of the link; `None` for any.
+    pub orientation: Option<UnitQuaternion<f64>>,
+}
+
+/// How near the arm came to a goal that it does not reach.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Missed {
+    /// \[m\]
+    pub distance_m: f64,
+    /// \[rad\]
+    pub angle_rad: f64,
+}
+
+impl Missed {
+    fn size(&self) -> f64 {
+        self.distance_m.hypot(METRES_PER_RADIAN * self.angle_rad)
+    }
+}
+
+/// An arm whose point is to go somewhere.
+#[derive(Debug)]
+pub(super) struct Inverse {
+    model: Model,
+    data: Data,
+    joints: Vec<JointRange>,
+    point: LinkPoint,
+}
+
+impl Inverse {
+    pub fn new(model: &Model, joints: &[JointRange], point: LinkPoint) -> Self {
+        Self {
+            model: model.clone(),
+            data: Data::new(model),
+            joints: joints.to_vec(),
+            point,
+        }
+    }
+
+    /// Name of the link.
+    pub fn link_name(&self) -> &str {
+        &self.model.links()[self.point.link].name
+    }
+
+    /// Where the point is at `position`.
+    pub fn pose(&mut self, position: &[f64]) -> Isometry3<f64> {
+        forward_kinematics(&self.model, &mut self.data, position);
+        self.point.pose(&self.model, &self.data)
+    }
+
+    /// Positions that reach the goal, found from `start`, and from elsewhere if they cannot be.
+    pub fn reach(&mut self, goal: &Goal, start: &JointArray) -> Result<JointArray, Missed> {
+        let mut best = match self.reach_from(goal, start) {
+            Ok(found) => return Ok(found),
+            Err(missed) => missed,
+        };
+        // The same for every seed: whether a point can be reached is not a matter of luck.
+        let mut rng = ChaCha8Rng::seed_from_u64(0);
+        for _ in 0..OTHER_STARTS {
+            let mut other = [0.0; MAX_JOINTS];
+            for (value, joint) in other.iter_mut().zip(&self.joints) {
+                *value = joint.lower + (joint.upper - joint.lower) * rng.random::<f64>();
+            }
+            match self.reach_from(goal, &other) {
+                Ok(found) => return Ok(found),
+                Err(missed) if missed.size() < best.size() => best = missed,
+                Err(_) => {}
+            }
+        }
+        Err(best)
+    }
+
+    /// Positions that reach the goal, found from `start` alone.
+    pub fn reach_from(&mut self, goal: &Goal, start: &JointArray) -> Result<JointArray, Missed> {
+        let n = self.joints.len();
+        let mut position = *start;
+        let mut damping = FIRST_DAMPING;
+        let mut error = self.error(goal, &position[..n]);
+        for _ in 0..STEPS {
+            let missed = missed(&error);
+            if missed.distance_m < NEAR && missed.angle_rad < NEAR {
+                return Ok(position);
+            }
+            // The last try was taken, so the kinematics are those of `position`.
+            let mut jacobian = self.jacobian(goal);
+            let downhill = jacobian.transpose() * &error;
+            for (j, joint) in self.joints.iter().enumerate() {
+                let held = (position[j] >= joint.upper && downhill[j] > 0.0)
+                    || (position[j] <= joint.lower && downhill[j] < 0.0);
+                if held {
+                    jacobian.column_mut(j).fill(0.0);
+                }
+            }
+            let square = &jacobian * jacobian.transpose();
+            loop {
+                let mut damped = square.clone();
+                for k in 0..damped.nrows() {
+                    damped[(k, k)] += damping;
+                }
+                let step = damped.cholesky().map(|factors| factors.solve(&error));
+                let mut next = position;
+                if let Some(step) = step {
+                    let step = jacobian.transpose() * step;
+                    for (j, joint) in self.joints.iter().enumerate() {
+                        next[j] = (position[j] + step[j]).clamp(joint.lower, joint.upper);
+                    }
+                }
+                let next_error = self.error(goal, &next[..n]);
+                if next_error.norm() < error.norm() {
+                    (position, error) = (next, next_error);
+                    damping = (0.2 * damping).max(1e-12);
+                    break;
+                }
+                damping *= 5.0;
+                if damping > LAST_DAMPING {
+                    return Err(missed);
+                }
+            }
+        }
+        Err(missed(&error))
+    }
+
+    /// How far there is to go, as a velocity would be: metres, and after them what angles count as such.
+    fn error(&mut self, goal: &Goal, position: &[f64]) -> DVector<f64> {
+        let pose = self.pose(position);
+        let way = goal.place - pose.translation.vector;
+        let Some(orientation) = goal.orientation else {
+            return DVector::from_column_slice(way.as_slice());
+        };
+        let turn = METRES_PER_RADIAN * (orientation * pose.rotation.inverse()).scaled_axis();
+        DVector::from_iterator(6, way.iter().chain(turn.iter()).copied())
+    }
+
+    fn jacobian(&mut self, goal: &Goal) -> DMatrix<f64> {
+        let jacobian = self.point.jacobian(&self.model, &mut self.data);
+        let rows = if goal.orientation.is_some() { 6 } else { 3 };
+        DMatrix::from_fn(rows, jacobian.ncols(), |k, j| {
+            let scale = if k < 3 { 1.0 } else { METRES_PER_RADIAN };
+            scale * jacobian[(k, j)]
+        })
+    }
+}
+
+fn missed(error: &DVector<f64>) -> Missed {
+    let turn = error.rows(3, error.len() - 3).norm();
+    Missed {
+        distance_m: error.rows(0, 3).norm(),
+        angle_rad: turn / METRES_PER_RADIAN,
+    }
+}
