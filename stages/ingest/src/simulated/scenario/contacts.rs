@@ -38,10 +38,6 @@ fn default_rise_s() -> f64 {
     0.08
 }
 
-fn is_rise_default(rise_s: &f64) -> bool {
-    (rise_s - default_rise_s()).abs() == 0.0
-}
-
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
@@ -113,7 +109,7 @@ pub struct HandsSpec {
     #[serde(default = "default_after_s")]
     pub after_s: f64,
     /// How long each takes to rise, and to fall \[s\].
-    #[serde(default = "default_rise_s", skip_serializing_if = "is_rise_default")]
+    #[serde(default = "default_rise_s")]
     #[schemars(range(min = 0.001))]
     pub rise_s: f64,
     /// How they rise and fall.

@@ -88,7 +88,7 @@ pub struct WithinSpec {
     pub about_m: Option<[f64; 3]>,
     /// How far the link is turned from the posture's orientation at most, about a random axis \[rad\].
     #[serde(default)]
-    #[schemars(range(min = 0.0, max = 3.14))]
+    #[schemars(range(min = 0.0, max = 3.1))]
     pub turn_rad: f64,
     /// Draws so many points, and goes through them again and again; without it every point is a new one.
     #[serde(default, skip_serializing_if = "Option::is_none")]

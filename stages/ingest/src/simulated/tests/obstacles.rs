@@ -1,5 +1,7 @@
 //! What the arm runs into, and who pushes it.
 
+#![allow(clippy::float_cmp, reason = "what is the same must be the same bits")]
+
 use nalgebra::Vector3;
 use tauscope_dynamics::{Data, forward_kinematics, link_pose};
 

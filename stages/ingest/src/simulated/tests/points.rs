@@ -1,5 +1,7 @@
 //! Teaching points by inverse kinematics, and cyclic moves.
 
+#![allow(clippy::float_cmp, reason = "what is the same must be the same bits")]
+
 use nalgebra::Isometry3;
 use tauscope_dynamics::{Data, forward_kinematics, link_pose};
 
