@@ -254,6 +254,7 @@ impl Model {
     }
 
     /// The same robot with nothing but `inertia`, in the frame of `link`: what it alone costs.
+    #[must_use]
     pub fn ghost(&self, link: usize, inertia: Inertia) -> Self {
         let mut ghost = self.clone();
         for body in &mut ghost.bodies {

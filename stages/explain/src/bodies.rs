@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use tauscope_dynamics::terms::Term;
 use tauscope_dynamics::{Data, Inertia, Model, gravity_effort, rnea};
 
 use crate::active::Active;
@@ -28,28 +29,61 @@ enum Unit {
 
 /// Costs of units that were computed before: at most one set for each link.
 #[derive(Debug, Default)]
-pub struct UnitCosts(Mutex<HashMap<Unit, Units>>);
+pub struct UnitCosts {
+    efforts: Mutex<HashMap<Unit, Units>>,
+    signals: Mutex<HashMap<Unit, Arc<Vec<Vec<f64>>>>>,
+}
 
 /// Adds what a piece of physics of bodies costs to efforts over all tracks; `rigid` is what the twin says of the motion.
 pub fn add(problem: &Problem, active: &Active, rigid: &[Vec<f64>], into: &mut [Vec<f64>]) {
     let hypothesis = active.hypothesis;
     let mut term = active.term(problem);
-    let cached = problem.rows <= CACHED_ROWS;
-    let mut altered = problem.model.clone();
-    if cached && let Some((link, inertia)) = term.inertia() {
-        add_units(&units(problem, Unit::Inertia(link)), &inertia.parameters(), into);
-    } else if cached && term.alter(&mut altered) {
-        let (before, after) = (problem.model.gravity(), altered.gravity());
-        let change: [f64; 3] = std::array::from_fn(|i| after[i] - before[i]);
-        add_units(&units(problem, Unit::Gravity), &change, into);
+    if let Some((unit, factors)) = in_units(problem, &*term) {
+        add_units(&units(problem, unit), &factors, into);
     } else {
-        if cached && has_rotor(&hypothesis) {
+        if problem.rows <= CACHED_ROWS && has_rotor(&hypothesis) {
             term.expand(problem.expansion(hypothesis.place.joint));
         }
         let silent: TrackEfforts = rigid.iter().map(|r| vec![0.0; r.len()]).collect();
         let added = act_over(problem, &mut *term, &silent, rigid);
         add_units(&[added], &[1.0], into);
     }
+}
+
+/// The same as a signal, if it is so many times some units.
+pub fn signal(problem: &Problem, active: &Active) -> Option<Vec<f64>> {
+    let (unit, factors) = in_units(problem, &*active.term(problem))?;
+    let lock = || problem.units.signals.lock().unwrap_or_else(PoisonError::into_inner);
+    let known = lock().get(&unit).map(Arc::clone);
+    let signals = known.unwrap_or_else(|| {
+        let units = units(problem, unit);
+        let new = Arc::new(units.iter().map(|unit| problem.signal(unit)).collect::<Vec<_>>());
+        lock().insert(unit, Arc::clone(&new));
+        new
+    });
+    let mut sum = vec![0.0; problem.joints * problem.rows];
+    for (signal, factor) in signals.iter().zip(&factors).filter(|(_, f)| **f != 0.0) {
+        for (sum, signal) in sum.iter_mut().zip(signal) {
+            *sum += factor * signal;
+        }
+    }
+    Some(sum)
+}
+
+/// How many times which units a term costs, if its effort is linear in some, and these may be kept.
+fn in_units(problem: &Problem, term: &dyn Term) -> Option<(Unit, Vec<f64>)> {
+    if problem.rows > CACHED_ROWS {
+        return None;
+    }
+    if let Some((link, inertia)) = term.inertia() {
+        return Some((Unit::Inertia(link), inertia.parameters().to_vec()));
+    }
+    let mut altered = problem.model.clone();
+    term.alter(&mut altered).then(|| {
+        let (before, after) = (problem.model.gravity(), altered.gravity());
+        let change = after.iter().zip(before).map(|(after, before)| after - before);
+        (Unit::Gravity, change.collect())
+    })
 }
 
 fn add_units(units: &[TrackEfforts], factors: &[f64], into: &mut [Vec<f64>]) {
@@ -63,7 +97,7 @@ fn add_units(units: &[TrackEfforts], factors: &[f64], into: &mut [Vec<f64>]) {
 }
 
 fn units(problem: &Problem, unit: Unit) -> Units {
-    let lock = || problem.units.0.lock().unwrap_or_else(PoisonError::into_inner);
+    let lock = || problem.units.efforts.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(known) = lock().get(&unit) {
         return Arc::clone(known);
     }

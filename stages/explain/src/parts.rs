@@ -6,7 +6,7 @@ use std::sync::Arc;
 use tauscope_dynamics::terms::{Coordinate, CoordinateKind, Layer, PlaceKind};
 
 use crate::active::{Active, Column, Hypothesis};
-use crate::bodies::TrackEfforts;
+use crate::bodies::{self, TrackEfforts};
 use crate::columns::{CACHED_ROWS, units};
 use crate::drive::{gains, is_drive};
 use crate::efforts::{Efforts, change, column, transmitted};
@@ -102,6 +102,11 @@ impl Parts {
             let efforts = Efforts::of_bodies(Arc::clone(load), problem.joints);
             let ones = vec![1.0; problem.joints];
             return column(problem, &change(problem, &[], &efforts, active, &ones), joint);
+        }
+        if hypothesis.effect.layer == Layer::Body
+            && let Some(values) = bodies::signal(problem, active)
+        {
+            return Column { joint, values };
         }
         if is_kept(problem, active) {
             let units = units(problem, hypothesis, &active.shape());

@@ -16,10 +16,11 @@ use crate::parallel;
 use crate::problem::Problem;
 use crate::propose::{Base, Proposal};
 use crate::unknown;
+use crate::windows::{TimeKind, time_kind};
 
 pub use evidence::{Explanation, LEAST_EVIDENCE, LEAST_SIZE, has_rotor};
 use evidence::{
-    ROTOR, describe, most_at_one_place, needs, overwhelming, steps_enough, wald,
+    ROTOR, describe, matters, most_at_one_place, needs, overwhelming, steps_enough, wald,
     worse_joints,
 };
 
@@ -29,6 +30,9 @@ const CURVE_EVIDENCE: f64 = 25.0;
 const CURVE_EXCESS: f64 = 1.6;
 /// A curve must divide the variance that is left at its joint by this.
 const CURVE_SIZE: f64 = 1.35;
+/// Where much is left that no name fits, what a name must explain of it while there is more to be found, and in the end.
+const LOUD_SIZE: f64 = 0.25;
+const NAMED_SIZE: f64 = 0.5;
 /// How many proposals of a round are refined before one is taken.
 const REFINED: usize = 3;
 /// More pieces of physics than this are not looked for.
@@ -80,7 +84,35 @@ impl Search<'_> {
                 break;
             }
         }
-        best
+        self.culled(best)
+    }
+
+    /// Takes out the names that explain less than half of what is left where they are and that is far above the noise: there
+    /// something is that no name fits, and it could be what they seem to be. The smallest go first.
+    fn culled(&self, mut best: Explanation) -> Explanation {
+        loop {
+            let names: Vec<usize> = (0..best.fit.actives.len())
+                .filter(|&i| {
+                    let active = &best.fit.actives[i];
+                    let once = time_kind(active.hypothesis) == TimeKind::Once;
+                    active.curve.is_none() && !once && !is_drive(&active.hypothesis)
+                })
+                .collect();
+            let without = parallel::map(&names, |&i| self.less(&best, i));
+            let size = |less: &Explanation| {
+                let each = less.fit.variance.iter().zip(&best.fit.variance);
+                each.map(|(less, best)| less / best).fold(0.0, f64::max)
+            };
+            let small = names.iter().zip(without).filter(|(_, less)| {
+                !matters(self.problem, &best.fit, &less.fit, LEAST_SIZE, NAMED_SIZE)
+            });
+            let Some((&index, less)) = small.min_by(|(_, a), (_, b)| size(a).total_cmp(&size(b)))
+            else {
+                return best;
+            };
+            (self.say)(&format!("- {}", best.fit.actives[index].hypothesis.effect.name));
+            best = less;
+        }
     }
 
     /// The explanation with a curve in a joint, where names do not do: beside the names, if much is left, or in place
@@ -257,7 +289,9 @@ impl Search<'_> {
         let joined = parallel::map(&worthy, |proposal| self.joined(now, proposal));
         for (next, proposal) in joined.into_iter().zip(worthy) {
             let (evidence, _) = needs(proposal.active.hypothesis, &now.fit);
-            if next.ahead_of(now, worth) >= evidence || overwhelming(&next, now) {
+            let evident = next.ahead_of(now, worth) >= evidence || overwhelming(&next, now);
+            let once = time_kind(proposal.active.hypothesis) == TimeKind::Once;
+            if evident && (once || matters(self.problem, &next.fit, &now.fit, 0.0, LOUD_SIZE)) {
                 able.push((next, proposal));
             }
         }
@@ -306,9 +340,6 @@ impl Search<'_> {
 
     /// Whether one of the pieces is needed, to judge by the explanation without it.
     fn is_needed(&self, best: &Explanation, less: &Explanation, index: usize) -> bool {
-        let size = (0..self.problem.joints)
-            .map(|j| (less.fit.variance[j] - best.fit.variance[j]) / best.fit.variance[j])
-            .fold(0.0, f64::max);
         let active = &best.fit.actives[index];
         let (evidence, least) = match active.curve {
             Some(_) => (CURVE_EVIDENCE, CURVE_SIZE - 1.0),
@@ -316,7 +347,8 @@ impl Search<'_> {
         };
         let worth = &self.problem.worth;
         let strong = best.ahead_of(less, worth) >= evidence || overwhelming(best, less);
-        steps_enough(active) && strong && size >= least
+        let matters = matters(self.problem, &best.fit, &less.fit, least, least);
+        steps_enough(active) && strong && matters
     }
 
     /// Which pieces are beyond doubt by their own numbers, to first order: Wald's test, with much to spare.

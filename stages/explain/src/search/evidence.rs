@@ -132,6 +132,21 @@ pub fn needs(hypothesis: Hypothesis, fit: &Fit) -> (f64, f64) {
     }
 }
 
+/// The joint variances that are this many times the white noise are noise alone, or something that nobody has named.
+const QUIET_RATIO: f64 = 1.5;
+const LOUD_RATIO: f64 = 4.0;
+
+/// Whether at some joint the `with` fit leaves less than `without` by a share of what it still leaves: `least`, and up to
+/// `loud` where that is far above the white noise. What cannot be named there could do what a small piece seems to do.
+pub fn matters(problem: &Problem, with: &Fit, without: &Fit, least: f64, loud: f64) -> bool {
+    (0..problem.joints).any(|j| {
+        let ratio = with.variance[j] / (problem.white_noise[j] * problem.white_noise[j]).max(1e-16);
+        let share = ((ratio - QUIET_RATIO) / (LOUD_RATIO - QUIET_RATIO)).clamp(0.0, 1.0);
+        let needed = least.max(least + share * (loud - least));
+        without.variance[j] - with.variance[j] >= needed * with.variance[j]
+    })
+}
+
 /// The joints at which `fit` leaves clearly more than `better`.
 pub fn worse_joints(fit: &Fit, better: &Fit) -> Vec<usize> {
     let worse = |&j: &usize| fit.variance[j] > (1.0 + LEAST_SIZE) * better.variance[j];
