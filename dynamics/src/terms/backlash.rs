@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use super::law::array;
 use super::two_masses::{Deviation, Oscillator, Transmission, TwoMasses};
-use super::{Coordinate, Effect, Expansion, Layer, MotionSample, Parameter, PlaceKind, Scale, Term};
+use super::{
+    Coordinate, Effect, Expansion, Layer, MotionSample, Parameter, PlaceKind, Scale, Term,
+};
 
 /// Natural frequency \[rad/s\] and damping ratio of the contact on either side of the play: it settles
 /// within some 20 ms and does not bounce. Stiffer contacts only turn the noise of a measured acceleration

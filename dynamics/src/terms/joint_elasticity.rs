@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use super::law::array;
 use super::two_masses::{Deviation, Oscillator, Transmission, TwoMasses};
-use super::{Coordinate, Effect, Expansion, Layer, MotionSample, Parameter, PlaceKind, Scale, Term};
+use super::{
+    Coordinate, Effect, Expansion, Layer, MotionSample, Parameter, PlaceKind, Scale, Term,
+};
 
 /// Share of the critical damping that the link has against a rotor that stands still. It is none of the
 /// parameters: motions of robots do not show it.

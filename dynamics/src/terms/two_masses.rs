@@ -215,7 +215,11 @@ impl TwoMasses {
     fn effort(&mut self, deviation: Deviation, at: &MotionSample<'_>, acceleration: f64) -> f64 {
         let j = self.joint;
         if let Some((along, k)) = &self.along {
-            let off = [deviation.angle, deviation.rate, acceleration - at.acceleration[j]];
+            let off = [
+                deviation.angle,
+                deviation.rate,
+                acceleration - at.acceleration[j],
+            ];
             along.effort(*k, off, &mut self.link);
             return self.link[j];
         }

@@ -7,10 +7,10 @@ use tauscope_dynamics::terms::Term;
 use tauscope_dynamics::{Data, Inertia, Model, gravity_effort, rnea};
 
 use crate::active::Active;
-use crate::efforts::act_over;
-use crate::search::has_rotor;
 use crate::columns::CACHED_ROWS;
+use crate::efforts::act_over;
 use crate::problem::Problem;
+use crate::search::has_rotor;
 
 /// An effort by track, row-major, one number per joint and sample \[N m or N\].
 pub type TrackEfforts = Vec<Vec<f64>>;
@@ -53,11 +53,22 @@ pub fn add(problem: &Problem, active: &Active, rigid: &[Vec<f64>], into: &mut [V
 /// The same as a signal, if it is so many times some units.
 pub fn signal(problem: &Problem, active: &Active) -> Option<Vec<f64>> {
     let (unit, factors) = in_units(problem, &*active.term(problem))?;
-    let lock = || problem.units.signals.lock().unwrap_or_else(PoisonError::into_inner);
+    let lock = || {
+        problem
+            .units
+            .signals
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+    };
     let known = lock().get(&unit).map(Arc::clone);
     let signals = known.unwrap_or_else(|| {
         let units = units(problem, unit);
-        let new = Arc::new(units.iter().map(|unit| problem.signal(unit)).collect::<Vec<_>>());
+        let new = Arc::new(
+            units
+                .iter()
+                .map(|unit| problem.signal(unit))
+                .collect::<Vec<_>>(),
+        );
         lock().insert(unit, Arc::clone(&new));
         new
     });
@@ -81,7 +92,10 @@ fn in_units(problem: &Problem, term: &dyn Term) -> Option<(Unit, Vec<f64>)> {
     let mut altered = problem.model.clone();
     term.alter(&mut altered).then(|| {
         let (before, after) = (problem.model.gravity(), altered.gravity());
-        let change = after.iter().zip(before).map(|(after, before)| after - before);
+        let change = after
+            .iter()
+            .zip(before)
+            .map(|(after, before)| after - before);
         (Unit::Gravity, change.collect())
     })
 }
@@ -97,7 +111,13 @@ fn add_units(units: &[TrackEfforts], factors: &[f64], into: &mut [Vec<f64>]) {
 }
 
 fn units(problem: &Problem, unit: Unit) -> Units {
-    let lock = || problem.units.efforts.lock().unwrap_or_else(PoisonError::into_inner);
+    let lock = || {
+        problem
+            .units
+            .efforts
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+    };
     if let Some(known) = lock().get(&unit) {
         return Arc::clone(known);
     }
@@ -105,7 +125,9 @@ fn units(problem: &Problem, unit: Unit) -> Units {
         Unit::Inertia(link) => {
             let mut parameters = [0.0; 10];
             parameters[k] = 1.0;
-            let model = problem.model.ghost(link, Inertia::from_parameters(parameters));
+            let model = problem
+                .model
+                .ghost(link, Inertia::from_parameters(parameters));
             over_tracks(problem, &model, true)
         }
         Unit::Gravity => {

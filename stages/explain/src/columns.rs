@@ -191,7 +191,11 @@ fn computed(
     }
     let at = |coordinates: &[f64]| {
         let active = hypothesis.with(coordinates.to_vec());
-        column(problem, &change(problem, others, efforts, &active, gains), joint)
+        column(
+            problem,
+            &change(problem, others, efforts, &active, gains),
+            joint,
+        )
     };
     let alone = at(&coordinates);
     let mut factors = Vec::with_capacity(steps.len());

@@ -25,18 +25,22 @@ pub struct Efforts {
 
 fn terms_of(problem: &Problem, actives: &[Active], layer: Layer) -> Vec<Box<dyn Term>> {
     // The scale of a drive is that of all bodies, and is put to them when they are summed.
-    let of_layer = |active: &&Active| {
-        active.hypothesis.effect.layer == layer && !is_drive(&active.hypothesis)
-    };
+    let of_layer =
+        |active: &&Active| active.hypothesis.effect.layer == layer && !is_drive(&active.hypothesis);
     let of_layer = actives.iter().filter(of_layer);
     of_layer.map(|active| active.term(problem)).collect()
 }
 
 /// What the gears transmit under the physics of `actives`.
 pub fn transmitted(problem: &Problem, actives: &[Active]) -> TrackEfforts {
-    let rigid: TrackEfforts = problem.tracks.iter().map(|t| t.track.rigid.clone()).collect();
+    let rigid: TrackEfforts = problem
+        .tracks
+        .iter()
+        .map(|t| t.track.rigid.clone())
+        .collect();
     let mut body = rigid.clone();
-    let of_bodies = |a: &&Active| a.hypothesis.effect.layer == Layer::Body && !is_drive(&a.hypothesis);
+    let of_bodies =
+        |a: &&Active| a.hypothesis.effect.layer == Layer::Body && !is_drive(&a.hypothesis);
     for active in actives.iter().filter(of_bodies) {
         if !add_shaped(problem, active, &mut body) {
             bodies::add(problem, active, &rigid, &mut body);

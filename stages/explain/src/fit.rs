@@ -67,7 +67,10 @@ impl Fit {
             } else {
                 fit.parts.recorded(problem, &fit.actives, joint)
             };
-            for (left, explained) in residual[problem.joint_rows(joint)].iter_mut().zip(&explained) {
+            for (left, explained) in residual[problem.joint_rows(joint)]
+                .iter_mut()
+                .zip(&explained)
+            {
                 *left -= explained;
             }
         }
@@ -136,7 +139,11 @@ impl Fit {
             } else {
                 problem.bare()
             };
-            return column(problem, &change(problem, &[], efforts, active, gains), joint);
+            return column(
+                problem,
+                &change(problem, &[], efforts, active, gains),
+                joint,
+            );
         }
         let joint = joint.filter(|_| !self.parts.is_coupled());
         let changed = change(problem, &self.actives, self.efforts(problem), active, gains);
@@ -151,7 +158,11 @@ impl Fit {
     /// How the explained effort changes with each free coordinate of what touches these joints; all without them.
     pub fn jacobian_at(&self, problem: &Problem, joints: Option<&[usize]>) -> Vec<Arc<Column>> {
         let free = self.parameters_at(joints);
-        let of = |i: usize| free.iter().filter(move |(active, _)| *active == i).map(|(_, c)| *c);
+        let of = |i: usize| {
+            free.iter()
+                .filter(move |(active, _)| *active == i)
+                .map(|(_, c)| *c)
+        };
         let touching = (0..self.actives.len()).filter(|&i| of(i).next().is_some());
         touching
             .flat_map(|i| self.sensitivities(problem, i, &of(i).collect::<Vec<_>>()))
@@ -167,7 +178,9 @@ impl Fit {
     /// the factors. Its shape is dear and hardly moves.
     fn parameters_at(&self, joints: Option<&[usize]>) -> Vec<(usize, usize)> {
         let mut all = self.parameters();
-        all.retain(|&(i, c)| self.touches(i, joints) && (self.is_factor(i, c) || self.belongs(i, joints)));
+        all.retain(|&(i, c)| {
+            self.touches(i, joints) && (self.is_factor(i, c) || self.belongs(i, joints))
+        });
         all
     }
 
@@ -177,9 +190,13 @@ impl Fit {
 
     fn belongs(&self, index: usize, joints: Option<&[usize]>) -> bool {
         let hypothesis = self.actives[index].hypothesis;
-        let at_joint = matches!(hypothesis.effect.place, PlaceKind::Joint | PlaceKind::TwoJoints);
+        let at_joint = matches!(
+            hypothesis.effect.place,
+            PlaceKind::Joint | PlaceKind::TwoJoints
+        );
         joints.is_none_or(|joints| {
-            joints.len() == self.variance.len() || (at_joint && joints.contains(&hypothesis.place.joint))
+            joints.len() == self.variance.len()
+                || (at_joint && joints.contains(&hypothesis.place.joint))
         })
     }
 
@@ -235,7 +252,9 @@ impl Fit {
             joint = hypothesis.only_joint().filter(|_| !self.parts.is_coupled());
             values = column(problem, &changed, joint).values;
             let rows = joint.map_or(0..problem.joints * problem.rows, |j| problem.joint_rows(j));
-            let explained = problem.measured[rows.clone()].iter().zip(&self.residual[rows]);
+            let explained = problem.measured[rows.clone()]
+                .iter()
+                .zip(&self.residual[rows]);
             base = explained.map(|(m, r)| m - r).collect();
         } else {
             let there = self.added(problem, &there);

@@ -25,9 +25,7 @@ pub fn covariance(problem: &Problem, fit: &Fit) -> DMatrix<f64> {
         let touching: Vec<(usize, &[f64])> = jacobian
             .iter()
             .enumerate()
-            .filter_map(|(a, column)| {
-                Some((a, column.of_joint(j, problem.rows)?))
-            })
+            .filter_map(|(a, column)| Some((a, column.of_joint(j, problem.rows)?)))
             .collect();
         let variance = fit.squares[j] / (fit.count[j] - touching.len() as f64).max(1.0);
         let variance = variance.max(1e-16);

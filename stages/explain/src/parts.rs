@@ -101,7 +101,11 @@ impl Parts {
         {
             let efforts = Efforts::of_bodies(Arc::clone(load), problem.joints);
             let ones = vec![1.0; problem.joints];
-            return column(problem, &change(problem, &[], &efforts, active, &ones), joint);
+            return column(
+                problem,
+                &change(problem, &[], &efforts, active, &ones),
+                joint,
+            );
         }
         if hypothesis.effect.layer == Layer::Body
             && let Some(values) = bodies::signal(problem, active)
@@ -115,7 +119,10 @@ impl Parts {
                 Some(alone) => alone.values.clone(),
                 None => vec![0.0; count],
             };
-            let factors = hypothesis.factors().into_iter().map(|i| active.coordinates[i]);
+            let factors = hypothesis
+                .factors()
+                .into_iter()
+                .map(|i| active.coordinates[i]);
             for (unit, factor) in units.factors.iter().zip(factors) {
                 for (value, unit) in values.iter_mut().zip(&unit.values) {
                     *value += factor * unit;
@@ -137,7 +144,9 @@ impl Parts {
     pub fn bodies(&self, problem: &Problem, actives: &[Active], joint: usize) -> Vec<f64> {
         let mut sum = problem.rigid()[problem.joint_rows(joint)].to_vec();
         for (active, part) in actives.iter().zip(&self.columns) {
-            let values = part.as_ref().filter(|_| active.hypothesis.effect.layer == Layer::Body);
+            let values = part
+                .as_ref()
+                .filter(|_| active.hypothesis.effect.layer == Layer::Body);
             if let Some(values) = values.and_then(|part| part.of_joint(joint, problem.rows)) {
                 add(&mut sum, values);
             }
@@ -152,7 +161,9 @@ impl Parts {
             *value *= self.gains[joint];
         }
         for (active, part) in actives.iter().zip(&self.columns) {
-            let values = part.as_ref().filter(|_| active.hypothesis.effect.layer != Layer::Body);
+            let values = part
+                .as_ref()
+                .filter(|_| active.hypothesis.effect.layer != Layer::Body);
             if let Some(values) = values.and_then(|part| part.of_joint(joint, problem.rows)) {
                 add(&mut sum, values);
             }
@@ -164,7 +175,10 @@ impl Parts {
 /// Whether the columns of an active may be kept: not those of every interval of time.
 pub fn is_kept(problem: &Problem, active: &Active) -> bool {
     let timeless = |c: &Coordinate| {
-        matches!(c.kind, CoordinateKind::Factor { .. } | CoordinateKind::Shape { .. })
+        matches!(
+            c.kind,
+            CoordinateKind::Factor { .. } | CoordinateKind::Shape { .. }
+        )
     };
     active.curve.is_none()
         && active.hypothesis.effect.coordinates.iter().all(timeless)
@@ -184,7 +198,10 @@ fn is_bias(hypothesis: &Hypothesis) -> bool {
 /// The joints whose recording something transforms; an offset alone does not.
 fn transformed(actives: &[Active], joints: usize) -> Vec<bool> {
     let mut transformed = vec![false; joints];
-    for active in actives.iter().filter(|a| a.is_of_record() && !is_bias(&a.hypothesis)) {
+    for active in actives
+        .iter()
+        .filter(|a| a.is_of_record() && !is_bias(&a.hypothesis))
+    {
         if active.hypothesis.effect.place == PlaceKind::All {
             return vec![true; joints];
         }
@@ -195,7 +212,13 @@ fn transformed(actives: &[Active], joints: usize) -> Vec<bool> {
 
 /// Whether two are the same, numbers and all.
 fn is_same(a: &Active, b: &Active) -> bool {
-    let bits = |active: &Active| active.coordinates.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+    let bits = |active: &Active| {
+        active
+            .coordinates
+            .iter()
+            .map(|x| x.to_bits())
+            .collect::<Vec<_>>()
+    };
     a.hypothesis == b.hypothesis && a.curve == b.curve && bits(a) == bits(b)
 }
 

@@ -20,8 +20,8 @@ use crate::windows::{TimeKind, time_kind};
 
 pub use evidence::{Explanation, LEAST_EVIDENCE, LEAST_SIZE, has_rotor};
 use evidence::{
-    ROTOR, describe, matters, most_at_one_place, needs, overwhelming, steps_enough, wald,
-    worse_joints,
+    ROTOR, describe, matters, most_at_one_place, needs, overwhelming, plausible, steps_enough,
+    wald, worse_joints,
 };
 
 /// Evidence that a curve without a name needs \[nats\].
@@ -110,7 +110,10 @@ impl Search<'_> {
             else {
                 return best;
             };
-            (self.say)(&format!("- {}", best.fit.actives[index].hypothesis.effect.name));
+            (self.say)(&format!(
+                "- {}",
+                best.fit.actives[index].hypothesis.effect.name
+            ));
             best = less;
         }
     }
@@ -282,7 +285,8 @@ impl Search<'_> {
         let worth = &self.problem.worth;
         let worthy = proposals.iter().filter(|p| {
             let (evidence, size) = needs(p.active.hypothesis, &now.fit);
-            p.evidence() > evidence && p.size > size && steps_enough(&p.active)
+            let possible = steps_enough(&p.active) && plausible(&p.active, &self.problem.model);
+            p.evidence() > evidence && p.size > size && possible
         });
         let mut able: Vec<(Explanation, &Proposal)> = Vec::new();
         let worthy: Vec<&Proposal> = worthy.take(REFINED).collect();
@@ -348,7 +352,8 @@ impl Search<'_> {
         let worth = &self.problem.worth;
         let strong = best.ahead_of(less, worth) >= evidence || overwhelming(best, less);
         let matters = matters(self.problem, &best.fit, &less.fit, least, least);
-        steps_enough(active) && strong && matters
+        let possible = steps_enough(active) && plausible(active, &self.problem.model);
+        possible && strong && matters
     }
 
     /// Which pieces are beyond doubt by their own numbers, to first order: Wald's test, with much to spare.
@@ -362,6 +367,7 @@ impl Search<'_> {
             let worth = joints.iter().map(|&j| worth[j]).fold(1.0, f64::min);
             let (evidence, size) = needs(active.hypothesis, fit);
             steps_enough(active)
+                && plausible(active, &self.problem.model)
                 && active.curve.is_none()
                 && 0.5 * worth * chi_square > 4.0 * evidence + 60.0
                 && chi_square > 4.0 * size * rows

@@ -36,12 +36,7 @@ pub fn undetectable(
         let Some(shape) = shapes(search.problem, *hypothesis).into_iter().next() else {
             continue;
         };
-        let columns = columns(
-            search.problem,
-            &found.fit,
-            *hypothesis,
-            &shape,
-        );
+        let columns = columns(search.problem, &found.fit, *hypothesis, &shape);
         let Some(column) = columns.factors.first() else {
             continue;
         };

@@ -1,6 +1,7 @@
 //! What counts as evidence for a piece of physics, and how much of it is asked for.
 
 use nalgebra::{DMatrix, DVector};
+use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::CoordinateKind;
 
 use crate::active::{Active, Column, Hypothesis};
@@ -110,6 +111,23 @@ pub fn steps_enough(active: &Active) -> bool {
     }
     let (before, after) = (active.coordinates[0], active.coordinates[1]);
     (after - before).abs() > LEAST_STEP * before.abs().max(after.abs())
+}
+
+/// Friction of one direction is at least this share of the other's; what looks more lopsided is friction and an offset.
+const LEAST_SYMMETRY: f64 = 0.2;
+
+/// Whether the numbers are ones that a robot may have: a link's mass stays above nothing and within twice what its URDF says,
+/// and friction is not of one direction alone.
+pub fn plausible(active: &Active, model: &Model) -> bool {
+    let x = &active.coordinates;
+    match active.hypothesis.effect.name {
+        "link_mass" => {
+            let link = &model.links()[active.hypothesis.place.link];
+            x[0].abs() < link.mass_kg()
+        }
+        "asymmetric_coulomb" => x[0].min(x[1]) >= LEAST_SYMMETRY * x[0].max(x[1]),
+        _ => true,
+    }
 }
 
 pub const ROTOR: &str = "rotor_inertia";

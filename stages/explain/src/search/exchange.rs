@@ -89,5 +89,9 @@ impl Search<'_> {
 
 /// Where a piece is in an explanation, if it still is.
 fn place_of(explanation: &Explanation, piece: Hypothesis) -> Option<usize> {
-    explanation.fit.actives.iter().position(|a| a.hypothesis == piece)
+    explanation
+        .fit
+        .actives
+        .iter()
+        .position(|a| a.hypothesis == piece)
 }
