@@ -13,7 +13,7 @@ pub(super) static EFFECT: Effect = Effect {
     place: PlaceKind::All,
     layer: Layer::Record,
     parameters: &[Parameter::at_least("delay_s", 0.0)],
-    coordinates: &[Coordinate::shape("delay_s", 0.0, 1.0, 26, Scale::Linear)],
+    coordinates: &[Coordinate::shape("delay_s", 0.002, 1.0, 12, Scale::Log)],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
     build: |site, values| Box::new(TorqueDelay::new(site, array(values))),

@@ -292,9 +292,13 @@ fn recorded(problem: &Problem, fit: &Fit, hypothesis: Hypothesis, shape: &[f64])
             let own = &mut values[problem.joint_rows(joint)];
             if fit.parts.transformed[joint] {
                 problem.joint_signal(&on_top, joint, own);
-                own.iter_mut().for_each(|value| *value /= step);
+                for value in own {
+                    *value /= step;
+                }
             } else {
-                own.iter_mut().for_each(|value| *value *= gains[joint]);
+                for value in own {
+                    *value *= gains[joint];
+                }
             }
         }
         Column {

@@ -280,7 +280,7 @@ impl<'a> Base<'a> {
 
     /// The best factors of a hypothesis at one shape.
     pub fn propose_at(&self, hypothesis: Hypothesis, shape: &[f64]) -> Option<Proposal> {
-        let columns = columns(self.problem, &self.fit, hypothesis, shape);
+        let columns = columns(self.problem, self.fit, hypothesis, shape);
         self.propose_columns(hypothesis, shape, columns.alone.as_ref(), &columns.factors)
     }
 

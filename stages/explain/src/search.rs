@@ -271,7 +271,8 @@ impl Search<'_> {
             let new = next.fit.actives.last().map(|active| active.hypothesis);
             let next = self.pruned(next);
             let worth = &self.problem.worth;
-            if next.ahead_of(&best, worth) < LEAST_EVIDENCE {
+            let evident = next.ahead_of(&best, worth) >= LEAST_EVIDENCE;
+            if !evident && !overwhelming(&next, &best) {
                 barred.extend(new);
             } else {
                 best = next;

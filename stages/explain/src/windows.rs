@@ -71,7 +71,7 @@ impl Base<'_> {
         let mut shape = vec![0.0; hypothesis.effect.coordinates.len()];
         let time = time_index(hypothesis)?;
         shape[time] = f64::NEG_INFINITY;
-        let all = columns(problem, &self.fit, hypothesis, &shape);
+        let all = columns(problem, self.fit, hypothesis, &shape);
         // With the change before everything, the second factor's column is the whole effect.
         let whole = all.factors.last()?;
         let joint = whole.joint?;
@@ -116,7 +116,7 @@ impl Base<'_> {
         let [start, end] = times[..] else { return None };
         let mut shape = vec![0.0; hypothesis.effect.coordinates.len()];
         (shape[start], shape[end]) = (f64::NEG_INFINITY, f64::INFINITY);
-        let all = columns(problem, &self.fit, hypothesis, &shape);
+        let all = columns(problem, self.fit, hypothesis, &shape);
         let all = &all.factors;
         let scanned = &all[..all.len().min(SCANNED_FACTORS)];
         let mut best: Option<Proposal> = None;
