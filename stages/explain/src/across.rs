@@ -34,7 +34,11 @@ pub fn carries_over(problem: &Problem, with: &Fit, without: &Fit, joints: &[usiz
 /// Sum of squares by joint that a fit leaves in each recording with the numbers of the others.
 fn left_where_not_fitted(problem: &Problem, fit: &Fit, joints: &[usize]) -> Vec<f64> {
     let jacobian = fit.jacobian_at(problem, Some(joints));
-    let columns: Vec<&Column> = jacobian.iter().map(AsRef::as_ref).collect();
+    // Shapes stay as they are: to first order they would run away.
+    let factors = fit.parameters_at(Some(joints)).into_iter();
+    let factors = factors.map(|(index, c)| fit.is_factor(index, c));
+    let columns = jacobian.iter().zip(factors).filter(|(_, factor)| *factor);
+    let columns: Vec<&Column> = columns.map(|(column, _)| column.as_ref()).collect();
     let all = Products::new(problem, &columns, &fit.residual, None);
     let (normal, _) = all.normal(&fit.variance, &vec![0.0; columns.len()]);
     let ridge: Vec<f64> = normal.diagonal().iter().map(|d| DAMPING * d).collect();

@@ -176,7 +176,7 @@ impl Fit {
 
     /// The coordinates that are free of what touches these joints: of what touches all joints but belongs to others, only
     /// the factors. Its shape is dear and hardly moves.
-    fn parameters_at(&self, joints: Option<&[usize]>) -> Vec<(usize, usize)> {
+    pub fn parameters_at(&self, joints: Option<&[usize]>) -> Vec<(usize, usize)> {
         let mut all = self.parameters();
         all.retain(|&(i, c)| {
             self.touches(i, joints) && (self.is_factor(i, c) || self.belongs(i, joints))
@@ -184,7 +184,8 @@ impl Fit {
         all
     }
 
-    fn is_factor(&self, index: usize, c: usize) -> bool {
+    /// Whether a coordinate is a factor.
+    pub fn is_factor(&self, index: usize, c: usize) -> bool {
         matches!(self.actives[index].kind(c), CoordinateKind::Factor { .. })
     }
 

@@ -272,7 +272,8 @@ impl Search<'_> {
             let next = self.pruned(next);
             let worth = &self.problem.worth;
             let evident = next.ahead_of(&best, worth) >= LEAST_EVIDENCE;
-            if !evident && !overwhelming(&next, &best) {
+            let once = new.is_some_and(|new| time_kind(new) == TimeKind::Once);
+            if !evident && (once || !overwhelming(&next, &best)) {
                 barred.extend(new);
             } else {
                 best = next;
