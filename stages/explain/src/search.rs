@@ -40,7 +40,7 @@ const MOST_PIECES: usize = 24;
 /// An exchange must gain this \[nats\].
 const LEAST_GAIN: f64 = 0.5;
 /// So often pieces are added and all exchanged again.
-const MOST_ROUNDS: usize = 4;
+const MOST_ROUNDS: usize = 2;
 /// A joint whose variance is below this many times its white noise is not tried with costly effects.
 const QUIET: f64 = 1.15;
 
