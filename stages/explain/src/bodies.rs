@@ -8,8 +8,8 @@ use tauscope_dynamics::{Data, Inertia, Model, gravity_effort, rnea};
 
 use crate::active::Active;
 use crate::columns::CACHED_ROWS;
-use crate::efforts::act_over;
-use crate::problem::Problem;
+use crate::efforts::{act_over, silent};
+use crate::problem::{FitTrack, Problem};
 use crate::search::has_rotor;
 
 /// An effort by track, row-major, one number per joint and sample \[N m or N\].
@@ -44,8 +44,7 @@ pub fn add(problem: &Problem, active: &Active, rigid: &[Vec<f64>], into: &mut [V
         if problem.rows <= CACHED_ROWS && has_rotor(&hypothesis) {
             term.expand(problem.expansion(hypothesis.place.joint));
         }
-        let silent: TrackEfforts = rigid.iter().map(|r| vec![0.0; r.len()]).collect();
-        let added = act_over(problem, &mut *term, &silent, rigid);
+        let added = act_over(problem, &mut *term, &silent(rigid), rigid);
         add_units(&[added], &[1.0], into);
     }
 }
@@ -149,7 +148,7 @@ fn units(problem: &Problem, unit: Unit) -> Units {
 /// What a model costs over the motion of all tracks, or what holds it still there.
 fn over_tracks(problem: &Problem, model: &Model, moving: bool) -> TrackEfforts {
     let mut data = Data::new(model);
-    let mut of = |track: &crate::problem::FitTrack| {
+    let mut of = |track: &FitTrack| {
         let mut effort = Vec::with_capacity(track.track.position.len());
         track.track.each(|_, at| {
             effort.extend_from_slice(if moving {

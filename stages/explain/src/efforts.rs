@@ -33,17 +33,13 @@ fn terms_of(problem: &Problem, actives: &[Active], layer: Layer) -> Vec<Box<dyn 
 
 /// What the gears transmit under the physics of `actives`.
 pub fn transmitted(problem: &Problem, actives: &[Active]) -> TrackEfforts {
-    let rigid: TrackEfforts = problem
-        .tracks
-        .iter()
-        .map(|t| t.track.rigid.clone())
-        .collect();
-    let mut body = rigid.clone();
+    let rigid = &problem.bare().body;
+    let mut body = TrackEfforts::clone(rigid);
     let of_bodies =
         |a: &&Active| a.hypothesis.effect.layer == Layer::Body && !is_drive(&a.hypothesis);
     for active in actives.iter().filter(of_bodies) {
         if !add_shaped(problem, active, &mut body) {
-            bodies::add(problem, active, &rigid, &mut body);
+            bodies::add(problem, active, rigid, &mut body);
         }
     }
     scale(&mut body, &gains(actives, problem.joints));

@@ -53,12 +53,12 @@ impl Fit {
             actives,
             parts,
             efforts: OnceLock::new(),
-            residual: problem.measured.clone(),
+            residual: Vec::new(),
             variance: Vec::new(),
             squares: Vec::new(),
             count: Vec::new(),
         };
-        let mut residual = std::mem::take(&mut fit.residual);
+        let mut residual = problem.measured.clone();
         for joint in 0..problem.joints {
             let explained = if fit.parts.transformed[joint] {
                 let mut signal = vec![0.0; problem.rows];
