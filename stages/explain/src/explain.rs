@@ -124,9 +124,9 @@ pub fn explain(
         say: &say,
     };
     let penalties = vec![0.0; drives.len()];
-    let moving = search.run(drives, penalties);
+    let moving = search.first_guess(drives, penalties);
     // Where friction is not set-valued, standstills tell as much as motion.
-    progress(0.6, "standstills");
+    progress(0.3, "standstills");
     let rests_count: Vec<bool> = (0..joints.len())
         .map(|j| {
             let holds =
@@ -134,9 +134,13 @@ pub fn explain(
             !moving.fit.actives.iter().any(holds)
         })
         .collect();
-    let problem = setup.problem(&rests_count)?;
+    let with_rests = match rests_count.contains(&true) {
+        true => Some(setup.problem(&rests_count)?),
+        false => None,
+    };
+    let problem = with_rests.as_ref().unwrap_or(&problem);
     let search = Search {
-        problem: &problem,
+        problem,
         hypotheses: &hypotheses,
         say: &say,
     };
@@ -148,10 +152,10 @@ pub fn explain(
     } else {
         Vec::new()
     };
-    let before = Fit::new(&problem, scales).refined(&problem);
+    let before = Fit::new(problem, scales).refined(problem);
     let named = findings::of(&search, &found, &before, &input, &joints);
     progress(0.95, "proof");
-    let proof = setup.proof(&problem, &before, &found.fit)?;
+    let proof = setup.proof(problem, &before, &found.fit)?;
     let verdict = if found.fit.actives.iter().any(|a| a.curve.is_some()) {
         Verdict::UnknownRemains
     } else if named.findings.is_empty() {
@@ -170,7 +174,7 @@ pub fn explain(
         reason: None,
         summary: findings::summary(verdict, &named.findings, &proof.before, &proof.after),
         effort_unit: input.effort_unit.clone(),
-        located: locate::located(&problem, &before, &joints),
+        located: locate::located(problem, &before, &joints),
         undetectable: findings::undetectable(&search, &found, &joints),
         findings: named.findings,
         rejected: named.rejected,

@@ -16,7 +16,7 @@ use crate::problem::Problem;
 
 const MAX_ITERATIONS: usize = 12;
 /// A step that gains less log-likelihood than this is the last \[nats\].
-const CONVERGED: f64 = 1e-3;
+const CONVERGED: f64 = 0.02;
 /// Step of the difference quotient of a time \[s\].
 const TIME_STEP_S: f64 = 0.01;
 

@@ -55,13 +55,14 @@ pub struct Search<'a> {
 }
 
 impl Search<'_> {
+    /// Adds names one at a time, without a second look at any: enough to tell which joints have dry friction.
+    pub fn first_guess(&self, start: Vec<Active>, penalties: Vec<f64>) -> Explanation {
+        self.forward(self.begun(start, penalties))
+    }
+
     /// Finds the explanation, from pieces of physics with their penalties that are taken for true at first.
     pub fn run(&self, start: Vec<Active>, penalties: Vec<f64>) -> Explanation {
-        let mut best = Explanation {
-            fit: Fit::new(self.problem, start).refined(self.problem),
-            penalties,
-        };
-        best = self.pruned(best);
+        let mut best = self.begun(start, penalties);
         best = self.named(best);
         for joint in 0..self.problem.joints {
             if let Some(described) = self.described(&best, joint) {
@@ -70,6 +71,11 @@ impl Search<'_> {
             }
         }
         best
+    }
+
+    fn begun(&self, start: Vec<Active>, penalties: Vec<f64>) -> Explanation {
+        let fit = Fit::new(self.problem, start).refined(self.problem);
+        self.pruned(Explanation { fit, penalties })
     }
 
     /// Adds and exchanges names until nothing is gained.

@@ -30,11 +30,7 @@ impl Search<'_> {
 
     /// Takes each piece out, and each two at one joint, and tries all rivals in their place: once over all of them.
     pub(super) fn exchange(&self, mut best: Explanation) -> Explanation {
-        let own = |best: &Explanation| -> Vec<Hypothesis> {
-            let named = best.fit.actives.iter().map(|a| a.hypothesis);
-            named.filter(|h| !is_drive(h)).collect()
-        };
-        for piece in own(&best) {
+        for piece in pieces(&best) {
             let Some(index) = place_of(&best, piece) else {
                 continue;
             };
@@ -44,17 +40,17 @@ impl Search<'_> {
                 best = better;
             }
         }
-        let all = own(&best);
+        let all = pieces(&best);
         if all.len() > MOST_PAIRED {
             return best;
         }
         for (i, a) in all.iter().enumerate() {
             for b in &all[..i] {
-                let one_joint = a.only_joint().is_some() && a.only_joint() == b.only_joint();
+                let joint = |piece: &Piece| piece.0.only_joint();
                 let (Some(first), Some(second)) = (place_of(&best, *a), place_of(&best, *b)) else {
                     continue;
                 };
-                if !one_joint || first == second {
+                if joint(a).is_none() || joint(a) != joint(b) {
                     continue;
                 }
                 let (low, high) = (first.min(second), first.max(second));
@@ -87,11 +83,19 @@ impl Search<'_> {
     }
 }
 
+/// A piece of physics: a hypothesis, and the how-manieth of its kind it is.
+type Piece = (Hypothesis, usize);
+
+fn pieces(explanation: &Explanation) -> Vec<Piece> {
+    let all: Vec<Hypothesis> = explanation.fit.actives.iter().map(|a| a.hypothesis).collect();
+    let alike_before = |i: usize| all[..i].iter().filter(|h| **h == all[i]).count();
+    let numbered = (0..all.len()).map(|i| (all[i], alike_before(i)));
+    numbered.filter(|(h, _)| !is_drive(h)).collect()
+}
+
 /// Where a piece is in an explanation, if it still is.
-fn place_of(explanation: &Explanation, piece: Hypothesis) -> Option<usize> {
-    explanation
-        .fit
-        .actives
-        .iter()
-        .position(|a| a.hypothesis == piece)
+fn place_of(explanation: &Explanation, (hypothesis, alike_before): Piece) -> Option<usize> {
+    let actives = explanation.fit.actives.iter().enumerate();
+    let mut alike = actives.filter(|(_, a)| a.hypothesis == hypothesis);
+    alike.nth(alike_before).map(|(index, _)| index)
 }
