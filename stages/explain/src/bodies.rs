@@ -49,7 +49,18 @@ pub fn add(problem: &Problem, active: &Active, rigid: &[Vec<f64>], into: &mut [V
     }
 }
 
-/// The same as a signal, if it is so many times some units.
+/// What a unit of rotor inertia costs at a joint with rotor and link: the first factor of what has both.
+pub fn rotor(problem: &Problem, joint: usize) -> TrackEfforts {
+    let mut effort = silent(&problem.bare().body);
+    for (track, effort) in problem.tracks.iter().zip(&mut effort) {
+        let of_joint = effort.iter_mut().zip(&track.track.acceleration);
+        let of_joint = of_joint.skip(joint).step_by(problem.joints);
+        of_joint.for_each(|(effort, acceleration)| *effort = *acceleration);
+    }
+    effort
+}
+
+/// What a piece of physics of bodies costs as a signal, if it is so many times some units.
 pub fn signal(problem: &Problem, active: &Active) -> Option<Vec<f64>> {
     let (unit, factors) = in_units(problem, &*active.term(problem))?;
     let lock = || {

@@ -10,6 +10,7 @@ use crate::bodies::{self, TrackEfforts};
 use crate::efforts::{Efforts, change, column, recorded_on_top, scale, silent, subtract};
 use crate::fit::Fit;
 use crate::problem::Problem;
+use crate::search::has_rotor;
 
 /// The columns of a hypothesis at some shape.
 #[derive(Debug)]
@@ -199,6 +200,18 @@ fn computed(
     };
     let alone = at(&coordinates);
     let mut factors = Vec::with_capacity(steps.len());
+    if has_rotor(&hypothesis) && others.is_empty() {
+        let own = hypothesis.place.joint;
+        let mut values = vec![0.0; alone.values.len()];
+        let rotor = &mut values[problem.joint_rows(own)];
+        problem.joint_signal(&bodies::rotor(problem, own), own, rotor);
+        rotor.iter_mut().for_each(|value| *value *= gains[own]);
+        factors.push(Arc::new(Column { joint, values }));
+        return Columns {
+            alone: Some(alone),
+            factors,
+        };
+    }
     for (i, step) in steps {
         coordinates[i] = step;
         let mut column = at(&coordinates);
@@ -239,7 +252,10 @@ fn bodies_of(problem: &Problem, hypothesis: Hypothesis, shape: &[f64]) -> Arc<Bo
         }
         let alone = at(&coordinates);
         let mut factors = Vec::new();
-        for (i, step) in steps(hypothesis) {
+        if has_rotor(&hypothesis) {
+            factors.push(bodies::rotor(problem, hypothesis.place.joint));
+        }
+        for (i, step) in steps(hypothesis).into_iter().skip(factors.len()) {
             coordinates[i] = step;
             let mut unit = subtract(at(&coordinates), &alone);
             coordinates[i] = 0.0;

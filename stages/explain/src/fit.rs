@@ -15,8 +15,10 @@ use crate::parts::{Parts, is_kept};
 use crate::problem::Problem;
 
 const MAX_ITERATIONS: usize = 12;
-/// A step that gains less log-likelihood than this is the last \[nats\].
+/// A step that gains less log-likelihood than this is the last \[nats\], or less than this share of the distance from
+/// another explanation that it is compared with.
 const CONVERGED: f64 = 0.02;
+const CONVERGED_SHARE: f64 = 0.01;
 /// Step of the difference quotient of a time \[s\].
 const TIME_STEP_S: f64 = 0.01;
 
@@ -271,12 +273,13 @@ impl Fit {
     /// Improves all numbers together.
     #[must_use]
     pub fn refined(self, problem: &Problem) -> Self {
-        self.refined_at(problem, None)
+        self.refined_at(problem, None, f64::NAN)
     }
 
-    /// Improves the numbers of what touches these joints; all without them.
+    /// Improves the numbers of what touches these joints, all without them; as precisely as is needed to compare it with an
+    /// explanation of the likelihood `rival`, or wholly if that is NaN.
     #[must_use]
-    pub fn refined_at(mut self, problem: &Problem, joints: Option<&[usize]>) -> Self {
+    pub fn refined_at(mut self, problem: &Problem, joints: Option<&[usize]>, rival: f64) -> Self {
         let free = self.parameters_at(joints);
         if free.is_empty() {
             return self;
@@ -307,7 +310,8 @@ impl Fit {
                 }
                 damping *= 8.0;
             }
-            if gained.is_none_or(|gained| gained < CONVERGED) {
+            let enough = CONVERGED.max(CONVERGED_SHARE * (best - rival).abs());
+            if gained.is_none_or(|gained| gained < enough) {
                 break;
             }
         }

@@ -5,6 +5,24 @@ use nalgebra::{DMatrix, DVector};
 use crate::active::Column;
 use crate::problem::Problem;
 
+/// Sums are formed in this many parts, which a processor adds at once.
+const LANES: usize = 8;
+
+/// Sum of `weight * x * y`.
+pub fn weighted_dot(weight: &[f64], x: &[f64], y: &[f64]) -> f64 {
+    let mut sums = [0.0; LANES];
+    let (ws, w_rest) = weight.as_chunks::<LANES>();
+    let (xs, x_rest) = x.as_chunks::<LANES>();
+    let (ys, y_rest) = y.as_chunks::<LANES>();
+    for ((w, x), y) in ws.iter().zip(xs).zip(ys) {
+        for lane in 0..LANES {
+            sums[lane] += w[lane] * x[lane] * y[lane];
+        }
+    }
+    let rest = w_rest.iter().zip(x_rest).zip(y_rest);
+    sums.iter().sum::<f64>() + rest.map(|((w, x), y)| w * x * y).sum::<f64>()
+}
+
 /// The products of a set of columns with each other and with a residual, joint by joint.
 #[derive(Debug, Clone)]
 pub struct Products {
@@ -46,26 +64,17 @@ impl Products {
                 .collect();
             for a in 0..p {
                 let Some(x) = parts[a] else { continue };
-                let mut sum = 0.0;
-                for ((x, e), w) in x.iter().zip(e).zip(weight) {
-                    sum += w * x * e;
-                }
-                right[a] = sum;
+                right[a] = weighted_dot(weight, x, e);
                 for b in a..p {
                     let Some(y) = parts[b] else { continue };
-                    let mut sum = 0.0;
-                    for ((x, y), w) in x.iter().zip(y).zip(weight) {
-                        sum += w * x * y;
-                    }
-                    gram[(a, b)] = sum;
-                    gram[(b, a)] = sum;
+                    let product = weighted_dot(weight, x, y);
+                    gram[(a, b)] = product;
+                    gram[(b, a)] = product;
                 }
             }
             products.gram.push(gram);
             products.right.push(right);
-            products
-                .square
-                .push(e.iter().zip(weight).map(|(e, w)| w * e * e).sum());
+            products.square.push(weighted_dot(weight, e, e));
             products.count.push(weight.iter().sum());
         }
         products

@@ -27,6 +27,7 @@ pub mod report;
 pub mod search;
 pub mod smoother;
 mod standstill;
+mod trial;
 mod unknown;
 mod wall;
 pub mod watch;

@@ -3,7 +3,7 @@
 use std::borrow::Borrow;
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use tauscope_dynamics::terms::{CoordinateKind, PlaceKind, Scale};
 
 use crate::active::{Active, Column, Hypothesis};
@@ -11,6 +11,7 @@ use crate::columns::columns;
 use crate::fit::{Fit, likelihood, variances};
 use crate::least_squares::Products;
 use crate::problem::Problem;
+use crate::trial::{Factored, Trial};
 
 /// Steps of a shape of all joints.
 const MOST_STEPS_OF_ALL: usize = 12;
@@ -48,6 +49,7 @@ pub struct Base<'a> {
     /// How the fit changes with its own numbers.
     jacobian: Vec<Arc<Column>>,
     products: Products,
+    factored: Factored,
     /// Keeps shapes from running away in the linear step.
     ridge: Vec<f64>,
 
@@ -61,7 +63,7 @@ impl<'a> Base<'a> {
         let jacobian = fit.jacobian(problem);
         let references: Vec<&Column> = jacobian.iter().map(AsRef::as_ref).collect();
         let products = Products::new(problem, &references, &fit.residual, None);
-        let ridge = fit
+        let ridge: Vec<f64> = fit
             .parameters()
             .iter()
             .map(|&(i, c)| {
@@ -83,11 +85,13 @@ impl<'a> Base<'a> {
                 1.0 / (range * range)
             })
             .collect();
+        let factored = Factored::new(&products, &fit.variance, &ridge);
         Self {
             problem,
             fit,
             jacobian,
             products,
+            factored,
             ridge,
             library: (hypotheses.max(1) as f64).ln(),
         }
@@ -102,6 +106,28 @@ impl<'a> Base<'a> {
         0.5 * free as f64 * rows.max(2.0).ln() + self.library
     }
 
+    fn trial<C: Borrow<Column>>(&self, alone: Option<&Column>, columns: &[C]) -> Trial<'_> {
+        let own = (&self.jacobian[..], &self.products);
+        Trial::new(self.problem, self.fit, own, alone, columns)
+    }
+
+    /// What a hypothesis with these columns would gain to first order, as the variances are: to tell the best of many.
+    pub fn glance<C: Borrow<Column>>(
+        &self,
+        hypothesis: Hypothesis,
+        alone: Option<&Column>,
+        columns: &[C],
+    ) -> Option<f64> {
+        let trial = self.trial(alone, columns);
+        trial.gain(self.problem, &self.factored, &minimum(hypothesis))
+    }
+
+    /// The same at one shape.
+    pub fn glance_at(&self, hypothesis: Hypothesis, shape: &[f64]) -> Option<f64> {
+        let columns = columns(self.problem, self.fit, hypothesis, shape);
+        self.glance(hypothesis, columns.alone.as_ref(), &columns.factors)
+    }
+
     /// Tries `columns` as additional factors, after `alone` is taken off the residual. Gives the factors, the
     /// gain of log-likelihood and the size of it; `minimum` bounds the factors.
     pub fn try_columns<C: Borrow<Column>>(
@@ -110,7 +136,7 @@ impl<'a> Base<'a> {
         columns: &[C],
         minimum: &[f64],
     ) -> Option<(Vec<f64>, f64, f64)> {
-        let products = self.augmented(alone, columns);
+        let products = self.trial(alone, columns).products();
         let p = self.jacobian.len();
         let q = columns.len();
         let mut ridge = self.ridge.clone();
@@ -150,129 +176,44 @@ impl<'a> Base<'a> {
         Some((solution.rows(p, q).iter().copied().collect(), gain, size))
     }
 
-    /// The products of the fit's own columns and more, with the residual less `alone`.
-    fn augmented<C: Borrow<Column>>(&self, alone: Option<&Column>, more: &[C]) -> Products {
-        let problem = self.problem;
-        let (p, q) = (self.jacobian.len(), more.len());
-        let mut out = Products {
-            gram: Vec::with_capacity(problem.joints),
-            right: Vec::with_capacity(problem.joints),
-            square: self.products.square.clone(),
-            count: self.products.count.clone(),
-        };
-        let mut less = vec![0.0; problem.rows];
-        for j in 0..problem.joints {
-            let rows = problem.joint_rows(j);
-            let weight = &problem.weight[rows.clone()];
-            let mut e = &self.fit.residual[rows];
-            let mut gram = DMatrix::zeros(p + q, p + q);
-            gram.view_mut((0, 0), (p, p))
-                .copy_from(&self.products.gram[j]);
-            let mut right = DVector::zeros(p + q);
-            right.rows_mut(0, p).copy_from(&self.products.right[j]);
-            let dot = |a: &[f64], b: &[f64]| -> f64 {
-                a.iter()
-                    .zip(b)
-                    .zip(weight)
-                    .map(|((a, b), w)| w * a * b)
-                    .sum()
-            };
-            if let Some(taken) = alone.and_then(|column| column.of_joint(j, problem.rows)) {
-                for ((less, e), taken) in less.iter_mut().zip(e).zip(taken) {
-                    *less = e - taken;
-                }
-                e = &less;
-                out.square[j] = dot(e, e);
-                for (a, own) in self.jacobian.iter().enumerate() {
-                    if let Some(own) = own.of_joint(j, problem.rows) {
-                        right[a] = dot(own, e);
-                    }
-                }
-            }
-            for (a, new) in more.iter().enumerate() {
-                let Some(new) = new.borrow().of_joint(j, problem.rows) else {
-                    continue;
-                };
-                right[p + a] = dot(new, e);
-                for (b, own) in self.jacobian.iter().enumerate() {
-                    if let Some(own) = own.of_joint(j, problem.rows) {
-                        let product = dot(new, own);
-                        gram[(p + a, b)] = product;
-                        gram[(b, p + a)] = product;
-                    }
-                }
-                for (b, other) in more.iter().enumerate().skip(a) {
-                    if let Some(other) = other.borrow().of_joint(j, problem.rows) {
-                        let product = dot(new, other);
-                        gram[(p + a, p + b)] = product;
-                        gram[(p + b, p + a)] = product;
-                    }
-                }
-            }
-            out.gram.push(gram);
-            out.right.push(right);
-        }
-        out
-    }
-
     /// The best of a hypothesis over the grid of its shapes; effects in time have their own search.
     pub fn propose(&self, hypothesis: Hypothesis) -> Option<Proposal> {
-        let mut best: Option<Proposal> = None;
-        for shape in shapes(self.problem, hypothesis) {
-            if let Some(proposal) = self.propose_at(hypothesis, &shape)
-                && best.as_ref().is_none_or(|best| proposal.gain > best.gain)
-            {
-                best = Some(proposal);
-            }
-        }
-        best.map(|best| self.sharpened(hypothesis, best))
+        let grid = shapes(self.problem, hypothesis);
+        let (at, gain) = best_of(grid.iter().map(|shape| self.glance_at(hypothesis, shape)))?;
+        let penalty = self.penalty(grid[at].len(), hypothesis.only_joint());
+        let shape = match shape_index(hypothesis) {
+            Some(c) if gain > penalty => self.sharpened(hypothesis, c, &grid, (at, gain)),
+            _ => grid[at].clone(),
+        };
+        self.propose_at(hypothesis, &shape)
     }
 
-    /// Halves the grid's step about the best value of a single shape a few times, so that rivals are compared at their
-    /// best.
-    fn sharpened(&self, hypothesis: Hypothesis, mut best: Proposal) -> Proposal {
-        let shapes: Vec<usize> = (0..hypothesis.effect.coordinates.len())
-            .filter(|&c| {
-                matches!(
-                    hypothesis.effect.coordinates[c].kind,
-                    CoordinateKind::Shape { .. }
-                )
-            })
-            .collect();
-        let ([c], true) = (&shapes[..], best.evidence() > 0.0) else {
-            return best;
-        };
-        let grid: Vec<f64> = shapes_of(self.problem, hypothesis, *c);
-        let at = grid
-            .iter()
-            .position(|x| x.to_bits() == best.active.coordinates[*c].to_bits())
-            .unwrap_or(0);
-        let (mut below, mut above) = (
-            grid[at.saturating_sub(1)],
-            grid[(at + 1).min(grid.len() - 1)],
-        );
+    /// Halves the step of a grid of the single shape `c` about its best value a few times, so that rivals are compared at
+    /// their best.
+    fn sharpened(
+        &self,
+        hypothesis: Hypothesis,
+        c: usize,
+        grid: &[Vec<f64>],
+        (at, mut gain): (usize, f64),
+    ) -> Vec<f64> {
+        let mut best = grid[at].clone();
+        let mut below = grid[at.saturating_sub(1)][c];
+        let mut above = grid[(at + 1).min(grid.len() - 1)][c];
         for _ in 0..HALVINGS {
-            let centre = best.active.coordinates[*c];
+            let centre = best[c];
             let (left, right) = (0.5 * (below + centre), 0.5 * (centre + above));
-            let mut moved = false;
-            for value in [left, right] {
-                let mut shape = vec![0.0; hypothesis.effect.coordinates.len()];
-                shape[*c] = value;
-                if let Some(proposal) = self.propose_at(hypothesis, &shape)
-                    && proposal.gain > best.gain
+            (below, above) = (left, right);
+            for (value, around) in [(left, (below, centre)), (right, (centre, above))] {
+                let mut shape = best.clone();
+                shape[c] = value;
+                if let Some(other) = self.glance_at(hypothesis, &shape)
+                    && other > gain
                 {
-                    best = proposal;
-                    (below, above) = if value < centre {
-                        (below, centre)
-                    } else {
-                        (centre, above)
-                    };
-                    moved = true;
+                    (best, gain) = (shape, other);
+                    (below, above) = around;
                     break;
                 }
-            }
-            if !moved {
-                (below, above) = (left, right);
             }
         }
         best
@@ -293,14 +234,7 @@ impl<'a> Base<'a> {
         columns: &[C],
     ) -> Option<Proposal> {
         let factors = hypothesis.factors();
-        let minimum: Vec<f64> = factors
-            .iter()
-            .map(|&i| match hypothesis.effect.coordinates[i].kind {
-                CoordinateKind::Factor { minimum, .. } => minimum,
-                _ => f64::NEG_INFINITY,
-            })
-            .collect();
-        let (values, gain, size) = self.try_columns(alone, columns, &minimum)?;
+        let (values, gain, size) = self.try_columns(alone, columns, &minimum(hypothesis))?;
         let mut coordinates = shape.to_vec();
         for (&i, value) in factors.iter().zip(values) {
             coordinates[i] = value;
@@ -315,12 +249,30 @@ impl<'a> Base<'a> {
     }
 }
 
-/// The values of one shape in the grid of a hypothesis.
-fn shapes_of(problem: &Problem, hypothesis: Hypothesis, coordinate: usize) -> Vec<f64> {
-    shapes(problem, hypothesis)
+/// The least that the factors of a hypothesis may be.
+fn minimum(hypothesis: Hypothesis) -> Vec<f64> {
+    let factors = hypothesis.factors();
+    let of = factors
         .iter()
-        .map(|shape| shape[coordinate])
-        .collect()
+        .map(|&i| match hypothesis.effect.coordinates[i].kind {
+            CoordinateKind::Factor { minimum, .. } => minimum,
+            _ => f64::NEG_INFINITY,
+        });
+    of.collect()
+}
+
+/// The only shape of a hypothesis, if there is one.
+fn shape_index(hypothesis: Hypothesis) -> Option<usize> {
+    let coordinates = hypothesis.effect.coordinates.iter().enumerate();
+    let mut shapes = coordinates.filter(|(_, c)| matches!(c.kind, CoordinateKind::Shape { .. }));
+    let (first, _) = shapes.next()?;
+    shapes.next().is_none().then_some(first)
+}
+
+/// Where the largest of some gains is, and the gain.
+pub fn best_of(gains: impl Iterator<Item = Option<f64>>) -> Option<(usize, f64)> {
+    let known = gains.enumerate().filter_map(|(i, gain)| Some((i, gain?)));
+    known.max_by(|(_, a), (_, b)| a.total_cmp(b))
 }
 
 /// The grid of a hypothesis' shapes; factors are 0 in it.

@@ -70,6 +70,8 @@ impl Search<'_> {
                 best = self.named(self.pruned(described));
             }
         }
+        // What it was compared with until now is no measure of how precise its numbers are to be.
+        best.fit = best.fit.refined(self.problem);
         best
     }
 
@@ -146,7 +148,8 @@ impl Search<'_> {
             let base = Base::new(self.problem, &from.fit, self.hypotheses.len());
             let curve = base.propose_curve(joint)?;
             let fit = from.fit.with(self.problem, curve.active);
-            let mut actives = fit.refined_at(self.problem, Some(&[joint])).actives;
+            let rival = from.fit.likelihood();
+            let mut actives = fit.refined_at(self.problem, Some(&[joint]), rival).actives;
             if let Some(curve) = actives.last_mut() {
                 unknown::keep_what_is_evident(curve);
             }
@@ -165,7 +168,8 @@ impl Search<'_> {
                 bare.penalties.remove(i);
             }
             bare.fit = Fit::new(self.problem, bare.fit.actives);
-            bare.fit = bare.fit.refined_at(self.problem, Some(&[joint]));
+            let rival = best.fit.likelihood();
+            bare.fit = bare.fit.refined_at(self.problem, Some(&[joint]), rival);
             if let Some(instead) = with(&bare)
                 && instead.ahead_of(best, &white) > CURVE_EVIDENCE
             {
@@ -270,7 +274,7 @@ impl Search<'_> {
         while pieces(&best) < MOST_PIECES {
             let mut proposals = self.proposals(&best.fit, &all);
             proposals.retain(|p| !barred.contains(&p.active.hypothesis));
-            let Some(next) = self.best_of(&best, &proposals) else {
+            let Some(next) = self.best_of(&best, &proposals, best.fit.likelihood()) else {
                 break;
             };
             (self.say)(&format!("+ {}", describe(&next)));
@@ -288,8 +292,14 @@ impl Search<'_> {
         best
     }
 
-    /// The best explanation with one of the proposals, if there is evidence enough for any.
-    fn best_of(&self, now: &Explanation, proposals: &[Proposal]) -> Option<Explanation> {
+    /// The best explanation with one of the proposals, if there is evidence enough for any, refined to be compared with a
+    /// `rival` likelihood.
+    fn best_of(
+        &self,
+        now: &Explanation,
+        proposals: &[Proposal],
+        rival: f64,
+    ) -> Option<Explanation> {
         let worth = &self.problem.worth;
         let worthy = proposals.iter().filter(|p| {
             let (evidence, size) = needs(p.active.hypothesis, &now.fit);
@@ -298,7 +308,7 @@ impl Search<'_> {
         });
         let mut able: Vec<(Explanation, &Proposal)> = Vec::new();
         let worthy: Vec<&Proposal> = worthy.take(REFINED).collect();
-        let joined = parallel::map(&worthy, |proposal| self.joined(now, proposal));
+        let joined = parallel::map(&worthy, |proposal| self.joined(now, proposal, rival));
         for (next, proposal) in joined.into_iter().zip(worthy) {
             let (evidence, _) = needs(proposal.active.hypothesis, &now.fit);
             let evident = next.ahead_of(now, worth) >= evidence || overwhelming(&next, now);
@@ -316,12 +326,12 @@ impl Search<'_> {
         .map(|(next, _)| next)
     }
 
-    /// An explanation with a proposal, refined where it touches.
-    pub fn joined(&self, now: &Explanation, proposal: &Proposal) -> Explanation {
+    /// An explanation with a proposal, refined where it touches to be compared with a `rival` likelihood.
+    pub fn joined(&self, now: &Explanation, proposal: &Proposal, rival: f64) -> Explanation {
         let joints = Fit::joints_of(&proposal.active.hypothesis, self.problem.joints);
         let fit = now.fit.with(self.problem, proposal.active.clone());
         Explanation {
-            fit: fit.refined_at(self.problem, Some(&joints)),
+            fit: fit.refined_at(self.problem, Some(&joints), rival),
             penalties: [&now.penalties[..], &[proposal.penalty]].concat(),
         }
     }
@@ -389,10 +399,11 @@ impl Search<'_> {
         penalties.remove(index);
         let joints = Fit::joints_of(&from.fit.actives[index].hypothesis, self.problem.joints);
         Explanation {
-            fit: from
-                .fit
-                .without(self.problem, index)
-                .refined_at(self.problem, Some(&joints)),
+            fit: from.fit.without(self.problem, index).refined_at(
+                self.problem,
+                Some(&joints),
+                from.fit.likelihood(),
+            ),
             penalties,
         }
     }

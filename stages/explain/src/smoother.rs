@@ -93,23 +93,21 @@ impl LowPass {
     pub fn apply(&self, x: &mut [f64]) {
         let n = self.diagonal.len();
         assert_eq!(x.len(), n, "one number per sample");
-        for i in 0..n {
-            let l = &self.bands[i];
-            let mut value = self.weight[i] * x[i];
-            for k in 1..=3.min(i) {
-                value -= l[k - 1] * x[i - k];
-            }
-            x[i] = value;
+        // The newest of the three before comes last: each step waits for it alone.
+        let mut before = [0.0; 3];
+        for ((x, l), weight) in x.iter_mut().zip(&self.bands).zip(&self.weight) {
+            let rest = weight * *x - l[2] * before[2] - l[1] * before[1];
+            *x = rest - l[0] * before[0];
+            before = [*x, before[0], before[1]];
         }
         for (value, pivot) in x.iter_mut().zip(&self.diagonal) {
             *value /= pivot;
         }
-        for i in (0..n).rev() {
-            let mut value = x[i];
-            for k in 1..=3.min(n - 1 - i) {
-                value -= self.bands[i + k][k - 1] * x[i + k];
-            }
-            x[i] = value;
+        // Here the three after, each already times its own band.
+        let mut owed = [0.0; 3];
+        for (x, l) in x.iter_mut().zip(&self.bands).rev() {
+            *x -= owed[0];
+            owed = [owed[1] + l[0] * *x, owed[2] + l[1] * *x, l[2] * *x];
         }
     }
 }

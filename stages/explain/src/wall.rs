@@ -22,7 +22,7 @@ impl Base<'_> {
         }
         let total: Vector3<f64> = contacts.iter().map(|(_, force)| force).sum();
         let mut direction = -total.try_normalize(1e-9)?;
-        let mut best: Option<Proposal> = None;
+        let mut best: Option<(f64, [f64; 4])> = None;
         // The force of each sample is uncertain where the arm cannot feel it; leaning towards those that agree helps.
         for _ in 0..3 {
             let agreeing: Vector3<f64> = contacts
@@ -41,14 +41,14 @@ impl Base<'_> {
                 let azimuth = direction.y.atan2(direction.x);
                 let elevation = direction.z.clamp(-1.0, 1.0).asin();
                 let shape = [0.0, azimuth, elevation, offset];
-                if let Some(proposal) = self.propose_at(hypothesis, &shape)
-                    && best.as_ref().is_none_or(|best| proposal.gain > best.gain)
+                if let Some(gain) = self.glance_at(hypothesis, &shape)
+                    && best.is_none_or(|(most, _)| gain > most)
                 {
-                    best = Some(proposal);
+                    best = Some((gain, shape));
                 }
             }
         }
-        best
+        self.propose_at(hypothesis, &best?.1)
     }
 
     /// Samples at which a force on the last moving link is evident: where its frame is, and the force \[N\].

@@ -8,12 +8,14 @@ use tauscope_dynamics::terms::CoordinateKind;
 
 use crate::active::{Column, Hypothesis};
 use crate::columns::columns;
-use crate::propose::{Base, Proposal};
+use crate::propose::{Base, Proposal, best_of};
 
 /// Shortest interval that is looked for \[s\].
 const SHORTEST_S: f64 = 0.35;
 /// How many of the best intervals are tried exactly.
 const TRIED: usize = 4;
+/// A change needs so many rows on either side of it.
+const LEAST_ROWS: usize = 8;
 /// Steps per recording that change points and intervals are looked for on, at most.
 const STEPS: usize = 100;
 /// Factors beyond these are left out of the scan: inertias hardly show in it.
@@ -75,38 +77,39 @@ impl Base<'_> {
         // With the change before everything, the second factor's column is the whole effect.
         let whole = all.factors.last()?;
         let joint = whole.joint?;
-        let mut best: Option<Proposal> = None;
+        let split = |first: usize| {
+            let (mut before, mut after) = (Column::clone(whole), Column::clone(whole));
+            before.values[first..].fill(0.0);
+            after.values[..first].fill(0.0);
+            [before, after]
+        };
+        let weight = &problem.weight[problem.joint_rows(joint)];
+        let moves = |(value, weight): (&f64, &f64)| *value != 0.0 && *weight > 0.0;
+        let rows: Vec<usize> = (0..problem.rows)
+            .filter(|&row| moves((&whole.values[row], &weight[row])))
+            .collect();
+        let mut times = Vec::new();
         for track in &problem.tracks {
-            let rows = track.rows();
-            let stride = (rows.len() / STEPS).max(1);
-            for first in rows.clone().step_by(stride) {
-                let (mut before, mut after) = (Column::clone(whole), Column::clone(whole));
-                before.values[first..].fill(0.0);
-                after.values[..first].fill(0.0);
-                let moves = |c: &Column| {
-                    let weight = &problem.weight[problem.joint_rows(joint)];
-                    c.values
-                        .iter()
-                        .zip(weight)
-                        .filter(|(v, w)| **v != 0.0 && **w > 0.0)
-                        .count()
-                };
-                if moves(&before) < 8 || moves(&after) < 8 {
-                    continue;
-                }
-                let at = track.compared[first - rows.start];
-                shape[time] = track.track.session_s + track.track.time_s[at];
-                let proposal = self.propose_columns(hypothesis, &shape, None, &[before, after]);
-                if let Some(mut proposal) = proposal
-                    && best.as_ref().is_none_or(|best| proposal.gain > best.gain)
-                {
-                    // One of as many times as were tried.
-                    proposal.penalty += (STEPS as f64).ln();
-                    best = Some(proposal);
+            let own = track.rows();
+            let stride = (own.len() / STEPS).max(1);
+            for first in own.clone().step_by(stride) {
+                let before = rows.partition_point(|row| *row < first);
+                if before >= LEAST_ROWS && rows.len() - before >= LEAST_ROWS {
+                    let at = track.compared[first - own.start];
+                    times.push((first, track.track.session_s + track.track.time_s[at]));
                 }
             }
         }
-        best
+        let glances = times
+            .iter()
+            .map(|&(first, _)| self.glance(hypothesis, None, &split(first)));
+        let (best, _) = best_of(glances)?;
+        let (first, time_s) = times[best];
+        shape[time] = time_s;
+        let mut proposal = self.propose_columns(hypothesis, &shape, None, &split(first))?;
+        // One of as many times as were tried.
+        proposal.penalty += (STEPS as f64).ln();
+        Some(proposal)
     }
 
     /// Factors within an interval, of one track or of all.
@@ -119,22 +122,23 @@ impl Base<'_> {
         let all = columns(problem, self.fit, hypothesis, &shape);
         let all = &all.factors;
         let scanned = &all[..all.len().min(SCANNED_FACTORS)];
-        let mut best: Option<Proposal> = None;
-        for (from_s, to_s) in self.scan(scanned, only) {
-            let masked: Vec<Column> = all
-                .iter()
+        let intervals = self.scan(scanned, only);
+        let masked = |(from_s, to_s): (f64, f64)| -> Vec<Column> {
+            all.iter()
                 .map(|c| self.within(c, from_s, to_s, only))
-                .collect();
-            let session_s = only.map_or(0.0, |track| problem.tracks[track].track.session_s);
-            (shape[start], shape[end]) = (session_s + from_s, session_s + to_s);
-            if let Some(mut proposal) = self.propose_columns(hypothesis, &shape, None, &masked)
-                && best.as_ref().is_none_or(|best| proposal.gain > best.gain)
-            {
-                proposal.penalty += 2.0 * (STEPS as f64).ln();
-                best = Some(proposal);
-            }
-        }
-        best
+                .collect()
+        };
+        let glances = intervals
+            .iter()
+            .map(|&interval| self.glance(hypothesis, None, &masked(interval)));
+        let (best, _) = best_of(glances)?;
+        let (from_s, to_s) = intervals[best];
+        let session_s = only.map_or(0.0, |track| problem.tracks[track].track.session_s);
+        (shape[start], shape[end]) = (session_s + from_s, session_s + to_s);
+        let masked = masked(intervals[best]);
+        let mut proposal = self.propose_columns(hypothesis, &shape, None, &masked)?;
+        proposal.penalty += 2.0 * (STEPS as f64).ln();
+        Some(proposal)
     }
 
     /// A column with what lies outside an interval of recording time \[s\] set to zero.

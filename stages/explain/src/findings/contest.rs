@@ -42,7 +42,7 @@ pub fn contest(
         .iter()
         .filter(|p| p.active.hypothesis != active.hypothesis && p.evidence() > 0.0);
     for proposal in rivals.take(RIVALS) {
-        let other = search.joined(less, proposal);
+        let other = search.joined(less, proposal, found.fit.likelihood());
         let behind = found.ahead_of(&other, efficiency);
         let hypothesis = proposal.active.hypothesis;
         if behind < TIE.max(TIE_SHARE * evidence) {

@@ -25,7 +25,7 @@ impl Search<'_> {
             .filter(|p| p.gain > COULD_DO_BETTER * gain)
             .cloned()
             .collect();
-        self.best_of(without, &able)
+        self.best_of(without, &able, best.fit.likelihood())
     }
 
     /// Takes each piece out, and each two at one joint, and tries all rivals in their place: once over all of them.
@@ -87,7 +87,12 @@ impl Search<'_> {
 type Piece = (Hypothesis, usize);
 
 fn pieces(explanation: &Explanation) -> Vec<Piece> {
-    let all: Vec<Hypothesis> = explanation.fit.actives.iter().map(|a| a.hypothesis).collect();
+    let all: Vec<Hypothesis> = explanation
+        .fit
+        .actives
+        .iter()
+        .map(|a| a.hypothesis)
+        .collect();
     let alike_before = |i: usize| all[..i].iter().filter(|h| **h == all[i]).count();
     let numbered = (0..all.len()).map(|i| (all[i], alike_before(i)));
     numbered.filter(|(h, _)| !is_drive(h)).collect()
