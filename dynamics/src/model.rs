@@ -100,6 +100,12 @@ impl Link {
     pub fn com_m(&self) -> [f64; 3] {
         self.inertia.com_m()
     }
+
+    /// How far its mass is from its centre, as the root of the mean square \[m\]; NaN without a mass.
+    pub fn gyration_radius_m(&self) -> f64 {
+        let [xx, _, _, yy, _, zz] = self.inertia.inertia_about_com_kgm2();
+        (0.5 * (xx + yy + zz) / self.mass_kg()).sqrt()
+    }
 }
 
 /// A moving body: a joint's child link and all that is fixed to it. Its frame has the joint's axis as

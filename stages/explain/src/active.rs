@@ -5,7 +5,7 @@ use tauscope_dynamics::terms::{
     table,
 };
 
-use tauscope_dynamics::Model;
+use tauscope_dynamics::{Inertia, Model};
 
 use crate::drive::is_drive;
 use crate::problem::Problem;
@@ -20,6 +20,14 @@ pub struct Whereabouts {
     /// The link.
     pub link: usize,
 }
+
+/// Inertial parameters of a body.
+const BODY: usize = 10;
+/// From which of them on they are its inertia.
+const FIRST_OF_INERTIA: usize = 4;
+
+/// A body has no mass to spare in a direction in which its spread is below this share of the largest.
+const EDGE: f64 = 1e-6;
 
 /// Slow, but fast enough for a sign.
 const SLOW_RAD_S: f64 = 0.02;
@@ -100,6 +108,16 @@ impl Hypothesis {
     /// Whether it depends on what the gear transmits.
     pub fn needs_load(&self) -> bool {
         self.effect.name == "load_dependent_friction"
+    }
+
+    /// Whether its first ten coordinates are those of a body, see [`Inertia::parameters`].
+    fn is_body(&self) -> bool {
+        self.effect.place == PlaceKind::Tool && self.effect.coordinates.len() >= BODY
+    }
+
+    /// Whether a coordinate belongs to the inertia of a body.
+    pub fn is_inertia(&self, coordinate: usize) -> bool {
+        self.is_body() && (FIRST_OF_INERTIA..BODY).contains(&coordinate)
     }
 
     /// Whether all its coordinates are factors.
@@ -201,6 +219,28 @@ impl Active {
     pub fn kind(&self, coordinate: usize) -> CoordinateKind {
         let of_effect = self.hypothesis.effect.coordinates.get(coordinate);
         of_effect.map_or(Coordinate::factor("value_nm").kind, |c| c.kind)
+    }
+
+    /// The body that it is, if it is one.
+    pub fn body(&self) -> Option<Inertia> {
+        let ten = self.coordinates.first_chunk::<BODY>();
+        ten.filter(|_| self.hypothesis.is_body())
+            .map(|ten| Inertia::from_parameters(*ten))
+    }
+
+    /// Makes the body that it is, if it is one, one whose mass is nowhere negative; whether it was not.
+    pub fn make_consistent(&mut self) -> bool {
+        let Some(body) = self.body() else {
+            return false;
+        };
+        let nearest = body.nearest_consistent();
+        self.coordinates[..BODY].copy_from_slice(&nearest.parameters());
+        nearest != body
+    }
+
+    /// Whether it is a body that has no mass to spare in some direction.
+    pub fn is_at_edge(&self) -> bool {
+        self.body().is_some_and(|body| body.least_spread() <= EDGE)
     }
 
     /// Its parameters, as reports hold them.

@@ -1,8 +1,7 @@
-//! All numbers of an explanation fitted at once: Gauss-Newton with Levenberg's damping on the filtered effort.
+//! An explanation with its numbers: what it says of the recordings, what it leaves, and how both change with each number.
 
 use std::sync::{Arc, OnceLock};
 
-use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::{CoordinateKind, Layer, PlaceKind, Scale};
 
 use crate::active::{Active, Column, Hypothesis};
@@ -14,11 +13,6 @@ use crate::least_squares::Products;
 use crate::parts::{Parts, is_kept};
 use crate::problem::Problem;
 
-const MAX_ITERATIONS: usize = 12;
-/// A step that gains less log-likelihood than this is the last \[nats\], or less than this share of the distance from
-/// another explanation that it is compared with.
-const CONVERGED: f64 = 0.02;
-const CONVERGED_SHARE: f64 = 0.01;
 /// Step of the difference quotient of a time \[s\].
 const TIME_STEP_S: f64 = 0.01;
 
@@ -48,7 +42,7 @@ impl Fit {
     }
 
     /// The same, where much is as in the fit `before`.
-    fn beside(problem: &Problem, actives: Vec<Active>, before: Option<&Self>) -> Self {
+    pub(crate) fn beside(problem: &Problem, actives: Vec<Active>, before: Option<&Self>) -> Self {
         let known = before.map(|before| (&before.actives[..], &before.parts));
         let parts = Parts::new(problem, &actives, known);
         let mut fit = Self {
@@ -270,70 +264,6 @@ impl Fit {
         Column { joint, values }
     }
 
-    /// Improves all numbers together.
-    #[must_use]
-    pub fn refined(self, problem: &Problem) -> Self {
-        self.refined_at(problem, None, f64::NAN)
-    }
-
-    /// Improves the numbers of what touches these joints, all without them; as precisely as is needed to compare it with an
-    /// explanation of the likelihood `rival`, or wholly if that is NaN.
-    #[must_use]
-    pub fn refined_at(mut self, problem: &Problem, joints: Option<&[usize]>, rival: f64) -> Self {
-        let free = self.parameters_at(joints);
-        if free.is_empty() {
-            return self;
-        }
-        let mut damping = 1e-4;
-        let mut best = self.likelihood();
-        for _ in 0..MAX_ITERATIONS {
-            let jacobian = self.jacobian_at(problem, joints);
-            let columns: Vec<&Column> = jacobian.iter().map(AsRef::as_ref).collect();
-            let products = Products::new(problem, &columns, &self.residual, None);
-            let ridge = vec![0.0; columns.len()];
-            let (normal, right) = products.normal(&self.variance, &ridge);
-            let mut gained = None;
-            for _ in 0..6 {
-                let Some(step) = damped(&normal, &right, damping) else {
-                    damping *= 10.0;
-                    continue;
-                };
-                let moved = self.moved(problem, &free, &step);
-                let next = Self::beside(problem, moved, Some(&self));
-                let likelihood = next.likelihood();
-                if likelihood > best {
-                    gained = Some(likelihood - best);
-                    best = likelihood;
-                    self = next;
-                    damping = (damping * 0.2).max(1e-9);
-                    break;
-                }
-                damping *= 8.0;
-            }
-            let enough = CONVERGED.max(CONVERGED_SHARE * (best - rival).abs());
-            if gained.is_none_or(|gained| gained < enough) {
-                break;
-            }
-        }
-        self
-    }
-
-    /// The physics with its coordinates moved by `step`, within their bounds.
-    fn moved(
-        &self,
-        problem: &Problem,
-        parameters: &[(usize, usize)],
-        step: &DVector<f64>,
-    ) -> Vec<Active> {
-        let mut actives = self.actives.clone();
-        for (&(i, c), step) in parameters.iter().zip(step) {
-            let (lower, upper) = bounds(problem, &actives[i], c);
-            let value = &mut actives[i].coordinates[c];
-            *value = (*value + step).clamp(lower, upper);
-        }
-        actives
-    }
-
     /// The fit with one of its pieces of physics taken out, not refined.
     #[must_use]
     pub fn without(&self, problem: &Problem, index: usize) -> Self {
@@ -367,18 +297,6 @@ pub fn variances(problem: &Problem, squares: &[f64], count: &[f64]) -> Vec<f64> 
         .collect()
 }
 
-fn damped(normal: &DMatrix<f64>, right: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
-    let p = right.len();
-    let scale: Vec<f64> = (0..p).map(|a| normal[(a, a)].max(1e-300).sqrt()).collect();
-    let mut scaled = DMatrix::from_fn(p, p, |a, b| normal[(a, b)] / (scale[a] * scale[b]));
-    for a in 0..p {
-        scaled[(a, a)] += damping + 1e-10;
-    }
-    let rhs = DVector::from_fn(p, |a, _| right[a] / scale[a]);
-    let solved = scaled.cholesky()?.solve(&rhs);
-    Some(DVector::from_fn(p, |a, _| solved[a] / scale[a]))
-}
-
 /// Step of the difference quotient of a coordinate.
 fn step_of(problem: &Problem, active: &Active, c: usize) -> f64 {
     let value = active.coordinates[c];
@@ -397,27 +315,5 @@ fn step_of(problem: &Problem, active: &Active, c: usize) -> f64 {
             }
         },
         CoordinateKind::RecordingTime | CoordinateKind::SessionTime => TIME_STEP_S,
-    }
-}
-
-/// Lowest and highest value of a coordinate.
-fn bounds(problem: &Problem, active: &Active, c: usize) -> (f64, f64) {
-    match active.kind(c) {
-        CoordinateKind::Factor { minimum, .. } => (minimum, f64::INFINITY),
-        CoordinateKind::Shape {
-            lower,
-            upper,
-            scale,
-            ..
-        } => match scale {
-            Scale::OfEffort => {
-                let largest = problem.largest_effort[active.hypothesis.place.joint];
-                (lower * largest, 1.1 * upper * largest)
-            }
-            Scale::Log | Scale::Linear => (lower, upper),
-        },
-        CoordinateKind::RecordingTime | CoordinateKind::SessionTime => {
-            (f64::NEG_INFINITY, f64::INFINITY)
-        }
     }
 }

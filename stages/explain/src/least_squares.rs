@@ -23,6 +23,38 @@ pub fn weighted_dot(weight: &[f64], x: &[f64], y: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + rest.map(|((w, x), y)| w * x * y).sum::<f64>()
 }
 
+/// Least share that is added to the diagonal, so that columns that are nearly dependent may be solved for.
+const LEAST_DAMPING: f64 = 1e-10;
+
+/// Solves normal equations for the columns in `used`, the others stay at 0, with `damping` in shares of the diagonal (Levenberg
+/// and Marquardt). `None` if the columns are not independent even so.
+pub fn solved(
+    normal: &DMatrix<f64>,
+    right: &DVector<f64>,
+    used: &[bool],
+    damping: f64,
+) -> Option<DVector<f64>> {
+    let index: Vec<usize> = (0..used.len()).filter(|&i| used[i]).collect();
+    let m = index.len();
+    let scale: Vec<f64> = index
+        .iter()
+        .map(|&i| normal[(i, i)].max(1e-300).sqrt())
+        .collect();
+    let mut scaled = DMatrix::from_fn(m, m, |a, b| {
+        normal[(index[a], index[b])] / (scale[a] * scale[b])
+    });
+    for a in 0..m {
+        scaled[(a, a)] += damping + LEAST_DAMPING;
+    }
+    let side = DVector::from_fn(m, |a, _| right[index[a]] / scale[a]);
+    let within = scaled.cholesky()?.solve(&side);
+    let mut solution = DVector::zeros(used.len());
+    for (a, &i) in index.iter().enumerate() {
+        solution[i] = within[a] / scale[a];
+    }
+    Some(solution)
+}
+
 /// The products of a set of columns with each other and with a residual, joint by joint.
 #[derive(Debug, Clone)]
 pub struct Products {
@@ -119,21 +151,7 @@ impl Products {
     /// `used` left at 0. `None` if the columns are not independent even so.
     pub fn solve(&self, variance: &[f64], ridge: &[f64], used: &[bool]) -> Option<DVector<f64>> {
         let (normal, right) = self.normal(variance, ridge);
-        let index: Vec<usize> = (0..used.len()).filter(|&i| used[i]).collect();
-        let m = index.len();
-        let small = DMatrix::from_fn(m, m, |a, b| normal[(index[a], index[b])]);
-        let scale: Vec<f64> = (0..m).map(|a| small[(a, a)].max(1e-300).sqrt()).collect();
-        let mut scaled = DMatrix::from_fn(m, m, |a, b| small[(a, b)] / (scale[a] * scale[b]));
-        for a in 0..m {
-            scaled[(a, a)] += 1e-10;
-        }
-        let rhs = DVector::from_fn(m, |a, _| right[index[a]] / scale[a]);
-        let solved = scaled.cholesky()?.solve(&rhs);
-        let mut solution = DVector::zeros(used.len());
-        for (a, &i) in index.iter().enumerate() {
-            solution[i] = solved[a] / scale[a];
-        }
-        Some(solution)
+        solved(&normal, &right, used, 0.0)
     }
 
     /// The normal equations for these variances by joint.

@@ -23,6 +23,7 @@ pub mod problem;
 mod proof;
 pub mod propose;
 pub mod recording;
+mod refine;
 pub mod report;
 pub mod search;
 pub mod smoother;
