@@ -66,3 +66,71 @@ impl Expansion {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::super::tests::{TwoJoints, motion, run};
+    use super::super::{effect, tests::Instant};
+    use super::*;
+
+    fn along(robot: &TwoJoints, motion: &[Instant]) -> Expansion {
+        let mut data = Data::new(&robot.model);
+        let mut all = Expansion::new(&robot.model, 0);
+        for at in motion {
+            all.push(
+                &robot.model,
+                &mut data,
+                &at.position,
+                &at.velocity,
+                &at.acceleration,
+            );
+        }
+        all
+    }
+
+    #[test]
+    fn near_the_motion_it_is_the_rigid_body() {
+        let robot = TwoJoints::new();
+        let motion = motion(&robot.model, 50);
+        let all = along(&robot, &motion);
+        let mut data = Data::new(&robot.model);
+        let [q, qd, qdd] = [0.05, -0.4, 3.0];
+        for (k, at) in motion.iter().enumerate() {
+            let exact = rnea(
+                &robot.model,
+                &mut data,
+                &[at.position[0] + q, at.position[1]],
+                &[at.velocity[0] + qd, at.velocity[1]],
+                &[at.acceleration[0] + qdd, at.acceleration[1]],
+            );
+            let mut near = [0.0; 2];
+            all.effort(k, [q, qd, qdd], &mut near);
+            for (near, exact) in near.iter().zip(exact) {
+                assert!((near - exact).abs() < 0.02, "{near} for {exact}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_term_that_was_given_one_costs_the_same() {
+        let robot = TwoJoints::new();
+        let motion = motion(&robot.model, 300);
+        let all = Arc::new(along(&robot, &motion));
+        for (name, shape) in [("joint_elasticity", 800.0), ("backlash", 0.004)] {
+            let build = || (effect(name).unwrap().build)(&robot.site(), &[0.2, shape]);
+            let alone = run(&mut *build(), &motion);
+            let mut expanded = build();
+            expanded.expand(&all);
+            let expanded = run(&mut *expanded, &motion);
+            let largest = alone
+                .iter()
+                .flatten()
+                .fold(0.0_f64, |most, e| most.max(e.abs()));
+            for (a, b) in alone.iter().flatten().zip(expanded.iter().flatten()) {
+                assert!((a - b).abs() < 0.01 * largest, "{name}: {a}, expanded {b}");
+            }
+        }
+    }
+}

@@ -22,6 +22,7 @@ pub(super) static EFFECT: Effect = Effect {
                 against: Against::Position,
                 of_joint: site.joint,
                 by_direction: false,
+                period: None,
                 knots: vec![0.0],
                 values: vec![0.0],
             },
@@ -61,7 +62,7 @@ impl Against {
     }
 }
 
-/// A curve through knots, straight between them and held at the ends.
+/// A curve through knots, straight between them and held at the ends, or repeated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
     /// What it is drawn against.
@@ -70,6 +71,8 @@ pub struct Table {
     pub of_joint: usize,
     /// Whether the effort turns its sign with the joint's direction of motion, as friction's does.
     pub by_direction: bool,
+    /// After how much of what it is drawn against it repeats, if it does: more than the knots span.
+    pub period: Option<f64>,
     /// Where the curve is given, rising.
     pub knots: Vec<f64>,
     /// Effort at the knots \[N m or N\].
@@ -88,6 +91,9 @@ pub struct TableSpec {
     /// Whether the effort turns its sign with the joint's direction of motion, as friction's does.
     #[serde(default)]
     pub by_direction: bool,
+    /// After how much of what it is drawn against it repeats, if it does: more than the knots span.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub period: Option<f64>,
     /// Where the curve is given, rising.
     pub knots: Vec<f64>,
     /// Effort at the knots \[N m or N\].
@@ -100,6 +106,7 @@ impl TableSpec {
             against: table.against,
             of_joint: Some(model.joints()[table.of_joint].name.clone()),
             by_direction: table.by_direction,
+            period: table.period,
             knots: table.knots.clone(),
             values: table.values.clone(),
         }
@@ -110,6 +117,7 @@ impl TableSpec {
             against: self.against,
             of_joint,
             by_direction: self.by_direction,
+            period: self.period,
             knots: self.knots.clone(),
             values: self.values.clone(),
         }
@@ -119,8 +127,8 @@ impl TableSpec {
 /// Makes an `unknown` effect of the curve `table` in the joint of `site`.
 ///
 /// # Errors
-/// If the curve has no knots, their number is not that of the values, they do not rise, or a number is
-/// not finite.
+/// If the curve has no knots, their number is not that of the values, they do not rise, the period is not longer than they
+/// span, or a number is not finite.
 pub fn table(site: &Site<'_>, table: Table) -> Result<Box<dyn Term>, TermError> {
     let wrong = |reason| Err(TermError::Table { reason });
     if table.knots.is_empty() {
@@ -135,6 +143,13 @@ pub fn table(site: &Site<'_>, table: Table) -> Result<Box<dyn Term>, TermError> 
     }
     if table.knots.windows(2).any(|pair| pair[0] >= pair[1]) {
         return wrong("`knots` do not rise");
+    }
+    let span = table.knots[table.knots.len() - 1] - table.knots[0];
+    if table
+        .period
+        .is_some_and(|period| !period.is_finite() || period <= span)
+    {
+        return wrong("`period` is not longer than the span of the knots");
     }
     Ok(Box::new(Curve {
         joint: site.joint,
@@ -151,16 +166,22 @@ struct Curve {
 impl Table {
     /// The curve at `x`.
     fn at(&self, x: f64) -> f64 {
+        let first = self.knots[0];
+        let x = match self.period {
+            Some(period) => first + (x - first).rem_euclid(period),
+            None => x,
+        };
         let next = self.knots.partition_point(|&knot| knot <= x);
         let last = self.knots.len() - 1;
         if next == 0 {
             return self.values[0];
         }
-        if next > last {
-            return self.values[last];
-        }
-        let (x0, x1) = (self.knots[next - 1], self.knots[next]);
-        let (y0, y1) = (self.values[next - 1], self.values[next]);
+        let (x0, y0) = (self.knots[next - 1], self.values[next - 1]);
+        let (x1, y1) = match self.period {
+            _ if next <= last => (self.knots[next], self.values[next]),
+            Some(period) => (first + period, self.values[0]),
+            None => return self.values[last],
+        };
         y0 + (y1 - y0) * (x - x0) / (x1 - x0)
     }
 }
@@ -201,6 +222,7 @@ mod tests {
             against: Against::Position,
             of_joint: 1,
             by_direction: true,
+            period: None,
             knots: vec![0.0, 1.0, 3.0],
             values: vec![2.0, 4.0, 0.0],
         }
@@ -213,6 +235,21 @@ mod tests {
         for (q, expected) in [(-1.0, 2.0), (0.0, 2.0), (0.5, 3.0), (2.0, 2.0), (7.0, 0.0)] {
             let effort = push(&mut *term, [0.0, q], [-0.5, 0.0], [0.0; 2]);
             assert_eq!(effort, [-expected, 0.0], "at {q}");
+        }
+    }
+
+    #[test]
+    fn with_a_period_it_repeats_and_closes() {
+        let robot = TwoJoints::new();
+        let repeated = Table {
+            period: Some(4.0),
+            by_direction: false,
+            ..curve()
+        };
+        let mut term = table(&robot.site(), repeated).unwrap();
+        for (q, expected) in [(0.5, 3.0), (3.5, 1.0), (4.5, 3.0), (-0.5, 1.0), (-4.0, 2.0)] {
+            let effort = push(&mut *term, [0.0, q], [0.0; 2], [0.0; 2]);
+            assert_eq!(effort, [expected, 0.0], "at {q}");
         }
     }
 
@@ -237,5 +274,6 @@ mod tests {
         assert!(refused(|t| t.values.truncate(1)));
         assert!(refused(|t| t.knots.reverse()));
         assert!(refused(|t| t.values[0] = f64::NAN));
+        assert!(refused(|t| t.period = Some(3.0)));
     }
 }

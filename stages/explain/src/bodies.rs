@@ -9,8 +9,9 @@ use tauscope_dynamics::{Data, Inertia, Model, gravity_effort, rnea};
 use crate::active::Active;
 use crate::columns::CACHED_ROWS;
 use crate::efforts::{act_over, silent};
-use crate::problem::{FitTrack, Problem};
+use crate::problem::Problem;
 use crate::search::has_rotor;
+use crate::track::FitTrack;
 
 /// An effort by track, row-major, one number per joint and sample \[N m or N\].
 pub type TrackEfforts = Vec<Vec<f64>>;

@@ -12,10 +12,11 @@ use crate::findings;
 use crate::fit::Fit;
 use crate::library;
 use crate::locate;
-use crate::problem::{Problem, Track};
+use crate::problem::Problem;
 use crate::recording::Recording;
 use crate::report::{RecordingPicture, Report, Verdict};
 use crate::search::{Explanation, Search};
+use crate::track::Track;
 
 /// What is to be explained.
 #[derive(Debug)]

@@ -135,6 +135,9 @@ pub fn of(
             let against = serde_json::to_value(curve.against).unwrap_or(Value::Null);
             parameters.insert("against".to_owned(), against);
             parameters.insert("by_direction".to_owned(), Value::from(curve.by_direction));
+            if let Some(period) = curve.period {
+                parameters.insert("period_s".to_owned(), Value::from(period));
+            }
         }
         let (joint, link) = place_of(input, joints, &active.hypothesis);
         let place = joint.clone().or_else(|| link.clone()).unwrap_or_default();

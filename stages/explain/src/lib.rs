@@ -28,6 +28,7 @@ pub mod report;
 pub mod search;
 pub mod smoother;
 mod standstill;
+pub mod track;
 mod trial;
 mod unknown;
 mod wall;

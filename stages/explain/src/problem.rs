@@ -2,15 +2,15 @@
 
 use std::sync::{Arc, OnceLock};
 
-use tauscope_dynamics::terms::{Expansion, MotionSample, Physics};
-use tauscope_dynamics::{Data, Model, rnea};
+use tauscope_dynamics::terms::Expansion;
+use tauscope_dynamics::{Data, Model};
 
 use crate::bodies::UnitCosts;
 use crate::columns::ColumnCache;
 use crate::efforts::Efforts;
-use crate::recording::{MAX_GAP_S, Recording};
-use crate::smoother::{LowPass, MotionSmoother};
-use crate::standstill;
+use crate::recording::Recording;
+use crate::smoother::LowPass;
+use crate::track::{FitTrack, Track, moving_joints, spaced, thinned};
 use crate::worth::worth;
 
 /// What is compared lies below this frequency, unless the recordings are too slow for it \[Hz\].
@@ -23,178 +23,8 @@ const MOTION_CUTOFF_RATIO: f64 = 2.0;
 const FIT_RATE_HZ: [f64; 2] = [50.0, 130.0];
 /// From how many samples on.
 const FIT_SAMPLES: f64 = 8000.0;
-/// Below this speed a joint stands: its friction is any value up to breakaway \[rad/s\].
-pub const STANDSTILL_RAD_S: f64 = 0.01;
-/// Samples nearer than this to an end of the recording are left out, in periods of the cutoff.
-const END_PERIODS: f64 = 0.8;
-/// And nearer than this to a standstill or reversal of the joint: what friction does there, the motion does not tell.
-const REVERSAL_PERIODS: f64 = 0.4;
 /// Fast recordings are filtered this many times higher than what is compared before they are thinned.
 const ALIASING_RATIO: f64 = 5.0;
-/// A joint that moves in less than this share of the time is judged at rest, too.
-const LEAST_MOVING_SHARE: f64 = 0.2;
-
-/// One recording as a fit sees it. Matrices are row-major: one number per joint and sample.
-#[derive(Debug, Clone)]
-pub struct Track {
-    /// The recording's name.
-    pub name: String,
-    /// Its start \[s from the start of the session\].
-    pub session_s: f64,
-    /// \[s from its start\]
-    pub time_s: Vec<f64>,
-    /// Smoothed position \[rad or m\].
-    pub position: Vec<f64>,
-    /// Smoothed velocity \[rad/s or m/s\].
-    pub velocity: Vec<f64>,
-    /// Smoothed acceleration \[rad/s² or m/s²\].
-    pub acceleration: Vec<f64>,
-    /// What the twin says \[N m or N\].
-    pub rigid: Vec<f64>,
-}
-
-impl Track {
-    /// The motion of a recording, at all its samples, and what the twin says of it. Motion is smoothed with half
-    /// amplitude at `motion_cutoff_hz`; `unit_nm` turns the recording's unit into N m, by joint.
-    pub fn new(
-        recording: &Recording,
-        session_s: f64,
-        model: &Model,
-        motion_cutoff_hz: f64,
-        unit_nm: &[f64],
-    ) -> Self {
-        let n = model.dof();
-        let count = recording.len();
-        let smoother = MotionSmoother::new(&recording.time_s, motion_cutoff_hz);
-        let mut track = Self {
-            name: recording.name.clone(),
-            session_s,
-            time_s: recording.time_s.clone(),
-            position: vec![0.0; n * count],
-            velocity: vec![0.0; n * count],
-            acceleration: vec![0.0; n * count],
-            rigid: vec![0.0; n * count],
-        };
-        for j in 0..n {
-            let measured: Vec<f64> = (0..count).map(|k| recording.position[k * n + j]).collect();
-            let mut states = smoother.smooth(&measured);
-            standstill::resmooth(&recording.time_s, &measured, &mut states);
-            for (k, state) in states.iter().enumerate() {
-                track.position[k * n + j] = state.x;
-                track.velocity[k * n + j] = state.y;
-                track.acceleration[k * n + j] = state.z;
-            }
-        }
-        if recording.reference.is_empty() {
-            let mut data = Data::new(model);
-            for k in 0..count {
-                let row = k * n..(k + 1) * n;
-                let effort = rnea(
-                    model,
-                    &mut data,
-                    &track.position[row.clone()],
-                    &track.velocity[row.clone()],
-                    &track.acceleration[row.clone()],
-                );
-                track.rigid[row].copy_from_slice(effort);
-            }
-        } else {
-            for (k, value) in recording.reference.iter().enumerate() {
-                track.rigid[k] = value * unit_nm[k % n];
-            }
-        }
-        track
-    }
-
-    /// Number of samples.
-    pub fn len(&self) -> usize {
-        self.time_s.len()
-    }
-
-    /// Whether there is none.
-    pub fn is_empty(&self) -> bool {
-        self.time_s.is_empty()
-    }
-
-    /// Keeps the samples of these indices.
-    fn thin(&self, keep: &[usize], n: usize) -> Self {
-        let rows = |from: &[f64]| -> Vec<f64> {
-            keep.iter()
-                .flat_map(|&k| from[k * n..(k + 1) * n].to_vec())
-                .collect()
-        };
-        Self {
-            name: self.name.clone(),
-            session_s: self.session_s,
-            time_s: keep.iter().map(|&k| self.time_s[k]).collect(),
-            position: rows(&self.position),
-            velocity: rows(&self.velocity),
-            acceleration: rows(&self.acceleration),
-            rigid: rows(&self.rigid),
-        }
-    }
-
-    /// Runs `physics` over the track, from `start` efforts (row-major) to what is recorded.
-    pub fn run(&self, physics: &mut Physics, start: &[f64]) -> Vec<f64> {
-        let mut effort = start.to_vec();
-        physics.reset();
-        self.each(|k, at| {
-            let n = at.position.len();
-            physics.act(at, &mut effort[k * n..(k + 1) * n]);
-        });
-        effort
-    }
-
-    /// Calls `visit` with every sample in order.
-    pub fn each(&self, mut visit: impl FnMut(usize, &MotionSample<'_>)) {
-        let n = self.position.len() / self.len().max(1);
-        for k in 0..self.len() {
-            let row = k * n..(k + 1) * n;
-            let at = MotionSample {
-                dt_s: if k == 0 {
-                    0.0
-                } else {
-                    self.time_s[k] - self.time_s[k - 1]
-                },
-                recording_s: self.time_s[k],
-                session_s: self.session_s + self.time_s[k],
-                position: &self.position[row.clone()],
-                velocity: &self.velocity[row.clone()],
-                acceleration: &self.acceleration[row.clone()],
-                transmitted: &self.rigid[row],
-            };
-            visit(k, &at);
-        }
-    }
-}
-
-/// A track with the filter of its clock and the samples that are compared.
-#[derive(Debug)]
-pub struct FitTrack {
-    /// The motion, thinned.
-    pub track: Track,
-    /// By joint, passing over what does not count there.
-    filters: Vec<LowPass>,
-    /// Samples at which filtered signals are compared.
-    pub compared: Vec<usize>,
-    /// Where they begin in the rows of the problem.
-    pub first_row: usize,
-}
-
-impl FitTrack {
-    /// Rows of the problem that are this track's.
-    pub fn rows(&self) -> std::ops::Range<usize> {
-        self.first_row..self.first_row + self.compared.len()
-    }
-
-    /// Filters one joint's signal on the track's clock and writes what is compared.
-    pub fn compare(&self, joint: usize, mut signal: Vec<f64>, into: &mut [f64]) {
-        self.filters[joint].apply(&mut signal);
-        for (value, &k) in into.iter_mut().zip(&self.compared) {
-            *value = signal[k];
-        }
-    }
-}
 
 /// Everything that a fit works on. A *signal* is joint-major: `rows` numbers for joint 0, then for joint 1,
 /// and so on; the rows of each joint are those of the tracks, one after the other.
@@ -385,82 +215,6 @@ impl Problem {
             track.compare(joint, one, &mut into[track.rows()]);
         }
     }
-}
-
-impl Track {
-    /// Which samples of a joint are worth comparing: not the ends, not beside a gap and, where the joint `moves`
-    /// at all, not its standstills and reversals.
-    fn counts(&self, joint: usize, moves: bool, cutoff_hz: f64) -> Vec<bool> {
-        let n = self.position.len() / self.len();
-        let time = &self.time_s;
-        let mut counts = vec![true; time.len()];
-        let mut spoil = |from: f64, to: f64| {
-            let first = time.partition_point(|t| *t < from);
-            let last = time.partition_point(|t| *t <= to);
-            counts[first..last].fill(false);
-        };
-        let margin = END_PERIODS / cutoff_hz;
-        let (start, end) = (time[0], time[time.len() - 1]);
-        spoil(start, start + margin);
-        spoil(end - margin, end);
-        for pair in time.windows(2) {
-            if pair[1] - pair[0] > MAX_GAP_S {
-                spoil(pair[0] - margin, pair[1] + margin);
-            }
-        }
-        if moves {
-            let margin = REVERSAL_PERIODS / cutoff_hz;
-            let velocity = |k: usize| self.velocity[k * n + joint];
-            for (k, &t) in time.iter().enumerate() {
-                let reverses = k > 0 && velocity(k) * velocity(k - 1) < 0.0;
-                if reverses || velocity(k).abs() < STANDSTILL_RAD_S {
-                    spoil(t - margin, t + margin);
-                }
-            }
-        }
-        counts
-    }
-}
-
-/// Which joints move in a fair share of the time; the others are judged at rest, too.
-fn moving_joints<'a>(tracks: impl Iterator<Item = &'a Track>, n: usize) -> Vec<bool> {
-    let (mut moving, mut samples) = (vec![0_usize; n], 0);
-    for track in tracks {
-        samples += track.len();
-        for (k, velocity) in track.velocity.iter().enumerate() {
-            moving[k % n] += usize::from(velocity.abs() > 2.0 * STANDSTILL_RAD_S);
-        }
-    }
-    let share = |count: &usize| *count as f64 > LEAST_MOVING_SHARE * samples as f64;
-    moving.iter().map(share).collect()
-}
-
-/// Indices of samples at least `step_s` apart (but for a tenth of it, for uneven clocks).
-fn thinned(time_s: &[f64], step_s: f64) -> Vec<usize> {
-    let mut kept = Vec::new();
-    let mut next = f64::NEG_INFINITY;
-    for (k, &t) in time_s.iter().enumerate() {
-        if t >= next {
-            kept.push(k);
-            next = t + 0.9 * step_s;
-        }
-    }
-    kept
-}
-
-/// Indices of the samples nearest to an even grid of `step_s`.
-fn spaced(time_s: &[f64], step_s: f64) -> Vec<usize> {
-    let mut kept = Vec::new();
-    let mut at = time_s[0] + 0.5 * step_s;
-    let end = time_s[time_s.len() - 1];
-    while at < end {
-        let k = time_s.partition_point(|t| *t < at).min(time_s.len() - 1);
-        if kept.last() != Some(&k) {
-            kept.push(k);
-        }
-        at += step_s;
-    }
-    kept
 }
 
 /// Variance of the white noise on a smooth signal, from its fourth differences, robust against jumps.

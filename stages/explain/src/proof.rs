@@ -5,9 +5,10 @@ use tauscope_dynamics::terms::{Physics, TermError};
 use crate::explain::Setup;
 use crate::findings;
 use crate::fit::Fit;
-use crate::problem::{Problem, Track};
+use crate::problem::Problem;
 use crate::recording::Recording;
 use crate::report::{JointPicture, RecordingPicture};
+use crate::track::Track;
 
 /// Motion of a prediction is smoothed with the best of these, as shares of the fit's cutoff.
 const PREDICTION_CUTOFFS: [f64; 5] = [0.75, 1.0, 1.4, 2.0, 3.0];

@@ -256,6 +256,13 @@ fn curve(active: &Active, place: &str, joints: &[String]) -> String {
     } else {
         ""
     };
+    let repeated = curve.period.map_or_else(String::new, |period_s| {
+        format!(
+            ", and repeats every {} s ({} Hz)",
+            number(period_s),
+            number(1.0 / period_s)
+        )
+    });
     let most = active
         .coordinates
         .iter()
@@ -269,7 +276,7 @@ fn curve(active: &Active, place: &str, joints: &[String]) -> String {
         )
     });
     format!(
-        "Joint {place} has an effort that no effect of the library explains: it depends on {against}{direction}{peak}."
+        "Joint {place} has an effort that no effect of the library explains: it depends on {against}{direction}{repeated}{peak}."
     )
 }
 

@@ -115,14 +115,12 @@ pub fn steps_enough(active: &Active) -> bool {
 
 /// Friction of one direction is at least this share of the other's; what looks more lopsided is friction and an offset.
 const LEAST_SYMMETRY: f64 = 0.2;
-/// Coulomb friction is at least this share of the breakaway: what falls off to nothing is no dry friction.
-const LEAST_COULOMB: f64 = 0.2;
 /// A link's centre of mass is not off by more than this many times its radius of gyration, or by this \[m\] if that is more.
 const MOST_GYRATIONS: f64 = 3.0;
 const FAR_OFF_M: f64 = 0.1;
 
 /// Whether the numbers are ones that a robot may have: a link's mass stays above nothing and within twice what its URDF says,
-/// its centre within the link, and friction is not of one direction or of low speeds alone.
+/// its centre within the link, and friction is not of one direction alone.
 pub fn plausible(active: &Active, model: &Model) -> bool {
     let x = &active.coordinates;
     let link = &model.links()[active.hypothesis.place.link];
@@ -138,10 +136,6 @@ pub fn plausible(active: &Active, model: &Model) -> bool {
             shift_m < FAR_OFF_M.max(MOST_GYRATIONS * link.gyration_radius_m())
         }
         "asymmetric_coulomb" => x[0].min(x[1]) >= LEAST_SYMMETRY * x[0].max(x[1]),
-        "stribeck_friction" => {
-            let [coulomb, breakaway] = [active.parameters()[0], active.parameters()[1]];
-            coulomb >= LEAST_COULOMB * breakaway
-        }
         _ => true,
     }
 }

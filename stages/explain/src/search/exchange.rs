@@ -4,6 +4,7 @@ use super::{Explanation, LEAST_GAIN, Search, describe};
 use crate::active::Hypothesis;
 use crate::drive::is_drive;
 use crate::propose::Proposal;
+use crate::windows::{TimeKind, time_kind};
 
 /// A rival may gain this much less to first order than what it is to replace.
 const COULD_DO_BETTER: f64 = 0.85;
@@ -28,7 +29,8 @@ impl Search<'_> {
         self.best_of(without, &able, best.fit.likelihood())
     }
 
-    /// Takes each piece out, and each two at one joint, and tries all rivals in their place: once over all of them.
+    /// Takes each piece out, all pushes together, and each two at one joint, and tries all rivals in their place: once over
+    /// all of them.
     pub(super) fn exchange(&self, mut best: Explanation) -> Explanation {
         for piece in pieces(&best) {
             let Some(index) = place_of(&best, piece) else {
@@ -37,6 +39,17 @@ impl Search<'_> {
             let without = self.less(&best, index);
             if let Some(better) = self.replaced(&best, &without, index) {
                 (self.say)(&format!("= {}", describe(&better)));
+                best = better;
+            }
+        }
+        // Several pushes may be one wall.
+        let once = |&i: &usize| time_kind(best.fit.actives[i].hypothesis) == TimeKind::Once;
+        let pushes: Vec<usize> = (0..best.fit.actives.len()).filter(once).collect();
+        if pushes.len() > 1 {
+            let less = |from: Explanation, index: &usize| self.less(&from, *index);
+            let without = pushes.iter().rev().fold(best.clone(), less);
+            if let Some(better) = self.replaced(&best, &without, pushes[0]) {
+                (self.say)(&format!("== {}", describe(&better)));
                 best = better;
             }
         }
