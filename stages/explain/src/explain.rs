@@ -102,7 +102,7 @@ pub fn explain(
         unit_nm: &unit_nm,
         session_start_ns,
     };
-    let problem = setup.problem(&vec![false; joints.len()])?;
+    let problem = setup.problem(&input.fit, &vec![false; joints.len()])?;
     if let Some(reason) = audit::of_problem(&input, &problem) {
         return Ok(not_evaluated(&input, joints, reason));
     }
@@ -136,7 +136,7 @@ pub fn explain(
         })
         .collect();
     let with_rests = match rests_count.contains(&true) {
-        true => Some(setup.problem(&rests_count)?),
+        true => Some(setup.problem(&input.fit, &rests_count)?),
         false => None,
     };
     let problem = with_rests.as_ref().unwrap_or(&problem);
@@ -146,6 +146,11 @@ pub fn explain(
         say: &say,
     };
     let found = search.run(moving.fit.actives, moving.penalties);
+    let found = if input.holdout.is_empty() {
+        found
+    } else {
+        search.upheld(found, &setup.problem(&input.holdout, &rests_count)?)
+    };
     progress(0.8, "rivals");
     // Where nobody knows the scale of the drives, the twin is only one once they are fitted.
     let scales = if unscaled {
@@ -287,19 +292,21 @@ impl Setup<'_> {
         Ok(track)
     }
 
-    fn problem(&self, rests_count: &[bool]) -> Result<Problem, TermError> {
+    /// What there is of some recordings, compared as those are that are fitted.
+    fn problem(
+        &self,
+        recordings: &[Recording],
+        rests_count: &[bool],
+    ) -> Result<Problem, TermError> {
         let cutoff_hz = Problem::cutoff_hz(&self.input.fit);
         let motion_cutoff_hz = Problem::motion_cutoff_hz(cutoff_hz);
-        let tracks = self
-            .input
-            .fit
+        let tracks = recordings
             .iter()
             .map(|recording| self.track(recording, motion_cutoff_hz))
             .collect::<Result<Vec<_>, _>>()?;
-        let fit = &self.input.fit;
         Ok(Problem::new(
             &self.input.model,
-            fit,
+            recordings,
             tracks,
             cutoff_hz,
             self.unit_nm,

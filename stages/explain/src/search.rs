@@ -41,6 +41,13 @@ const MOST_PIECES: usize = 24;
 const LEAST_GAIN: f64 = 0.5;
 /// So often pieces are added and all exchanged again.
 const MOST_ROUNDS: usize = 2;
+/// Names that leave less of the variance than this on recordings held out carry over, and so do those that leave at most so
+/// many times the share that they leave where they were fitted.
+const MOST_LEFT: f64 = 0.1;
+const MOST_WORSE: f64 = 10.0;
+/// That is told by so many rows, of a joint whose variance without them is this many times its white noise.
+const LEAST_ROWS_ELSEWHERE: f64 = 50.0;
+const LOUD: f64 = 4.0;
 /// A joint whose variance is below this many times its white noise is not tried with costly effects.
 const QUIET: f64 = 1.15;
 
@@ -144,33 +151,9 @@ impl Search<'_> {
         }
         // What it explains must be much, so that its rows may count in full.
         let white = vec![1.0; self.problem.joints];
-        let with = |from: &Explanation| {
-            let base = Base::new(self.problem, &from.fit, self.hypotheses.len());
-            let curve = base.propose_curve(joint)?;
-            let fit = from.fit.with(self.problem, curve.active);
-            let rival = from.fit.likelihood();
-            let mut actives = fit.refined_at(self.problem, Some(&[joint]), rival).actives;
-            if let Some(curve) = actives.last_mut() {
-                unknown::keep_what_is_evident(curve);
-            }
-            let fit = Fit::new(self.problem, actives);
-            let mut penalties = from.penalties.clone();
-            penalties.push(curve.penalty);
-            let with = Explanation { fit, penalties };
-            let evident = with.ahead_of(from, &self.problem.worth) > CURVE_EVIDENCE
-                || overwhelming(&with, from);
-            (evident && carries_over(self.problem, &with.fit, &from.fit, &[joint])).then_some(with)
-        };
         if !own.is_empty() {
-            let mut bare = best.clone();
-            for &i in own.iter().rev() {
-                bare.fit.actives.remove(i);
-                bare.penalties.remove(i);
-            }
-            bare.fit = Fit::new(self.problem, bare.fit.actives);
-            let rival = best.fit.likelihood();
-            bare.fit = bare.fit.refined_at(self.problem, Some(&[joint]), rival);
-            if let Some(instead) = with(&bare)
+            let bare = self.stripped(best, &own, joint);
+            if let Some(instead) = self.with_curve(&bare, joint)
                 && instead.ahead_of(best, &white) > CURVE_EVIDENCE
             {
                 return Some(instead);
@@ -179,9 +162,77 @@ impl Search<'_> {
         if excess(&best.fit) < CURVE_EXCESS {
             return None;
         }
-        let beside = with(best)?;
+        let beside = self.with_curve(best, joint)?;
         let less = best.fit.variance[joint] / beside.fit.variance[joint];
         (beside.ahead_of(best, &white) > CURVE_EVIDENCE && less > CURVE_SIZE).then_some(beside)
+    }
+
+    /// The explanation with the curve that does best in a joint, if there is evidence for one and it carries over.
+    fn with_curve(&self, from: &Explanation, joint: usize) -> Option<Explanation> {
+        let base = Base::new(self.problem, &from.fit, self.hypotheses.len());
+        let curve = base.propose_curve(joint)?;
+        let fit = from.fit.with(self.problem, curve.active);
+        let fit = fit.refined_at(self.problem, Some(&[joint]), from.fit.likelihood());
+        let mut actives = fit.actives;
+        if let Some(curve) = actives.last_mut() {
+            unknown::keep_what_is_evident(curve);
+        }
+        let fit = Fit::new(self.problem, actives);
+        let penalties = [&from.penalties[..], &[curve.penalty]].concat();
+        let with = Explanation { fit, penalties };
+        let evident =
+            with.ahead_of(from, &self.problem.worth) > CURVE_EVIDENCE || overwhelming(&with, from);
+        (evident && carries_over(self.problem, &with.fit, &from.fit, &[joint])).then_some(with)
+    }
+
+    /// The explanation without some of its pieces, refined at the joint that they are in.
+    fn stripped(&self, best: &Explanation, pieces: &[usize], joint: usize) -> Explanation {
+        let mut bare = best.clone();
+        for &i in pieces.iter().rev() {
+            bare.fit.actives.remove(i);
+            bare.penalties.remove(i);
+        }
+        let fit = Fit::new(self.problem, bare.fit.actives);
+        bare.fit = fit.refined_at(self.problem, Some(&[joint]), best.fit.likelihood());
+        bare
+    }
+
+    /// Takes the names of a joint back that leave much more on recordings held out, the `elsewhere`, than they should by what
+    /// they leave where they were fitted: together they only draw a curve, which is said in their place.
+    ///
+    /// This is all that the held-out recordings are used for: nothing is fitted on them, and nothing chosen by them.
+    pub fn upheld(&self, found: Explanation, elsewhere: &Problem) -> Explanation {
+        let mut best = found;
+        for joint in 0..self.problem.joints {
+            let local = |&i: &usize| {
+                let active = &best.fit.actives[i];
+                active.hypothesis.only_joint() == Some(joint)
+                    && active.curve.is_none()
+                    && !is_drive(&active.hypothesis)
+            };
+            let names: Vec<usize> = (0..best.fit.actives.len()).filter(local).collect();
+            let lasting =
+                |&i: &usize| time_kind(best.fit.actives[i].hypothesis) == TimeKind::Always;
+            if names.is_empty() || !names.iter().all(lasting) {
+                continue;
+            }
+            let bare = self.stripped(&best, &names, joint);
+            let there = |fit: &Fit| Fit::new(elsewhere, fit.actives.clone());
+            let (with, without) = (there(&best.fit), there(&bare.fit));
+            let noise = elsewhere.white_noise[joint] * elsewhere.white_noise[joint];
+            if with.count[joint] < LEAST_ROWS_ELSEWHERE || without.variance[joint] < LOUD * noise {
+                continue;
+            }
+            let left_here = best.fit.variance[joint] / bare.fit.variance[joint];
+            let left_there = with.variance[joint] / without.variance[joint];
+            if left_there > MOST_LEFT.max(MOST_WORSE * left_here) {
+                (self.say)(&format!(
+                    "! joint {joint}: {left_there:.2} left, {left_here:.2} where fitted"
+                ));
+                best = self.with_curve(&bare, joint).unwrap_or(bare);
+            }
+        }
+        best
     }
 
     /// Every hypothesis that could change the effort of one of `joints`, beside what `fit` holds, most evidence

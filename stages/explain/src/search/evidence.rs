@@ -19,7 +19,7 @@ pub const LEAST_SIZE: f64 = 0.12;
 const LEAST_SIZE_OF_INTERVAL: f64 = 0.03;
 const INTERVAL_EVIDENCE: f64 = 40.0;
 /// Least share beside a curve without a name in the same joint, which the name may only patch.
-const LEAST_SIZE_BESIDE_CURVE: f64 = 1.0;
+const LEAST_SIZE_BESIDE_CURVE: f64 = 3.0;
 /// Evidence that needs no account of correlation, if rows counted in full \[nats\].
 const OVERWHELMING: f64 = 40.0;
 /// And what is left over what is then left; a curve, which bends to any slow noise, must do much more.
