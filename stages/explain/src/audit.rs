@@ -17,28 +17,14 @@ const FOLLOWS: f64 = 0.15;
 
 /// Why nothing can be said, found before anything is fitted.
 pub fn before(input: &Input) -> Option<String> {
-    let n = input.model.dof();
     if let Some(recording) = input.fit.iter().find(|r| r.effort.is_empty()) {
         return Some(format!("recording {} holds no effort", recording.name));
     }
     if !input.bodies && input.fit.iter().any(|r| r.reference.is_empty()) {
         return Some("the twin is a topic, and a recording does not hold it".to_owned());
     }
-    if input.fit.len() + input.holdout.len() < 2 && input.start.is_none() {
-        return Some(
-            "there is one recording only: what is fitted on it cannot be proved on another. Record the same arm \
-             once more, with another motion, or start from a corrected twin"
-                .to_owned(),
-        );
-    }
     if input.fit.iter().all(|r| r.effort.iter().all(|x| *x == 0.0)) {
         return Some("the effort is zero throughout: the driver does not publish it".to_owned());
-    }
-    if input.start.is_none() && (0..n).all(|j| moving_s(&input.fit, j, n) < LEAST_MOTION_S) {
-        return Some(
-            "no joint moves for as long as a second: standstill does not tell friction from load"
-                .to_owned(),
-        );
     }
     if let Some(recording) = input
         .fit
@@ -52,7 +38,20 @@ pub fn before(input: &Input) -> Option<String> {
             recording.duration_s()
         ));
     }
+    if input.fit.len() + input.holdout.len() < 2 && input.start.is_none() && !at_rest(input) {
+        return Some(
+            "there is one recording only: what is fitted on it cannot be proved on another. Record the same arm \
+             once more, with another motion, or start from a corrected twin"
+                .to_owned(),
+        );
+    }
     None
+}
+
+/// Whether no joint moves for as long as a verdict on what lasts needs.
+pub fn at_rest(input: &Input) -> bool {
+    let n = input.model.dof();
+    (0..n).all(|j| moving_s(&input.fit, j, n) < LEAST_MOTION_S)
 }
 
 /// How long a joint moves \[s\].

@@ -5,17 +5,17 @@ use std::collections::{BTreeMap, BTreeSet};
 use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::{Physics, Site, TermError, TermSpec};
 
-use crate::active::{Active, Hypothesis};
+use crate::active::Hypothesis;
+use crate::at_rest;
 use crate::audit;
 use crate::drive;
-use crate::findings;
+use crate::findings::{self, Named};
 use crate::fit::Fit;
 use crate::library;
 use crate::locate;
 use crate::problem::Problem;
 use crate::recording::Recording;
-use crate::report::{RecordingPicture, Report, Verdict};
-use crate::search::{Explanation, Search};
+use crate::report::{RecordingPicture, Report, Undetectable, Verdict};
 use crate::track::Track;
 
 /// What is to be explained.
@@ -73,7 +73,6 @@ pub struct Outcome {
 ///
 /// # Errors
 /// If a term of the start cannot be built for the robot.
-#[expect(clippy::too_many_lines, reason = "the whole way, step by step")]
 pub fn explain(
     mut input: Input,
     progress: &(dyn Fn(f64, &str) + Sync),
@@ -83,7 +82,8 @@ pub fn explain(
     if let Some(reason) = audit::before(&input) {
         return Ok(not_evaluated(&input, joints, reason));
     }
-    if input.holdout.is_empty() {
+    let at_rest = audit::at_rest(&input);
+    if input.holdout.is_empty() && !at_rest {
         hold_out_some(&mut input);
     }
     let unit_nm = input
@@ -101,68 +101,28 @@ pub fn explain(
         input: &input,
         unit_nm: &unit_nm,
         session_start_ns,
+        at_rest,
     };
-    let problem = setup.problem(&input.fit, &vec![false; joints.len()])?;
-    if let Some(reason) = audit::of_problem(&input, &problem) {
-        return Ok(not_evaluated(&input, joints, reason));
-    }
-    let hypotheses = setup.hypotheses();
-    let unscaled = input.effort_unit == "A"
-        && input.torque_constants_nm_per_a.is_none()
-        && input.start.is_none();
-    let drives = if unscaled {
-        drive::unknown_gains(joints.len())
+    let judged = if at_rest {
+        setup.at_rest(progress)?
     } else {
-        Vec::new()
+        setup.in_motion(progress)?
     };
-    let say = |text: &str| {
-        // Nobody knows how many rounds there will be: each takes a share of what is left.
-        progress(0.1, text);
+    let judged = match judged {
+        Ok(judged) => judged,
+        Err(reason) => return Ok(not_evaluated(&input, joints, reason)),
     };
-    let search = Search {
-        problem: &problem,
-        hypotheses: &hypotheses,
-        say: &say,
-    };
-    let penalties = vec![0.0; drives.len()];
-    let moving = search.first_guess(drives, penalties);
-    // Where friction is not set-valued, standstills tell as much as motion.
-    progress(0.3, "standstills");
-    let rests_count: Vec<bool> = (0..joints.len())
-        .map(|j| {
-            let holds =
-                |a: &Active| a.hypothesis.only_joint() == Some(j) && a.is_set_valued(&input.model);
-            !moving.fit.actives.iter().any(holds)
-        })
-        .collect();
-    let with_rests = match rests_count.contains(&true) {
-        true => Some(setup.problem(&input.fit, &rests_count)?),
-        false => None,
-    };
-    let problem = with_rests.as_ref().unwrap_or(&problem);
-    let search = Search {
+    let Judged {
         problem,
-        hypotheses: &hypotheses,
-        say: &say,
-    };
-    let found = search.run(moving.fit.actives, moving.penalties);
-    let found = if input.holdout.is_empty() {
-        found
-    } else {
-        search.upheld(found, &setup.problem(&input.holdout, &rests_count)?)
-    };
-    progress(0.8, "rivals");
-    // Where nobody knows the scale of the drives, the twin is only one once they are fitted.
-    let scales = if unscaled {
-        drive::unknown_gains(joints.len())
-    } else {
-        Vec::new()
-    };
-    let before = Fit::new(problem, scales).refined(problem);
-    let named = findings::of(&search, &found, &before, &input, &joints);
+        before,
+        found,
+        named,
+        undetectable,
+        rests_count,
+    } = judged;
     progress(0.95, "proof");
-    let proof = setup.proof(problem, &before, &found.fit)?;
-    let verdict = if found.fit.actives.iter().any(|a| a.curve.is_some()) {
+    let proof = setup.proof(&problem, &before, &found)?;
+    let verdict = if found.actives.iter().any(|a| a.curve.is_some()) {
         Verdict::UnknownRemains
     } else if named.findings.is_empty() {
         Verdict::NothingMissing
@@ -180,8 +140,8 @@ pub fn explain(
         reason: None,
         summary: findings::summary(verdict, &named.findings, &proof.before, &proof.after),
         effort_unit: input.effort_unit.clone(),
-        located: locate::located(problem, &before, &joints),
-        undetectable: findings::undetectable(&search, &found, &joints),
+        located: locate::located(&problem, &before, &joints),
+        undetectable,
         findings: named.findings,
         rejected: named.rejected,
         next_motions: named.next_motions,
@@ -196,11 +156,27 @@ pub fn explain(
     Ok(Outcome {
         report,
         terms: setup.lasting_terms(&found),
-        gain: drive::gains(&found.fit.actives, unit_nm.len()),
+        gain: drive::gains(&found.actives, unit_nm.len()),
         predictions: proof.predictions,
         pictures: proof.pictures,
         trajectories: named.trajectories,
     })
+}
+
+/// What a search came to.
+pub(crate) struct Judged {
+    /// The recordings that were fitted.
+    pub problem: Problem,
+    /// The twin as it was, its scales fitted where nobody knows them.
+    pub before: Fit,
+    /// The twin as it should be.
+    pub found: Fit,
+    /// What is said of it.
+    pub named: Named,
+    /// The smallest effects that would have been found.
+    pub undetectable: Vec<Undetectable>,
+    /// By joint, whether its standstills count.
+    pub rests_count: Vec<bool>,
 }
 
 /// Without hold-out recordings some of those to be fitted are held out: about a third, the last ones, so that
@@ -244,20 +220,27 @@ pub(crate) struct Setup<'a> {
     pub input: &'a Input,
     pub unit_nm: &'a [f64],
     session_start_ns: i64,
+    /// Whether no joint moves.
+    pub at_rest: bool,
 }
 
 impl Setup<'_> {
-    fn hypotheses(&self) -> Vec<Hypothesis> {
+    pub fn hypotheses(&self) -> Vec<Hypothesis> {
         let input = self.input;
         let mut without = input.without.clone();
-        if input.effort_unit == "A"
-            && input.torque_constants_nm_per_a.is_none()
-            && input.start.is_none()
-        {
+        if self.is_unscaled() {
             // The scale of each joint is free as it is.
             without.insert("torque_gain".to_owned());
         }
         library::hypotheses(&input.model, input.bodies, &without)
+    }
+
+    /// Whether nobody knows the scale between the recordings' unit and N m.
+    pub fn is_unscaled(&self) -> bool {
+        let input = self.input;
+        input.effort_unit == "A"
+            && input.torque_constants_nm_per_a.is_none()
+            && input.start.is_none()
     }
 
     /// Terms of the start, in N m.
@@ -289,11 +272,14 @@ impl Setup<'_> {
                 *value += start.offset[k % n] * self.unit_nm[k % n];
             }
         }
+        if self.at_rest {
+            at_rest::start_at_measured(&mut track, recording, self.unit_nm);
+        }
         Ok(track)
     }
 
     /// What there is of some recordings, compared as those are that are fitted.
-    fn problem(
+    pub fn problem(
         &self,
         recordings: &[Recording],
         rests_count: &[bool],
@@ -315,14 +301,14 @@ impl Setup<'_> {
     }
 
     /// What a corrected twin keeps: not what came and went.
-    fn lasting_terms(&self, found: &Explanation) -> Vec<TermSpec> {
+    fn lasting_terms(&self, found: &Fit) -> Vec<TermSpec> {
         let mut terms = self
             .input
             .start
             .as_ref()
             .map_or_else(Vec::new, |start| start.terms.clone());
         let model = &self.input.model;
-        for active in &found.fit.actives {
+        for active in &found.actives {
             if drive::is_drive(&active.hypothesis) || !findings::lasts(active.hypothesis) {
                 continue;
             }

@@ -30,6 +30,7 @@ const VAGUE_S: f64 = 5.0;
 const KNOWN_SCALE: f64 = 5.0;
 
 /// What is said of an explanation.
+#[derive(Debug, Default)]
 pub struct Named {
     /// That which explains most first.
     pub findings: Vec<Finding>,
@@ -41,6 +42,17 @@ pub struct Named {
     pub trajectories: Vec<(String, String)>,
     /// On the scales of drives.
     pub notes: Vec<String>,
+}
+
+impl Named {
+    /// Adds what is said of another.
+    pub fn extend(&mut self, other: Self) {
+        self.findings.extend(other.findings);
+        self.rejected.extend(other.rejected);
+        self.next_motions.extend(other.next_motions);
+        self.trajectories.extend(other.trajectories);
+        self.notes.extend(other.notes);
+    }
 }
 
 /// Whether an effect is part of the arm, not something that came and went.

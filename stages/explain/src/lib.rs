@@ -3,6 +3,7 @@
 
 mod across;
 pub mod active;
+mod at_rest;
 mod audit;
 mod bodies;
 mod columns;
@@ -12,6 +13,7 @@ pub mod explain;
 mod findings;
 pub mod fit;
 pub mod html;
+mod in_motion;
 pub mod interval;
 pub mod least_squares;
 pub mod library;

@@ -184,7 +184,7 @@ pub fn worse_joints(fit: &Fit, better: &Fit) -> Vec<usize> {
 /// How many of one effect there may be at one place.
 pub fn most_at_one_place(hypothesis: Hypothesis) -> usize {
     match hypothesis.effect.name {
-        "external_push" => 8,
+        "external_push" => 24,
         "torque_ripple" => 2,
         _ => 1,
     }
