@@ -1,13 +1,17 @@
 //! The search where no joint moves: what comes and goes can be told, what lasts cannot.
 
+use std::collections::BTreeSet;
+
 use tauscope_dynamics::terms::TermError;
 
 use crate::active::Hypothesis;
 use crate::explain::{Judged, Setup};
 use crate::findings;
 use crate::fit::Fit;
+use crate::problem::Problem;
+use crate::propose::Base;
 use crate::recording::Recording;
-use crate::search::Search;
+use crate::search::{Explanation, Search, plausible};
 use crate::track::Track;
 use crate::windows::{TimeKind, time_kind};
 
@@ -29,6 +33,138 @@ pub fn start_at_measured(track: &mut Track, recording: &Recording, unit_nm: &[f6
             *value += mean;
         }
     }
+}
+
+/// What is left stands out where it is so many times its deviation in the beginning, over all joints,
+const STANDS_OUT: f64 = 8.0;
+/// and this share of the most within some time on either side \[s\]: after a push friction holds some of it for long.
+const SHARE_OF_PEAK: f64 = 0.3;
+const NEAR_S: f64 = 1.0;
+/// What is shorter than this is no push, and what is nearer together is one \[s\].
+const SHORTEST_S: f64 = 0.15;
+/// A joint feels a push if it bears so many times its deviation in the beginning, and this share of what the joint does that
+/// bears most.
+const FELT: f64 = 4.0;
+const FELT_SHARE: f64 = 0.015;
+
+/// Deviation of what is left at each joint as the only recording of a problem begins \[N m or N\].
+fn deviations(problem: &Problem, fit: &Fit) -> Vec<f64> {
+    let track = &problem.tracks[0];
+    let begins = |k: &usize| track.track.time_s[*k] < BEGINNING_S;
+    let beginning = track.compared.iter().take_while(|k| begins(k)).count();
+    let of = |j: usize| {
+        let rows = problem.joint_rows(j);
+        let left = fit.residual[rows.clone()].iter().zip(&problem.weight[rows]);
+        let (sum, count) = left
+            .take(beginning)
+            .fold((0.0, 0.0), |(sum, n), (e, w)| (sum + w * e * e, n + w));
+        (sum / f64::max(count, 1.0))
+            .sqrt()
+            .max(problem.white_noise[j])
+    };
+    (0..problem.joints).map(of).collect()
+}
+
+/// When something stands out of what is left, in the only recording of a problem \[s of recording time\].
+fn stands_out(problem: &Problem, fit: &Fit, deviations: &[f64]) -> Vec<(f64, f64)> {
+    let track = &problem.tracks[0];
+    let times: Vec<f64> = (track.compared.iter())
+        .map(|&k| track.track.time_s[k])
+        .collect();
+    // In N m: whitened, the joint with the finest sensor would decide, and what friction holds there.
+    let norm: Vec<f64> = (0..times.len())
+        .map(|row| {
+            let of = |j: usize| {
+                let at = problem.joint_rows(j).start + row;
+                problem.weight[at] * fit.residual[at].powi(2)
+            };
+            (0..problem.joints).map(of).sum::<f64>().sqrt()
+        })
+        .collect();
+    let noise = deviations.iter().map(|d| d * d).sum::<f64>().sqrt();
+    let stands_out = |k: usize| {
+        let first = times.partition_point(|t| *t < times[k] - NEAR_S);
+        let last = times.partition_point(|t| *t <= times[k] + NEAR_S);
+        let peak = norm[first..last]
+            .iter()
+            .fold(0.0_f64, |most, x| most.max(*x));
+        norm[k] > (STANDS_OUT * noise).max(SHARE_OF_PEAK * peak)
+    };
+    let mut found: Vec<(f64, f64)> = Vec::new();
+    for (k, &t) in times.iter().enumerate().filter(|(k, _)| stands_out(*k)) {
+        // A sample stands for the time until the next.
+        let until = times.get(k + 1).copied().unwrap_or(t);
+        match found.last_mut() {
+            Some((_, end)) if t - *end < SHORTEST_S => *end = until,
+            _ => found.push((t, until)),
+        }
+    }
+    found.retain(|(from, to)| to - from >= SHORTEST_S);
+    found
+}
+
+/// The joint furthest from the base that bears something in an interval: what is beyond a touch does not feel it.
+fn last_to_feel(
+    problem: &Problem,
+    fit: &Fit,
+    deviations: &[f64],
+    (from_s, to_s): (f64, f64),
+) -> Option<usize> {
+    let track = &problem.tracks[0];
+    let within = |k: &usize| (from_s..to_s).contains(&track.track.time_s[*k]);
+    let inside: Vec<bool> = track.compared.iter().map(within).collect();
+    let count = inside.iter().filter(|inside| **inside).count().max(1) as f64;
+    let mean = |j: usize| {
+        let left = fit.residual[problem.joint_rows(j)].iter().zip(&inside);
+        let sum: f64 = left.filter(|(_, inside)| **inside).map(|(e, _)| e).sum();
+        (sum / count).abs()
+    };
+    let means: Vec<f64> = (0..problem.joints).map(mean).collect();
+    let most = means.iter().fold(0.0_f64, |most, x| most.max(*x));
+    let feels = |j: &usize| means[*j] > (FELT * deviations[*j]).max(FELT_SHARE * most);
+    (0..problem.joints)
+        .filter(feels)
+        .max_by_key(|j| order(problem, *j))
+}
+
+/// How many joints there are from the base to one.
+fn order(problem: &Problem, joint: usize) -> usize {
+    let model = &problem.model;
+    let mut link = Some(model.joints()[joint].child_link);
+    let mut joints = BTreeSet::new();
+    while let Some(index) = link {
+        joints.extend(model.links()[index].joint);
+        link = model.links()[index].parent;
+    }
+    joints.len()
+}
+
+/// A push for each time that something stands out, at the link where a constant force explains most of it: one that is next to
+/// the last joint that feels it.
+fn pushes(search: &Search<'_>) -> Explanation {
+    let problem = search.problem;
+    let mut best = Explanation {
+        fit: Fit::new(problem, Vec::new()),
+        penalties: Vec::new(),
+    };
+    let deviations = deviations(problem, &best.fit);
+    for interval in stands_out(problem, &best.fit, &deviations) {
+        let last = last_to_feel(problem, &best.fit, &deviations, interval);
+        let near = |h: &&Hypothesis| match (last, problem.model.links()[h.place.link].joint) {
+            (Some(last), Some(joint)) => order(problem, last).abs_diff(order(problem, joint)) <= 1,
+            _ => true,
+        };
+        let base = Base::new(problem, &best.fit, search.hypotheses.len());
+        let within = |h: &Hypothesis| base.propose_within(*h, interval, Some(0));
+        let proposals = search.hypotheses.iter().filter(near).filter_map(within);
+        let possible = proposals.filter(|p| plausible(&p.active, &problem.model));
+        if let Some(push) = possible.max_by(|a, b| a.gain.total_cmp(&b.gain)) {
+            // When it was is told by what stood out: a force that grows and fades has no sharper times.
+            best.fit = best.fit.with(problem, push.active);
+            best.penalties.push(push.penalty);
+        }
+    }
+    best
 }
 
 impl Setup<'_> {
@@ -53,7 +189,7 @@ impl Setup<'_> {
                 hypotheses: &hypotheses,
                 say: &say,
             };
-            let found = search.run(Vec::new(), Vec::new());
+            let found = pushes(&search);
             let before = Fit::new(&problem, Vec::new());
             named.extend(findings::of(&search, &found, &before, input, &joints));
             if undetectable.is_empty() {

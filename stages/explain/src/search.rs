@@ -18,10 +18,10 @@ use crate::propose::{Base, Proposal};
 use crate::unknown;
 use crate::windows::{TimeKind, time_kind};
 
-pub use evidence::{Explanation, LEAST_EVIDENCE, LEAST_SIZE, has_rotor};
+pub use evidence::{Explanation, LEAST_EVIDENCE, LEAST_SIZE, has_rotor, plausible};
 use evidence::{
-    ROTOR, describe, matters, most_at_one_place, needs, overwhelming, plausible, steps_enough,
-    wald, worse_joints,
+    ROTOR, describe, matters, most_at_one_place, needs, overwhelming, steps_enough, wald,
+    worse_joints,
 };
 
 /// Evidence that a curve without a name needs \[nats\].

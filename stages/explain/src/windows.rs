@@ -123,22 +123,43 @@ impl Base<'_> {
         let all = &all.factors;
         let scanned = &all[..all.len().min(SCANNED_FACTORS)];
         let intervals = self.scan(scanned, only);
-        let masked = |(from_s, to_s): (f64, f64)| -> Vec<Column> {
-            all.iter()
-                .map(|c| self.within(c, from_s, to_s, only))
-                .collect()
-        };
-        let glances = intervals
-            .iter()
-            .map(|&interval| self.glance(hypothesis, None, &masked(interval)));
+        let glances = intervals.iter().map(|&interval| {
+            let masked = self.all_within(all, interval, only);
+            self.glance(hypothesis, None, &masked)
+        });
         let (best, _) = best_of(glances)?;
-        let (from_s, to_s) = intervals[best];
-        let session_s = only.map_or(0.0, |track| problem.tracks[track].track.session_s);
+        self.propose_within(hypothesis, intervals[best], only)
+    }
+
+    /// Factors within an interval of recording time \[s\], of one track or of all.
+    pub fn propose_within(
+        &self,
+        hypothesis: Hypothesis,
+        (from_s, to_s): (f64, f64),
+        only: Option<usize>,
+    ) -> Option<Proposal> {
+        let times = time_indices(hypothesis);
+        let [start, end] = times[..] else { return None };
+        let mut shape = vec![0.0; hypothesis.effect.coordinates.len()];
+        (shape[start], shape[end]) = (f64::NEG_INFINITY, f64::INFINITY);
+        let all = columns(self.problem, self.fit, hypothesis, &shape);
+        let masked = self.all_within(&all.factors, (from_s, to_s), only);
+        let session_s = only.map_or(0.0, |track| self.problem.tracks[track].track.session_s);
         (shape[start], shape[end]) = (session_s + from_s, session_s + to_s);
-        let masked = masked(intervals[best]);
         let mut proposal = self.propose_columns(hypothesis, &shape, None, &masked)?;
+        // One of as many beginnings and ends as there are.
         proposal.penalty += 2.0 * (STEPS as f64).ln();
         Some(proposal)
+    }
+
+    fn all_within(
+        &self,
+        columns: &[Arc<Column>],
+        (from_s, to_s): (f64, f64),
+        only: Option<usize>,
+    ) -> Vec<Column> {
+        let within = |column: &Arc<Column>| self.within(column, from_s, to_s, only);
+        columns.iter().map(within).collect()
     }
 
     /// A column with what lies outside an interval of recording time \[s\] set to zero.

@@ -119,8 +119,11 @@ const LEAST_SYMMETRY: f64 = 0.2;
 const MOST_GYRATIONS: f64 = 3.0;
 const FAR_OFF_M: f64 = 0.1;
 
+/// A stronger force is none that pushes a robot \[N\]: it hardly acts on the joints that would feel a weaker one elsewhere.
+const STRONGEST_N: f64 = 1000.0;
+
 /// Whether the numbers are ones that a robot may have: a link's mass stays above nothing and within twice what its URDF says,
-/// its centre within the link, and friction is not of one direction alone.
+/// its centre within the link, a push is not beyond all strength, and friction is not of one direction alone.
 pub fn plausible(active: &Active, model: &Model) -> bool {
     let x = &active.coordinates;
     let link = &model.links()[active.hypothesis.place.link];
@@ -135,6 +138,7 @@ pub fn plausible(active: &Active, model: &Model) -> bool {
                 .sqrt();
             shift_m < FAR_OFF_M.max(MOST_GYRATIONS * link.gyration_radius_m())
         }
+        "external_push" => x[..3].iter().map(|f| f * f).sum::<f64>().sqrt() < STRONGEST_N,
         "asymmetric_coulomb" => x[0].min(x[1]) >= LEAST_SYMMETRY * x[0].max(x[1]),
         _ => true,
     }
@@ -184,7 +188,7 @@ pub fn worse_joints(fit: &Fit, better: &Fit) -> Vec<usize> {
 /// How many of one effect there may be at one place.
 pub fn most_at_one_place(hypothesis: Hypothesis) -> usize {
     match hypothesis.effect.name {
-        "external_push" => 24,
+        "external_push" => 8,
         "torque_ripple" => 2,
         _ => 1,
     }
