@@ -8,6 +8,8 @@ use crate::recording::Recording;
 const MOVES: f64 = 0.02;
 /// A verdict needs a joint that moves for at least this long \[s\].
 const LEAST_MOTION_S: f64 = 1.0;
+/// And in some recording further than this: a push bends even an arm that holds still \[rad or m\].
+const LEAST_RANGE: f64 = 0.05;
 /// A joint's twin effort varies enough to compare with the measured one from this many times the noise.
 const STRONG: f64 = 5.0;
 /// A slope of measured effort over the twin's beyond this, either way, is a wrong unit rather than physics.
@@ -48,10 +50,17 @@ pub fn before(input: &Input) -> Option<String> {
     None
 }
 
-/// Whether no joint moves for as long as a verdict on what lasts needs.
+/// Whether no joint moves for as long, or as far, as a verdict on what lasts needs.
 pub fn at_rest(input: &Input) -> bool {
     let n = input.model.dof();
-    (0..n).all(|j| moving_s(&input.fit, j, n) < LEAST_MOTION_S)
+    let range = |recording: &Recording, j: usize| {
+        let positions = recording.position.iter().skip(j).step_by(n);
+        let ends = (f64::INFINITY, f64::NEG_INFINITY);
+        let (low, high) = positions.fold(ends, |(low, high), q| (low.min(*q), high.max(*q)));
+        high - low
+    };
+    let stays = |j: usize| input.fit.iter().all(|r| range(r, j) < LEAST_RANGE);
+    (0..n).all(|j| moving_s(&input.fit, j, n) < LEAST_MOTION_S || stays(j))
 }
 
 /// How long a joint moves \[s\].
