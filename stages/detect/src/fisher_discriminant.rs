@@ -64,7 +64,7 @@ impl Rule for Discriminant {
 /// # Errors
 /// If `setup` has no model, or nothing was learnt.
 pub(crate) fn build(settings: &Settings, setup: &Setup) -> Result<Box<dyn Detector>, ConfigError> {
-    let signals = Signals::new(&settings.signals, setup, NAME)?;
+    let signals = Signals::tap(&settings.signals, setup, NAME)?;
     let Some(discriminant) = settings.discriminant else {
         return Err(ConfigError::NotLearnt { detector: NAME });
     };
