@@ -80,7 +80,7 @@ fn samples(model: &Model, pushed: bool) -> Vec<TwinState> {
 }
 
 /// One configuration a detector.
-fn configs(joints: usize, free: &[TwinState]) -> Vec<Config> {
+fn configs(joints: usize, setup: &Setup, free: &[TwinState]) -> Vec<Config> {
     let free = [Lesson {
         name: "free".to_owned(),
         samples: free.to_vec(),
@@ -90,7 +90,7 @@ fn configs(joints: usize, free: &[TwinState]) -> Vec<Config> {
         train: &free,
         validation: &[],
     };
-    let learnt = tauscope::learn(&tauscope::Settings::default(), &lessons);
+    let learnt = tauscope::learn(&tauscope::Settings::default(), setup, &lessons);
     let bias = Some(vec![0.5; joints]);
     let threshold = Threshold {
         score: Some(100.0),
@@ -197,7 +197,7 @@ fn main() {
         ..Setup::default()
     };
     let (free, pushed) = (samples(&model, false), samples(&model, true));
-    let configs = configs(n, &free);
+    let configs = configs(n, &setup, &free);
     let stage = |config: &Config| Detect::new(config, setup.clone()).expect("a detector");
 
     let [mut clock, mut floor, mut apart, mut together] = [(); 4].map(|()| histogram());

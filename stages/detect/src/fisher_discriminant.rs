@@ -116,7 +116,8 @@ pub fn learn(
     Ok(learnt)
 }
 
-fn discriminant(found: &[(ContactKind, Vector6<f64>)]) -> Discriminant {
+/// Fisher's linear discriminant between collisions and cooperations.
+pub(crate) fn discriminant(found: &[(ContactKind, Vector6<f64>)]) -> Discriminant {
     let mut scatter = Matrix6::zeros();
     let mut mean = |kind| {
         let of_kind = || found.iter().filter(move |(other, _)| *other == kind);
