@@ -196,8 +196,9 @@ impl Detector for Tauscope {
             self.waits_since_ns = None;
         }
         let free = self.alarm.is_none();
-        // Whatever raises no alarm may be drift.
-        let score = self.windows.score(sample, free.then_some(self.threshold));
+        // Whatever raises no alarm and is not far from usual may be drift.
+        let drifts = free.then_some(self.threshold.min(DRIFT));
+        let score = self.windows.score(sample, drifts);
         let ready = self.windows.ready() && sample.header.has(flags::READY);
         if !ready {
             self.alarm = None;
