@@ -163,23 +163,17 @@ impl InertialEffort {
     pub fn place(&mut self, q: &[f64]) {
         sines(q, &mut self.sin, &mut self.cos);
         for body in &mut self.bodies {
-            let (home, origin) = (&body.home, &body.origin);
-            if body.prismatic {
-                for i in 0..3 {
-                    for k in 0..3 {
-                        body.rotation[i][k].follow(home[i][k]);
-                    }
-                    body.translation[i].follow(origin[i] + home[i][2] * q[body.joint]);
+            let (sin, cos) = (self.sin[body.joint], self.cos[body.joint]);
+            for (i, (&[x, y, z], &origin)) in body.home.iter().zip(&body.origin).enumerate() {
+                let (row, translation) = if body.prismatic {
+                    ([x, y, z], origin + z * q[body.joint])
+                } else {
+                    ([x * cos + y * sin, y * cos - x * sin, z], origin)
+                };
+                for (entry, newest) in body.rotation[i].iter_mut().zip(row) {
+                    entry.follow(newest);
                 }
-            } else {
-                let (sin, cos) = (self.sin[body.joint], self.cos[body.joint]);
-                for i in 0..3 {
-                    let [x, y, z] = home[i];
-                    body.rotation[i][0].follow(x * cos + y * sin);
-                    body.rotation[i][1].follow(y * cos - x * sin);
-                    body.rotation[i][2].follow(z);
-                    body.translation[i].follow(origin[i]);
-                }
+                body.translation[i].follow(translation);
             }
         }
     }

@@ -55,8 +55,8 @@ const FOLLOW_S: f64 = 0.15;
 const AGAIN_S: f64 = 0.25;
 /// Where kinds are told, the alarm waits so long for the force to show where it points \[s\].
 const DECIDE_S: f64 = 0.012;
-/// A score above this is not taken for drift: the unit is what one of a thousand contact-free samples exceeds.
-const DRIFT: f64 = 1.5;
+/// A score above this is not taken for drift: the unit, what one of a thousand contact-free samples exceeds.
+const DRIFT: f64 = 1.0;
 /// A score from this share of the threshold on may already belong to a contact.
 const LOW: f64 = 0.3;
 

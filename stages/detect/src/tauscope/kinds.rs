@@ -103,36 +103,5 @@ pub(crate) fn learn(
     }
     let count = |kind| found.iter().filter(|(of, _)| *of == kind).count();
     let enough = count(ContactKind::Collision) >= LEAST && count(ContactKind::Cooperation) >= LEAST;
-    enough.then(|| bounded(discriminant(&found), &found))
-}
-
-/// With the bound that has the largest 2 specificity + sensitivity on the contacts learnt from, as
-/// [`contact_classifier`](crate::contact_classifier) is tuned; of a range of equal ones its middle. Fisher's, half-way between the means, is for
-/// kinds that scatter alike, and cooperations scatter more.
-fn bounded(kinds: Discriminant, found: &[(ContactKind, Vector6<f64>)]) -> Kinds {
-    let weights = Vector6::from(kinds.weights);
-    let mut sums: Vec<(f64, bool)> = found
-        .iter()
-        .map(|(kind, seen)| (weights.dot(seen), *kind == ContactKind::Collision))
-        .collect();
-    sums.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let collisions = sums.iter().filter(|(_, collides)| *collides).count() as f64;
-    let cooperations = sums.len() as f64 - collisions;
-    // Between this contact and the next: what is above collides.
-    let value = |at: usize| {
-        let missed = sums[..=at].iter().filter(|(_, collides)| *collides).count() as f64;
-        let right = (at + 1) as f64 - missed;
-        2.0 * (1.0 - missed / collisions) + right / cooperations
-    };
-    let last = sums.len() - 1;
-    let most = (0..last).map(value).fold(f64::NEG_INFINITY, f64::max);
-    let mut best = (0..last).filter(|&at| value(at) >= most - 1e-9);
-    let Some(first) = best.next() else {
-        return kinds;
-    };
-    let to = best.next_back().unwrap_or(first) + 1;
-    Discriminant {
-        bound: 0.5 * (sums[first].0 + sums[to].0),
-        ..kinds
-    }
+    enough.then(|| discriminant(&found))
 }
