@@ -106,7 +106,7 @@ fn what_is_shared_changes_nothing() {
         out.0
     };
     let (alone, together) = (run(None), run(Some(Shared::default())));
-    assert!(alone.iter().any(|detection| detection.alarm()));
+    assert!(alone.iter().any(Detection::alarm));
     for (alone, together) in alone.iter().zip(&together) {
         assert_eq!(alone.score.to_bits(), together.score.to_bits());
         assert_eq!(alone.state.as_str(), together.state.as_str());

@@ -308,8 +308,8 @@ fn touched(seed: u64) -> Lesson {
         point_jacobian(&model, &data, 3, &point, |j, linear, _| {
             torque[j] = linear.dot(&along) * force;
         });
-        for j in 0..3 {
-            sample.effort[j] -= torque[j];
+        for (effort, torque) in sample.effort.iter_mut().zip(torque) {
+            *effort -= torque;
         }
         if place == 100 {
             contacts.push(LabelledContact {
