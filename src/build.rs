@@ -140,13 +140,15 @@ pub fn twin(
     Ok(Twin::new(config, setup, correction(model, cell)?)?)
 }
 
-/// A detector behind a twin of `cell` with this `model`.
+/// A detector behind a twin of `cell` with this `model`, and what it shares with others.
 pub fn detect(
     config: &tauscope_detect::Config,
     model: Option<&TwinFile>,
     cell: &Cell,
+    shared: Option<tauscope_detect::Shared>,
 ) -> Result<Detect, BuildError> {
     let mut setup = detect_setup(model, cell)?;
+    setup.shared = shared;
     trained::read(config, &mut setup)?;
     Ok(Detect::new(config, setup)?)
 }
@@ -192,6 +194,7 @@ pub fn detect_setup(
         contact_point_on_tool_m: cell.contact_point_on_tool_m(),
         impedance: cell.facts.impedance,
         trained: BTreeMap::new(),
+        shared: None,
     })
 }
 

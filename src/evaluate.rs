@@ -300,6 +300,7 @@ fn learn(
         let task = Task {
             setup: &setup,
             lessons,
+            free_first_s: request.set.free_first_s,
             seed,
             weights: out.join("models").join(file),
         };

@@ -193,6 +193,8 @@ impl<'a> Replay<'a> {
         let mut files = Vec::new();
         let mut graph = Graph::default();
         let mut streams: BTreeMap<usize, Stream> = BTreeMap::new();
+        // Detectors behind one twin are given the same samples, one after the other.
+        let mut shared: BTreeMap<usize, tauscope_detect::Shared> = BTreeMap::new();
         for &index in &self.members {
             let stage = &self.pipeline.stages[index];
             let input = stage
@@ -214,7 +216,9 @@ impl<'a> Replay<'a> {
                     }
                 }),
                 (Settings::Detect { config, model }, Some(input)) => {
-                    let detect = build::detect(config, model.as_ref(), cell)?;
+                    let behind = stage.inputs.first().copied().unwrap_or(index);
+                    let shared = Some(shared.entry(behind).or_default().clone());
+                    let detect = build::detect(config, model.as_ref(), cell, shared)?;
                     Some(graph.stage(&stage.name, Box::new(detect), &input)?)
                 }
                 (

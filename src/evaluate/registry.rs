@@ -44,6 +44,8 @@ pub struct Task<'a> {
     pub setup: &'a Setup,
     /// Train and validation recordings behind the twin.
     pub lessons: Lessons<'a>,
+    /// For so long nothing touches the robot at the beginning of each recording \[s\].
+    pub free_first_s: f64,
     /// For what is drawn by chance.
     pub seed: u64,
     /// Where trained weights go; the ending is the detector's.
@@ -192,7 +194,11 @@ pub static ENTRIES: &[Entry] = &[
         ..detector!(tuned frequency_classifier)
     },
     entry("tauscope", |task| {
-        let settings = tauscope::learn(&tauscope::Settings::default(), &task.lessons)?;
+        let settings = tauscope::Settings {
+            offset_from_first_s: task.free_first_s,
+            ..tauscope::Settings::default()
+        };
+        let settings = tauscope::learn(&settings, task.setup, &task.lessons)?;
         Ok(Config {
             tauscope: Some(settings),
             ..Config::default()

@@ -53,6 +53,7 @@ pub fn all(evaluation: &Evaluation, judged: &[Judged<'_>]) -> Vec<Table> {
     } else {
         tables.push(overall::unscored(evaluation));
     }
+    tables.extend(overall::smallest(judged));
     tables
 }
 

@@ -48,6 +48,9 @@ pub struct SetFile {
     /// Cycles at the beginning of the session that a detector may learn from.
     #[serde(default)]
     pub learning_cycles: Option<u32>,
+    /// For so long nothing touches the robot at the beginning of each recording \[s\]: there `tauscope` takes its offset from.
+    #[serde(default)]
+    pub free_first_s: f64,
     /// Contact-free recordings that detectors are trained on.
     #[serde(default)]
     pub train: Vec<PathBuf>,

@@ -231,3 +231,30 @@ pub fn unscored(evaluation: &Evaluation) -> Table {
     }
     table
 }
+
+/// By link, the smallest force that `tauscope` finds, for its own wish and two others.
+pub fn smallest(judged: &[Judged<'_>]) -> Vec<Table> {
+    let tables = judged.iter().filter_map(|one| {
+        let settings = one.run.first().config.tauscope.as_ref()?;
+        let wish = settings.false_alarms_per_hour;
+        let wishes = [wish, 1.0, 1.0 / (7.0 * 24.0)];
+        let forces = wishes.map(|per_hour| settings.smallest_forces(per_hour));
+        let mut table = Table::new(
+            format!("Smallest force found, {}", one.label),
+            "Once it has lasted 0.1 s, in half and in nine of ten of the postures and directions of the contact-free recordings [N]; by the false alarms that are put up with.",
+            &["link"],
+        );
+        for said in [format!("{wish} an hour"), "one an hour".to_owned(), "one a week".to_owned()] {
+            table.head.extend([format!("{said}: half"), "nine of ten".to_owned()]);
+        }
+        for (i, of_link) in forces[0].iter().enumerate() {
+            let mut row = vec![of_link.link.clone()];
+            for forces in &forces {
+                row.extend([forces[i].half_n, forces[i].most_n].map(|force| number(force.unwrap_or(f64::NAN), 1)));
+            }
+            table.row(row);
+        }
+        (!table.rows.is_empty()).then_some(table)
+    });
+    tables.collect()
+}

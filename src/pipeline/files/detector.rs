@@ -45,7 +45,7 @@ impl Resolver<'_> {
             return None;
         }
         if let Some(cell) = self.cell(index)
-            && let Err(error) = build::detect(&resumed, model, cell)
+            && let Err(error) = build::detect(&resumed, model, cell, None)
         {
             self.report.push(self.file.at_key(place, error.to_string()));
             return None;

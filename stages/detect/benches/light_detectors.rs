@@ -1,5 +1,6 @@
 //! What each detector that computes no net costs per sample, as a stage of its own, and what all of them
-//! cost together; beside the floor, the inverse dynamics alone.
+//! cost behind one twin in one process, where they share what they derive alike, and where not; beside the floor, the
+//! inverse dynamics alone.
 //!
 //!     cargo bench -p tauscope-detect --bench light_detectors
 //!
@@ -16,7 +17,7 @@ use rand_chacha::ChaCha8Rng;
 use tauscope_bus::{Detection, Emit, LinkError, Stage, TwinState, flags};
 use tauscope_detect::fisher_discriminant::Discriminant;
 use tauscope_detect::{
-    Config, Detect, JointSetup, Lesson, Lessons, Setup, Threshold, contact_classifier,
+    Config, Detect, JointSetup, Lesson, Lessons, Setup, Shared, Threshold, contact_classifier,
     fisher_discriminant, frequency_classifier, momentum_observer, naive_difference, tauscope,
     twin_regression, virtual_collision_sensor, virtual_collision_sensor_basic,
 };
@@ -79,7 +80,7 @@ fn samples(model: &Model, pushed: bool) -> Vec<TwinState> {
 }
 
 /// One configuration a detector.
-fn configs(joints: usize, free: &[TwinState]) -> Vec<Config> {
+fn configs(joints: usize, setup: &Setup, free: &[TwinState]) -> Vec<Config> {
     let free = [Lesson {
         name: "free".to_owned(),
         samples: free.to_vec(),
@@ -89,7 +90,7 @@ fn configs(joints: usize, free: &[TwinState]) -> Vec<Config> {
         train: &free,
         validation: &[],
     };
-    let learnt = tauscope::learn(&tauscope::Settings::default(), &lessons);
+    let learnt = tauscope::learn(&tauscope::Settings::default(), setup, &lessons);
     let bias = Some(vec![0.5; joints]);
     let threshold = Threshold {
         score: Some(100.0),
@@ -196,10 +197,10 @@ fn main() {
         ..Setup::default()
     };
     let (free, pushed) = (samples(&model, false), samples(&model, true));
-    let configs = configs(n, &free);
+    let configs = configs(n, &setup, &free);
     let stage = |config: &Config| Detect::new(config, setup.clone()).expect("a detector");
 
-    let [mut clock, mut floor, mut together] = [(); 3].map(|()| histogram());
+    let [mut clock, mut floor, mut apart, mut together] = [(); 4].map(|()| histogram());
     let mut alone: Vec<_> = (configs.iter())
         .map(|_| [histogram(), histogram()])
         .collect();
@@ -229,14 +230,21 @@ fn main() {
                 }
             }
         }
-        let mut all: Vec<Detect> = configs.iter().map(stage).collect();
-        for sample in &free {
-            let sample = warm(sample);
-            timed(&mut together, || {
-                for detect in &mut all {
-                    accept(detect, &sample, &mut out);
-                }
-            });
+        for (shared, histogram) in [(None, &mut apart), (Some(Shared::default()), &mut together)] {
+            let setup = Setup {
+                shared,
+                ..setup.clone()
+            };
+            let stage = |config: &Config| Detect::new(config, setup.clone()).expect("a detector");
+            let mut all: Vec<Detect> = configs.iter().map(stage).collect();
+            for sample in &free {
+                let sample = warm(sample);
+                timed(histogram, || {
+                    for detect in &mut all {
+                        accept(detect, &sample, &mut out);
+                    }
+                });
+            }
         }
     }
 
@@ -259,5 +267,6 @@ fn main() {
     for (config, [in_free, in_alarm]) in configs.iter().zip(&alone) {
         row(config.name().unwrap_or("?"), in_free, Some(in_alarm));
     }
+    row("all, sharing nothing", &apart, None);
     row("all together", &together, None);
 }

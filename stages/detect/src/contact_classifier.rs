@@ -63,7 +63,7 @@ impl Default for Settings {
 /// # Errors
 /// If `setup` has no model.
 pub(crate) fn build(settings: &Settings, setup: &Setup) -> Result<Box<dyn Detector>, ConfigError> {
-    let signals = Signals::new(&settings.signals, setup, NAME)?;
+    let signals = Signals::tap(&settings.signals, setup, NAME)?;
     let rule = Conditions::of(settings);
     let shared = (&settings.signals, &settings.detection);
     Ok(Box::new(ContactDetector::new(NAME, signals, shared, rule)))

@@ -20,6 +20,8 @@ use crate::contact_signals::{Instant, SignalSettings, Signals};
 use crate::detector::{Details, Detector, Judgement, Seen, Verdict};
 use crate::isolation::Contact;
 use crate::lesson::ContactKind;
+use crate::shared::Tap;
+use crate::sliding_dft::BandError;
 
 /// A fall of the force by this share of the threshold parts one rise from another.
 const SWING: f64 = 0.5;
@@ -223,7 +225,9 @@ pub(crate) fn unit(vector: [f64; 3]) -> [f64; 3] {
 /// A detector made of the signals, Algorithm 1 and a rule.
 pub(crate) struct ContactDetector<R> {
     name: &'static str,
-    signals: Signals,
+    signals: Tap<Signals>,
+    tool_link: usize,
+    fault: Option<BandError>,
     machine: Machine,
     rule: R,
 }
@@ -231,13 +235,15 @@ pub(crate) struct ContactDetector<R> {
 impl<R: Rule> ContactDetector<R> {
     pub fn new(
         name: &'static str,
-        signals: Signals,
+        mut signals: Tap<Signals>,
         settings: (&SignalSettings, &MachineSettings),
         rule: R,
     ) -> Self {
         Self {
             name,
+            tool_link: signals.with(|signals| signals.tool_link()),
             signals,
+            fault: None,
             machine: Machine::new(settings.1, settings.0.window),
             rule,
         }
@@ -283,14 +289,16 @@ impl<R: Rule> Detector for ContactDetector<R> {
     }
 
     fn judge(&mut self, sample: &TwinState) -> Judgement {
-        let instant = self.signals.update(sample);
+        let (instant, fault) =
+            (self.signals).with(|signals| (signals.update(sample), signals.fault()));
+        self.fault = fault;
         let ongoing = if let Some(instant) = &instant {
             self.machine.step(instant, &mut self.rule)
         } else {
             self.machine.reset();
             None
         };
-        judgement(instant.as_ref(), ongoing, self.signals.tool_link())
+        judgement(instant.as_ref(), ongoing, self.tool_link)
     }
 
     fn threshold(&self) -> Option<f64> {
@@ -302,6 +310,6 @@ impl<R: Rule> Detector for ContactDetector<R> {
     }
 
     fn fault(&self) -> Option<String> {
-        self.signals.fault().map(|fault| fault.to_string())
+        self.fault.map(|fault| fault.to_string())
     }
 }

@@ -10,6 +10,7 @@ use tauscope_dynamics::lowpass::Butterworth2;
 
 use crate::config::ConfigError;
 use crate::momentum::{DEFAULT_GAIN_PER_S, MomentumObserver};
+use crate::shared::Tap;
 use crate::sliding_dft::{BandError, SlidingDft, bins};
 use crate::stage::Setup;
 use crate::wrench::ToolPoint;
@@ -117,6 +118,19 @@ impl Signals {
         })
     }
 
+    /// As [`Signals::new`], shared with the other detectors that `setup` shares with.
+    pub(crate) fn tap(
+        settings: &SignalSettings,
+        setup: &Setup,
+        detector: &'static str,
+    ) -> Result<Tap<Self>, ConfigError> {
+        let own = Self::new(settings, setup, detector)?;
+        Ok(match &setup.shared {
+            Some(shared) => shared.signals(settings, own),
+            None => Tap::own(own),
+        })
+    }
+
     /// The link that the point on the tool belongs to.
     pub fn tool_link(&self) -> usize {
         self.tool.link()
@@ -136,7 +150,7 @@ impl Signals {
             return self.newest;
         }
         self.observer.update(sample);
-        let at = self.tool.at(&self.observer, &sample.velocity);
+        let at = self.tool.at(&mut self.observer, &sample.velocity);
         let mut velocity_m_per_s = [0.0; 3];
         for (axis, filter) in self.velocity.iter_mut().enumerate() {
             let value = at.velocity_m_per_s[axis];

@@ -64,7 +64,7 @@ impl Rule for Discriminant {
 /// # Errors
 /// If `setup` has no model, or nothing was learnt.
 pub(crate) fn build(settings: &Settings, setup: &Setup) -> Result<Box<dyn Detector>, ConfigError> {
-    let signals = Signals::new(&settings.signals, setup, NAME)?;
+    let signals = Signals::tap(&settings.signals, setup, NAME)?;
     let Some(discriminant) = settings.discriminant else {
         return Err(ConfigError::NotLearnt { detector: NAME });
     };
@@ -116,7 +116,8 @@ pub fn learn(
     Ok(learnt)
 }
 
-fn discriminant(found: &[(ContactKind, Vector6<f64>)]) -> Discriminant {
+/// Fisher's linear discriminant between collisions and cooperations.
+pub(crate) fn discriminant(found: &[(ContactKind, Vector6<f64>)]) -> Discriminant {
     let mut scatter = Matrix6::zeros();
     let mut mean = |kind| {
         let of_kind = || found.iter().filter(move |(other, _)| *other == kind);

@@ -17,6 +17,8 @@ use crate::contact_signals::{Instant, SignalSettings, Signals};
 use crate::contact_tuning;
 use crate::detector::{Details, Detector, Judgement};
 use crate::lesson::{ContactKind, LearnError, Lessons};
+use crate::shared::Tap;
+use crate::sliding_dft::BandError;
 use crate::stage::Setup;
 
 /// Canonical name.
@@ -55,14 +57,19 @@ impl Default for Settings {
 /// # Errors
 /// If `setup` has no model.
 pub(crate) fn build(settings: &Settings, setup: &Setup) -> Result<Box<dyn Detector>, ConfigError> {
+    let mut signals = Signals::tap(&settings.signals, setup, NAME)?;
     Ok(Box::new(FrequencyClassifier {
-        signals: Signals::new(&settings.signals, setup, NAME)?,
+        tool_link: signals.with(|signals| signals.tool_link()),
+        signals,
+        fault: None,
         by_content: ByContent::new(settings),
     }))
 }
 
 struct FrequencyClassifier {
-    signals: Signals,
+    signals: Tap<Signals>,
+    tool_link: usize,
+    fault: Option<BandError>,
     by_content: ByContent,
 }
 
@@ -72,14 +79,16 @@ impl Detector for FrequencyClassifier {
     }
 
     fn judge(&mut self, sample: &TwinState) -> Judgement {
-        let instant = self.signals.update(sample);
+        let (instant, fault) =
+            (self.signals).with(|signals| (signals.update(sample), signals.fault()));
+        self.fault = fault;
         let ongoing = if let Some(instant) = &instant {
             self.by_content.step(instant)
         } else {
             self.by_content.reset();
             None
         };
-        judgement(instant.as_ref(), ongoing, self.signals.tool_link())
+        judgement(instant.as_ref(), ongoing, self.tool_link)
     }
 
     fn threshold(&self) -> Option<f64> {
@@ -91,7 +100,7 @@ impl Detector for FrequencyClassifier {
     }
 
     fn fault(&self) -> Option<String> {
-        self.signals.fault().map(|fault| fault.to_string())
+        self.fault.map(|fault| fault.to_string())
     }
 }
 

@@ -14,15 +14,17 @@
 //! Differentiated, the observer is a low-pass, `ṙ = K (ṗ - Ṁ q̇ - τ + n - r)`. By the product rule
 //! `ṗ - Ṁ q̇` over a step is the mean mass matrix times the change of velocity; with the input constant
 //! over the step, the step is solved exactly, so that clocks may be uneven and no integral drifts.
+//! The mass matrix itself is not needed: it multiplies, at either end of the step, what the velocity has
+//! changed by a second less q̈.
 //!
 //! Sign: the measured effort is the motors'. It exceeds the twin's by friction and the like less Jᵀ F,
 //! with F the force on the robot; at rest the result is minus the residual.
 
-use nalgebra::DMatrix;
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState, flags};
-use tauscope_dynamics::{Data, Model, mass_matrix};
+use tauscope_dynamics::{Data, InertialEffort, Model};
 
 use crate::config::ConfigError;
+use crate::shared::Tap;
 use crate::stage::Setup;
 
 /// The papers' gain \[1/s\].
@@ -35,15 +37,12 @@ const SETTLED: f64 = 4.605_170_185_988_092;
 #[derive(Debug, Clone)]
 pub struct MomentumObserver {
     gain_per_s: f64,
-    model: Model,
-    data: Data,
-    /// Effort unit per N m by joint; 0 where that is not known.
-    effort_per_nm: Vec<f64>,
-    /// Stamp of the sample before, and its velocity, τ - n \[N m\] and mass matrix.
+    inertia: Tap<Inertia>,
+    /// N m per effort unit by joint; 0 where that is not known.
+    nm_per_effort: Vec<f64>,
+    /// Stamp of the sample before, and its τ less what the twin expects \[N m\].
     before_ns: Option<i64>,
-    velocity: JointArray,
-    driving: JointArray,
-    mass: DMatrix<f64>,
+    excess: JointArray,
     /// Step \[s\], and the share of a change that is followed in it; kept, for clocks are often even.
     step: (f64, f64),
     /// Estimate by joint \[N m\].
@@ -61,23 +60,23 @@ impl MomentumObserver {
         gain_per_s: f64,
         detector: &'static str,
     ) -> Result<Self, ConfigError> {
-        let Some(model) = setup.model.clone() else {
+        let Some(model) = &setup.model else {
             return Err(ConfigError::NoModel { detector });
         };
-        let n = model.dof();
         let known = |per_nm: f64| per_nm.is_finite() && per_nm != 0.0;
+        let new = || Inertia::new(model.clone());
         Ok(Self {
             gain_per_s,
-            data: Data::new(&model),
-            model,
-            effort_per_nm: (setup.joints.iter())
+            inertia: match &setup.shared {
+                Some(shared) => shared.inertia(new),
+                None => Tap::own(new()),
+            },
+            nm_per_effort: (setup.joints.iter())
                 .map(|joint| Some(joint.effort_per_nm).filter(|&per_nm| known(per_nm)))
-                .map(Option::unwrap_or_default)
+                .map(|per_nm| per_nm.map_or(0.0, f64::recip))
                 .collect(),
             before_ns: None,
-            velocity: [0.0; MAX_JOINTS],
-            driving: [0.0; MAX_JOINTS],
-            mass: DMatrix::zeros(n, n),
+            excess: [0.0; MAX_JOINTS],
             step: (0.0, 0.0),
             torque_nm: [0.0; MAX_JOINTS],
             started_ns: 0,
@@ -97,41 +96,22 @@ impl MomentumObserver {
         sample: &TwinState,
         expected_effort: &JointArray,
     ) -> &JointArray {
-        let n = self.effort_per_nm.len();
+        let n = self.nm_per_effort.len();
         let stamp_ns = sample.header.stamp_ns;
         let before_ns = self.before_ns.filter(|_| !sample.header.has(flags::RESET));
         if before_ns.is_some_and(|before_ns| stamp_ns <= before_ns) {
             return &self.torque_nm;
         }
-        let mass = mass_matrix(&self.model, &mut self.data, &sample.position[..n]);
-        let (mass, mass_before) = (mass.as_slice(), self.mass.as_mut_slice());
-        // M q̈ now, and twice the mean mass matrix times the change of velocity.
-        let (mut inertial, mut momentum) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
-        for k in 0..n {
-            let acceleration = sample.acceleration[k];
-            let change = sample.velocity[k] - self.velocity[k];
-            // Symmetric: a row is a column.
-            let rows = mass[k * n..].iter().zip(&mass_before[k * n..]);
-            let sums = inertial[..n].iter_mut().zip(&mut momentum[..n]);
-            for ((inertial, momentum), (now, then)) in sums.zip(rows) {
-                *inertial += now * acceleration;
-                *momentum += (now + then) * change;
-            }
-        }
-        mass_before.copy_from_slice(mass);
-        self.velocity[..n].copy_from_slice(&sample.velocity[..n]);
         let dt_s = before_ns.map(|before_ns| (stamp_ns - before_ns) as f64 * 1e-9);
         if let Some(dt_s) = dt_s.filter(|dt_s| dt_s.to_bits() != self.step.0.to_bits()) {
             self.step = (dt_s, -(-self.gain_per_s * dt_s).exp_m1());
         }
-        for j in (0..n).filter(|&j| self.effort_per_nm[j] != 0.0) {
-            let excess = sample.effort[j] - expected_effort[j];
-            let driving = excess / self.effort_per_nm[j] + inertial[j];
-            let before = std::mem::replace(&mut self.driving[j], driving);
-            if let Some(dt_s) = dt_s {
-                let input = 0.5 * (momentum[j] / dt_s - (driving + before));
-                self.torque_nm[j] += self.step.1 * (input - self.torque_nm[j]);
-            }
+        let inertial_nm = self.inertia.with(|inertia| inertia.update(sample));
+        for j in (0..n).filter(|&j| self.nm_per_effort[j] != 0.0) {
+            let excess = (sample.effort[j] - expected_effort[j]) * self.nm_per_effort[j];
+            let before = std::mem::replace(&mut self.excess[j], excess);
+            let input = inertial_nm[j] - 0.5 * (excess + before);
+            self.torque_nm[j] += self.step.1 * (input - self.torque_nm[j]);
         }
         if dt_s.is_none() {
             self.torque_nm = [0.0; MAX_JOINTS];
@@ -141,9 +121,12 @@ impl MomentumObserver {
         &self.torque_nm
     }
 
-    /// The robot, and where its links were at the newest sample.
-    pub(crate) fn robot(&self) -> (&Model, &Data) {
-        (&self.model, &self.data)
+    /// Shows `work` the robot, and where its links are at the newest sample.
+    pub(crate) fn with_robot<R>(&mut self, work: impl FnOnce(&Model, &Data) -> R) -> R {
+        self.inertia.with(|inertia| {
+            let (model, data) = inertia.robot();
+            work(model, data)
+        })
     }
 
     /// What the last update returned.
@@ -153,7 +136,7 @@ impl MomentumObserver {
 
     /// Whether the effort of this joint can be turned into a torque.
     pub fn knows(&self, joint: usize) -> bool {
-        self.effort_per_nm[joint] != 0.0
+        (self.nm_per_effort.get(joint)).is_some_and(|&per_effort| per_effort != 0.0)
     }
 
     /// Whether what was assumed at the start has been forgotten: all but 1 % of it.
@@ -162,5 +145,68 @@ impl MomentumObserver {
             let since_s = (before_ns - self.started_ns) as f64 * 1e-9;
             self.gain_per_s * since_s >= SETTLED
         })
+    }
+}
+
+/// What the arm's motion costs in inertia beyond what the twin has taken it for. No allocation per sample.
+#[derive(Debug, Clone)]
+pub(crate) struct Inertia {
+    model: Model,
+    data: Data,
+    effort: InertialEffort,
+    /// Stamp of the sample before, its velocity and the twin's acceleration.
+    before_ns: Option<i64>,
+    velocity: JointArray,
+    acceleration: JointArray,
+    /// By joint \[N m\].
+    mean_nm: JointArray,
+}
+
+impl Inertia {
+    fn new(model: Model) -> Self {
+        Self {
+            data: Data::new(&model),
+            effort: InertialEffort::new(&model),
+            model,
+            before_ns: None,
+            velocity: [0.0; MAX_JOINTS],
+            acceleration: [0.0; MAX_JOINTS],
+            mean_nm: [0.0; MAX_JOINTS],
+        }
+    }
+
+    /// Mean over the step to the next sample of M times (the velocity's change a second - q̈), by joint
+    /// \[N m\]; 0 at the first. A repeated stamp changes nothing.
+    fn update(&mut self, sample: &TwinState) -> JointArray {
+        let stamp_ns = sample.header.stamp_ns;
+        let n = self.model.dof();
+        let before_ns = self.before_ns.filter(|_| !sample.header.has(flags::RESET));
+        if before_ns.is_some_and(|before_ns| stamp_ns <= before_ns) {
+            return self.mean_nm;
+        }
+        self.effort.place(&sample.position[..n]);
+        self.mean_nm = [0.0; MAX_JOINTS];
+        if let Some(before_ns) = before_ns {
+            // Half of either end.
+            let per_s = 0.5 / ((stamp_ns - before_ns) as f64 * 1e-9);
+            let (mut newest, mut previous) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
+            for j in 0..n {
+                let rate = (sample.velocity[j] - self.velocity[j]) * per_s;
+                newest[j] = rate - 0.5 * sample.acceleration[j];
+                previous[j] = rate - 0.5 * self.acceleration[j];
+            }
+            let sum = self.effort.sum(&newest[..n], &previous[..n]);
+            self.mean_nm[..n].copy_from_slice(sum);
+        }
+        self.velocity[..n].copy_from_slice(&sample.velocity[..n]);
+        self.acceleration[..n].copy_from_slice(&sample.acceleration[..n]);
+        self.before_ns = Some(stamp_ns);
+        self.mean_nm
+    }
+
+    /// The robot, and where its links are at the newest sample.
+    fn robot(&mut self) -> (&Model, &Data) {
+        self.effort.pose(&self.model, &mut self.data);
+        (&self.model, &self.data)
     }
 }

@@ -115,73 +115,62 @@ pub struct SlidingDft {
     /// The window as a ring; zeros before it has filled.
     ring: Vec<[f64; AXES]>,
     at: usize,
-    bins: Bins,
+    bins: Vec<Group>,
+    count: usize,
+    /// By direction, the largest squared length of any bin.
+    most: [f64; AXES],
     /// The bin whose sum is begun anew in this cycle, and that sum.
     renewed: usize,
     fresh: [[f64; 2]; AXES],
 }
 
-/// What belongs to the bins: by number, bin by bin, so that several are followed at once.
-#[derive(Debug, Clone, Default)]
-struct Bins {
-    /// e^(-2πi k/N), and that to the power of the place in the cycle: real and imaginary parts.
-    turn: [Vec<f64>; 2],
-    phase: [Vec<f64>; 2],
-    /// By direction, real and imaginary parts.
-    sums: [[Vec<f64>; 2]; AXES],
+/// How many bins are followed at once, that the processor may take several in one instruction.
+const LANES: usize = 4;
+type Lanes = [f64; LANES];
+
+/// Bins that are followed at once; one that is not wanted stays zero. Complex numbers are real and imaginary parts.
+#[derive(Debug, Clone, Copy, Default)]
+struct Group {
+    /// e^(-2πi k/N), and that to the power of the place in the cycle.
+    turn: [Lanes; 2],
+    phase: [Lanes; 2],
+    /// By direction.
+    sums: [[Lanes; 2]; AXES],
 }
 
-impl Bins {
-    fn len(&self) -> usize {
-        self.turn[0].len()
-    }
+/// Multiplication and addition lane by lane.
+fn lanes(f: impl Fn(usize) -> f64) -> Lanes {
+    std::array::from_fn(f)
+}
 
-    /// Phases as at the beginning of a cycle.
+impl Group {
+    /// The phase as at the beginning of a cycle.
     fn rewind(&mut self) {
-        self.phase[0].fill(1.0);
-        self.phase[1].fill(0.0);
+        self.phase = [[1.0; LANES], [0.0; LANES]];
     }
 
-    /// Adds `change` in the present phase, and goes on to the next.
-    fn push(&mut self, change: [f64; AXES]) {
-        let n = self.len();
-        let [phase_re, phase_im] = &mut self.phase;
-        let (phase_re, phase_im) = (&mut phase_re[..n], &mut phase_im[..n]);
-        for ([re, im], change) in self.sums.iter_mut().zip(change) {
-            let (re, im) = (&mut re[..n], &mut im[..n]);
-            for k in 0..n {
-                re[k] += change * phase_re[k];
-                im[k] += change * phase_im[k];
-            }
+    /// Adds `change` in the present phase, and goes on to the next; raises `most` to the squared lengths.
+    #[inline]
+    fn push(&mut self, change: [f64; AXES], most: &mut [Lanes; AXES]) {
+        let [phase_re, phase_im] = self.phase;
+        for (axis, change) in change.into_iter().enumerate() {
+            let [re, im] = &mut self.sums[axis];
+            *re = lanes(|k| re[k] + change * phase_re[k]);
+            *im = lanes(|k| im[k] + change * phase_im[k]);
+            let squared = lanes(|k| re[k] * re[k] + im[k] * im[k]);
+            most[axis] = lanes(|k| larger(squared[k], most[axis][k]));
         }
-        let [turn_re, turn_im] = &self.turn;
-        let (turn_re, turn_im) = (&turn_re[..n], &turn_im[..n]);
-        for k in 0..n {
-            let (re, im) = (phase_re[k], phase_im[k]);
-            phase_re[k] = re * turn_re[k] - im * turn_im[k];
-            phase_im[k] = re * turn_im[k] + im * turn_re[k];
-        }
+        let [turn_re, turn_im] = self.turn;
+        self.phase = [
+            lanes(|k| phase_re[k] * turn_re[k] - phase_im[k] * turn_im[k]),
+            lanes(|k| phase_re[k] * turn_im[k] + phase_im[k] * turn_re[k]),
+        ];
     }
+}
 
-    /// By direction, the largest squared length of any bin; 0 over no bin.
-    fn most(&self) -> [f64; AXES] {
-        // Four at a time, for a single running maximum waits for itself.
-        const LANES: usize = 4;
-        let larger = |a: f64, b: f64| if a > b { a } else { b };
-        std::array::from_fn(|axis| {
-            let [re, im] = &self.sums[axis];
-            let (mut re, mut im) = (re.chunks_exact(LANES), im.chunks_exact(LANES));
-            let mut most = [0.0; LANES];
-            for (re, im) in re.by_ref().zip(im.by_ref()) {
-                for (lane, most) in most.iter_mut().enumerate() {
-                    *most = larger(re[lane] * re[lane] + im[lane] * im[lane], *most);
-                }
-            }
-            let rest = re.remainder().iter().zip(im.remainder());
-            let rest = rest.map(|(re, im)| re * re + im * im);
-            rest.chain(most).fold(0.0, larger)
-        })
-    }
+/// As the processor has it: no matter which of two that cannot be compared.
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
 impl SlidingDft {
@@ -190,7 +179,9 @@ impl SlidingDft {
         Self {
             ring: vec![[0.0; AXES]; window.max(1)],
             at: 0,
-            bins: Bins::default(),
+            bins: Vec::new(),
+            count: 0,
+            most: [0.0; AXES],
             renewed: 0,
             fresh: [[0.0; 2]; AXES],
         }
@@ -200,46 +191,61 @@ impl SlidingDft {
     pub fn set_bins(&mut self, bins: RangeInclusive<usize>) {
         self.ring.fill([0.0; AXES]);
         self.at = 0;
+        self.most = [0.0; AXES];
         self.renewed = 0;
         self.fresh = [[0.0; 2]; AXES];
         let n = self.ring.len() as f64;
-        let Bins { turn, phase, sums } = &mut self.bins;
-        turn.iter_mut().for_each(Vec::clear);
-        for k in bins {
+        self.count = bins.clone().count();
+        self.bins.clear();
+        self.bins
+            .resize(self.count.div_ceil(LANES), Group::default());
+        for (i, k) in bins.enumerate() {
             let (sin, cos) = (TAU * k as f64 / n).sin_cos();
-            turn[0].push(cos);
-            turn[1].push(-sin);
+            let group = &mut self.bins[i / LANES];
+            let lane = i % LANES;
+            (group.turn[0][lane], group.turn[1][lane]) = (cos, -sin);
         }
-        let count = turn[0].len();
-        for numbers in phase.iter_mut().chain(sums.as_flattened_mut()) {
-            numbers.clear();
-            numbers.resize(count, 0.0);
+        self.rewind();
+    }
+
+    /// Phases as at the beginning of a cycle.
+    fn rewind(&mut self) {
+        self.bins.iter_mut().for_each(Group::rewind);
+        // The lanes beyond the last bin hear nothing.
+        if let Some(last) = self.bins.last_mut() {
+            let used = (self.count - 1) % LANES + 1;
+            last.phase[0][used..].fill(0.0);
         }
-        self.bins.rewind();
     }
 
     /// Takes the newest value; the oldest leaves.
     pub fn push(&mut self, value: [f64; AXES]) {
         let old = std::mem::replace(&mut self.ring[self.at], value);
-        if self.renewed < self.bins.len() {
-            let [re, im] = [0, 1].map(|part: usize| self.bins.phase[part][self.renewed]);
+        let (group, lane) = (self.renewed / LANES, self.renewed % LANES);
+        if let Some(group) = self.bins.get(group) {
+            let [re, im] = group.phase.map(|part| part[lane]);
             for (sum, value) in self.fresh.iter_mut().zip(value) {
                 sum[0] += value * re;
                 sum[1] += value * im;
             }
         }
-        self.bins.push(std::array::from_fn(|i| value[i] - old[i]));
+        let change = std::array::from_fn(|i| value[i] - old[i]);
+        let mut most = [[0.0; LANES]; AXES];
+        for group in &mut self.bins {
+            group.push(change, &mut most);
+        }
+        self.most = most.map(|lanes| lanes.into_iter().fold(0.0, larger));
         self.at += 1;
         if self.at == self.ring.len() {
             // A cycle is over: every cycle sees the same phases, bit for bit.
             self.at = 0;
-            self.bins.rewind();
+            self.rewind();
             let fresh = std::mem::take(&mut self.fresh);
-            if self.renewed < self.bins.len() {
-                for ([re, im], fresh) in self.bins.sums.iter_mut().zip(fresh) {
-                    (re[self.renewed], im[self.renewed]) = (fresh[0], fresh[1]);
+            if let Some(group) = self.bins.get_mut(group) {
+                for ([re, im], fresh) in group.sums.iter_mut().zip(fresh) {
+                    (re[lane], im[lane]) = (fresh[0], fresh[1]);
                 }
-                self.renewed = (self.renewed + 1) % self.bins.len();
+                self.renewed = (self.renewed + 1) % self.count;
             }
         }
     }
@@ -247,7 +253,7 @@ impl SlidingDft {
     /// By direction, the largest length of any bin (the L∞-norm over the band) times 2/N; 0 over no bin.
     pub fn norms(&self) -> [f64; AXES] {
         let n = self.ring.len() as f64;
-        self.bins.most().map(|squared| squared.sqrt() * 2.0 / n)
+        self.most.map(|squared| squared.sqrt() * 2.0 / n)
     }
 }
 

@@ -13,6 +13,7 @@ use crate::detector::Detector;
 use crate::events::{Alarm, OwnEvents, Step};
 use crate::isolation::Isolation;
 use crate::learned::Trained;
+use crate::shared::Shared;
 use crate::virtual_collision_sensor::Learnt;
 
 /// What a detector must know of its cell and its twin.
@@ -32,6 +33,8 @@ pub struct Setup {
     pub impedance: Option<Impedance>,
     /// By detector, those that were trained.
     pub trained: BTreeMap<String, Arc<Trained>>,
+    /// What it shares with other detectors that are given the same samples; `None` shares nothing.
+    pub shared: Option<Shared>,
 }
 
 impl Setup {

@@ -10,27 +10,34 @@
 //! The threshold is set by a wish: so many false alarms an hour. How often the score exceeds what by chance is
 //! extrapolated from its peaks in contact-free data ([`Tail`]).
 //!
+//! Where labels tell collisions from cooperations, what parts them is learnt, too ([`Kinds`]).
+//!
 //! The touched link is the one whose force explains the whitened residual best, the point of contact
 //! sought along the link (Haddadin, De Luca and Albu-Schäffer, "Robot Collisions: A Survey on Detection,
 //! Isolation, and Identification", 2017, sections V and VI).
 
+mod kinds;
 mod learnt;
 mod place;
+mod smallest;
 mod tail;
 mod windows;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tauscope_bus::{TwinState, flags};
+use tauscope_bus::{JointArray, MAX_JOINTS, TwinState, flags};
 
 use crate::config::ConfigError;
 use crate::detector::{Detector, Judgement, Seen, Verdict};
 use crate::lesson::{LearnError, Lessons};
 use crate::stage::Setup;
+pub use kinds::Kinds;
 pub use learnt::{Learnt, LearntJoint, LearntWindow};
+use nalgebra::Vector6;
 use place::Place;
+pub use smallest::Smallest;
 pub use tail::Tail;
-use windows::Windows;
+use windows::{Follow, Windows};
 
 /// Canonical name.
 pub(crate) const NAME: &str = "tauscope";
@@ -39,11 +46,17 @@ pub(crate) const NAME: &str = "tauscope";
 const RELEASE: f64 = 0.35;
 /// For so long \[s\].
 const HOLD_S: f64 = 0.1;
-/// Another contact on top of one: the score rises to this many times what it has been \[-\], which is
-/// followed with this time constant, not sooner than this after the last alarm \[s\].
-const RISE: f64 = 3.0;
+/// Another contact on top of one: the residual changes by this many times the threshold against what it has been, which is
+/// followed with this time constant, and grows (else it is a release); not sooner than this after the last alarm \[s\].
+const CHANGE: f64 = 2.0;
+/// Where no kinds are told apart, one contact may swell and still be one: the change must be this share of what it has been as well.
+const SWELL: f64 = 0.5;
 const FOLLOW_S: f64 = 0.15;
 const AGAIN_S: f64 = 0.25;
+/// Where kinds are told, the alarm waits so long for the force to show where it points \[s\].
+const DECIDE_S: f64 = 0.012;
+/// A score above this is not taken for drift: the unit, what one of a thousand contact-free samples exceeds.
+const DRIFT: f64 = 1.0;
 /// A score from this share of the threshold on may already belong to a contact.
 const LOW: f64 = 0.3;
 
@@ -96,25 +109,48 @@ pub(crate) fn build(settings: &Settings, setup: &Setup) -> Result<Box<dyn Detect
             reason,
         });
     }
-    Ok(Box::new(Tauscope {
-        windows: Windows::new(learnt, settings.drift_s, settings.offset_from_first_s),
-        place: Place::new(setup),
-        threshold: learnt.tail.threshold(settings.false_alarms_per_hour),
-        alarm: None,
-        newest_low_ns: None,
-    }))
+    Ok(Box::new(Tauscope::new(learnt, settings, setup)))
 }
 
-/// Learns from contact-free stretches of all recordings.
+/// Learns from contact-free stretches of all recordings, and what parts the kinds from the training recordings' contacts.
 ///
 /// # Errors
 /// If they hold too little.
-pub fn learn(settings: &Settings, lessons: &Lessons<'_>) -> Result<Settings, LearnError> {
-    let learnt = Learnt::new(lessons, settings.drift_s)?;
+pub fn learn(
+    settings: &Settings,
+    setup: &Setup,
+    lessons: &Lessons<'_>,
+) -> Result<Settings, LearnError> {
+    let mut learnt = Learnt::new(lessons, settings.follow())?;
+    learnt.smallest = smallest::smallest(&learnt, lessons, setup, settings.follow());
+    learnt.kinds = kinds::learn(&learnt, settings, setup, lessons);
     Ok(Settings {
         learnt: Some(learnt),
         ..settings.clone()
     })
+}
+
+impl Settings {
+    fn follow(&self) -> Follow {
+        Follow {
+            drift_s: self.drift_s,
+            offset_from_first_s: self.offset_from_first_s,
+        }
+    }
+
+    /// By link, the smallest force that is found at `false_alarms_per_hour`; empty before anything is learnt.
+    pub fn smallest_forces(&self, false_alarms_per_hour: f64) -> Vec<Smallest> {
+        let Some(learnt) = &self.learnt else {
+            return Vec::new();
+        };
+        let factor = learnt.tail.threshold(false_alarms_per_hour).sqrt();
+        let at = |of: &Smallest| Smallest {
+            link: of.link.clone(),
+            half_n: of.half_n.map(|force| force * factor),
+            most_n: of.most_n.map(|force| force * factor),
+        };
+        learnt.smallest.iter().map(at).collect()
+    }
 }
 
 struct Tauscope {
@@ -124,15 +160,22 @@ struct Tauscope {
     alarm: Option<Alarm>,
     /// Newest sample whose score was usual.
     newest_low_ns: Option<i64>,
+    /// The joints' velocity then \[rad/s\].
+    velocity: JointArray,
+    kinds: Option<Kinds>,
+    tells_kinds: bool,
+    /// When the score rose above the threshold, while the alarm waits.
+    waits_since_ns: Option<i64>,
 }
 
 /// An alarm that lasts.
 struct Alarm {
+    /// What kinds are told by, and what was told, as it was raised.
+    measurements: Option<Vector6<f64>>,
+    state: &'static str,
     contact_ns: i64,
     raised_ns: i64,
     newest_high_ns: i64,
-    /// The score as it has been.
-    usual: f64,
     newest_ns: i64,
 }
 
@@ -150,32 +193,48 @@ impl Detector for Tauscope {
             self.windows.reset();
             self.alarm = None;
             self.newest_low_ns = None;
+            self.waits_since_ns = None;
         }
         let free = self.alarm.is_none();
-        let score = self
-            .windows
-            .score(sample, free.then_some(LOW * self.threshold));
+        // Whatever raises no alarm and is not far from usual may be drift.
+        let drifts = free.then_some(self.threshold.min(DRIFT));
+        let score = self.windows.score(sample, drifts);
         let ready = self.windows.ready() && sample.header.has(flags::READY);
         if !ready {
             self.alarm = None;
+            self.waits_since_ns = None;
             return Judgement {
                 score,
                 ready,
                 verdict: None,
             };
         }
-        let contact = self
-            .step(sample.header.stamp_ns, score)
-            .map(|contact_ns| Seen {
+        let raised_ns = self.alarm.as_ref().map(|alarm| alarm.raised_ns);
+        let contact_ns = self.step(sample.header.stamp_ns, score);
+        if score < LOW * self.threshold || raised_ns.is_some() {
+            self.velocity = sample.velocity;
+        }
+        let contact = contact_ns.map(|contact_ns| {
+            let touch = self.place.locate(sample, &self.windows, &self.velocity);
+            if let Some(alarm) = &mut self.alarm
+                && raised_ns != Some(alarm.raised_ns)
+            {
+                alarm.measurements = touch.as_ref().map(kinds::measurements);
+                if let (Some(kinds), Some(seen)) = (&self.kinds, &alarm.measurements) {
+                    alarm.state = kinds::classify(kinds, seen);
+                }
+            }
+            Seen {
                 contact_ns,
                 joints: Some(Place::loaded(&self.windows)),
-                place: self.place.locate(sample, &self.windows),
-            });
+                place: touch.map(|touch| touch.contact),
+            }
+        });
         Judgement {
             score,
             ready,
             verdict: Some(Verdict {
-                state: if contact.is_some() { "contact" } else { "free" },
+                state: self.alarm.as_ref().map_or("free", |alarm| alarm.state),
                 contact,
             }),
         }
@@ -183,19 +242,41 @@ impl Detector for Tauscope {
 }
 
 impl Tauscope {
+    fn new(learnt: &Learnt, settings: &Settings, setup: &Setup) -> Self {
+        Self {
+            windows: Windows::new(learnt, settings.follow()),
+            place: Place::new(setup),
+            threshold: learnt.tail.threshold(settings.false_alarms_per_hour),
+            alarm: None,
+            newest_low_ns: None,
+            velocity: [0.0; MAX_JOINTS],
+            kinds: learnt.kinds,
+            tells_kinds: learnt.kinds.is_some(),
+            waits_since_ns: None,
+        }
+    }
+
     /// Takes the next score; gives the beginning of the contact, if there is one.
     fn step(&mut self, now_ns: i64, score: f64) -> Option<i64> {
         let high = score >= self.threshold;
         let ns = |seconds: f64| (seconds * 1e9) as i64;
         match &mut self.alarm {
-            None if high => {
-                self.alarm = Some(Alarm {
-                    contact_ns: self.newest_low_ns.unwrap_or(now_ns),
-                    raised_ns: now_ns,
-                    newest_high_ns: now_ns,
-                    usual: score,
-                    newest_ns: now_ns,
-                });
+            None if high || self.waits_since_ns.is_some() => {
+                let since_ns = *self.waits_since_ns.get_or_insert(now_ns);
+                if score < RELEASE * self.threshold {
+                    self.waits_since_ns = None;
+                } else if !self.tells_kinds || now_ns - since_ns >= ns(DECIDE_S) {
+                    self.waits_since_ns = None;
+                    self.windows.begin(false);
+                    self.alarm = Some(Alarm {
+                        measurements: None,
+                        state: "contact",
+                        contact_ns: self.newest_low_ns.unwrap_or(now_ns),
+                        raised_ns: now_ns,
+                        newest_high_ns: now_ns,
+                        newest_ns: now_ns,
+                    });
+                }
             }
             None => {}
             Some(alarm) => {
@@ -204,14 +285,19 @@ impl Tauscope {
                 }
                 let dt_s = (now_ns - alarm.newest_ns) as f64 * 1e-9;
                 alarm.newest_ns = now_ns;
-                let again =
-                    high && score > RISE * alarm.usual && now_ns - alarm.raised_ns > ns(AGAIN_S);
+                let swell = if self.tells_kinds { 0.0 } else { SWELL };
+                let again = now_ns - alarm.raised_ns > ns(AGAIN_S)
+                    && high
+                    && self.windows.grows()
+                    && self.windows.change()
+                        > (CHANGE * self.threshold).max(swell * self.windows.held());
                 if again {
                     alarm.contact_ns = now_ns;
                     alarm.raised_ns = now_ns;
-                    alarm.usual = score;
+                    self.windows.begin(true);
                 } else {
-                    alarm.usual += (score - alarm.usual) * (1.0 - (-dt_s / FOLLOW_S).exp());
+                    let share = 1.0 - (-dt_s / FOLLOW_S).exp();
+                    self.windows.hold(share);
                 }
                 if now_ns - alarm.newest_high_ns >= ns(HOLD_S) {
                     self.alarm = None;

@@ -3,7 +3,7 @@
 //! of Jᵀ, and it is the one taken here).
 
 use nalgebra::{Matrix3, Vector3};
-use tauscope_bus::JointArray;
+use tauscope_bus::{JointArray, MAX_JOINTS};
 use tauscope_dynamics::{Model, point_jacobian};
 
 use crate::momentum::MomentumObserver;
@@ -51,30 +51,40 @@ impl ToolPoint {
     /// The point at the observer's newest sample and at `velocity` \[rad/s\], and the force in the wrench of
     /// least squares that the observed joint torques amount to; joints whose effort cannot be turned into a
     /// torque are passed over.
-    pub fn at(&self, observer: &MomentumObserver, velocity: &JointArray) -> AtTool {
-        let ((model, data), torque_nm) = (observer.robot(), observer.torque_nm());
+    pub fn at(&self, observer: &mut MomentumObserver, velocity: &JointArray) -> AtTool {
+        let (mut torque_nm, mut weight) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
+        for j in (0..MAX_JOINTS).filter(|&j| observer.knows(j)) {
+            (torque_nm[j], weight[j]) = (observer.torque_nm()[j], 1.0);
+        }
         let mut velocity_m_per_s = Vector3::zeros();
-        // J Jᵀ + λ² 1 and J τ by blocks: forces, forces against moments, moments.
+        // J Jᵀ + λ² 1 and J τ by blocks: forces, forces against moments, moments; of what is symmetric the
+        // lower half.
         let damped = Matrix3::from_diagonal_element(DAMPING * DAMPING);
-        let (mut forces, mut mixed, mut moments) = (damped, Matrix3::zeros(), damped);
-        let (mut pull, mut twist) = (Vector3::zeros(), Vector3::zeros());
+        let (mut forces, mut mixed, mut moments) = (damped, Matrix3::<f64>::zeros(), damped);
+        let (mut pull, mut twist) = (Vector3::<f64>::zeros(), Vector3::<f64>::zeros());
         let add = |j: usize, linear: Vector3<f64>, angular: Vector3<f64>| {
             velocity_m_per_s += linear * velocity[j];
-            if observer.knows(j) {
-                pull += linear * torque_nm[j];
-                twist += angular * torque_nm[j];
-                forces += linear * linear.transpose();
-                mixed += linear * angular.transpose();
-                moments += angular * angular.transpose();
+            pull += linear * torque_nm[j];
+            twist += angular * torque_nm[j];
+            let (pushed, turned) = (linear * weight[j], angular * weight[j]);
+            for a in 0..3 {
+                for b in 0..3 {
+                    mixed[(a, b)] += pushed[a] * angular[b];
+                    if b <= a {
+                        forces[(a, b)] += pushed[a] * linear[b];
+                        moments[(a, b)] += turned[a] * angular[b];
+                    }
+                }
             }
         };
-        let position_m = point_jacobian(model, data, self.link, &self.point, add);
+        let position_m = observer
+            .with_robot(|model, data| point_jacobian(model, data, self.link, &self.point, add));
         // The moment is eliminated. Both inverses exist: the damped matrix is positive definite, and so
         // are its last block and what remains of the first.
-        let force_n = moments.try_inverse().and_then(|inverse| {
+        let force_n = symmetric_inverse(&moments).and_then(|inverse| {
             let through = mixed * inverse;
             let rest = forces - through * mixed.transpose();
-            Some(rest.try_inverse()? * (pull - through * twist))
+            Some(symmetric_inverse(&rest)? * (pull - through * twist))
         });
         AtTool {
             position_m,
@@ -82,4 +92,18 @@ impl ToolPoint {
             force_n: force_n.unwrap_or_default(),
         }
     }
+}
+
+/// Inverse of the symmetric matrix of which `lower` holds the lower half; `None` of a singular one.
+fn symmetric_inverse(lower: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    let (a, b, c) = (lower.m11, lower.m21, lower.m31);
+    let (d, e, f) = (lower.m22, lower.m32, lower.m33);
+    let (aa, ab, ac) = (d * f - e * e, c * e - b * f, b * e - c * d);
+    let determinant = a * aa + b * ab + c * ac;
+    if determinant == 0.0 {
+        return None;
+    }
+    let (bb, bc, cc) = (a * f - c * c, b * c - a * e, a * d - b * b);
+    let inverse = Matrix3::new(aa, ab, ac, ab, bb, bc, ac, bc, cc);
+    Some(inverse * determinant.recip())
 }

@@ -2,13 +2,15 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tauscope_bus::{Detection, Emit, EventKind, LinkError, Stage, TwinState, flags};
 use tauscope_detect::{
-    Config, ConfigError, Detect, JointSetup, LabelledContact, LearnError, Lesson, Lessons, Setup,
-    tauscope,
+    Config, ConfigError, ContactKind, Detect, JointSetup, LabelledContact, LearnError, Lesson,
+    Lessons, Setup, tauscope,
 };
+use tauscope_dynamics::{Data, Model, forward_kinematics, point_jacobian};
 
 const JOINTS: usize = 3;
 const STEP_NS: i64 = 10_000_000;
@@ -62,7 +64,7 @@ fn learnt(settings: &tauscope::Settings) -> tauscope::Settings {
         train: &train,
         validation: &[],
     };
-    tauscope::learn(settings, &lessons).unwrap()
+    tauscope::learn(settings, &setup(), &lessons).unwrap()
 }
 
 fn detector(settings: tauscope::Settings) -> Detect {
@@ -151,7 +153,7 @@ fn labelled_contacts_teach_nothing() {
     lesson_.contacts = Some(vec![LabelledContact {
         on_ns: 2000 * STEP_NS,
         off_ns: 2100 * STEP_NS,
-        kind: tauscope_detect::ContactKind::Contact,
+        kind: ContactKind::Contact,
         ignore: false,
     }]);
     let train = [lesson_];
@@ -159,7 +161,7 @@ fn labelled_contacts_teach_nothing() {
         train: &train,
         validation: &[],
     };
-    let learnt = tauscope::learn(&tauscope::Settings::default(), &lessons).unwrap();
+    let learnt = tauscope::learn(&tauscope::Settings::default(), &setup(), &lessons).unwrap();
     let noise = &learnt.learnt.unwrap().windows[0].noise[0];
     assert!(noise.iter().all(|noise| *noise < 0.3), "{noise:?}");
 }
@@ -171,7 +173,7 @@ fn too_short_a_lesson_says_how_much_is_wanted() {
         train: &train,
         validation: &[],
     };
-    let error = tauscope::learn(&tauscope::Settings::default(), &lessons).unwrap_err();
+    let error = tauscope::learn(&tauscope::Settings::default(), &setup(), &lessons).unwrap_err();
     assert!(matches!(error, LearnError::TooLittle { .. }), "{error}");
 }
 
@@ -205,4 +207,159 @@ fn a_reset_forgets_what_was_before() {
     assert!(detections[19].header.has(flags::READY));
     assert!(!detections[20].header.has(flags::READY));
     assert!(detections[35].header.has(flags::READY));
+}
+
+#[test]
+fn four_minutes_of_training_keep_a_wish_under_slow_drift() {
+    let train = [lesson(quiet(11, 12_000)), lesson(quiet(12, 12_000))];
+    let lessons = Lessons {
+        train: &train,
+        validation: &[],
+    };
+    // Five an hour by default.
+    let learnt = tauscope::learn(&tauscope::Settings::default(), &setup(), &lessons).unwrap();
+    let mut alarms = 0;
+    for seed in 20..30 {
+        let mut samples = quiet(seed, 12_000);
+        for (k, sample) in samples.iter_mut().enumerate() {
+            sample.effort[0] += 0.2 * k as f64 / 12_000.0;
+        }
+        alarms += onsets(&run(&mut detector(learnt.clone()), &samples)).len();
+    }
+    // 1.7 are to be expected in twenty minutes.
+    assert!(alarms <= 5, "{alarms} alarms");
+}
+
+#[test]
+fn a_contact_on_top_of_another_is_an_alarm_of_its_own_and_a_release_is_none() {
+    let mut detector = detector(learnt(&tauscope::Settings::default()));
+    let mut samples = quiet(3, 3000);
+    for sample in &mut samples[1000..1200] {
+        sample.effort[1] -= 1.5;
+    }
+    for sample in &mut samples[1100..1200] {
+        sample.effort[2] -= 1.5;
+    }
+    let onsets = onsets(&run(&mut detector, &samples));
+    assert_eq!(onsets.len(), 2, "{onsets:?}");
+    assert!((1100..1110).contains(&onsets[1]), "{onsets:?}");
+}
+
+/// Three joints in a row, axes z, y, y, half a metre apart.
+const ARM: &str = r#"<robot name="arm">
+  <link name="base"/>
+  <link name="shoulder"><inertial><origin xyz="0 0 0.25"/><mass value="3"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
+  <link name="upper"><inertial><origin xyz="0.1 0 0.25"/><mass value="2"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
+  <link name="lower"><inertial><origin xyz="0.1 0 0.25"/><mass value="1"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
+  <joint name="a" type="continuous"><parent link="base"/><child link="shoulder"/><axis xyz="0 0 1"/></joint>
+  <joint name="b" type="continuous"><origin xyz="0 0 0.5"/><parent link="shoulder"/><child link="upper"/><axis xyz="0 1 0"/></joint>
+  <joint name="c" type="continuous"><origin xyz="0 0 0.5"/><parent link="upper"/><child link="lower"/><axis xyz="0 1 0"/></joint>
+</robot>"#;
+
+fn with_model() -> Setup {
+    Setup {
+        model: Some(Model::from_urdf(ARM).unwrap()),
+        ..setup()
+    }
+}
+
+#[test]
+fn the_smallest_force_grows_with_the_wish_and_falls_along_the_arm() {
+    let train = [lesson(quiet(1, 6000))];
+    let lessons = Lessons {
+        train: &train,
+        validation: &[],
+    };
+    let learnt = tauscope::learn(&tauscope::Settings::default(), &with_model(), &lessons).unwrap();
+    let half = |per_hour: f64| -> Vec<Option<f64>> {
+        let smallest = learnt.smallest_forces(per_hour);
+        smallest.iter().map(|of_link| of_link.half_n).collect()
+    };
+    let (often, weekly) = (half(60.0), half(0.006));
+    // The first link turns about its own axis and feels nothing; along the upright arm the second feels one direction of three.
+    assert_eq!(often[..2], [None, None]);
+    assert!(
+        weekly[2] > often[2] && often[2] > Some(0.1),
+        "{often:?} {weekly:?}"
+    );
+}
+
+/// A minute in which the lower link is touched every two seconds while it goes round: against its motion, or along
+/// with it.
+fn touched(seed: u64) -> Lesson {
+    let model = Model::from_urdf(ARM).unwrap();
+    let mut data = Data::new(&model);
+    let mut lesson = lesson(quiet(seed, 6000));
+    let mut contacts = Vec::new();
+    for k in 0..6000 {
+        let sample = &mut lesson.samples[k];
+        sample.position[..3].copy_from_slice(&[0.003 * k as f64, 0.8, 0.6]);
+        sample.velocity[..3].copy_from_slice(&[0.3, 0.0, 0.0]);
+        let (place, sense) = (k % 200, if (k / 200) % 2 == 0 { -1.0 } else { 1.0 });
+        if !(100..140).contains(&place) {
+            continue;
+        }
+        forward_kinematics(&model, &mut data, &sample.position[..3]);
+        let force = 30.0 * sense;
+        let mut torque = [0.0; 3];
+        let point = Vector3::new(0.0, 0.0, 0.4);
+        // Force along the point's motion, which the first joint alone gives it.
+        let along = Vector3::new(-sample.position[0].sin(), sample.position[0].cos(), 0.0);
+        point_jacobian(&model, &data, 3, &point, |j, linear, _| {
+            torque[j] = linear.dot(&along) * force;
+        });
+        for (effort, torque) in sample.effort.iter_mut().zip(torque) {
+            *effort -= torque;
+        }
+        if place == 100 {
+            contacts.push(LabelledContact {
+                on_ns: k as i64 * STEP_NS,
+                off_ns: (k as i64 + 39) * STEP_NS,
+                kind: if sense < 0.0 {
+                    ContactKind::Collision
+                } else {
+                    ContactKind::Cooperation
+                },
+                ignore: false,
+            });
+        }
+    }
+    lesson.contacts = Some(contacts);
+    lesson
+}
+
+#[test]
+fn a_force_against_the_motion_is_a_collision_and_one_with_it_a_cooperation() {
+    let train = [touched(1), lesson(quiet(2, 6000))];
+    let lessons = Lessons {
+        train: &train,
+        validation: &[],
+    };
+    let learnt = tauscope::learn(&tauscope::Settings::default(), &with_model(), &lessons).unwrap();
+    let config = Config {
+        tauscope: Some(learnt),
+        ..Config::default()
+    };
+    let mut detector = Detect::new(&config, with_model()).unwrap();
+    let test = touched(7);
+    let detections = run(&mut detector, &test.samples);
+    let onsets = onsets(&detections);
+    let (mut right, mut all) = (0, 0);
+    for contact in test.contacts.iter().flatten() {
+        let of_contact = |k: &&usize| {
+            let stamp = **k as i64 * STEP_NS;
+            (contact.on_ns..=contact.off_ns).contains(&stamp)
+        };
+        let said = onsets
+            .iter()
+            .find(of_contact)
+            .map(|k| detections[*k].state.to_string());
+        let wanted = match contact.kind {
+            ContactKind::Collision => "collision",
+            _ => "cooperation",
+        };
+        all += 1;
+        right += usize::from(said.as_deref() == Some(wanted));
+    }
+    assert!(all == 30 && right >= 27, "{right} of {all}");
 }

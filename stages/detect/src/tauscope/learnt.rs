@@ -6,8 +6,10 @@ use serde::{Deserialize, Serialize};
 use tauscope_bus::{MAX_JOINTS, TwinState, flags};
 
 use super::NAME;
+use super::kinds::Kinds;
+use super::smallest::Smallest;
 use super::tail::{BLOCK_S, Tail};
-use super::windows::{Means, WINDOWS_S, Windows};
+use super::windows::{Follow, Means, WINDOWS_S, Windows};
 use crate::lesson::{LearnError, Lesson, Lessons};
 
 /// Where speeds are divided, as shares of a joint's usual highest speed.
@@ -27,8 +29,11 @@ const USUAL: f64 = 0.999;
 /// So much around a labelled contact is left out \[ns\].
 const BEFORE_NS: i64 = 50_000_000;
 const AFTER_NS: i64 = 1_000_000_000;
+/// In how many parts data is held out from what its noise is learnt from, and of how many pieces at least.
+const FOLDS: usize = 4;
+const LEAST_PIECES: usize = 8;
 /// The least that can be learnt from \[samples\].
-const LEAST_SAMPLES: usize = 1000;
+const LEAST_SAMPLES: usize = 500;
 
 /// What contact-free recordings taught.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -40,6 +45,12 @@ pub struct Learnt {
     pub windows: Vec<LearntWindow>,
     /// How often the score exceeds what by chance.
     pub tail: Tail,
+    /// By link, the smallest force that reaches a score of 1; empty where the robot is not known.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub smallest: Vec<Smallest>,
+    /// What parts collisions from cooperations, where the labels told them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kinds: Option<Kinds>,
 }
 
 /// A joint's speeds.
@@ -69,22 +80,44 @@ pub(crate) fn bin(joint: &LearntJoint, speed_rad_s: f64) -> usize {
 }
 
 impl Learnt {
-    /// From the contact-free stretches of all recordings.
+    /// From the contact-free stretches of all recordings. The tail is told from recordings, or pieces of one, that the noise
+    /// it is held against was not learnt from: each fold's by the noise of the others.
     ///
     /// # Errors
     /// If they hold too little.
-    pub(crate) fn new(lessons: &Lessons<'_>, drift_s: f64) -> Result<Self, LearnError> {
-        let all: Vec<&Lesson> = lessons.train.iter().chain(lessons.validation).collect();
-        let count: usize = all.iter().map(|lesson| free(lesson).count()).sum();
-        let Some(first) = all.iter().find_map(|lesson| lesson.samples.first()) else {
+    pub(crate) fn new(lessons: &Lessons<'_>, follow: Follow) -> Result<Self, LearnError> {
+        let all = pieces(lessons, follow);
+        let count: usize = all.iter().map(|piece| free(piece).count()).sum();
+        let Some(first) = all.iter().find_map(|piece| piece.samples.first()) else {
             return Err(too_little(0));
         };
         if count < LEAST_SAMPLES {
             return Err(too_little(count));
         }
         let n = first.header.joint_count as usize;
+        let mut peaks = Vec::new();
+        for fold in 0..FOLDS {
+            let part = |held_out: bool| -> Vec<Piece<'_>> {
+                let pieces = all.iter().enumerate();
+                let pieces = pieces.filter(|(i, _)| (i % FOLDS == fold) == held_out);
+                pieces.map(|(_, piece)| *piece).collect()
+            };
+            let others = match part(false) {
+                // A single piece: nothing is left to learn from without it.
+                none if none.is_empty() => all.clone(),
+                others => others,
+            };
+            peaks.extend(Self::usual(&others, n, follow).peaks(&part(true), follow));
+        }
+        let mut learnt = Self::usual(&all, n, follow);
+        learnt.tail = Tail::new(peaks);
+        Ok(learnt)
+    }
+
+    /// What is usual in these pieces, without a tail.
+    fn usual(pieces: &[Piece<'_>], n: usize, follow: Follow) -> Self {
         let mut learnt = Self {
-            joints: speeds(&all, n),
+            joints: speeds(pieces, n),
             windows: Vec::new(),
             tail: Tail {
                 level: 0.0,
@@ -92,12 +125,13 @@ impl Learnt {
                 scale: 1.0,
                 shape: 0.0,
             },
+            smallest: Vec::new(),
+            kinds: None,
         };
-        learnt.windows = learnt.noise(&all, drift_s);
-        learnt.correlate(&all, drift_s);
-        learnt.measure_usual(&all, drift_s);
-        learnt.tail = Tail::new(learnt.peaks(&all, drift_s));
-        Ok(learnt)
+        learnt.windows = learnt.noise(pieces, follow);
+        learnt.correlate(pieces, follow);
+        learnt.measure_usual(pieces, follow);
+        learnt
     }
 
     fn fast(&self) -> [f64; MAX_JOINTS] {
@@ -109,12 +143,12 @@ impl Learnt {
     }
 
     /// Root mean square of the means by window, joint and class of speed.
-    fn noise(&self, all: &[&Lesson], drift_s: f64) -> Vec<LearntWindow> {
+    fn noise(&self, all: &[Piece<'_>], follow: Follow) -> Vec<LearntWindow> {
         let n = self.joints.len();
         let mut sums = vec![vec![[(0.0, 0.0); BINS]; n]; WINDOWS_S.len()];
-        for lesson in all {
-            let mut means = Means::new(self.fast(), drift_s, 0.0);
-            for (sample, is_free) in marked(lesson) {
+        for piece in all {
+            let mut means = Means::new(self.fast(), follow);
+            for (sample, is_free) in marked(piece) {
                 restart(&mut means, sample);
                 means.push(sample, is_free);
                 if !(is_free && means.ready()) {
@@ -151,15 +185,15 @@ impl Learnt {
     }
 
     /// Runs over the contact-free samples, and hands the windows out at each.
-    fn each(
+    pub(super) fn each(
         &self,
-        all: &[&Lesson],
-        drift_s: f64,
+        all: &[Piece<'_>],
+        follow: Follow,
         mut visit: impl FnMut(&TwinState, &Windows, f64),
     ) {
-        for lesson in all {
-            let mut windows = Windows::new(self, drift_s, 0.0);
-            for (sample, is_free) in marked(lesson) {
+        for piece in all {
+            let mut windows = Windows::new(self, follow);
+            for (sample, is_free) in marked(piece) {
                 if sample.header.has(flags::RESET) {
                     windows.reset();
                 }
@@ -171,10 +205,10 @@ impl Learnt {
         }
     }
 
-    fn correlate(&mut self, all: &[&Lesson], drift_s: f64) {
+    fn correlate(&mut self, all: &[Piece<'_>], follow: Follow) {
         let n = self.joints.len();
         let mut products = vec![DMatrix::<f64>::zeros(n, n); WINDOWS_S.len()];
-        self.each(all, drift_s, |_, windows, _| {
+        self.each(all, follow, |_, windows, _| {
             for (w, product) in products.iter_mut().enumerate() {
                 let z: Vec<f64> = (0..n)
                     .map(|j| windows.mean(w, j) / windows.noise(w, j))
@@ -201,9 +235,9 @@ impl Learnt {
         }
     }
 
-    fn measure_usual(&mut self, all: &[&Lesson], drift_s: f64) {
+    fn measure_usual(&mut self, all: &[Piece<'_>], follow: Follow) {
         let mut lengths = vec![Vec::new(); WINDOWS_S.len()];
-        self.each(all, drift_s, |_, windows, _| {
+        self.each(all, follow, |_, windows, _| {
             for (w, lengths) in lengths.iter_mut().enumerate() {
                 lengths.push(windows.length(w));
             }
@@ -214,10 +248,10 @@ impl Learnt {
     }
 
     /// The largest score of each block of contact-free time.
-    fn peaks(&self, all: &[&Lesson], drift_s: f64) -> Vec<f64> {
+    fn peaks(&self, all: &[Piece<'_>], follow: Follow) -> Vec<f64> {
         let mut peaks: Vec<(i64, f64)> = Vec::new();
         let length_ns = (BLOCK_S * 1e9) as i64;
-        self.each(all, drift_s, |sample, _, score| {
+        self.each(all, follow, |sample, _, score| {
             let block = sample.header.stamp_ns.div_euclid(length_ns);
             match peaks.last_mut() {
                 Some((last, peak)) if *last == block => *peak = peak.max(score),
@@ -242,10 +276,10 @@ fn restart(means: &mut Means, sample: &TwinState) {
     }
 }
 
-fn speeds(all: &[&Lesson], n: usize) -> Vec<LearntJoint> {
+fn speeds(all: &[Piece<'_>], n: usize) -> Vec<LearntJoint> {
     (0..n)
         .map(|j| {
-            let samples = all.iter().flat_map(|lesson| &lesson.samples);
+            let samples = all.iter().flat_map(|piece| piece.samples);
             let mut speeds: Vec<f64> = samples.map(|sample| sample.velocity[j].abs()).collect();
             LearntJoint {
                 fast_rad_s: quantile(&mut speeds, FAST).max(LEAST_FAST_RAD_S),
@@ -262,10 +296,35 @@ fn quantile(values: &mut [f64], share: f64) -> f64 {
     values.get(at).copied().unwrap_or(0.0)
 }
 
-/// Settled samples of a recording, and whether nothing touched the robot then.
-fn marked(lesson: &Lesson) -> impl Iterator<Item = (&TwinState, bool)> {
-    let settled = lesson.samples.iter().filter(|s| s.header.has(flags::READY));
-    settled.map(|sample| {
+/// A stretch of a recording.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Piece<'a> {
+    samples: &'a [TwinState],
+    lesson: &'a Lesson,
+}
+
+/// All recordings; few ones in equal pieces, so that there are some for each fold, unless each must begin where it does.
+pub(super) fn pieces<'a>(lessons: &Lessons<'a>, follow: Follow) -> Vec<Piece<'a>> {
+    let all = || lessons.train.iter().chain(lessons.validation);
+    let each = if follow.offset_from_first_s > 0.0 {
+        1
+    } else {
+        LEAST_PIECES.div_ceil(all().count().max(1))
+    };
+    all()
+        .flat_map(|lesson| {
+            let length = lesson.samples.len().div_ceil(each).max(1);
+            let parts = lesson.samples.chunks(length);
+            parts.map(move |samples| Piece { samples, lesson })
+        })
+        .collect()
+}
+
+/// Settled samples of a piece, and whether nothing touched the robot then.
+fn marked<'a>(piece: &Piece<'a>) -> impl Iterator<Item = (&'a TwinState, bool)> {
+    let Piece { samples, lesson } = *piece;
+    let settled = samples.iter().filter(|s| s.header.has(flags::READY));
+    settled.map(move |sample| {
         let stamp = sample.header.stamp_ns;
         let touched = lesson.contacts.iter().flatten().any(|contact| {
             stamp >= contact.on_ns - BEFORE_NS && stamp <= contact.off_ns + AFTER_NS
@@ -274,6 +333,6 @@ fn marked(lesson: &Lesson) -> impl Iterator<Item = (&TwinState, bool)> {
     })
 }
 
-fn free(lesson: &Lesson) -> impl Iterator<Item = &TwinState> {
-    marked(lesson).filter_map(|(sample, is_free)| is_free.then_some(sample))
+fn free<'a>(piece: &Piece<'a>) -> impl Iterator<Item = &'a TwinState> {
+    marked(piece).filter_map(|(sample, is_free)| is_free.then_some(sample))
 }

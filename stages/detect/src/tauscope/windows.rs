@@ -6,10 +6,21 @@ use super::learnt::{Learnt, bin};
 
 /// Lengths of the windows \[s\].
 pub(crate) const WINDOWS_S: [f64; 3] = [0.01, 0.03, 0.1];
+/// The window that a contact is followed by.
+const MIDDLE: usize = 1;
 /// How long a joint that was slow counts as slow \[s\].
 const SLOW_MEMORY_S: f64 = 0.3;
 /// Most samples of a window; after as many, sums are formed anew so that rounding does not add up.
 const CAPACITY: usize = 1024;
+
+/// How the slow part of a residual is had.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Follow {
+    /// Time constant \[s\].
+    pub drift_s: f64,
+    /// The mean of so much at the beginning \[s\]; 0 for none.
+    pub offset_from_first_s: f64,
+}
 
 /// Running means over each window.
 #[derive(Debug)]
@@ -21,8 +32,7 @@ pub(crate) struct Means {
     sums: [JointArray; WINDOWS_S.len()],
     /// The slow part of the residual.
     offset: JointArray,
-    drift_s: f64,
-    offset_from_first_s: f64,
+    settings: Follow,
     /// Step \[s\], and how much of the residual's drift is followed in it; kept, for clocks are often even.
     step: (f64, f64),
     /// Smallest speed of late, by joint.
@@ -33,15 +43,14 @@ pub(crate) struct Means {
 
 impl Means {
     /// For joints whose usual speeds go up to `fast` \[rad/s\].
-    pub fn new(fast: JointArray, drift_s: f64, offset_from_first_s: f64) -> Self {
+    pub fn new(fast: JointArray, settings: Follow) -> Self {
         Self {
             rows: vec![(0, [0.0; MAX_JOINTS]); CAPACITY],
             head: 0,
             tails: [0; WINDOWS_S.len()],
             sums: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
             offset: [0.0; MAX_JOINTS],
-            drift_s,
-            offset_from_first_s,
+            settings,
             step: (0.0, 0.0),
             slow: [0.0; MAX_JOINTS],
             fast,
@@ -60,7 +69,7 @@ impl Means {
     pub fn ready(&self) -> bool {
         let newest = self.rows[(self.head.max(1) - 1) % CAPACITY].0;
         let longest = WINDOWS_S[WINDOWS_S.len() - 1];
-        (newest - self.start_ns) as f64 * 1e-9 >= longest.max(self.offset_from_first_s)
+        (newest - self.start_ns) as f64 * 1e-9 >= longest.max(self.settings.offset_from_first_s)
     }
 
     /// Takes a sample; slow drift is followed if `follow`.
@@ -78,9 +87,9 @@ impl Means {
             (now - before) as f64 * 1e-9
         };
         let since_s = (now - self.start_ns) as f64 * 1e-9;
-        let first = since_s < self.offset_from_first_s;
+        let first = since_s < self.settings.offset_from_first_s;
         if dt_s.to_bits() != self.step.0.to_bits() {
-            self.step = (dt_s, 1.0 - (-dt_s / self.drift_s).exp());
+            self.step = (dt_s, 1.0 - (-dt_s / self.settings.drift_s).exp());
         }
         let drift = self.step.1;
         let recovery = dt_s / SLOW_MEMORY_S;
@@ -147,6 +156,9 @@ pub(crate) struct Windows {
     learnt: Learnt,
     /// Class of each joint's present speed.
     bins: [usize; MAX_JOINTS],
+    /// Mean residual of the contact that goes on, as it is followed, and of the one below it.
+    held: JointArray,
+    base: JointArray,
     /// The window whose mean is most unusual.
     pub most: usize,
     /// How unusual: the newest score.
@@ -154,15 +166,17 @@ pub(crate) struct Windows {
 }
 
 impl Windows {
-    pub fn new(learnt: &Learnt, drift_s: f64, offset_from_first_s: f64) -> Self {
+    pub fn new(learnt: &Learnt, settings: Follow) -> Self {
         let mut fast = [0.0; MAX_JOINTS];
         for (fast, joint) in fast.iter_mut().zip(&learnt.joints) {
             *fast = joint.fast_rad_s;
         }
         Self {
-            means: Means::new(fast, drift_s, offset_from_first_s),
+            means: Means::new(fast, settings),
             learnt: learnt.clone(),
             bins: [0; MAX_JOINTS],
+            held: [0.0; MAX_JOINTS],
+            base: [0.0; MAX_JOINTS],
             most: 0,
             score: 0.0,
         }
@@ -197,10 +211,14 @@ impl Windows {
 
     /// Squared Mahalanobis length of the mean residual over a window.
     pub fn length(&self, window: usize) -> f64 {
+        self.length_of(window, |joint| self.mean(window, joint))
+    }
+
+    fn length_of(&self, window: usize, mean: impl Fn(usize) -> f64) -> f64 {
         let n = self.learnt.joints.len();
         let mut z = [0.0; MAX_JOINTS];
         for (j, z) in z.iter_mut().enumerate().take(n) {
-            *z = self.mean(window, j) / self.noise(window, j);
+            *z = mean(j) / self.noise(window, j);
         }
         let inverse = &self.learnt.windows[window].inverse_correlation;
         // Symmetric: a row is a column.
@@ -216,6 +234,40 @@ impl Windows {
     /// Mean residual of a joint over a window \[effort unit\].
     pub fn mean(&self, window: usize, joint: usize) -> f64 {
         self.means.mean(window, joint)
+    }
+
+    /// The same less what a contact that goes on had before another came on top of it.
+    pub fn excess(&self, window: usize, joint: usize) -> f64 {
+        self.mean(window, joint) - self.base[joint]
+    }
+
+    /// Begins to follow a contact, alone or on top of the one that goes on.
+    pub fn begin(&mut self, on_top: bool) {
+        self.base = if on_top { self.held } else { [0.0; MAX_JOINTS] };
+        self.held = std::array::from_fn(|j| self.mean(MIDDLE, j));
+    }
+
+    /// Follows the contact that goes on by a share of its changes.
+    pub fn hold(&mut self, share: f64) {
+        for j in 0..self.joints() {
+            self.held[j] += share * (self.mean(MIDDLE, j) - self.held[j]);
+        }
+    }
+
+    /// Whether the residual is larger than the contact as it has been followed.
+    pub fn grows(&self) -> bool {
+        self.length(MIDDLE) / self.learnt.windows[MIDDLE].usual >= self.held()
+    }
+
+    /// How unusual the contact is as it has been followed.
+    pub fn held(&self) -> f64 {
+        self.length_of(MIDDLE, |joint| self.held[joint]) / self.learnt.windows[MIDDLE].usual
+    }
+
+    /// How unusual the residual's change is against the contact as it has been followed.
+    pub fn change(&self) -> f64 {
+        self.length_of(MIDDLE, |j| self.mean(MIDDLE, j) - self.held[j])
+            / self.learnt.windows[MIDDLE].usual
     }
 
     /// Its usual size at the joint's present speed \[effort unit\].

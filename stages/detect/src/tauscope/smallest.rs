@@ -1,0 +1,88 @@
+//! The smallest force that would be found, link by link.
+
+use nalgebra::Vector3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::learnt::{Learnt, pieces};
+use super::place::Place;
+use super::windows::{Follow, WINDOWS_S};
+use crate::lesson::Lessons;
+use crate::stage::Setup;
+
+/// Of the contact-free samples every so many is a posture that is asked about.
+const EVERY: usize = 50;
+
+/// The force on a link that reaches a score of 1 once it has lasted as long as the longest window; it grows with the root of the score.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Smallest {
+    /// The link.
+    pub link: String,
+    /// In half of the postures and directions no more is needed \[N\]; none where they are not felt.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub half_n: Option<f64>,
+    /// In nine of ten of them \[N\].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub most_n: Option<f64>,
+}
+
+/// By link, over the postures and speeds of contact-free recordings, the points of the link and the directions of the
+/// world's axes; empty without a model.
+pub(crate) fn smallest(
+    learnt: &Learnt,
+    lessons: &Lessons<'_>,
+    setup: &Setup,
+    follow: Follow,
+) -> Vec<Smallest> {
+    let mut place = Place::new(setup);
+    let w = WINDOWS_S.len() - 1;
+    let n = learnt.joints.len();
+    // By link in order, the score of 1 N.
+    let mut scores: Vec<(usize, Vec<f64>)> = Vec::new();
+    let mut count = 0;
+    let per_nm = place.effort_per_nm().to_vec();
+    learnt.each(&pieces(lessons, follow), follow, |sample, windows, _| {
+        count += 1;
+        if count % EVERY != 0 {
+            return;
+        }
+        let inverse = windows.inverse_correlation(w);
+        let usual = learnt.windows[w].usual;
+        place.each_point(sample, n, |link, _, columns| {
+            let mut information = Vector3::<f64>::zeros();
+            for a in 0..n {
+                let row = columns[a] * (per_nm[a] / windows.noise(w, a));
+                for b in 0..n {
+                    let other = columns[b] * (per_nm[b] / windows.noise(w, b));
+                    information += row.component_mul(&other) * inverse[a * n + b];
+                }
+            }
+            let found = scores.iter_mut().position(|(of, _)| *of == link);
+            let at = found.unwrap_or_else(|| {
+                scores.push((link, Vec::new()));
+                scores.len() - 1
+            });
+            scores[at]
+                .1
+                .extend(information.iter().map(|score| score / usual));
+        });
+    });
+    let of_link = |(link, mut scores): (usize, Vec<f64>)| {
+        scores.sort_by(f64::total_cmp);
+        // The force that does in this share of the cases: the others' score is below.
+        let force = |share: f64| {
+            let at = ((1.0 - share) * (scores.len() - 1) as f64).round() as usize;
+            Some(scores[at].max(0.0).sqrt().recip()).filter(|force| *force < FELT_N)
+        };
+        Smallest {
+            link: place.link_name(link).to_owned(),
+            half_n: force(0.5),
+            most_n: force(0.9),
+        }
+    };
+    scores.into_iter().map(of_link).collect()
+}
+
+/// A direction in which even this does not reach a score of 1 is not felt \[N\].
+const FELT_N: f64 = 1e4;
