@@ -3,6 +3,7 @@
 use crate::active::Column;
 use crate::fit::Fit;
 use crate::least_squares::Products;
+use crate::parallel;
 use crate::problem::Problem;
 
 /// Least share of what a piece of physics gains where it is fitted that it must gain where it is not.
@@ -29,6 +30,19 @@ pub fn carries_over(problem: &Problem, with: &Fit, without: &Fit, joints: &[usiz
         &left_where_not_fitted(problem, without, joints),
     );
     elsewhere > LEAST_SHARE * fitted
+}
+
+/// Sum of squares that a fit leaves at a joint in each recording with the numbers that the others give what touches the joint,
+/// shapes and all.
+pub fn left_elsewhere(problem: &Problem, fit: &Fit, joint: usize) -> f64 {
+    let tracks: Vec<usize> = (0..problem.tracks.len()).collect();
+    let left = parallel::map(&tracks, |&track| {
+        let others = problem.without(track);
+        let known = Fit::beside(&others, fit.actives.clone(), Some(fit));
+        let refitted = known.refined_at(&others, Some(&[joint]), f64::NAN);
+        Products::new(problem, &[], &refitted.residual, Some(track)).square[joint]
+    });
+    left.iter().sum()
 }
 
 /// Sum of squares by joint that a fit leaves in each recording with the numbers of the others.

@@ -113,7 +113,7 @@ pub fn of(
         notes: Vec::new(),
     };
     for (index, active) in fit.actives.iter().enumerate() {
-        let deviations = parameter_deviations(fit, &spread, index);
+        let deviations = parameter_deviations(search.problem, fit, &spread, index);
         if is_drive(&active.hypothesis) {
             named.notes.push(drive_note(active, deviations[0], joints));
             continue;

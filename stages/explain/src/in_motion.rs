@@ -8,7 +8,6 @@ use crate::drive;
 use crate::explain::{Judged, Setup};
 use crate::findings;
 use crate::fit::Fit;
-use crate::recording::Recording;
 use crate::search::Search;
 
 impl Setup<'_> {
@@ -60,12 +59,7 @@ impl Setup<'_> {
             hypotheses: &hypotheses,
             say: &say,
         };
-        let mut found = search.run(moving.fit.actives, moving.penalties);
-        let measured = |recording: &&Recording| !recording.effort.is_empty();
-        let held_out: Vec<Recording> = input.holdout.iter().filter(measured).cloned().collect();
-        if !held_out.is_empty() {
-            found = search.upheld(found, &self.problem(&held_out, &rests_count)?);
-        }
+        let found = search.run(moving.fit.actives, moving.penalties);
         progress(0.8, "rivals");
         let before = Fit::new(&problem, drives()).refined(&problem);
         let named = findings::of(&search, &found, &before, input, &joints);

@@ -28,7 +28,7 @@ const ALIASING_RATIO: f64 = 5.0;
 
 /// Everything that a fit works on. A *signal* is joint-major: `rows` numbers for joint 0, then for joint 1,
 /// and so on; the rows of each joint are those of the tracks, one after the other.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Problem {
     /// The robot.
     pub model: Model,
@@ -52,9 +52,9 @@ pub struct Problem {
     /// Independent samples that a row of noise is worth, by joint.
     pub worth: Vec<f64>,
     /// Columns that were computed before.
-    pub cache: ColumnCache,
+    pub cache: Arc<ColumnCache>,
     /// What unit bodies cost.
-    pub units: UnitCosts,
+    pub units: Arc<UnitCosts>,
     bare: OnceLock<Efforts>,
     rigid: OnceLock<Vec<f64>>,
     expansions: Vec<OnceLock<Arc<Expansion>>>,
@@ -95,8 +95,8 @@ impl Problem {
             largest_effort: vec![0.0; n],
             cutoff_hz,
             worth: Vec::new(),
-            cache: ColumnCache::default(),
-            units: UnitCosts::default(),
+            cache: Arc::default(),
+            units: Arc::default(),
             bare: OnceLock::new(),
             rigid: OnceLock::new(),
             expansions: vec![OnceLock::new(); n],
@@ -160,6 +160,17 @@ impl Problem {
         }
         problem.worth = worth(&problem);
         problem
+    }
+
+    /// The same where one recording does not count.
+    #[must_use]
+    pub fn without(&self, track: usize) -> Self {
+        let mut others = self.clone();
+        for joint in 0..self.joints {
+            let rows = others.joint_rows(joint);
+            others.weight[rows][self.tracks[track].rows()].fill(0.0);
+        }
+        others
     }
 
     /// What the twin says without any physics beside it.

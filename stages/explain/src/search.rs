@@ -8,7 +8,7 @@ mod exchange;
 
 use tauscope_dynamics::terms::Layer;
 
-use crate::across::carries_over;
+use crate::across::{carries_over, left_elsewhere};
 use crate::active::{Active, Hypothesis};
 use crate::drive::is_drive;
 use crate::fit::Fit;
@@ -41,12 +41,11 @@ const MOST_PIECES: usize = 24;
 const LEAST_GAIN: f64 = 0.5;
 /// So often pieces are added and all exchanged again.
 const MOST_ROUNDS: usize = 2;
-/// Names that leave less of the variance than this on recordings held out carry over, and so do those that leave at most so
-/// many times the share that they leave where they were fitted.
+/// Names that leave less of the variance than this on recordings that they were not fitted on carry over, and so do those that
+/// leave at most so many times the share that they leave where they were.
 const MOST_LEFT: f64 = 0.1;
 const MOST_WORSE: f64 = 10.0;
-/// That is told by so many rows, of a joint whose variance without them is this many times its white noise.
-const LEAST_ROWS_ELSEWHERE: f64 = 50.0;
+/// That is asked where the variance without them is this many times the white noise.
 const LOUD: f64 = 4.0;
 /// A joint whose variance is below this many times its white noise is not tried with costly effects.
 const QUIET: f64 = 1.15;
@@ -79,7 +78,7 @@ impl Search<'_> {
         }
         // What it was compared with until now is no measure of how precise its numbers are to be.
         best.fit = best.fit.refined(self.problem);
-        best
+        self.upheld(best)
     }
 
     fn begun(&self, start: Vec<Active>, penalties: Vec<f64>) -> Explanation {
@@ -197,11 +196,9 @@ impl Search<'_> {
         bare
     }
 
-    /// Takes the names of a joint back that leave much more on recordings held out, the `elsewhere`, than they should by what
-    /// they leave where they were fitted: together they only draw a curve, which is said in their place.
-    ///
-    /// This is all that the held-out recordings are used for: nothing is fitted on them, and nothing chosen by them.
-    pub fn upheld(&self, found: Explanation, elsewhere: &Problem) -> Explanation {
+    /// Takes the names of a joint back that leave much more on recordings that they were not fitted on, each left out in
+    /// turn, than where they were: together they only draw a curve, which is said in their place.
+    fn upheld(&self, found: Explanation) -> Explanation {
         let mut best = found;
         for joint in 0..self.problem.joints {
             let local = |&i: &usize| {
@@ -211,24 +208,24 @@ impl Search<'_> {
                     && !is_drive(&active.hypothesis)
             };
             let names: Vec<usize> = (0..best.fit.actives.len()).filter(local).collect();
-            let lasting =
-                |&i: &usize| time_kind(best.fit.actives[i].hypothesis) == TimeKind::Always;
-            if names.is_empty() || !names.iter().all(lasting) {
+            let of = |i: usize| best.fit.actives[i].hypothesis;
+            let lasting = names.iter().all(|&i| time_kind(of(i)) == TimeKind::Always);
+            let shaped = names.iter().any(|&i| !of(i).is_linear());
+            if !lasting || !shaped {
                 continue;
             }
             let bare = self.stripped(&best, &names, joint);
-            let there = |fit: &Fit| Fit::new(elsewhere, fit.actives.clone());
-            let (with, without) = (there(&best.fit), there(&bare.fit));
-            let noise = elsewhere.white_noise[joint] * elsewhere.white_noise[joint];
-            if with.count[joint] < LEAST_ROWS_ELSEWHERE || without.variance[joint] < LOUD * noise {
+            let noise = self.problem.white_noise[joint] * self.problem.white_noise[joint];
+            if bare.fit.variance[joint] < LOUD * noise {
                 continue;
             }
-            let left_here = best.fit.variance[joint] / bare.fit.variance[joint];
-            let left_there = with.variance[joint] / without.variance[joint];
+            let left_here = best.fit.squares[joint] / bare.fit.squares[joint];
+            let left_there = left_elsewhere(self.problem, &best.fit, joint)
+                / left_elsewhere(self.problem, &bare.fit, joint);
+            (self.say)(&format!(
+                "! joint {joint}: {left_there:.3} left, {left_here:.3} where fitted"
+            ));
             if left_there > MOST_LEFT.max(MOST_WORSE * left_here) {
-                (self.say)(&format!(
-                    "! joint {joint}: {left_there:.2} left, {left_here:.2} where fitted"
-                ));
                 best = self.with_curve(&bare, joint).unwrap_or(bare);
             }
         }

@@ -186,7 +186,7 @@ impl Track {
 }
 
 /// A track with the filter of its clock and the samples that are compared.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct FitTrack {
     /// The motion, thinned.
     pub track: Track,
