@@ -1,6 +1,7 @@
 //! Whether the data allows a verdict at all, and what a reader should know of it.
 
 use crate::explain::Input;
+use crate::fit::Fit;
 use crate::problem::{Problem, white_variance};
 use crate::recording::Recording;
 
@@ -10,6 +11,8 @@ const MOVES: f64 = 0.02;
 const LEAST_MOTION_S: f64 = 1.0;
 /// And in some recording further than this: a push bends even an arm that holds still \[rad or m\].
 const LEAST_RANGE: f64 = 0.05;
+/// What is left stands out from this many times the white noise.
+const LOUD: f64 = 5.0;
 /// A joint's twin effort varies enough to compare with the measured one from this many times the noise.
 const STRONG: f64 = 5.0;
 /// A slope of measured effort over the twin's beyond this, either way, is a wrong unit rather than physics.
@@ -220,10 +223,19 @@ pub fn losses(input: &Input) -> Vec<String> {
     notes
 }
 
-/// What else a reader should know.
-pub fn notes(input: &Input, rests_count: &[bool]) -> Vec<String> {
+/// What else a reader should know; `found` is what was found on a problem.
+pub fn notes(input: &Input, problem: &Problem, found: &Fit, rests_count: &[bool]) -> Vec<String> {
     let mut notes = losses(input);
     let names: Vec<&str> = input.model.joint_names().collect();
+    for (j, name) in names.iter().enumerate() {
+        let ratio = (found.variance[j].sqrt()) / problem.white_noise[j].max(1e-12);
+        if ratio > LOUD {
+            notes.push(format!(
+                "What is left at joint {name} is {ratio:.0} times what the measurement's white noise leaves, and nothing explains it: \
+                 slow noise, or something that is not in the library and does not depend on the joint's motion or on time alone."
+            ));
+        }
+    }
     let stuck: Vec<&str> = names
         .iter()
         .zip(rests_count)

@@ -205,7 +205,9 @@ fn computed(
         let mut values = vec![0.0; alone.values.len()];
         let rotor = &mut values[problem.joint_rows(own)];
         problem.joint_signal(&bodies::rotor(problem, own), own, rotor);
-        rotor.iter_mut().for_each(|value| *value *= gains[own]);
+        for value in rotor {
+            *value *= gains[own];
+        }
         factors.push(Arc::new(Column { joint, values }));
         return Columns {
             alone: Some(alone),

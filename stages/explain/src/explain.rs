@@ -133,7 +133,7 @@ pub fn explain(
         .map(|j| audit::white_noise(&input.fit, j, joints.len()))
         .collect();
     let mut notes = named.notes;
-    notes.extend(audit::notes(&input, &rests_count));
+    notes.extend(audit::notes(&input, &problem, &found, &rests_count));
     let report = Report {
         case: input.case.clone(),
         verdict,

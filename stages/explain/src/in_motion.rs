@@ -25,9 +25,12 @@ impl Setup<'_> {
         }
         let hypotheses = self.hypotheses();
         // Where nobody knows the scale of the drives, the twin is only one once they are fitted.
-        let drives = || match self.is_unscaled() {
-            true => drive::unknown_gains(joints.len()),
-            false => Vec::new(),
+        let drives = || {
+            if self.is_unscaled() {
+                drive::unknown_gains(joints.len())
+            } else {
+                Vec::new()
+            }
         };
         let say = |text: &str| {
             // Nobody knows how many rounds there will be: each takes a share of what is left.
@@ -50,9 +53,10 @@ impl Setup<'_> {
                 !moving.fit.actives.iter().any(holds)
             })
             .collect();
-        let problem = match rests_count.contains(&true) {
-            true => self.problem(&input.fit, &rests_count)?,
-            false => problem,
+        let problem = if rests_count.contains(&true) {
+            self.problem(&input.fit, &rests_count)?
+        } else {
+            problem
         };
         let search = Search {
             problem: &problem,

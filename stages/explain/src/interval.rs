@@ -126,9 +126,10 @@ pub fn parameter_deviations(
     let in_time = |row: usize| (0..count).any(|c| times[c] && slopes[(row, c)] != 0.0);
     (0..centre.len())
         .map(|row| {
-            let systematic = match in_time(row) {
-                true => 0.0,
-                false => SYSTEMATIC * centre[row],
+            let systematic = if in_time(row) {
+                0.0
+            } else {
+                SYSTEMATIC * centre[row]
             };
             (spread[(row, row)].max(0.0) + systematic * systematic).sqrt()
         })

@@ -54,7 +54,9 @@ impl Fit {
                     if held.is_empty() {
                         break step;
                     }
-                    held.into_iter().for_each(|k| used[k] = false);
+                    for k in held {
+                        used[k] = false;
+                    }
                 };
                 let Some(step) = step else {
                     damping *= 10.0;

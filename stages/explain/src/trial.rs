@@ -191,7 +191,9 @@ impl<'a> Trial<'a> {
             if below.is_empty() {
                 break factors;
             }
-            below.into_iter().for_each(|a| used[a] = false);
+            for a in below {
+                used[a] = false;
+            }
         };
         if q > 0 && !used.contains(&true) && self.own_right.iter().all(Option::is_none) {
             return None;
