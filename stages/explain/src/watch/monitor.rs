@@ -5,10 +5,11 @@ mod learning;
 
 use super::blocks::{BLOCK_ROWS, BLOCK_S, Ranges, Ring};
 use super::finding::Finding;
-use super::judge::{Judge, STRANGE, Usual, Verdict};
+use super::judge::{Judge, STRANGE, Verdict};
 use super::moments::{JOINT_KINDS, JointScore, Reference};
 use super::rows::Row;
 use super::scale::{Loudness, Scale};
+use super::usual::Usual;
 use super::window::Window;
 use contact::{Run, Told};
 
@@ -117,8 +118,9 @@ impl Monitor {
             return None;
         }
         let watches = self.watches();
-        if watches && self.ring.len() == FRESH {
+        if watches && self.ring.len() >= FRESH {
             self.learn_oldest();
+            self.ring.keep(FRESH - 1);
         }
         if watches {
             self.listen();
