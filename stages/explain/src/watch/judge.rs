@@ -19,6 +19,8 @@ const LATEST: usize = 18;
 pub(super) const STRANGE: f64 = 0.03;
 /// A gain counts among those without a change once so many blocks have passed.
 const DELAY: usize = 22;
+/// Nothing is told of a time in which a joint moved as never before in more than this share of it.
+const NEW_MOTION: f64 = 0.5;
 /// Parts of the time since the change that must each hold their share of it; longer ones where they tell too
 /// little.
 const PARTS: usize = 4;
@@ -140,7 +142,8 @@ impl Judge {
         {
             return (Verdict::Nothing, score);
         }
-        if !self.began(ring, usual, &first) || (poor && usual.unlike >= STRANGE) {
+        let strange = first.best.novel > NEW_MOTION || (poor && usual.unlike >= STRANGE);
+        if strange || !self.began(ring, usual, &first) {
             return (Verdict::Drifted, score);
         }
         let mut finding = self.finding(usual, &first, ring);
@@ -189,11 +192,12 @@ impl Judge {
             if blocks < Scale::SHORT {
                 continue;
             }
-            let novel = |j: usize| self.window.novel[j] as f64 / blocks as f64;
+            // Where one joint moves as never before, all that it carries and that carries it does.
+            let novel = self.window.novel.iter().copied().max().unwrap_or(0) as f64 / blocks as f64;
             let payload = self
                 .window
                 .scores(usual.references, usual.noise, &mut self.scores);
-            for (j, (best, score)) in self.best.iter_mut().zip(&self.scores).enumerate() {
+            for (best, score) in self.best.iter_mut().zip(&self.scores) {
                 let Some(score) = score else { continue };
                 for (kind, best) in best.iter_mut().enumerate() {
                     if score.gain[kind] > best.gain {
@@ -202,7 +206,7 @@ impl Judge {
                             size: score.size[kind],
                             blocks,
                             back,
-                            novel: novel(j),
+                            novel,
                         };
                     }
                 }
@@ -210,13 +214,12 @@ impl Judge {
             if let Some((change, gain)) = payload.solve()
                 && gain > self.payload.gain
             {
-                let most = (0..self.scores.len()).map(novel).fold(0.0, f64::max);
                 self.payload = Best {
                     gain,
                     size: change[0],
                     blocks,
                     back,
-                    novel: most,
+                    novel,
                 };
                 self.payload_change = change;
             }

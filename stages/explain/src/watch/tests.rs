@@ -313,6 +313,9 @@ fn quiet() {
     let hours = 2.0;
     let mut total = 0;
     for (calibrated, program_s, rest_s, noise) in [
+        (true, 300.0, 0.0, 0.0005),
+        (false, 300.0, 0.0, 0.003),
+        (true, 300.0, 0.0, 0.001),
         (true, f64::INFINITY, 0.0, 0.003),
         (true, f64::INFINITY, 0.0, 0.0005),
         (false, f64::INFINITY, 1.0, 0.0005),

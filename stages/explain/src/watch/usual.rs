@@ -10,7 +10,7 @@ const INEXPERIENCE: f64 = 4.0;
 /// Nor is a change what explains less than so many times the most it ever did without one.
 const OVER_LARGEST: f64 = 2.0;
 /// How much more where the motion is unlike all that the reference has seen.
-const NOVELTY: f64 = 8.0;
+const NOVELTY: f64 = 12.0;
 
 /// What is usual, and what must be known to judge.
 pub(super) struct Usual<'a> {
