@@ -193,17 +193,17 @@ fn csv(model: &Model, parts: &[Excite], joint: usize, centre: &[f64]) -> String 
 /// with speeds that need no more room than there is.
 fn crept(room: f64, speed: f64, t: f64) -> f64 {
     let stroke_s = PART_S / (2 * SPEEDS) as f64;
-    let stroke = (t / stroke_s).floor();
-    let speed = (CREEP * FASTER.powi((stroke / 2.0) as i32))
+    let stroke = (t / stroke_s) as i32;
+    let speed = (CREEP * FASTER.powi(stroke / 2))
         .min(speed)
         .min(room / (stroke_s - RAMP_S));
     // The way under a trapezoid of speed: comes within RAMP_S, stays, goes within RAMP_S.
-    let within = t - stroke * stroke_s;
+    let within = t - f64::from(stroke) * stroke_s;
     let coming = within.min(RAMP_S);
     let going = (within - (stroke_s - RAMP_S)).max(0.0);
     let way =
         speed * (within - coming + 0.5 * coming * coming / RAMP_S - 0.5 * going * going / RAMP_S);
-    if stroke % 2.0 == 0.0 {
+    if stroke % 2 == 0 {
         way
     } else {
         speed * (stroke_s - RAMP_S) - way
