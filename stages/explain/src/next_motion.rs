@@ -240,9 +240,8 @@ fn position(model: &Model, excite: Excite, joint: usize, centre: &[f64], j: usiz
             let hz = (speed / (TAU * room.max(1e-6))).min(0.1);
             room.min(swing(hz)) * (TAU * hz * t).sin()
         }
-        Excite::WholeRange => 0.0,
         Excite::Creep if own => return middle + crept(room, speed, t),
-        Excite::Creep => 0.0,
+        Excite::WholeRange | Excite::Creep => 0.0,
         Excite::Fast => {
             0.3 * wave(0.4 + 0.13 * j as f64)
                 + 0.3 * wave(1.5 + 0.29 * j as f64)
