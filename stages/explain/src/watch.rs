@@ -20,6 +20,8 @@ mod rows;
 mod scale;
 #[cfg(test)]
 mod tests;
+mod touch;
+mod usual;
 mod window;
 mod words;
 

@@ -30,17 +30,54 @@ impl Ranges {
         }
     }
 
-    pub fn join(&mut self, other: &Self) {
+    fn join(&mut self, other: &Self) {
         self.take(other.low);
         self.take(other.high);
     }
 
     /// Whether `other` lies outside by more than a share `slack` of this range, in any feature.
-    pub fn is_left_by(&self, other: &Self, slack: f64) -> bool {
+    fn is_left_by(&self, other: &Self, slack: f64) -> bool {
         (0..FEATURES).any(|f| {
             let slack = slack * (self.high[f] - self.low[f]);
             other.low[f] < self.low[f] - slack || other.high[f] > self.high[f] + slack
         })
+    }
+}
+
+/// The ranges that a joint moved in lately. What was seen long ago the reference has forgotten, and so do they:
+/// a program that comes back after many others is new again.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Known {
+    /// Of the blocks since a multiple of [`Known::GENERATION`], and of as many before.
+    current: Ranges,
+    previous: Ranges,
+    blocks: usize,
+}
+
+impl Known {
+    pub const NONE: Self = Self {
+        current: Ranges::NONE,
+        previous: Ranges::NONE,
+        blocks: 0,
+    };
+    /// As long as the reference remembers: 150 s of motion.
+    const GENERATION: usize = 300;
+
+    pub fn take(&mut self, ranges: &Ranges) {
+        if self.blocks == Self::GENERATION {
+            self.previous = self.current;
+            self.current = Ranges::NONE;
+            self.blocks = 0;
+        }
+        self.current.join(ranges);
+        self.blocks += 1;
+    }
+
+    /// See [`Ranges::is_left_by`].
+    pub fn is_left_by(&self, other: &Ranges, slack: f64) -> bool {
+        let mut all = self.current;
+        all.join(&self.previous);
+        all.is_left_by(other, slack)
     }
 }
 

@@ -4,29 +4,25 @@
 
 use super::blocks::Ring;
 use super::finding::{Cause, Finding};
-use super::moments::{
-    BIAS, COULOMB, Compared, GAIN, JOINT_KINDS, JointScore, Outer, OuterScore, Reference,
-};
-use super::rows::{FORCE, PAYLOAD};
+use super::moments::{BIAS, COULOMB, Compared, GAIN, JOINT_KINDS, JointScore};
+use super::rows::PAYLOAD;
 use super::scale::Scale;
+use super::touch;
+use super::usual::{BEYOND, Usual};
 use super::window::Window;
 
-/// A change is named after so many blocks of motion, and if it is hard to tell from another, after so many.
+/// A change is named after so many blocks of motion; if it is hard to tell from another, after so many: as
+/// long as ten seconds of motion allow.
 const SOONEST: usize = 13;
-const LATEST: usize = 15;
-/// A change is told from so many times what is usual on (about six standard deviations), and from more
-/// while what is usual rests on few windows.
-const BEYOND: f64 = 40.0;
-const INEXPERIENCE: f64 = 4.0;
+const LATEST: usize = 18;
 /// From this share of joints on that lately moved unlike ever before, nothing is told that has no name.
 pub(super) const STRANGE: f64 = 0.03;
-/// Nor is a change what explains less than so many times the most it ever did without one.
-const OVER_LARGEST: f64 = 2.0;
 /// A gain counts among those without a change once so many blocks have passed.
 const DELAY: usize = 22;
-/// How much more where the motion is unlike all that the reference has seen.
-const NOVELTY: f64 = 8.0;
-/// Parts of the time since the change that must each hold their share of it.
+/// Nothing is told of a time in which a joint moved as never before in more than this share of it.
+const NEW_MOTION: f64 = 0.5;
+/// Parts of the time since the change that must each hold their share of it; longer ones where they tell too
+/// little.
 const PARTS: usize = 4;
 const SHARE: std::ops::RangeInclusive<f64> = 0.4..=2.2;
 /// The newest blocks, which by themselves must hold their share, too.
@@ -76,30 +72,6 @@ struct Candidate {
     normal: f64,
     /// Gain in units of what must be exceeded.
     score: f64,
-}
-
-/// What is usual, and what must be known to judge.
-pub(super) struct Usual<'a> {
-    pub references: &'a [Reference],
-    pub scales: &'a [[Scale; JOINT_KINDS]],
-    pub floors: &'a [f64],
-    pub noise: &'a [Option<f64>],
-    pub payload: &'a Scale,
-    pub caution: f64,
-    /// Share of joints that lately moved unlike ever before.
-    pub unlike: f64,
-}
-
-impl Usual<'_> {
-    /// What a change must explain to be told.
-    fn threshold(&self, scale: &Scale, usual: f64, novel: f64) -> f64 {
-        let beyond = usual
-            * BEYOND
-            * self.caution
-            * (1.0 + INEXPERIENCE / scale.independent())
-            * (1.0 + NOVELTY * novel.max(self.unlike));
-        beyond.max(OVER_LARGEST * self.caution * scale.largest())
-    }
 }
 
 /// What the newest blocks say.
@@ -166,11 +138,12 @@ impl Judge {
         if score < enough
             || first.best.blocks < soonest
             || !self.lasts(ring, usual, &first)
-            || force(ring, usual, first.best.back) > forced * first.normal
+            || touch::strongest(ring, usual, 0, first.best.back).1 > forced * first.normal
         {
             return (Verdict::Nothing, score);
         }
-        if !self.began(ring, usual, &first) || (poor && usual.unlike >= STRANGE) {
+        let strange = first.best.novel > NEW_MOTION || (poor && usual.unlike >= STRANGE);
+        if strange || !self.began(ring, usual, &first) {
             return (Verdict::Drifted, score);
         }
         let mut finding = self.finding(usual, &first, ring);
@@ -219,11 +192,12 @@ impl Judge {
             if blocks < Scale::SHORT {
                 continue;
             }
-            let novel = |j: usize| self.window.novel[j] as f64 / blocks as f64;
+            // Where one joint moves as never before, all that it carries and that carries it does.
+            let novel = self.window.novel.iter().copied().max().unwrap_or(0) as f64 / blocks as f64;
             let payload = self
                 .window
                 .scores(usual.references, usual.noise, &mut self.scores);
-            for (j, (best, score)) in self.best.iter_mut().zip(&self.scores).enumerate() {
+            for (best, score) in self.best.iter_mut().zip(&self.scores) {
                 let Some(score) = score else { continue };
                 for (kind, best) in best.iter_mut().enumerate() {
                     if score.gain[kind] > best.gain {
@@ -232,7 +206,7 @@ impl Judge {
                             size: score.size[kind],
                             blocks,
                             back,
-                            novel: novel(j),
+                            novel,
                         };
                     }
                 }
@@ -240,13 +214,12 @@ impl Judge {
             if let Some((change, gain)) = payload.solve()
                 && gain > self.payload.gain
             {
-                let most = (0..self.scores.len()).map(novel).fold(0.0, f64::max);
                 self.payload = Best {
                     gain,
                     size: change[0],
                     blocks,
                     back,
-                    novel: most,
+                    novel,
                 };
                 self.payload_change = change;
             }
@@ -333,13 +306,14 @@ impl Judge {
             if self.window.blocks < per_part && at + 1 < first.best.blocks {
                 continue;
             }
+            // What tells too little by itself is looked at with what came before it.
             if let Some(share) = self.share(usual, first) {
                 telling += 1;
                 if !SHARE.contains(&share) {
                     return false;
                 }
+                self.window.clear();
             }
-            self.window.clear();
         }
         telling >= 2
     }
@@ -411,61 +385,4 @@ impl Judge {
             .filter(|&j| most(j) > BEYOND)
             .fold(0, |joints, j| joints | 1 << j)
     }
-}
-
-/// What the best constant force on one of the links explains since a block, in units of noise.
-fn force(ring: &Ring, usual: &Usual<'_>, back: usize) -> f64 {
-    let joints = usual.references.len();
-    let gain = |touched: usize| {
-        let mut whole = OuterScore::<FORCE>::zero();
-        for j in 0..joints {
-            let Some(noise) = usual.noise[j] else {
-                continue;
-            };
-            let mut own = super::moments::Moments::ZERO;
-            let mut outer = Outer::<FORCE>::zero();
-            for back in 0..=back {
-                let block = ring.back(back);
-                if !block.excluded {
-                    own.add(&block.joints[j].own, 1.0);
-                    outer.add(&block.joints[j].force[touched]);
-                }
-            }
-            if let Some(compared) = Compared::new(&own, &usual.references[j]) {
-                whole.add(&compared.outer(&outer), 1.0 / noise);
-            }
-        }
-        whole.solve().map_or(0.0, |(_, gain)| gain)
-    };
-    (0..joints).map(gain).fold(0.0, f64::max)
-}
-
-/// The joint whose child link a constant force between two blocks explains best.
-pub(super) fn touched(
-    ring: &Ring,
-    usual: &Usual<'_>,
-    newest: usize,
-    oldest: usize,
-) -> Option<usize> {
-    let joints = usual.references.len();
-    let gain = |touched: usize| {
-        let mut whole = OuterScore::<FORCE>::zero();
-        for j in 0..joints {
-            let Some(noise) = usual.noise[j] else {
-                continue;
-            };
-            for back in newest..=oldest {
-                let block = &ring.back(back).joints[j];
-                if let Some(compared) = Compared::new(&block.own, &usual.references[j]) {
-                    whole.add(&compared.outer(&block.force[touched]), 1.0 / noise);
-                }
-            }
-        }
-        whole.solve().map_or(0.0, |(_, gain)| gain)
-    };
-    (0..joints)
-        .map(|link| (link, gain(link)))
-        .filter(|(_, gain)| *gain > 0.0)
-        .max_by(|a, b| a.1.total_cmp(&b.1))
-        .map(|(link, _)| link)
 }

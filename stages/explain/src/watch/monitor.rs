@@ -3,12 +3,13 @@
 mod contact;
 mod learning;
 
-use super::blocks::{BLOCK_ROWS, BLOCK_S, Ranges, Ring};
+use super::blocks::{BLOCK_ROWS, BLOCK_S, Known, Ring};
 use super::finding::Finding;
-use super::judge::{Judge, STRANGE, Usual, Verdict};
+use super::judge::{Judge, STRANGE, Verdict};
 use super::moments::{JOINT_KINDS, JointScore, Reference};
 use super::rows::Row;
 use super::scale::{Loudness, Scale};
+use super::usual::Usual;
 use super::window::Window;
 use contact::{Run, Told};
 
@@ -52,7 +53,7 @@ pub(super) struct Monitor {
     phase: Phase,
     ring: Ring,
     references: Vec<Reference>,
-    ranges: Vec<Ranges>,
+    known: Vec<Known>,
     scales: Vec<[Scale; JOINT_KINDS]>,
     payload: Scale,
     loudness: Vec<Loudness>,
@@ -80,7 +81,7 @@ impl Monitor {
             phase: Phase::Learning { told: false },
             ring: Ring::new(capacity, joints),
             references: vec![Reference::EMPTY; joints],
-            ranges: vec![Ranges::NONE; joints],
+            known: vec![Known::NONE; joints],
             scales: vec![[Scale::default(); JOINT_KINDS]; joints],
             payload: Scale::default(),
             loudness: vec![Loudness::default(); joints],
@@ -117,8 +118,9 @@ impl Monitor {
             return None;
         }
         let watches = self.watches();
-        if watches && self.ring.len() == FRESH {
+        if watches && self.ring.len() >= FRESH {
             self.learn_oldest();
+            self.ring.keep(FRESH - 1);
         }
         if watches {
             self.listen();
@@ -136,7 +138,7 @@ impl Monitor {
                 continue;
             }
             all += 1.0;
-            joint.novel = self.ranges[j].is_left_by(&joint.ranges, SLACK);
+            joint.novel = self.known[j].is_left_by(&joint.ranges, SLACK);
             novel += f64::from(u8::from(joint.novel));
             let energy = self.references[j].energy_per_row(&joint.own);
             let floor = LEAST_SHARE * LEAST_SHARE * self.references[j].effort_square();

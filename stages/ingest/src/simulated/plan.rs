@@ -9,7 +9,7 @@ use super::error::ScenarioError;
 use super::push::find_link;
 use super::scenario::{RecordedMotionSpec, RecordingSpec, Scenario};
 use super::trajectory::{Allowed, Fourier, JointRange, Points, Spline, Trajectory};
-use crate::config::{Config, FileConfig, Topics};
+use crate::config::{Config, CsvConfig, FileConfig, Topics};
 use crate::recorded::RecordedSource;
 use crate::setup::Setup;
 
@@ -121,24 +121,26 @@ fn above(model: Model, min_height_m: Option<f64>) -> Allowed {
     })
 }
 
-/// The positions of a recording, seconds from its first.
+/// The positions of a recording or of a table, seconds from its first.
 fn read_motion(
     recorded: &RecordedMotionSpec,
     joints: &[JointRange],
 ) -> Result<Spline, ScenarioError> {
-    let file = FileConfig {
-        path: recorded.path.clone(),
-        topics: Topics {
-            state: recorded.topic.clone(),
-            ..Topics::default()
-        },
-    };
     let setup = Setup {
         joint_names: joints.iter().map(|joint| joint.name.clone()).collect(),
         ..Setup::default()
     };
-    let mut source = RecordedSource::open_file(&file, &Config::default(), &setup)
-        .map_err(|error| ScenarioError::Motion(Box::new(error)))?;
+    let (path, config) = (recorded.path.clone(), Config::default());
+    let source = if let Some(columns) = recorded.columns.clone() {
+        RecordedSource::open_csv(&CsvConfig { path, columns }, &config, &setup)
+    } else {
+        let topics = Topics {
+            state: recorded.topic.clone(),
+            ..Topics::default()
+        };
+        RecordedSource::open_file(&FileConfig { path, topics }, &config, &setup)
+    };
+    let mut source = source.map_err(|error| ScenarioError::Motion(Box::new(error)))?;
     let (mut times_s, mut positions) = (Vec::new(), Vec::new());
     let mut first_ns = None;
     while let Some(sample) = source

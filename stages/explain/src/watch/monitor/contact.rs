@@ -1,8 +1,8 @@
 //! Loud blocks, and what becomes of a run of them: a contact, a lasting change, or neither.
 
 use super::super::finding::{Cause, Finding};
-use super::super::judge::touched;
 use super::super::moments::{Compared, JOINT_KINDS, Moments};
+use super::super::touch;
 use super::{FRESH, Monitor};
 
 /// A contact is over after so many quiet blocks that hold less than this share of it.
@@ -73,7 +73,8 @@ impl Monitor {
         if run.quiet >= QUIET && self.is_over(&run) {
             self.run = None;
             let oldest = (run.quiet + run.blocks - 1).min(self.ring.len() - 1);
-            finding.link = touched(&self.ring, &self.usual(), run.quiet, oldest);
+            let (link, explained) = touch::strongest(&self.ring, &self.usual(), run.quiet, oldest);
+            finding.link = (explained > 0.0).then_some(link);
             // One block around it: its beginning and its end.
             for back in run.quiet - 1..=(oldest + 1).min(self.ring.len() - 1) {
                 let block = self.ring.back_mut(back);

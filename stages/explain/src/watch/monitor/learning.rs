@@ -38,7 +38,7 @@ impl Monitor {
                 let block = self.ring.back(back);
                 if !block.excluded {
                     moments.add(&block.joints[j].own, 1.0);
-                    self.ranges[j].join(&block.joints[j].ranges);
+                    self.known[j].take(&block.joints[j].ranges);
                 }
             }
             let mut before = self.aside[j].moments;
@@ -151,7 +151,7 @@ impl Monitor {
             moments.scale((-moved_s / MEMORY_S).exp());
             moments.add(&joint.own, 1.0);
             self.references[j] = Reference::of(moments);
-            self.ranges[j].join(&joint.ranges);
+            self.known[j].take(&joint.ranges);
         }
         self.settle();
     }

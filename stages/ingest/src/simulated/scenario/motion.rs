@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tauscope_archive::CsvMapping;
 
 /// How the arm moves: exactly one of the three.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
@@ -150,15 +151,18 @@ impl Default for FourierSpec {
     }
 }
 
-/// The positions of a recording, joined by cubic splines.
+/// The positions of a recording or of a table, joined by cubic splines.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RecordedMotionSpec {
-    /// The recording; relative to this file.
+    /// The recording or table; relative to this file.
     pub path: PathBuf,
     /// Its topic (`sensor_msgs/msg/JointState`).
     #[serde(default = "default_motion_topic")]
     pub topic: String,
+    /// Of a CSV table, which column is what; only times and positions are taken.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub columns: Option<CsvMapping>,
 }
 
 fn default_motion_topic() -> String {

@@ -132,3 +132,23 @@ fn the_motion_of_a_recording_is_made_again() {
     }
     assert!(fastest > 0.3, "{fastest}");
 }
+
+#[test]
+fn the_motion_of_a_table_is_followed() {
+    let folder = tempfile::tempdir().unwrap();
+    let position = |t: f64| 0.3 * (1.0 - (2.0 * t).cos());
+    let rows = (0..=200).map(|k| {
+        let t = 0.01 * f64::from(k);
+        format!("{t}{}\n", format!(",{}", position(t)).repeat(N))
+    });
+    let path = folder.path().join("next.csv");
+    std::fs::write(&path, rows.collect::<String>()).unwrap();
+    let motion = format!(
+        "duration_s: 2, motion: {{recorded: {{path: {path:?}, \
+         columns: {{time: {{number: 1}}, position: {{first: 2}}}}}}}}"
+    );
+    for (k, reading) in readings(&ideal(&motion, "")).iter().enumerate() {
+        let error = reading.command_position[0] - position(0.001 * k as f64);
+        assert!(error.abs() < 1e-3, "reading {k}: {error}");
+    }
+}
