@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use tauscope_dynamics::terms::TermError;
 
 use crate::active::Hypothesis;
+use crate::audit;
 use crate::explain::{Judged, Setup};
 use crate::findings;
 use crate::fit::Fit;
@@ -46,6 +47,10 @@ const SHORTEST_S: f64 = 0.15;
 /// bears most.
 const FELT: f64 = 4.0;
 const FELT_SHARE: f64 = 0.015;
+
+/// What stands out for more than this share of the time is no push: the effort changes while the positions do not, as where a
+/// driver does not publish them.
+const MOST_OF_TIME: f64 = 0.7;
 
 /// Deviation of what is left at each joint as the only recording of a problem begins \[N m or N\].
 fn deviations(problem: &Problem, fit: &Fit) -> Vec<f64> {
@@ -148,7 +153,17 @@ fn pushes(search: &Search<'_>) -> Explanation {
         penalties: Vec::new(),
     };
     let deviations = deviations(problem, &best.fit);
-    for interval in stands_out(problem, &best.fit, &deviations) {
+    let intervals = stands_out(problem, &best.fit, &deviations);
+    let length_s: f64 = intervals.iter().map(|(from, to)| to - from).sum();
+    let whole_s = problem.tracks[0]
+        .track
+        .time_s
+        .last()
+        .map_or(0.0, |end| end - BEGINNING_S);
+    if length_s > MOST_OF_TIME * whole_s {
+        return best;
+    }
+    for interval in intervals {
         let last = last_to_feel(problem, &best.fit, &deviations, interval);
         let near = |h: &&Hypothesis| match (last, problem.model.links()[h.place.link].joint) {
             (Some(last), Some(joint)) => order(problem, last).abs_diff(order(problem, joint)) <= 1,
@@ -182,16 +197,21 @@ impl Setup<'_> {
         let say = |text: &str| progress(0.1, text);
         let (mut actives, mut undetectable) = (Vec::new(), Vec::new());
         let mut named = findings::Named::default();
-        for recording in &input.fit {
+        let known = |recording: &&Recording| !audit::is_frozen(recording, joints.len());
+        for recording in input.fit.iter().filter(known) {
             let problem = self.problem(std::slice::from_ref(recording), &rests_count)?;
             let search = Search {
                 problem: &problem,
                 hypotheses: &hypotheses,
                 say: &say,
             };
-            let found = pushes(&search);
             let before = Fit::new(&problem, Vec::new());
-            named.extend(findings::of(&search, &found, &before, input, &joints));
+            let found = pushes(&search);
+            let mut own = findings::of(&search, &found, &before, input, &joints);
+            // No motion tells more of a push that is over.
+            own.next_motions.clear();
+            own.trajectories.clear();
+            named.extend(own);
             if undetectable.is_empty() {
                 undetectable = findings::undetectable(&search, &found, &joints);
             }

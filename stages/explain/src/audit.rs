@@ -56,14 +56,21 @@ pub fn before(input: &Input) -> Option<String> {
 /// Whether no joint moves for as long, or as far, as a verdict on what lasts needs.
 pub fn at_rest(input: &Input) -> bool {
     let n = input.model.dof();
-    let range = |recording: &Recording, j: usize| {
-        let positions = recording.position.iter().skip(j).step_by(n);
-        let ends = (f64::INFINITY, f64::NEG_INFINITY);
-        let (low, high) = positions.fold(ends, |(low, high), q| (low.min(*q), high.max(*q)));
-        high - low
-    };
-    let stays = |j: usize| input.fit.iter().all(|r| range(r, j) < LEAST_RANGE);
+    let stays = |j: usize| input.fit.iter().all(|r| range(r, j, n) < LEAST_RANGE);
     (0..n).all(|j| moving_s(&input.fit, j, n) < LEAST_MOTION_S || stays(j))
+}
+
+/// Whether no position ever changes, not by an encoder's step: then nobody publishes them.
+pub fn is_frozen(recording: &Recording, n: usize) -> bool {
+    (0..n).all(|j| range(recording, j, n) <= 0.0)
+}
+
+/// How far a joint moves in a recording \[rad or m\].
+fn range(recording: &Recording, joint: usize, n: usize) -> f64 {
+    let positions = recording.position.iter().skip(joint).step_by(n);
+    let ends = (f64::INFINITY, f64::NEG_INFINITY);
+    let (low, high) = positions.fold(ends, |(low, high), q| (low.min(*q), high.max(*q)));
+    high - low
 }
 
 /// How long a joint moves \[s\].

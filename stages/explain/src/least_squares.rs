@@ -166,3 +166,31 @@ impl Products {
         (normal, right)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sum_in_lanes_is_the_sum() {
+        for n in [0, 1, 7, 8, 9, 31, 64] {
+            let of =
+                |shift: f64| -> Vec<f64> { (0..n).map(|k| (f64::from(k) + shift).sin()).collect() };
+            let (w, x, y) = (of(0.1), of(0.7), of(1.9));
+            let plain: f64 = w.iter().zip(&x).zip(&y).map(|((w, x), y)| w * x * y).sum();
+            assert!((weighted_dot(&w, &x, &y) - plain).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn what_is_not_used_stays_at_zero_and_damping_shortens_the_step() {
+        let normal = DMatrix::from_row_slice(3, 3, &[4.0, 1.0, 0.0, 1.0, 3.0, 1.0, 0.0, 1.0, 2.0]);
+        let right = DVector::from_row_slice(&[1.0, 2.0, 3.0]);
+        let all = solved(&normal, &right, &[true; 3], 0.0).unwrap();
+        assert!((&normal * &all - &right).norm() < 1e-8);
+        let some = solved(&normal, &right, &[true, false, true], 0.0).unwrap();
+        assert!(some[1].abs() <= 0.0 && (some[2] - 1.5).abs() < 1e-8);
+        let damped = solved(&normal, &right, &[true; 3], 1.0).unwrap();
+        assert!(damped.norm() < all.norm());
+    }
+}

@@ -225,3 +225,27 @@ fn loudest(rows: &[(f64, f64)], [lowest_hz, highest_hz]: [f64; 2]) -> Option<f64
     };
     Some(best + shift.clamp(-0.5, 0.5) * step_hz)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::loudest;
+
+    #[test]
+    fn the_loudest_frequency_is_found_on_an_uneven_clock_with_gaps() {
+        for hz in [0.31, 0.7858, 1.24, 3.3] {
+            let rows: Vec<(f64, f64)> = (0..900)
+                .map(|k| {
+                    let k = f64::from(k);
+                    // Three recordings, minutes apart, whose clocks jitter.
+                    let gap = 40.0 * (k / 300.0).floor();
+                    let t = 0.0625 * k + gap + 0.02 * (7.0 * k).sin();
+                    let slow = 0.3 * (0.05 * t).cos();
+                    (t, (std::f64::consts::TAU * hz * t + 0.4).sin() + slow)
+                })
+                .collect();
+            let found = loudest(&rows, [0.1, 8.0]).unwrap();
+            assert!((found - hz).abs() < 2e-4, "{found} Hz for {hz}");
+        }
+        assert!(loudest(&[], [0.1, 8.0]).is_none());
+    }
+}
