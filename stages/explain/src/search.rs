@@ -3,33 +3,28 @@
 //! Forward, one piece at a time, always the one with the most evidence; after each the earlier ones must prove
 //! themselves again; in the end each is taken out and every rival tried in its place.
 
+mod curves;
 mod evidence;
 mod exchange;
 
 use tauscope_dynamics::terms::Layer;
 
-use crate::across::{carries_over, left_elsewhere};
+use crate::across::carries_over;
 use crate::active::{Active, Hypothesis};
 use crate::drive::is_drive;
 use crate::fit::Fit;
 use crate::parallel;
 use crate::problem::Problem;
 use crate::propose::{Base, Proposal};
-use crate::unknown;
 use crate::windows::{TimeKind, time_kind};
 
+use curves::{CURVE_EVIDENCE, CURVE_SIZE};
 pub use evidence::{Explanation, LEAST_EVIDENCE, LEAST_SIZE, has_rotor, plausible};
 use evidence::{
     ROTOR, describe, matters, most_at_one_place, needs, overwhelming, steps_enough, wald,
     worse_joints,
 };
 
-/// Evidence that a curve without a name needs \[nats\].
-const CURVE_EVIDENCE: f64 = 25.0;
-/// A curve is not looked for at a joint whose variance is below this many times its white noise.
-const CURVE_EXCESS: f64 = 1.6;
-/// A curve must divide the variance that is left at its joint by this.
-const CURVE_SIZE: f64 = 1.35;
 /// Where much is left that no name fits, what a name must explain of it while there is more to be found, and in the end.
 const LOUD_SIZE: f64 = 0.25;
 const NAMED_SIZE: f64 = 0.5;
@@ -41,12 +36,6 @@ const MOST_PIECES: usize = 24;
 const LEAST_GAIN: f64 = 0.5;
 /// So often pieces are added and all exchanged again.
 const MOST_ROUNDS: usize = 2;
-/// Names that leave less of the variance than this on recordings that they were not fitted on carry over, and so do those that
-/// leave at most so many times the share that they leave where they were.
-const MOST_LEFT: f64 = 0.1;
-const MOST_WORSE: f64 = 10.0;
-/// That is asked where the variance without them is this many times the white noise.
-const LOUD: f64 = 4.0;
 /// A joint whose variance is below this many times its white noise is not tried with costly effects.
 const QUIET: f64 = 1.15;
 
@@ -130,106 +119,6 @@ impl Search<'_> {
             ));
             best = less;
         }
-    }
-
-    /// The explanation with a curve in a joint, where names do not do: beside the names, if much is left, or in place
-    /// of them, if it does better than they.
-    fn described(&self, best: &Explanation, joint: usize) -> Option<Explanation> {
-        let excess = |fit: &Fit| {
-            fit.variance[joint]
-                / (self.problem.white_noise[joint] * self.problem.white_noise[joint])
-        };
-        let own: Vec<usize> = (0..best.fit.actives.len())
-            .filter(|&i| {
-                let hypothesis = &best.fit.actives[i].hypothesis;
-                hypothesis.only_joint() == Some(joint) && !is_drive(hypothesis)
-            })
-            .collect();
-        if own.iter().any(|&i| best.fit.actives[i].curve.is_some()) {
-            return None;
-        }
-        // What it explains must be much, so that its rows may count in full.
-        let white = vec![1.0; self.problem.joints];
-        if !own.is_empty() {
-            let bare = self.stripped(best, &own, joint);
-            if let Some(instead) = self.with_curve(&bare, joint)
-                && instead.ahead_of(best, &white) > CURVE_EVIDENCE
-            {
-                return Some(instead);
-            }
-        }
-        if excess(&best.fit) < CURVE_EXCESS {
-            return None;
-        }
-        let beside = self.with_curve(best, joint)?;
-        let less = best.fit.variance[joint] / beside.fit.variance[joint];
-        (beside.ahead_of(best, &white) > CURVE_EVIDENCE && less > CURVE_SIZE).then_some(beside)
-    }
-
-    /// The explanation with the curve that does best in a joint, if there is evidence for one and it carries over.
-    fn with_curve(&self, from: &Explanation, joint: usize) -> Option<Explanation> {
-        let base = Base::new(self.problem, &from.fit, self.hypotheses.len());
-        let curve = base.propose_curve(joint)?;
-        let fit = from.fit.with(self.problem, curve.active);
-        let fit = fit.refined_at(self.problem, Some(&[joint]), from.fit.likelihood());
-        let mut actives = fit.actives;
-        if let Some(curve) = actives.last_mut() {
-            unknown::keep_what_is_evident(curve);
-        }
-        let fit = Fit::new(self.problem, actives);
-        let penalties = [&from.penalties[..], &[curve.penalty]].concat();
-        let with = Explanation { fit, penalties };
-        let evident =
-            with.ahead_of(from, &self.problem.worth) > CURVE_EVIDENCE || overwhelming(&with, from);
-        (evident && carries_over(self.problem, &with.fit, &from.fit, &[joint])).then_some(with)
-    }
-
-    /// The explanation without some of its pieces, refined at the joint that they are in.
-    fn stripped(&self, best: &Explanation, pieces: &[usize], joint: usize) -> Explanation {
-        let mut bare = best.clone();
-        for &i in pieces.iter().rev() {
-            bare.fit.actives.remove(i);
-            bare.penalties.remove(i);
-        }
-        let fit = Fit::new(self.problem, bare.fit.actives);
-        bare.fit = fit.refined_at(self.problem, Some(&[joint]), best.fit.likelihood());
-        bare
-    }
-
-    /// Takes the names of a joint back that leave much more on recordings that they were not fitted on, each left out in
-    /// turn, than where they were: together they only draw a curve, which is said in their place.
-    fn upheld(&self, found: Explanation) -> Explanation {
-        let mut best = found;
-        for joint in 0..self.problem.joints {
-            let local = |&i: &usize| {
-                let active = &best.fit.actives[i];
-                active.hypothesis.only_joint() == Some(joint)
-                    && active.curve.is_none()
-                    && !is_drive(&active.hypothesis)
-            };
-            let names: Vec<usize> = (0..best.fit.actives.len()).filter(local).collect();
-            let of = |i: usize| best.fit.actives[i].hypothesis;
-            let lasting = names.iter().all(|&i| time_kind(of(i)) == TimeKind::Always);
-            let shaped = names.iter().any(|&i| !of(i).is_linear());
-            if !lasting || !shaped {
-                continue;
-            }
-            let bare = self.stripped(&best, &names, joint);
-            let noise = self.problem.white_noise[joint] * self.problem.white_noise[joint];
-            if bare.fit.variance[joint] < LOUD * noise {
-                continue;
-            }
-            let left_here = best.fit.squares[joint] / bare.fit.squares[joint];
-            let left_there = left_elsewhere(self.problem, &best.fit, joint)
-                / left_elsewhere(self.problem, &bare.fit, joint);
-            (self.say)(&format!(
-                "! joint {joint}: {left_there:.3} left, {left_here:.3} where fitted"
-            ));
-            if left_there > MOST_LEFT.max(MOST_WORSE * left_here) {
-                best = self.with_curve(&bare, joint).unwrap_or(bare);
-            }
-        }
-        best
     }
 
     /// Every hypothesis that could change the effort of one of `joints`, beside what `fit` holds, most evidence

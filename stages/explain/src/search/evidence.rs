@@ -151,6 +151,14 @@ pub fn has_rotor(hypothesis: &Hypothesis) -> bool {
     matches!(hypothesis.effect.name, "joint_elasticity" | "backlash")
 }
 
+/// Whether an effect is a function of its joint's position alone.
+pub fn is_of_position(hypothesis: Hypothesis) -> bool {
+    matches!(
+        hypothesis.effect.name,
+        "cable_spring" | "counterbalance_spring" | "torque_ripple"
+    )
+}
+
 /// Evidence and size that a piece of physics needs beside what `fit` holds.
 pub fn needs(hypothesis: Hypothesis, fit: &Fit) -> (f64, f64) {
     let joint = hypothesis.only_joint();

@@ -1,0 +1,135 @@
+//! What no name fits: a curve beside the names of a joint, or in their place.
+
+use crate::across::{carries_over, left_elsewhere};
+use crate::drive::is_drive;
+use crate::fit::Fit;
+use crate::propose::Base;
+use crate::unknown;
+use crate::windows::{TimeKind, time_kind};
+
+use super::evidence::{is_of_position, overwhelming};
+use super::{Explanation, Search};
+
+/// Evidence that a curve without a name needs \[nats\].
+pub const CURVE_EVIDENCE: f64 = 25.0;
+/// A curve is not looked for at a joint whose variance is below this many times its white noise.
+const CURVE_EXCESS: f64 = 1.6;
+/// A curve must divide the variance that is left at its joint by this.
+pub const CURVE_SIZE: f64 = 1.35;
+/// Names that leave less of the variance than this on recordings that they were not fitted on carry over, and so do those that
+/// leave at most so many times the share that they leave where they were.
+const MOST_LEFT: f64 = 0.1;
+const MOST_WORSE: f64 = 10.0;
+/// More functions of one joint's position than this, each wave of a ripple counted, draw any curve.
+const MOST_OF_POSITION: usize = 3;
+/// That is asked where the variance without them is this many times the white noise.
+const LOUD: f64 = 4.0;
+
+impl Search<'_> {
+    /// The explanation with a curve in a joint, where names do not do: beside the names, if much is left, or in place
+    /// of them, if it does better than they.
+    pub(super) fn described(&self, best: &Explanation, joint: usize) -> Option<Explanation> {
+        let excess = |fit: &Fit| {
+            fit.variance[joint]
+                / (self.problem.white_noise[joint] * self.problem.white_noise[joint])
+        };
+        let own: Vec<usize> = (0..best.fit.actives.len())
+            .filter(|&i| {
+                let hypothesis = &best.fit.actives[i].hypothesis;
+                hypothesis.only_joint() == Some(joint) && !is_drive(hypothesis)
+            })
+            .collect();
+        if own.iter().any(|&i| best.fit.actives[i].curve.is_some()) {
+            return None;
+        }
+        // What it explains must be much, so that its rows may count in full.
+        let white = vec![1.0; self.problem.joints];
+        if !own.is_empty() {
+            let bare = self.stripped(best, &own, joint);
+            if let Some(instead) = self.with_curve(&bare, joint)
+                && instead.ahead_of(best, &white) > CURVE_EVIDENCE
+            {
+                return Some(instead);
+            }
+        }
+        if excess(&best.fit) < CURVE_EXCESS {
+            return None;
+        }
+        let beside = self.with_curve(best, joint)?;
+        let less = best.fit.variance[joint] / beside.fit.variance[joint];
+        (beside.ahead_of(best, &white) > CURVE_EVIDENCE && less > CURVE_SIZE).then_some(beside)
+    }
+
+    /// The explanation with the curve that does best in a joint, if there is evidence for one and it carries over.
+    fn with_curve(&self, from: &Explanation, joint: usize) -> Option<Explanation> {
+        let base = Base::new(self.problem, &from.fit, self.hypotheses.len());
+        let curve = base.propose_curve(joint)?;
+        let fit = from.fit.with(self.problem, curve.active);
+        let fit = fit.refined_at(self.problem, Some(&[joint]), from.fit.likelihood());
+        let mut actives = fit.actives;
+        if let Some(curve) = actives.last_mut() {
+            unknown::keep_what_is_evident(curve);
+        }
+        let fit = Fit::new(self.problem, actives);
+        let penalties = [&from.penalties[..], &[curve.penalty]].concat();
+        let with = Explanation { fit, penalties };
+        let evident =
+            with.ahead_of(from, &self.problem.worth) > CURVE_EVIDENCE || overwhelming(&with, from);
+        (evident && carries_over(self.problem, &with.fit, &from.fit, &[joint])).then_some(with)
+    }
+
+    /// The explanation without some of its pieces, refined at the joint that they are in.
+    fn stripped(&self, best: &Explanation, pieces: &[usize], joint: usize) -> Explanation {
+        let mut bare = best.clone();
+        for &i in pieces.iter().rev() {
+            bare.fit.actives.remove(i);
+            bare.penalties.remove(i);
+        }
+        let fit = Fit::new(self.problem, bare.fit.actives);
+        bare.fit = fit.refined_at(self.problem, Some(&[joint]), best.fit.likelihood());
+        bare
+    }
+
+    /// Takes the names of a joint back that are too many functions of its position, or that leave much more on recordings that they were not fitted on, each left out in
+    /// turn, than where they were: together they only draw a curve, which is said in their place.
+    pub(super) fn upheld(&self, found: Explanation) -> Explanation {
+        let mut best = found;
+        for joint in 0..self.problem.joints {
+            let local = |&i: &usize| {
+                let active = &best.fit.actives[i];
+                active.hypothesis.only_joint() == Some(joint)
+                    && active.curve.is_none()
+                    && !is_drive(&active.hypothesis)
+            };
+            let names: Vec<usize> = (0..best.fit.actives.len()).filter(local).collect();
+            let of = |i: usize| best.fit.actives[i].hypothesis;
+            let lasting = names.iter().all(|&i| time_kind(of(i)) == TimeKind::Always);
+            let shaped = names.iter().any(|&i| !of(i).is_linear());
+            if !lasting || !shaped {
+                continue;
+            }
+            let bare = self.stripped(&best, &names, joint);
+            let of_position = names.iter().filter(|&&i| is_of_position(of(i))).count();
+            if of_position > MOST_OF_POSITION
+                && let Some(curve) = self.with_curve(&bare, joint)
+            {
+                best = curve;
+                continue;
+            }
+            let noise = self.problem.white_noise[joint] * self.problem.white_noise[joint];
+            if bare.fit.variance[joint] < LOUD * noise {
+                continue;
+            }
+            let left_here = best.fit.squares[joint] / bare.fit.squares[joint];
+            let left_there = left_elsewhere(self.problem, &best.fit, joint)
+                / left_elsewhere(self.problem, &bare.fit, joint);
+            (self.say)(&format!(
+                "! joint {joint}: {left_there:.3} left, {left_here:.3} where fitted"
+            ));
+            if left_there > MOST_LEFT.max(MOST_WORSE * left_here) {
+                best = self.with_curve(&bare, joint).unwrap_or(bare);
+            }
+        }
+        best
+    }
+}
