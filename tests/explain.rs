@@ -236,6 +236,46 @@ fn a_payload_in_amperes_is_weighed_and_is_in_the_robot() {
 }
 
 #[test]
+fn a_joint_with_dry_and_viscous_friction_keeps_both_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let robot = root().join("tests/data/demo_arm.urdf");
+    let scenario = folder.path().join("two.yaml");
+    let text = format!(
+        "version: 1
+robot: {}
+seed: 3
+rate_hz: 125
+physics:
+  - {{effect: coulomb_friction, joint: joint2, parameters: {{coulomb_nm: 1.8}}}}
+  - {{effect: viscous_friction, joint: joint2, parameters: {{viscous_nms_per_rad: 2.6}}}}
+sensors: {{effort_noise_nm: 0.08}}
+recordings:
+  - {{name: r0, duration_s: 8, motion: {{fourier: {{period_s: 8, harmonics: 4}}}}}}
+  - {{name: r1, duration_s: 8, motion: {{points: {{speed: 0.4, rest_s: [0.2, 0.8]}}}}}}
+  - {{name: r2, duration_s: 8, motion: {{fourier: {{period_s: 8, harmonics: 5}}}}}}
+",
+        robot.display()
+    );
+    write(&scenario, &text);
+    let mut simulate = tauscope();
+    simulate.arg("simulate").arg(&scenario);
+    simulate.arg("--out").arg(folder.path());
+    let done = Out::of(simulate);
+    assert_eq!(done.code, 0, "{}", done.stderr);
+    let of = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let out = folder.path().join("out");
+    let [r0, r1, r2] = ["r0.mcap", "r1.mcap", "r2.mcap"].map(of);
+    let robot = robot.to_str().unwrap();
+    let done = explain(
+        &out,
+        &["--robot", robot, "--fit", &r0, &r1, "--holdout", &r2],
+    );
+    assert_eq!(done.code, 0, "{}", done.stderr);
+    let both = ["coulomb_friction", "viscous_friction"].map(|effect| pair(effect, "joint2"));
+    assert_eq!(named(&report(&out)), both);
+}
+
+#[test]
 fn nothing_is_missing_where_nothing_was_concealed() {
     let folder = tempfile::tempdir().unwrap();
     let done = explain_case(folder.path(), &case("m11/case.yaml"));

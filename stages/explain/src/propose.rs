@@ -99,11 +99,7 @@ impl<'a> Base<'a> {
 
     /// What `free` numbers at these joints gain by chance.
     pub fn penalty(&self, free: usize, only_joint: Option<usize>) -> f64 {
-        let rows: f64 = match only_joint {
-            Some(joint) => self.fit.count[joint],
-            None => self.fit.count.iter().sum(),
-        };
-        0.5 * free as f64 * rows.max(2.0).ln() + self.library
+        penalty(self.fit, self.library, free, only_joint)
     }
 
     fn trial<C: Borrow<Column>>(&self, alone: Option<&Column>, columns: &[C]) -> Trial<'_> {
@@ -247,6 +243,15 @@ impl<'a> Base<'a> {
             size,
         })
     }
+}
+
+/// What `free` numbers at these joints gain by chance, for being one of `library` nats' worth of hypotheses.
+pub fn penalty(fit: &Fit, library: f64, free: usize, only_joint: Option<usize>) -> f64 {
+    let rows: f64 = match only_joint {
+        Some(joint) => fit.count[joint],
+        None => fit.count.iter().sum(),
+    };
+    0.5 * free as f64 * rows.max(2.0).ln() + library
 }
 
 /// The least that the factors of a hypothesis may be.

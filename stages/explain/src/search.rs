@@ -7,7 +7,7 @@ mod curves;
 mod evidence;
 mod exchange;
 
-use tauscope_dynamics::terms::Layer;
+use tauscope_dynamics::terms::{Layer, effect};
 
 use crate::across::carries_over;
 use crate::active::{Active, Hypothesis};
@@ -15,7 +15,7 @@ use crate::drive::is_drive;
 use crate::fit::Fit;
 use crate::parallel;
 use crate::problem::Problem;
-use crate::propose::{Base, Proposal};
+use crate::propose::{Base, Proposal, penalty};
 use crate::windows::{TimeKind, time_kind};
 
 use curves::{CURVE_EVIDENCE, CURVE_SIZE};
@@ -28,6 +28,16 @@ use evidence::{
 /// Where much is left that no name fits, what a name must explain of it while there is more to be found, and in the end.
 const LOUD_SIZE: f64 = 0.25;
 const NAMED_SIZE: f64 = 0.5;
+/// Effects that contain a simpler one, whose only number is their first.
+const SIMPLER: [(&str, &str); 7] = [
+    ("friction_step", "coulomb_friction"),
+    ("stribeck_friction", "coulomb_friction"),
+    ("asymmetric_coulomb", "coulomb_friction"),
+    ("presliding_hysteresis", "coulomb_friction"),
+    ("temperature_viscous", "viscous_friction"),
+    ("joint_elasticity", "rotor_inertia"),
+    ("backlash", "rotor_inertia"),
+];
 /// How many proposals of a round are refined before one is taken.
 const REFINED: usize = 3;
 /// More pieces of physics than this are not looked for.
@@ -289,12 +299,46 @@ impl Search<'_> {
                         "- {}",
                         best.fit.actives[index].hypothesis.effect.name
                     ));
-                    best = less;
+                    best = self.simpler(&best, &less, index).unwrap_or(less);
                     continue 'again;
                 }
             }
             return best;
         }
+    }
+
+    /// The explanation `less` with the simpler effect that the piece taken out of `best` contains, if there is evidence for it: a
+    /// friction that does not step is still friction.
+    fn simpler(&self, best: &Explanation, less: &Explanation, index: usize) -> Option<Explanation> {
+        let Active {
+            hypothesis,
+            coordinates,
+            ..
+        } = &best.fit.actives[index];
+        let (_, name) = SIMPLER
+            .iter()
+            .find(|(of, _)| *of == hypothesis.effect.name)?;
+        let simple = Hypothesis {
+            effect: effect(name)?,
+            place: hypothesis.place,
+        };
+        let there = |a: &Active| a.hypothesis == simple;
+        if !self.hypotheses.contains(&simple) || less.fit.actives.iter().any(there) {
+            return None;
+        }
+        let joints = Fit::joints_of(&simple, self.problem.joints);
+        let library = (self.hypotheses.len() as f64).ln();
+        let penalty = penalty(&less.fit, library, 1, simple.only_joint());
+        let fit = less
+            .fit
+            .with(self.problem, simple.with(vec![coordinates[0]]));
+        let with = Explanation {
+            fit: fit.refined_at(self.problem, Some(&joints), less.fit.likelihood()),
+            penalties: [&less.penalties[..], &[penalty]].concat(),
+        };
+        let worth = &self.problem.worth;
+        let evident = with.ahead_of(less, worth) >= LEAST_EVIDENCE || overwhelming(&with, less);
+        evident.then_some(with)
     }
 
     /// Whether one of the pieces is needed, to judge by the explanation without it.
