@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use common::{Out, root, tauscope, write};
 use serde_json::Value;
-use tauscope_archive::ros::JointState;
+use tauscope_archive::ros::{Header, JointState};
 use tauscope_archive::{Compression, McapWriter, Recording};
 
 const STATES: &str = "/joint_states";
@@ -401,7 +401,6 @@ fn pushed(path: &Path, robot: &Path, link: &str, pushes: &[(f64, f64, [f64; 3])]
     let link = model.link_index(link).unwrap();
     let jacobian = link_jacobian(&model, &mut data, link).clone();
     let names: Vec<String> = model.joint_names().map(str::to_owned).collect();
-    let template = states(&case("m00/rec_00.mcap")).swap_remove(0).1;
     let rows: Vec<(i64, JointState)> = (0..1200_u32)
         .map(|k| {
             let t = 0.01 * f64::from(k);
@@ -416,14 +415,15 @@ fn pushed(path: &Path, robot: &Path, link: &str, pushes: &[(f64, f64, [f64; 3])]
                     *effort -= now * torque;
                 }
             }
+            let time_ns = 1_000_000_000 + i64::from(k) * 10_000_000;
             let state = JointState {
+                header: Header::new(time_ns, ""),
                 name: names.clone(),
                 position: position.map(|q| q + 1e-5 * noise(3)).to_vec(),
                 velocity: Vec::new(),
                 effort,
-                ..template.clone()
             };
-            (1_000_000_000 + i64::from(k) * 10_000_000, state)
+            (time_ns, state)
         })
         .collect();
     record(path, &[(STATES, &rows)]);
