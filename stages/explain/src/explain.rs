@@ -272,7 +272,13 @@ impl Setup<'_> {
                 *value += start.offset[k % n] * self.unit_nm[k % n];
             }
         }
-        if self.at_rest {
+        // Not of recordings held out: what is predicted for them comes from the motion alone.
+        let fitted = self
+            .input
+            .fit
+            .iter()
+            .any(|own| std::ptr::eq(own, recording));
+        if self.at_rest && fitted {
             at_rest::start_at_measured(&mut track, recording, self.unit_nm);
         }
         Ok(track)
