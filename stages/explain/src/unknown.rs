@@ -200,6 +200,9 @@ fn loudest(rows: &[(f64, f64)], [lowest_hz, highest_hz]: [f64; 2]) -> Option<f64
         .map(|(t, _)| *t)
         .fold(f64::NEG_INFINITY, f64::max);
     let first_s = rows.iter().map(|(t, _)| *t).fold(f64::INFINITY, f64::min);
+    if last_s <= first_s {
+        return None;
+    }
     let step_hz = 1.0 / (STEPS_OF_FREQUENCY * (last_s - first_s));
     let power = |hz: f64| {
         let turn = std::f64::consts::TAU * hz;
@@ -246,6 +249,6 @@ mod tests {
             let found = loudest(&rows, [0.1, 8.0]).unwrap();
             assert!((found - hz).abs() < 2e-4, "{found} Hz for {hz}");
         }
-        assert!(loudest(&[], [0.1, 8.0]).is_none());
+        assert!(loudest(&[(1.0, 2.0)], [0.1, 8.0]).is_none());
     }
 }
