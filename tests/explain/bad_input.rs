@@ -1,0 +1,210 @@
+//! Data that allows no verdict, rows that are lost, and what is refused.
+
+use std::path::Path;
+
+use super::common::{Out, root, write};
+use super::{case, changed, explain, explain_case, named, pair, report, robot, states};
+
+/// What data that allows no verdict gets: a reason, and exit code 0.
+fn not_evaluated(out: &Path, done: &Out, reason: &str) {
+    assert_eq!(done.code, 0, "{}", done.stderr);
+    let report = report(out);
+    assert_eq!(report["verdict"], "not_evaluated");
+    assert_eq!(named(&report), []);
+    let said = report["reason"].as_str().unwrap();
+    assert!(said.contains(reason), "{said}");
+    assert!(done.stdout.contains(reason), "{}", done.stdout);
+    assert!(!out.join("twin.yaml").exists());
+}
+
+#[test]
+fn one_recording_proves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    // Of an explanation before nothing may be left beside a report that names nothing.
+    std::fs::create_dir(&out).unwrap();
+    write(&out.join("report.json"), "{}");
+    write(&out.join("twin.yaml"), "");
+    let (robot, recording) = (robot("slide"), case("m01/rec_00.mcap"));
+    let done = explain(
+        &out,
+        &[
+            "--robot",
+            robot.to_str().unwrap(),
+            "--fit",
+            recording.to_str().unwrap(),
+        ],
+    );
+    not_evaluated(&out, &done, "one recording only");
+}
+
+#[test]
+fn an_arm_at_rest_tells_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let still = changed(folder.path(), "m01", &[], |_, state| {
+        state.position.fill(0.1);
+        state.velocity.fill(0.0);
+    });
+    let out = folder.path().join("out");
+    not_evaluated(&out, &explain_case(&out, &still), "no joint moves");
+}
+
+#[test]
+fn an_effort_that_is_zero_throughout_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let zero = changed(folder.path(), "m01", &[], |_, state| state.effort.fill(0.0));
+    let out = folder.path().join("out");
+    not_evaluated(&out, &explain_case(&out, &zero), "effort is zero");
+}
+
+#[test]
+fn the_wrong_robot_and_the_wrong_unit_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let other = changed(folder.path(), "m01", &[], |_, state| {
+        state
+            .effort
+            .iter_mut()
+            .for_each(|effort| *effort = -*effort);
+    });
+    let out = folder.path().join("out");
+    not_evaluated(&out, &explain_case(&out, &other), "another robot");
+
+    let folder = tempfile::tempdir().unwrap();
+    let amperes = changed(folder.path(), "m01", &[], |_, state| {
+        state.effort.iter_mut().for_each(|effort| *effort /= 12.0);
+    });
+    let out = folder.path().join("out");
+    not_evaluated(&out, &explain_case(&out, &amperes), "unit");
+}
+
+#[test]
+fn rows_that_are_lost_are_said_and_end_with_3() {
+    let folder = tempfile::tempdir().unwrap();
+    let holes = changed(folder.path(), "m01", &["rec_00", "rec_03"], |row, state| {
+        if row % 100 == 50 {
+            state.effort[2] = f64::NAN;
+        }
+    });
+    let out = folder.path().join("out");
+    let done = explain_case(&out, &holes);
+    assert_eq!(done.code, 3, "{}", done.stderr);
+    assert!(done.stdout.contains("not finite"), "{}", done.stdout);
+    assert_eq!(named(&report(&out)), [pair("viscous_friction", "roll")]);
+    let rows = std::fs::read_to_string(out.join("rec_03.csv"))
+        .unwrap()
+        .lines()
+        .count();
+    assert_eq!(rows, states(&folder.path().join("rec_03.mcap")).len());
+}
+
+#[test]
+fn a_torn_tail_is_read_up_to_the_tear() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = changed(folder.path(), "m01", &["rec_00"], |_, _| {});
+    let torn = folder.path().join("rec_00.mcap");
+    let bytes = std::fs::read(&torn).unwrap();
+    std::fs::write(&torn, &bytes[..bytes.len() * 8 / 10]).unwrap();
+    let out = folder.path().join("out");
+    let done = explain_case(&out, &whole);
+    assert_eq!(done.code, 3, "{}", done.stderr);
+    assert_eq!(named(&report(&out)), [pair("viscous_friction", "roll")]);
+}
+
+/// Arguments or files that are wrong: exit code 2 and these words.
+fn refused(done: &Out, words: &[&str]) {
+    assert_eq!(done.code, 2, "{}", done.stderr);
+    for word in words {
+        assert!(done.stderr.contains(word), "{word}: {}", done.stderr);
+    }
+}
+
+#[test]
+fn wrong_arguments_and_files_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let m01 = case("m01/case.yaml");
+    let m01 = m01.to_str().unwrap();
+    let done = explain(&out, &[m01, "--without", "coulomb"]);
+    refused(
+        &done,
+        &["no effect `coulomb`", "did you mean `coulomb_friction`?"],
+    );
+    refused(&explain(&out, &[]), &["CASE"]);
+
+    let (robot_file, recording) = (robot("six"), case("m01/rec_00.mcap"));
+    let (robot_file, recording) = (robot_file.to_str().unwrap(), recording.to_str().unwrap());
+    let done = explain(&out, &["--robot", robot_file, "--fit", recording]);
+    refused(&done, &["rec_00.mcap: joint `", "` is not in it"]);
+    let done = explain(
+        &out,
+        &[
+            "--robot",
+            robot_file,
+            "--fit",
+            recording,
+            "--holdout",
+            recording,
+        ],
+    );
+    refused(&done, &["named twice"]);
+    let done = explain(&out, &["--fit", recording]);
+    refused(&done, &["--robot URDF"]);
+
+    let text = "case: x\nrobot: none.urdf\nfit: [a.mcap]\nefort_unit: A\n";
+    let file = write(&folder.path().join("case.yaml"), text);
+    refused(
+        &explain_case(&out, &file),
+        &["did you mean `effort_unit`?", "case.yaml:4"],
+    );
+    let file = write(
+        &folder.path().join("case.yaml"),
+        &text.replace("efort_unit: A\n", ""),
+    );
+    refused(
+        &explain_case(&out, &file),
+        &["case.yaml:2", "case.yaml:3", "no recording"],
+    );
+    assert!(!out.exists());
+}
+
+#[test]
+fn a_joint_that_is_never_a_number_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let never = changed(folder.path(), "m01", &["rec_01"], |_, state| {
+        state.effort[3] = f64::NAN;
+    });
+    let out = folder.path().join("out");
+    refused(&explain_case(&out, &never), &["rec_01", "NaN throughout"]);
+}
+
+#[test]
+fn what_it_reads_is_not_overwritten() {
+    let folder = tempfile::tempdir().unwrap();
+    let m01 = case("m01/case.yaml");
+    let out = folder.path().join("out");
+    let done = explain_case(&out, &m01);
+    assert_eq!(done.code, 0, "{}", done.stderr);
+    let text = std::fs::read_to_string(&m01).unwrap();
+    let here = root().join("tests/proof/set");
+    let text = text
+        .replace("../../robots", here.join("robots").to_str().unwrap())
+        .replace("rec_", here.join("cases/m01/rec_").to_str().unwrap());
+    let text = format!("{text}twin: {{model: out/twin.yaml}}\n");
+    let again = write(&folder.path().join("case.yaml"), &text);
+    refused(&explain_case(&out, &again), &["would overwrite"]);
+    // Elsewhere it is fine: nothing has changed since.
+    let other = folder.path().join("other");
+    let done = explain_case(&other, &again);
+    assert_eq!(done.code, 0, "{}", done.stderr);
+    assert_eq!(report(&other)["verdict"], "nothing_missing");
+    let twin = |out: &Path| std::fs::read_to_string(out.join("twin.yaml")).unwrap();
+    let terms = |text: String| {
+        text.split("scores:")
+            .next()
+            .unwrap()
+            .split("terms:")
+            .nth(1)
+            .map(str::to_owned)
+    };
+    assert_eq!(terms(twin(&out)), terms(twin(&other)));
+}
