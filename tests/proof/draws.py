@@ -245,19 +245,34 @@ def together(names, count, rng):
     """Some distinct effects that may be in one case."""
     out = []
     for name in (str(x) for x in rng.permutation(names)):
-        if len(out) < count and allowed(name, None, [{"effect": x, "joint": x} for x in out]):
+        if len(out) < count and allowed(name.partition("@")[0], None, [{"effect": x.partition("@")[0], "joint": x} for x in out]):
             out.append(name)
     return out
 
 
+def whole_arm(n, rng):
+    """What an arm has at once: friction and mostly a rotor on every joint, and up to two things more; `name@joint`."""
+    out = []
+    for j in range(n):
+        dry = ["coulomb_friction", "stribeck_friction", "asymmetric_coulomb"]
+        out += [f"viscous_friction@{j}", f"{rng.choice(dry, p=[0.7, 0.2, 0.1])}@{j}"]
+        out += [f"rotor_inertia@{j}"] if rng.random() < 0.6 else []
+        out += [f"load_dependent_friction@{j}"] if j in (1, 2) and rng.random() < 0.6 else []
+    more = ["payload", "payload_pickup", "link_com", "base_tilt", "cable_spring", "counterbalance_spring", "torque_ripple", "torque_bias",
+            f"transmission_coupling@{n - 1}", "torque_delay", "external_push", "torque_gain"]
+    return out + together(more, int(rng.integers(0, 3)), rng)
+
+
 def draw(name, c, rng, target, taken=()):
-    """One effect of this name, or None where the robot's motion cannot show it."""
+    """One effect of this name, or None where the robot's motion cannot show it. On a joint of its own it asks nobody: `name@joint`."""
+    name, _, at = name.partition("@")
     kind = name.split(":")[1] if name.startswith("unknown:") else None
     target = max(target * (1. if kind else SHARE.get(name, 1.)), 1.5)
     # Whole-arm and link effects have no joint of their own.
     free = kind is None and CLASS[name] in ("mass", "tilt", "lag", "contact")
     options = [0] if free else [j for j in candidates("" if kind else name, c)
-                                if kind or allowed(name, c.robot.names[j], taken)]
+                                if kind or at or allowed(name, c.robot.names[j], taken)]
+    options = [j for j in options if j == int(at)] if at else options
     if not options or (free and not allowed(name, None, taken)):
         return None
     j = int(rng.choice(options))

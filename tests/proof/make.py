@@ -1,6 +1,6 @@
 """Make cases of arms with concealed physics: recordings, case files and the answers.
 
-    python make.py --out DIR --seed 1 --count 20 [--kind single|combo|null|unknown|mixed] [--effects a,b] [--robots DIR_OR_FILES ...]
+    python make.py --out DIR --seed 1 --count 20 [--kind single|combo|null|unknown|arm|mixed] [--effects a,b] [--robots DIR_OR_FILES ...]
 
 DIR gets cases/<id>/{case.yaml, rec_XX.mcap}, robots/*.urdf, answers.json and its sha256.  The same call gives the same bytes.
 """
@@ -30,7 +30,7 @@ def options():
     a.add_argument("--out", required=True)
     a.add_argument("--seed", type=int, default=1)
     a.add_argument("--count", type=int, default=10)
-    a.add_argument("--kind", default="mixed", choices=["single", "combo", "null", "unknown", "mixed"])
+    a.add_argument("--kind", default="mixed", choices=["single", "combo", "null", "unknown", "arm", "mixed"])
     a.add_argument("--plan", help="kinds and effects case by case instead, e.g. 'payload;coulomb_friction+torque_delay;null;unknown:torque_bump'")
     a.add_argument("--effects", help="only these, separated by commas")
     a.add_argument("--robots", nargs="+", default=[os.path.join(HERE, "robots")], help="URDF files or folders of them")
@@ -67,6 +67,8 @@ def plan(o, rng, robots):
             names = []
         elif kind == "unknown":
             names = ["unknown:" + draws.UNKNOWN[i % len(draws.UNKNOWN)]]
+        elif kind == "arm":
+            names = None                        # drawn for the robot
         elif kind == "single":
             deck = deck or [str(x) for x in rng.permutation(allowed)]
             names = [deck.pop()]
@@ -76,7 +78,8 @@ def plan(o, rng, robots):
     order = []
     for kind, names in rows:
         order = order or [robots[k] for k in rng.permutation(len(robots))]
-        yield kind, names, order.pop()
+        robot = order.pop()
+        yield kind, draws.whole_arm(robot.n, rng) if kind == "arm" else names, robot
 
 
 def set_up(o, names, robot, rng):
@@ -107,7 +110,9 @@ def concealed(o, kind, names, c, rng):
         again = kind == "combo" and rng.random() < o.several and draws.CLASS[name] not in draws.ONCE | {"alone"}
         for _ in range(1 + again):
             target = o.strength * float(np.exp(rng.uniform(np.log(low), np.log(high))))
-            e = next((x for x in (draws.draw(name, c, rng, target, effects) for _ in range(4)) if x), None)
+            e = next((x for x in (draws.draw(name, c, rng, target, effects if kind != "arm" else ()) for _ in range(4)) if x), None)
+            if e is None and kind == "arm" and "@" in name:      # not every joint can show everything
+                continue
             if e is None:
                 return None
             effects.append(e)
@@ -188,7 +193,7 @@ def attempt(o, ident, kind, names, robot, rng, folder, rejected):
         rejected.append(f"does not close: {closure:.2f} of the noise")
         return None
     low = min(1., 0.35 * o.strength * pair(o.snr)[0])
-    if any(v.get("snr_distinct", 9.) < low or v["snr_rms"] < 0.3 * low for v in views):
+    if kind != "arm" and any(v.get("snr_distinct", 9.) < low or v["snr_rms"] < 0.3 * low for v in views):
         rejected.append("not distinct")
         return None
 

@@ -10,7 +10,7 @@ use serde_json::Value;
 use tauscope_dynamics::terms::PlaceKind;
 
 use crate::active::{Active, Hypothesis};
-use crate::drive::is_drive;
+use crate::drive::{is_drive, off_with_the_links};
 use crate::explain::Input;
 use crate::fit::Fit;
 use crate::interval::{HALF_WIDTH_95, covariance, parameter_deviations};
@@ -112,10 +112,17 @@ pub fn of(
         trajectories: Vec::new(),
         notes: Vec::new(),
     };
+    let drives = fit.actives.iter().any(|a| is_drive(&a.hypothesis));
+    let off = drives.then(|| off_with_the_links(search.problem, fit));
+    let mut first = 0;
     for (index, active) in fit.actives.iter().enumerate() {
         let deviations = parameter_deviations(search.problem, fit, &spread, index);
+        first += active.coordinates.len();
         if is_drive(&active.hypothesis) {
-            named.notes.push(drive_note(active, deviations[0], joints));
+            let off = off.as_ref().map_or(0.0, |off| off[first - 1]);
+            named
+                .notes
+                .push(drive_note(active, deviations[0].hypot(off), joints));
             continue;
         }
         let less = search.less(found, index);
@@ -287,7 +294,7 @@ fn drive_note(active: &Active, deviation: f64, joints: &[String]) -> String {
     if !(deviation.is_finite() && gain > KNOWN_SCALE * deviation) {
         return format!(
             "The gain of joint {joint} is not identifiable: hardly any gravity or inertia acts on it in these \
-             recordings ({} A per N m, 95 % interval {} to {}).",
+             recordings, and what does hangs on how exact the URDF's masses are ({} A per N m, 95 % interval {} to {}).",
             words::number(gain),
             words::number(gain - HALF_WIDTH_95 * deviation),
             words::number(gain + HALF_WIDTH_95 * deviation)

@@ -12,6 +12,10 @@ use crate::track::Track;
 
 /// Motion of a prediction is smoothed with the best of these, as shares of the fit's cutoff.
 const PREDICTION_CUTOFFS: [f64; 5] = [0.75, 1.0, 1.4, 2.0, 3.0];
+/// And the velocity that friction turns on with these times that, or taken as it was recorded: friction of a few mrad/s has a sign.
+const VELOCITY_CUTOFFS: [f64; 3] = [2.0, 4.0, 8.0];
+/// No smoothing above this share of the rate of rows.
+const MOST_OF_RATE: f64 = 0.4;
 /// Samples of a picture, at most.
 const PICTURE_SAMPLES: usize = 2000;
 
@@ -25,6 +29,22 @@ pub struct Proof {
     pub predictions: Vec<(String, Vec<f64>)>,
     /// What is drawn, hold-out recordings first.
     pub pictures: Vec<RecordingPicture>,
+}
+
+/// How the motion of a prediction is smoothed.
+#[derive(Debug, Clone, Copy)]
+struct Smoothing {
+    motion_hz: f64,
+    velocity: Velocity,
+}
+
+/// Where the velocity comes from that friction turns on.
+#[derive(Debug, Clone, Copy)]
+enum Velocity {
+    AsMotion,
+    /// Half amplitude at \[Hz\].
+    Smoothed(f64),
+    Recorded,
 }
 
 impl Setup<'_> {
@@ -42,25 +62,79 @@ impl Setup<'_> {
         effort
     }
 
-    /// The smoothing that predicts the fitted recordings' unfiltered effort best.
-    fn best_smoothing(&self, problem: &Problem, found: &Fit) -> Result<f64, TermError> {
+    /// How unlikely the fitted recordings' unfiltered effort is if their motion is smoothed so.
+    fn unlikeliness(
+        &self,
+        problem: &Problem,
+        found: &Fit,
+        smoothing: &Smoothing,
+    ) -> Result<f64, TermError> {
         let n = self.unit_nm.len();
-        let mut best = (f64::INFINITY, Problem::motion_cutoff_hz(problem.cutoff_hz));
+        let mut sum = vec![0.0; n];
+        let mut count = 0.0;
+        for recording in &self.input.fit {
+            let track = self.smoothed(recording, smoothing)?;
+            let predicted = self.predict(problem, found, &track);
+            for (k, (p, m)) in predicted.iter().zip(&recording.effort).enumerate() {
+                sum[k % n] += (m - p) * (m - p);
+            }
+            count += recording.len() as f64;
+        }
+        Ok(sum.iter().map(|s| (s / count).max(1e-16).ln()).sum())
+    }
+
+    fn smoothed(&self, recording: &Recording, by: &Smoothing) -> Result<Track, TermError> {
+        let mut track = self.track(recording, by.motion_hz)?;
+        match by.velocity {
+            Velocity::AsMotion => {}
+            Velocity::Smoothed(hz) => track.sharpen_velocity(recording, Some(hz)),
+            Velocity::Recorded => track.sharpen_velocity(recording, None),
+        }
+        Ok(track)
+    }
+
+    /// The smoothing that predicts the fitted recordings' unfiltered effort best.
+    fn best_smoothing(&self, problem: &Problem, found: &Fit) -> Result<Smoothing, TermError> {
+        let start = Smoothing {
+            motion_hz: Problem::motion_cutoff_hz(problem.cutoff_hz),
+            velocity: Velocity::AsMotion,
+        };
+        let mut best = (f64::INFINITY, start);
+        let try_it = |smoothing: Smoothing, best: &mut (f64, Smoothing)| {
+            let unlikeliness = self.unlikeliness(problem, found, &smoothing)?;
+            if unlikeliness < best.0 {
+                *best = (unlikeliness, smoothing);
+            }
+            Ok::<(), TermError>(())
+        };
         for share in PREDICTION_CUTOFFS {
-            let mut sum = vec![0.0; n];
-            let mut count = 0.0;
-            for recording in &self.input.fit {
-                let track = self.track(recording, share * problem.cutoff_hz)?;
-                let predicted = self.predict(problem, found, &track);
-                for (k, (p, m)) in predicted.iter().zip(&recording.effort).enumerate() {
-                    sum[k % n] += (m - p) * (m - p);
-                }
-                count += recording.len() as f64;
-            }
-            let likelihood: f64 = sum.iter().map(|s| (s / count).max(1e-16).ln()).sum();
-            if likelihood < best.0 {
-                best = (likelihood, share * problem.cutoff_hz);
-            }
+            let motion_hz = share * problem.cutoff_hz;
+            try_it(Smoothing { motion_hz, ..start }, &mut best)?;
+        }
+        let motion_hz = best.1.motion_hz;
+        let rate_hz = |r: &Recording| (r.len() - 1) as f64 / r.duration_s().max(1e-9);
+        let fit = &self.input.fit;
+        let most_hz = MOST_OF_RATE * fit.iter().map(rate_hz).fold(f64::INFINITY, f64::min);
+        for times in VELOCITY_CUTOFFS {
+            let velocity = Velocity::Smoothed((times * motion_hz).min(most_hz));
+            try_it(
+                Smoothing {
+                    motion_hz,
+                    velocity,
+                },
+                &mut best,
+            )?;
+        }
+        let all = fit.iter().chain(&self.input.holdout);
+        if all.clone().all(|r| r.velocity.len() == r.position.len()) {
+            let velocity = Velocity::Recorded;
+            try_it(
+                Smoothing {
+                    motion_hz,
+                    velocity,
+                },
+                &mut best,
+            )?;
         }
         Ok(best.1)
     }
@@ -69,13 +143,13 @@ impl Setup<'_> {
     pub fn proof(&self, problem: &Problem, scaled: &Fit, found: &Fit) -> Result<Proof, TermError> {
         let n = self.unit_nm.len();
         let names: Vec<&str> = self.input.model.joint_names().collect();
-        let smoothing_hz = self.best_smoothing(problem, found)?;
+        let smoothing = self.best_smoothing(problem, found)?;
         let (mut before, mut after, mut count) = (vec![0.0; n], vec![0.0; n], 0.0);
         let (mut predictions, mut pictures) = (Vec::new(), Vec::new());
         let held = self.input.holdout.iter().map(|recording| (recording, true));
         let fitted = self.input.fit.iter().map(|recording| (recording, false));
         for (recording, held_out) in held.chain(fitted) {
-            let track = self.track(recording, smoothing_hz)?;
+            let track = self.smoothed(recording, &smoothing)?;
             let predicted = self.predict(problem, found, &track);
             let rigid = self.predict(problem, scaled, &track);
             if held_out {

@@ -21,7 +21,7 @@ use crate::windows::{TimeKind, time_kind};
 use curves::{CURVE_EVIDENCE, CURVE_SIZE};
 pub use evidence::{Explanation, LEAST_EVIDENCE, LEAST_SIZE, has_rotor, plausible};
 use evidence::{
-    ROTOR, describe, matters, most_at_one_place, needs, overwhelming, steps_enough, wald,
+    ROTOR, at_bound, describe, matters, most_at_one_place, needs, overwhelming, steps_enough, wald,
     worse_joints,
 };
 
@@ -38,6 +38,9 @@ const SIMPLER: [(&str, &str); 7] = [
     ("joint_elasticity", "rotor_inertia"),
     ("backlash", "rotor_inertia"),
 ];
+/// Nearer than this \[nats\], or than this share of the evidence for either, two rivals cannot be told apart.
+const TIE: f64 = 5.0;
+const TIE_SHARE: f64 = 0.01;
 /// How many proposals of a round are refined before one is taken.
 const REFINED: usize = 3;
 /// More pieces of physics than this are not looked for.
@@ -57,6 +60,14 @@ pub struct Search<'a> {
     pub hypotheses: &'a [Hypothesis],
     /// Called now and then with a text.
     pub say: &'a (dyn Fn(&str) + Sync),
+}
+
+/// What contains a simpler effect must be ahead of it by this \[nats\], odds of twenty to one.
+const MORE_THAN_SIMPLE: f64 = 3.0;
+
+/// By how much a rival may be behind \[nats\] and still not be told from what has so much evidence.
+pub fn tie(evidence: f64) -> f64 {
+    TIE.max(TIE_SHARE * evidence)
 }
 
 impl Search<'_> {
@@ -97,7 +108,27 @@ impl Search<'_> {
                 break;
             }
         }
-        self.culled(best)
+        self.plainer(self.culled(best))
+    }
+
+    /// Puts the simpler effect that a piece contains in its place, where the recordings hardly tell the two apart or the piece
+    /// has a shape that ends its range.
+    fn plainer(&self, mut best: Explanation) -> Explanation {
+        for piece in exchange::pieces(&best) {
+            let Some(index) = exchange::place_of(&best, piece) else {
+                continue;
+            };
+            let less = self.less(&best, index);
+            let worth = &self.problem.worth;
+            if let Some(simple) = self.simpler(&best, &less, index)
+                && (best.ahead_of(&simple, worth) < MORE_THAN_SIMPLE
+                    || at_bound(&best.fit.actives[index]))
+            {
+                (self.say)(&format!("~ {}", describe(&simple)));
+                best = simple;
+            }
+        }
+        best
     }
 
     /// Takes out the names that explain less than half of what is left where they are and that is far above the noise: there

@@ -1,5 +1,6 @@
 //! One recording as a fit sees it: smoothed motion, what the twin says of it, and what counts.
 
+use nalgebra::Vector3;
 use tauscope_dynamics::terms::{MotionSample, Physics};
 use tauscope_dynamics::{Data, Model, rnea};
 
@@ -86,6 +87,27 @@ impl Track {
             }
         }
         track
+    }
+
+    /// Takes the velocity from positions smoothed with another half amplitude \[Hz\] or, without one, as it was recorded, but for
+    /// standstills; what the twin says stays.
+    pub(crate) fn sharpen_velocity(&mut self, recording: &Recording, cutoff_hz: Option<f64>) {
+        let n = self.velocity.len() / self.len().max(1);
+        let smoother = cutoff_hz.map(|hz| MotionSmoother::new(&recording.time_s, hz));
+        for j in 0..n {
+            let of_joint = |all: &[f64]| all.iter().skip(j).step_by(n).copied().collect::<Vec<_>>();
+            let measured = of_joint(&recording.position);
+            let mut states = match &smoother {
+                Some(smoother) => smoother.smooth(&measured),
+                None => (of_joint(&recording.velocity).into_iter())
+                    .map(|velocity| Vector3::new(0.0, velocity, 0.0))
+                    .collect(),
+            };
+            standstill::resmooth(&recording.time_s, &measured, &mut states);
+            for (velocity, state) in self.velocity.iter_mut().skip(j).step_by(n).zip(&states) {
+                *velocity = state.y;
+            }
+        }
     }
 
     /// Number of samples.

@@ -1,12 +1,9 @@
 //! Every rival in the place of a finding.
 
 use crate::active::{Active, Hypothesis};
-use crate::search::{Explanation, Search};
+use crate::search::{Explanation, Search, tie};
 use crate::words;
 
-/// A rival this close \[nats\], or within this share of the winner's evidence, cannot be told apart from it.
-const TIE: f64 = 5.0;
-const TIE_SHARE: f64 = 0.01;
 /// How many rivals of a finding are refined, and how many are told.
 const RIVALS: usize = 5;
 
@@ -45,7 +42,7 @@ pub fn contest(
         let other = search.joined(less, proposal, found.fit.likelihood());
         let behind = found.ahead_of(&other, efficiency);
         let hypothesis = proposal.active.hypothesis;
-        if behind < TIE.max(TIE_SHARE * evidence) {
+        if behind < tie(evidence) {
             result.ties.push(hypothesis);
             continue;
         }

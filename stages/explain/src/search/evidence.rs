@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::Model;
-use tauscope_dynamics::terms::CoordinateKind;
+use tauscope_dynamics::terms::{CoordinateKind, Scale};
 
 use crate::active::{Active, Column, Hypothesis};
 use crate::fit::Fit;
@@ -113,17 +113,41 @@ pub fn steps_enough(active: &Active) -> bool {
     (after - before).abs() > LEAST_STEP * before.abs().max(after.abs())
 }
 
+/// What is left of dry friction at speed is at least this share of what it is at rest; what falls to nothing is another curve.
+const LEAST_AT_SPEED: f64 = 0.1;
 /// Friction of one direction is at least this share of the other's; what looks more lopsided is friction and an offset.
 const LEAST_SYMMETRY: f64 = 0.2;
 /// A link's centre of mass is not off by more than this many times its radius of gyration, or by this \[m\] if that is more.
-const MOST_GYRATIONS: f64 = 3.0;
+const MOST_GYRATIONS: f64 = 1.0;
 const FAR_OFF_M: f64 = 0.1;
 
 /// A stronger force is none that pushes a robot \[N\]: it hardly acts on the joints that would feel a weaker one elsewhere.
 const STRONGEST_N: f64 = 1000.0;
 
+/// A rotor on the spring of its gear resonates at least this fast against a link that stands still.
+const SOFTEST_RAD_S: f64 = 3.0 * std::f64::consts::TAU;
+/// Nearer than this to the end of its range, as a share of it, a shape is there.
+const AT_BOUND: f64 = 1e-3;
+
+/// Whether one of the shapes is where its range ends: then the effect is only a way to say something else.
+pub fn at_bound(active: &Active) -> bool {
+    (0..active.coordinates.len()).any(|c| match active.kind(c) {
+        CoordinateKind::Shape {
+            lower,
+            upper,
+            scale: Scale::Log,
+            ..
+        } => {
+            let share = (active.coordinates[c] / lower).ln() / (upper / lower).ln();
+            !(AT_BOUND..=1.0 - AT_BOUND).contains(&share)
+        }
+        _ => false,
+    })
+}
+
 /// Whether the numbers are ones that a robot may have: a link's mass stays above nothing and within twice what its URDF says,
-/// its centre within the link, a push is not beyond all strength, and friction is not of one direction alone.
+/// its centre within the link, a push is not beyond all strength, a gear is no soft spring, and friction is not of one direction
+/// or of standstill alone.
 pub fn plausible(active: &Active, model: &Model) -> bool {
     let x = &active.coordinates;
     let link = &model.links()[active.hypothesis.place.link];
@@ -139,6 +163,8 @@ pub fn plausible(active: &Active, model: &Model) -> bool {
             shift_m < FAR_OFF_M.max(MOST_GYRATIONS * link.gyration_radius_m())
         }
         "external_push" => x[..3].iter().map(|f| f * f).sum::<f64>().sqrt() < STRONGEST_N,
+        "joint_elasticity" => (x[1] / x[0].max(1e-12)).sqrt() >= SOFTEST_RAD_S,
+        "stribeck_friction" => x[0] >= LEAST_AT_SPEED * (x[0] + x[1]),
         "asymmetric_coulomb" => x[0].min(x[1]) >= LEAST_SYMMETRY * x[0].max(x[1]),
         _ => true,
     }

@@ -97,9 +97,9 @@ impl Search<'_> {
 }
 
 /// A piece of physics: a hypothesis, and the how-manieth of its kind it is.
-type Piece = (Hypothesis, usize);
+pub(super) type Piece = (Hypothesis, usize);
 
-fn pieces(explanation: &Explanation) -> Vec<Piece> {
+pub(super) fn pieces(explanation: &Explanation) -> Vec<Piece> {
     let all: Vec<Hypothesis> = explanation
         .fit
         .actives
@@ -112,7 +112,10 @@ fn pieces(explanation: &Explanation) -> Vec<Piece> {
 }
 
 /// Where a piece is in an explanation, if it still is.
-fn place_of(explanation: &Explanation, (hypothesis, alike_before): Piece) -> Option<usize> {
+pub(super) fn place_of(
+    explanation: &Explanation,
+    (hypothesis, alike_before): Piece,
+) -> Option<usize> {
     let actives = explanation.fit.actives.iter().enumerate();
     let mut alike = actives.filter(|(_, a)| a.hypothesis == hypothesis);
     alike.nth(alike_before).map(|(index, _)| index)
