@@ -238,6 +238,52 @@ fn a_payload_in_amperes_is_weighed_and_is_in_the_robot() {
 }
 
 #[test]
+fn drives_nobody_knows_are_scaled_by_gravity_and_a_wrist_that_carries_none_is_said_not_to_be() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let copy = changed(folder.path(), "m00", &[], |_, _| {});
+    let text = std::fs::read_to_string(&copy).unwrap();
+    let constants = text.find("torque_constants_nm_per_a:").unwrap();
+    let known: BTreeMap<String, f64> = text[constants..]
+        .lines()
+        .skip(1)
+        .map_while(|line| line.strip_prefix("  ")?.split_once(": "))
+        .map(|(joint, value)| (joint.to_owned(), value.parse().unwrap()))
+        .collect();
+    let kept = |line: &&str| {
+        !line.starts_with("torque_constants")
+            && !known
+                .keys()
+                .any(|joint| line.starts_with(&format!("  {joint}: ")))
+    };
+    let without: Vec<&str> = text.lines().filter(kept).collect();
+    write(&copy, &without.join("\n"));
+    let done = explain_case(&out, &copy);
+    assert_eq!(done.code, 0, "{}", done.stderr);
+    let report = report(&out);
+    assert_eq!(named(&report), [pair("stribeck_friction", "lift")]);
+    let notes: Vec<&str> = report["notes"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter_map(Value::as_str)
+        .collect();
+    let says = |start: &str| notes.iter().any(|note| note.starts_with(start));
+    assert!(
+        says("The gain of joint roll is not identifiable"),
+        "{notes:?}"
+    );
+    assert!(says("The drive of joint lift has 39.5 N m/A"), "{notes:?}");
+    assert!((known["lift"] - 39.5).abs() < 0.1);
+    // What is said of lift is in N m although the recordings are in A.
+    let finding = &report["findings"][0];
+    let coulomb_nm = finding["parameters"]["coulomb_nm"].as_f64().unwrap();
+    let interval = finding["intervals_95"]["coulomb_nm"].as_array().unwrap();
+    let ends: Vec<f64> = interval.iter().filter_map(Value::as_f64).collect();
+    assert!(ends[0] < 4.188 && 4.188 < ends[1], "{coulomb_nm} {ends:?}");
+}
+
+#[test]
 fn a_joint_with_dry_and_viscous_friction_keeps_both_names() {
     let folder = tempfile::tempdir().unwrap();
     let robot = root().join("tests/data/demo_arm.urdf");

@@ -1,6 +1,7 @@
 //! From the winning explanation to what is said: findings with intervals, rivals, what could have hidden.
 
 mod contest;
+mod scales;
 mod undetectable;
 mod waves;
 
@@ -10,7 +11,7 @@ use serde_json::Value;
 use tauscope_dynamics::terms::PlaceKind;
 
 use crate::active::{Active, Hypothesis};
-use crate::drive::{is_drive, off_with_the_links};
+use crate::drive::is_drive;
 use crate::explain::Input;
 use crate::fit::Fit;
 use crate::interval::{HALF_WIDTH_95, covariance, parameter_deviations};
@@ -21,13 +22,12 @@ use crate::windows::{TimeKind, time_kind};
 use crate::words;
 
 use contest::contest;
+use scales::Scales;
 pub use undetectable::undetectable;
 use waves::merge_waves;
 
 /// A time that is known no better than this has no interval \[s\].
 const VAGUE_S: f64 = 5.0;
-/// A known scale needs at least this many times its own deviation.
-const KNOWN_SCALE: f64 = 5.0;
 
 /// What is said of an explanation.
 #[derive(Debug, Default)]
@@ -112,19 +112,13 @@ pub fn of(
         trajectories: Vec::new(),
         notes: Vec::new(),
     };
-    let drives = fit.actives.iter().any(|a| is_drive(&a.hypothesis));
-    let off = drives.then(|| off_with_the_links(search.problem, fit));
-    let mut first = 0;
+    let scales = Scales::of(search.problem, fit, &spread);
+    named.notes.extend(scales.notes(joints));
     for (index, active) in fit.actives.iter().enumerate() {
-        let deviations = parameter_deviations(search.problem, fit, &spread, index);
-        first += active.coordinates.len();
         if is_drive(&active.hypothesis) {
-            let off = off.as_ref().map_or(0.0, |off| off[first - 1]);
-            named
-                .notes
-                .push(drive_note(active, deviations[0].hypot(off), joints));
             continue;
         }
+        let deviations = parameter_deviations(search.problem, fit, &spread, index);
         let less = search.less(found, index);
         let evidence = found.ahead_of(&less, efficiency);
         let contest = contest(search, found, &less, active);
@@ -161,7 +155,11 @@ pub fn of(
         let (joint, link) = place_of(input, joints, &active.hypothesis);
         let place = joint.clone().or_else(|| link.clone()).unwrap_or_default();
         let when = when(search, active, &mut parameters, &mut intervals);
-        let sentence = words::sentence(active, &place, &parameters, &intervals, joints);
+        let in_amperes = scales.to_nm(active.hypothesis, &mut parameters, &mut intervals);
+        let mut sentence = words::sentence(active, &place, &parameters, &intervals, joints);
+        if in_amperes {
+            sentence = words::in_amperes(&sentence);
+        }
         let equivalent_to: Vec<Rival> = contest
             .ties
             .iter()
@@ -286,26 +284,6 @@ fn when(
             }
         }
     }
-}
-
-fn drive_note(active: &Active, deviation: f64, joints: &[String]) -> String {
-    let gain = 1.0 + active.coordinates[0];
-    let joint = &joints[active.hypothesis.place.joint];
-    if !(deviation.is_finite() && gain > KNOWN_SCALE * deviation) {
-        return format!(
-            "The gain of joint {joint} is not identifiable: hardly any gravity or inertia acts on it in these \
-             recordings, and what does hangs on how exact the URDF's masses are ({} A per N m, 95 % interval {} to {}).",
-            words::number(gain),
-            words::number(gain - HALF_WIDTH_95 * deviation),
-            words::number(gain + HALF_WIDTH_95 * deviation)
-        );
-    }
-    format!(
-        "The drive of joint {joint} has {} N m/A (95 % interval {} to {}).",
-        words::number(1.0 / gain),
-        words::number(1.0 / (gain + HALF_WIDTH_95 * deviation)),
-        words::number(1.0 / (gain - HALF_WIDTH_95 * deviation))
-    )
 }
 
 /// From this share of the error on, it is said to have stayed as it was.

@@ -17,11 +17,12 @@ use crate::parallel;
 use crate::problem::Problem;
 use crate::propose::{Base, Proposal, penalty};
 use crate::windows::{TimeKind, time_kind};
+use crate::worth;
 
 use curves::{CURVE_EVIDENCE, CURVE_SIZE};
 pub use evidence::{Explanation, LEAST_EVIDENCE, LEAST_SIZE, has_rotor, plausible};
 use evidence::{
-    ROTOR, at_bound, describe, matters, most_at_one_place, needs, overwhelming, steps_enough, wald,
+    ROTOR, at_bound, describe, is_timely, matters, most_at_one_place, needs, overwhelming, wald,
     worse_joints,
 };
 
@@ -73,13 +74,17 @@ pub fn tie(evidence: f64) -> f64 {
 impl Search<'_> {
     /// Adds names one at a time, without a second look at any: enough to tell which joints have dry friction.
     pub fn first_guess(&self, start: Vec<Active>, penalties: Vec<f64>) -> Explanation {
-        self.forward(self.begun(start, penalties))
+        self.plainer(self.forward(self.begun(start, penalties)), tie)
     }
 
     /// Finds the explanation, from pieces of physics with their penalties that are taken for true at first.
     pub fn run(&self, start: Vec<Active>, penalties: Vec<f64>) -> Explanation {
         let mut best = self.begun(start, penalties);
         best = self.named(best);
+        if let Some(described) = self.described_for_intervals(&best) {
+            (self.say)(&format!("? {}", describe(&described)));
+            best = self.named(self.pruned(described));
+        }
         for joint in 0..self.problem.joints {
             if let Some(described) = self.described(&best, joint) {
                 (self.say)(&format!("? {}", describe(&described)));
@@ -108,21 +113,26 @@ impl Search<'_> {
                 break;
             }
         }
-        self.plainer(self.culled(best))
+        self.plainer(self.culled(best), |_| MORE_THAN_SIMPLE)
     }
 
-    /// Puts the simpler effect that a piece contains in its place, where the recordings hardly tell the two apart or the piece
-    /// has a shape that ends its range.
-    fn plainer(&self, mut best: Explanation) -> Explanation {
+    /// Puts the simpler effect that a piece contains in its place, where it is not ahead by `enough` for the evidence for it
+    /// \[nats\]; more is asked of a shape that ends its range.
+    fn plainer(&self, mut best: Explanation, enough: impl Fn(f64) -> f64) -> Explanation {
         for piece in exchange::pieces(&best) {
             let Some(index) = exchange::place_of(&best, piece) else {
                 continue;
             };
             let less = self.less(&best, index);
             let worth = &self.problem.worth;
+            let evidence = best.ahead_of(&less, worth);
+            let enough = if at_bound(&best.fit.actives[index]) {
+                tie(evidence)
+            } else {
+                enough(evidence)
+            };
             if let Some(simple) = self.simpler(&best, &less, index)
-                && (best.ahead_of(&simple, worth) < MORE_THAN_SIMPLE
-                    || at_bound(&best.fit.actives[index]))
+                && best.ahead_of(&simple, worth) < enough
             {
                 (self.say)(&format!("~ {}", describe(&simple)));
                 best = simple;
@@ -258,9 +268,14 @@ impl Search<'_> {
             (self.say)(&format!("+ {}", describe(&next)));
             let new = next.fit.actives.last().map(|active| active.hypothesis);
             let next = self.pruned(next);
-            let worth = &self.problem.worth;
-            let evident = next.ahead_of(&best, worth) >= LEAST_EVIDENCE;
             let once = new.is_some_and(|new| time_kind(new) == TimeKind::Once);
+            // What lasts for a while makes noise look correlated as long as it is not explained.
+            let worth = if once {
+                worth::at_least(self.problem, &next.fit)
+            } else {
+                self.problem.worth.clone()
+            };
+            let evident = next.ahead_of(&best, &worth) >= LEAST_EVIDENCE;
             if !evident && (once || !overwhelming(&next, &best)) {
                 barred.extend(new);
             } else {
@@ -281,7 +296,8 @@ impl Search<'_> {
         let worth = &self.problem.worth;
         let worthy = proposals.iter().filter(|p| {
             let (evidence, size) = needs(p.active.hypothesis, &now.fit);
-            let possible = steps_enough(&p.active) && plausible(&p.active, &self.problem.model);
+            let possible =
+                is_timely(self.problem, &p.active) && plausible(&p.active, &self.problem.model);
             p.evidence() > evidence && p.size > size && possible
         });
         let mut able: Vec<(Explanation, &Proposal)> = Vec::new();
@@ -382,7 +398,7 @@ impl Search<'_> {
         let worth = &self.problem.worth;
         let strong = best.ahead_of(less, worth) >= evidence || overwhelming(best, less);
         let matters = matters(self.problem, &best.fit, &less.fit, least, least);
-        let possible = steps_enough(active) && plausible(active, &self.problem.model);
+        let possible = is_timely(self.problem, active) && plausible(active, &self.problem.model);
         possible && strong && matters
     }
 
@@ -396,7 +412,7 @@ impl Search<'_> {
             let rows: f64 = joints.iter().map(|&j| fit.count[j]).sum();
             let worth = joints.iter().map(|&j| worth[j]).fold(1.0, f64::min);
             let (evidence, size) = needs(active.hypothesis, fit);
-            steps_enough(active)
+            is_timely(self.problem, active)
                 && plausible(active, &self.problem.model)
                 && active.curve.is_none()
                 && 0.5 * worth * chi_square > 4.0 * evidence + 60.0

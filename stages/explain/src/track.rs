@@ -275,3 +275,55 @@ pub(crate) fn spaced(time_s: &[f64], step_s: f64) -> Vec<usize> {
     }
     kept
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::Losses;
+
+    /// A joint that creeps at 2 mrad/s for half a second and then slips at 1 rad/s.
+    #[test]
+    fn a_joint_that_slips_has_its_recorded_velocity_at_once_and_none_of_its_noise_at_rest() {
+        let time_s: Vec<f64> = (0..100).map(|k| 0.01 * f64::from(k)).collect();
+        let slips = |t: f64| (t - 0.495).max(0.0);
+        let position: Vec<f64> = time_s.iter().map(|t| 0.002 * t + slips(*t)).collect();
+        let noise = |k: usize| if k.is_multiple_of(2) { 0.004 } else { -0.004 };
+        let velocity: Vec<f64> = (0..100)
+            .map(|k| {
+                if slips(time_s[k]) > 0.0 {
+                    1.0
+                } else {
+                    0.002 + noise(k)
+                }
+            })
+            .collect();
+        let recording = Recording {
+            name: String::new(),
+            path: std::path::PathBuf::new(),
+            start_ns: 0,
+            time_s: time_s.clone(),
+            position: position.clone(),
+            velocity,
+            effort: Vec::new(),
+            reference: Vec::new(),
+            sample_of_row: (0..100).collect(),
+            losses: Losses::default(),
+        };
+        let mut track = Track {
+            name: String::new(),
+            session_s: 0.0,
+            time_s,
+            position,
+            velocity: vec![0.0; 100],
+            acceleration: vec![0.0; 100],
+            rigid: vec![0.0; 100],
+        };
+        track.sharpen_velocity(&recording, None);
+        assert!(
+            track.velocity[5..45]
+                .iter()
+                .all(|v| (v - 0.002).abs() < 1e-3)
+        );
+        assert!(track.velocity[50..].iter().all(|v| (v - 1.0).abs() < 1e-9));
+    }
+}

@@ -5,6 +5,7 @@ use tauscope_dynamics::terms::{Against, MotionSample, Table, effect};
 use crate::active::{Active, Column, Hypothesis, Whereabouts};
 use crate::problem::Problem;
 use crate::propose::Base;
+use crate::track::FitTrack;
 
 /// Knots of a curve.
 const KNOTS: usize = 10;
@@ -13,6 +14,8 @@ const MANY_KNOTS: usize = 28;
 /// Knots of a curve that repeats, and the least frequency that is looked for, in periods of the time there is.
 const KNOTS_OF_PERIOD: usize = 8;
 const LEAST_PERIODS: f64 = 3.0;
+/// And so often within the longest recording.
+const LEAST_IN_RECORDING: f64 = 1.5;
 /// Steps of the frequency within which a sine of all the time there is stays in step.
 const STEPS_OF_FREQUENCY: f64 = 4.0;
 /// Longer than this no clock is trusted to keep step \[s\].
@@ -126,7 +129,14 @@ fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
         if knots.len() < 3 {
             return;
         }
-        for by_direction in [false, true] {
+        // Through standstills the joint's own friction jumps, and nothing tells how: samples there are left out.
+        let own_velocity = against == Against::Velocity && of_joint == joint;
+        let either: &[bool] = if own_velocity {
+            &[true]
+        } else {
+            &[false, true]
+        };
+        for &by_direction in either {
             all.push(Table {
                 against,
                 of_joint,
@@ -175,7 +185,11 @@ impl Base<'_> {
             if !(span_s > 0.0 && span_s < LONGEST_IN_STEP_S) {
                 return None;
             }
-            let frequency_hz = loudest(&rows, [LEAST_PERIODS / span_s, self.problem.cutoff_hz])?;
+            // What does not come back within a recording is not seen to repeat.
+            let length_s = |track: &FitTrack| track.track.time_s.last().copied().unwrap_or(0.0);
+            let longest_s = self.problem.tracks.iter().map(length_s).fold(0.0, f64::max);
+            let least_hz = (LEAST_PERIODS / span_s).max(LEAST_IN_RECORDING / longest_s);
+            let frequency_hz = loudest(&rows, [least_hz, self.problem.cutoff_hz])?;
             let period = 1.0 / frequency_hz;
             let knot = |k: usize| start_s + period * k as f64 / KNOTS_OF_PERIOD as f64;
             Some(Table {

@@ -56,6 +56,17 @@ pub fn unit(parameter: &str) -> &'static str {
     ""
 }
 
+/// Whether a parameter is so much effort, or so much of it by something.
+pub fn is_of_effort(parameter: &str) -> bool {
+    let unit = unit(parameter);
+    unit.starts_with("N m") || unit == "kg m²"
+}
+
+/// A sentence on an effort whose numbers are in A.
+pub fn in_amperes(sentence: &str) -> String {
+    sentence.replace("N m", "A").replace("kg m²", "A s²/rad")
+}
+
 /// What an effect is called in words.
 pub fn name(effect: &str) -> String {
     match effect {

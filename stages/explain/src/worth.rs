@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::{MotionSample, sign};
 
+use crate::fit::Fit;
 use crate::problem::Problem;
 
 /// Rows of a stretch whose correlation is told by itself.
@@ -25,10 +26,26 @@ pub fn worth(problem: &Problem) -> Vec<f64> {
     (0..problem.joints)
         .map(|joint| {
             let left = left_by_rich_model(problem, joint);
-            let r = (calm_correlation(problem, joint, &left) + CALM_BIAS).clamp(0.0, 1.0);
-            ((1.0 - r) / (1.0 + r)).clamp(LEAST, 1.0)
+            of_left(problem, joint, &left)
         })
         .collect()
+}
+
+/// The same, or what a fit leaves if that is whiter: the noise is no more correlated than that.
+pub fn at_least(problem: &Problem, fit: &Fit) -> Vec<f64> {
+    let of_joint = |(joint, known): (usize, &f64)| {
+        known.max(of_left(
+            problem,
+            joint,
+            &fit.residual[problem.joint_rows(joint)],
+        ))
+    };
+    problem.worth.iter().enumerate().map(of_joint).collect()
+}
+
+fn of_left(problem: &Problem, joint: usize, left: &[f64]) -> f64 {
+    let r = (calm_correlation(problem, joint, left) + CALM_BIAS).clamp(0.0, 1.0);
+    ((1.0 - r) / (1.0 + r)).clamp(LEAST, 1.0)
 }
 
 /// Functions of an instant that an effort of joint `j` may be made of.

@@ -1,13 +1,16 @@
 //! What no name fits: a curve beside the names of a joint, or in their place.
 
+use tauscope_dynamics::terms::Against;
+
 use crate::across::{carries_over, left_elsewhere};
+use crate::active::{Active, Hypothesis};
 use crate::drive::is_drive;
 use crate::fit::Fit;
 use crate::propose::Base;
 use crate::unknown;
 use crate::windows::{TimeKind, time_kind};
 
-use super::evidence::{is_of_position, overwhelming};
+use super::evidence::{is_of_position, overwhelming, worse_joints};
 use super::{Explanation, Search};
 
 /// Evidence that a curve without a name needs \[nats\].
@@ -24,6 +27,21 @@ const MOST_WORSE: f64 = 10.0;
 const MOST_OF_POSITION: usize = 3;
 /// That is asked where the variance without them is this many times the white noise.
 const LOUD: f64 = 4.0;
+
+/// Whether a piece is a curve over the joint's own velocity.
+fn is_friction_curve(active: &Active, joint: usize) -> bool {
+    active
+        .curve
+        .as_ref()
+        .is_some_and(|curve| curve.against == Against::Velocity && curve.of_joint == joint)
+}
+
+fn is_plain_friction(hypothesis: Hypothesis) -> bool {
+    matches!(
+        hypothesis.effect.name,
+        "coulomb_friction" | "viscous_friction"
+    )
+}
 
 impl Search<'_> {
     /// The explanation with a curve in a joint, where names do not do: beside the names, if much is left, or in place
@@ -46,7 +64,15 @@ impl Search<'_> {
         let white = vec![1.0; self.problem.joints];
         if !own.is_empty() {
             let bare = self.stripped(best, &own, joint);
-            if let Some(instead) = self.with_curve(&bare, joint)
+            let mut instead = self.with_curve(&bare, joint);
+            let last = instead.as_ref().and_then(|e| e.fit.actives.last());
+            if last.is_some_and(|curve| is_friction_curve(curve, joint)) {
+                // Friction it is, whatever bends its curve.
+                let shaped = |i: &usize| !is_plain_friction(best.fit.actives[*i].hypothesis);
+                let shaped: Vec<usize> = own.iter().copied().filter(shaped).collect();
+                instead = self.with_curve(&self.stripped(best, &shaped, joint), joint);
+            }
+            if let Some(instead) = instead
                 && instead.ahead_of(best, &white) > CURVE_EVIDENCE
             {
                 return Some(instead);
@@ -60,6 +86,25 @@ impl Search<'_> {
         (beside.ahead_of(best, &white) > CURVE_EVIDENCE && less > CURVE_SIZE).then_some(beside)
     }
 
+    /// The explanation with a curve in one joint in the place of all that lasted for an interval, if that does better: what comes
+    /// back at a place, or time and again, looks like many pushes.
+    pub(super) fn described_for_intervals(&self, best: &Explanation) -> Option<Explanation> {
+        let once = |&i: &usize| time_kind(best.fit.actives[i].hypothesis) == TimeKind::Once;
+        let intervals: Vec<usize> = (0..best.fit.actives.len()).filter(once).collect();
+        if intervals.len() < 2 {
+            return None;
+        }
+        let less = |from: Explanation, index: &usize| self.less(&from, *index);
+        let bare = intervals.iter().rev().fold(best.clone(), less);
+        let white = vec![1.0; self.problem.joints];
+        let joints = worse_joints(&bare.fit, &best.fit);
+        let with = joints
+            .iter()
+            .filter_map(|&joint| self.with_curve(&bare, joint));
+        with.filter(|with| with.ahead_of(best, &white) > CURVE_EVIDENCE)
+            .max_by(|a, b| a.ahead_of(b, &white).total_cmp(&0.0))
+    }
+
     /// The explanation with the curve that does best in a joint, if there is evidence for one and it carries over.
     fn with_curve(&self, from: &Explanation, joint: usize) -> Option<Explanation> {
         let base = Base::new(self.problem, &from.fit, self.hypotheses.len());
@@ -67,7 +112,9 @@ impl Search<'_> {
         let fit = from.fit.with(self.problem, curve.active);
         let fit = fit.refined_at(self.problem, Some(&[joint]), from.fit.likelihood());
         let mut actives = fit.actives;
-        if let Some(curve) = actives.last_mut() {
+        if let Some(curve) = actives.last_mut()
+            && !is_friction_curve(curve, joint)
+        {
             unknown::keep_what_is_evident(curve);
         }
         let fit = Fit::new(self.problem, actives);

@@ -18,13 +18,15 @@ pub const LEAST_SIZE: f64 = 0.12;
 /// The same for what lasts only for an interval, which must have this much more evidence.
 const LEAST_SIZE_OF_INTERVAL: f64 = 0.03;
 const INTERVAL_EVIDENCE: f64 = 40.0;
-/// Least share beside a curve without a name in the same joint, which the name may only patch.
+/// Least share beside a curve without a name in the same joint, or of an interval beside any: the name may only patch the curve.
 const LEAST_SIZE_BESIDE_CURVE: f64 = 3.0;
 /// Evidence that needs no account of correlation, if rows counted in full \[nats\].
 const OVERWHELMING: f64 = 40.0;
 /// And what is left over what is then left; a curve, which bends to any slow noise, must do much more.
 const FAIR_SHARE: f64 = 1.3;
 const FAIR_SHARE_OF_CURVE: f64 = 3.0;
+/// What began or ended so much beside a recording began or ended with it \[s\].
+const BESIDE_S: f64 = 0.5;
 /// A change of friction smaller than this share of it is what friction does from day to day.
 const LEAST_STEP: f64 = 0.3;
 
@@ -104,17 +106,35 @@ pub fn wald(problem: &Problem, fit: &Fit) -> Vec<f64> {
         .collect()
 }
 
-/// Whether a friction that changes once changes by more than friction does from day to day.
-pub fn steps_enough(active: &Active) -> bool {
-    if time_kind(active.hypothesis) != TimeKind::Step {
-        return true;
+/// Friction that changes once leaves at least this share of what it was, or was: none comes from nothing or goes for good.
+const LEAST_LEFT: f64 = 0.1;
+/// What lasts for an interval of one recording lasts at most for this share of it; what lasts longer is not told from an offset.
+const LONGEST_SHARE: f64 = 0.75;
+
+/// Whether the times of a piece of physics are ones that tell something: friction that changes once changes by more than friction
+/// does from day to day and does not vanish, and what comes and goes does both within a recording.
+pub fn is_timely(problem: &Problem, active: &Active) -> bool {
+    let x = &active.coordinates;
+    match time_kind(active.hypothesis) {
+        TimeKind::Step => {
+            let (less, more) = (x[0].min(x[1]), x[0].max(x[1]));
+            more - less > LEAST_STEP * more && less >= LEAST_LEFT * more
+        }
+        TimeKind::Once => {
+            let [.., start_s, end_s] = x[..] else {
+                return true;
+            };
+            problem.tracks.iter().map(|t| &t.track).any(|track| {
+                let first_s = track.session_s;
+                let length_s = track.time_s.last().copied().unwrap_or(0.0);
+                let within = start_s > first_s - BESIDE_S && end_s < first_s + length_s + BESIDE_S;
+                within && end_s - start_s <= LONGEST_SHARE * length_s
+            })
+        }
+        TimeKind::Always | TimeKind::EveryRecording => true,
     }
-    let (before, after) = (active.coordinates[0], active.coordinates[1]);
-    (after - before).abs() > LEAST_STEP * before.abs().max(after.abs())
 }
 
-/// What is left of dry friction at speed is at least this share of what it is at rest; what falls to nothing is another curve.
-const LEAST_AT_SPEED: f64 = 0.1;
 /// Friction of one direction is at least this share of the other's; what looks more lopsided is friction and an offset.
 const LEAST_SYMMETRY: f64 = 0.2;
 /// A link's centre of mass is not off by more than this many times its radius of gyration, or by this \[m\] if that is more.
@@ -129,7 +149,7 @@ const SOFTEST_RAD_S: f64 = 3.0 * std::f64::consts::TAU;
 /// Nearer than this to the end of its range, as a share of it, a shape is there.
 const AT_BOUND: f64 = 1e-3;
 
-/// Whether one of the shapes is where its range ends: then the effect is only a way to say something else.
+/// Whether one of the shapes is where its range ends: then the effect may only be a way to say something else.
 pub fn at_bound(active: &Active) -> bool {
     (0..active.coordinates.len()).any(|c| match active.kind(c) {
         CoordinateKind::Shape {
@@ -147,7 +167,7 @@ pub fn at_bound(active: &Active) -> bool {
 
 /// Whether the numbers are ones that a robot may have: a link's mass stays above nothing and within twice what its URDF says,
 /// its centre within the link, a push is not beyond all strength, a gear is no soft spring, and friction is not of one direction
-/// or of standstill alone.
+/// alone.
 pub fn plausible(active: &Active, model: &Model) -> bool {
     let x = &active.coordinates;
     let link = &model.links()[active.hypothesis.place.link];
@@ -164,7 +184,6 @@ pub fn plausible(active: &Active, model: &Model) -> bool {
         }
         "external_push" => x[..3].iter().map(|f| f * f).sum::<f64>().sqrt() < STRONGEST_N,
         "joint_elasticity" => (x[1] / x[0].max(1e-12)).sqrt() >= SOFTEST_RAD_S,
-        "stribeck_friction" => x[0] >= LEAST_AT_SPEED * (x[0] + x[1]),
         "asymmetric_coulomb" => x[0].min(x[1]) >= LEAST_SYMMETRY * x[0].max(x[1]),
         _ => true,
     }
@@ -188,14 +207,18 @@ pub fn is_of_position(hypothesis: Hypothesis) -> bool {
 /// Evidence and size that a piece of physics needs beside what `fit` holds.
 pub fn needs(hypothesis: Hypothesis, fit: &Fit) -> (f64, f64) {
     let joint = hypothesis.only_joint();
-    let curve = |a: &Active| a.curve.is_some() && a.hypothesis.only_joint() == joint;
-    if joint.is_some() && fit.actives.iter().any(curve) {
-        return (LEAST_EVIDENCE, LEAST_SIZE_BESIDE_CURVE);
+    let once = time_kind(hypothesis) == TimeKind::Once;
+    let curve = |a: &Active| a.curve.is_some() && (once || a.hypothesis.only_joint() == joint);
+    let beside_curve = (once || joint.is_some()) && fit.actives.iter().any(curve);
+    let (evidence, size) = if once {
+        (INTERVAL_EVIDENCE, LEAST_SIZE_OF_INTERVAL)
+    } else {
+        (LEAST_EVIDENCE, LEAST_SIZE)
+    };
+    if beside_curve {
+        return (evidence, LEAST_SIZE_BESIDE_CURVE);
     }
-    match time_kind(hypothesis) {
-        TimeKind::Once => (INTERVAL_EVIDENCE, LEAST_SIZE_OF_INTERVAL),
-        _ => (LEAST_EVIDENCE, LEAST_SIZE),
-    }
+    (evidence, size)
 }
 
 /// The joint variances that are this many times the white noise are noise alone, or something that nobody has named.
