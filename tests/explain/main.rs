@@ -471,3 +471,38 @@ fn pushes_on_an_arm_at_rest_are_told_in_time_and_place() {
         );
     }
 }
+
+#[test]
+fn a_push_that_only_the_first_joint_feels_is_a_force_further_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let (robot, recording) = (robot("six"), folder.path().join("aside.mcap"));
+    // Along the axes of lift and elbow, in the pose of `pushed`.
+    let (sin, cos) = 0.4_f64.sin_cos();
+    pushed(
+        &recording,
+        &robot,
+        "fore",
+        &[(3.0, 4.0, [-20.0 * sin, 20.0 * cos, 0.0])],
+    );
+    let out = folder.path().join("out");
+    let arguments = [
+        "--robot",
+        robot.to_str().unwrap(),
+        "--fit",
+        recording.to_str().unwrap(),
+    ];
+    let done = explain(&out, &arguments);
+    assert_eq!(done.code, 0, "{}", done.stderr);
+    let report = report(&out);
+    let findings = report["findings"].as_array().unwrap();
+    assert_eq!(findings.len(), 1, "{report:#}");
+    let force = |axis: &str| {
+        let name = format!("force_{axis}_n");
+        findings[0]["parameters"][&name].as_f64().unwrap()
+    };
+    let (x, y) = (force("x"), force("y"));
+    assert!(
+        x.hypot(y) > 5.0 && (y * sin + x * cos).abs() < 0.5 * x.hypot(y),
+        "{x} {y}"
+    );
+}
