@@ -17,7 +17,7 @@ use crate::stage::Setup;
 /// A joint counts as loaded from this many times its usual residual on.
 const LOADED: f64 = 4.0;
 /// How hard robots are touched \[N\].
-const HAND_N: f64 = 20.0;
+const HAND_N: f64 = 10.0;
 /// The twin is believed to this share of the residual: a strong force is told no better than that.
 const MODEL_ERROR: f64 = 0.05;
 /// What is wrong with a residual stays for so long: samples closer than that tell the same \[s\].
@@ -141,7 +141,7 @@ fn most_probable(information: &Matrix3<f64>, pull: &Vector3<f64>) -> (Vector3<f6
     (force, evidence)
 }
 
-/// Mean over weights whose logarithms are given, with the logarithm of the weights' mean.
+/// Mean over weights whose logarithms are given, with the logarithm of their sum.
 fn weighted<const N: usize>(logs: &[f64], values: &[[Vector3<f64>; N]]) -> ([Vector3<f64>; N], f64) {
     let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let (mut sums, mut sum) = ([Vector3::zeros(); N], 0.0);
@@ -156,7 +156,7 @@ fn weighted<const N: usize>(logs: &[f64], values: &[[Vector3<f64>; N]]) -> ([Vec
         }
     }
     let mean = sums.map(|value| value / sum);
-    (mean, largest + (sum / logs.len().max(1) as f64).ln())
+    (mean, largest + sum.ln())
 }
 
 impl Place {
@@ -206,15 +206,18 @@ impl Place {
         let mut means = [[Vector3::zeros(); 2]; MAX_JOINTS];
         points.each_link(sample, |joint, link| {
             let wrench = load.at(&link.columns);
-            let mut logs = [0.0; POINTS];
+            let mut logs = [f64::NEG_INFINITY; POINTS];
             let mut found = [[Vector3::zeros(); 2]; POINTS];
-            for ((log, found), arm) in logs.iter_mut().zip(&mut found).zip(link.around()) {
+            let mut weights = 0.0;
+            let slots = logs.iter_mut().zip(&mut found);
+            for ((log, found), (arm, weight)) in slots.zip(link.around()) {
                 let (information, pull) = wrench.force_at(&arm);
                 let (force, evidence) = most_probable(&information, &pull);
-                (*log, *found) = (evidence, [force, link.origin_m + arm]);
+                (*log, *found) = (evidence + f64::ln(weight), [force, link.origin_m + arm]);
+                weights += weight;
             }
             let (mean, evidence) = weighted(&logs, &found);
-            self.evidence[joint] += share * evidence;
+            self.evidence[joint] += share * (evidence - weights.ln());
             (links[joint], means[joint]) = (link.link, mean);
         });
         // What was gathered in less than a correlation time counts as much as one sample does.

@@ -12,12 +12,12 @@ use crate::stage::Setup;
 const ALONG: [f64; 4] = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0];
 /// How many around it.
 const AROUND: usize = 6;
-/// How far from its axis: half an arm's thickness \[m\].
-const RADIUS_M: f64 = 0.05;
+/// How far from its axis: between its axis and its surface \[m\].
+const RADIUS_M: f64 = 0.03;
 /// A link shorter than this has no axis of its own \[m\].
 const SHORT_M: f64 = 0.02;
 /// Points of a link.
-pub(crate) const POINTS: usize = (ALONG.len() + 1) * AROUND;
+pub(crate) const POINTS: usize = (ALONG.len() + 1) * AROUND + 1;
 
 /// A robot's links. No allocation per call.
 #[derive(Debug)]
@@ -35,6 +35,8 @@ pub(crate) struct LinkAt {
     /// From the origin to the centre of mass and to the next joint, or to the point of the tool that is touched.
     pub com_m: Vector3<f64>,
     pub end_m: Vector3<f64>,
+    /// Whether it ends at the point of the tool.
+    has_tool: bool,
     /// The axis of the joint that carries it.
     axis: Vector3<f64>,
     /// How the origin moves, and how the link turns, by 1 rad/s of each joint.
@@ -49,8 +51,9 @@ impl LinkAt {
         column.fixed_rows::<3>(0) + angular.cross(arm)
     }
 
-    /// Points along and around the link, from its origin \[m\].
-    pub fn around(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
+    /// Points along and around the link and at its end, from its origin \[m\], with their weights: the tool is touched where it is
+    /// meant to be as often as anywhere else on the link that carries it.
+    pub fn around(&self) -> impl Iterator<Item = (Vector3<f64>, f64)> + '_ {
         let axis = if self.end_m.norm() < SHORT_M {
             self.axis
         } else {
@@ -61,6 +64,11 @@ impl LinkAt {
         let across = axis.cross(&Vector3::ith(least, 1.0)).normalize();
         let other = axis.cross(&across);
         let middles = ALONG.map(|share| self.end_m * share);
+        let end = if self.has_tool {
+            (POINTS - 1) as f64
+        } else {
+            1.0
+        };
         middles
             .into_iter()
             .chain([self.com_m])
@@ -70,6 +78,8 @@ impl LinkAt {
                     middle + (across * cos + other * sin) * RADIUS_M
                 })
             })
+            .map(|arm| (arm, 1.0))
+            .chain([(self.end_m, end)])
     }
 }
 
@@ -120,6 +130,7 @@ impl Points {
                     origin_m,
                     com_m,
                     end_m: end - origin_m,
+                    has_tool: joint + 1 == n && self.tool.is_some(),
                     // A joint that slides has none; then any will do.
                     axis: turn.try_normalize(1e-9).unwrap_or_else(Vector3::z),
                     columns,

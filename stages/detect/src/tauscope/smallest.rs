@@ -59,7 +59,7 @@ pub(crate) fn smallest(
                 scores.push((link.link, Vec::new()));
                 scores.len() - 1
             });
-            for arm in link.around() {
+            for (arm, _) in link.around() {
                 let mut information = Vector3::<f64>::zeros();
                 let mut rows = [Vector3::zeros(); MAX_JOINTS];
                 for (a, row) in rows.iter_mut().enumerate().take(n) {
