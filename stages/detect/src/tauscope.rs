@@ -36,6 +36,7 @@ use crate::lesson::{LearnError, Lessons};
 use crate::stage::Setup;
 use alarm::Watch;
 pub use kinds::Kinds;
+use learnt::ENOUGH_S;
 pub use learnt::{Learnt, LearntJoint, LearntWindow};
 use nalgebra::Vector6;
 use place::{MOVED_NS, Place};
@@ -125,6 +126,16 @@ pub fn learn(
     Ok(Settings {
         learnt: Some(learnt),
         ..settings.clone()
+    })
+}
+
+/// What speaks against running it with these settings, though it can.
+pub(crate) fn warning(settings: &Settings) -> Option<String> {
+    let free_s = settings.learnt.as_ref()?.free_s?;
+    (free_s < ENOUGH_S).then(|| {
+        format!(
+            "{NAME} has learnt what is usual from {free_s:.1} s in which nothing touched the arm, and that is too little: its threshold is a guess, how often it is exceeded by chance is not known, and all joints are taken for more alike than they are; let it learn from at least {ENOUGH_S} s, better some minutes"
+        )
     })
 }
 

@@ -65,12 +65,7 @@ struct Wrench {
 
 impl Load {
     /// Of a mean `residual` over a window.
-    fn new(
-        residual: &JointArray,
-        windows: &Windows,
-        window: usize,
-        effort_per_nm: &[f64],
-    ) -> Self {
+    fn new(residual: &JointArray, windows: &Windows, window: usize, effort_per_nm: &[f64]) -> Self {
         let n = windows.joints();
         let inverse = windows.inverse_correlation(window);
         let (mut z, mut scale) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
@@ -142,7 +137,10 @@ fn most_probable(information: &Matrix3<f64>, pull: &Vector3<f64>) -> (Vector3<f6
 }
 
 /// Mean over weights whose logarithms are given, with the logarithm of their sum.
-fn weighted<const N: usize>(logs: &[f64], values: &[[Vector3<f64>; N]]) -> ([Vector3<f64>; N], f64) {
+fn weighted<const N: usize>(
+    logs: &[f64],
+    values: &[[Vector3<f64>; N]],
+) -> ([Vector3<f64>; N], f64) {
     let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let (mut sums, mut sum) = ([Vector3::zeros(); N], 0.0);
     if !largest.is_finite() {
