@@ -19,6 +19,7 @@ const DECIDE_S: f64 = 0.012;
 const LOW: f64 = 0.3;
 /// An alarm that lasts.
 #[derive(Debug)]
+#[allow(clippy::struct_field_names, reason = "a unit stands in each name")]
 struct Alarm {
     contact_ns: i64,
     raised_ns: i64,
@@ -84,7 +85,7 @@ impl Watch {
         let raised = if self.alarm.is_some() {
             self.on_top(now_ns, score, windows)
         } else {
-            self.from_rest(now_ns, score, windows)
+            self.out_of_rest(now_ns, score, windows)
         };
         if score < LOW * self.threshold || self.newest_low_ns.is_none() {
             self.newest_low_ns = Some(now_ns);
@@ -103,7 +104,7 @@ impl Watch {
         })
     }
 
-    fn from_rest(&mut self, now_ns: i64, score: f64, windows: &mut Windows) -> Option<()> {
+    fn out_of_rest(&mut self, now_ns: i64, score: f64, windows: &mut Windows) -> Option<()> {
         if score < self.threshold && self.waits_since_ns.is_none() {
             return None;
         }

@@ -3,7 +3,7 @@
 //! A force F at a point loads the joints with Jᵀ F, J the point's Jacobian: the residual is minus that. A hand may touch a link
 //! anywhere along it and around it, from any side. For each of such points the residual's likelihood is had in closed form, with F
 //! normal with a standard deviation of [`HAND_N`] in each direction; the mean over a link's points is the evidence for the link
-//! (MacKay, "Information Theory, Inference and Learning Algorithms", 2003, chapter 28): a link does not win by having many
+//! (`MacKay`, "Information Theory, Inference and Learning Algorithms", 2003, chapter 28): a link does not win by having many
 //! ways to explain what it was not touched for. Evidence is gathered while the contact lasts.
 
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
