@@ -39,7 +39,7 @@ pub use kinds::Kinds;
 use learnt::ENOUGH_S;
 pub use learnt::{Learnt, LearntJoint, LearntWindow};
 use nalgebra::Vector6;
-use place::{MOVED_NS, Place};
+use place::Place;
 use ring::Ring;
 pub use smallest::Smallest;
 pub use tail::Tail;
@@ -50,6 +50,10 @@ pub(crate) const NAME: &str = "tauscope";
 
 /// A contact's kind where none is told.
 const UNTOLD: &str = "contact";
+/// A contact is felt so much before its alarm is on its way \[ns\].
+const FELT_NS: i64 = 3_000_000;
+/// How the tool moved is told from so long before that to so long before it \[ns\].
+const MOVED_NS: [i64; 2] = [28_000_000, 7_000_000];
 /// A score above this is not taken for drift: the unit, what one of a thousand contact-free samples exceeds.
 const DRIFT: f64 = 1.0;
 
@@ -204,8 +208,8 @@ impl Detector for Tauscope {
             };
         }
         let now_ns = sample.header.stamp_ns;
-        if self.watch.step(now_ns, score, &mut self.windows) {
-            self.tell(sample);
+        if let Some(since_ns) = self.watch.step(now_ns, score, &mut self.windows) {
+            self.tell(sample, since_ns);
         }
         let contact = self.watch.contact_ns().map(|contact_ns| Seen {
             contact_ns,
@@ -238,12 +242,13 @@ impl Tauscope {
         }
     }
 
-    /// Tells what can be told of a contact as its alarm is raised.
-    fn tell(&mut self, sample: &TwinState) {
+    /// Tells what can be told of a contact as its alarm is raised, which has been on its way since then.
+    fn tell(&mut self, sample: &TwinState, since_ns: i64) {
         self.place.begin();
-        let [from_ns, to_ns] = MOVED_NS.map(|ago_ns| sample.header.stamp_ns - ago_ns);
+        let [from_ns, to_ns] = MOVED_NS.map(|before_ns| since_ns - before_ns);
         let velocity = self.moved.mean(from_ns, to_ns);
-        let touch = self.place.on_tool(sample, &self.windows, &velocity);
+        let rise = self.windows.rise(since_ns - FELT_NS);
+        let touch = (self.place).on_tool(sample, &self.windows, &rise, &velocity);
         self.measurements = touch.as_ref().map(kinds::measurements);
         let told = self.kinds.as_ref().zip(self.measurements.as_ref());
         self.state = told.map_or(UNTOLD, |(kinds, seen)| kinds::classify(kinds, seen));

@@ -276,8 +276,10 @@ fn the_smallest_force_grows_with_the_wish_and_falls_along_the_arm() {
         smallest.iter().map(|of_link| of_link.half_n).collect()
     };
     let (often, weekly) = (half(60.0), half(0.006));
-    // The first link turns about its own axis and feels nothing; along the upright arm the second feels one direction of three.
-    assert_eq!(often[..2], [None, None]);
+    // The first link turns about its own axis, and feels what acts a little beside it.
+    let all: Option<Vec<f64>> = often.iter().copied().collect();
+    let all = all.unwrap();
+    assert!(all[0] > all[1] && all[1] > all[2], "{often:?}");
     assert!(
         weekly[2] > often[2] && often[2] > Some(0.1),
         "{often:?} {weekly:?}"
@@ -381,7 +383,7 @@ fn too_little_contact_free_time_is_said_and_the_threshold_stays_usable() {
     let (little, much) = (learnt_from(600), learnt_from(6000));
     assert_eq!(much.warning(&setup()), None);
     let warning = little.warning(&setup()).unwrap();
-    assert!(warning.contains("6.0 s"), "{warning}");
+    assert!(warning.contains("5.9 s"), "{warning}");
     let mut samples = quiet(3, 3000);
     for sample in &mut samples[1000..1050] {
         sample.effort[1] -= 1.5;

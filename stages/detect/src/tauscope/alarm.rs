@@ -80,8 +80,8 @@ impl Watch {
         self.alarm.as_ref().map(|alarm| alarm.raised_ns)
     }
 
-    /// Takes the next score; says whether an alarm is raised by it.
-    pub fn step(&mut self, now_ns: i64, score: f64, windows: &mut Windows) -> bool {
+    /// Takes the next score; where an alarm is raised by it, says since when it has been on its way \[ns\].
+    pub fn step(&mut self, now_ns: i64, score: f64, windows: &mut Windows) -> Option<i64> {
         let raised = if self.alarm.is_some() {
             self.on_top(now_ns, score, windows)
         } else {
@@ -91,7 +91,7 @@ impl Watch {
             self.newest_low_ns = Some(now_ns);
             windows.rest();
         }
-        raised.is_some()
+        raised
     }
 
     /// Whether the alarm has waited long enough, if it is to wait.
@@ -104,7 +104,7 @@ impl Watch {
         })
     }
 
-    fn out_of_rest(&mut self, now_ns: i64, score: f64, windows: &mut Windows) -> Option<()> {
+    fn out_of_rest(&mut self, now_ns: i64, score: f64, windows: &mut Windows) -> Option<i64> {
         if score < self.threshold && self.waits_since_ns.is_none() {
             return None;
         }
@@ -112,14 +112,14 @@ impl Watch {
             self.waits_since_ns = None;
             return None;
         }
-        self.decides(now_ns)?;
+        let since_ns = self.decides(now_ns)?;
         let contact_ns = self.newest_low_ns.unwrap_or(now_ns);
         self.raise(now_ns, contact_ns);
         windows.begin(false);
-        Some(())
+        Some(since_ns)
     }
 
-    fn on_top(&mut self, now_ns: i64, score: f64, windows: &mut Windows) -> Option<()> {
+    fn on_top(&mut self, now_ns: i64, score: f64, windows: &mut Windows) -> Option<i64> {
         let alarm = self.alarm.as_mut()?;
         if score >= RELEASE * self.threshold {
             alarm.newest_high_ns = now_ns;
@@ -146,7 +146,7 @@ impl Watch {
         let since_ns = self.decides(now_ns)?;
         self.raise(now_ns, since_ns);
         windows.begin(true);
-        Some(())
+        Some(since_ns)
     }
 
     fn raise(&mut self, now_ns: i64, contact_ns: i64) {

@@ -37,7 +37,7 @@ const LEAST_SAMPLES: usize = 500;
 /// With less than this a tail cannot be told, nor how often a threshold is exceeded \[s\].
 pub(super) const ENOUGH_S: f64 = 20.0;
 /// A joint's noise and the joints' correlations count half once they are from so much; until then noise is held to what is usual of
-/// all joints (their geometric means), and correlations to none \[s\].
+/// all joints (the median), and correlations to none \[s\].
 const HALF_S: f64 = 2.0;
 /// No joint's noise is believed below this share of what is usual of all joints.
 const LEAST_NOISE: f64 = 0.02;
@@ -200,10 +200,8 @@ impl Learnt {
     fn hold_noise(&mut self) {
         let believed = self.believed();
         for window in &mut self.windows {
-            let of_all = window.noise.iter().flatten();
-            let (sum, count) =
-                of_all.fold((0.0, 0.0), |(sum, n), noise| (sum + noise.ln(), n + 1.0));
-            let usual = f64::exp(sum / f64::max(count, 1.0));
+            let mut of_all: Vec<f64> = window.noise.iter().flatten().copied().collect();
+            let usual = quantile(&mut of_all, 0.5);
             for noise in window.noise.iter_mut().flatten() {
                 let least = noise.max(LEAST_NOISE * usual);
                 *noise = least.powf(believed) * usual.powf(1.0 - believed);

@@ -22,11 +22,6 @@ const HAND_N: f64 = 10.0;
 const MODEL_ERROR: f64 = 0.05;
 /// What is wrong with a residual stays for so long: samples closer than that tell the same \[s\].
 const CORRELATED_S: f64 = 0.1;
-/// How a contact begins is told by what the residual has risen in so long \[ns\].
-const RISE_NS: i64 = 15_000_000;
-/// How the tool moved before is told from so long ago to so long ago \[ns\].
-pub(super) const MOVED_NS: [i64; 2] = [40_000_000, 19_000_000];
-
 /// The force on the tool that explains the residual best, and how the touched point moves. World frame.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ToolTouch {
@@ -230,16 +225,16 @@ impl Place {
         })
     }
 
-    /// What a force on the tool has to do with how the residual rises; the joints' `velocity` \[rad/s\] is that before it did.
+    /// What a force on the tool has to do with the residual's `rise` \[effort unit\]; the joints' `velocity` \[rad/s\] is that before it rose.
     pub fn on_tool(
         &mut self,
         sample: &TwinState,
         windows: &Windows,
+        rise: &JointArray,
         velocity: &JointArray,
     ) -> Option<ToolTouch> {
         let points = self.points.as_mut()?;
-        let rise = windows.rise(RISE_NS);
-        let load = Load::new(&rise, windows, SHORTEST, &self.effort_per_nm);
+        let load = Load::new(rise, windows, SHORTEST, &self.effort_per_nm);
         let mut touch = None;
         points.each_link(sample, |joint, link| {
             if joint + 1 < load.joints {

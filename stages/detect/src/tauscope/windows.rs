@@ -154,9 +154,8 @@ impl Means {
         self.sums[window][joint] / (self.rows.count() - self.tails[window]).max(1) as f64
     }
 
-    /// What the shortest window's mean was so long ago \[ns\].
-    pub fn earlier(&self, ago_ns: i64) -> JointArray {
-        let to_ns = self.newest_ns() - ago_ns;
+    /// What the shortest window's mean was at this instant.
+    pub fn earlier(&self, to_ns: i64) -> JointArray {
         // The window is open where it begins.
         let from_ns = to_ns - (WINDOWS_S[SHORTEST] * 1e9) as i64 + 1;
         self.rows.mean(from_ns, to_ns)
@@ -263,9 +262,9 @@ impl Windows {
         self.rest = std::array::from_fn(|j| self.mean(LONGEST, j));
     }
 
-    /// How the mean residual over the shortest window has changed in so long \[effort unit\].
-    pub fn rise(&self, ago_ns: i64) -> JointArray {
-        let mut rise = self.means.earlier(ago_ns);
+    /// How the mean residual over the shortest window has changed since this instant \[effort unit\].
+    pub fn rise(&self, since_ns: i64) -> JointArray {
+        let mut rise = self.means.earlier(since_ns);
         for (j, rise) in rise.iter_mut().enumerate().take(self.joints()) {
             *rise = self.mean(SHORTEST, j) - *rise;
         }
