@@ -22,6 +22,8 @@ const HAND_N: f64 = 10.0;
 const MODEL_ERROR: f64 = 0.05;
 /// What is wrong with a residual stays for so long: samples closer than that tell the same \[s\].
 const CORRELATED_S: f64 = 0.1;
+/// So often it is asked anew where the contact is \[ns\].
+const EVERY_NS: i64 = 8_000_000;
 /// The force on the tool that explains the residual best, and how the touched point moves. World frame.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ToolTouch {
@@ -39,7 +41,8 @@ pub(crate) struct Place {
     /// Logarithms of the evidence by joint that carries the link, and what it has been gathered over \[correlation times\].
     evidence: JointArray,
     gathered: f64,
-    newest_ns: Option<i64>,
+    /// When it was asked last, and what came of it.
+    newest: Option<(i64, Contact)>,
 }
 
 /// A residual in units of its noise, as equations for a force.
@@ -162,7 +165,7 @@ impl Place {
             effort_per_nm,
             evidence: [0.0; MAX_JOINTS],
             gathered: 0.0,
-            newest_ns: None,
+            newest: None,
         }
     }
 
@@ -178,12 +181,17 @@ impl Place {
     pub fn begin(&mut self) {
         self.evidence = [0.0; MAX_JOINTS];
         self.gathered = 0.0;
-        self.newest_ns = None;
+        self.newest = None;
     }
 
-    /// The link for which there is most evidence since the contact began, and the mean of the forces that the newest sample allows. To
-    /// be called with each sample of a contact.
+    /// The link for which there is most evidence since the contact began, and the mean of the forces that a sample allows which is no
+    /// older than [`EVERY_NS`]. To be called with each sample of a contact.
     pub fn locate(&mut self, sample: &TwinState, windows: &Windows) -> Option<Contact> {
+        let now_ns = sample.header.stamp_ns;
+        let newest = self.newest.filter(|(at_ns, _)| now_ns - at_ns < EVERY_NS);
+        if let Some((_, contact)) = newest {
+            return Some(contact);
+        }
         let points = self.points.as_mut()?;
         let n = windows.joints();
         let mut residual = [0.0; MAX_JOINTS];
@@ -191,8 +199,7 @@ impl Place {
             *residual = windows.excess(windows.most, j);
         }
         let load = Load::new(&residual, windows, windows.most, &self.effort_per_nm);
-        let now_ns = sample.header.stamp_ns;
-        let before_ns = self.newest_ns.replace(now_ns).unwrap_or(now_ns);
+        let before_ns = self.newest.map_or(now_ns, |(at_ns, _)| at_ns);
         let share = ((now_ns - before_ns) as f64 * 1e-9 / CORRELATED_S).clamp(1e-3, 1.0);
         self.gathered += share;
         let mut links = [0; MAX_JOINTS];
@@ -218,11 +225,13 @@ impl Place {
         let logs = self.evidence.map(|evidence| evidence * scale);
         let (best, _) = (logs[..n].iter().enumerate()).max_by(|(_, a), (_, b)| a.total_cmp(b))?;
         let ([force, _], _) = weighted(&logs[..n], &means[..n]);
-        Some(Contact {
+        let contact = Contact {
             link: links[best],
             force_n: force.into(),
             point_m: means[best][1].into(),
-        })
+        };
+        self.newest = Some((now_ns, contact));
+        Some(contact)
     }
 
     /// What a force on the tool has to do with the residual's `rise` \[effort unit\]; the joints' `velocity` \[rad/s\] is that before it rose.
