@@ -54,6 +54,8 @@ const UNTOLD: &str = "contact";
 const FELT_NS: i64 = 3_000_000;
 /// How the tool moved is told from so long before that to so long before it \[ns\].
 const MOVED_NS: [i64; 2] = [28_000_000, 7_000_000];
+/// For so many samples it is kept how the joints moved.
+const MOVED: usize = 128;
 /// A score above this is not taken for drift: the unit, what one of a thousand contact-free samples exceeds.
 const DRIFT: f64 = 1.0;
 
@@ -169,7 +171,7 @@ impl Settings {
 struct Tauscope {
     windows: Windows,
     /// How the joints have moved \[rad/s\].
-    moved: Ring,
+    moved: Ring<MOVED>,
     place: Place,
     watch: Watch,
     kinds: Option<Kinds>,

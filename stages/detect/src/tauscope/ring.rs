@@ -2,18 +2,15 @@
 
 use tauscope_bus::{JointArray, MAX_JOINTS};
 
-/// Rows that are kept.
-const CAPACITY: usize = 1024;
-
-/// By joint and sample, a number with its stamp. No allocation per sample.
+/// By joint and sample, a number with its stamp; `CAPACITY` rows are kept. No allocation per sample.
 #[derive(Debug)]
-pub(crate) struct Ring {
+pub(crate) struct Ring<const CAPACITY: usize> {
     rows: Vec<(i64, JointArray)>,
     /// Rows that have come in since the beginning.
     count: usize,
 }
 
-impl Ring {
+impl<const CAPACITY: usize> Ring<CAPACITY> {
     pub fn new() -> Self {
         Self {
             rows: vec![(0, [0.0; MAX_JOINTS]); CAPACITY],
@@ -74,7 +71,9 @@ impl Ring {
 mod tests {
     use super::*;
 
-    fn filled(count: i64) -> Ring {
+    const CAPACITY: usize = 1024;
+
+    fn filled(count: i64) -> Ring<CAPACITY> {
         let mut ring = Ring::new();
         for k in 0..count {
             ring.push(k, &[k as f64; MAX_JOINTS]);

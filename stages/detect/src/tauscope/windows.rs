@@ -25,10 +25,13 @@ pub(crate) struct Follow {
     pub offset_from_first_s: f64,
 }
 
+/// Most samples of a window.
+const CAPACITY: usize = 1024;
+
 /// Running means over each window.
 #[derive(Debug)]
 pub(crate) struct Means {
-    rows: Ring,
+    rows: Ring<CAPACITY>,
     /// First row of each window.
     tails: [usize; WINDOWS_S.len()],
     sums: [JointArray; WINDOWS_S.len()],
