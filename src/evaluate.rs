@@ -311,7 +311,12 @@ fn learn(
     let (mut runners, mut notes) = (Vec::new(), Vec::new());
     for result in results {
         match result {
-            Ok(runner) => runners.push(runner),
+            Ok(runner) => {
+                // What its random siblings say, too, is said once.
+                let warning = runner.config.warning(&setup);
+                notes.extend(warning.filter(|warning| !notes.contains(warning)));
+                runners.push(runner);
+            }
             Err(EvaluateError::Learn { detector, source }) if !request.explicit => {
                 notes.push(format!("{detector} is left out: {source}"));
             }

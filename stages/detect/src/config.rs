@@ -178,8 +178,11 @@ impl Config {
 
     /// What speaks against running this detector in this cell, though it can.
     pub fn warning(&self, setup: &Setup) -> Option<String> {
-        let settings = self.contact_classifier.as_ref()?;
-        contact_classifier::warning(settings, setup)
+        let classifier = self.contact_classifier.as_ref();
+        let own = self.tauscope.as_ref();
+        classifier
+            .and_then(|settings| contact_classifier::warning(settings, setup))
+            .or_else(|| own.and_then(tauscope::warning))
     }
 
     /// A line a detector.

@@ -118,27 +118,69 @@ pub fn learn(
 
 /// Fisher's linear discriminant between collisions and cooperations.
 pub(crate) fn discriminant(found: &[(ContactKind, Vector6<f64>)]) -> Discriminant {
-    let mut scatter = Matrix6::zeros();
-    let mut mean = |kind| {
-        let of_kind = || found.iter().filter(move |(other, _)| *other == kind);
-        let count = of_kind().count().max(1) as f64;
-        let mean = of_kind().map(|(_, x)| x).sum::<Vector6<f64>>() / count;
-        for (_, x) in of_kind() {
-            scatter += (x - mean) * (x - mean).transpose();
+    Moments::of(found).discriminant()
+}
+
+/// What Fisher's discriminant is made from, for collisions and cooperations.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Moments {
+    /// How many there are of each kind.
+    pub counts: [f64; 2],
+    /// Means of the measurements.
+    pub means: [Vector6<f64>; 2],
+    /// Scatter within both kinds.
+    pub scatter: Matrix6<f64>,
+}
+
+impl Moments {
+    /// Of measured contacts.
+    pub fn of(found: &[(ContactKind, Vector6<f64>)]) -> Self {
+        let mut moments = Self {
+            counts: [0.0; 2],
+            means: [Vector6::zeros(); 2],
+            scatter: Matrix6::zeros(),
+        };
+        let kinds = [ContactKind::Collision, ContactKind::Cooperation];
+        for (k, kind) in kinds.into_iter().enumerate() {
+            let of_kind = || found.iter().filter(move |(other, _)| *other == kind);
+            let count = of_kind().count() as f64;
+            let mean = of_kind().map(|(_, x)| x).sum::<Vector6<f64>>() / count.max(1.0);
+            for (_, x) in of_kind() {
+                moments.scatter += (x - mean) * (x - mean).transpose();
+            }
+            (moments.counts[k], moments.means[k]) = (count, mean);
         }
-        mean
-    };
-    let (collision, cooperation) = (mean(ContactKind::Collision), mean(ContactKind::Cooperation));
-    // Both kinds without any scatter: then any direction in which they differ will do.
-    let ridge = (RIDGE * scatter.trace()).max(f64::EPSILON);
-    let scatter = scatter + Matrix6::identity() * ridge;
-    let apart = collision - cooperation;
-    let weights = scatter
-        .cholesky()
-        .map_or(apart, |scatter| scatter.solve(&apart));
-    Discriminant {
-        weights: weights.into(),
-        bound: 0.5 * weights.dot(&(collision + cooperation)),
+        moments
+    }
+
+    /// Together with others, whose means are taken for the same and whose scatter is added.
+    pub fn and(&self, other: &Self) -> Self {
+        let both = |k: usize| {
+            let (own, others) = (self.counts[k], other.counts[k]);
+            let sum = self.means[k] * own + other.means[k] * others;
+            sum / (own + others).max(1.0)
+        };
+        Self {
+            counts: std::array::from_fn(|k| self.counts[k] + other.counts[k]),
+            means: [both(0), both(1)],
+            scatter: self.scatter + other.scatter,
+        }
+    }
+
+    /// The direction that parts the kinds best, and the bound half-way between their means.
+    pub fn discriminant(&self) -> Discriminant {
+        let [collision, cooperation] = self.means;
+        // Both kinds without any scatter: then any direction in which they differ will do.
+        let ridge = (RIDGE * self.scatter.trace()).max(f64::EPSILON);
+        let scatter = self.scatter + Matrix6::identity() * ridge;
+        let apart = collision - cooperation;
+        let weights = scatter
+            .cholesky()
+            .map_or(apart, |scatter| scatter.solve(&apart));
+        Discriminant {
+            weights: weights.into(),
+            bound: 0.5 * weights.dot(&(collision + cooperation)),
+        }
     }
 }
 

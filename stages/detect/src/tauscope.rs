@@ -16,25 +16,31 @@
 //! sought along the link (Haddadin, De Luca and Albu-Schäffer, "Robot Collisions: A Survey on Detection,
 //! Isolation, and Identification", 2017, sections V and VI).
 
+mod alarm;
 mod kinds;
 mod learnt;
 mod place;
+mod points;
+mod ring;
 mod smallest;
 mod tail;
 mod windows;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tauscope_bus::{JointArray, MAX_JOINTS, TwinState, flags};
+use tauscope_bus::{TwinState, flags};
 
 use crate::config::ConfigError;
 use crate::detector::{Detector, Judgement, Seen, Verdict};
 use crate::lesson::{LearnError, Lessons};
 use crate::stage::Setup;
+use alarm::Watch;
 pub use kinds::Kinds;
+use learnt::ENOUGH_S;
 pub use learnt::{Learnt, LearntJoint, LearntWindow};
 use nalgebra::Vector6;
 use place::Place;
+use ring::Ring;
 pub use smallest::Smallest;
 pub use tail::Tail;
 use windows::{Follow, Windows};
@@ -42,23 +48,16 @@ use windows::{Follow, Windows};
 /// Canonical name.
 pub(crate) const NAME: &str = "tauscope";
 
-/// An alarm ends where the score has stayed below this share of the threshold.
-const RELEASE: f64 = 0.35;
-/// For so long \[s\].
-const HOLD_S: f64 = 0.1;
-/// Another contact on top of one: the residual changes by this many times the threshold against what it has been, which is
-/// followed with this time constant, and grows (else it is a release); not sooner than this after the last alarm \[s\].
-const CHANGE: f64 = 2.0;
-/// Where no kinds are told apart, one contact may swell and still be one: the change must be this share of what it has been as well.
-const SWELL: f64 = 0.5;
-const FOLLOW_S: f64 = 0.15;
-const AGAIN_S: f64 = 0.25;
-/// Where kinds are told, the alarm waits so long for the force to show where it points \[s\].
-const DECIDE_S: f64 = 0.012;
+/// A contact's kind where none is told.
+const UNTOLD: &str = "contact";
+/// A contact is felt so much before its alarm is on its way \[ns\].
+const FELT_NS: i64 = 3_000_000;
+/// How the tool moved is told from so long before that to so long before it \[ns\].
+const MOVED_NS: [i64; 2] = [28_000_000, 7_000_000];
+/// For so many samples it is kept how the joints moved.
+const MOVED: usize = 128;
 /// A score above this is not taken for drift: the unit, what one of a thousand contact-free samples exceeds.
 const DRIFT: f64 = 1.0;
-/// A score from this share of the threshold on may already belong to a contact.
-const LOW: f64 = 0.3;
 
 /// Settings of `tauscope`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -109,7 +108,13 @@ pub(crate) fn build(settings: &Settings, setup: &Setup) -> Result<Box<dyn Detect
             reason,
         });
     }
-    Ok(Box::new(Tauscope::new(learnt, settings, setup)))
+    let tells_kinds = learnt.kinds.is_some();
+    Ok(Box::new(Tauscope::new(
+        learnt,
+        settings,
+        setup,
+        tells_kinds,
+    )))
 }
 
 /// Learns from contact-free stretches of all recordings, and what parts the kinds from the training recordings' contacts.
@@ -127,6 +132,16 @@ pub fn learn(
     Ok(Settings {
         learnt: Some(learnt),
         ..settings.clone()
+    })
+}
+
+/// What speaks against running it with these settings, though it can.
+pub(crate) fn warning(settings: &Settings) -> Option<String> {
+    let free_s = settings.learnt.as_ref()?.free_s?;
+    (free_s < ENOUGH_S).then(|| {
+        format!(
+            "{NAME} has learnt what is usual from {free_s:.1} s in which nothing touched the arm, and that is too little: its threshold is a guess, how often it is exceeded by chance is not known, and all joints are taken for more alike than they are; let it learn from at least {ENOUGH_S} s, better some minutes"
+        )
     })
 }
 
@@ -155,28 +170,14 @@ impl Settings {
 
 struct Tauscope {
     windows: Windows,
+    /// How the joints have moved \[rad/s\].
+    moved: Ring<MOVED>,
     place: Place,
-    threshold: f64,
-    alarm: Option<Alarm>,
-    /// Newest sample whose score was usual.
-    newest_low_ns: Option<i64>,
-    /// The joints' velocity then \[rad/s\].
-    velocity: JointArray,
+    watch: Watch,
     kinds: Option<Kinds>,
-    tells_kinds: bool,
-    /// When the score rose above the threshold, while the alarm waits.
-    waits_since_ns: Option<i64>,
-}
-
-/// An alarm that lasts.
-struct Alarm {
-    /// What kinds are told by, and what was told, as it was raised.
+    /// Of the newest alarm, what kinds are told by, and what was told.
     measurements: Option<Vector6<f64>>,
     state: &'static str,
-    contact_ns: i64,
-    raised_ns: i64,
-    newest_high_ns: i64,
-    newest_ns: i64,
 }
 
 impl Detector for Tauscope {
@@ -185,56 +186,43 @@ impl Detector for Tauscope {
     }
 
     fn threshold(&self) -> Option<f64> {
-        Some(self.threshold)
+        Some(self.watch.threshold())
     }
 
     fn judge(&mut self, sample: &TwinState) -> Judgement {
         if sample.header.has(flags::RESET) {
             self.windows.reset();
-            self.alarm = None;
-            self.newest_low_ns = None;
-            self.waits_since_ns = None;
+            self.moved.reset();
+            self.watch.reset();
         }
-        let free = self.alarm.is_none();
+        let free = self.watch.contact_ns().is_none();
         // Whatever raises no alarm and is not far from usual may be drift.
-        let drifts = free.then_some(self.threshold.min(DRIFT));
+        let drifts = free.then_some(self.watch.threshold().min(DRIFT));
         let score = self.windows.score(sample, drifts);
+        self.moved.push(sample.header.stamp_ns, &sample.velocity);
         let ready = self.windows.ready() && sample.header.has(flags::READY);
         if !ready {
-            self.alarm = None;
-            self.waits_since_ns = None;
+            self.watch.end();
             return Judgement {
                 score,
                 ready,
                 verdict: None,
             };
         }
-        let raised_ns = self.alarm.as_ref().map(|alarm| alarm.raised_ns);
-        let contact_ns = self.step(sample.header.stamp_ns, score);
-        if score < LOW * self.threshold || raised_ns.is_some() {
-            self.velocity = sample.velocity;
+        let now_ns = sample.header.stamp_ns;
+        if let Some(since_ns) = self.watch.step(now_ns, score, &mut self.windows) {
+            self.tell(sample, since_ns);
         }
-        let contact = contact_ns.map(|contact_ns| {
-            let touch = self.place.locate(sample, &self.windows, &self.velocity);
-            if let Some(alarm) = &mut self.alarm
-                && raised_ns != Some(alarm.raised_ns)
-            {
-                alarm.measurements = touch.as_ref().map(kinds::measurements);
-                if let (Some(kinds), Some(seen)) = (&self.kinds, &alarm.measurements) {
-                    alarm.state = kinds::classify(kinds, seen);
-                }
-            }
-            Seen {
-                contact_ns,
-                joints: Some(Place::loaded(&self.windows)),
-                place: touch.map(|touch| touch.contact),
-            }
+        let contact = self.watch.contact_ns().map(|contact_ns| Seen {
+            contact_ns,
+            joints: Some(Place::loaded(&self.windows)),
+            place: self.place.locate(sample, &self.windows),
         });
         Judgement {
             score,
             ready,
             verdict: Some(Verdict {
-                state: self.alarm.as_ref().map_or("free", |alarm| alarm.state),
+                state: contact.map_or("free", |_| self.state),
                 contact,
             }),
         }
@@ -242,71 +230,29 @@ impl Detector for Tauscope {
 }
 
 impl Tauscope {
-    fn new(learnt: &Learnt, settings: &Settings, setup: &Setup) -> Self {
+    /// One that takes its time to tell the kinds if `tells_kinds`.
+    fn new(learnt: &Learnt, settings: &Settings, setup: &Setup, tells_kinds: bool) -> Self {
+        let threshold = learnt.tail.threshold(settings.false_alarms_per_hour);
         Self {
             windows: Windows::new(learnt, settings.follow()),
+            moved: Ring::new(),
             place: Place::new(setup),
-            threshold: learnt.tail.threshold(settings.false_alarms_per_hour),
-            alarm: None,
-            newest_low_ns: None,
-            velocity: [0.0; MAX_JOINTS],
+            watch: Watch::new(threshold, tells_kinds),
             kinds: learnt.kinds,
-            tells_kinds: learnt.kinds.is_some(),
-            waits_since_ns: None,
+            measurements: None,
+            state: UNTOLD,
         }
     }
 
-    /// Takes the next score; gives the beginning of the contact, if there is one.
-    fn step(&mut self, now_ns: i64, score: f64) -> Option<i64> {
-        let high = score >= self.threshold;
-        let ns = |seconds: f64| (seconds * 1e9) as i64;
-        match &mut self.alarm {
-            None if high || self.waits_since_ns.is_some() => {
-                let since_ns = *self.waits_since_ns.get_or_insert(now_ns);
-                if score < RELEASE * self.threshold {
-                    self.waits_since_ns = None;
-                } else if !self.tells_kinds || now_ns - since_ns >= ns(DECIDE_S) {
-                    self.waits_since_ns = None;
-                    self.windows.begin(false);
-                    self.alarm = Some(Alarm {
-                        measurements: None,
-                        state: "contact",
-                        contact_ns: self.newest_low_ns.unwrap_or(now_ns),
-                        raised_ns: now_ns,
-                        newest_high_ns: now_ns,
-                        newest_ns: now_ns,
-                    });
-                }
-            }
-            None => {}
-            Some(alarm) => {
-                if score >= RELEASE * self.threshold {
-                    alarm.newest_high_ns = now_ns;
-                }
-                let dt_s = (now_ns - alarm.newest_ns) as f64 * 1e-9;
-                alarm.newest_ns = now_ns;
-                let swell = if self.tells_kinds { 0.0 } else { SWELL };
-                let again = now_ns - alarm.raised_ns > ns(AGAIN_S)
-                    && high
-                    && self.windows.grows()
-                    && self.windows.change()
-                        > (CHANGE * self.threshold).max(swell * self.windows.held());
-                if again {
-                    alarm.contact_ns = now_ns;
-                    alarm.raised_ns = now_ns;
-                    self.windows.begin(true);
-                } else {
-                    let share = 1.0 - (-dt_s / FOLLOW_S).exp();
-                    self.windows.hold(share);
-                }
-                if now_ns - alarm.newest_high_ns >= ns(HOLD_S) {
-                    self.alarm = None;
-                }
-            }
-        }
-        if score < LOW * self.threshold || self.newest_low_ns.is_none() {
-            self.newest_low_ns = Some(now_ns);
-        }
-        self.alarm.as_ref().map(|alarm| alarm.contact_ns)
+    /// Tells what can be told of a contact as its alarm is raised, which has been on its way since then.
+    fn tell(&mut self, sample: &TwinState, since_ns: i64) {
+        self.place.begin();
+        let [from_ns, to_ns] = MOVED_NS.map(|before_ns| since_ns - before_ns);
+        let velocity = self.moved.mean(from_ns, to_ns);
+        let rise = self.windows.rise(since_ns - FELT_NS);
+        let touch = (self.place).on_tool(sample, &self.windows, &rise, &velocity);
+        self.measurements = touch.as_ref().map(kinds::measurements);
+        let told = self.kinds.as_ref().zip(self.measurements.as_ref());
+        self.state = told.map_or(UNTOLD, |(kinds, seen)| kinds::classify(kinds, seen));
     }
 }

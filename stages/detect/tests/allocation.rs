@@ -7,9 +7,9 @@ use std::cell::Cell;
 
 use tauscope_bus::{Detection, Emit, Header, LinkError, Stage, TwinState, flags};
 use tauscope_detect::{
-    Config, Detect, JointSetup, Setup, Threshold, contact_classifier, frequency_classifier,
-    momentum_observer, naive_difference, twin_regression, virtual_collision_sensor,
-    virtual_collision_sensor_basic,
+    Config, Detect, JointSetup, Lesson, Lessons, Setup, Threshold, contact_classifier,
+    frequency_classifier, momentum_observer, naive_difference, tauscope, twin_regression,
+    virtual_collision_sensor, virtual_collision_sensor_basic,
 };
 use tauscope_dynamics::Model;
 
@@ -117,6 +117,10 @@ fn nothing_is_allocated_per_sample() {
             }),
             ..Config::default()
         },
+        Config {
+            tauscope: Some(learnt(&setup)),
+            ..Config::default()
+        },
     ];
     for config in configs {
         let mut detect = Detect::new(&config, setup.clone()).unwrap();
@@ -125,24 +129,43 @@ fn nothing_is_allocated_per_sample() {
             if i == WARM {
                 before = ALLOCATIONS.with(Cell::get);
             }
-            let mut sample = TwinState {
-                header: Header {
-                    stamp_ns: i64::from(i) * 2_000_000,
-                    flags: flags::READY,
-                    joint_count: 7,
-                    ..Header::default()
-                },
-                ..TwinState::default()
-            };
-            for j in 0..7 {
-                let t = f64::from(i) * 0.002;
-                sample.expected_effort[j] = (3.0 * t).sin();
-                // Now and then a collision.
-                let push = if i % 700 > 600 { 5.0 } else { 0.0 };
-                sample.effort[j] = (3.1 * t).sin() + push;
-            }
-            detect.accept(&sample, &mut Nowhere).unwrap();
+            // Now and then a collision.
+            detect
+                .accept(&sample(i, i % 700 > 600), &mut Nowhere)
+                .unwrap();
         }
         assert_eq!(ALLOCATIONS.with(Cell::get), before, "{config:?}");
     }
+}
+
+fn sample(i: i32, pushed: bool) -> TwinState {
+    let mut sample = TwinState {
+        header: Header {
+            stamp_ns: i64::from(i) * 2_000_000,
+            flags: flags::READY,
+            joint_count: 7,
+            ..Header::default()
+        },
+        ..TwinState::default()
+    };
+    for j in 0..7 {
+        let t = f64::from(i) * 0.002;
+        sample.expected_effort[j] = (3.0 * t).sin();
+        sample.effort[j] = (3.1 * t).sin() + if pushed { 5.0 } else { 0.0 };
+    }
+    sample
+}
+
+/// `tauscope` as contact-free samples have taught it.
+fn learnt(setup: &Setup) -> tauscope::Settings {
+    let free = [Lesson {
+        name: "free".to_owned(),
+        samples: (0..20_000).map(|i| sample(i, false)).collect(),
+        contacts: Some(Vec::new()),
+    }];
+    let lessons = Lessons {
+        train: &free,
+        validation: &[],
+    };
+    tauscope::learn(&tauscope::Settings::default(), setup, &lessons).unwrap()
 }

@@ -34,6 +34,13 @@ const FOLDS: usize = 4;
 const LEAST_PIECES: usize = 8;
 /// The least that can be learnt from \[samples\].
 const LEAST_SAMPLES: usize = 500;
+/// With less than this a tail cannot be told, nor how often a threshold is exceeded \[s\].
+pub(super) const ENOUGH_S: f64 = 20.0;
+/// A joint's noise and the joints' correlations count half once they are from so much; until then noise is held to what is usual of
+/// all joints (the median), and correlations to none \[s\].
+const HALF_S: f64 = 2.0;
+/// No joint's noise is believed below this share of what is usual of all joints.
+const LEAST_NOISE: f64 = 0.02;
 
 /// What contact-free recordings taught.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -45,6 +52,9 @@ pub struct Learnt {
     pub windows: Vec<LearntWindow>,
     /// How often the score exceeds what by chance.
     pub tail: Tail,
+    /// How much of contact-free time all of it is from \[s\].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub free_s: Option<f64>,
     /// By link, the smallest force that reaches a score of 1; empty where the robot is not known.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub smallest: Vec<Smallest>,
@@ -95,22 +105,12 @@ impl Learnt {
             return Err(too_little(count));
         }
         let n = first.header.joint_count as usize;
-        let mut peaks = Vec::new();
-        for fold in 0..FOLDS {
-            let part = |held_out: bool| -> Vec<Piece<'_>> {
-                let pieces = all.iter().enumerate();
-                let pieces = pieces.filter(|(i, _)| (i % FOLDS == fold) == held_out);
-                pieces.map(|(_, piece)| *piece).collect()
-            };
-            let others = match part(false) {
-                // A single piece: nothing is left to learn from without it.
-                none if none.is_empty() => all.clone(),
-                others => others,
-            };
-            peaks.extend(Self::usual(&others, n, follow).peaks(&part(true), follow));
-        }
         let mut learnt = Self::usual(&all, n, follow);
-        learnt.tail = Tail::new(peaks);
+        learnt.tail = if learnt.free_s.is_some_and(|free_s| free_s < ENOUGH_S) {
+            Tail::of_few(&learnt.peaks(&all, follow))
+        } else {
+            Tail::new(held_out_peaks(&all, n, follow))
+        };
         Ok(learnt)
     }
 
@@ -125,10 +125,12 @@ impl Learnt {
                 scale: 1.0,
                 shape: 0.0,
             },
+            free_s: Some(free_s(pieces)),
             smallest: Vec::new(),
             kinds: None,
         };
         learnt.windows = learnt.noise(pieces, follow);
+        learnt.hold_noise();
         learnt.correlate(pieces, follow);
         learnt.measure_usual(pieces, follow);
         learnt
@@ -184,6 +186,29 @@ impl Learnt {
             .collect()
     }
 
+    /// How far what was learnt is believed, of 1.
+    fn believed(&self) -> f64 {
+        let free_s = self.free_s.unwrap_or(f64::INFINITY);
+        if free_s.is_finite() {
+            free_s / (free_s + HALF_S)
+        } else {
+            1.0
+        }
+    }
+
+    /// Holds the joints' noise to what is usual of all of them, the more the less it was learnt from.
+    fn hold_noise(&mut self) {
+        let believed = self.believed();
+        for window in &mut self.windows {
+            let mut of_all: Vec<f64> = window.noise.iter().flatten().copied().collect();
+            let usual = quantile(&mut of_all, 0.5);
+            for noise in window.noise.iter_mut().flatten() {
+                let least = noise.max(LEAST_NOISE * usual);
+                *noise = least.powf(believed) * usual.powf(1.0 - believed);
+            }
+        }
+    }
+
     /// Runs over the contact-free samples, and hands the windows out at each.
     pub(super) fn each(
         &self,
@@ -207,6 +232,7 @@ impl Learnt {
 
     fn correlate(&mut self, all: &[Piece<'_>], follow: Follow) {
         let n = self.joints.len();
+        let believed = BELIEVED * self.believed();
         let mut products = vec![DMatrix::<f64>::zeros(n, n); WINDOWS_S.len()];
         self.each(all, follow, |_, windows, _| {
             for (w, product) in products.iter_mut().enumerate() {
@@ -226,7 +252,7 @@ impl Learnt {
                 if a == b || scale <= 0.0 {
                     f64::from(u8::from(a == b))
                 } else {
-                    BELIEVED * product[(a, b)] / scale
+                    believed * product[(a, b)] / scale
                 }
             });
             if let Some(inverse) = correlation.try_inverse() {
@@ -260,6 +286,36 @@ impl Learnt {
         });
         peaks.into_iter().map(|(_, peak)| peak).collect()
     }
+}
+
+/// The largest score of each block of contact-free time, by the noise of other recordings, or pieces of one, than the block's own.
+fn held_out_peaks(all: &[Piece<'_>], n: usize, follow: Follow) -> Vec<f64> {
+    let mut peaks = Vec::new();
+    for fold in 0..FOLDS {
+        let part = |held_out: bool| -> Vec<Piece<'_>> {
+            let pieces = all.iter().enumerate();
+            let pieces = pieces.filter(|(i, _)| (i % FOLDS == fold) == held_out);
+            pieces.map(|(_, piece)| *piece).collect()
+        };
+        let others = match part(false) {
+            // A single piece: nothing is left to learn from without it.
+            none if none.is_empty() => all.to_vec(),
+            others => others,
+        };
+        peaks.extend(Learnt::usual(&others, n, follow).peaks(&part(true), follow));
+    }
+    peaks
+}
+
+/// How long nothing touched the robot \[s\].
+fn free_s(all: &[Piece<'_>]) -> f64 {
+    let of_piece = |piece: &Piece<'_>| {
+        let mut stamps = piece.samples.iter().map(|sample| sample.header.stamp_ns);
+        let (first, last) = (stamps.next(), stamps.next_back());
+        let long_s = first.zip(last).map_or(0.0, |(a, b)| (b - a) as f64 * 1e-9);
+        long_s * free(piece).count() as f64 / piece.samples.len().max(1) as f64
+    };
+    all.iter().map(of_piece).sum()
 }
 
 fn too_little(found: usize) -> LearnError {

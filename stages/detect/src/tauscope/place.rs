@@ -1,59 +1,171 @@
-//! Which link was touched, where, and how hard: the force that explains the whitened residual best.
+//! Which link was touched, where, and how hard.
+//!
+//! A force F at a point loads the joints with Jᵀ F, J the point's Jacobian: the residual is minus that. A hand may touch a link
+//! anywhere along it and around it, from any side. For each of such points the residual's likelihood is had in closed form, with F
+//! normal with a standard deviation of [`HAND_N`] in each direction; the mean over a link's points is the evidence for the link
+//! (`MacKay`, "Information Theory, Inference and Learning Algorithms", 2003, chapter 28): a link does not win by having many
+//! ways to explain what it was not touched for. Evidence is gathered while the contact lasts.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
-use tauscope_dynamics::{Data, Model, forward_kinematics, link_jacobian, link_pose};
 
-use super::windows::Windows;
+use super::points::{POINTS, Points};
+use super::windows::{SHORTEST, Windows};
 use crate::isolation::Contact;
 use crate::stage::Setup;
 
 /// A joint counts as loaded from this many times its usual residual on.
 const LOADED: f64 = 4.0;
-/// Weight of a small force against a good fit, relative to what the joints tell: keeps directions that no
-/// joint feels at zero.
-const DAMPING: f64 = 1e-3;
+/// How hard robots are touched \[N\].
+const HAND_N: f64 = 10.0;
 /// The twin is believed to this share of the residual: a strong force is told no better than that.
 const MODEL_ERROR: f64 = 0.05;
-/// Where along a link contacts are sought, as shares of the way from its joint to the next.
-const ALONG: [f64; 3] = [0.0, 0.5, 1.0];
-
-/// A contact, and how the point moves that it acts on. World frame.
+/// What is wrong with a residual stays for so long: samples closer than that tell the same \[s\].
+const CORRELATED_S: f64 = 0.1;
+/// So often it is asked anew where the contact is \[ns\].
+const EVERY_NS: i64 = 8_000_000;
+/// The force on the tool that explains the residual best, and how the touched point moves. World frame.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Touch {
-    pub contact: Contact,
+pub(crate) struct ToolTouch {
+    pub force_n: Vector3<f64>,
     pub velocity_m_per_s: Vector3<f64>,
+    /// How much of the residual it explains, of 1.
+    pub share: f64,
 }
 
 /// Finds contacts on one robot. No allocation per call.
 #[derive(Debug)]
 pub(crate) struct Place {
-    model: Option<(Model, Data)>,
+    points: Option<Points>,
     effort_per_nm: Vec<f64>,
-    /// Where the tool is touched: its link and the point in its frame.
-    tool: Option<(usize, Vector3<f64>)>,
+    /// Logarithms of the evidence by joint that carries the link, and what it has been gathered over \[correlation times\].
+    evidence: JointArray,
+    gathered: f64,
+    /// When it was asked last, and what came of it.
+    newest: Option<(i64, Contact)>,
+}
+
+/// A residual in units of its noise, as equations for a force.
+struct Load {
+    joints: usize,
+    /// A force's information between two joints, and what the residual pulls at one.
+    weights: [[f64; MAX_JOINTS]; MAX_JOINTS],
+    pull: JointArray,
+    /// The residual's squared length.
+    total: f64,
+}
+
+/// The same for forces and torques at a link's origin.
+struct Wrench {
+    information: Matrix6<f64>,
+    pull: Vector6<f64>,
+}
+
+impl Load {
+    /// Of a mean `residual` over a window.
+    fn new(residual: &JointArray, windows: &Windows, window: usize, effort_per_nm: &[f64]) -> Self {
+        let n = windows.joints();
+        let inverse = windows.inverse_correlation(window);
+        let (mut z, mut scale) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
+        for j in 0..n {
+            let mean = residual[j];
+            let noise = windows.noise(window, j).hypot(MODEL_ERROR * mean);
+            z[j] = mean / noise;
+            // residual = -Jᵀ F.
+            scale[j] = -effort_per_nm[j] / noise;
+        }
+        let mut load = Self {
+            joints: n,
+            weights: [[0.0; MAX_JOINTS]; MAX_JOINTS],
+            pull: [0.0; MAX_JOINTS],
+            total: 0.0,
+        };
+        for a in 0..n {
+            for b in 0..n {
+                let entry = inverse[a * n + b];
+                load.weights[a][b] = scale[a] * entry * scale[b];
+                load.pull[a] += scale[a] * entry * z[b];
+                load.total += z[a] * entry * z[b];
+            }
+        }
+        load
+    }
+
+    /// For a link whose frame moves with `columns`: of each joint the linear and the angular velocity.
+    fn at(&self, columns: &[Vector6<f64>; MAX_JOINTS]) -> Wrench {
+        let (mut information, mut pull) = (Matrix6::zeros(), Vector6::zeros());
+        for a in 0..self.joints {
+            // A force on a link loads only the joints between it and the base.
+            if columns[a] == Vector6::zeros() {
+                continue;
+            }
+            let mut weighted = Vector6::zeros();
+            for (column, weight) in columns.iter().zip(&self.weights[a]).take(self.joints) {
+                weighted += column * *weight;
+            }
+            information += columns[a] * weighted.transpose();
+            pull += columns[a] * self.pull[a];
+        }
+        Wrench { information, pull }
+    }
+}
+
+impl Wrench {
+    /// Information and pull of a force that acts at `arm` from the link's origin.
+    fn force_at(&self, arm: &Vector3<f64>) -> (Matrix3<f64>, Vector3<f64>) {
+        // The point moves with linear + angular × arm.
+        let cross = arm.cross_matrix();
+        let linear = self.information.fixed_view::<3, 3>(0, 0);
+        let mixed = self.information.fixed_view::<3, 3>(0, 3) * cross.transpose();
+        let angular = cross * self.information.fixed_view::<3, 3>(3, 3) * cross.transpose();
+        let pull = self.pull.fixed_rows::<3>(0) - cross * self.pull.fixed_rows::<3>(3);
+        (linear - mixed - mixed.transpose() + angular, pull)
+    }
+}
+
+/// The most probable force, and the logarithm of the evidence for its point beside that for no force at all.
+fn most_probable(information: &Matrix3<f64>, pull: &Vector3<f64>) -> (Vector3<f64>, f64) {
+    let scaled = information * HAND_N.powi(2) + Matrix3::identity();
+    let Some(inverse) = scaled.try_inverse() else {
+        return (Vector3::zeros(), f64::NEG_INFINITY);
+    };
+    let force = inverse * pull * HAND_N.powi(2);
+    let evidence = 0.5 * (pull.dot(&force) - scaled.determinant().ln());
+    (force, evidence)
+}
+
+/// Mean over weights whose logarithms are given, with the logarithm of their sum.
+fn weighted<const N: usize>(
+    logs: &[f64],
+    values: &[[Vector3<f64>; N]],
+) -> ([Vector3<f64>; N], f64) {
+    let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let (mut sums, mut sum) = ([Vector3::zeros(); N], 0.0);
+    if !largest.is_finite() {
+        return (sums, f64::NEG_INFINITY);
+    }
+    for (log, values) in logs.iter().zip(values) {
+        let weight = (log - largest).exp();
+        sum += weight;
+        for (sum, value) in sums.iter_mut().zip(values) {
+            *sum += value * weight;
+        }
+    }
+    let mean = sums.map(|value| value / sum);
+    (mean, largest + sum.ln())
 }
 
 impl Place {
     pub fn new(setup: &Setup) -> Self {
-        let known = setup
-            .joints
-            .iter()
-            .all(|joint| joint.effort_per_nm.is_finite());
+        let joints = setup.joints.iter();
+        let effort_per_nm: Vec<f64> = joints.map(|joint| joint.effort_per_nm).collect();
+        let known = effort_per_nm.iter().all(|per_nm| per_nm.is_finite());
         Self {
-            model: setup.model.clone().filter(|_| known).map(|model| {
-                let data = Data::new(&model);
-                (model, data)
-            }),
-            effort_per_nm: setup
-                .joints
-                .iter()
-                .map(|joint| joint.effort_per_nm)
-                .collect(),
-            tool: setup.tool_link.map(|link| {
-                let point = setup.contact_point_on_tool_m.unwrap_or_default();
-                (link, Vector3::from(point))
-            }),
+            points: Points::new(setup).filter(|_| known),
+            effort_per_nm,
+            evidence: [0.0; MAX_JOINTS],
+            gathered: 0.0,
+            newest: None,
         }
     }
 
@@ -65,104 +177,91 @@ impl Place {
             .fold(0, |mask, j| mask | 1 << j)
     }
 
-    /// The contact that leaves least unexplained; its point moves as the joints' `velocity` \[rad/s\] has it.
-    pub fn locate(
+    /// Another contact begins.
+    pub fn begin(&mut self) {
+        self.evidence = [0.0; MAX_JOINTS];
+        self.gathered = 0.0;
+        self.newest = None;
+    }
+
+    /// The link for which there is most evidence since the contact began, and the mean of the forces that a sample allows which is no
+    /// older than [`EVERY_NS`]. To be called with each sample of a contact.
+    pub fn locate(&mut self, sample: &TwinState, windows: &Windows) -> Option<Contact> {
+        let now_ns = sample.header.stamp_ns;
+        let newest = self.newest.filter(|(at_ns, _)| now_ns - at_ns < EVERY_NS);
+        if let Some((_, contact)) = newest {
+            return Some(contact);
+        }
+        let points = self.points.as_mut()?;
+        let n = windows.joints();
+        let mut residual = [0.0; MAX_JOINTS];
+        for (j, residual) in residual.iter_mut().enumerate().take(n) {
+            *residual = windows.excess(windows.most, j);
+        }
+        let load = Load::new(&residual, windows, windows.most, &self.effort_per_nm);
+        let before_ns = self.newest.map_or(now_ns, |(at_ns, _)| at_ns);
+        let share = ((now_ns - before_ns) as f64 * 1e-9 / CORRELATED_S).clamp(1e-3, 1.0);
+        self.gathered += share;
+        let mut links = [0; MAX_JOINTS];
+        let mut means = [[Vector3::zeros(); 2]; MAX_JOINTS];
+        points.each_link(sample, |joint, link| {
+            let wrench = load.at(&link.columns);
+            let mut logs = [f64::NEG_INFINITY; POINTS];
+            let mut found = [[Vector3::zeros(); 2]; POINTS];
+            let mut weights = 0.0;
+            let slots = logs.iter_mut().zip(&mut found);
+            for ((log, found), (arm, weight)) in slots.zip(link.around()) {
+                let (information, pull) = wrench.force_at(&arm);
+                let (force, evidence) = most_probable(&information, &pull);
+                (*log, *found) = (evidence + f64::ln(weight), [force, link.origin_m + arm]);
+                weights += weight;
+            }
+            let (mean, evidence) = weighted(&logs, &found);
+            self.evidence[joint] += share * (evidence - weights.ln());
+            (links[joint], means[joint]) = (link.link, mean);
+        });
+        // What was gathered in less than a correlation time counts as much as one sample does.
+        let scale = self.gathered.recip().max(1.0);
+        let logs = self.evidence.map(|evidence| evidence * scale);
+        let (best, _) = (logs[..n].iter().enumerate()).max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+        let ([force, _], _) = weighted(&logs[..n], &means[..n]);
+        let contact = Contact {
+            link: links[best],
+            force_n: force.into(),
+            point_m: means[best][1].into(),
+        };
+        self.newest = Some((now_ns, contact));
+        Some(contact)
+    }
+
+    /// What a force on the tool has to do with the residual's `rise` \[effort unit\]; the joints' `velocity` \[rad/s\] is that before it rose.
+    pub fn on_tool(
         &mut self,
         sample: &TwinState,
         windows: &Windows,
+        rise: &JointArray,
         velocity: &JointArray,
-    ) -> Option<Touch> {
-        let n = windows.joints();
-        let w = windows.most;
-        let inverse = windows.inverse_correlation(w);
-        let (mut z, mut scale) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
-        for j in 0..n {
-            let mean = windows.excess(w, j);
-            let noise = windows.noise(w, j).hypot(MODEL_ERROR * mean);
-            z[j] = mean / noise;
-            scale[j] = self.effort_per_nm[j] / noise;
-        }
-        let weighted_z: [f64; MAX_JOINTS] = std::array::from_fn(|a| {
-            let row = inverse.iter().skip(a * n).take(n);
-            row.zip(&z).map(|(weight, z)| weight * z).sum()
-        });
-        let mut best: Option<(f64, Touch)> = None;
-        self.each_point(sample, n, |link, point_m, columns| {
-            let (mut information, mut pull) = (Matrix3::zeros(), Vector3::zeros());
-            for a in 0..n {
-                // A force on a link loads only the joints between it and the base.
-                if columns[a] == Vector3::zeros() {
-                    continue;
-                }
-                // residual = -Jᵀ F, in units of the noise.
-                let row = columns[a] * -scale[a];
-                let mut weighted = Vector3::zeros();
-                for b in 0..n {
-                    weighted += columns[b] * (-scale[b] * inverse[a * n + b]);
-                }
-                information += row * weighted.transpose();
-                pull += row * weighted_z[a];
-            }
-            let ridge = DAMPING * information.trace() + 1e-12;
-            let Some(solver) = (information + Matrix3::identity() * ridge).try_inverse() else {
+    ) -> Option<ToolTouch> {
+        let points = self.points.as_mut()?;
+        let load = Load::new(rise, windows, SHORTEST, &self.effort_per_nm);
+        let mut touch = None;
+        points.each_link(sample, |joint, link| {
+            if joint + 1 < load.joints {
                 return;
-            };
-            let force = solver * pull;
-            let explained = 2.0 * pull.dot(&force) - force.dot(&(information * force));
-            if best.is_none_or(|(most, _)| explained > most) {
-                let moved = columns.iter().zip(velocity).take(n);
-                let touch = Touch {
-                    contact: Contact {
-                        link,
-                        force_n: force.into(),
-                        point_m: point_m.into(),
-                    },
-                    velocity_m_per_s: moved.map(|(column, rate)| column * *rate).sum(),
-                };
-                best = Some((explained, touch));
             }
+            let (information, pull) = load.at(&link.columns).force_at(&link.end_m);
+            let (force_n, _) = most_probable(&information, &pull);
+            let explained = 2.0 * pull.dot(&force_n) - force_n.dot(&(information * force_n));
+            let moved = link.columns.iter().zip(velocity).take(load.joints);
+            let velocity: Vector6<f64> = moved.map(|(column, rate)| column * *rate).sum();
+            let angular = velocity.fixed_rows::<3>(3);
+            touch = Some(ToolTouch {
+                force_n,
+                velocity_m_per_s: velocity.fixed_rows::<3>(0) + angular.cross(&link.end_m),
+                share: explained / load.total.max(f64::MIN_POSITIVE),
+            });
         });
-        best.map(|(_, touch)| touch)
-    }
-
-    /// Calls `visit` with points of each link, in order: the link, where the point is \[m\], and what 1 N at it along
-    /// the world's axes loads each joint with \[N m\]. Nothing without a model.
-    pub fn each_point(
-        &mut self,
-        sample: &TwinState,
-        n: usize,
-        mut visit: impl FnMut(usize, Vector3<f64>, &[Vector3<f64>; MAX_JOINTS]),
-    ) {
-        let Some((model, data)) = self.model.as_mut() else {
-            return;
-        };
-        forward_kinematics(model, data, &sample.position[..n]);
-        for joint in 0..n {
-            let link = model.joints()[joint].child_link;
-            let pose = link_pose(model, data, link);
-            let origin = pose.translation.vector;
-            let com = pose.rotation * Vector3::from(model.links()[link].com_m());
-            let end = if joint + 1 < n {
-                let next = model.joints()[joint + 1].child_link;
-                link_pose(model, data, next).translation.vector
-            } else if let Some((tool, point)) = self.tool {
-                let tool = link_pose(model, data, tool);
-                tool.translation.vector + tool.rotation * point
-            } else {
-                origin + com
-            };
-            let jacobian = link_jacobian(model, data, link);
-            let along = ALONG.map(|share| (end - origin) * share);
-            for arm in along.into_iter().chain([com]) {
-                let mut columns = [Vector3::zeros(); MAX_JOINTS];
-                for (j, column) in columns.iter_mut().enumerate().take(n) {
-                    let of_joint = jacobian.column(j);
-                    let angular = of_joint.fixed_rows::<3>(3).into_owned();
-                    *column = of_joint.fixed_rows::<3>(0) + angular.cross(&arm);
-                }
-                visit(link, origin + arm, &columns);
-            }
-        }
+        touch
     }
 
     /// By joint, how much the measured effort changes by 1 N m \[effort unit\].
@@ -170,10 +269,8 @@ impl Place {
         &self.effort_per_nm
     }
 
-    /// The name of a link.
-    pub fn link_name(&self, link: usize) -> &str {
-        self.model
-            .as_ref()
-            .map_or("", |(model, _)| model.links()[link].name.as_str())
+    /// The points of the robot that are asked about; nothing where the robot or its efforts are not known.
+    pub fn into_points(self) -> Option<Points> {
+        self.points
     }
 }

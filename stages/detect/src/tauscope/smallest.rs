@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tauscope_bus::MAX_JOINTS;
 
 use super::learnt::{Learnt, pieces};
 use super::place::Place;
@@ -35,13 +36,16 @@ pub(crate) fn smallest(
     setup: &Setup,
     follow: Follow,
 ) -> Vec<Smallest> {
-    let mut place = Place::new(setup);
+    let place = Place::new(setup);
+    let per_nm = place.effort_per_nm().to_vec();
+    let Some(mut points) = place.into_points() else {
+        return Vec::new();
+    };
     let w = WINDOWS_S.len() - 1;
     let n = learnt.joints.len();
     // By link in order, the score of 1 N.
     let mut scores: Vec<(usize, Vec<f64>)> = Vec::new();
     let mut count = 0;
-    let per_nm = place.effort_per_nm().to_vec();
     learnt.each(&pieces(lessons, follow), follow, |sample, windows, _| {
         count += 1;
         if count % EVERY != 0 {
@@ -49,25 +53,29 @@ pub(crate) fn smallest(
         }
         let inverse = windows.inverse_correlation(w);
         let usual = learnt.windows[w].usual;
-        place.each_point(sample, n, |link, _, columns| {
-            let mut information = Vector3::<f64>::zeros();
-            for a in 0..n {
-                let row = columns[a] * (per_nm[a] / windows.noise(w, a));
-                for b in 0..n {
-                    let other = columns[b] * (per_nm[b] / windows.noise(w, b));
-                    information += row.component_mul(&other) * inverse[a * n + b];
-                }
-            }
-            let found = scores.iter_mut().position(|(of, _)| *of == link);
-            let at = found.unwrap_or_else(|| {
-                scores.push((link, Vec::new()));
+        points.each_link(sample, |_, link| {
+            let of_link = scores.iter().position(|(of, _)| *of == link.link);
+            let at = of_link.unwrap_or_else(|| {
+                scores.push((link.link, Vec::new()));
                 scores.len() - 1
             });
-            scores[at]
-                .1
-                .extend(information.iter().map(|score| score / usual));
+            for (arm, _) in link.around() {
+                let mut information = Vector3::<f64>::zeros();
+                let mut rows = [Vector3::zeros(); MAX_JOINTS];
+                for (a, row) in rows.iter_mut().enumerate().take(n) {
+                    *row = link.moved(a, &arm) * (per_nm[a] / windows.noise(w, a));
+                }
+                for a in 0..n {
+                    for b in 0..n {
+                        information += rows[a].component_mul(&rows[b]) * inverse[a * n + b];
+                    }
+                }
+                let score = information.iter().map(|score| score / usual);
+                scores[at].1.extend(score);
+            }
         });
     });
+    let points = &points;
     let of_link = |(link, mut scores): (usize, Vec<f64>)| {
         scores.sort_by(f64::total_cmp);
         // The force that does in this share of the cases: the others' score is below.
@@ -76,7 +84,7 @@ pub(crate) fn smallest(
             Some(scores[at].max(0.0).sqrt().recip()).filter(|force| *force < FELT_N)
         };
         Smallest {
-            link: place.link_name(link).to_owned(),
+            link: points.link_name(link).to_owned(),
             half_n: force(0.5),
             most_n: force(0.9),
         }

@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 pub(crate) const BLOCK_S: f64 = 1.0;
 /// Share of the blocks above the level from which the tail is told.
 const ABOVE: f64 = 0.15;
+/// Where too little was seen to tell a tail, its scale as a share of the largest score's root.
+const FEW: f64 = 0.25;
 /// Bounds of the tail's shape: 0 is exponential, above 0 the tail is heavier.
 const SHAPE: [f64; 2] = [0.0, 0.3];
 
@@ -60,6 +62,18 @@ impl Tail {
             per_hour: above as f64 / count.max(1) as f64 * 3600.0 / BLOCK_S,
             scale: (a0 * (1.0 - shape)).max(1e-9),
             shape,
+        }
+    }
+
+    /// From blocks that are too few to tell a tail: it is taken for exponential above the largest of them, or above what one of a
+    /// thousand samples exceeds (the unit of a score). A wish for false alarms is no more than a guess then.
+    pub(crate) fn of_few(blocks: &[f64]) -> Self {
+        let level = blocks.iter().fold(1.0, |a, b| f64::max(a, *b)).sqrt();
+        Self {
+            level,
+            per_hour: 3600.0 / BLOCK_S / blocks.len().max(1) as f64,
+            scale: FEW * level,
+            shape: 0.0,
         }
     }
 

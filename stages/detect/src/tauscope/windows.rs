@@ -3,15 +3,18 @@
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 
 use super::learnt::{Learnt, bin};
+use super::ring::Ring;
 
 /// Lengths of the windows \[s\].
 pub(crate) const WINDOWS_S: [f64; 3] = [0.01, 0.03, 0.1];
+/// The window that tells how a contact begins.
+pub(crate) const SHORTEST: usize = 0;
 /// The window that a contact is followed by.
 const MIDDLE: usize = 1;
+/// The window that tells what is usual just now.
+const LONGEST: usize = WINDOWS_S.len() - 1;
 /// How long a joint that was slow counts as slow \[s\].
 const SLOW_MEMORY_S: f64 = 0.3;
-/// Most samples of a window; after as many, sums are formed anew so that rounding does not add up.
-const CAPACITY: usize = 1024;
 
 /// How the slow part of a residual is had.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,12 +25,14 @@ pub(crate) struct Follow {
     pub offset_from_first_s: f64,
 }
 
+/// Most samples of a window.
+const CAPACITY: usize = 1024;
+
 /// Running means over each window.
 #[derive(Debug)]
 pub(crate) struct Means {
-    rows: Vec<(i64, JointArray)>,
-    /// Rows that have come in since the beginning, and the first of each window.
-    head: usize,
+    rows: Ring<CAPACITY>,
+    /// First row of each window.
     tails: [usize; WINDOWS_S.len()],
     sums: [JointArray; WINDOWS_S.len()],
     /// The slow part of the residual.
@@ -45,8 +50,7 @@ impl Means {
     /// For joints whose usual speeds go up to `fast` \[rad/s\].
     pub fn new(fast: JointArray, settings: Follow) -> Self {
         Self {
-            rows: vec![(0, [0.0; MAX_JOINTS]); CAPACITY],
-            head: 0,
+            rows: Ring::new(),
             tails: [0; WINDOWS_S.len()],
             sums: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
             offset: [0.0; MAX_JOINTS],
@@ -59,7 +63,7 @@ impl Means {
     }
 
     pub fn reset(&mut self) {
-        self.head = 0;
+        self.rows.reset();
         self.tails = [0; WINDOWS_S.len()];
         self.sums = [[0.0; MAX_JOINTS]; WINDOWS_S.len()];
         self.offset = [0.0; MAX_JOINTS];
@@ -67,24 +71,28 @@ impl Means {
 
     /// Whether the longest window is full, and the offset known.
     pub fn ready(&self) -> bool {
-        let newest = self.rows[(self.head.max(1) - 1) % CAPACITY].0;
+        let newest = self.newest_ns();
         let longest = WINDOWS_S[WINDOWS_S.len() - 1];
         (newest - self.start_ns) as f64 * 1e-9 >= longest.max(self.settings.offset_from_first_s)
+    }
+
+    fn newest_ns(&self) -> i64 {
+        self.rows.row(self.rows.count().max(1) - 1).0
     }
 
     /// Takes a sample; slow drift is followed if `follow`.
     pub fn push(&mut self, sample: &TwinState, follow: bool) {
         let n = sample.header.joint_count as usize;
         let now = sample.header.stamp_ns;
-        if self.head == 0 {
+        let is_first = self.rows.count() == 0;
+        if is_first {
             self.start_ns = now;
             self.slow = sample.velocity.map(f64::abs);
         }
-        let before = self.rows[(self.head.max(1) - 1) % CAPACITY].0;
-        let dt_s = if self.head == 0 {
+        let dt_s = if is_first {
             0.0
         } else {
-            (now - before) as f64 * 1e-9
+            (now - self.newest_ns()) as f64 * 1e-9
         };
         let since_s = (now - self.start_ns) as f64 * 1e-9;
         let first = since_s < self.settings.offset_from_first_s;
@@ -107,17 +115,17 @@ impl Means {
             let recovered = self.slow[j] + recovery * self.fast[j];
             self.slow[j] = recovered.min(sample.velocity[j].abs());
         }
-        self.rows[self.head % CAPACITY] = (now, row);
-        self.head += 1;
+        self.rows.push(now, &row);
+        let head = self.rows.count();
         for (w, length_s) in WINDOWS_S.iter().enumerate() {
             let sums = &mut self.sums[w][..n];
             for (sum, value) in sums.iter_mut().zip(&row) {
                 *sum += value;
             }
             let begin = now - (length_s * 1e9) as i64;
-            while self.tails[w] + 1 < self.head {
-                let (stamp, old) = &self.rows[self.tails[w] % CAPACITY];
-                if *stamp > begin && self.head - self.tails[w] < CAPACITY {
+            while self.tails[w] + 1 < head {
+                let (stamp, old) = self.rows.row(self.tails[w]);
+                if *stamp > begin && self.rows.is_kept(self.tails[w]) {
                     break;
                 }
                 for (sum, value) in sums.iter_mut().zip(old) {
@@ -126,7 +134,8 @@ impl Means {
                 self.tails[w] += 1;
             }
         }
-        if self.head.is_multiple_of(CAPACITY) {
+        // Rounding is not to add up.
+        if self.rows.is_round() {
             self.sum_anew(n);
         }
     }
@@ -134,8 +143,8 @@ impl Means {
     fn sum_anew(&mut self, n: usize) {
         for (sum, &tail) in self.sums.iter_mut().zip(&self.tails) {
             *sum = [0.0; MAX_JOINTS];
-            for k in tail..self.head {
-                let row = &self.rows[k % CAPACITY].1;
+            for k in tail..self.rows.count() {
+                let row = &self.rows.row(k).1;
                 for j in 0..n {
                     sum[j] += row[j];
                 }
@@ -145,7 +154,14 @@ impl Means {
 
     /// Mean residual of a joint over a window \[effort unit\].
     pub fn mean(&self, window: usize, joint: usize) -> f64 {
-        self.sums[window][joint] / (self.head - self.tails[window]).max(1) as f64
+        self.sums[window][joint] / (self.rows.count() - self.tails[window]).max(1) as f64
+    }
+
+    /// What the shortest window's mean was at this instant.
+    pub fn earlier(&self, to_ns: i64) -> JointArray {
+        // The window is open where it begins.
+        let from_ns = to_ns - (WINDOWS_S[SHORTEST] * 1e9) as i64 + 1;
+        self.rows.mean(from_ns, to_ns)
     }
 }
 
@@ -159,6 +175,8 @@ pub(crate) struct Windows {
     /// Mean residual of the contact that goes on, as it is followed, and of the one below it.
     held: JointArray,
     base: JointArray,
+    /// Mean residual when the score was usual last.
+    rest: JointArray,
     /// The window whose mean is most unusual.
     pub most: usize,
     /// How unusual: the newest score.
@@ -177,6 +195,7 @@ impl Windows {
             bins: [0; MAX_JOINTS],
             held: [0.0; MAX_JOINTS],
             base: [0.0; MAX_JOINTS],
+            rest: [0.0; MAX_JOINTS],
             most: 0,
             score: 0.0,
         }
@@ -236,14 +255,28 @@ impl Windows {
         self.means.mean(window, joint)
     }
 
-    /// The same less what a contact that goes on had before another came on top of it.
+    /// The same less what it was before the contact began, alone or on top of another.
     pub fn excess(&self, window: usize, joint: usize) -> f64 {
         self.mean(window, joint) - self.base[joint]
     }
 
+    /// Takes the residual for what it is without a contact.
+    pub fn rest(&mut self) {
+        self.rest = std::array::from_fn(|j| self.mean(LONGEST, j));
+    }
+
+    /// How the mean residual over the shortest window has changed since this instant \[effort unit\].
+    pub fn rise(&self, since_ns: i64) -> JointArray {
+        let mut rise = self.means.earlier(since_ns);
+        for (j, rise) in rise.iter_mut().enumerate().take(self.joints()) {
+            *rise = self.mean(SHORTEST, j) - *rise;
+        }
+        rise
+    }
+
     /// Begins to follow a contact, alone or on top of the one that goes on.
     pub fn begin(&mut self, on_top: bool) {
-        self.base = if on_top { self.held } else { [0.0; MAX_JOINTS] };
+        self.base = if on_top { self.held } else { self.rest };
         self.held = std::array::from_fn(|j| self.mean(MIDDLE, j));
     }
 

@@ -1,0 +1,160 @@
+//! When a contact is said to be there.
+
+use super::windows::Windows;
+
+/// An alarm ends where the score has stayed below this share of the threshold.
+const RELEASE: f64 = 0.35;
+/// For so long \[s\].
+const HOLD_S: f64 = 0.1;
+/// Another contact on top of one: the residual changes by this many times the threshold against what it has been, which is
+/// followed with this time constant, and grows (else it is a release); not sooner than this after the last alarm \[s\].
+const CHANGE: f64 = 2.0;
+/// Where no kinds are told apart, one contact may swell and still be one: the change must be this share of what it has been as well.
+const SWELL: f64 = 0.5;
+const FOLLOW_S: f64 = 0.15;
+const AGAIN_S: f64 = 0.25;
+/// Where kinds are told, the alarm waits so long for the force to show where it points \[s\].
+const DECIDE_S: f64 = 0.012;
+/// A score from this share of the threshold on may already belong to a contact.
+const LOW: f64 = 0.3;
+/// An alarm that lasts.
+#[derive(Debug)]
+#[allow(clippy::struct_field_names, reason = "a unit stands in each name")]
+struct Alarm {
+    contact_ns: i64,
+    raised_ns: i64,
+    newest_high_ns: i64,
+    newest_ns: i64,
+}
+
+/// Follows a score.
+#[derive(Debug)]
+pub(crate) struct Watch {
+    threshold: f64,
+    /// Whether kinds are told.
+    tells_kinds: bool,
+    alarm: Option<Alarm>,
+    /// Newest sample whose score was usual.
+    newest_low_ns: Option<i64>,
+    /// When the score rose above the threshold, while the alarm waits, or when another contact came on top.
+    waits_since_ns: Option<i64>,
+}
+
+fn ns(seconds: f64) -> i64 {
+    (seconds * 1e9) as i64
+}
+
+impl Watch {
+    pub fn new(threshold: f64, tells_kinds: bool) -> Self {
+        Self {
+            threshold,
+            tells_kinds,
+            alarm: None,
+            newest_low_ns: None,
+            waits_since_ns: None,
+        }
+    }
+
+    pub fn threshold(&self) -> f64 {
+        self.threshold
+    }
+
+    pub fn reset(&mut self) {
+        self.end();
+        self.newest_low_ns = None;
+    }
+
+    /// No contact is there.
+    pub fn end(&mut self) {
+        self.alarm = None;
+        self.waits_since_ns = None;
+    }
+
+    /// When the contact that is there began, if there is one.
+    pub fn contact_ns(&self) -> Option<i64> {
+        self.alarm.as_ref().map(|alarm| alarm.contact_ns)
+    }
+
+    /// When the alarm was raised that lasts.
+    pub fn raised_ns(&self) -> Option<i64> {
+        self.alarm.as_ref().map(|alarm| alarm.raised_ns)
+    }
+
+    /// Takes the next score; where an alarm is raised by it, says since when it has been on its way \[ns\].
+    pub fn step(&mut self, now_ns: i64, score: f64, windows: &mut Windows) -> Option<i64> {
+        let raised = if self.alarm.is_some() {
+            self.on_top(now_ns, score, windows)
+        } else {
+            self.out_of_rest(now_ns, score, windows)
+        };
+        if score < LOW * self.threshold || self.newest_low_ns.is_none() {
+            self.newest_low_ns = Some(now_ns);
+            windows.rest();
+        }
+        raised
+    }
+
+    /// Whether the alarm has waited long enough, if it is to wait.
+    fn decides(&mut self, now_ns: i64) -> Option<i64> {
+        let since_ns = *self.waits_since_ns.get_or_insert(now_ns);
+        let decides = !self.tells_kinds || now_ns - since_ns >= ns(DECIDE_S);
+        decides.then(|| {
+            self.waits_since_ns = None;
+            since_ns
+        })
+    }
+
+    fn out_of_rest(&mut self, now_ns: i64, score: f64, windows: &mut Windows) -> Option<i64> {
+        if score < self.threshold && self.waits_since_ns.is_none() {
+            return None;
+        }
+        if score < RELEASE * self.threshold {
+            self.waits_since_ns = None;
+            return None;
+        }
+        let since_ns = self.decides(now_ns)?;
+        let contact_ns = self.newest_low_ns.unwrap_or(now_ns);
+        self.raise(now_ns, contact_ns);
+        windows.begin(false);
+        Some(since_ns)
+    }
+
+    fn on_top(&mut self, now_ns: i64, score: f64, windows: &mut Windows) -> Option<i64> {
+        let alarm = self.alarm.as_mut()?;
+        if score >= RELEASE * self.threshold {
+            alarm.newest_high_ns = now_ns;
+        }
+        let dt_s = (now_ns - alarm.newest_ns) as f64 * 1e-9;
+        alarm.newest_ns = now_ns;
+        if now_ns - alarm.newest_high_ns >= ns(HOLD_S) {
+            self.end();
+            return None;
+        }
+        let rested = now_ns - alarm.raised_ns > ns(AGAIN_S);
+        let swell = if self.tells_kinds { 0.0 } else { SWELL };
+        let change = windows.change();
+        let waits = self.waits_since_ns.is_some() && change > RELEASE * CHANGE * self.threshold;
+        let again = rested
+            && score >= self.threshold
+            && windows.grows()
+            && change > (CHANGE * self.threshold).max(swell * windows.held());
+        if !(again || waits) {
+            self.waits_since_ns = None;
+            windows.hold(1.0 - (-dt_s / FOLLOW_S).exp());
+            return None;
+        }
+        let since_ns = self.decides(now_ns)?;
+        self.raise(now_ns, since_ns);
+        windows.begin(true);
+        Some(since_ns)
+    }
+
+    fn raise(&mut self, now_ns: i64, contact_ns: i64) {
+        self.alarm = Some(Alarm {
+            contact_ns,
+            raised_ns: now_ns,
+            newest_high_ns: now_ns,
+            newest_ns: now_ns,
+        });
+    }
+}
