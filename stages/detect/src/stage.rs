@@ -21,6 +21,8 @@ use crate::virtual_collision_sensor::Learnt;
 pub struct Setup {
     /// By joint in URDF order.
     pub joints: Vec<JointSetup>,
+    /// Their names: what was learnt by joint belongs to them.
+    pub joint_names: Vec<String>,
     /// The robot, where there is one: for the touched link and the force.
     pub model: Option<Model>,
     /// By detector, what its score did on contact-free data.

@@ -30,6 +30,7 @@ use tauscope_bus::{JointArray, MAX_JOINTS, TwinState, flags};
 use crate::config::ConfigError;
 use crate::detector::{Detector, Judgement, Seen, Verdict};
 use crate::lesson::{LearnError, Lessons};
+use crate::rate::Rate;
 use crate::stage::Setup;
 pub use kinds::Kinds;
 pub use learnt::{Learnt, LearntJoint, LearntWindow};
@@ -93,17 +94,12 @@ impl Default for Settings {
 /// The detector.
 ///
 /// # Errors
-/// If nothing has been learnt, or for a robot with another number of joints.
+/// If nothing has been learnt, or for a robot with other joints.
 pub(crate) fn build(settings: &Settings, setup: &Setup) -> Result<Box<dyn Detector>, ConfigError> {
     let Some(learnt) = &settings.learnt else {
         return Err(ConfigError::NotLearnt { detector: NAME });
     };
-    let joint_count = setup.joints.len();
-    if learnt.joints.len() != joint_count {
-        let reason = format!(
-            "is of a robot with {} joints, not {joint_count}",
-            learnt.joints.len()
-        );
+    if let Some(reason) = learnt.fault(&setup.joint_names) {
         return Err(ConfigError::LearntState {
             detector: NAME,
             reason,
@@ -121,7 +117,7 @@ pub fn learn(
     setup: &Setup,
     lessons: &Lessons<'_>,
 ) -> Result<Settings, LearnError> {
-    let mut learnt = Learnt::new(lessons, settings.follow())?;
+    let mut learnt = Learnt::new(lessons, &setup.joint_names, settings.follow())?;
     learnt.smallest = smallest::smallest(&learnt, lessons, setup, settings.follow());
     learnt.kinds = kinds::learn(&learnt, settings, setup, lessons);
     Ok(Settings {
@@ -154,6 +150,7 @@ impl Settings {
 }
 
 struct Tauscope {
+    rate: Rate,
     windows: Windows,
     place: Place,
     threshold: f64,
@@ -188,7 +185,12 @@ impl Detector for Tauscope {
         Some(self.threshold)
     }
 
+    fn fault(&self) -> Option<String> {
+        self.rate.fault()
+    }
+
     fn judge(&mut self, sample: &TwinState) -> Judgement {
+        self.rate.update(sample);
         if sample.header.has(flags::RESET) {
             self.windows.reset();
             self.alarm = None;
@@ -244,6 +246,7 @@ impl Detector for Tauscope {
 impl Tauscope {
     fn new(learnt: &Learnt, settings: &Settings, setup: &Setup) -> Self {
         Self {
+            rate: Rate::new(learnt.rate_hz),
             windows: Windows::new(learnt, settings.follow()),
             place: Place::new(setup),
             threshold: learnt.tail.threshold(settings.false_alarms_per_hour),

@@ -10,7 +10,9 @@ use super::kinds::Kinds;
 use super::smallest::Smallest;
 use super::tail::{BLOCK_S, Tail};
 use super::windows::{Follow, Means, WINDOWS_S, Windows};
+use crate::joints;
 use crate::lesson::{LearnError, Lesson, Lessons};
+use crate::rate;
 
 /// Where speeds are divided, as shares of a joint's usual highest speed.
 const EDGES: [f64; BINS - 1] = [0.02, 0.05, 0.12, 0.3];
@@ -39,6 +41,8 @@ const LEAST_SAMPLES: usize = 500;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Learnt {
+    /// Samples a second that it was learnt from.
+    pub rate_hz: f64,
     /// By joint in URDF order.
     pub joints: Vec<LearntJoint>,
     /// By window.
@@ -57,6 +61,8 @@ pub struct Learnt {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LearntJoint {
+    /// Its name.
+    pub name: String,
     /// Its usual highest speed \[rad/s\], by which speeds are classed.
     pub fast_rad_s: f64,
 }
@@ -85,16 +91,17 @@ impl Learnt {
     ///
     /// # Errors
     /// If they hold too little.
-    pub(crate) fn new(lessons: &Lessons<'_>, follow: Follow) -> Result<Self, LearnError> {
+    pub(crate) fn new(
+        lessons: &Lessons<'_>,
+        joint_names: &[String],
+        follow: Follow,
+    ) -> Result<Self, LearnError> {
         let all = pieces(lessons, follow);
         let count: usize = all.iter().map(|piece| free(piece).count()).sum();
-        let Some(first) = all.iter().find_map(|piece| piece.samples.first()) else {
-            return Err(too_little(0));
-        };
-        if count < LEAST_SAMPLES {
+        let rate_hz = rate::of(&[lessons.train, lessons.validation]);
+        let Some(rate_hz) = rate_hz.filter(|_| count >= LEAST_SAMPLES) else {
             return Err(too_little(count));
-        }
-        let n = first.header.joint_count as usize;
+        };
         let mut peaks = Vec::new();
         for fold in 0..FOLDS {
             let part = |held_out: bool| -> Vec<Piece<'_>> {
@@ -107,17 +114,19 @@ impl Learnt {
                 none if none.is_empty() => all.clone(),
                 others => others,
             };
-            peaks.extend(Self::usual(&others, n, follow).peaks(&part(true), follow));
+            peaks.extend(Self::usual(&others, joint_names, follow).peaks(&part(true), follow));
         }
-        let mut learnt = Self::usual(&all, n, follow);
+        let mut learnt = Self::usual(&all, joint_names, follow);
+        learnt.rate_hz = rate_hz;
         learnt.tail = Tail::new(peaks);
         Ok(learnt)
     }
 
-    /// What is usual in these pieces, without a tail.
-    fn usual(pieces: &[Piece<'_>], n: usize, follow: Follow) -> Self {
+    /// What is usual in these pieces, without rate and tail.
+    fn usual(pieces: &[Piece<'_>], joint_names: &[String], follow: Follow) -> Self {
         let mut learnt = Self {
-            joints: speeds(pieces, n),
+            rate_hz: 0.0,
+            joints: speeds(pieces, joint_names),
             windows: Vec::new(),
             tail: Tail {
                 level: 0.0,
@@ -132,6 +141,28 @@ impl Learnt {
         learnt.correlate(pieces, follow);
         learnt.measure_usual(pieces, follow);
         learnt
+    }
+
+    /// What is wrong with it for a robot with these joints, as a clause.
+    pub(super) fn fault(&self, joint_names: &[String]) -> Option<String> {
+        let found = self.joints.iter().map(|joint| &joint.name);
+        if let Some(reason) = joints::in_other_order(found, joint_names) {
+            return Some(reason);
+        }
+        let n = joint_names.len();
+        let fits = |window: &LearntWindow| {
+            window.inverse_correlation.len() == n * n
+                && window.noise.len() == n
+                && window.noise.iter().all(|noise| noise.len() == BINS)
+        };
+        let whole = self.windows.len() == WINDOWS_S.len() && self.windows.iter().all(fits);
+        if !whole {
+            let windows = WINDOWS_S.len();
+            return Some(format!(
+                "is not whole: it needs noise by {n} joints and {BINS} speeds for each of {windows} windows"
+            ));
+        }
+        (!(self.rate_hz > 0.0)).then(|| "has a rate that is not above 0".to_owned())
     }
 
     fn fast(&self) -> [f64; MAX_JOINTS] {
@@ -276,12 +307,13 @@ fn restart(means: &mut Means, sample: &TwinState) {
     }
 }
 
-fn speeds(all: &[Piece<'_>], n: usize) -> Vec<LearntJoint> {
-    (0..n)
-        .map(|j| {
+fn speeds(all: &[Piece<'_>], joint_names: &[String]) -> Vec<LearntJoint> {
+    (joint_names.iter().enumerate())
+        .map(|(j, name)| {
             let samples = all.iter().flat_map(|piece| piece.samples);
             let mut speeds: Vec<f64> = samples.map(|sample| sample.velocity[j].abs()).collect();
             LearntJoint {
+                name: name.clone(),
                 fast_rad_s: quantile(&mut speeds, FAST).max(LEAST_FAST_RAD_S),
             }
         })
