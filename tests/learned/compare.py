@@ -1,6 +1,6 @@
 """The five learned methods of Tajiri and Iwamoto written with PyTorch and scikit-learn, beside tauscope's, on one set.
 
-    compare.py SET.yaml EVALUATED [--detectors a,b] [--seeds 5] [--json OUT]
+    compare.py SET.yaml EVALUATED [--detectors a,b] [--seeds 5] [--keep FILE]
 
 EVALUATED is the folder of `tauscope evaluate SET.yaml --out EVALUATED --detectors ... --twin regression --json > EVALUATED/summary.json`.
 Taken from there: the twin's gains and offsets (twin.yaml) and every hyperparameter (learnt.yaml), and tauscope's own figures.
@@ -186,7 +186,8 @@ def judge(method, recordings, spec, labels):
 
 
 def spread(values):
-    values = [v for v in values if v is not None]
+    if not values:
+        return "-"
     return f"{np.mean(values):.3f}" + (f" ± {np.std(values):.3f}" if len(values) > 1 else "")
 
 
@@ -196,11 +197,15 @@ def main():
     parser.add_argument("evaluated")
     parser.add_argument("--detectors", default=",".join(METHODS))
     parser.add_argument("--seeds", type=int, default=5)
-    parser.add_argument("--json", help="write all figures here")
+    parser.add_argument("--keep", help="a file of this side's figures: what is in it is not computed anew")
     args = parser.parse_args()
     spec = yaml.safe_load(open(args.set))
     read = lambda name: yaml.safe_load(open(os.path.join(args.evaluated, name)))
-    twin, learnt, summary = read("twin.yaml"), read("learnt.yaml"), json.load(open(os.path.join(args.evaluated, "summary.json")))
+    twin, learnt = read("twin.yaml"), read("learnt.yaml")
+    summary = os.path.join(args.evaluated, "summary.json")
+    own = {d["detector"]: [(s["samples"]["auc"], s["samples"]["f1"]) for s in d["seeds"]]
+           for d in (json.load(open(summary))["detectors"] if os.path.exists(summary) else [])}
+    kept = json.load(open(args.keep)) if args.keep and os.path.exists(args.keep) else {}
     labels = json.load(open(os.path.join(os.path.dirname(args.set), spec["labels"])))
     for p in spec["train"] + spec["validation"]:
         if labels["recordings"][os.path.splitext(os.path.basename(p))[0]]["events"]:
@@ -209,21 +214,20 @@ def main():
     train = [recordings[os.path.splitext(os.path.basename(p))[0]] for p in spec["train"]]
     print(f"{sum(r.settled.sum() for r in train)} training samples", flush=True)
     print("| | ROC area, tauscope | ROC area, reference | F1, tauscope | F1, reference | training, reference [s] |\n" + "| --- " * 6 + "|")
-    rows = {}
     for name in args.detectors.split(","):
-        own = next(d for d in summary["detectors"] if d["detector"] == name)["seeds"]
-        figures, took = [], []
-        for seed in range(1 if name in EXACT else args.seeds):
+        seeds = kept.setdefault(name, [])
+        for seed in range(len(seeds), 1 if name in EXACT else args.seeds):
             method, began = METHODS[name](learnt[name][name]), time.time()
             method.train(train, seed)
-            took.append(time.time() - began)
-            figures.append(judge(method, recordings, spec, labels))
-        rows[name] = dict(tauscope=[(s["samples"]["auc"], s["samples"]["f1"]) for s in own], reference=figures)
-        cells = [spread([s["samples"]["auc"] for s in own]), spread([f[0] for f in figures]),
-                 spread([s["samples"]["f1"] for s in own]), spread([f[1] for f in figures]), f"{np.mean(took):.1f}"]
+            took = time.time() - began
+            area_, f1_ = judge(method, recordings, spec, labels)
+            seeds.append(dict(auc=float(area_), f1=float(f1_), training_s=took))
+            if args.keep:
+                json.dump(kept, open(args.keep, "w"), indent=1)
+        ours = own.get(name, [])
+        cells = [spread([s[0] for s in ours]), spread([s["auc"] for s in seeds]), spread([s[1] for s in ours]),
+                 spread([s["f1"] for s in seeds]), f"{np.mean([s['training_s'] for s in seeds]):.1f}"]
         print(f"| `{name}` | " + " | ".join(cells) + " |", flush=True)
-    if args.json:
-        json.dump(rows, open(args.json, "w"), indent=1, default=float)
 
 
 main()

@@ -94,8 +94,16 @@ pub(crate) fn tracks(
         detector,
         missing: missing.to_owned(),
     };
-    if lessons.train.iter().any(|lesson| lesson.contacts.is_none()) {
-        return Err(unlabelled("training recordings have no labels"));
+    let lacking = lessons
+        .train
+        .iter()
+        .filter(|lesson| lesson.contacts.is_none());
+    let lacking: Vec<&str> = lacking.map(|lesson| lesson.name.as_str()).collect();
+    if !lacking.is_empty() {
+        let names = lacking.join(", ");
+        return Err(unlabelled(&format!(
+            "the training recordings {names} have no labels"
+        )));
     }
     let mut fault = None;
     let mut run = |lesson: &Lesson| {

@@ -156,7 +156,7 @@ impl Stage<TwinState, Detection> for Detect {
         let judgement = self.detector.judge(sample);
         if let Some(fault) = self.detector.fault() {
             let detector = self.detector.name();
-            return Err(StageError::failed(format!("{detector}: {fault}")));
+            return Err(StageError::Unfit(format!("{detector}: {fault}")));
         }
         let stamp_ns = sample.header.stamp_ns;
         let score = judgement.ready.then_some(judgement.score);
