@@ -3,8 +3,9 @@
 //! [`virtual_collision_sensor_basic`](crate::virtual_collision_sensor_basic).
 //!
 //! It needs the measured and the expected effort alone, whoever computed that: no URDF. Per joint the
-//! residue |R| (equation 1) is held against the threshold `S_coll = α (m + Coll_bias)` (equations 4
-//! and 17), with the estimated model error m (equations 7 to 11) and the bias, which is learnt and
+//! residue |R| (equation 1) is held against the threshold `S_coll = α (m + Coll_bias) + ν` (equations 4
+//! and 17), with the estimated model error m (equations 7 to 11), what measurement noise may add (ν, not in the
+//! paper) and the bias, which is learnt and
 //! adapts once somebody asks for it (equations 12 to 16). A machine of five states tells when a
 //! collision is possible; in its safe state, Moving, nothing is tested. The score is the largest
 //! `|R_i| / S_coll_i` among the joints that are tested.
@@ -21,6 +22,7 @@ mod joint;
 mod learnt;
 mod lessons;
 mod model_error;
+mod noise;
 mod phase;
 mod sensor;
 mod trend;

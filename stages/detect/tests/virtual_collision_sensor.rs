@@ -272,8 +272,9 @@ fn remark_4_at_worst_alpha_less_one_is_lost() {
     let without = run(&mut detect(&basic()), &samples);
     let with = run(&mut detect(&adaptive_with(worst)), &samples);
     for (without, with) in without.iter().zip(&with) {
-        // Both scores are |R| over the threshold.
-        assert!((without.score - 1.1 * with.score).abs() < 1e-9);
+        // Both scores are |R| over the threshold, of which α does not raise the part that is left to noise.
+        assert!(with.score <= without.score + 1e-9);
+        assert!(without.score <= 1.1 * with.score + 1e-9);
     }
 }
 

@@ -1,0 +1,128 @@
+//! How much of the residue is measurement noise, whatever the model knows: the threshold stays so far above the model
+//! error that noise alone does not reach it in weeks.
+
+use tauscope_dynamics::lowpass::Butterworth2;
+
+/// Standard deviations that noise may make of a residue. What is Gaussian, behind a low-pass of 15 Hz, reaches
+/// more on top of what was learnt once in some thousand cycles.
+const SIGMAS: f64 = 4.0;
+/// Memory of the estimate \[s\].
+const MEMORY_S: f64 = 10.0;
+/// A second difference counts as no more than this many of its standard deviations: a collision is no noise.
+const CLIP: f64 = 3.0;
+/// Samples that count in full, for there is nothing yet to hold them against.
+const FIRST: u32 = 50;
+/// The variance of a second difference of white noise is this many times that of the noise.
+const SECOND_DIFFERENCE: f64 = 6.0;
+
+/// The noise of one joint's currents, from second differences of what the model leaves: what is smooth, be it a
+/// constant, a ramp or a model error, leaves none.
+#[derive(Debug, Clone)]
+pub(super) struct MeasurementNoise {
+    /// The low-pass's noise bandwidth \[Hz\].
+    bandwidth_hz: f64,
+    /// The two errors before, newest first.
+    before: [f64; 2],
+    /// Steps since the start.
+    steps: u32,
+    /// Mean square of second differences, and the mean step \[s\].
+    square: f64,
+    step_s: f64,
+    /// `SIGMAS` standard deviations behind the low-pass \[effort unit\].
+    margin: f64,
+}
+
+impl MeasurementNoise {
+    /// Behind a low-pass of this cutoff.
+    pub fn new(cutoff_hz: f64) -> Self {
+        Self {
+            bandwidth_hz: Butterworth2::NOISE_BANDWIDTH * cutoff_hz,
+            before: [0.0; 2],
+            steps: 0,
+            square: 0.0,
+            step_s: 0.0,
+            margin: 0.0,
+        }
+    }
+
+    /// Forgets what it has seen of the signals; how noisy they are it knows still.
+    pub fn reset(&mut self, error: f64) {
+        self.before = [error; 2];
+    }
+
+    /// Takes the next difference of measured and expected current, `dt_s` after the one before, and gives what noise
+    /// may make of the residue \[effort unit\].
+    pub fn update(&mut self, dt_s: f64, error: f64) -> f64 {
+        if dt_s <= 0.0 {
+            return self.margin;
+        }
+        let [newest, oldest] = self.before;
+        self.before = [error, newest];
+        let difference = error - 2.0 * newest + oldest;
+        let mut square = difference * difference;
+        if self.steps >= FIRST {
+            square = square.min(CLIP * CLIP * self.square);
+        } else {
+            self.steps += 1;
+        }
+        let share = (dt_s / MEMORY_S).max(1.0 / f64::from(self.steps)).min(1.0);
+        self.square += share * (square - self.square);
+        self.step_s += share * (dt_s - self.step_s);
+        // Of white noise that much of the band up to half the rate passes.
+        let passes = (2.0 * self.bandwidth_hz * self.step_s).min(1.0);
+        self.margin = SIGMAS * (self.square / SECOND_DIFFERENCE * passes).sqrt();
+        self.margin
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CUTOFF_HZ: f64 = 15.0;
+
+    /// Even noise of standard deviation 1.
+    fn noise() -> impl FnMut() -> f64 {
+        let mut state = 5_u64;
+        move || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            let even = (state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5;
+            even * 12.0_f64.sqrt()
+        }
+    }
+
+    #[test]
+    fn it_is_what_the_lowpass_leaves_of_white_noise() {
+        let (mut estimate, mut lowpass) = (
+            MeasurementNoise::new(CUTOFF_HZ),
+            Butterworth2::new(CUTOFF_HZ),
+        );
+        let (mut noise, mut margin) = (noise(), 0.0);
+        let (mut squares, count) = (0.0, 100_000);
+        for k in 0..count {
+            let x = noise();
+            // A ramp, and a jump as of a collision, are no noise.
+            let jump = if k > 50_000 { 20.0 } else { 0.0 };
+            margin = estimate.update(0.002, x + 0.01 * f64::from(k) + jump);
+            squares += lowpass.update(0.002, x).powi(2);
+        }
+        let sigma = (squares / f64::from(count)).sqrt();
+        assert!(
+            (margin / (SIGMAS * sigma) - 1.0).abs() < 0.05,
+            "{margin} {sigma}"
+        );
+    }
+
+    #[test]
+    fn without_noise_there_is_none_and_repeated_stamps_change_nothing() {
+        let mut estimate = MeasurementNoise::new(CUTOFF_HZ);
+        estimate.reset(3.0);
+        for _ in 0..100 {
+            assert!(estimate.update(0.002, 3.0) < 1e-12);
+        }
+        let margin = estimate.update(0.0, 50.0);
+        assert!((estimate.update(0.002, 3.0) - margin).abs() < 1e-12);
+    }
+}
