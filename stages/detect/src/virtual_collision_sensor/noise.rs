@@ -45,9 +45,11 @@ impl MeasurementNoise {
         }
     }
 
-    /// Forgets what it has seen of the signals; how noisy they are it knows still.
+    /// Starts anew at this difference of measured and expected current.
     pub fn reset(&mut self, error: f64) {
         self.before = [error; 2];
+        self.steps = 0;
+        (self.square, self.step_s, self.margin) = (0.0, 0.0, 0.0);
     }
 
     /// Takes the next difference of measured and expected current, `dt_s` after the one before, and gives what noise
