@@ -10,8 +10,9 @@ const SIGMAS: f64 = 4.0;
 const MEMORY_S: f64 = 10.0;
 /// A second difference counts as no more than this many of its standard deviations: a collision is no noise.
 const CLIP: f64 = 3.0;
-/// Samples that count in full, for there is nothing yet to hold them against.
-const FIRST: u32 = 50;
+/// Samples that are gathered before the estimate is brought up to date; the first of them count in full, for there is
+/// nothing yet to hold them against.
+const BLOCK: u32 = 16;
 /// The variance of a second difference of white noise is this many times that of the noise.
 const SECOND_DIFFERENCE: f64 = 6.0;
 
@@ -23,12 +24,16 @@ pub(super) struct MeasurementNoise {
     bandwidth_hz: f64,
     /// The two errors before, newest first.
     before: [f64; 2],
-    /// Steps since the start.
-    steps: u32,
-    /// Mean square of second differences, and the mean step \[s\].
+    /// Of the block that is being gathered: squares of second differences, time \[s\], samples.
+    sum: f64,
+    block_s: f64,
+    count: u32,
+    /// Time since the start \[s\].
+    elapsed_s: f64,
+    /// Mean square of second differences, and the largest that still counts in full.
     square: f64,
-    step_s: f64,
-    /// `SIGMAS` standard deviations behind the low-pass \[effort unit\].
+    most: f64,
+    /// [`SIGMAS`] standard deviations behind the low-pass \[effort unit\].
     margin: f64,
 }
 
@@ -38,9 +43,12 @@ impl MeasurementNoise {
         Self {
             bandwidth_hz: Butterworth2::NOISE_BANDWIDTH * cutoff_hz,
             before: [0.0; 2],
-            steps: 0,
+            sum: 0.0,
+            block_s: 0.0,
+            count: 0,
+            elapsed_s: 0.0,
             square: 0.0,
-            step_s: 0.0,
+            most: f64::INFINITY,
             margin: 0.0,
         }
     }
@@ -48,12 +56,14 @@ impl MeasurementNoise {
     /// Starts anew at this difference of measured and expected current.
     pub fn reset(&mut self, error: f64) {
         self.before = [error; 2];
-        self.steps = 0;
-        (self.square, self.step_s, self.margin) = (0.0, 0.0, 0.0);
+        (self.sum, self.block_s, self.count) = (0.0, 0.0, 0);
+        (self.elapsed_s, self.square, self.margin) = (0.0, 0.0, 0.0);
+        self.most = f64::INFINITY;
     }
 
     /// Takes the next difference of measured and expected current, `dt_s` after the one before, and gives what noise
     /// may make of the residue \[effort unit\].
+    #[inline]
     pub fn update(&mut self, dt_s: f64, error: f64) -> f64 {
         if dt_s <= 0.0 {
             return self.margin;
@@ -61,19 +71,25 @@ impl MeasurementNoise {
         let [newest, oldest] = self.before;
         self.before = [error, newest];
         let difference = error - 2.0 * newest + oldest;
-        let mut square = difference * difference;
-        if self.steps >= FIRST {
-            square = square.min(CLIP * CLIP * self.square);
-        } else {
-            self.steps += 1;
+        self.sum += (difference * difference).min(self.most);
+        self.block_s += dt_s;
+        self.count += 1;
+        if self.count == BLOCK {
+            self.take_block();
         }
-        let share = (dt_s / MEMORY_S).max(1.0 / f64::from(self.steps)).min(1.0);
-        self.square += share * (square - self.square);
-        self.step_s += share * (dt_s - self.step_s);
-        // Of white noise that much of the band up to half the rate passes.
-        let passes = (2.0 * self.bandwidth_hz * self.step_s).min(1.0);
-        self.margin = SIGMAS * (self.square / SECOND_DIFFERENCE * passes).sqrt();
         self.margin
+    }
+
+    fn take_block(&mut self) {
+        let count = f64::from(BLOCK);
+        self.elapsed_s += self.block_s;
+        let share = (self.block_s / self.elapsed_s.min(MEMORY_S)).min(1.0);
+        self.square += share * (self.sum / count - self.square);
+        self.most = CLIP * CLIP * self.square;
+        // Of white noise that much of the band up to half the rate passes.
+        let passes = (2.0 * self.bandwidth_hz * self.block_s / count).min(1.0);
+        self.margin = SIGMAS * (self.square / SECOND_DIFFERENCE * passes).sqrt();
+        (self.sum, self.block_s, self.count) = (0.0, 0.0, 0);
     }
 }
 
