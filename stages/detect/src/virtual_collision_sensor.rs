@@ -187,14 +187,11 @@ pub fn learn(
     let joint_count = setup.joints.len();
     let needed = lessons::needed(NAME, settings.tuning(), joint_count, lessons.train)?;
     let mut learnt = settings.clone();
-    match &settings.bias {
-        Some(bias) => {
-            first_bias(NAME, Some(bias), setup)?;
-        }
-        None => {
-            let values = needed.iter().map(lessons::Needed::first_bias);
-            learnt.bias = Some(FirstBias::named(&setup.joint_names, values));
-        }
+    if settings.bias.is_some() {
+        first_bias(NAME, settings.bias.as_ref(), setup)?;
+    } else {
+        let values = needed.iter().map(lessons::Needed::first_bias);
+        learnt.bias = Some(FirstBias::named(&setup.joint_names, values));
     }
     let joints = needed.iter().map(|needed| LearntJoint {
         ident: needed.ident,

@@ -162,7 +162,8 @@ impl Learnt {
                 "is not whole: it needs noise by {n} joints and {BINS} speeds for each of {windows} windows"
             ));
         }
-        (!(self.rate_hz > 0.0)).then(|| "has a rate that is not above 0".to_owned())
+        let is_rate = self.rate_hz > 0.0;
+        (!is_rate).then(|| "has a rate that is not above 0".to_owned())
     }
 
     fn fast(&self) -> [f64; MAX_JOINTS] {
