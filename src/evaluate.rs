@@ -18,6 +18,7 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use tauscope_bus::StageError;
 use tauscope_detect::{LearnError, Lesson, Lessons};
 
 use self::heard::Heard;
@@ -235,24 +236,7 @@ impl Evaluation {
             let results = in_parallel(request.jobs, runners.iter_mut().collect(), |runner| {
                 runner.pass(recording, samples, joints)
             });
-            let mut results = results.into_iter();
-            let mut faults = Vec::new();
-            runners.retain(|runner| match results.next() {
-                Some(Err(source)) => {
-                    faults.push((runner.entry.name, source));
-                    false
-                }
-                _ => true,
-            });
-            for (detector, source) in faults {
-                if request.explicit || runners.is_empty() {
-                    return Err(failed(recording, source.into()));
-                }
-                notes.push(format!(
-                    "{detector} is left out: {}: {source}",
-                    recording.name
-                ));
-            }
+            leave_out_failed(&mut runners, results, recording, request, &mut notes)?;
             let share = LEARNT + (1.0 - LEARNT) * (at + 1) as f64 / count;
             progress(share, &format!("{name}: {}", recording.name));
         }
@@ -276,6 +260,39 @@ impl Evaluation {
         self.twins.push(twin);
         Ok(())
     }
+}
+
+/// Leaves out the detectors that could not judge `recording`, and notes why; one that was asked for by name is an
+/// error, and so is that none is left.
+fn leave_out_failed(
+    runners: &mut Vec<Runner>,
+    results: Vec<Result<(), StageError>>,
+    recording: &Named,
+    request: &Request,
+    notes: &mut Vec<String>,
+) -> Result<(), EvaluateError> {
+    let mut results = results.into_iter();
+    let mut faults = Vec::new();
+    runners.retain(|runner| match results.next() {
+        Some(Err(source)) => {
+            faults.push((runner.entry.name, source));
+            false
+        }
+        _ => true,
+    });
+    for (detector, source) in faults {
+        if request.explicit || runners.is_empty() {
+            return Err(EvaluateError::Recording {
+                recording: recording.path.display().to_string(),
+                source: source.into(),
+            });
+        }
+        notes.push(format!(
+            "{detector} is left out: {}: {source}",
+            recording.name
+        ));
+    }
+    Ok(())
 }
 
 /// Lets every detector learn. Those that cannot are noted, unless somebody asked for just them.
