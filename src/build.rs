@@ -188,6 +188,7 @@ pub fn detect_setup(
         });
     Ok(tauscope_detect::Setup {
         joints: joints.collect(),
+        joint_names: cell.facts.joint_names.clone(),
         model: cell.model.clone(),
         scores: scores.collect(),
         tool_link: cell.tool_link(),

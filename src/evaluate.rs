@@ -1,6 +1,7 @@
 //! `tauscope evaluate`: trains, thresholds and scores detectors on a labelled set.
 
 mod files;
+mod heard;
 mod html;
 mod input;
 mod judged;
@@ -17,8 +18,10 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use tauscope_bus::StageError;
 use tauscope_detect::{LearnError, Lesson, Lessons};
 
+use self::heard::Heard;
 use self::input::{Named, Role};
 use self::registry::{Entry, SEEDS, Task};
 use self::runner::Runner;
@@ -57,6 +60,14 @@ pub enum EvaluateError {
     NothingToFit {
         /// The twin.
         twin: String,
+    },
+    /// A recording of motion alone.
+    #[error(
+        "{recording}: no joint state holds efforts, and without them there is nothing to detect; leave it out of the set, or record it with efforts"
+    )]
+    NoEffort {
+        /// The recording.
+        recording: String,
     },
     /// Every sample is in a contact, or before the filters have settled.
     #[error(
@@ -134,7 +145,9 @@ pub fn run(
     progress: &Progress<'_>,
 ) -> Result<Evaluation, EvaluateError> {
     let mut evaluation = Evaluation {
-        notes: request.notes.clone(),
+        notes: (request.notes.iter().cloned())
+            .chain(heard::unlabelled(&request))
+            .collect(),
         twins: Vec::new(),
         runs: Vec::new(),
         lost: 0,
@@ -183,7 +196,7 @@ impl Evaluation {
             let played = session
                 .play(recording, &mut |_| progress(FITTED, &what))
                 .map_err(|source| failed(recording, source))?;
-            heard.add(recording, &played);
+            heard.add(recording, &played)?;
             lessons.push(session::lesson(recording, played.samples));
         }
         let measured: &[Lesson] = if validation.is_empty() {
@@ -196,7 +209,7 @@ impl Evaluation {
             train: &train,
             validation: &validation,
         };
-        let (mut runners, notes) = learn(request, &twin, lessons, out, &|share, what| {
+        let (mut runners, mut notes) = learn(request, &twin, lessons, out, &|share, what| {
             progress(
                 FITTED + (LEARNT - FITTED) * share,
                 &format!("{name}: {what}"),
@@ -214,7 +227,7 @@ impl Evaluation {
                     played = session
                         .play(recording, &mut |_| {})
                         .map_err(|source| failed(recording, source))?;
-                    heard.add(recording, &played);
+                    heard.add(recording, &played)?;
                     Some(&played.samples)
                 }
             };
@@ -223,9 +236,7 @@ impl Evaluation {
             let results = in_parallel(request.jobs, runners.iter_mut().collect(), |runner| {
                 runner.pass(recording, samples, joints)
             });
-            for result in results {
-                result.map_err(|source| failed(recording, source.into()))?;
-            }
+            leave_out_failed(&mut runners, results, recording, request, &mut notes)?;
             let share = LEARNT + (1.0 - LEARNT) * (at + 1) as f64 / count;
             progress(share, &format!("{name}: {}", recording.name));
         }
@@ -251,32 +262,37 @@ impl Evaluation {
     }
 }
 
-/// What was odd in the recordings.
-#[derive(Debug, Default)]
-struct Heard {
-    lost: u64,
-    notes: Vec<String>,
-}
-
-impl Heard {
-    fn add(&mut self, recording: &Named, played: &session::Played) {
-        let name = &recording.name;
-        self.lost += played.lost;
-        if played.lost > 0 {
-            self.notes.push(format!(
-                "{name}: {} samples were lost or refused",
-                played.lost
-            ));
+/// Leaves out the detectors that could not judge `recording`, and notes why; one that was asked for by name is an
+/// error, and so is that none is left.
+fn leave_out_failed(
+    runners: &mut Vec<Runner>,
+    results: Vec<Result<(), StageError>>,
+    recording: &Named,
+    request: &Request,
+    notes: &mut Vec<String>,
+) -> Result<(), EvaluateError> {
+    let mut results = results.into_iter();
+    let mut faults = Vec::new();
+    runners.retain(|runner| match results.next() {
+        Some(Err(source)) => {
+            faults.push((runner.entry.name, source));
+            false
         }
-        if played.gaps > 0 {
-            self.notes.push(format!(
-                "{name}: {} gap(s) in time; {} of {} samples passed over while the filters settled",
-                played.gaps,
-                played.unsettled,
-                played.samples.len()
-            ));
+        _ => true,
+    });
+    for (detector, source) in faults {
+        if request.explicit || runners.is_empty() {
+            return Err(EvaluateError::Recording {
+                recording: recording.path.display().to_string(),
+                source: source.into(),
+            });
         }
+        notes.push(format!(
+            "{detector} is left out: {}: {source}",
+            recording.name
+        ));
     }
+    Ok(())
 }
 
 /// Lets every detector learn. Those that cannot are noted, unless somebody asked for just them.

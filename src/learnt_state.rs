@@ -95,7 +95,7 @@ mod tests {
     use std::path::Path;
 
     use tauscope_bus::{Header, LinkError, flags};
-    use tauscope_detect::virtual_collision_sensor::Settings;
+    use tauscope_detect::virtual_collision_sensor::{FirstBias, Settings};
     use tauscope_detect::{JointSetup, Setup};
 
     use super::*;
@@ -112,7 +112,7 @@ mod tests {
     fn kept(path: &Path) -> Kept {
         let mut config = Config {
             virtual_collision_sensor: Some(Settings {
-                bias: Some(vec![1.0]),
+                bias: Some(FirstBias::InOrder(vec![1.0])),
                 state: Some(path.to_owned()),
                 ..Settings::default()
             }),
@@ -127,6 +127,7 @@ mod tests {
         };
         let setup = Setup {
             joints: vec![joint],
+            joint_names: vec!["elbow".to_owned()],
             ..Setup::default()
         };
         Kept::new(Detect::new(&config, setup).unwrap(), Some(path.to_owned()))
@@ -153,7 +154,7 @@ mod tests {
         assert!(!path.exists());
         first.finish(&mut Nowhere).unwrap();
         let learnt = first.stage.learnt().unwrap();
-        assert!(learnt.joints[0].ident > 0.0);
+        assert!(learnt.joints["elbow"].ident > 0.0);
         assert_eq!(kept(&path).stage.learnt().unwrap(), learnt);
     }
 
@@ -161,7 +162,7 @@ mod tests {
     fn a_file_that_holds_something_else_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("learnt.yaml");
-        std::fs::write(&path, "joints: [{ident: much}]\n").unwrap();
+        std::fs::write(&path, "joints: {elbow: {ident: much}}\n").unwrap();
         let mut config = Config {
             virtual_collision_sensor: Some(Settings {
                 state: Some(path),

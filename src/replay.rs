@@ -390,9 +390,14 @@ fn members(pipeline: &Pipeline, source: &Stage) -> Vec<usize> {
 fn file_config(config: &tauscope_ingest::Config, recording: &Path) -> tauscope_ingest::FileConfig {
     let topics = (config.file.as_ref().map(|file| &file.topics))
         .or_else(|| config.zenoh.as_ref().map(|zenoh| &zenoh.topics));
+    // What a simulated cell was asked for is in its archive, too.
+    let simulated = || tauscope_ingest::Topics {
+        learn: Some("/learn".to_owned()),
+        ..tauscope_ingest::Topics::default()
+    };
     tauscope_ingest::FileConfig {
         path: recording.to_owned(),
-        topics: topics.cloned().unwrap_or_default(),
+        topics: topics.cloned().unwrap_or_else(simulated),
     }
 }
 

@@ -74,7 +74,8 @@ pub fn write(
         Ok(std::fs::write(&path, trained.to_bytes()?)?)
     };
     match write() {
-        Ok(()) => Ok(path),
+        // Absolute: what names it is copied into pipeline files that lie anywhere.
+        Ok(()) => Ok(std::path::absolute(&path).unwrap_or(path)),
         Err(error) => Err(LearnError::NotKept {
             path,
             reason: error.to_string(),

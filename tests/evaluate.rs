@@ -5,62 +5,16 @@
 
 mod common;
 
-use std::collections::BTreeMap;
+#[path = "common/labelled_set.rs"]
+mod labelled_set;
+
 use std::path::{Path, PathBuf};
 
-use common::{Out, bundled, shared, skipped, tauscope, write};
+use common::{bundled, shared, skipped, write};
+use labelled_set::{Set, changed, evaluate};
 use serde_json::Value;
-use tauscope_archive::ros::JointState;
-use tauscope_archive::{Compression, McapWriter, Recording};
 
-const STATES: &str = "/joint_states";
 const LIGHT: [&str; 2] = ["--detectors", "naive_difference,twin_regression"];
-
-/// What a set is made of; recordings without a folder are the bundled ones.
-struct Set {
-    labels: Option<PathBuf>,
-    validation: PathBuf,
-    test: PathBuf,
-}
-
-impl Default for Set {
-    fn default() -> Self {
-        Self {
-            labels: Some(bundled().join("labels.json")),
-            validation: bundled().join("demo_validation.mcap"),
-            test: bundled().join("demo.mcap"),
-        }
-    }
-}
-
-impl Set {
-    fn write(&self, folder: &Path) -> PathBuf {
-        let data = bundled();
-        let labels = self.labels.as_ref();
-        let labels = labels.map_or_else(String::new, |l| format!("labels: {}\n", l.display()));
-        let text = format!(
-            "set: hands\nrobot: {robot}\n{labels}topics: {{state: /joint_states, contact: /contact}}\n\
-             train: [{points}, {sweep}]\nvalidation: [{validation}]\ntest: [{test}]\n",
-            robot = data.join("demo_arm.urdf").display(),
-            points = data.join("demo_train_points.mcap").display(),
-            sweep = data.join("demo_train_sweep.mcap").display(),
-            validation = self.validation.display(),
-            test = self.test.display(),
-        );
-        write(&folder.join("set.yaml"), &text)
-    }
-}
-
-fn evaluate(set: &Path, out: &Path, more: &[&str]) -> Out {
-    let mut command = tauscope();
-    command
-        .arg("evaluate")
-        .arg(set)
-        .arg("--out")
-        .arg(out)
-        .args(more);
-    Out::of(command)
-}
 
 /// The same with `--json`, which must have gone well.
 fn summary(set: &Path, out: &Path, more: &[&str]) -> Value {
@@ -77,31 +31,6 @@ fn numbers<'a>(summary: &'a Value, detector: &str) -> &'a Value {
 
 fn json(path: &Path) -> Value {
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
-}
-
-/// A copy of a bundled recording whose joint states went through `change`; those it says `false` to are gone.
-fn changed(
-    folder: &Path,
-    name: &str,
-    mut change: impl FnMut(usize, &mut JointState) -> bool,
-) -> PathBuf {
-    let recording = Recording::open(bundled().join(name)).unwrap();
-    let path = folder.join(name);
-    let mut writer = McapWriter::create(&path, Compression::None, &BTreeMap::new()).unwrap();
-    let topic = writer.add_topic::<JointState>(STATES).unwrap();
-    let mut states = recording.joint_states(STATES).unwrap();
-    let mut row = 0;
-    while let Some(state) = states.next_state() {
-        let state = state.unwrap();
-        let mut message = state.message.clone();
-        if change(row, &mut message) {
-            let at = state.log_time_ns;
-            writer.write(topic, at, at, &message).unwrap();
-        }
-        row += 1;
-    }
-    writer.finish().unwrap();
-    path
 }
 
 #[test]

@@ -22,9 +22,12 @@ pub enum StageError {
     /// The link it writes to failed.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// What it reads from or writes to failed, or its input is not what it was configured for.
+    /// What it reads from or writes to failed.
     #[error("{0}")]
     Failed(#[source] Box<dyn std::error::Error + Send + Sync>),
+    /// Its input is not what it was configured for: it would fail again however often it is started.
+    #[error("{0}")]
+    Unfit(String),
 }
 
 impl StageError {

@@ -39,6 +39,9 @@ struct Step {
 }
 
 impl Butterworth2 {
+    /// Of white noise it passes as much as an ideal low-pass at this many times its cutoff: π / (2 √2).
+    pub const NOISE_BANDWIDTH: f64 = PI / (2.0 * SQRT_2);
+
     /// A filter with its -3 dB point at `cutoff_hz`. Until [`Butterworth2::reset`] its first sample
     /// sets its state.
     ///

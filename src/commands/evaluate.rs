@@ -65,7 +65,8 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
         if error.is_input() {
             Failure::rejected(error.to_string())
         } else {
-            Failure::Failed(error.into())
+            // Its text holds what caused it.
+            Failure::Failed(anyhow::Error::msg(error.to_string()))
         }
     })?;
     progress.doing(1.0, "writing");

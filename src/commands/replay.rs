@@ -244,12 +244,15 @@ fn table(outcomes: &[Outcome]) -> String {
             let _ = writeln!(text, "{}", rms_table(outcome, &twin.rms()));
         }
         for detector in &outcome.detectors {
-            let _ = writeln!(
-                text,
-                "  {}: {} events",
-                detector.detector,
-                detector.events.len()
-            );
+            let (name, events) = (&detector.detector, detector.events.len());
+            if detector.judged == 0 {
+                let _ = writeln!(
+                    text,
+                    "  {name}: judged no sample: there were no efforts, or the filters never settled"
+                );
+                continue;
+            }
+            let _ = writeln!(text, "  {name}: {events} events");
             for event in &detector.events {
                 let line = event_line(event, &outcome.effort_unit);
                 let _ = writeln!(text, "    {line}");

@@ -381,6 +381,12 @@ fn twin_file(path: &Path, cell: &Cell) -> Result<TwinFile, Report> {
     }
     let file: Located<TwinFile> = yaml::load(path)?;
     let facts = &cell.facts;
+    if let Some(robot) = &cell.model
+        && let Some(title) = file.value.made_for_other(robot.name())
+    {
+        let help = "calibrate one for this robot: `tauscope calibrate`, or --twin regression";
+        return Err(Problem::of_file(path, title).help(help).into());
+    }
     (file.value)
         .resolve(&facts.joint_names, facts.effort_unit.as_str())
         .map_err(|error| Problem::of_file(path, error.to_string()))?;

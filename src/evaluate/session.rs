@@ -1,6 +1,7 @@
 //! The recordings of a set behind one twin, one after the other as one session: what a twin or a
 //! detector has learnt of the arm (how warm it is, what its cycle looks like) it keeps from one to the next.
 
+use tauscope_archive::Damage;
 use tauscope_bus::{Emit, LinkError, Sample, Source as _, Stage as _, TwinState, flags};
 use tauscope_detect::Lesson;
 use tauscope_ingest::{FileConfig, RecordedSource, Topics};
@@ -17,7 +18,9 @@ pub struct Played {
     /// Every sample, in order.
     pub samples: Vec<TwinState>,
     /// Samples of the recording that were lost or refused.
-    pub lost: u64,
+    pub refused: u64,
+    /// Parts of the recording that cannot be read, and what was in them is lost.
+    pub damage: Vec<Damage>,
     /// Gaps and steps of the clock after which the filters began anew.
     pub gaps: u64,
     /// Samples at which they had not settled.
@@ -65,8 +68,11 @@ impl<'a> Session<'a> {
         }
         let samples = all.0;
         let resets = samples.iter().skip(1);
+        let damage = source.damage().iter().filter(|part| part.loses_data());
+        let damage: Vec<Damage> = damage.cloned().collect();
         Ok(Played {
-            lost: source.dropped() + self.twin.dropped(),
+            refused: source.dropped() - damage.len() as u64 + self.twin.dropped(),
+            damage,
             gaps: resets.filter(|s| s.header.has(flags::RESET)).count() as u64,
             unsettled: (samples.iter().filter(|s| !s.header.has(flags::READY))).count() as u64,
             samples,

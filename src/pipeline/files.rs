@@ -222,6 +222,15 @@ impl<'a> Resolver<'a> {
         }
         match yaml::load::<TwinFile>(&path) {
             Ok(model) => {
+                let wrong = self.cell(index).and_then(|cell| {
+                    let facts = &cell.facts;
+                    let unit = facts.effort_unit.as_str();
+                    model.value.resolve(&facts.joint_names, unit).err()
+                });
+                if let Some(error) = wrong {
+                    self.report.push(self.file.at(&place, error.to_string()));
+                    return;
+                }
                 let hash = provenance::sha256(model.text().as_bytes());
                 self.model_sha256.insert(entry.name.clone(), hash);
                 self.models.insert(index, model.value);

@@ -1,8 +1,11 @@
 //! A pipeline in one process and one thread.
 //!
-//! After each step of a source every stage below takes all there is for it, in the order of the
-//! pipeline (each stage after those it listens to), before the next step. So the order of everything
-//! that is written is a function of the pipeline and the recording alone.
+//! After each step of a source the stages below take what there is for them, a sample each in the order of the
+//! pipeline (each stage after those it listens to) until nothing is left, then the sinks, before the next step. So
+//! stages that listen to one stream go through it side by side, as those that share what they derive must, and the
+//! order of everything that is written is a function of the pipeline and the recording alone.
+
+mod sink;
 
 use std::time::Duration;
 
@@ -10,8 +13,11 @@ use serde::Serialize;
 use tauscope_bus::shell::{HealthClock, Report};
 use tauscope_bus::{
     Audience, Emit, Header, InProcess, Keep, LinkError, Progress, Received, Receiver, Sample,
-    SampleRef, Sender, Sink, Source, Stage, StageError, Transport,
+    Sender, Sink, Source, Stage, StageError, Transport,
 };
+
+pub use self::sink::SinkInput;
+use self::sink::SinkNode;
 
 /// Samples a stage may leave unread. A source gives out at most a few in a step, and they are all
 /// taken before its next one.
@@ -63,8 +69,10 @@ impl StageCounts {
 
 /// A stage with its links, whatever its types are.
 trait Node {
-    /// Takes what there is; false once nothing more will come out of it.
+    /// A source's step, a stage's next sample, or all there is for a sink; false if there was nothing.
     fn turn(&mut self) -> Result<bool, StageError>;
+    /// Nothing more will come out of it.
+    fn is_over(&self) -> bool;
     fn counts(&self) -> StageCounts;
     fn fraction_done(&self) -> Option<f64> {
         None
@@ -98,7 +106,11 @@ impl<T: Sample> Node for SourceNode<T> {
             self.out.link.end()?;
             self.health.end(&self.counts().report())?;
         }
-        Ok(!self.ended)
+        Ok(true)
+    }
+
+    fn is_over(&self) -> bool {
+        self.ended
     }
 
     fn counts(&self) -> StageCounts {
@@ -130,27 +142,32 @@ struct StageNode<I: Sample, O: Sample> {
 
 impl<I: Sample, O: Sample> Node for StageNode<I, O> {
     fn turn(&mut self) -> Result<bool, StageError> {
-        while !self.ended {
-            let (mut result, mut due) = (Ok(()), false);
-            let (stage, out, health) = (&mut self.stage, &mut self.out, &mut self.health);
-            let received = self.input.receive(Duration::ZERO, &mut |sample| {
-                due = health.note(sample.header());
-                result = stage.accept(sample, out);
-            })?;
-            result?;
-            match received {
-                Received::Sample if due => self.health.send(&self.counts().report())?,
-                Received::Sample => {}
-                Received::Nothing => break,
-                Received::End => {
-                    self.stage.finish(&mut self.out)?;
-                    self.out.link.end()?;
-                    self.health.end(&self.counts().report())?;
-                    self.ended = true;
-                }
+        if self.ended {
+            return Ok(false);
+        }
+        let (mut result, mut due) = (Ok(()), false);
+        let (stage, out, health) = (&mut self.stage, &mut self.out, &mut self.health);
+        let received = self.input.receive(Duration::ZERO, &mut |sample| {
+            due = health.note(sample.header());
+            result = stage.accept(sample, out);
+        })?;
+        result?;
+        match received {
+            Received::Sample if due => self.health.send(&self.counts().report())?,
+            Received::Sample => {}
+            Received::Nothing => return Ok(false),
+            Received::End => {
+                self.stage.finish(&mut self.out)?;
+                self.out.link.end()?;
+                self.health.end(&self.counts().report())?;
+                self.ended = true;
             }
         }
-        Ok(!self.ended)
+        Ok(true)
+    }
+
+    fn is_over(&self) -> bool {
+        self.ended
     }
 
     fn counts(&self) -> StageCounts {
@@ -160,84 +177,6 @@ impl<I: Sample, O: Sample> Node for StageNode<I, O> {
             received: input.received,
             emitted: self.out.link.counts().sent,
             dropped: input.lost + self.stage.dropped(),
-        }
-    }
-}
-
-/// A receiver whose sample type is known at run time only.
-trait AnyInput {
-    fn take(
-        &mut self,
-        read: &mut dyn FnMut(SampleRef<'_>) -> Result<(), StageError>,
-    ) -> Result<Received, StageError>;
-    fn counts(&self) -> tauscope_bus::ReceiverCounts;
-}
-
-impl<T: Sample> AnyInput for Box<dyn Receiver<T>> {
-    fn take(
-        &mut self,
-        read: &mut dyn FnMut(SampleRef<'_>) -> Result<(), StageError>,
-    ) -> Result<Received, StageError> {
-        let mut result = Ok(());
-        let received =
-            self.receive(Duration::ZERO, &mut |sample| result = read(sample.as_ref()))?;
-        result?;
-        Ok(received)
-    }
-
-    fn counts(&self) -> tauscope_bus::ReceiverCounts {
-        (**self).counts()
-    }
-}
-
-/// One of the streams that a sink listens to.
-pub struct SinkInput {
-    from: String,
-    receiver: Box<dyn AnyInput>,
-    open: bool,
-}
-
-struct SinkNode<'a> {
-    name: String,
-    sink: Box<dyn Sink + 'a>,
-    inputs: Vec<SinkInput>,
-    ended: bool,
-}
-
-impl Node for SinkNode<'_> {
-    fn turn(&mut self) -> Result<bool, StageError> {
-        if self.ended {
-            return Ok(false);
-        }
-        for SinkInput {
-            from,
-            receiver,
-            open,
-        } in &mut self.inputs
-        {
-            while *open {
-                match receiver.take(&mut |sample| self.sink.accept(from, sample))? {
-                    Received::Sample => {}
-                    Received::Nothing => break,
-                    Received::End => *open = false,
-                }
-            }
-        }
-        if self.inputs.iter().all(|input| !input.open) {
-            self.sink.finish()?;
-            self.ended = true;
-        }
-        Ok(!self.ended)
-    }
-
-    fn counts(&self) -> StageCounts {
-        let counts = self.inputs.iter().map(|input| input.receiver.counts());
-        let (received, lost) = counts.fold((0, 0), |(r, l), c| (r + c.received, l + c.lost));
-        StageCounts {
-            stage: self.name.clone(),
-            received,
-            emitted: 0,
-            dropped: lost + self.sink.dropped(),
         }
     }
 }
@@ -262,7 +201,15 @@ impl Stream {
 #[derive(Default)]
 pub struct Graph<'a> {
     links: InProcess,
-    nodes: Vec<Box<dyn Node + 'a>>,
+    nodes: Vec<(Place, Box<dyn Node + 'a>)>,
+}
+
+/// Where a node stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Place {
+    Source,
+    Stage,
+    Sink,
 }
 
 impl<'a> Graph<'a> {
@@ -277,13 +224,14 @@ impl<'a> Graph<'a> {
     ) -> Result<Stream, LinkError> {
         let (stream, out, health) = self.outlets(name)?;
         let name = name.to_owned();
-        self.nodes.push(Box::new(SourceNode {
+        let node = SourceNode {
             name,
             source,
             out,
             health,
             ended: false,
-        }));
+        };
+        self.nodes.push((Place::Source, Box::new(node)));
         Ok(stream)
     }
 
@@ -300,14 +248,15 @@ impl<'a> Graph<'a> {
         let input = self.links.receiver(input.key(), Keep::All, DEPTH)?;
         let (stream, out, health) = self.outlets(name)?;
         let name = name.to_owned();
-        self.nodes.push(Box::new(StageNode {
+        let node = StageNode {
             name,
             stage,
             input,
             out,
             health,
             ended: false,
-        }));
+        };
+        self.nodes.push((Place::Stage, Box::new(node)));
         Ok(stream)
     }
 
@@ -329,22 +278,13 @@ impl<'a> Graph<'a> {
 
     fn input<T: Sample>(&mut self, stream: &Stream, key: &str) -> Result<SinkInput, LinkError> {
         let receiver: Box<dyn Receiver<T>> = self.links.receiver(key, Keep::All, DEPTH)?;
-        Ok(SinkInput {
-            from: stream.stage.clone(),
-            receiver: Box::new(receiver),
-            open: true,
-        })
+        Ok(SinkInput::new(&stream.stage, receiver))
     }
 
     /// Adds a sink.
     pub fn sink(&mut self, name: &str, sink: Box<dyn Sink + 'a>, inputs: Vec<SinkInput>) {
-        let name = name.to_owned();
-        self.nodes.push(Box::new(SinkNode {
-            name,
-            sink,
-            inputs,
-            ended: false,
-        }));
+        let node = SinkNode::new(name, sink, inputs);
+        self.nodes.push((Place::Sink, Box::new(node)));
     }
 
     fn outlets<T: Sample>(&mut self, name: &str) -> Result<(Stream, Outlet<T>, Health), LinkError> {
@@ -369,15 +309,24 @@ impl<'a> Graph<'a> {
     /// The first that a stage gives.
     pub fn run(&mut self, progress: &mut dyn FnMut(f64)) -> Result<Vec<StageCounts>, StageError> {
         loop {
-            let mut going = false;
-            for node in &mut self.nodes {
-                going |= node.turn()?;
-            }
-            let done = self.nodes.iter().filter_map(|node| node.fraction_done());
+            self.turn(Place::Source)?;
+            while self.turn(Place::Stage)? {}
+            self.turn(Place::Sink)?;
+            let nodes = || self.nodes.iter().map(|(_, node)| node);
+            let done = nodes().filter_map(|node| node.fraction_done());
             progress(done.fold(1.0, f64::min));
-            if !going {
-                return Ok(self.nodes.iter().map(|node| node.counts()).collect());
+            if nodes().all(|node| node.is_over()) {
+                return Ok(nodes().map(|node| node.counts()).collect());
             }
         }
+    }
+
+    /// A turn for each node that stands there; false if there was nothing for any.
+    fn turn(&mut self, at: Place) -> Result<bool, StageError> {
+        let mut any = false;
+        for (_, node) in self.nodes.iter_mut().filter(|(place, _)| *place == at) {
+            any |= node.turn()?;
+        }
+        Ok(any)
     }
 }

@@ -127,18 +127,20 @@ impl Local {
     /// Its process has ended, and all that it said was heard.
     pub fn exited(&mut self, status: std::io::Result<ExitStatus>) -> End {
         let outcome = self.tally.newest().outcome.clone();
-        // One that says itself why it cannot even begin would say the same again.
+        // One that says itself why it cannot even begin would say the same again, as would one whose
+        // input is not what it was made for.
         let said_why = outcome.is_some();
+        let is_unfit = matches!(outcome, Some(Outcome::Unfit(_)));
         let how = match (status, outcome) {
             (Ok(status), _) if status.success() => {
                 self.state = State::Ended;
                 return End::InOrder;
             }
-            (_, Some(Outcome::Failed(why))) => format!("failed: {why}"),
+            (_, Some(Outcome::Failed(why) | Outcome::Unfit(why))) => format!("failed: {why}"),
             (Ok(status), _) => words_for(status),
             (Err(error), _) => format!("cannot be waited for: {error}"),
         };
-        let can_begin = self.ready || !said_why;
+        let can_begin = (self.ready || !said_why) && !is_unfit;
         let may_return = can_begin && !self.last_life && !self.told_to_stop;
         let again = if may_return {
             self.deaths.note(std::time::Instant::now())

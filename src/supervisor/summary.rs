@@ -59,6 +59,7 @@ impl Summary {
     /// Adds up what the stages have reported.
     pub fn new(pipeline: &Pipeline, links: &[Link], stages: &[Local]) -> Self {
         let mut summary = Self::reported(pipeline, links, stages);
+        summary.count_what_lives_missed();
         // A stage that was killed has sent more than it lived to report, as its listeners know.
         for stage in summary
             .stages
@@ -81,6 +82,22 @@ impl Summary {
             }
         }
         summary
+    }
+
+    /// What went to a stage that died and was not there for its next life, or had none, is lost, too.
+    fn count_what_lives_missed(&mut self) {
+        let died =
+            |stage: &&mut StageSummary| (stage.restarts > 0 || stage.failed) && stage.reported;
+        for stage in self.stages.iter_mut().filter(died) {
+            for link in self.links.iter_mut().filter(|link| link.to == stage.stage) {
+                let (Some(emitted), Some(received)) = (link.emitted, link.received) else {
+                    continue;
+                };
+                let missed = emitted.saturating_sub(received + link.dropped);
+                link.dropped += missed;
+                stage.dropped += missed;
+            }
+        }
     }
 
     fn reported(pipeline: &Pipeline, links: &[Link], stages: &[Local]) -> Self {

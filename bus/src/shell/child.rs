@@ -248,7 +248,7 @@ impl Child {
 }
 
 fn done(report: Report) -> ExitCode {
-    let failed = matches!(report.outcome, Some(Outcome::Failed(_)));
+    let failed = report.outcome.as_ref().and_then(Outcome::failure).is_some();
     say(&Line::Done(report));
     ExitCode::from(u8::from(failed))
 }

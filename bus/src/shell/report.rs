@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
 use crate::link::{Position, ReceiverCounts, SenderCounts};
+use crate::stage::StageError;
 
 /// What a stage has done so far.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -80,6 +81,28 @@ pub enum Outcome {
     Stopped,
     /// It could not go on; the text says why.
     Failed(String),
+    /// Its input is not what it was configured for, and another life would end the same; the text says
+    /// why.
+    Unfit(String),
+}
+
+impl Outcome {
+    /// Of a stage that could not go on.
+    pub(super) fn of(error: &StageError) -> Self {
+        let why = text_of(error);
+        match error {
+            StageError::Unfit(_) => Self::Unfit(why),
+            StageError::Failed(_) | StageError::Link(_) => Self::Failed(why),
+        }
+    }
+
+    /// Why it could not go on, if it could not.
+    pub fn failure(&self) -> Option<&str> {
+        match self {
+            Self::Failed(why) | Self::Unfit(why) => Some(why),
+            Self::Ended | Self::Stopped => None,
+        }
+    }
 }
 
 /// Where a shell posts its report while it runs. Clones are one.

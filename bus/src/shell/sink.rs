@@ -4,7 +4,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::health::HealthClock;
-use super::report::{InputReport, Outcome, Poster, Report, text_of};
+use super::report::{InputReport, Outcome, Poster, Report};
 use super::{Context, Stop, TAKEN_WITHIN, TICK};
 use crate::link::{MAX_DEPTH, Received, Sender};
 use crate::sample::{Health, SampleRef};
@@ -59,7 +59,7 @@ pub fn run_sink(
     let mut shell = shared.into_inner().unwrap_or_else(PoisonError::into_inner);
     let outcome = shell
         .complete(context)
-        .unwrap_or_else(|error| Outcome::Failed(text_of(&error)));
+        .unwrap_or_else(|error| Outcome::of(&error));
     shell.count();
     shell.report.outcome = Some(outcome);
     shell.poster.post(&shell.report);

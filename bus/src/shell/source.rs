@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::health::HealthClock;
-use super::report::{Outcome, Poster, Report, text_of};
+use super::report::{Outcome, Poster, Report};
 use super::stage::Out;
 use super::{Context, TAKEN_WITHIN};
 use crate::link::Sender;
@@ -32,7 +32,7 @@ pub fn run_source<T: Sample>(
     };
     let outcome = shell
         .run(source, output)
-        .unwrap_or_else(|error| Outcome::Failed(text_of(&error)));
+        .unwrap_or_else(|error| Outcome::of(&error));
     shell.count(source, output);
     shell.report.outcome = Some(outcome);
     shell.poster.post(&shell.report);

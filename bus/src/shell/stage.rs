@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::health::HealthClock;
-use super::report::{InputReport, Outcome, Poster, Report, text_of};
+use super::report::{InputReport, Outcome, Poster, Report};
 use super::{Context, TAKEN_WITHIN, TICK};
 use crate::link::{LinkError, MAX_DEPTH, Received, Receiver, Sender};
 use crate::sample::{Header, Health, Sample};
@@ -36,7 +36,7 @@ pub fn run_stage<I: Sample, O: Sample>(
     };
     let outcome = shell
         .run(stage, input, output)
-        .unwrap_or_else(|error| Outcome::Failed(text_of(&error)));
+        .unwrap_or_else(|error| Outcome::of(&error));
     shell.count(stage, input, output);
     shell.report.outcome = Some(outcome);
     shell.poster.post(&shell.report);

@@ -17,11 +17,8 @@ impl Resolver<'_> {
         cell: &Cell,
     ) {
         if let Some(robot) = &cell.model
-            && !model.robot.name.is_empty()
-            && model.robot.name != robot.name()
+            && let Some(title) = model.made_for_other(robot.name())
         {
-            let (made_for, name) = (&model.robot.name, robot.name());
-            let title = format!("this twin was made for the robot `{made_for}`, not for `{name}`");
             let problem = self.file.at(&place.key("model"), title);
             self.report
                 .push(problem.help("calibrate one for this robot: `tauscope calibrate`"));

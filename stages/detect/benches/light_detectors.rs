@@ -91,7 +91,8 @@ fn configs(joints: usize, setup: &Setup, free: &[TwinState]) -> Vec<Config> {
         validation: &[],
     };
     let learnt = tauscope::learn(&tauscope::Settings::default(), setup, &lessons);
-    let bias = Some(vec![0.5; joints]);
+    let bias = vec![0.5; joints];
+    let bias = Some(virtual_collision_sensor::FirstBias::InOrder(bias));
     let threshold = Threshold {
         score: Some(100.0),
         sigmas: None,
@@ -193,6 +194,7 @@ fn main() {
     };
     let setup = Setup {
         joints: vec![joint; n],
+        joint_names: model.joint_names().map(str::to_owned).collect(),
         model: Some(model.clone()),
         ..Setup::default()
     };

@@ -160,6 +160,7 @@ type Tuned = (Settings, contact_tuning::Tracks, Vec<ClassSweep>);
 fn tune(settings: &Settings, setup: &Setup, lessons: &Lessons<'_>) -> Result<Tuned, LearnError> {
     let tracks = contact_tuning::tracks(&settings.signals, setup, lessons, NAME)?;
     let mut learnt = settings.clone();
+    learnt.signals.tuned_rate_hz = tracks.rate_hz;
     learnt.detection.force_threshold_n = contact_tuning::force_threshold(&tracks, NAME)?;
     let window = settings.signals.window;
     let rule = &mut Conditions::of(settings);

@@ -10,6 +10,7 @@ use tauscope_dynamics::lowpass::Butterworth2;
 
 use crate::config::ConfigError;
 use crate::momentum::{DEFAULT_GAIN_PER_S, MomentumObserver};
+use crate::rate;
 use crate::shared::Tap;
 use crate::sliding_dft::{BandError, SlidingDft, bins};
 use crate::stage::Setup;
@@ -31,6 +32,10 @@ pub struct SignalSettings {
     /// Low-pass on the tool's velocity \[Hz\].
     #[schemars(range(min = 0.01, max = 10_000.0))]
     pub velocity_cutoff_hz: f64,
+    /// Samples a second of the recordings that thresholds were tuned on: they hold for no other rate.
+    #[schemars(range(min = 0.01, max = 1_000_000.0))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tuned_rate_hz: Option<f64>,
 }
 
 impl Default for SignalSettings {
@@ -40,6 +45,7 @@ impl Default for SignalSettings {
             window: 500,
             band_hz: [10.0, 100.0],
             velocity_cutoff_hz: 20.0,
+            tuned_rate_hz: None,
         }
     }
 }
@@ -205,7 +211,7 @@ impl Signals {
         self.full
     }
 
-    /// The bins of the band. The sample period is the median over the window, so that neither jitter nor
+    /// The bins of the band, at the rate that it was tuned at. The sample period is the median over the window, so that neither jitter nor
     /// a missing sample changes it.
     fn bins(&mut self) -> Result<RangeInclusive<usize>, BandError> {
         let stamps = self.filling.windows(2);
@@ -214,10 +220,14 @@ impl Signals {
             .extend(stamps.map(|pair| pair[1].0 - pair[0].0));
         let middle = self.periods_ns.len() / 2;
         let (_, &mut period_ns, _) = self.periods_ns.select_nth_unstable(middle);
-        bins(
-            self.settings.window,
-            period_ns as f64 * 1e-9,
-            self.settings.band_hz,
-        )
+        let period_s = period_ns as f64 * 1e-9;
+        let bins = bins(self.settings.window, period_s, self.settings.band_hz)?;
+        match self.settings.tuned_rate_hz {
+            Some(tuned_hz) if !rate::same(tuned_hz, 1.0 / period_s) => Err(BandError::OtherRate {
+                tuned_hz,
+                rate_hz: 1.0 / period_s,
+            }),
+            _ => Ok(bins),
+        }
     }
 }

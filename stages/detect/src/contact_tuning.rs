@@ -7,6 +7,7 @@ use tauscope_bus::TwinState;
 use crate::contact_machine::{Machine, MachineSettings, NewContact, Rule};
 use crate::contact_signals::{Instant, SignalSettings, Signals};
 use crate::lesson::{ContactKind, LabelledContact, LearnError, Lesson, Lessons};
+use crate::rate;
 use crate::stage::Setup;
 
 pub use class::ClassSweep;
@@ -36,6 +37,8 @@ pub(crate) struct Track {
 pub(crate) struct Tracks {
     pub train: Vec<Track>,
     pub validation: Vec<Track>,
+    /// Samples a second.
+    pub rate_hz: Option<f64>,
     /// How long a contact stays in the window \[ns\].
     window_ns: i64,
 }
@@ -91,8 +94,16 @@ pub(crate) fn tracks(
         detector,
         missing: missing.to_owned(),
     };
-    if lessons.train.iter().any(|lesson| lesson.contacts.is_none()) {
-        return Err(unlabelled("training recordings have no labels"));
+    let lacking = lessons
+        .train
+        .iter()
+        .filter(|lesson| lesson.contacts.is_none());
+    let lacking: Vec<&str> = lacking.map(|lesson| lesson.name.as_str()).collect();
+    if !lacking.is_empty() {
+        let names = lacking.join(", ");
+        return Err(unlabelled(&format!(
+            "the training recordings {names} have no labels"
+        )));
     }
     let mut fault = None;
     let mut run = |lesson: &Lesson| {
@@ -110,10 +121,9 @@ pub(crate) fn tracks(
         .filter(|lesson| lesson.contacts.is_some());
     let validation: Vec<Track> = labelled.map(&mut run).collect();
     if let Some(fault) = fault {
-        return Err(LearnError::TooLittle {
+        return Err(LearnError::Failed {
             detector,
-            wanted: "the rate that its band needs".to_owned(),
-            found: fault.to_string(),
+            reason: fault.to_string(),
         });
     }
     let kinds = |kind| {
@@ -133,6 +143,7 @@ pub(crate) fn tracks(
     Ok(Tracks {
         train,
         validation,
+        rate_hz: rate::of(&[lessons.train, lessons.validation]),
         window_ns: period_ns.unwrap_or_default() * settings.window as i64,
     })
 }

@@ -70,7 +70,9 @@ pub enum ContactKind {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LearnError {
     /// Labels that its tuning needs are missing.
-    #[error("{detector} is tuned on labelled contacts, and {missing}")]
+    #[error(
+        "{detector} is tuned on labelled contacts, and {missing}: say in the set's `labels` what touched the robot and of which `kind` it was, collision or cooperation"
+    )]
     NoLabels {
         /// The detector.
         detector: &'static str,

@@ -45,6 +45,16 @@ pub enum BandError {
         /// Samples per second.
         rate_hz: f64,
     },
+    /// Not the rate that thresholds were tuned at.
+    #[error(
+        "its thresholds were tuned at {tuned_hz:.1} samples a second, and here are {rate_hz:.1}: let `tauscope evaluate` tune it on recordings of this rate"
+    )]
+    OtherRate {
+        /// Samples per second of the tuning recordings.
+        tuned_hz: f64,
+        /// Samples per second.
+        rate_hz: f64,
+    },
     /// No bin between the limits.
     #[error(
         "no bin lies between {min_hz} and {max_hz} Hz: {window} samples at {rate_hz:.1} Hz have one every {spacing_hz:.2} Hz; take a wider band or more samples"

@@ -21,6 +21,8 @@ use crate::virtual_collision_sensor::Learnt;
 pub struct Setup {
     /// By joint in URDF order.
     pub joints: Vec<JointSetup>,
+    /// Their names: what was learnt by joint belongs to them.
+    pub joint_names: Vec<String>,
     /// The robot, where there is one: for the touched link and the force.
     pub model: Option<Model>,
     /// By detector, what its score did on contact-free data.
@@ -154,7 +156,7 @@ impl Stage<TwinState, Detection> for Detect {
         let judgement = self.detector.judge(sample);
         if let Some(fault) = self.detector.fault() {
             let detector = self.detector.name();
-            return Err(StageError::failed(format!("{detector}: {fault}")));
+            return Err(StageError::Unfit(format!("{detector}: {fault}")));
         }
         let stamp_ns = sample.header.stamp_ns;
         let score = judgement.ready.then_some(judgement.score);

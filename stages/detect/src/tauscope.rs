@@ -33,6 +33,7 @@ use tauscope_bus::{TwinState, flags};
 use crate::config::ConfigError;
 use crate::detector::{Detector, Judgement, Seen, Verdict};
 use crate::lesson::{LearnError, Lessons};
+use crate::rate::Rate;
 use crate::stage::Setup;
 use alarm::Watch;
 pub use kinds::Kinds;
@@ -92,17 +93,12 @@ impl Default for Settings {
 /// The detector.
 ///
 /// # Errors
-/// If nothing has been learnt, or for a robot with another number of joints.
+/// If nothing has been learnt, or for a robot with other joints.
 pub(crate) fn build(settings: &Settings, setup: &Setup) -> Result<Box<dyn Detector>, ConfigError> {
     let Some(learnt) = &settings.learnt else {
         return Err(ConfigError::NotLearnt { detector: NAME });
     };
-    let joint_count = setup.joints.len();
-    if learnt.joints.len() != joint_count {
-        let reason = format!(
-            "is of a robot with {} joints, not {joint_count}",
-            learnt.joints.len()
-        );
+    if let Some(reason) = learnt.fault(&setup.joint_names) {
         return Err(ConfigError::LearntState {
             detector: NAME,
             reason,
@@ -126,7 +122,7 @@ pub fn learn(
     setup: &Setup,
     lessons: &Lessons<'_>,
 ) -> Result<Settings, LearnError> {
-    let mut learnt = Learnt::new(lessons, settings.follow())?;
+    let mut learnt = Learnt::new(lessons, &setup.joint_names, settings.follow())?;
     learnt.smallest = smallest::smallest(&learnt, lessons, setup, settings.follow());
     learnt.kinds = kinds::learn(&learnt, settings, setup, lessons);
     Ok(Settings {
@@ -169,6 +165,7 @@ impl Settings {
 }
 
 struct Tauscope {
+    rate: Rate,
     windows: Windows,
     /// How the joints have moved \[rad/s\].
     moved: Ring<MOVED>,
@@ -189,7 +186,12 @@ impl Detector for Tauscope {
         Some(self.watch.threshold())
     }
 
+    fn fault(&self) -> Option<String> {
+        self.rate.fault()
+    }
+
     fn judge(&mut self, sample: &TwinState) -> Judgement {
+        self.rate.update(sample);
         if sample.header.has(flags::RESET) {
             self.windows.reset();
             self.moved.reset();
@@ -234,6 +236,7 @@ impl Tauscope {
     fn new(learnt: &Learnt, settings: &Settings, setup: &Setup, tells_kinds: bool) -> Self {
         let threshold = learnt.tail.threshold(settings.false_alarms_per_hour);
         Self {
+            rate: Rate::new(learnt.rate_hz),
             windows: Windows::new(learnt, settings.follow()),
             moved: Ring::new(),
             place: Place::new(setup),

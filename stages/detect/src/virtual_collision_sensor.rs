@@ -3,8 +3,9 @@
 //! [`virtual_collision_sensor_basic`](crate::virtual_collision_sensor_basic).
 //!
 //! It needs the measured and the expected effort alone, whoever computed that: no URDF. Per joint the
-//! residue |R| (equation 1) is held against the threshold `S_coll = α (m + Coll_bias)` (equations 4
-//! and 17), with the estimated model error m (equations 7 to 11) and the bias, which is learnt and
+//! residue |R| (equation 1) is held against the threshold `S_coll = α (m + Coll_bias) + ν` (equations 4
+//! and 17), with the estimated model error m (equations 7 to 11), what measurement noise may add (ν, not in the
+//! paper) and the bias, which is learnt and
 //! adapts once somebody asks for it (equations 12 to 16). A machine of five states tells when a
 //! collision is possible; in its safe state, Moving, nothing is tested. The score is the largest
 //! `|R_i| / S_coll_i` among the joints that are tested.
@@ -13,13 +14,15 @@
 //! smallest collision effort for most of the last ten seconds: a payload that was declared wrongly
 //! (remark 1).
 //!
-//! Efforts are in the cell's unit (N m or A) throughout; lists go by joint in URDF order.
+//! Efforts are in the cell's unit (N m or A) throughout; what is learnt goes by the joint's name.
 
 mod bias;
+mod first_bias;
 mod joint;
 mod learnt;
 mod lessons;
 mod model_error;
+mod noise;
 mod phase;
 mod sensor;
 mod trend;
@@ -34,6 +37,7 @@ use crate::config::ConfigError;
 use crate::lesson::{LearnError, Lessons};
 use crate::stage::Setup;
 pub use bias::LearningState;
+pub use first_bias::FirstBias;
 pub(crate) use joint::Tuning;
 pub use learnt::{Learnt, LearntJoint};
 pub use phase::Phase;
@@ -47,10 +51,10 @@ pub(crate) const NAME: &str = "virtual_collision_sensor";
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// The first bias (`Coll_bias0`) by joint in URDF order: the smallest effort that is a collision
-    /// until something is learnt \[effort unit\]. `tauscope evaluate` learns it.
+    /// The first bias (`Coll_bias0`), by joint name or as a list in URDF order: the smallest effort that
+    /// is a collision until something is learnt \[effort unit\]. `tauscope evaluate` learns it.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub bias: Option<Vec<f64>>,
+    pub bias: Option<FirstBias>,
     /// When learning is asked for. A message on the source's `learn` topic asks at any time.
     pub learn: Learn,
     /// How long learning takes: at least one cycle of the robot's motion, better three \[s\].
@@ -129,58 +133,31 @@ pub(crate) fn build(
     setup: &Setup,
     hold_s: f64,
 ) -> Result<Sensor, ConfigError> {
-    let joint_count = setup.joints.len();
-    let bias = first_bias(NAME, settings.bias.as_deref(), joint_count)?;
-    if let Some(learnt) = &settings.learnt {
-        let found = learnt.joints.len();
-        let reason = if found != joint_count {
-            Some(format!("holds {found} joints, the robot has {joint_count}"))
-        } else if learnt.joints.iter().any(|joint| !joint.is_sound()) {
-            Some("holds a number that is negative or not finite".to_owned())
-        } else {
-            None
-        };
-        if let Some(reason) = reason {
-            return Err(ConfigError::LearntState {
-                detector: NAME,
-                reason,
-            });
-        }
+    let bias = first_bias(NAME, settings.bias.as_ref(), setup)?;
+    let learnt = settings.learnt.as_ref();
+    if let Some(reason) = learnt.and_then(|learnt| learnt.fault(&setup.joint_names)) {
+        return Err(ConfigError::LearntState {
+            detector: NAME,
+            reason,
+        });
     }
     let learning = Learning {
         duration_s: settings.learning_s,
         at_start: settings.learn == Learn::AtStart,
     };
-    let learnt = settings.learnt.as_ref();
-    Ok(Sensor::new(
-        NAME,
-        settings.tuning(),
-        bias,
-        learnt,
-        Some(learning),
-        hold_s,
-    ))
+    let mut sensor = Sensor::new(NAME, settings.tuning(), &bias, hold_s);
+    sensor.let_learn(learning, &setup.joint_names, learnt);
+    Ok(sensor)
 }
 
-/// The first bias, checked.
-pub(crate) fn first_bias<'a>(
+/// The first bias by joint in URDF order, checked.
+pub(crate) fn first_bias(
     detector: &'static str,
-    bias: Option<&'a [f64]>,
-    joint_count: usize,
-) -> Result<&'a [f64], ConfigError> {
+    bias: Option<&FirstBias>,
+    setup: &Setup,
+) -> Result<Vec<f64>, ConfigError> {
     let bias = bias.ok_or(ConfigError::NoBias { detector })?;
-    if bias.len() != joint_count {
-        let reason = format!(
-            "has {} numbers, the robot has {joint_count} joints",
-            bias.len()
-        );
-        return Err(ConfigError::Bias { detector, reason });
-    }
-    if bias.iter().any(|bias| !(bias.is_finite() && *bias >= 0.0)) {
-        let reason = "holds a number that is negative or not finite".to_owned();
-        return Err(ConfigError::Bias { detector, reason });
-    }
-    Ok(bias)
+    bias.resolve(detector, &setup.joint_names)
 }
 
 /// The first bias by joint that `lessons` ask for: twice what would have avoided every virtual collision
@@ -190,9 +167,10 @@ pub(crate) fn learn_first_bias(
     tuning: Tuning,
     setup: &Setup,
     lessons: &Lessons,
-) -> Result<Vec<f64>, LearnError> {
+) -> Result<FirstBias, LearnError> {
     let needed = lessons::needed(detector, tuning, setup.joints.len(), lessons.train)?;
-    Ok(needed.iter().map(lessons::Needed::first_bias).collect())
+    let values = needed.iter().map(lessons::Needed::first_bias);
+    Ok(FirstBias::named(&setup.joint_names, values))
 }
 
 /// Learns the first bias, where `settings` gives none, and has the paper's learning phase (equations 12,
@@ -209,19 +187,18 @@ pub fn learn(
     let joint_count = setup.joints.len();
     let needed = lessons::needed(NAME, settings.tuning(), joint_count, lessons.train)?;
     let mut learnt = settings.clone();
-    match &settings.bias {
-        Some(bias) => {
-            first_bias(NAME, Some(bias), joint_count)?;
-        }
-        None => {
-            learnt.bias = Some(needed.iter().map(lessons::Needed::first_bias).collect());
-        }
+    if settings.bias.is_some() {
+        first_bias(NAME, settings.bias.as_ref(), setup)?;
+    } else {
+        let values = needed.iter().map(lessons::Needed::first_bias);
+        learnt.bias = Some(FirstBias::named(&setup.joint_names, values));
     }
     let joints = needed.iter().map(|needed| LearntJoint {
         ident: needed.ident,
         start: needed.ident,
         adapt_s: Some(0.0),
     });
+    let joints = setup.joint_names.iter().cloned().zip(joints);
     learnt.learnt = Some(Learnt {
         joints: joints.collect(),
     });

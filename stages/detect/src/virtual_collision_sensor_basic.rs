@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::config::ConfigError;
 use crate::lesson::{LearnError, Lessons};
 use crate::stage::Setup;
-use crate::virtual_collision_sensor::{Sensor, Tuning, first_bias, learn_first_bias};
+use crate::virtual_collision_sensor::{FirstBias, Sensor, Tuning, first_bias, learn_first_bias};
 
 /// Canonical name.
 pub(crate) const NAME: &str = "virtual_collision_sensor_basic";
@@ -18,10 +18,10 @@ pub(crate) const NAME: &str = "virtual_collision_sensor_basic";
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// The bias by joint in URDF order: the smallest effort that is a collision \[effort unit\].
-    /// `tauscope evaluate` learns it.
+    /// The bias, by joint name or as a list in URDF order: the smallest effort that is a collision
+    /// \[effort unit\]. `tauscope evaluate` learns it.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub bias: Option<Vec<f64>>,
+    pub bias: Option<FirstBias>,
     /// Weight of the average against the maximum in the unsteady model error (equation 9).
     #[schemars(range(min = 0.0, max = 1.0))]
     pub delta: f64,
@@ -66,9 +66,8 @@ pub(crate) fn build(
     setup: &Setup,
     hold_s: f64,
 ) -> Result<Sensor, ConfigError> {
-    let bias = first_bias(NAME, settings.bias.as_deref(), setup.joints.len())?;
-    let tuning = settings.tuning();
-    Ok(Sensor::new(NAME, tuning, bias, None, None, hold_s))
+    let bias = first_bias(NAME, settings.bias.as_ref(), setup)?;
+    Ok(Sensor::new(NAME, settings.tuning(), &bias, hold_s))
 }
 
 /// Learns the bias from the recordings `lessons` is trained on: per joint twice the smallest bias that
@@ -85,7 +84,7 @@ pub fn learn(
     let mut learnt = settings.clone();
     match &settings.bias {
         Some(bias) => {
-            first_bias(NAME, Some(bias), setup.joints.len())?;
+            first_bias(NAME, Some(bias), setup)?;
         }
         None => {
             learnt.bias = Some(learn_first_bias(NAME, settings.tuning(), setup, lessons)?);

@@ -67,12 +67,15 @@ fn nothing_is_allocated_per_sample() {
         effort_per_nm: 1.0,
     };
     let arm = include_str!("../../../tests/data/demo_arm.urdf");
+    let model = Model::from_urdf(arm).unwrap();
     let setup = Setup {
         joints: vec![joint; 7],
-        model: Some(Model::from_urdf(arm).unwrap()),
+        joint_names: model.joint_names().map(str::to_owned).collect(),
+        model: Some(model),
         ..Setup::default()
     };
-    let bias = Some(vec![0.5; 7]);
+    let bias = vec![0.5; 7];
+    let bias = Some(virtual_collision_sensor::FirstBias::InOrder(bias));
     let scored = Config {
         threshold: Threshold {
             score: Some(100.0),

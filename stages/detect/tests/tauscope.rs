@@ -54,6 +54,7 @@ fn setup() -> Setup {
     };
     Setup {
         joints: vec![joint; JOINTS],
+        joint_names: (1..=JOINTS).map(|j| format!("joint{j}")).collect(),
         ..Setup::default()
     }
 }
@@ -189,13 +190,43 @@ fn nothing_learnt_and_another_robot_are_refused() {
         refused(&bare, setup()),
         ConfigError::NotLearnt { .. }
     ));
-    let mut other = setup();
-    other.joints.pop();
-    let learnt = config(learnt(&tauscope::Settings::default()));
-    assert!(matches!(
-        refused(&learnt, other),
-        ConfigError::LearntState { .. }
-    ));
+    let learnt = learnt(&tauscope::Settings::default());
+    let (mut fewer, mut turned) = (setup(), setup());
+    fewer.joints.pop();
+    fewer.joint_names.pop();
+    turned.joint_names.reverse();
+    for other in [fewer, turned] {
+        let names = other.joint_names.join(", ");
+        let text = refused(&config(learnt.clone()), other).to_string();
+        assert!(
+            text.contains(&format!("but the cell has {names}")),
+            "{text}"
+        );
+    }
+    let mut torn = learnt;
+    let windows = &mut torn.learnt.as_mut().unwrap().windows;
+    windows[1].noise[0].pop();
+    let text = refused(&config(torn.clone()), setup()).to_string();
+    assert!(text.contains("is not whole"), "{text}");
+    torn.learnt.as_mut().unwrap().windows.clear();
+    let text = refused(&config(torn), setup()).to_string();
+    assert!(text.contains("is not whole"), "{text}");
+}
+
+#[test]
+fn what_was_learnt_at_one_rate_is_refused_at_another_as_soon_as_that_shows() {
+    let mut stage = detector(learnt(&tauscope::Settings::default()));
+    let mut slow = quiet(3, 400);
+    for (i, sample) in slow.iter_mut().enumerate() {
+        sample.header.stamp_ns = i as i64 * 20_000_000;
+    }
+    let mut out = Out::default();
+    let stopped = slow
+        .iter()
+        .position(|sample| stage.accept(sample, &mut out).is_err());
+    assert_eq!(stopped, Some(101), "a hundred steps and one tell");
+    let error = stage.accept(&slow[102], &mut out).unwrap_err().to_string();
+    assert!(error.contains("and here are 50.0"), "{error}");
 }
 
 #[test]

@@ -105,15 +105,11 @@ pub fn of(
     let efficiency = &search.problem.worth;
     let spread = covariance(search.problem, fit);
     let total = mismatch(before, fit, before);
-    let mut named = Named {
-        findings: Vec::new(),
-        rejected: Vec::new(),
-        next_motions: Vec::new(),
-        trajectories: Vec::new(),
-        notes: Vec::new(),
-    };
     let scales = Scales::of(search.problem, fit, &spread);
-    named.notes.extend(scales.notes(joints));
+    let mut named = Named {
+        notes: scales.notes(joints),
+        ..Named::default()
+    };
     for (index, active) in fit.actives.iter().enumerate() {
         if is_drive(&active.hypothesis) {
             continue;

@@ -239,6 +239,9 @@ fn roles<'a>(
     ] {
         wanted.extend(topic.as_deref().map(|name| (name, role)));
     }
+    // Where nobody asked for learning, nobody wrote it down.
+    let is_there = |name: &str| recording.topics().iter().any(|topic| topic.name == name);
+    wanted.retain(|(name, role)| !matches!(role, Role::Learn) || is_there(name));
     let mut roles = vec![None; recording.topics().len()];
     for &(name, role) in &wanted {
         let topic = match role {

@@ -128,6 +128,7 @@ impl Archive {
                         None
                     }
                 };
+                command.write_ahead(&mut self.file, sample)?;
                 state.write(
                     &mut self.file,
                     &sample.header,

@@ -145,6 +145,13 @@ impl Correction {
 }
 
 impl TwinFile {
+    /// Says so if it was made for another robot than `robot`, where both have a name.
+    pub fn made_for_other(&self, robot: &str) -> Option<String> {
+        let made_for = &self.robot.name;
+        let other = !made_for.is_empty() && !robot.is_empty() && made_for != robot;
+        other.then(|| format!("this twin was made for the robot `{made_for}`, not for `{robot}`"))
+    }
+
     /// Puts the corrections into the order of `joint_names`.
     ///
     /// # Errors

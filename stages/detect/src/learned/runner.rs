@@ -10,6 +10,7 @@ use super::{SignalSettings, demand};
 use crate::config::ConfigError;
 use crate::detector::{Detector, Judgement};
 use crate::lesson::{LearnError, Lessons};
+use crate::rate::Rate;
 use crate::stage::{ScoreStatistics, Setup};
 
 /// What a detector makes of the signals, sample by sample.
@@ -58,6 +59,7 @@ pub(crate) fn build(
     })?;
     Ok(Box::new(Learned {
         name,
+        rate: Rate::new(facts.rate_hz),
         signals,
         scorer,
         stamp_ns: i64::MIN,
@@ -79,6 +81,7 @@ const NOT_READY: Judgement = Judgement {
 
 struct Learned {
     name: &'static str,
+    rate: Rate,
     signals: Signals,
     scorer: Box<dyn Scorer>,
     stamp_ns: i64,
@@ -90,7 +93,12 @@ impl Detector for Learned {
         self.name
     }
 
+    fn fault(&self) -> Option<String> {
+        self.rate.fault()
+    }
+
     fn judge(&mut self, sample: &TwinState) -> Judgement {
+        self.rate.update(sample);
         let reset = sample.header.has(flags::RESET);
         if reset {
             self.scorer.reset();

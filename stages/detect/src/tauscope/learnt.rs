@@ -10,7 +10,9 @@ use super::kinds::Kinds;
 use super::smallest::Smallest;
 use super::tail::{BLOCK_S, Tail};
 use super::windows::{Follow, Means, WINDOWS_S, Windows};
+use crate::joints;
 use crate::lesson::{LearnError, Lesson, Lessons};
+use crate::rate;
 
 /// Where speeds are divided, as shares of a joint's usual highest speed.
 const EDGES: [f64; BINS - 1] = [0.02, 0.05, 0.12, 0.3];
@@ -46,6 +48,8 @@ const LEAST_NOISE: f64 = 0.02;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Learnt {
+    /// Samples a second that it was learnt from.
+    pub rate_hz: f64,
     /// By joint in URDF order.
     pub joints: Vec<LearntJoint>,
     /// By window.
@@ -67,6 +71,8 @@ pub struct Learnt {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LearntJoint {
+    /// Its name.
+    pub name: String,
     /// Its usual highest speed \[rad/s\], by which speeds are classed.
     pub fast_rad_s: f64,
 }
@@ -95,29 +101,32 @@ impl Learnt {
     ///
     /// # Errors
     /// If they hold too little.
-    pub(crate) fn new(lessons: &Lessons<'_>, follow: Follow) -> Result<Self, LearnError> {
+    pub(crate) fn new(
+        lessons: &Lessons<'_>,
+        joint_names: &[String],
+        follow: Follow,
+    ) -> Result<Self, LearnError> {
         let all = pieces(lessons, follow);
         let count: usize = all.iter().map(|piece| free(piece).count()).sum();
-        let Some(first) = all.iter().find_map(|piece| piece.samples.first()) else {
-            return Err(too_little(0));
-        };
-        if count < LEAST_SAMPLES {
+        let rate_hz = rate::of(&[lessons.train, lessons.validation]);
+        let Some(rate_hz) = rate_hz.filter(|_| count >= LEAST_SAMPLES) else {
             return Err(too_little(count));
-        }
-        let n = first.header.joint_count as usize;
-        let mut learnt = Self::usual(&all, n, follow);
+        };
+        let mut learnt = Self::usual(&all, joint_names, follow);
+        learnt.rate_hz = rate_hz;
         learnt.tail = if learnt.free_s.is_some_and(|free_s| free_s < ENOUGH_S) {
             Tail::of_few(&learnt.peaks(&all, follow))
         } else {
-            Tail::new(held_out_peaks(&all, n, follow))
+            Tail::new(held_out_peaks(&all, joint_names, follow))
         };
         Ok(learnt)
     }
 
-    /// What is usual in these pieces, without a tail.
-    fn usual(pieces: &[Piece<'_>], n: usize, follow: Follow) -> Self {
+    /// What is usual in these pieces, without rate and tail.
+    fn usual(pieces: &[Piece<'_>], joint_names: &[String], follow: Follow) -> Self {
         let mut learnt = Self {
-            joints: speeds(pieces, n),
+            rate_hz: 0.0,
+            joints: speeds(pieces, joint_names),
             windows: Vec::new(),
             tail: Tail {
                 level: 0.0,
@@ -134,6 +143,29 @@ impl Learnt {
         learnt.correlate(pieces, follow);
         learnt.measure_usual(pieces, follow);
         learnt
+    }
+
+    /// What is wrong with it for a robot with these joints, as a clause.
+    pub(super) fn fault(&self, joint_names: &[String]) -> Option<String> {
+        let found = self.joints.iter().map(|joint| &joint.name);
+        if let Some(reason) = joints::in_other_order(found, joint_names) {
+            return Some(reason);
+        }
+        let n = joint_names.len();
+        let fits = |window: &LearntWindow| {
+            window.inverse_correlation.len() == n * n
+                && window.noise.len() == n
+                && window.noise.iter().all(|noise| noise.len() == BINS)
+        };
+        let whole = self.windows.len() == WINDOWS_S.len() && self.windows.iter().all(fits);
+        if !whole {
+            let windows = WINDOWS_S.len();
+            return Some(format!(
+                "is not whole: it needs noise by {n} joints and {BINS} speeds for each of {windows} windows"
+            ));
+        }
+        let is_rate = self.rate_hz > 0.0;
+        (!is_rate).then(|| "has a rate that is not above 0".to_owned())
     }
 
     fn fast(&self) -> [f64; MAX_JOINTS] {
@@ -289,7 +321,7 @@ impl Learnt {
 }
 
 /// The largest score of each block of contact-free time, by the noise of other recordings, or pieces of one, than the block's own.
-fn held_out_peaks(all: &[Piece<'_>], n: usize, follow: Follow) -> Vec<f64> {
+fn held_out_peaks(all: &[Piece<'_>], joint_names: &[String], follow: Follow) -> Vec<f64> {
     let mut peaks = Vec::new();
     for fold in 0..FOLDS {
         let part = |held_out: bool| -> Vec<Piece<'_>> {
@@ -302,7 +334,7 @@ fn held_out_peaks(all: &[Piece<'_>], n: usize, follow: Follow) -> Vec<f64> {
             none if none.is_empty() => all.to_vec(),
             others => others,
         };
-        peaks.extend(Learnt::usual(&others, n, follow).peaks(&part(true), follow));
+        peaks.extend(Learnt::usual(&others, joint_names, follow).peaks(&part(true), follow));
     }
     peaks
 }
@@ -332,12 +364,13 @@ fn restart(means: &mut Means, sample: &TwinState) {
     }
 }
 
-fn speeds(all: &[Piece<'_>], n: usize) -> Vec<LearntJoint> {
-    (0..n)
-        .map(|j| {
+fn speeds(all: &[Piece<'_>], joint_names: &[String]) -> Vec<LearntJoint> {
+    (joint_names.iter().enumerate())
+        .map(|(j, name)| {
             let samples = all.iter().flat_map(|piece| piece.samples);
             let mut speeds: Vec<f64> = samples.map(|sample| sample.velocity[j].abs()).collect();
             LearntJoint {
+                name: name.clone(),
                 fast_rad_s: quantile(&mut speeds, FAST).max(LEAST_FAST_RAD_S),
             }
         })

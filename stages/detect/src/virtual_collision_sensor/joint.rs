@@ -2,6 +2,7 @@
 
 use super::bias::Bias;
 use super::model_error::ModelError;
+use super::noise::MeasurementNoise;
 use super::phase::{Phase, PhaseMachine};
 use super::trend::{NoiseBounds, Trend};
 
@@ -29,7 +30,7 @@ pub(super) struct Reading {
     pub residue: f64,
     /// Estimated model error \[effort unit\].
     pub model_error: f64,
-    /// `S_coll`, equations 4 and 17 \[effort unit\].
+    /// `S_coll`, equations 4 and 17, and what noise may add \[effort unit\].
     pub threshold: f64,
 }
 
@@ -53,6 +54,7 @@ pub(super) struct Joint {
     measured: Trend,
     expected: Trend,
     noise: NoiseBounds,
+    measurement: MeasurementNoise,
     machine: PhaseMachine,
     model_error: ModelError,
     /// Learning and adaptation.
@@ -66,6 +68,7 @@ impl Joint {
             measured: Trend::new(tuning.cutoff_hz),
             expected: Trend::new(tuning.cutoff_hz),
             noise: NoiseBounds::default(),
+            measurement: MeasurementNoise::new(tuning.cutoff_hz),
             machine: PhaseMachine::default(),
             model_error: ModelError::new(tuning.period_s, tuning.delta),
             bias,
@@ -77,6 +80,7 @@ impl Joint {
         self.measured.reset(measured);
         self.expected.reset(expected);
         self.noise = NoiseBounds::default();
+        self.measurement.reset(measured - expected);
         self.machine = PhaseMachine::default();
         self.model_error.reset();
     }
@@ -96,13 +100,14 @@ impl Joint {
         let model_error = self
             .model_error
             .update(dt_s, residue, phase == Phase::Steady);
+        let noise = self.measurement.update(dt_s, measured - expected);
         self.bias.advance(dt_s);
         let bias = self.bias.value(self.tuning.time_constant_s);
         Reading {
             phase,
             residue,
             model_error,
-            threshold: self.tuning.alpha * (model_error + bias),
+            threshold: self.tuning.alpha * (model_error + bias) + noise,
         }
     }
 

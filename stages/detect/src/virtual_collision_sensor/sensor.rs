@@ -46,6 +46,8 @@ struct Alarm {
 /// The sensor.
 pub(crate) struct Sensor {
     name: &'static str,
+    /// Names for what was learnt; empty where nothing is.
+    joint_names: Vec<String>,
     joints: Vec<Joint>,
     validity: Vec<Validity>,
     learning: Option<Learning>,
@@ -62,26 +64,20 @@ pub(crate) struct Sensor {
 }
 
 impl Sensor {
-    /// A sensor with the first bias of each joint, and what an earlier life has learnt.
-    pub(crate) fn new(
-        name: &'static str,
-        tuning: Tuning,
-        first: &[f64],
-        learnt: Option<&Learnt>,
-        learning: Option<Learning>,
-        hold_s: f64,
-    ) -> Self {
-        let joint = |(j, &first): (usize, &f64)| {
-            let learnt = learnt.and_then(|learnt| learnt.joints.get(j));
-            Joint::new(tuning, learnt.map_or(Bias::new(first), Bias::resume))
-        };
+    /// A sensor with the first bias of each joint; it learns nothing.
+    pub(crate) fn new(name: &'static str, tuning: Tuning, first: &[f64], hold_s: f64) -> Self {
+        let joints = first.iter();
         Self {
             name,
-            joints: first.iter().enumerate().map(joint).collect(),
-            validity: first.iter().map(|&first| Validity::new(first)).collect(),
-            learning,
+            joint_names: Vec::new(),
+            joints: (joints
+                .clone()
+                .map(|&first| Joint::new(tuning, Bias::new(first))))
+            .collect(),
+            validity: joints.map(|&first| Validity::new(first)).collect(),
+            learning: None,
             state: LearningState::default(),
-            asked: learning.is_some_and(|learning| learning.at_start) && learnt.is_none(),
+            asked: false,
             settling_s: Butterworth2::new(tuning.cutoff_hz).settling_time_s() + tuning.period_s,
             hold_ns: (hold_s * 1e9) as i64,
             previous_ns: None,
@@ -89,6 +85,23 @@ impl Sensor {
             newest_low_ns: None,
             alarm: None,
             newest_alarm_ns: None,
+        }
+    }
+
+    /// Lets it learn, from what an earlier life has `learnt` of these joints on.
+    pub(crate) fn let_learn(
+        &mut self,
+        learning: Learning,
+        joint_names: &[String],
+        learnt: Option<&Learnt>,
+    ) {
+        self.joint_names = joint_names.to_vec();
+        self.learning = Some(learning);
+        self.asked = learning.at_start && learnt.is_none();
+        for (joint, name) in self.joints.iter_mut().zip(joint_names) {
+            if let Some(learnt) = learnt.and_then(|learnt| learnt.joints.get(name)) {
+                joint.bias = Bias::resume(learnt);
+            }
         }
     }
 
@@ -167,6 +180,7 @@ impl Detector for Sensor {
     fn learnt(&self) -> Option<Learnt> {
         self.learning?;
         let joints = self.joints.iter().map(|joint| joint.bias.learnt());
+        let joints = self.joint_names.iter().cloned().zip(joints);
         Some(Learnt {
             joints: joints.collect(),
         })

@@ -16,6 +16,8 @@ pub(super) struct CellMessages {
     pub command: ros::JointState,
     /// On `/contact`.
     pub contact: ros::Bool,
+    /// On `/learn`, where it is true.
+    pub learn: ros::Bool,
 }
 
 impl CellMessages {
@@ -30,6 +32,7 @@ impl CellMessages {
             state: message(),
             command: message(),
             contact: ros::Bool::default(),
+            learn: ros::Bool::default(),
         }
     }
 
@@ -48,6 +51,7 @@ impl CellMessages {
         self.command.header.stamp = stamp;
         copy(&mut self.command.position, &reading.command_position[..n]);
         self.contact.data = reading.contact;
+        self.learn.data = reading.learn;
     }
 }
 

@@ -194,6 +194,10 @@ pub struct RecordingSpec {
     pub duration_s: f64,
     /// How the arm moves.
     pub motion: MotionSpec,
+    /// When somebody asks the detectors to learn the arm's usual behaviour anew \[s\]: `std_msgs/msg/Bool` on
+    /// `/learn`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub learn_at_s: Vec<f64>,
     /// Pushes at chosen times.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub contacts: Vec<ContactSpec>,

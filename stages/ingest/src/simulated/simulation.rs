@@ -35,6 +35,8 @@ pub struct Reading {
     pub command_position: JointArray,
     /// Whether something touches the arm.
     pub contact: bool,
+    /// Whether somebody has asked for learning since the reading before.
+    pub learn: bool,
 }
 
 /// A contact as the labels tell of it.
@@ -87,6 +89,8 @@ pub struct Simulation {
     /// The force of each obstacle in this step.
     touches: Vec<Option<Contact>>,
     events: Vec<Event>,
+    /// Times at which somebody asks for learning \[s\], ascending.
+    learn_at_s: std::iter::Peekable<std::vec::IntoIter<f64>>,
 }
 
 impl Simulation {
@@ -112,7 +116,10 @@ impl Simulation {
         }
         let controller = Controller::new(&model, &scenario.controller, &joints, start)?;
         let record = Record::new(&model, &scenario.physics)?;
+        let mut learn_at_s = spec.learn_at_s.clone();
+        learn_at_s.sort_by(f64::total_cmp);
         Ok(Self {
+            learn_at_s: learn_at_s.into_iter().peekable(),
             name: spec.name.clone(),
             start_ns: i64::from(scenario.start_s) * 1_000_000_000 + offset_ns,
             step: 0,
@@ -193,7 +200,12 @@ impl Simulation {
             self.plant.velocity(),
             self.record.effort_nm(),
         );
+        let mut learn = false;
+        while self.learn_at_s.next_if(|at_s| *at_s <= time_s).is_some() {
+            learn = true;
+        }
         Reading {
+            learn,
             stamp_ns: self.start_ns + self.step * STEP_NS,
             position: measured.position,
             velocity: measured.velocity,

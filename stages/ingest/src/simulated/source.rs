@@ -73,6 +73,7 @@ impl Source<JointState> for SimulatedCell {
         self.messages.fill(&reading);
         self.packer
             .command(&self.messages.command, reading.stamp_ns);
+        self.packer.learn(self.messages.learn);
         self.packer.state(&self.messages.state, reading.stamp_ns);
         while let Some(sample) = self.packer.pop(reading.stamp_ns) {
             out.emit(&mut |slot| *slot = sample)?;

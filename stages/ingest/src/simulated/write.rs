@@ -27,7 +27,7 @@ pub struct Simulated {
 }
 
 /// Makes every recording of the scenario in the folder `out`, `<name>.mcap` each with
-/// `/joint_states`, `/joint_commands` and `/contact`, and `labels.json`; and, for a scenario that
+/// `/joint_states`, `/joint_commands` and `/contact` (and `/learn` where somebody asks), and `labels.json`; and, for a scenario that
 /// conceals, what it conceals as `concealed.json`.
 ///
 /// `provenance` is written into each file; `progress` is told how much is done, from 0 to 1, and by
@@ -133,9 +133,18 @@ fn write(
     let states = writer.add_topic::<ros::JointState>("/joint_states")?;
     let commands = writer.add_topic::<ros::JointState>("/joint_commands")?;
     let contacts = writer.add_topic::<ros::Bool>("/contact")?;
+    let mut requests = None;
     while let Some(reading) = simulation.next_reading()? {
         messages.fill(&reading);
         let ns = reading.stamp_ns;
+        if messages.learn.data {
+            // Before the state from which on it holds.
+            let topic = match requests {
+                Some(topic) => topic,
+                None => *requests.insert(writer.add_topic::<ros::Bool>("/learn")?),
+            };
+            writer.write(topic, ns, ns, &messages.learn)?;
+        }
         writer.write(states, ns, ns, &messages.state)?;
         writer.write(commands, ns, ns, &messages.command)?;
         writer.write(contacts, ns, ns, &messages.contact)?;

@@ -1,5 +1,5 @@
-//! What a joint state carries besides the measurement, the command and the tool, so that the archive
-//! replays as the recording did. Written when they change; a command that stays is told again now
+//! What a joint state carries besides the measurement, the command, the tool and requests for learning, so that the
+//! archive replays as the recording did. Written when they change; a command that stays is told again now
 //! and then, because a source takes none that is old.
 
 use tauscope_archive::ros::{self, Inertia, InertiaStamped};
@@ -10,7 +10,7 @@ use super::File;
 use super::joints::JointTopic;
 use crate::streams::{Stream, Streams};
 
-/// The topics of the command and of the tool, made when there is something to write.
+/// The topics of the command, the tool and the requests, made when there is something to write.
 pub(super) struct CommandTopics {
     joints: Vec<String>,
     command_name: String,
@@ -20,6 +20,8 @@ pub(super) struct CommandTopics {
     tool_name: String,
     tool: Option<TopicWriter<InertiaStamped>>,
     attached: Option<Tool>,
+    learn_name: String,
+    learn: Option<TopicWriter<ros::Bool>>,
 }
 
 /// A command is told again after this time \[ns\].
@@ -44,9 +46,22 @@ impl CommandTopics {
             tool_name: format!("{prefix}/tool{suffix}"),
             tool: None,
             attached: None,
+            learn_name: format!("{prefix}/learn{suffix}"),
+            learn: None,
         }
     }
 
+    /// What must be read before the state itself: a request for learning holds from the state behind it on.
+    pub fn write_ahead(&mut self, file: &mut File, sample: &JointState) -> Result<(), WriteError> {
+        if sample.header.has(flags::LEARN) {
+            let asked = ros::Bool { data: true };
+            let name = || self.learn_name.clone();
+            file.write_late(&mut self.learn, name, &sample.header, &asked)?;
+        }
+        Ok(())
+    }
+
+    /// What may be read behind the state.
     pub fn write(&mut self, file: &mut File, sample: &JointState) -> Result<(), WriteError> {
         let header = &sample.header;
         if header.has(flags::COMMAND) {

@@ -1,0 +1,251 @@
+//! Damaged recordings and sets that lack something, in `evaluate`, `replay` and `run`: said in words, or counted and
+//! ended with exit code 3; never passed over.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+mod common;
+
+#[path = "common/labelled_set.rs"]
+mod labelled_set;
+
+#[path = "common/learnt_pipeline.rs"]
+mod learnt_pipeline;
+
+use std::path::Path;
+
+use common::{Out, bundled, tauscope, write};
+use labelled_set::{Set, changed, evaluate};
+use learnt_pipeline::{LEARNT, arm, pipeline, refused, replay, run};
+use serde_json::Value;
+use tauscope_archive::ros::JointState;
+
+#[test]
+fn a_detector_that_needs_kinds_says_which_recordings_have_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let bare = |folder: &Path, name| changed(folder, name, |_, _| true);
+    let set = Set {
+        labels: None,
+        train: vec![bare(folder.path(), "demo_train_points.mcap")],
+        ..Set::default()
+    };
+    let set = set.write(folder.path());
+    let out = folder.path().join("out");
+    let run = evaluate(&set, &out, &["--detectors", "contact_classifier"]);
+    refused(
+        &run,
+        &[
+            "the training recordings demo_train_points have no labels",
+            "`labels`",
+        ],
+    );
+    // One that needs none runs, and it is said what was taken for granted.
+    let run = evaluate(&set, &out, &["--detectors", "naive_difference"]);
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    let said = "without labels, and taken to be free of contacts: demo_train_points";
+    assert!(run.stdout.contains(said), "{}", run.stdout);
+}
+
+#[test]
+fn a_set_with_no_contact_scores_none_of_the_light_detectors_and_says_no_zero() {
+    let folder = tempfile::tempdir().unwrap();
+    let quiet = changed(folder.path(), "demo_train_points.mcap", |_, _| true);
+    let test = folder.path().join("quiet.mcap");
+    std::fs::rename(&quiet, &test).unwrap();
+    let labels = r#"{"recordings": {"quiet": {"events": []}}}"#;
+    let set = Set {
+        labels: Some(write(&folder.path().join("own.json"), labels)),
+        test,
+        ..Set::default()
+    };
+    let detectors = "naive_difference,twin_regression,momentum_observer,virtual_collision_sensor_basic,\
+                     virtual_collision_sensor,tauscope";
+    let set = set.write(folder.path());
+    let more = ["--json", "--detectors", detectors];
+    let run = evaluate(&set, &folder.path().join("out"), &more);
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    let summary: Value = serde_json::from_str(&run.stdout).unwrap();
+    for detector in summary["detectors"].as_array().unwrap() {
+        let numbers = &detector["seeds"][0];
+        for number in ["auc", "f1", "best_f1"] {
+            assert_eq!(numbers["samples"][number], Value::Null, "{detector}");
+        }
+        assert!(numbers["false_alarms_per_hour"].is_number(), "{detector}");
+    }
+    let run = evaluate(
+        &set,
+        &folder.path().join("out"),
+        &["--detectors", "contact_classifier"],
+    );
+    refused(&run, &["contact_classifier", "labels"]);
+}
+
+/// What is done to a joint state, by its place; false takes it out.
+type Damage = fn(usize, &mut JointState) -> bool;
+
+#[test]
+fn bursts_of_nan_are_counted_alike_by_evaluate_replay_and_run() {
+    const BURST: std::ops::Range<usize> = 1000..1040;
+    let bursts: [Damage; 4] = [
+        |row, state| {
+            if BURST.contains(&row) {
+                state.effort[2] = f64::NAN;
+            }
+            true
+        },
+        |row, state| {
+            if BURST.contains(&row) {
+                state.position.fill(f64::NAN);
+            }
+            true
+        },
+        |row, state| {
+            if BURST.contains(&row) {
+                state.velocity[6] = f64::NAN;
+            }
+            true
+        },
+        |row, state| {
+            if BURST.contains(&row) {
+                state.effort[0] = f64::INFINITY;
+            }
+            true
+        },
+    ];
+    for burst in bursts {
+        let folder = tempfile::tempdir().unwrap();
+        let recording = changed(folder.path(), "demo.mcap", burst);
+        let set = Set {
+            test: recording.clone(),
+            ..Set::default()
+        };
+        let detectors = LEARNT.join(",");
+        let out = evaluate(
+            &set.write(folder.path()),
+            &folder.path().join("out"),
+            &["--detectors", &detectors],
+        );
+        assert_eq!(out.code, 3, "{}", out.stderr);
+        let said = "demo: 40 samples were lost or refused";
+        assert!(out.stdout.contains(said), "{}", out.stdout);
+
+        let arm = arm();
+        let file = pipeline(&arm, &recording, None).write(folder.path(), str::to_owned);
+        let replayed = replay(&file, &recording, &folder.path().join("replayed"));
+        assert_eq!(replayed.code, 3, "{}", replayed.stderr);
+        let summary: Value = serde_json::from_str(&replayed.stdout).unwrap();
+        assert_eq!(summary[0]["lost"], 40);
+        let live = run(&file);
+        assert_eq!(live.code, 3, "{}", live.stderr);
+        let summary: Value = serde_json::from_str(&live.stdout).unwrap();
+        let ingest = &summary["stages"][0];
+        assert_eq!(
+            (&ingest["stage"], &ingest["dropped"]),
+            (&"ingest".into(), &40.into())
+        );
+    }
+}
+
+#[test]
+fn a_gap_of_three_seconds_is_told_and_starts_the_filters_anew() {
+    let folder = tempfile::tempdir().unwrap();
+    let gap = changed(folder.path(), "demo.mcap", |row, _| {
+        !(1000..1300).contains(&row)
+    });
+    let set = Set {
+        test: gap,
+        ..Set::default()
+    };
+    let more = ["--detectors", "naive_difference,tauscope"];
+    let run = evaluate(&set.write(folder.path()), &folder.path().join("out"), &more);
+    assert_eq!(
+        run.code, 0,
+        "nothing that was recorded is lost: {}",
+        run.stderr
+    );
+    assert!(
+        run.stdout.contains("demo: 1 gap(s) in time; "),
+        "{}",
+        run.stdout
+    );
+}
+
+#[test]
+fn repeated_stamps_change_no_event() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut before = None;
+    let repeated = changed(folder.path(), "demo.mcap", |row, state| {
+        match before.replace(state.clone()) {
+            // A driver that says the same twice.
+            Some(before) if (500..700).contains(&row) && row % 2 == 1 => *state = before,
+            _ => {}
+        }
+        true
+    });
+    let arm = arm();
+    let file = pipeline(&arm, &repeated, None).write(folder.path(), str::to_owned);
+    let out = replay(&file, &repeated, &folder.path().join("replayed"));
+    assert_eq!(out.code, 0, "{}", out.stderr);
+    let summary: Value = serde_json::from_str(&out.stdout).unwrap();
+    for detector in summary[0]["detectors"].as_array().unwrap() {
+        if detector["detector"] == "tauscope" {
+            assert_eq!(
+                detector["events"].as_array().unwrap().len(),
+                6,
+                "{detector}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_torn_recording_is_evaluated_up_to_the_tear_wherever_it_stands() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["demo.mcap", "demo_validation.mcap", "demo_train_sweep.mcap"] {
+        let whole = std::fs::read(bundled().join(name)).unwrap();
+        let torn = folder.path().join(name);
+        std::fs::write(&torn, &whole[..whole.len() * 2 / 3]).unwrap();
+        let mut set = Set::default();
+        let paths = [&mut set.test]
+            .into_iter()
+            .chain(&mut set.train)
+            .chain(&mut set.validation);
+        for path in paths.filter(|path| path.file_name() == torn.file_name()) {
+            path.clone_from(&torn);
+        }
+        let out = folder.path().join("out");
+        let run = evaluate(
+            &set.write(folder.path()),
+            &out,
+            &["--detectors", "tauscope"],
+        );
+        assert_eq!(run.code, 3, "{}", run.stderr);
+        let said = "the file is torn off here; readable until";
+        assert!(run.stdout.contains(said), "{name}: {}", run.stdout);
+    }
+}
+
+#[test]
+fn a_recording_without_efforts_is_no_recording_without_contacts() {
+    let folder = tempfile::tempdir().unwrap();
+    let bare = changed(folder.path(), "demo.mcap", |_, state| {
+        state.effort.clear();
+        true
+    });
+    let set = Set {
+        test: bare.clone(),
+        ..Set::default()
+    };
+    let more = ["--detectors", "naive_difference"];
+    let run = evaluate(&set.write(folder.path()), &folder.path().join("out"), &more);
+    refused(&run, &["demo.mcap: no joint state holds efforts"]);
+    let arm = arm();
+    let file = pipeline(&arm, &bare, None).write(folder.path(), str::to_owned);
+    let mut command = tauscope();
+    command.args(["replay", "--pipeline"]).arg(&file).arg(&bare);
+    let replayed = Out::of(command);
+    assert!(
+        replayed.stdout.contains("tauscope: judged no sample"),
+        "{}",
+        replayed.stdout
+    );
+}

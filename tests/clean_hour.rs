@@ -1,0 +1,92 @@
+//! An hour of clean cycles with friction that warms up (`tests/data/clean_hour.scenario.yaml`): no alarm is right. Every
+//! time in short; the whole hour with `cargo test --release --test clean_hour -- --ignored`.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+mod common;
+
+use std::path::Path;
+
+use common::{Out, bundled, tauscope, write};
+use serde_json::Value;
+
+const DETECTORS: &str = "virtual_collision_sensor_basic,virtual_collision_sensor,tauscope";
+
+/// Runs `tauscope` and expects it to go well.
+fn done(more: &[&str], path: &Path, out: &Path) -> Out {
+    let mut command = tauscope();
+    command.args(more).arg(path).arg("--out").arg(out);
+    let done = Out::of(command);
+    assert_eq!(done.code, 0, "{}", done.stderr);
+    done
+}
+
+/// Simulates the scenario's first `count` clean recordings after `change`, lets the detectors learn from its cold
+/// cycles, and expects them to be silent in the rest.
+fn nobody_cries(count: usize, change: impl Fn(String) -> String) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let robot = bundled().join("demo_arm.urdf").display().to_string();
+    let scenario = std::fs::read_to_string(bundled().join("clean_hour.scenario.yaml")).unwrap();
+    let lines = scenario.lines().filter(|line| {
+        let number = line
+            .split("name: clean_")
+            .nth(1)
+            .and_then(|rest| rest.get(..2));
+        number
+            .and_then(|number| number.parse::<usize>().ok())
+            .is_none_or(|number| number < count)
+    });
+    let lines: Vec<&str> = lines.collect();
+    let constants = lines
+        .iter()
+        .find(|line| line.starts_with("torque_constants"))
+        .unwrap();
+    let text = lines
+        .join("\n")
+        .replace("robot: demo_arm.urdf", &format!("robot: {robot}"));
+    let scenario = write(&path("scenario.yaml"), &change(text));
+    done(&["simulate"], &scenario, folder.path());
+
+    let clean: Vec<String> = (0..count)
+        .map(|number| format!("clean_{number:02}.mcap"))
+        .collect();
+    let set = format!(
+        "set: clean_hour\nrobot: {robot}\nlabels: labels.json\neffort_unit: A\n{constants}\ncycle_s: 8\n\
+         topics: {{state: /joint_states}}\ntrain: [learn.mcap]\nvalidation: [cold.mcap]\ntest: [{}]\n",
+        clean.join(", ")
+    );
+    let set = write(&path("set.yaml"), &set);
+    let said = done(
+        &["evaluate", "--json", "--detectors", DETECTORS],
+        &set,
+        &path("out"),
+    );
+    let summary: Value = serde_json::from_str(&said.stdout).unwrap();
+    let detectors = summary["detectors"].as_array().unwrap();
+    assert_eq!(detectors.len(), 3);
+    for detector in detectors {
+        assert_eq!(detector["seeds"][0]["false_alarms"], 0, "{detector}");
+    }
+}
+
+#[test]
+fn two_minutes_of_a_cold_arm_raise_no_alarm() {
+    nobody_cries(2, |text| text.replace("duration_s: 300", "duration_s: 60"));
+}
+
+#[test]
+#[ignore = "five minutes of simulation"]
+fn an_hour_of_clean_cycles_raises_no_alarm() {
+    nobody_cries(12, |text| text);
+}
+
+#[test]
+#[ignore = "five minutes of simulation"]
+fn nor_does_an_hour_of_other_noise() {
+    nobody_cries(12, |text| {
+        let noisier = "effort_noise_of_limit: 0.004";
+        text.replace("seed: 5", "seed: 6")
+            .replace("effort_noise_of_limit: 0.002", noisier)
+    });
+}

@@ -1,0 +1,129 @@
+//! What `evaluate` says of a recording a pipeline says, too: one that runs its `twin.yaml` and `learnt.yaml`, all
+//! detectors side by side.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+mod common;
+
+#[path = "common/labelled_set.rs"]
+mod labelled_set;
+
+#[path = "common/learnt_pipeline.rs"]
+mod learnt_pipeline;
+
+use std::path::Path;
+
+use common::{Out, bundled, tauscope, write};
+use labelled_set::{Set, evaluate};
+use learnt_pipeline::{LearntPipeline, replay};
+use serde_json::Value;
+
+/// The events of a replay, by detector, and those that `evaluate` wrote.
+fn both(replayed: &Out, evaluated: &Path, recording: &str) -> Vec<(String, Value, Value)> {
+    assert_eq!(replayed.code, 0, "{}", replayed.stderr);
+    let summary: Value = serde_json::from_str(&replayed.stdout).unwrap();
+    let detectors = summary[0]["detectors"].as_array().unwrap();
+    let both = detectors.iter().map(|replayed| {
+        let name = replayed["detector"].as_str().unwrap();
+        let file = evaluated.join(format!("{recording}.{name}.json"));
+        let wrote: Value = serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap();
+        (
+            name.to_owned(),
+            replayed["events"].clone(),
+            wrote["events"].clone(),
+        )
+    });
+    both.collect()
+}
+
+/// A session of one test recording, so that nothing is carried over from a validation recording.
+#[test]
+fn a_pipeline_of_what_was_learnt_finds_what_evaluate_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let set = Set {
+        validation: Vec::new(),
+        ..Set::default()
+    };
+    let detectors = "naive_difference,twin_regression,momentum_observer,virtual_collision_sensor_basic,\
+                     virtual_collision_sensor,window_ocsvm,tauscope";
+    let run = evaluate(&set.write(folder.path()), &out, &["--detectors", detectors]);
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    let pipeline = LearntPipeline {
+        evaluated: &out,
+        robot: &set.robot,
+        recording: &set.test,
+        twin: None,
+    };
+    let pipeline = pipeline.write(folder.path(), str::to_owned);
+    let replayed = replay(&pipeline, &set.test, &folder.path().join("replayed"));
+    let all = both(&replayed, &out, "demo");
+    assert_eq!(all.len(), 7);
+    for (detector, replayed, evaluated) in all {
+        assert_eq!(replayed, evaluated, "{detector}");
+        assert!(!replayed.as_array().unwrap().is_empty(), "{detector}");
+    }
+}
+
+/// The same of those that need collisions, cooperations and a high rate.
+#[test]
+fn the_classifiers_find_in_a_pipeline_what_they_found_in_evaluate() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenario = format!(
+        "version: 1
+name: pushes
+robot: {robot}
+seed: 3
+rate_hz: 500
+sensors: {{effort_noise_nm: 0.05}}
+recordings:
+- name: learn
+  role: train
+  duration_s: 14
+  motion: &there {{points: {{through: [[0, 0.5, 0, 1.2, 0, 0.6, 0], [0.5, 0.8, 0, 1.0, 0, 0.6, 0]], speed: 0.5, rest_s: [0.1, 0.1]}}}}
+  contacts: &contacts
+  - {{link: link6, force_n: [0, -40, 0], t_on_s: 3.0, t_off_s: 3.2, rise_s: 0.02, kind: collision}}
+  - {{link: link6, force_n: [25, 0, 0], t_on_s: 5.0, t_off_s: 6.0, rise_s: 0.1, kind: cooperation}}
+  - {{link: link6, force_n: [0, 45, 0], t_on_s: 8.0, t_off_s: 8.2, rise_s: 0.02, kind: collision}}
+  - {{link: link6, force_n: [0, 0, 30], t_on_s: 10.0, t_off_s: 11.0, rise_s: 0.1, kind: cooperation}}
+- {{name: touched, role: test, duration_s: 14, motion: *there, contacts: *contacts}}
+",
+        robot = bundled().join("demo_arm.urdf").display()
+    );
+    let file = write(&folder.path().join("pushes.yaml"), &scenario);
+    let mut simulate = tauscope();
+    simulate
+        .arg("simulate")
+        .arg(&file)
+        .arg("--out")
+        .arg(folder.path());
+    let made = Out::of(simulate);
+    assert_eq!(made.code, 0, "{}", made.stderr);
+    let recording = |name: &str| folder.path().join(name);
+    let set = Set {
+        robot: bundled().join("demo_arm.urdf"),
+        labels: Some(recording("labels.json")),
+        train: vec![recording("learn.mcap")],
+        validation: Vec::new(),
+        test: recording("touched.mcap"),
+    };
+    let detectors =
+        "momentum_observer,contact_classifier,fisher_discriminant,frequency_classifier,tauscope";
+    let out = recording("out");
+    let run = evaluate(&set.write(folder.path()), &out, &["--detectors", detectors]);
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    let pipeline = LearntPipeline {
+        evaluated: &out,
+        robot: &set.robot,
+        recording: &set.test,
+        twin: None,
+    };
+    let pipeline = pipeline.write(folder.path(), str::to_owned);
+    let replayed = replay(&pipeline, &set.test, &recording("replayed"));
+    let all = both(&replayed, &out, "touched");
+    assert_eq!(all.len(), 5);
+    for (detector, replayed, evaluated) in all {
+        assert_eq!(replayed, evaluated, "{detector}");
+        assert!(!replayed.as_array().unwrap().is_empty(), "{detector}");
+    }
+}
