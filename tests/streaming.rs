@@ -36,6 +36,30 @@ fn both(replayed: &Out, evaluated: &Path, recording: &str) -> Vec<(String, Value
     both.collect()
 }
 
+/// Replays a set's test recording through a pipeline of what its evaluation left in `out`: so many detectors must find the same, and
+/// something.
+fn finds_in_a_pipeline_what_was_found(
+    folder: &Path,
+    set: &Set,
+    out: &Path,
+    (name, count): (&str, usize),
+) {
+    let pipeline = LearntPipeline {
+        evaluated: out,
+        robot: &set.robot,
+        recording: &set.test,
+        twin: None,
+    };
+    let pipeline = pipeline.write(folder, str::to_owned);
+    let replayed = replay(&pipeline, &set.test, &folder.join("replayed"));
+    let all = both(&replayed, out, name);
+    assert_eq!(all.len(), count);
+    for (detector, replayed, evaluated) in all {
+        assert_eq!(replayed, evaluated, "{detector}");
+        assert!(!replayed.as_array().unwrap().is_empty(), "{detector}");
+    }
+}
+
 /// A session of one test recording, so that nothing is carried over from a validation recording.
 #[test]
 fn a_pipeline_of_what_was_learnt_finds_what_evaluate_found() {
@@ -49,20 +73,7 @@ fn a_pipeline_of_what_was_learnt_finds_what_evaluate_found() {
                      virtual_collision_sensor,window_ocsvm,tauscope";
     let run = evaluate(&set.write(folder.path()), &out, &["--detectors", detectors]);
     assert_eq!(run.code, 0, "{}", run.stderr);
-    let pipeline = LearntPipeline {
-        evaluated: &out,
-        robot: &set.robot,
-        recording: &set.test,
-        twin: None,
-    };
-    let pipeline = pipeline.write(folder.path(), str::to_owned);
-    let replayed = replay(&pipeline, &set.test, &folder.path().join("replayed"));
-    let all = both(&replayed, &out, "demo");
-    assert_eq!(all.len(), 7);
-    for (detector, replayed, evaluated) in all {
-        assert_eq!(replayed, evaluated, "{detector}");
-        assert!(!replayed.as_array().unwrap().is_empty(), "{detector}");
-    }
+    finds_in_a_pipeline_what_was_found(folder.path(), &set, &out, ("demo", 7));
 }
 
 /// The same of those that need collisions, cooperations and a high rate.
@@ -112,18 +123,5 @@ recordings:
     let out = recording("out");
     let run = evaluate(&set.write(folder.path()), &out, &["--detectors", detectors]);
     assert_eq!(run.code, 0, "{}", run.stderr);
-    let pipeline = LearntPipeline {
-        evaluated: &out,
-        robot: &set.robot,
-        recording: &set.test,
-        twin: None,
-    };
-    let pipeline = pipeline.write(folder.path(), str::to_owned);
-    let replayed = replay(&pipeline, &set.test, &recording("replayed"));
-    let all = both(&replayed, &out, "touched");
-    assert_eq!(all.len(), 5);
-    for (detector, replayed, evaluated) in all {
-        assert_eq!(replayed, evaluated, "{detector}");
-        assert!(!replayed.as_array().unwrap().is_empty(), "{detector}");
-    }
+    finds_in_a_pipeline_what_was_found(folder.path(), &set, &out, ("touched", 5));
 }

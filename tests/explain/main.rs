@@ -433,6 +433,14 @@ fn pushed(path: &Path, robot: &Path, link: &str, pushes: &[(f64, f64, [f64; 3])]
     record(path, &[(STATES, &rows)]);
 }
 
+/// What is said of one recording of a robot.
+fn explained(out: &Path, robot: &Path, recording: &Path) -> Value {
+    let (robot, recording) = (robot.to_str().unwrap(), recording.to_str().unwrap());
+    let done = explain(out, &["--robot", robot, "--fit", recording]);
+    assert_eq!(done.code, 0, "{}", done.stderr);
+    report(out)
+}
+
 #[test]
 fn pushes_on_an_arm_at_rest_are_told_in_time_and_place() {
     let folder = tempfile::tempdir().unwrap();
@@ -444,15 +452,7 @@ fn pushes_on_an_arm_at_rest_are_told_in_time_and_place() {
     ];
     pushed(&recording, &robot, "fore", &pushes);
     let out = folder.path().join("out");
-    let arguments = [
-        "--robot",
-        robot.to_str().unwrap(),
-        "--fit",
-        recording.to_str().unwrap(),
-    ];
-    let done = explain(&out, &arguments);
-    assert_eq!(done.code, 0, "{}", done.stderr);
-    let report = report(&out);
+    let report = explained(&out, &robot, &recording);
     assert_eq!(report["verdict"], "explained", "{report:#}");
     let findings = report["findings"].as_array().unwrap();
     assert_eq!(findings.len(), pushes.len(), "{report:#}");
@@ -485,15 +485,7 @@ fn a_push_that_only_the_first_joint_feels_is_a_force_further_out() {
         &[(3.0, 4.0, [-20.0 * sin, 20.0 * cos, 0.0])],
     );
     let out = folder.path().join("out");
-    let arguments = [
-        "--robot",
-        robot.to_str().unwrap(),
-        "--fit",
-        recording.to_str().unwrap(),
-    ];
-    let done = explain(&out, &arguments);
-    assert_eq!(done.code, 0, "{}", done.stderr);
-    let report = report(&out);
+    let report = explained(&out, &robot, &recording);
     let findings = report["findings"].as_array().unwrap();
     assert_eq!(findings.len(), 1, "{report:#}");
     let force = |axis: &str| {

@@ -112,29 +112,23 @@ impl Setup<'_> {
             try_it(Smoothing { motion_hz, ..start }, &mut best)?;
         }
         let motion_hz = best.1.motion_hz;
-        let rate_hz = |r: &Recording| (r.len() - 1) as f64 / r.duration_s().max(1e-9);
+        let rate_hz = |r: &Recording| r.len().saturating_sub(1) as f64 / r.duration_s().max(1e-9);
         let fit = &self.input.fit;
         let most_hz = MOST_OF_RATE * fit.iter().map(rate_hz).fold(f64::INFINITY, f64::min);
-        for times in VELOCITY_CUTOFFS {
-            let velocity = Velocity::Smoothed((times * motion_hz).min(most_hz));
-            try_it(
-                Smoothing {
-                    motion_hz,
-                    velocity,
-                },
-                &mut best,
-            )?;
+        let sharper = VELOCITY_CUTOFFS.map(|times| (times * motion_hz).min(most_hz));
+        let mut velocities: Vec<Velocity> = sharper.into_iter().map(Velocity::Smoothed).collect();
+        let is_recorded = |r: &Recording| {
+            r.velocity.len() == r.position.len() && r.velocity.iter().all(|v| v.is_finite())
+        };
+        if fit.iter().chain(&self.input.holdout).all(is_recorded) {
+            velocities.push(Velocity::Recorded);
         }
-        let all = fit.iter().chain(&self.input.holdout);
-        if all.clone().all(|r| r.velocity.len() == r.position.len()) {
-            let velocity = Velocity::Recorded;
-            try_it(
-                Smoothing {
-                    motion_hz,
-                    velocity,
-                },
-                &mut best,
-            )?;
+        for velocity in velocities {
+            let smoothing = Smoothing {
+                motion_hz,
+                velocity,
+            };
+            try_it(smoothing, &mut best)?;
         }
         Ok(best.1)
     }

@@ -1,0 +1,105 @@
+"""How often an interval holds the truth: the simulated cell conceals, `explain` tells, and both are compared, parameter by parameter.
+
+    python coverage.py TAUSCOPE OUT [--cases 250] [--count 2] [--first 1] [--scenario FILE]
+
+Counted are the numbers of effects that were named at the right place; the rest, and what was missed, is counted apart. Standard library only.
+"""
+import argparse
+import collections
+import json
+import math
+import pathlib
+import re
+import subprocess
+
+HERE = pathlib.Path(__file__).resolve().parent
+WRAPS = {"phase_rad", "phase2_rad"}
+
+
+def options():
+    a = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    a.add_argument("tauscope")
+    a.add_argument("out", type=pathlib.Path)
+    a.add_argument("--cases", type=int, default=250)
+    a.add_argument("--count", type=int, default=2, help="effects in a case")
+    a.add_argument("--first", type=int, default=1, help="seed of the first case")
+    a.add_argument("--scenario", type=pathlib.Path, default=HERE.parent / "data/concealed.scenario.yaml")
+    return a.parse_args()
+
+
+def run(o, seed):
+    """What was concealed and what was said, or None where nothing could be concealed."""
+    folder = o.out / f"{seed:04d}"
+    report, answer = folder / "report" / "report.json", folder / "concealed.json"
+    if not report.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        text = o.scenario.read_text()
+        text = re.sub(r"^robot: .*$", f"robot: {o.scenario.resolve().parent / 'demo_arm.urdf'}", text, flags=re.M)
+        text = re.sub(r"^seed: .*$", f"seed: {seed}", text, flags=re.M)
+        text = re.sub(r"^conceal: .*$", f"conceal: {{seed: {seed}, count: {o.count}}}", text, flags=re.M)
+        scenario = folder / "scenario.yaml"
+        scenario.write_text(text)
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        if subprocess.run([o.tauscope, "simulate", scenario, "--out", folder], **quiet).returncode:
+            return None
+        subprocess.run([o.tauscope, "explain", folder / "case.yaml", "--out", folder / "report"], check=True, **quiet)
+        for recording in folder.glob("*.mcap"):
+            recording.unlink()
+    return json.loads(answer.read_text())["effects"], json.loads(report.read_text())["findings"]
+
+
+def place(effect):
+    return effect.get("joint") or effect.get("link")
+
+
+def whole_arm(effect):
+    return effect["effect"] in ("torque_delay", "torque_lowpass", "base_tilt")
+
+
+def holds(name, truth, interval):
+    low, high = interval
+    if name in WRAPS:
+        middle = 0.5 * (low + high)
+        truth = middle + math.remainder(truth - middle, 2 * math.pi)
+    return low <= truth <= high
+
+
+def main():
+    o = options()
+    hit, of = collections.Counter(), collections.Counter()
+    missed, named, wrong, cases = [], 0, 0, 0
+    for seed in range(o.first, o.first + o.cases):
+        both = run(o, seed)
+        if both is None:
+            continue
+        concealed, said = both
+        cases += 1
+        for effect in concealed:
+            own = [f for f in said if f["effect"] == effect["effect"] and (whole_arm(f) or place(f) == place(effect))]
+            if not own:
+                continue
+            named += 1
+            for name, interval in own[0]["intervals_95"].items():
+                truth = effect["parameters"].get(name)
+                if not isinstance(truth, (int, float)):
+                    continue
+                key = (effect["effect"], name)
+                of[key] += 1
+                if holds(name, truth, interval):
+                    hit[key] += 1
+                else:
+                    missed.append((seed, *key, truth, interval))
+        names = {(e["effect"], None if whole_arm(e) else place(e)) for e in concealed}
+        wrong += sum((f["effect"], None if whole_arm(f) else place(f)) not in names for f in said)
+    for key in sorted(of):
+        print(f"{key[0]:26}{key[1]:34}{hit[key]:5} of {of[key]:4}  {hit[key] / of[key]:.2f}")
+    for seed, effect, name, truth, (low, high) in missed:
+        print(f"missed by {seed}: {effect} {name} {truth:.5g}, said {low:.5g} to {high:.5g}")
+    total, held = sum(of.values()), sum(hit.values())
+    share = held / max(total, 1)
+    print(f"{cases} cases of {o.count} effects: {named} named, {wrong} findings that were not concealed")
+    print(f"{held} of {total} intervals hold the truth: {100 * share:.1f} % (+- {196 * math.sqrt(share * (1 - share) / max(total, 1)):.1f})")
+
+
+if __name__ == "__main__":
+    main()
