@@ -10,7 +10,7 @@ use crate::explain::{Judged, Setup};
 use crate::findings;
 use crate::fit::Fit;
 use crate::problem::Problem;
-use crate::propose::{Base, Proposal};
+use crate::propose::Base;
 use crate::recording::Recording;
 use crate::search::{Explanation, Search, plausible};
 use crate::track::Track;
@@ -144,9 +144,6 @@ fn order(problem: &Problem, joint: usize) -> usize {
     joints.len()
 }
 
-/// A weaker force moves nothing that a joint feels \[N\].
-const LEAST_FORCE_N: f64 = 0.01;
-
 /// A push for each time that something stands out, at the link where a constant force explains most of it: one that is next to
 /// the last joint that feels it.
 fn pushes(search: &Search<'_>) -> Explanation {
@@ -174,21 +171,9 @@ fn pushes(search: &Search<'_>) -> Explanation {
         };
         let base = Base::new(problem, &best.fit, search.hypotheses.len());
         let within = |h: &Hypothesis| base.propose_within(*h, interval, Some(0));
-        let acts = |p: &Proposal| {
-            let force_n = p.active.coordinates[..3]
-                .iter()
-                .map(|f| f * f)
-                .sum::<f64>()
-                .sqrt();
-            force_n > LEAST_FORCE_N && plausible(&p.active, &problem.model)
-        };
-        let best_of = |hypotheses: &mut dyn Iterator<Item = &Hypothesis>| {
-            let possible = hypotheses.filter_map(within).filter(acts);
-            possible.max_by(|a, b| a.gain.total_cmp(&b.gain))
-        };
-        let hypotheses = || search.hypotheses.iter();
-        // A link whose frame lies on the axes does not feel a force there: then it was one further out.
-        let push = best_of(&mut hypotheses().filter(near)).or_else(|| best_of(&mut hypotheses()));
+        let proposals = search.hypotheses.iter().filter(near).filter_map(within);
+        let possible = proposals.filter(|p| plausible(&p.active, &problem.model));
+        let push = possible.max_by(|a, b| a.gain.total_cmp(&b.gain));
         if let Some(push) = push {
             // When it was is told by what stood out: a force that grows and fades has no sharper times.
             best.fit = best.fit.with(problem, push.active);

@@ -151,6 +151,7 @@ pub fn of(
         let (joint, link) = place_of(input, joints, &active.hypothesis);
         let place = joint.clone().or_else(|| link.clone()).unwrap_or_default();
         let when = when(search, active, &mut parameters, &mut intervals);
+        drop_no_force(&mut parameters, &mut intervals);
         let in_amperes = scales.to_nm(active.hypothesis, &mut parameters, &mut intervals);
         let mut sentence = words::sentence(active, &place, &parameters, &intervals, joints);
         if in_amperes {
@@ -199,6 +200,27 @@ pub fn of(
         .findings
         .sort_by(|a, b| b.explains.total_cmp(&a.explains));
     named
+}
+
+/// A weaker force at a link's frame is none \[N\].
+const LEAST_FORCE_N: f64 = 0.01;
+
+/// Takes out the force of a push where it is none: the link's frame lies on the axes of all joints that feel the push, so that no
+/// force there does what was felt.
+fn drop_no_force(
+    parameters: &mut BTreeMap<String, Value>,
+    intervals: &mut BTreeMap<String, [f64; 2]>,
+) {
+    let names = ["x", "y", "z"].map(|axis| format!("force_{axis}_n"));
+    let force: Vec<f64> = (names.iter())
+        .filter_map(|name| parameters.get(name)?.as_f64())
+        .collect();
+    if force.len() == names.len() && force.iter().all(|f| f.abs() < LEAST_FORCE_N) {
+        for name in &names {
+            parameters.remove(name);
+            intervals.remove(name);
+        }
+    }
 }
 
 fn number(value: f64) -> Value {

@@ -231,6 +231,9 @@ pub fn sentence(
             with("coefficient"),
             joints[active.hypothesis.place.source]
         ),
+        "external_push" if !parameters.contains_key("force_x_n") => format!(
+            "Something pushed link {place} or one further out: how hard, and where on it, a force at the link's frame cannot say."
+        ),
         "external_push" => format!(
             "Something pushed link {place} with ({}, {}, {}).",
             with("force_x_n"),
