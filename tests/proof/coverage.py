@@ -48,12 +48,14 @@ def run(o, seed):
     return json.loads(answer.read_text())["effects"], json.loads(report.read_text())["findings"]
 
 
-def place(effect):
-    return effect.get("joint") or effect.get("link")
+# Those have one place only, or none.
+ANYWHERE = {"torque_delay", "torque_lowpass", "base_tilt", "payload", "payload_pickup", "contact_wall"}
 
 
-def whole_arm(effect):
-    return effect["effect"] in ("torque_delay", "torque_lowpass", "base_tilt")
+def named(effect):
+    """Effect and place."""
+    where = None if effect["effect"] in ANYWHERE else effect.get("joint") or effect.get("link")
+    return effect["effect"], where
 
 
 def holds(name, truth, interval):
@@ -67,7 +69,7 @@ def holds(name, truth, interval):
 def main():
     o = options()
     hit, of = collections.Counter(), collections.Counter()
-    missed, named, wrong, cases = [], 0, 0, 0
+    missed, found, wrong, cases = [], 0, 0, 0
     for seed in range(o.first, o.first + o.cases):
         both = run(o, seed)
         if both is None:
@@ -75,13 +77,14 @@ def main():
         concealed, said = both
         cases += 1
         for effect in concealed:
-            own = [f for f in said if f["effect"] == effect["effect"] and (whole_arm(f) or place(f) == place(effect))]
+            own = [f for f in said if named(f) == named(effect)]
             if not own:
                 continue
-            named += 1
+            found += 1
             for name, interval in own[0]["intervals_95"].items():
                 truth = effect["parameters"].get(name)
-                if not isinstance(truth, (int, float)):
+                # A push is told in its recording's time.
+                if not isinstance(truth, (int, float)) or effect["effect"] == "external_push" and name.startswith("t_"):
                     continue
                 key = (effect["effect"], name)
                 of[key] += 1
@@ -89,15 +92,15 @@ def main():
                     hit[key] += 1
                 else:
                     missed.append((seed, *key, truth, interval))
-        names = {(e["effect"], None if whole_arm(e) else place(e)) for e in concealed}
-        wrong += sum((f["effect"], None if whole_arm(f) else place(f)) not in names for f in said)
+        names = {named(e) for e in concealed}
+        wrong += sum(named(f) not in names for f in said)
     for key in sorted(of):
         print(f"{key[0]:26}{key[1]:34}{hit[key]:5} of {of[key]:4}  {hit[key] / of[key]:.2f}")
     for seed, effect, name, truth, (low, high) in missed:
         print(f"missed by {seed}: {effect} {name} {truth:.5g}, said {low:.5g} to {high:.5g}")
     total, held = sum(of.values()), sum(hit.values())
     share = held / max(total, 1)
-    print(f"{cases} cases of {o.count} effects: {named} named, {wrong} findings that were not concealed")
+    print(f"{cases} cases of {o.count} effects: {found} named, {wrong} findings that were not concealed")
     print(f"{held} of {total} intervals hold the truth: {100 * share:.1f} % (+- {196 * math.sqrt(share * (1 - share) / max(total, 1)):.1f})")
 
 
