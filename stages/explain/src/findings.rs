@@ -186,6 +186,7 @@ pub fn of(
             link,
             parameters,
             intervals_95: intervals,
+            in_amperes,
             confidence: confidence(evidence, contest.margin),
             recording: when.recording,
             t_start: when.start,

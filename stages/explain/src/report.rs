@@ -70,6 +70,9 @@ pub struct Finding {
     pub parameters: BTreeMap<String, Value>,
     /// 95 % intervals of the numbers.
     pub intervals_95: BTreeMap<String, [f64; 2]>,
+    /// Whether its efforts are in A and not in N m, whatever the names of its numbers say: nobody knows the scale of its joint.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub in_amperes: bool,
     /// 0 to 1.
     pub confidence: f64,
     /// The recording that the times hold for; all if absent, or the session for a change that lasts.
@@ -84,6 +87,11 @@ pub struct Finding {
     pub equivalent_to: Vec<Rival>,
     /// In words.
     pub sentence: String,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 /// An effect at a place.

@@ -7,6 +7,7 @@ use super::effects::{effect_at, effect_meaning, effect_title, place};
 use super::proof;
 use super::words::{almost_all, number_text, parameter, percent, value, with_digits_of};
 use crate::report::{Finding, Report, Verdict};
+use crate::words::in_amperes;
 
 /// A card a finding, or that there is none.
 pub(super) fn cards(report: &Report) -> Option<Markup> {
@@ -127,6 +128,8 @@ fn parameters(finding: &Finding) -> Markup {
             tbody {
                 @for (name, given) in parameters {
                     @let (label, unit) = parameter(name);
+                    @let amperes = finding.in_amperes.then(|| in_amperes(unit));
+                    @let unit = amperes.as_deref().unwrap_or(unit);
                     @let interval = finding.intervals_95.get(name).copied();
                     tr {
                         th scope="row" { (label) }

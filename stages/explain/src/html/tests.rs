@@ -31,6 +31,7 @@ fn finding(effect: &str, sentence: &str) -> Finding {
         link: None,
         parameters: [("coulomb_nm".to_owned(), json!(4.1))].into(),
         intervals_95: [("coulomb_nm".to_owned(), [3.9, 4.3])].into(),
+        in_amperes: false,
         confidence: 0.999,
         recording: None,
         t_start: None,
@@ -256,4 +257,14 @@ fn what_is_no_number_does_not_show() {
         assert_well_formed(&page);
         assert!(!page.contains("NaN") && !page.contains("inf "));
     }
+}
+
+#[test]
+fn numbers_of_a_joint_without_a_scale_are_in_amperes() {
+    let mut report = full();
+    report.findings.truncate(1);
+    assert!(page(&report, &[], &BTreeMap::new()).contains("</b> N m"));
+    report.findings[0].in_amperes = true;
+    let page = page(&report, &[], &BTreeMap::new());
+    assert!(page.contains("</b> A") && !page.contains("</b> N m"));
 }
