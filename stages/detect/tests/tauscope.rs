@@ -361,11 +361,10 @@ fn touched(seed: u64) -> Lesson {
     lesson
 }
 
-#[test]
-fn a_force_against_the_motion_is_a_collision_and_one_with_it_a_cooperation() {
-    let train = [touched(1), lesson(quiet(2, 6000))];
+/// The detector after these training recordings.
+fn taught_by(train: &[Lesson]) -> Detect {
     let lessons = Lessons {
-        train: &train,
+        train,
         validation: &[],
     };
     let learnt = tauscope::learn(&tauscope::Settings::default(), &with_model(), &lessons).unwrap();
@@ -373,7 +372,13 @@ fn a_force_against_the_motion_is_a_collision_and_one_with_it_a_cooperation() {
         tauscope: Some(learnt),
         ..Config::default()
     };
-    let mut detector = Detect::new(&config, with_model()).unwrap();
+    Detect::new(&config, with_model()).unwrap()
+}
+
+#[test]
+fn a_force_against_the_motion_is_a_collision_and_one_with_it_a_cooperation() {
+    let train = [touched(1), lesson(quiet(2, 6000))];
+    let mut detector = taught_by(&train);
     let test = touched(7);
     let detections = run(&mut detector, &test.samples);
     let onsets = onsets(&detections);
@@ -470,16 +475,7 @@ fn pushed(points: &[(&'static str, usize, Vector3<f64>)]) -> (Vec<TwinState>, Ve
 #[test]
 fn the_link_that_was_pushed_is_told_wherever_on_it_that_was() {
     let train = [lesson(quiet(1, 6000)), lesson(quiet(2, 6000))];
-    let lessons = Lessons {
-        train: &train,
-        validation: &[],
-    };
-    let learnt = tauscope::learn(&tauscope::Settings::default(), &with_model(), &lessons).unwrap();
-    let config = Config {
-        tauscope: Some(learnt),
-        ..Config::default()
-    };
-    let mut detector = Detect::new(&config, with_model()).unwrap();
+    let mut detector = taught_by(&train);
     let (samples, links) = pushed(&[
         ("upper", 2, Vector3::new(0.03, 0.0, 0.3)),
         ("lower", 3, Vector3::new(0.0, 0.03, 0.2)),
