@@ -81,33 +81,28 @@ impl Inertia {
         [self.mass, h.x, h.y, h.z, xx, xy, xz, yy, yz, zz]
     }
 
-    /// The body of the same mass and centre whose mass is nowhere negative: the nearest such covariance of its density
-    /// about its centre in the Frobenius norm (Wensing, Kim and Slotine, "Linear Matrix Inequalities for Physically Consistent
-    /// Inertial Parameter Identification", 2018). Without a mass above 0, no body.
+    /// The body of the same mass and centre whose mass is nowhere negative: the nearest covariance of its density about its
+    /// centre, in the Frobenius norm, that has a variance of at least `least_m2` in each direction (Wensing, Kim and Slotine,
+    /// "Linear Matrix Inequalities for Physically Consistent Inertial Parameter Identification", 2018); itself if it has mass in
+    /// each as it is. Without a mass above 0, no body.
     #[must_use]
-    pub fn nearest_consistent(&self) -> Self {
+    pub fn nearest_consistent(&self, least_m2: f64) -> Self {
         if self.mass <= 0.0 {
             return Self::zero();
         }
-        let mut eigen = self.spread().symmetric_eigen();
-        if eigen.eigenvalues.iter().all(|value| *value >= 0.0) {
+        let mut eigen = self.spread_kgm2().symmetric_eigen();
+        if eigen.eigenvalues.iter().all(|value| *value > 0.0) {
             return *self;
         }
-        eigen.eigenvalues.apply(|value| *value = value.max(0.0));
+        let least = least_m2 * self.mass;
+        eigen.eigenvalues.apply(|value| *value = value.max(least));
         let spread = eigen.recompose();
         let about_com = Matrix3::identity() * spread.trace() - spread;
         Self::from_parts(self.mass, self.com_m().into(), about_com)
     }
 
-    /// Mass times variance of the density in the direction in which that is least, over that in the widest: negative for what
-    /// is no body, 0 for a flat one or a point.
-    pub fn least_spread(&self) -> f64 {
-        let spread = self.spread().symmetric_eigenvalues();
-        spread.min() / spread.amax().max(f64::MIN_POSITIVE)
-    }
-
     /// ½ tr(I) - I about the centre of mass: mass times the covariance of the density \[kg m²\].
-    fn spread(&self) -> Matrix3<f64> {
+    pub fn spread_kgm2(&self) -> Matrix3<f64> {
         let about_com = symmetric(self.inertia_about_com_kgm2());
         Matrix3::identity() * (0.5 * about_com.trace()) - about_com
     }
@@ -179,9 +174,9 @@ mod tests {
     #[test]
     fn the_nearest_consistent_body_has_no_negative_mass_anywhere() {
         let body = Inertia::new(2.0, [0.1, -0.2, 0.3], [0.01, 0.0, 0.0, 0.02, 0.0, 0.025]);
-        assert_eq!(body.nearest_consistent(), body);
+        assert_eq!(body.nearest_consistent(0.0), body);
         let odd = Inertia::new(2.0, [0.1, -0.2, 0.3], [-0.3, 0.02, 0.0, 0.1, 0.0, 0.01]);
-        let nearest = odd.nearest_consistent();
+        let nearest = odd.nearest_consistent(0.0);
         let [xx, xy, xz, yy, yz, zz] = nearest.inertia_about_com_kgm2();
         let principal = symmetric([xx, xy, xz, yy, yz, zz]).symmetric_eigenvalues();
         // The triangle inequality of principal moments.
@@ -190,12 +185,10 @@ mod tests {
         }
         assert!((nearest.mass_kg() - 2.0).abs() < 1e-12);
         assert!((nearest.com_m()[2] - 0.3).abs() < 1e-12);
-        let again = nearest.nearest_consistent().parameters();
-        for (a, b) in again.iter().zip(nearest.parameters()) {
-            assert!((a - b).abs() < 1e-12);
-        }
+        let wide = odd.nearest_consistent(0.01).spread_kgm2();
+        assert!((wide.symmetric_eigenvalues().min() - 2.0 * 0.01).abs() < 1e-12);
         assert_eq!(
-            Inertia::new(-1.0, [0.1; 3], [0.1; 6]).nearest_consistent(),
+            Inertia::new(-1.0, [0.1; 3], [0.1; 6]).nearest_consistent(0.0),
             Inertia::zero()
         );
     }

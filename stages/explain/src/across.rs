@@ -5,6 +5,7 @@ use crate::fit::Fit;
 use crate::least_squares::Products;
 use crate::parallel;
 use crate::problem::Problem;
+use crate::refine::Anchor;
 
 /// Least share of what a piece of physics gains where it is fitted that it must gain where it is not.
 const LEAST_SHARE: f64 = 0.4;
@@ -33,13 +34,14 @@ pub fn carries_over(problem: &Problem, with: &Fit, without: &Fit, joints: &[usiz
 }
 
 /// Sum of squares that a fit leaves at a joint in each recording with the numbers that the others give what touches the joint,
-/// shapes and all.
+/// shapes and all; what the others do not know stays nearly as it is.
 pub fn left_elsewhere(problem: &Problem, fit: &Fit, joint: usize) -> f64 {
     let tracks: Vec<usize> = (0..problem.tracks.len()).collect();
+    let anchor = Anchor::new(problem, fit, &[joint], DAMPING);
     let left = parallel::map(&tracks, |&track| {
         let others = problem.without(track);
         let known = Fit::beside(&others, fit.actives.clone(), Some(fit));
-        let refitted = known.refined_at(&others, Some(&[joint]), f64::NAN);
+        let refitted = known.refined_near(&others, &[joint], &anchor);
         Products::new(problem, &[], &refitted.residual, Some(track)).square[joint]
     });
     left.iter().sum()

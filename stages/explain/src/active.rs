@@ -22,12 +22,7 @@ pub struct Whereabouts {
 }
 
 /// Inertial parameters of a body.
-const BODY: usize = 10;
-/// From which of them on they are its inertia.
-const FIRST_OF_INERTIA: usize = 4;
-
-/// A body has no mass to spare in a direction in which its spread is below this share of the largest.
-const EDGE: f64 = 1e-6;
+pub const BODY: usize = 10;
 
 /// Slow, but fast enough for a sign.
 const SLOW_RAD_S: f64 = 0.02;
@@ -113,11 +108,6 @@ impl Hypothesis {
     /// Whether its first ten coordinates are those of a body, see [`Inertia::parameters`].
     fn is_body(&self) -> bool {
         self.effect.place == PlaceKind::Tool && self.effect.coordinates.len() >= BODY
-    }
-
-    /// Whether a coordinate belongs to the inertia of a body.
-    pub fn is_inertia(&self, coordinate: usize) -> bool {
-        self.is_body() && (FIRST_OF_INERTIA..BODY).contains(&coordinate)
     }
 
     /// Whether all its coordinates are factors.
@@ -226,21 +216,6 @@ impl Active {
         let ten = self.coordinates.first_chunk::<BODY>();
         ten.filter(|_| self.hypothesis.is_body())
             .map(|ten| Inertia::from_parameters(*ten))
-    }
-
-    /// Makes the body that it is, if it is one, one whose mass is nowhere negative; whether it was not.
-    pub fn make_consistent(&mut self) -> bool {
-        let Some(body) = self.body() else {
-            return false;
-        };
-        let nearest = body.nearest_consistent();
-        self.coordinates[..BODY].copy_from_slice(&nearest.parameters());
-        nearest != body
-    }
-
-    /// Whether it is a body that has no mass to spare in some direction.
-    pub fn is_at_edge(&self) -> bool {
-        self.body().is_some_and(|body| body.least_spread() <= EDGE)
     }
 
     /// Its parameters, as reports hold them.

@@ -13,6 +13,8 @@ use crate::least_squares::Products;
 use crate::parts::{Parts, is_kept};
 use crate::problem::Problem;
 
+/// Step of the difference quotient of a shape, as a share of its range: small, because a wall or a limit begins at a point.
+const SHAPE_STEP: f64 = 1e-5;
 /// Step of the difference quotient of a time \[s\].
 const TIME_STEP_S: f64 = 0.01;
 
@@ -308,10 +310,10 @@ fn step_of(problem: &Problem, active: &Active, c: usize) -> f64 {
             scale,
             ..
         } => match scale {
-            Scale::Log => 1e-3 * value.abs().max(lower),
-            Scale::Linear => 1e-3 * (upper - lower),
+            Scale::Log => SHAPE_STEP * value.abs().max(lower),
+            Scale::Linear => SHAPE_STEP * (upper - lower),
             Scale::OfEffort => {
-                1e-3 * problem.largest_effort[active.hypothesis.place.joint].max(1e-9)
+                SHAPE_STEP * problem.largest_effort[active.hypothesis.place.joint].max(1e-9)
             }
         },
         CoordinateKind::RecordingTime | CoordinateKind::SessionTime => TIME_STEP_S,

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::CoordinateKind;
 
 use crate::active::Active;
+use crate::body_prior;
 use crate::fit::Fit;
 use crate::problem::Problem;
 
@@ -60,6 +61,10 @@ pub fn covariance(problem: &Problem, fit: &Fit) -> DMatrix<f64> {
             }
         }
     }
+    // What is known before counts as if it had been measured, too.
+    let (known, _) = body_prior::normal(&fit.actives, &fit.parameters());
+    normal += &known;
+    scores += known;
     let scale: Vec<f64> = (0..p).map(|a| normal[(a, a)].max(1e-300).sqrt()).collect();
     let mut scaled = DMatrix::from_fn(p, p, |a, b| normal[(a, b)] / (scale[a] * scale[b]));
     for a in 0..p {

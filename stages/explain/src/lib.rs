@@ -6,6 +6,8 @@ pub mod active;
 mod at_rest;
 mod audit;
 mod bodies;
+mod body_prior;
+mod body_step;
 mod columns;
 pub mod drive;
 mod efforts;

@@ -1,21 +1,55 @@
 //! All numbers of an explanation fitted at once: Gauss-Newton with Levenberg's damping on the filtered effort, what is at its
 //! bound held there (Nocedal and Wright, *Numerical Optimization*, 2006, sections 10.3 and 16.7).
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::{CoordinateKind, Scale};
 
 use crate::active::{Active, Column};
+use crate::body_prior;
+use crate::body_step::body_step;
 use crate::fit::Fit;
-use crate::least_squares::{Products, solved};
+use crate::least_squares::Products;
 use crate::problem::Problem;
 
-const MAX_ITERATIONS: usize = 12;
+const MAX_ITERATIONS: usize = 20;
 /// So often the damping is raised for one step.
 const MOST_TRIES: usize = 6;
 /// A step that gains less log-likelihood than this is the last \[nats\], or less than this share of the distance from
 /// another explanation that it is compared with.
-const CONVERGED: f64 = 0.02;
+const CONVERGED: f64 = 0.01;
 const CONVERGED_SHARE: f64 = 0.01;
+
+/// Numbers that a fit is held near, and how firmly.
+#[derive(Debug)]
+pub(crate) struct Anchor {
+    centre: DVector<f64>,
+    weight: DVector<f64>,
+}
+
+impl Anchor {
+    /// The numbers of a fit that touch these joints, with a share of what all recordings tell of them.
+    pub fn new(problem: &Problem, fit: &Fit, joints: &[usize], share: f64) -> Self {
+        let jacobian = fit.jacobian_at(problem, Some(joints));
+        let columns: Vec<&Column> = jacobian.iter().map(AsRef::as_ref).collect();
+        let products = Products::new(problem, &columns, &fit.residual, None);
+        let (normal, _) = products.normal(&fit.variance, &vec![0.0; columns.len()]);
+        Self {
+            centre: numbers(fit, &fit.parameters_at(Some(joints))),
+            weight: normal.diagonal() * share,
+        }
+    }
+
+    /// Logarithm of its density, but for a constant.
+    fn log_density(&self, numbers: &DVector<f64>) -> f64 {
+        let off = numbers - &self.centre;
+        -0.5 * off.component_mul(&off).dot(&self.weight)
+    }
+}
+
+fn numbers(fit: &Fit, free: &[(usize, usize)]) -> DVector<f64> {
+    let all = free.iter().map(|&(i, c)| fit.actives[i].coordinates[c]);
+    DVector::from_iterator(free.len(), all)
+}
 
 impl Fit {
     /// Improves all numbers together.
@@ -25,27 +59,52 @@ impl Fit {
     }
 
     /// Improves the numbers of what touches these joints, all without them; as precisely as is needed to compare it with an
-    /// explanation of the likelihood `rival`, or wholly if that is NaN. Bodies become physically consistent.
+    /// explanation of the likelihood `rival`, or wholly if that is NaN. Bodies become physically consistent and are fitted with
+    /// their prior.
     #[must_use]
     pub fn refined_at(self, problem: &Problem, joints: Option<&[usize]>, rival: f64) -> Self {
+        self.improved(problem, joints, rival, None)
+    }
+
+    /// The same, held near an anchor.
+    #[must_use]
+    pub(crate) fn refined_near(self, problem: &Problem, joints: &[usize], anchor: &Anchor) -> Self {
+        self.improved(problem, Some(joints), f64::NAN, Some(anchor))
+    }
+
+    fn improved(
+        self,
+        problem: &Problem,
+        joints: Option<&[usize]>,
+        rival: f64,
+        anchor: Option<&Anchor>,
+    ) -> Self {
         let free = self.parameters_at(joints);
         if free.is_empty() {
             return self;
         }
         let mut fit = self.consistent(problem);
         let mut damping = 1e-4;
-        let mut best = fit.likelihood();
+        let objective = |fit: &Self| {
+            let near = anchor.map_or(0.0, |anchor| anchor.log_density(&numbers(fit, &free)));
+            fit.likelihood() + body_prior::log_density(&fit.actives) + near
+        };
+        let mut best = objective(&fit);
         for _ in 0..MAX_ITERATIONS {
             let jacobian = fit.jacobian_at(problem, joints);
             let columns: Vec<&Column> = jacobian.iter().map(AsRef::as_ref).collect();
             let products = Products::new(problem, &columns, &fit.residual, None);
             let ridge = vec![0.0; columns.len()];
-            let (normal, right) = products.normal(&fit.variance, &ridge);
+            let (mut normal, mut right) = products.normal(&fit.variance, &ridge);
+            if let Some(Anchor { centre, weight }) = anchor {
+                normal += DMatrix::from_diagonal(weight);
+                right += (centre - numbers(&fit, &free)).component_mul(weight);
+            }
             let mut used = vec![true; free.len()];
             let mut gained = None;
             for _ in 0..MOST_TRIES {
                 let step = loop {
-                    let step = solved(&normal, &right, &used, damping);
+                    let step = body_step(&fit.actives, &free, (&normal, &right), &used, damping);
                     let Some(out) = step.as_ref().map(|step| fit.out(problem, &free, step)) else {
                         break None;
                     };
@@ -64,10 +123,10 @@ impl Fit {
                 };
                 let moved = fit.moved(problem, &free, &step);
                 let next = Self::beside(problem, moved, Some(&fit));
-                let likelihood = next.likelihood();
-                if likelihood > best {
-                    gained = Some(likelihood - best);
-                    best = likelihood;
+                let reached = objective(&next);
+                if reached > best {
+                    gained = Some(reached - best);
+                    best = reached;
                     fit = next;
                     damping = (damping * 0.2).max(1e-9);
                     break;
@@ -85,38 +144,20 @@ impl Fit {
     /// The same with bodies whose mass is nowhere negative.
     fn consistent(self, problem: &Problem) -> Self {
         let mut actives = self.actives.clone();
-        let mut odd = false;
-        for active in &mut actives {
-            odd |= active.make_consistent();
-        }
-        if odd {
+        if body_prior::make_consistent(&mut actives) {
             Self::beside(problem, actives, Some(&self))
         } else {
             self
         }
     }
 
-    /// Which coordinates a step would take out of their bounds from where they meet them already; of a body the inertia, if
-    /// it has no mass to spare in some direction.
+    /// Which coordinates a step would take out of their bounds from where they meet them already.
     fn out(&self, problem: &Problem, free: &[(usize, usize)], step: &DVector<f64>) -> Vec<bool> {
-        let odd: Vec<bool> = (0..self.actives.len())
-            .map(|i| {
-                let mut moved = self.actives[i].clone();
-                let own = free.iter().zip(step).filter(|((of, _), _)| *of == i);
-                own.for_each(|((_, c), step)| moved.coordinates[*c] += step);
-                moved.make_consistent()
-            })
-            .collect();
         let one = |(&(i, c), step): (&(usize, usize), &f64)| {
             let active = &self.actives[i];
             let (lower, upper) = bounds(problem, active, c);
             let value = active.coordinates[c];
-            (value <= lower && *step < 0.0)
-                || (value >= upper && *step > 0.0)
-                || (odd[i]
-                    && active.hypothesis.is_inertia(c)
-                    && *step != 0.0
-                    && active.is_at_edge())
+            (value <= lower && *step < 0.0) || (value >= upper && *step > 0.0)
         };
         free.iter().zip(step).map(one).collect()
     }
@@ -134,9 +175,7 @@ impl Fit {
             let value = &mut actives[i].coordinates[c];
             *value = (*value + step).clamp(lower, upper);
         }
-        for active in &mut actives {
-            active.make_consistent();
-        }
+        body_prior::make_consistent(&mut actives);
         actives
     }
 }

@@ -180,7 +180,7 @@ impl Plant {
         &self.model.links()[link].name
     }
 
-    /// Effort of the drives in the step that led here \[N m\].
+    /// Effort of the drives in the step that led here, which balances the arm where that began \[N m\].
     pub fn applied_nm(&self) -> &[f64] {
         &self.applied_nm
     }

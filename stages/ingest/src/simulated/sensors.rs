@@ -24,15 +24,6 @@ pub(super) struct SensorBank {
     rng: ChaCha8Rng,
 }
 
-/// What the sensors say at one instant.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Measured {
-    pub position: JointArray,
-    pub velocity: JointArray,
-    /// In the scenario's unit.
-    pub effort: JointArray,
-}
-
 impl SensorBank {
     pub fn new(
         scenario: &Scenario,
@@ -82,27 +73,37 @@ impl SensorBank {
         position.map(|value| whole_steps(value, self.position_step_rad))
     }
 
-    /// Measures an arm that is at `position`, moves with `velocity` and is driven with `effort_nm`.
-    pub fn measure(&mut self, position: &[f64], velocity: &[f64], effort_nm: &[f64]) -> Measured {
-        let mut measured = Measured {
-            position: [0.0; MAX_JOINTS],
-            velocity: [0.0; MAX_JOINTS],
-            effort: [0.0; MAX_JOINTS],
-        };
+    /// Measures position \[rad\] and velocity \[rad/s\].
+    pub fn measure_motion(
+        &mut self,
+        position: &[f64],
+        velocity: &[f64],
+    ) -> (JointArray, JointArray) {
+        let mut measured = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
         for j in 0..self.joint_count {
-            // Drawn whether used or not: changing one noise leaves the others as they were.
-            let [n_position, n_velocity, n_effort]: [f64; 3] =
-                [0; 3].map(|_| StandardNormal.sample(&mut self.rng));
-            let exact = position[j] + self.position_noise_rad * n_position;
-            measured.position[j] = whole_steps(exact, self.position_step_rad);
-            let exact = velocity[j] + self.velocity_noise_rad_s * n_velocity;
-            measured.velocity[j] = whole_steps(exact, self.velocity_step_rad_s);
-            let effort_nm = self.effort_gain[j] * effort_nm[j]
-                + self.effort_bias_nm[j]
-                + self.effort_noise_nm[j] * n_effort;
-            measured.effort[j] = whole_steps(effort_nm, self.effort_step_nm) * self.unit_per_nm[j];
+            let exact = position[j] + self.position_noise_rad * self.noise();
+            measured.0[j] = whole_steps(exact, self.position_step_rad);
+            let exact = velocity[j] + self.velocity_noise_rad_s * self.noise();
+            measured.1[j] = whole_steps(exact, self.velocity_step_rad_s);
         }
         measured
+    }
+
+    /// Measures what is driven with `effort_nm`, in the scenario's unit.
+    pub fn measure_effort(&mut self, effort_nm: &[f64]) -> JointArray {
+        let mut measured = [0.0; MAX_JOINTS];
+        for j in 0..self.joint_count {
+            let effort_nm = self.effort_gain[j] * effort_nm[j]
+                + self.effort_bias_nm[j]
+                + self.effort_noise_nm[j] * self.noise();
+            measured[j] = whole_steps(effort_nm, self.effort_step_nm) * self.unit_per_nm[j];
+        }
+        measured
+    }
+
+    /// Drawn whether it is used or not: changing one noise leaves the others as they were.
+    fn noise(&mut self) -> f64 {
+        StandardNormal.sample(&mut self.rng)
     }
 }
 

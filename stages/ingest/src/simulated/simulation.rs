@@ -154,16 +154,13 @@ impl Simulation {
                 self.controller
                     .update(dt_s, &self.target, position, velocity);
             }
-            if self.step == 0 {
-                // Before the first step there is no effort but the controller's.
-                let effort_nm = self.controller.drive(0.0).effort_nm;
-                self.record.take(&self.plant, effort_nm, 0.0);
-            }
-            let due = self.step >= self.next_sample;
-            let reading = due.then(|| self.read(time_s));
+            let due = (self.step >= self.next_sample).then(|| self.read(time_s));
             self.advance(time_s)?;
-            if reading.is_some() {
-                return Ok(reading);
+            if let Some(mut reading) = due {
+                // What moves the arm on from here is the effort here.
+                let efforts_nm = self.record.effort_nm();
+                reading.effort = self.sensors.measure_effort(efforts_nm);
+                return Ok(Some(reading));
             }
         }
         self.events
@@ -191,15 +188,14 @@ impl Simulation {
         (self.step * STEP_NS) as f64 * 1e-9
     }
 
+    /// What there is to read now but for the effort.
     fn read(&mut self, time_s: f64) -> Reading {
         // The instants of the rate, each moved to the next step of the plant.
         let index = (time_s * self.rate_hz + 1e-6).floor() + 1.0;
         self.next_sample = (index / self.rate_hz * 1e9 / STEP_NS as f64 - 1e-6).ceil() as i64;
-        let measured = self.sensors.measure(
-            self.plant.position(),
-            self.plant.velocity(),
-            self.record.effort_nm(),
-        );
+        let (position, velocity) = self
+            .sensors
+            .measure_motion(self.plant.position(), self.plant.velocity());
         let mut learn = false;
         while self.learn_at_s.next_if(|at_s| *at_s <= time_s).is_some() {
             learn = true;
@@ -207,9 +203,9 @@ impl Simulation {
         Reading {
             learn,
             stamp_ns: self.start_ns + self.step * STEP_NS,
-            position: measured.position,
-            velocity: measured.velocity,
-            effort: measured.effort,
+            position,
+            velocity,
+            effort: JointArray::default(),
             command_position: self.sensors.in_steps(&self.target.position),
             contact: self.pushes.iter().any(|push| push.acts(time_s))
                 || self.obstacles.iter().any(Obstacle::touching),

@@ -1,0 +1,164 @@
+//! A step of least squares that leaves every body one.
+
+use nalgebra::{DMatrix, DVector};
+use tauscope_dynamics::Inertia;
+
+use crate::active::{Active, BODY};
+use crate::body_prior::{about, bodies, density_of, of_body};
+use crate::least_squares::solved;
+
+/// The prior weighs this much less from one round to the next, until it weighs 1.
+const ROUND: f64 = 0.1;
+/// Steps within a round, and how little is still to be gained when it is over \[nats\].
+const MOST_STEPS: usize = 20;
+const CONVERGED: f64 = 1e-6;
+/// So often a step within is halved.
+const MOST_HALVINGS: usize = 30;
+
+/// The step from normal equations with the prior of bodies, for the coordinates in `used`, the others stay at 0.
+///
+/// The equations are linear, the prior is not: it ends where a body does. Newton's method on both together, first with a heavy
+/// prior that keeps well within (Boyd and Vandenberghe, *Convex Optimization*, 2004, section 11.3). All coordinates but those
+/// of bodies follow from these.
+pub fn body_step(
+    actives: &[Active],
+    free: &[(usize, usize)],
+    (normal, right): (&DMatrix<f64>, &DVector<f64>),
+    used: &[bool],
+    damping: f64,
+) -> Option<DVector<f64>> {
+    let own: Vec<Own> = bodies(actives)
+        .filter(|(_, body)| body.mass_kg() > 0.0)
+        .map(|(i, body)| Own {
+            body,
+            coordinates: of_body(free, i),
+        })
+        .filter(|own| !own.coordinates.is_empty())
+        .collect();
+    if own.is_empty() {
+        return solved(normal, right, used, damping);
+    }
+    let inner: Vec<usize> = own
+        .iter()
+        .flat_map(|o| o.coordinates.iter().map(|c| c.0))
+        .collect();
+    let others: Vec<bool> = (0..free.len())
+        .map(|k| used[k] && !inner.contains(&k))
+        .collect();
+    let pick = |vector: &DVector<f64>| {
+        DVector::from_iterator(inner.len(), inner.iter().map(|&k| vector[k]))
+    };
+    // Schur's complement: what the equations say of the bodies once the others follow.
+    let alone = solved(normal, right, &others, damping)?;
+    let mut complement = DMatrix::from_fn(inner.len(), inner.len(), |a, b| {
+        normal[(inner[a], inner[b])] * if a == b { 1.0 + damping } else { 1.0 }
+    });
+    let mut following = Vec::with_capacity(inner.len());
+    for (b, &k) in inner.iter().enumerate() {
+        let follows = solved(normal, &normal.column(k).into_owned(), &others, damping)?;
+        for (a, &other) in inner.iter().enumerate() {
+            complement[(a, b)] -= normal.column(other).dot(&follows);
+        }
+        following.push(follows);
+    }
+    let side = pick(right) - pick(&(normal * &alone));
+    let within = Within {
+        own: &own,
+        complement,
+        side,
+    };
+    let step = within.solve()?;
+    let mut all = alone;
+    for ((&k, follows), step) in inner.iter().zip(&following).zip(&step) {
+        all -= follows * *step;
+        all[k] = *step;
+    }
+    Some(all)
+}
+
+/// A body before the step, and which of its parameters are free: where among the free coordinates, and which of the ten.
+struct Own {
+    body: Inertia,
+    coordinates: Vec<(usize, usize)>,
+}
+
+/// What is to be solved for the bodies alone: least of `½ dᵀ C d - sᵀ d` less the logarithm of the prior.
+struct Within<'a> {
+    own: &'a [Own],
+    complement: DMatrix<f64>,
+    side: DVector<f64>,
+}
+
+impl Within<'_> {
+    fn solve(&self) -> Option<DVector<f64>> {
+        let mut step = DVector::zeros(self.side.len());
+        // What is to be gained at most says how heavy the prior must be to matter.
+        let ridge = DMatrix::from_diagonal(&(self.complement.diagonal() * 1e-9).add_scalar(1e-300));
+        let free = (&self.complement + ridge).cholesky()?.solve(&self.side);
+        let mut weight = (0.5 * self.side.dot(&free)).max(1.0);
+        loop {
+            self.centre(&mut step, weight)?;
+            if weight <= 1.0 {
+                return Some(step);
+            }
+            weight = (weight * ROUND).max(1.0);
+        }
+    }
+
+    /// Newton's method for one weight of the prior.
+    fn centre(&self, step: &mut DVector<f64>, weight: f64) -> Option<()> {
+        let mut here = self.objective(step, weight);
+        for _ in 0..MOST_STEPS {
+            let mut curvature = self.complement.clone();
+            let mut slope = &self.side - &self.complement * &*step;
+            for (first, own, body) in self.moved(step) {
+                let (information, gradient) = about(&body);
+                for (a, &(_, c)) in own.coordinates.iter().enumerate() {
+                    slope[first + a] += weight * gradient[c];
+                    for (b, &(_, d)) in own.coordinates.iter().enumerate() {
+                        curvature[(first + a, first + b)] += weight * information[(c, d)];
+                    }
+                }
+            }
+            let used = vec![true; slope.len()];
+            let direction = solved(&curvature, &slope, &used, 0.0)?;
+            if slope.dot(&direction) < CONVERGED * weight {
+                break;
+            }
+            let mut share = 1.0;
+            let mut gained = false;
+            for _ in 0..MOST_HALVINGS {
+                let there = &*step + &direction * share;
+                let objective = self.objective(&there, weight);
+                if objective < here {
+                    (*step, here, gained) = (there, objective, true);
+                    break;
+                }
+                share *= 0.5;
+            }
+            if !gained {
+                break;
+            }
+        }
+        Some(())
+    }
+
+    fn objective(&self, step: &DVector<f64>, weight: f64) -> f64 {
+        let prior: f64 = self.moved(step).map(|(_, _, body)| density_of(&body)).sum();
+        0.5 * (&self.complement * step).dot(step) - self.side.dot(step) - weight * prior
+    }
+
+    /// The bodies after a step: where their coordinates begin, what they were, and what they are.
+    fn moved(&self, step: &DVector<f64>) -> impl Iterator<Item = (usize, &Own, Inertia)> {
+        let mut first = 0;
+        self.own.iter().map(move |own| {
+            let begin = first;
+            first += own.coordinates.len();
+            let mut parameters: [f64; BODY] = own.body.parameters();
+            for (&(_, c), step) in own.coordinates.iter().zip(step.iter().skip(begin)) {
+                parameters[c] += step;
+            }
+            (begin, own, Inertia::from_parameters(parameters))
+        })
+    }
+}
