@@ -131,7 +131,7 @@ impl Hypothesis {
 pub struct Active {
     /// What and where.
     pub hypothesis: Hypothesis,
-    /// In the effect's coordinates; the values at the knots for a curve.
+    /// In the effect's coordinates; the values at the knots for a curve, but for those that are held at zero.
     pub coordinates: Vec<f64>,
     /// What an `unknown` effect is drawn against; its own values are passed over.
     pub curve: Option<Table>,
@@ -157,7 +157,7 @@ impl Active {
             link,
         };
         let curve = self.curve.as_ref().and_then(|curve| {
-            let values = self.coordinates.clone();
+            let values = self.values_at_knots(curve);
             table(
                 &site,
                 Table {
@@ -168,6 +168,23 @@ impl Active {
             .ok()
         });
         curve.unwrap_or_else(|| (self.hypothesis.effect.build)(&site, &self.coordinates))
+    }
+
+    /// The values of its curve at all knots.
+    pub fn values_at_knots(&self, curve: &Table) -> Vec<f64> {
+        let held = held_knots(curve, self.hypothesis.place.joint);
+        let mut free = self.coordinates.iter();
+        let mut value = |k: usize| {
+            let value = (!held.contains(&k)).then(|| free.next().copied());
+            value.flatten().unwrap_or(0.0)
+        };
+        (0..curve.knots.len()).map(&mut value).collect()
+    }
+
+    /// Whether it is a curve over its joint's own velocity: friction, whatever bends it.
+    pub fn is_friction_curve(&self) -> bool {
+        let curve = self.curve.as_ref();
+        curve.is_some_and(|curve| is_of_friction(curve, self.hypothesis.place.joint))
     }
 
     /// Whether its effort jumps where its joint reverses.
@@ -222,6 +239,25 @@ impl Active {
     pub fn parameters(&self) -> Vec<f64> {
         (self.hypothesis.effect.to_parameters)(&self.coordinates)
     }
+}
+
+fn is_of_friction(curve: &Table, joint: usize) -> bool {
+    curve.against == Against::Velocity && curve.of_joint == joint
+}
+
+/// The knots of a curve in a joint that are held at zero. A curve over the joint's own velocity is what Coulomb and viscous
+/// friction leave: these are the straight line between its slowest and its fastest knot in each direction.
+pub fn held_knots(curve: &Table, joint: usize) -> Vec<usize> {
+    if !is_of_friction(curve, joint) {
+        return Vec::new();
+    }
+    let middle = curve.knots.partition_point(|knot| *knot < 0.0);
+    let directions = [0..middle, middle..curve.knots.len()];
+    directions
+        .into_iter()
+        .filter(|knots| knots.len() >= 2)
+        .flat_map(|knots| [knots.start, knots.end - 1])
+        .collect()
 }
 
 /// A signal that is zero but for one joint, or not.

@@ -144,6 +144,12 @@ pub fn of(
             let against = serde_json::to_value(curve.against).unwrap_or(Value::Null);
             parameters.insert("against".to_owned(), against);
             parameters.insert("by_direction".to_owned(), Value::from(curve.by_direction));
+            let values = active.values_at_knots(curve);
+            let all = values.iter().zip(&curve.knots);
+            if let Some((most, at)) = all.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs())) {
+                parameters.insert("largest_nm".to_owned(), number(*most));
+                parameters.insert("largest_at".to_owned(), number(*at));
+            }
             if let Some(period) = curve.period {
                 parameters.insert("period_s".to_owned(), Value::from(period));
             }

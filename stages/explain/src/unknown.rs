@@ -2,7 +2,7 @@
 
 use tauscope_dynamics::terms::{Against, MotionSample, Table, effect};
 
-use crate::active::{Active, Column, Hypothesis, Whereabouts};
+use crate::active::{Active, Column, Hypothesis, Whereabouts, held_knots};
 use crate::problem::Problem;
 use crate::propose::Base;
 use crate::track::FitTrack;
@@ -73,25 +73,28 @@ impl Base<'_> {
                 ..Whereabouts::default()
             },
         };
-        let knots = curve.knots.len();
+        let free = curve.knots.len() - held_knots(curve, joint).len();
+        if free == 0 {
+            return None;
+        }
         let at = |values: Vec<f64>| Active {
             hypothesis,
             coordinates: values,
             curve: Some(curve.clone()),
         };
-        let columns: Vec<Column> = (0..knots)
+        let columns: Vec<Column> = (0..free)
             .map(|k| {
-                let mut values = vec![0.0; knots];
+                let mut values = vec![0.0; free];
                 values[k] = 1.0;
                 self.fit.added(self.problem, &at(values))
             })
             .collect();
-        let minimum = vec![f64::NEG_INFINITY; knots];
+        let minimum = vec![f64::NEG_INFINITY; free];
         let (values, gain, size) = self.try_columns(None, &columns, &minimum)?;
         Some(CurveProposal {
             active: at(values),
             gain,
-            penalty: self.penalty(knots, Some(joint)),
+            penalty: self.penalty(free, Some(joint)),
             size,
         })
     }

@@ -244,11 +244,16 @@ pub fn sentence(
             "The end of the arm runs into something stiff, {}.",
             with("stiffness_n_per_m")
         ),
-        _ => curve(active, place, joints),
+        _ => curve(active, place, joints, |name| parameters.get(name)?.as_f64()),
     }
 }
 
-fn curve(active: &Active, place: &str, joints: &[String]) -> String {
+fn curve(
+    active: &Active,
+    place: &str,
+    joints: &[String],
+    value: impl Fn(&str) -> Option<f64>,
+) -> String {
     let Some(curve) = &active.curve else {
         return format!("Something in joint {place} has no name.");
     };
@@ -277,18 +282,17 @@ fn curve(active: &Active, place: &str, joints: &[String]) -> String {
             number(1.0 / period_s)
         )
     });
-    let most = active
-        .coordinates
-        .iter()
-        .zip(&curve.knots)
-        .max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
-    let peak = most.map_or_else(String::new, |(value, knot)| {
-        format!(
-            "; it is largest, {} N m, at {}",
-            number(*value),
-            number(*knot)
-        )
-    });
+    let peak = match (value("largest_nm"), value("largest_at")) {
+        (Some(most), Some(at)) => {
+            format!("; it is largest, {} N m, at {}", number(most), number(at))
+        }
+        _ => String::new(),
+    };
+    if active.is_friction_curve() {
+        return format!(
+            "The friction of joint {place} is more than a constant and a share of its velocity, and no effect of the library bends it so{peak} rad/s."
+        );
+    }
     format!(
         "Joint {place} has an effort that no effect of the library explains: it depends on {against}{direction}{repeated}{peak}."
     )

@@ -1,7 +1,5 @@
 //! What no name fits: a curve beside the names of a joint, or in their place.
 
-use tauscope_dynamics::terms::Against;
-
 use crate::across::{carries_over, left_elsewhere};
 use crate::active::{Active, Hypothesis};
 use crate::drive::is_drive;
@@ -28,15 +26,19 @@ const MOST_OF_POSITION: usize = 3;
 /// That is asked where the variance without them is this many times the white noise.
 const LOUD: f64 = 4.0;
 
-/// Whether a piece is a curve over the joint's own velocity.
-fn is_friction_curve(active: &Active, joint: usize) -> bool {
-    active
-        .curve
-        .as_ref()
-        .is_some_and(|curve| curve.against == Against::Velocity && curve.of_joint == joint)
+/// Friction that is another function of velocity, where a curve of friction says already how it bends.
+pub fn is_bent_already(fit: &Fit, hypothesis: Hypothesis) -> bool {
+    let bends = matches!(
+        hypothesis.effect.name,
+        "asymmetric_coulomb" | "stribeck_friction" | "presliding_hysteresis" | "quadratic_drag"
+    );
+    let joint = hypothesis.only_joint();
+    let curve = |a: &Active| a.is_friction_curve() && a.hypothesis.only_joint() == joint;
+    bends && fit.actives.iter().any(curve)
 }
 
-fn is_plain_friction(hypothesis: Hypothesis) -> bool {
+/// Friction that a curve of friction goes with.
+pub fn is_plain_friction(hypothesis: Hypothesis) -> bool {
     matches!(
         hypothesis.effect.name,
         "coulomb_friction" | "viscous_friction"
@@ -65,12 +67,18 @@ impl Search<'_> {
         if !own.is_empty() {
             let bare = self.stripped(best, &own, joint);
             let mut instead = self.with_curve(&bare, joint);
-            let last = instead.as_ref().and_then(|e| e.fit.actives.last());
-            if last.is_some_and(|curve| is_friction_curve(curve, joint)) {
-                // Friction it is, whatever bends its curve.
-                let shaped = |i: &usize| !is_plain_friction(best.fit.actives[*i].hypothesis);
-                let shaped: Vec<usize> = own.iter().copied().filter(shaped).collect();
-                instead = self.with_curve(&self.stripped(best, &shaped, joint), joint);
+            // Friction it is, whatever bends its curve.
+            let shaped = |i: &usize| !is_plain_friction(best.fit.actives[*i].hypothesis);
+            let shaped: Vec<usize> = own.iter().copied().filter(shaped).collect();
+            let plain = self.with_plain_friction(self.stripped(best, &shaped, joint), joint);
+            let bent = self.with_curve(&plain, joint);
+            let bent = bent.filter(|e| e.fit.actives.last().is_some_and(Active::is_friction_curve));
+            if let Some(bent) = bent
+                && instead
+                    .as_ref()
+                    .is_none_or(|other| bent.ahead_of(other, &white) > 0.0)
+            {
+                instead = Some(bent);
             }
             if let Some(instead) = instead
                 && instead.ahead_of(best, &white) > CURVE_EVIDENCE
@@ -113,7 +121,7 @@ impl Search<'_> {
         let fit = fit.refined_at(self.problem, Some(&[joint]), from.fit.likelihood());
         let mut actives = fit.actives;
         if let Some(curve) = actives.last_mut()
-            && !is_friction_curve(curve, joint)
+            && !curve.is_friction_curve()
         {
             unknown::keep_what_is_evident(curve);
         }
@@ -123,6 +131,23 @@ impl Search<'_> {
         let evident =
             with.ahead_of(from, &self.problem.worth) > CURVE_EVIDENCE || overwhelming(&with, from);
         (evident && carries_over(self.problem, &with.fit, &from.fit, &[joint])).then_some(with)
+    }
+
+    /// The explanation with Coulomb and viscous friction in a joint, which a curve of friction goes with.
+    fn with_plain_friction(&self, from: Explanation, joint: usize) -> Explanation {
+        let plain = self.hypotheses.iter().filter(|h| {
+            let missing = from.fit.actives.iter().all(|a| a.hypothesis != **h);
+            h.place.joint == joint && is_plain_friction(**h) && missing
+        });
+        let add = |from: Explanation, hypothesis: &Hypothesis| {
+            let base = Base::new(self.problem, &from.fit, self.hypotheses.len());
+            let proposal = base.propose(*hypothesis);
+            proposal.map_or_else(
+                || from.clone(),
+                |proposal| self.joined(&from, &proposal, from.fit.likelihood()),
+            )
+        };
+        plain.fold(from.clone(), add)
     }
 
     /// The explanation without some of its pieces, refined at the joint that they are in.

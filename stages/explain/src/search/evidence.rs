@@ -10,6 +10,8 @@ use crate::least_squares::Products;
 use crate::problem::Problem;
 use crate::windows::{TimeKind, time_kind};
 
+use super::curves::is_plain_friction;
+
 /// Evidence that a piece of physics needs \[nats\].
 pub const LEAST_EVIDENCE: f64 = 8.0;
 /// Least share of what is then left at some joint that a piece of physics must explain: less is in reach of what
@@ -106,7 +108,8 @@ pub fn wald(problem: &Problem, fit: &Fit) -> Vec<f64> {
         .collect()
 }
 
-/// Friction that changes once leaves at least this share of what it was, or was: none comes from nothing or goes for good.
+/// Friction that changes, once or as the joint warms up, leaves at least this share of what it was: none comes from nothing or
+/// goes for good.
 const LEAST_LEFT: f64 = 0.1;
 /// What lasts for an interval of one recording lasts at most for this share of it; what lasts longer is not told from an offset.
 const LONGEST_SHARE: f64 = 0.75;
@@ -137,6 +140,8 @@ pub fn is_timely(problem: &Problem, active: &Active) -> bool {
 
 /// Friction of one direction is at least this share of the other's; what looks more lopsided is friction and an offset.
 const LEAST_SYMMETRY: f64 = 0.2;
+/// Friction that falls with speed keeps at least this share of what it is when a joint breaks away: none falls to nothing.
+const LEAST_SLIDING: f64 = 0.2;
 /// A link's centre of mass is not off by more than this many times its radius of gyration, or by this \[m\] if that is more.
 const MOST_GYRATIONS: f64 = 1.0;
 const FAR_OFF_M: f64 = 0.1;
@@ -166,8 +171,8 @@ pub fn at_bound(active: &Active) -> bool {
 }
 
 /// Whether the numbers are ones that a robot may have: a link's mass stays above nothing and within twice what its URDF says,
-/// its centre within the link, a push is not beyond all strength, a gear is no soft spring, and friction is not of one direction
-/// alone.
+/// its centre within the link, a push is not beyond all strength, a gear is no soft spring, and friction is neither of one direction
+/// alone nor falls to nothing with speed or warmth.
 pub fn plausible(active: &Active, model: &Model) -> bool {
     let x = &active.coordinates;
     let link = &model.links()[active.hypothesis.place.link];
@@ -184,6 +189,8 @@ pub fn plausible(active: &Active, model: &Model) -> bool {
         }
         "external_push" => x[..3].iter().map(|f| f * f).sum::<f64>().sqrt() < STRONGEST_N,
         "joint_elasticity" => (x[1] / x[0].max(1e-12)).sqrt() >= SOFTEST_RAD_S,
+        "temperature_viscous" => x[0] >= LEAST_LEFT * (x[0] + x[1]),
+        "stribeck_friction" => x[0] >= LEAST_SLIDING * (x[0] + x[1]),
         "asymmetric_coulomb" => x[0].min(x[1]) >= LEAST_SYMMETRY * x[0].max(x[1]),
         _ => true,
     }
@@ -208,7 +215,10 @@ pub fn is_of_position(hypothesis: Hypothesis) -> bool {
 pub fn needs(hypothesis: Hypothesis, fit: &Fit) -> (f64, f64) {
     let joint = hypothesis.only_joint();
     let once = time_kind(hypothesis) == TimeKind::Once;
-    let curve = |a: &Active| a.curve.is_some() && (once || a.hypothesis.only_joint() == joint);
+    let goes_with = |a: &Active| is_plain_friction(hypothesis) && a.is_friction_curve();
+    let curve = |a: &Active| {
+        a.curve.is_some() && (once || a.hypothesis.only_joint() == joint) && !goes_with(a)
+    };
     let beside_curve = (once || joint.is_some()) && fit.actives.iter().any(curve);
     let (evidence, size) = if once {
         (INTERVAL_EVIDENCE, LEAST_SIZE_OF_INTERVAL)
