@@ -278,3 +278,41 @@ impl Column {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use tauscope_dynamics::terms::effect;
+
+    use super::*;
+
+    #[test]
+    fn a_curve_of_friction_is_what_lines_through_its_ends_leave() {
+        let curve = Table {
+            against: Against::Velocity,
+            of_joint: 2,
+            by_direction: true,
+            period: None,
+            knots: vec![-1.0, -0.5, -0.1, 0.1, 0.4, 0.9],
+            values: vec![0.0; 6],
+        };
+        let active = Active {
+            hypothesis: Hypothesis {
+                effect: effect("unknown").unwrap(),
+                place: Whereabouts {
+                    joint: 2,
+                    ..Whereabouts::default()
+                },
+            },
+            coordinates: vec![3.0, 4.0],
+            curve: Some(curve.clone()),
+        };
+        assert!(active.is_friction_curve());
+        let values = active.values_at_knots(&curve);
+        assert_eq!(values, [0.0, 3.0, 0.0, 0.0, 4.0, 0.0]);
+        let of_another = Table {
+            of_joint: 1,
+            ..curve
+        };
+        assert!(held_knots(&of_another, 2).is_empty());
+    }
+}

@@ -162,3 +162,126 @@ impl Within<'_> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use tauscope_dynamics::Model;
+
+    use super::*;
+    use crate::body_prior::log_density;
+    use crate::library;
+
+    const ARM: &str = include_str!("../../../tests/data/demo_arm.urdf");
+
+    fn carried(body: Inertia) -> Vec<Active> {
+        let model = Model::from_urdf(ARM).unwrap();
+        let all = library::hypotheses(&model, true, &BTreeSet::new());
+        let payload = all.iter().find(|h| h.effect.name == "payload").unwrap();
+        vec![payload.with(body.parameters().to_vec())]
+    }
+
+    fn free() -> Vec<(usize, usize)> {
+        (0..BODY).map(|c| (0, c)).collect()
+    }
+
+    /// Normal equations that ask for a body as precisely as these standard deviations say.
+    fn asking(
+        here: &Inertia,
+        wanted: &Inertia,
+        deviations: [f64; BODY],
+    ) -> (DMatrix<f64>, DVector<f64>) {
+        let information = deviations.map(|deviation| 1.0 / (deviation * deviation));
+        let (wanted, here) = (wanted.parameters(), here.parameters());
+        let away = wanted.iter().zip(here).map(|(a, b)| a - b);
+        let right = DVector::from_iterator(BODY, away.zip(information).map(|(d, i)| d * i));
+        (
+            DMatrix::from_diagonal(&DVector::from_row_slice(&information)),
+            right,
+        )
+    }
+
+    fn after(actives: &[Active], step: &DVector<f64>) -> Vec<Active> {
+        let mut there = actives.to_vec();
+        for (value, step) in there[0].coordinates.iter_mut().zip(step) {
+            *value += step;
+        }
+        there
+    }
+
+    #[test]
+    fn what_is_measured_precisely_is_reached_from_afar() {
+        let here = Inertia::new(1.0, [0.0, 0.0, 0.1], [1e-5, 0.0, 0.0, 1e-5, 0.0, 1.5e-5]);
+        let wanted = Inertia::new(
+            0.3,
+            [0.03, -0.02, 0.05],
+            [4e-4, 0.0, 0.0, 5e-4, 0.0, 4.5e-4],
+        );
+        let actives = carried(here);
+        let (normal, right) = asking(&here, &wanted, [1e-6; BODY]);
+        let step = body_step(&actives, &free(), (&normal, &right), &[true; BODY], 0.0).unwrap();
+        let there = after(&actives, &step);
+        for (value, wanted) in there[0].coordinates.iter().zip(wanted.parameters()) {
+            assert!((value - wanted).abs() < 1e-5, "{value} instead of {wanted}");
+        }
+    }
+
+    #[test]
+    fn an_impossible_inertia_that_is_hardly_measured_leaves_the_rest_as_measured() {
+        let here = Inertia::new(0.5, [0.0; 3], [1e-3, 0.0, 0.0, 1e-3, 0.0, 1e-3]);
+        // The moment about z is sure, the others are so unsure that they came out below zero.
+        let wanted =
+            Inertia::from_parameters([0.3, 0.01, 0.0, 0.02, -3e-3, 0.0, 0.0, 4e-3, 0.0, 6e-4]);
+        let actives = carried(here);
+        let mut deviations = [3e-3; BODY];
+        deviations[..4].fill(1e-5);
+        deviations[9] = 1e-5;
+        let (normal, right) = asking(&here, &wanted, deviations);
+        let step = body_step(&actives, &free(), (&normal, &right), &[true; BODY], 0.0).unwrap();
+        let there = after(&actives, &step);
+        assert!(log_density(&there).is_finite());
+        for c in [0, 1, 2, 3, 9] {
+            let (value, wanted) = (there[0].coordinates[c], wanted.parameters()[c]);
+            assert!(
+                (value - wanted).abs() < 4e-5,
+                "{c}: {value} instead of {wanted}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_is_not_used_stays_and_what_is_no_body_follows() {
+        let here = Inertia::new(1.0, [0.0; 3], [2e-2, 0.0, 0.0, 2e-2, 0.0, 2e-2]);
+        let mut actives = carried(here);
+        let model = Model::from_urdf(ARM).unwrap();
+        let all = library::hypotheses(&model, true, &BTreeSet::new());
+        let friction = |h: &&crate::active::Hypothesis| h.effect.name == "coulomb_friction";
+        actives.push(all.iter().find(friction).unwrap().with(vec![1.0]));
+        let mut all_free = free();
+        all_free.push((1, 0));
+        let n = BODY + 1;
+        let mut normal = DMatrix::from_diagonal_element(n, n, 1e6);
+        normal[(0, BODY)] = 5e5;
+        normal[(BODY, 0)] = 5e5;
+        let mut right = DVector::zeros(n);
+        right[BODY] = 1e6;
+        let both = body_step(
+            &actives,
+            &all_free,
+            (&normal, &right),
+            &[true; BODY + 1],
+            0.0,
+        )
+        .unwrap();
+        let left = &right - &normal * &both;
+        assert!(
+            left[BODY].abs() < 1e-3,
+            "the friction solves its own equation"
+        );
+        let mut used = [true; BODY + 1];
+        used[BODY] = false;
+        let held = body_step(&actives, &all_free, (&normal, &right), &used, 0.0).unwrap();
+        assert!(held[BODY].abs() <= 0.0);
+    }
+}

@@ -212,8 +212,8 @@ pub fn of(
 /// A weaker force at a link's frame is none \[N\].
 const LEAST_FORCE_N: f64 = 0.01;
 
-/// Takes out the force of a push where it is none: the link's frame lies on the axes of all joints that feel the push, so that no
-/// force there does what was felt.
+/// Takes out the force of a push where it is none, and how well its times are known, which hangs on it: the link's frame lies on
+/// the axes of all joints that feel the push, so that no force there does what was felt.
 fn drop_no_force(
     parameters: &mut BTreeMap<String, Value>,
     intervals: &mut BTreeMap<String, [f64; 2]>,
@@ -225,8 +225,8 @@ fn drop_no_force(
     if force.len() == names.len() && force.iter().all(|f| f.abs() < LEAST_FORCE_N) {
         for name in &names {
             parameters.remove(name);
-            intervals.remove(name);
         }
+        intervals.clear();
     }
 }
 

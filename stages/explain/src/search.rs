@@ -19,7 +19,7 @@ use crate::propose::{Base, Proposal, penalty};
 use crate::windows::{TimeKind, time_kind};
 use crate::worth;
 
-use curves::{CURVE_EVIDENCE, CURVE_SIZE, is_bent_already};
+use curves::{CURVE_EVIDENCE, CURVE_SIZE, is_drawn_already};
 pub use evidence::{Explanation, LEAST_EVIDENCE, LEAST_SIZE, has_rotor, plausible};
 use evidence::{
     ROTOR, at_bound, describe, is_timely, matters, most_at_one_place, needs, overwhelming, wald,
@@ -230,7 +230,7 @@ impl Search<'_> {
             .iter()
             .filter(|active| active.hypothesis == hypothesis)
             .count();
-        if same >= most_at_one_place(hypothesis) || is_bent_already(fit, hypothesis) {
+        if same >= most_at_one_place(hypothesis) || is_drawn_already(fit, hypothesis) {
             return false;
         }
         let excess = |j: usize| {

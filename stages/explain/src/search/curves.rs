@@ -1,5 +1,7 @@
 //! What no name fits: a curve beside the names of a joint, or in their place.
 
+use tauscope_dynamics::terms::Against;
+
 use crate::across::{carries_over, left_elsewhere};
 use crate::active::{Active, Hypothesis};
 use crate::drive::is_drive;
@@ -26,15 +28,26 @@ const MOST_OF_POSITION: usize = 3;
 /// That is asked where the variance without them is this many times the white noise.
 const LOUD: f64 = 4.0;
 
-/// Friction that is another function of velocity, where a curve of friction says already how it bends.
-pub fn is_bent_already(fit: &Fit, hypothesis: Hypothesis) -> bool {
+/// Whether a curve in the joint says already what a hypothesis would: friction that bends with velocity, or a function of
+/// position. Beside the curve it could take any size that the curve takes back.
+pub fn is_drawn_already(fit: &Fit, hypothesis: Hypothesis) -> bool {
     let bends = matches!(
         hypothesis.effect.name,
         "asymmetric_coulomb" | "stribeck_friction" | "presliding_hysteresis" | "quadratic_drag"
     );
     let joint = hypothesis.only_joint();
-    let curve = |a: &Active| a.is_friction_curve() && a.hypothesis.only_joint() == joint;
-    bends && fit.actives.iter().any(curve)
+    let draws = |active: &Active| {
+        active.curve.as_ref().is_some_and(|curve| {
+            let own = Some(curve.of_joint) == joint && active.hypothesis.only_joint() == joint;
+            let of_position = curve.against == Against::Position && !curve.by_direction;
+            own && if of_position {
+                is_of_position(hypothesis)
+            } else {
+                bends && active.is_friction_curve()
+            }
+        })
+    };
+    fit.actives.iter().any(draws)
 }
 
 /// Friction that a curve of friction goes with.
