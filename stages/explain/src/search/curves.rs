@@ -28,12 +28,15 @@ const MOST_OF_POSITION: usize = 3;
 /// That is asked where the variance without them is this many times the white noise.
 const LOUD: f64 = 4.0;
 
-/// Whether a curve in the joint says already what a hypothesis would: friction that bends with velocity, or a function of
-/// position. Beside the curve it could take any size that the curve takes back.
+/// Whether a curve in the joint says already what a hypothesis would: friction that is not plain, or a function of position. Beside the curve it could take any size that the curve takes back.
 pub fn is_drawn_already(fit: &Fit, hypothesis: Hypothesis) -> bool {
     let bends = matches!(
         hypothesis.effect.name,
-        "asymmetric_coulomb" | "stribeck_friction" | "presliding_hysteresis" | "quadratic_drag"
+        "asymmetric_coulomb"
+            | "friction_step"
+            | "stribeck_friction"
+            | "presliding_hysteresis"
+            | "quadratic_drag"
     );
     let joint = hypothesis.only_joint();
     let draws = |active: &Active| {
@@ -102,7 +105,12 @@ impl Search<'_> {
         if excess(&best.fit) < CURVE_EXCESS {
             return None;
         }
-        let beside = self.with_curve(best, joint)?;
+        let mut beside = self.with_curve(best, joint)?;
+        let drawn = |i: &usize| is_drawn_already(&beside.fit, best.fit.actives[*i].hypothesis);
+        let drawn: Vec<usize> = own.iter().copied().filter(drawn).collect();
+        if !drawn.is_empty() {
+            beside = self.with_curve(&self.stripped(best, &drawn, joint), joint)?;
+        }
         let less = best.fit.variance[joint] / beside.fit.variance[joint];
         (beside.ahead_of(best, &white) > CURVE_EVIDENCE && less > CURVE_SIZE).then_some(beside)
     }
