@@ -17,7 +17,7 @@ pub(super) static EFFECT: Effect = Effect {
     coordinates: &[
         Coordinate::positive_factor("viscous_warm_nms_per_rad"),
         Coordinate::positive_factor("viscous_extra_cold_nms_per_rad"),
-        Coordinate::shape("time_constant_s", 1.5, 900.0, 20, Scale::Log),
+        Coordinate::shape("time_constant_s", 3.0, 900.0, 18, Scale::Log),
     ],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,

@@ -47,6 +47,9 @@ pub(super) const DRAWN: &[&str] = &[
 const LARGEST_SHARE: f64 = 0.4;
 /// Radius of gyration of a payload \[m\].
 const PAYLOAD_RADIUS_M: f64 = 0.04;
+/// A URDF is off by at most this share of a link's mass, and by this in its centre \[m\].
+const MOST_OF_MASS: f64 = 0.6;
+const MOST_SHIFT_M: f64 = 0.06;
 
 type Parameters = Vec<(&'static str, f64)>;
 
@@ -336,10 +339,10 @@ fn body(name: &str, plan: &Plan, site: &Site, rng: &mut ChaCha8Rng) -> Option<Dr
             })
         }
         "link_mass" => {
-            let most = plan.model.links()[site.link].mass_kg();
+            let most = MOST_OF_MASS * plan.model.links()[site.link].mass_kg();
             drawn([1e-3 * most, most], |mass| vec![("delta_mass_kg", mass)])
         }
-        "link_com" => drawn([1e-4, 0.1], move |shift| {
+        "link_com" => drawn([1e-4, MOST_SHIFT_M], move |shift| {
             along(["delta_com_x_m", "delta_com_y_m", "delta_com_z_m"], shift)
         }),
         "base_tilt" => {
