@@ -14,9 +14,25 @@ const LEAST_SAMPLES: usize = 8;
 const SURFACES: [f64; 4] = [0.0, 0.05, 0.2, 0.4];
 
 impl Base<'_> {
-    /// The best wall: its normal is the direction of the force, its surface where the force begins.
+    /// The best wall: its normal is the direction of the force, its surface where the force begins. What is evident beside all that
+    /// is left finds a wall that is met now and then, what is beside the noise one that is leant on nearly all the time.
     pub fn propose_wall(&self, hypothesis: Hypothesis) -> Option<Proposal> {
-        let contacts = self.contacts();
+        let noise = self.problem.white_noise.iter();
+        let noise: Vec<f64> = noise.map(|sigma| (sigma * sigma).max(1e-16)).collect();
+        let [left, noise] =
+            [&self.fit.variance, &noise].map(|variance| self.wall_of(hypothesis, variance));
+        let gain = |wall: &Option<(f64, [f64; 4])>| wall.map_or(f64::NEG_INFINITY, |wall| wall.0);
+        let best = if gain(&noise) > gain(&left) {
+            noise
+        } else {
+            left
+        };
+        self.propose_at(hypothesis, &best?.1)
+    }
+
+    /// The gain and the shape of the best wall, from forces that are evident beside these variances of the joints.
+    fn wall_of(&self, hypothesis: Hypothesis, variance: &[f64]) -> Option<(f64, [f64; 4])> {
+        let contacts = self.contacts(variance);
         if contacts.len() < LEAST_SAMPLES {
             return None;
         }
@@ -48,11 +64,11 @@ impl Base<'_> {
                 }
             }
         }
-        self.propose_at(hypothesis, &best?.1)
+        best
     }
 
     /// Samples at which a force on the last moving link is evident: where its frame is, and the force \[N\].
-    fn contacts(&self) -> Vec<(Point3<f64>, Vector3<f64>)> {
+    fn contacts(&self, variance: &[f64]) -> Vec<(Point3<f64>, Vector3<f64>)> {
         let problem = self.problem;
         let n = problem.joints;
         let Some(last) = problem.model.joints().last() else {
@@ -71,7 +87,7 @@ impl Base<'_> {
                 let mut right = Vector3::zeros();
                 for j in 0..n {
                     let at = j * problem.rows + row;
-                    let weight = 1.0 / self.fit.variance[j];
+                    let weight = 1.0 / variance[j];
                     let column = Vector3::new(jacobian[(0, j)], jacobian[(1, j)], jacobian[(2, j)]);
                     normal += weight * column * column.transpose();
                     right -= weight * self.fit.residual[at] * column;

@@ -146,6 +146,10 @@ const LEAST_SLIDING: f64 = 0.2;
 const MOST_GYRATIONS: f64 = 1.0;
 const FAR_OFF_M: f64 = 0.1;
 
+/// What is behind a gear comes back after a revolution: slower waves are whole numbers of cycles in it, within what is known of them.
+const MOST_WHOLE_CYCLES: f64 = 30.0;
+const NEARLY_WHOLE: f64 = 0.15;
+
 /// A stronger force is none that pushes a robot \[N\]: it hardly acts on the joints that would feel a weaker one elsewhere.
 const STRONGEST_N: f64 = 1000.0;
 
@@ -171,7 +175,8 @@ pub fn at_bound(active: &Active) -> bool {
 }
 
 /// Whether the numbers are ones that a robot may have: a link's mass stays above nothing and within twice what its URDF says,
-/// its centre within the link, a push is not beyond all strength, a gear is no soft spring, and friction is neither of one direction
+/// its centre within the link, a push is not beyond all strength, a gear is no soft spring, a ripple
+/// closes after a revolution, and friction is neither of one direction
 /// alone nor falls to nothing with speed or warmth.
 pub fn plausible(active: &Active, model: &Model) -> bool {
     let x = &active.coordinates;
@@ -190,6 +195,10 @@ pub fn plausible(active: &Active, model: &Model) -> bool {
         "external_push" => x[..3].iter().map(|f| f * f).sum::<f64>().sqrt() < STRONGEST_N,
         "joint_elasticity" => (x[1] / x[0].max(1e-12)).sqrt() >= SOFTEST_RAD_S,
         "temperature_viscous" => x[0] >= LEAST_LEFT * (x[0] + x[1]),
+        "torque_ripple" => {
+            let fraction = (x[2] - x[2].round()).abs();
+            x[2] > MOST_WHOLE_CYCLES || fraction < NEARLY_WHOLE
+        }
         "stribeck_friction" => x[0] >= LEAST_SLIDING * (x[0] + x[1]),
         "asymmetric_coulomb" => x[0].min(x[1]) >= LEAST_SYMMETRY * x[0].max(x[1]),
         _ => true,
