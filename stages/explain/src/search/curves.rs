@@ -10,7 +10,7 @@ use crate::propose::Base;
 use crate::unknown;
 use crate::windows::{TimeKind, time_kind};
 
-use super::evidence::{is_of_position, overwhelming, worse_joints};
+use super::evidence::{is_of_position, is_open_wave, overwhelming, worse_joints};
 use super::{Explanation, Search};
 
 /// Evidence that a curve without a name needs \[nats\].
@@ -183,7 +183,7 @@ impl Search<'_> {
         bare
     }
 
-    /// Takes the names of a joint back that are too many functions of its position, or that leave much more on recordings that they were not fitted on, each left out in
+    /// Takes the names of a joint back that are too many functions of its position or waves that no gear makes, or that leave much more on recordings that they were not fitted on, each left out in
     /// turn, than where they were: together they only draw a curve, which is said in their place.
     pub(super) fn upheld(&self, found: Explanation) -> Explanation {
         let mut best = found;
@@ -203,7 +203,8 @@ impl Search<'_> {
             }
             let bare = self.stripped(&best, &names, joint);
             let of_position = names.iter().filter(|&&i| is_of_position(of(i))).count();
-            if of_position > MOST_OF_POSITION
+            let open = names.iter().any(|&i| is_open_wave(&best.fit.actives[i]));
+            if (of_position > MOST_OF_POSITION || open)
                 && let Some(curve) = self.with_curve(&bare, joint)
             {
                 best = curve;

@@ -150,6 +150,16 @@ const FAR_OFF_M: f64 = 0.1;
 const MOST_WHOLE_CYCLES: f64 = 30.0;
 const NEARLY_WHOLE: f64 = 0.15;
 
+/// Whether a wave over a joint's position does not close after a revolution.
+pub fn is_open_wave(active: &Active) -> bool {
+    let [_, _, cycles] = active.coordinates[..] else {
+        return false;
+    };
+    active.hypothesis.effect.name == "torque_ripple"
+        && cycles < MOST_WHOLE_CYCLES
+        && (cycles - cycles.round()).abs() > NEARLY_WHOLE
+}
+
 /// A stronger force is none that pushes a robot \[N\]: it hardly acts on the joints that would feel a weaker one elsewhere.
 const STRONGEST_N: f64 = 1000.0;
 
@@ -175,8 +185,7 @@ pub fn at_bound(active: &Active) -> bool {
 }
 
 /// Whether the numbers are ones that a robot may have: a link's mass stays above nothing and within twice what its URDF says,
-/// its centre within the link, a push is not beyond all strength, a gear is no soft spring, a ripple
-/// closes after a revolution, and friction is neither of one direction
+/// its centre within the link, a push is not beyond all strength, a gear is no soft spring, and friction is neither of one direction
 /// alone nor falls to nothing with speed or warmth.
 pub fn plausible(active: &Active, model: &Model) -> bool {
     let x = &active.coordinates;
@@ -195,10 +204,6 @@ pub fn plausible(active: &Active, model: &Model) -> bool {
         "external_push" => x[..3].iter().map(|f| f * f).sum::<f64>().sqrt() < STRONGEST_N,
         "joint_elasticity" => (x[1] / x[0].max(1e-12)).sqrt() >= SOFTEST_RAD_S,
         "temperature_viscous" => x[0] >= LEAST_LEFT * (x[0] + x[1]),
-        "torque_ripple" => {
-            let fraction = (x[2] - x[2].round()).abs();
-            x[2] > MOST_WHOLE_CYCLES || fraction < NEARLY_WHOLE
-        }
         "stribeck_friction" => x[0] >= LEAST_SLIDING * (x[0] + x[1]),
         "asymmetric_coulomb" => x[0].min(x[1]) >= LEAST_SYMMETRY * x[0].max(x[1]),
         _ => true,
