@@ -13,6 +13,8 @@ pub(crate) const SHORTEST: usize = 0;
 const MIDDLE: usize = 1;
 /// The window that tells what is usual just now.
 const LONGEST: usize = WINDOWS_S.len() - 1;
+/// So much of its usual noise a longer window's mean may be away from the shortest's: what has gone is not told any longer.
+const BORNE_OUT: f64 = 6.0;
 /// How long a joint that was slow counts as slow \[s\].
 const SLOW_MEMORY_S: f64 = 0.3;
 
@@ -228,9 +230,17 @@ impl Windows {
         self.score
     }
 
-    /// Squared Mahalanobis length of the mean residual over a window.
+    /// Squared Mahalanobis length of the mean residual over a window, as far as the newest samples bear it out.
     pub fn length(&self, window: usize) -> f64 {
-        self.length_of(window, |joint| self.mean(window, joint))
+        if window == SHORTEST {
+            return self.length_of(window, |joint| self.mean(window, joint));
+        }
+        self.length_of(window, |joint| {
+            let newest = self.mean(SHORTEST, joint);
+            let margin = BORNE_OUT * self.noise(SHORTEST, joint);
+            let mean = self.mean(window, joint);
+            mean.max(newest - margin).min(newest + margin)
+        })
     }
 
     fn length_of(&self, window: usize, mean: impl Fn(usize) -> f64) -> f64 {
