@@ -21,8 +21,10 @@ mod kinds;
 mod learnt;
 mod place;
 mod points;
+mod rest;
 mod ring;
 mod smallest;
+mod sums;
 mod tail;
 mod windows;
 
@@ -41,6 +43,7 @@ use learnt::ENOUGH_S;
 pub use learnt::{Learnt, LearntJoint, LearntWindow};
 use nalgebra::Vector6;
 use place::Place;
+pub use rest::LearntRest;
 use ring::Ring;
 pub use smallest::Smallest;
 pub use tail::Tail;
@@ -234,10 +237,13 @@ impl Detector for Tauscope {
 impl Tauscope {
     /// One that takes its time to tell the kinds if `tells_kinds`.
     fn new(learnt: &Learnt, settings: &Settings, setup: &Setup, tells_kinds: bool) -> Self {
-        let threshold = learnt.tail.threshold(settings.false_alarms_per_hour);
+        let per_hour = settings.false_alarms_per_hour;
+        let threshold = learnt.tail.threshold(per_hour);
+        let mut windows = Windows::new(learnt, settings.follow());
+        windows.heed_rest(threshold, per_hour);
         Self {
             rate: Rate::new(learnt.rate_hz),
-            windows: Windows::new(learnt, settings.follow()),
+            windows,
             moved: Ring::new(),
             place: Place::new(setup),
             watch: Watch::new(threshold, tells_kinds),

@@ -7,8 +7,9 @@ use tauscope_bus::{MAX_JOINTS, TwinState, flags};
 
 use super::NAME;
 use super::kinds::Kinds;
+use super::rest::{self, LearntRest};
 use super::smallest::Smallest;
-use super::tail::{BLOCK_S, Tail};
+use super::tail::{Peaks, Tail};
 use super::windows::{Follow, Means, WINDOWS_S, Windows};
 use crate::joints;
 use crate::lesson::{LearnError, Lesson, Lessons};
@@ -54,6 +55,9 @@ pub struct Learnt {
     pub joints: Vec<LearntJoint>,
     /// By window.
     pub windows: Vec<LearntWindow>,
+    /// Of a standing arm, where there was enough of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rest: Option<LearntRest>,
     /// How often the score exceeds what by chance.
     pub tail: Tail,
     /// How much of contact-free time all of it is from \[s\].
@@ -119,6 +123,7 @@ impl Learnt {
         } else {
             Tail::new(held_out_peaks(&all, joint_names, follow))
         };
+        learnt.rest = rest::learn(joint_names.len(), &all, |noise| learnt.hold(noise));
         Ok(learnt)
     }
 
@@ -128,6 +133,7 @@ impl Learnt {
             rate_hz: 0.0,
             joints: speeds(pieces, joint_names),
             windows: Vec::new(),
+            rest: None,
             tail: Tail {
                 level: 0.0,
                 per_hour: 1.0,
@@ -162,6 +168,11 @@ impl Learnt {
             let windows = WINDOWS_S.len();
             return Some(format!(
                 "is not whole: it needs noise by {n} joints and {BINS} speeds for each of {windows} windows"
+            ));
+        }
+        if self.rest.as_ref().is_some_and(|rest| !rest.is_whole(n)) {
+            return Some(format!(
+                "is not whole: at rest it needs noise by {n} joints for each window"
             ));
         }
         let is_rate = self.rate_hz > 0.0;
@@ -230,14 +241,23 @@ impl Learnt {
 
     /// Holds the joints' noise to what is usual of all of them, the more the less it was learnt from.
     fn hold_noise(&mut self) {
-        let believed = self.believed();
-        for window in &mut self.windows {
+        let mut windows = std::mem::take(&mut self.windows);
+        for window in &mut windows {
             let mut of_all: Vec<f64> = window.noise.iter().flatten().copied().collect();
-            let usual = quantile(&mut of_all, 0.5);
-            for noise in window.noise.iter_mut().flatten() {
-                let least = noise.max(LEAST_NOISE * usual);
-                *noise = least.powf(believed) * usual.powf(1.0 - believed);
+            self.hold(&mut of_all);
+            for (noise, held) in window.noise.iter_mut().flatten().zip(of_all) {
+                *noise = held;
             }
+        }
+        self.windows = windows;
+    }
+
+    fn hold(&self, noise: &mut [f64]) {
+        let believed = self.believed();
+        let usual = quantile(&mut noise.to_vec(), 0.5);
+        for noise in noise {
+            let least = noise.max(LEAST_NOISE * usual);
+            *noise = least.powf(believed) * usual.powf(1.0 - believed);
         }
     }
 
@@ -307,16 +327,11 @@ impl Learnt {
 
     /// The largest score of each block of contact-free time.
     fn peaks(&self, all: &[Piece<'_>], follow: Follow) -> Vec<f64> {
-        let mut peaks: Vec<(i64, f64)> = Vec::new();
-        let length_ns = (BLOCK_S * 1e9) as i64;
+        let mut peaks = Peaks::default();
         self.each(all, follow, |sample, _, score| {
-            let block = sample.header.stamp_ns.div_euclid(length_ns);
-            match peaks.last_mut() {
-                Some((last, peak)) if *last == block => *peak = peak.max(score),
-                _ => peaks.push((block, score)),
-            }
+            peaks.add(sample.header.stamp_ns, score);
         });
-        peaks.into_iter().map(|(_, peak)| peak).collect()
+        peaks.into_blocks()
     }
 }
 
@@ -378,7 +393,7 @@ fn speeds(all: &[Piece<'_>], joint_names: &[String]) -> Vec<LearntJoint> {
 }
 
 /// The value below which a share of all is; 0 of none.
-fn quantile(values: &mut [f64], share: f64) -> f64 {
+pub(super) fn quantile(values: &mut [f64], share: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     let last = values.len().saturating_sub(1);
     let at = (last as f64 * share).round() as usize;
@@ -410,7 +425,7 @@ pub(super) fn pieces<'a>(lessons: &Lessons<'a>, follow: Follow) -> Vec<Piece<'a>
 }
 
 /// Settled samples of a piece, and whether nothing touched the robot then.
-fn marked<'a>(piece: &Piece<'a>) -> impl Iterator<Item = (&'a TwinState, bool)> {
+pub(super) fn marked<'a>(piece: &Piece<'a>) -> impl Iterator<Item = (&'a TwinState, bool)> {
     let Piece { samples, lesson } = *piece;
     let settled = samples.iter().filter(|s| s.header.has(flags::READY));
     settled.map(move |sample| {

@@ -3,20 +3,27 @@
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 
 use super::learnt::{Learnt, bin};
-use super::ring::Ring;
+use super::rest::Rest;
+use super::sums::Sums;
 
 /// Lengths of the windows \[s\].
 pub(crate) const WINDOWS_S: [f64; 3] = [0.01, 0.03, 0.1];
 /// The window that tells how a contact begins.
 pub(crate) const SHORTEST: usize = 0;
 /// The window that a contact is followed by.
-const MIDDLE: usize = 1;
+pub(crate) const MIDDLE: usize = 1;
 /// The window that tells what is usual just now.
-const LONGEST: usize = WINDOWS_S.len() - 1;
+pub(super) const LONGEST: usize = WINDOWS_S.len() - 1;
 /// So much of its usual noise a longer window's mean may be away from the shortest's: what has gone is not told any longer.
 const BORNE_OUT: f64 = 6.0;
 /// How long a joint that was slow counts as slow \[s\].
 const SLOW_MEMORY_S: f64 = 0.3;
+
+/// A longer window's mean as far as the `newest` samples' mean, with this noise, bears it out.
+pub(super) fn borne_out(mean: f64, newest: f64, noise: f64) -> f64 {
+    let margin = BORNE_OUT * noise;
+    mean.max(newest - margin).min(newest + margin)
+}
 
 /// How the slow part of a residual is had.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,16 +34,10 @@ pub(crate) struct Follow {
     pub offset_from_first_s: f64,
 }
 
-/// Most samples of a window.
-const CAPACITY: usize = 1024;
-
-/// Running means over each window.
+/// Running means of the residual over each window.
 #[derive(Debug)]
 pub(crate) struct Means {
-    rows: Ring<CAPACITY>,
-    /// First row of each window.
-    tails: [usize; WINDOWS_S.len()],
-    sums: [JointArray; WINDOWS_S.len()],
+    sums: Sums,
     /// The slow part of the residual.
     offset: JointArray,
     settings: Follow,
@@ -52,9 +53,7 @@ impl Means {
     /// For joints whose usual speeds go up to `fast` \[rad/s\].
     pub fn new(fast: JointArray, settings: Follow) -> Self {
         Self {
-            rows: Ring::new(),
-            tails: [0; WINDOWS_S.len()],
-            sums: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
+            sums: Sums::new(),
             offset: [0.0; MAX_JOINTS],
             settings,
             step: (0.0, 0.0),
@@ -65,28 +64,22 @@ impl Means {
     }
 
     pub fn reset(&mut self) {
-        self.rows.reset();
-        self.tails = [0; WINDOWS_S.len()];
-        self.sums = [[0.0; MAX_JOINTS]; WINDOWS_S.len()];
+        self.sums.reset();
         self.offset = [0.0; MAX_JOINTS];
     }
 
     /// Whether the longest window is full, and the offset known.
     pub fn ready(&self) -> bool {
-        let newest = self.newest_ns();
+        let newest = self.sums.newest_ns();
         let longest = WINDOWS_S[WINDOWS_S.len() - 1];
         (newest - self.start_ns) as f64 * 1e-9 >= longest.max(self.settings.offset_from_first_s)
-    }
-
-    fn newest_ns(&self) -> i64 {
-        self.rows.row(self.rows.count().max(1) - 1).0
     }
 
     /// Takes a sample; slow drift is followed if `follow`.
     pub fn push(&mut self, sample: &TwinState, follow: bool) {
         let n = sample.header.joint_count as usize;
         let now = sample.header.stamp_ns;
-        let is_first = self.rows.count() == 0;
+        let is_first = self.sums.is_empty();
         if is_first {
             self.start_ns = now;
             self.slow = sample.velocity.map(f64::abs);
@@ -94,7 +87,7 @@ impl Means {
         let dt_s = if is_first {
             0.0
         } else {
-            (now - self.newest_ns()) as f64 * 1e-9
+            (now - self.sums.newest_ns()) as f64 * 1e-9
         };
         let since_s = (now - self.start_ns) as f64 * 1e-9;
         let first = since_s < self.settings.offset_from_first_s;
@@ -117,53 +110,19 @@ impl Means {
             let recovered = self.slow[j] + recovery * self.fast[j];
             self.slow[j] = recovered.min(sample.velocity[j].abs());
         }
-        self.rows.push(now, &row);
-        let head = self.rows.count();
-        for (w, length_s) in WINDOWS_S.iter().enumerate() {
-            let sums = &mut self.sums[w][..n];
-            for (sum, value) in sums.iter_mut().zip(&row) {
-                *sum += value;
-            }
-            let begin = now - (length_s * 1e9) as i64;
-            while self.tails[w] + 1 < head {
-                let (stamp, old) = self.rows.row(self.tails[w]);
-                if *stamp > begin && self.rows.is_kept(self.tails[w]) {
-                    break;
-                }
-                for (sum, value) in sums.iter_mut().zip(old) {
-                    *sum -= value;
-                }
-                self.tails[w] += 1;
-            }
-        }
-        // Rounding is not to add up.
-        if self.rows.is_round() {
-            self.sum_anew(n);
-        }
-    }
-
-    fn sum_anew(&mut self, n: usize) {
-        for (sum, &tail) in self.sums.iter_mut().zip(&self.tails) {
-            *sum = [0.0; MAX_JOINTS];
-            for k in tail..self.rows.count() {
-                let row = &self.rows.row(k).1;
-                for j in 0..n {
-                    sum[j] += row[j];
-                }
-            }
-        }
+        self.sums.push(now, &row, n);
     }
 
     /// Mean residual of a joint over a window \[effort unit\].
     pub fn mean(&self, window: usize, joint: usize) -> f64 {
-        self.sums[window][joint] / (self.rows.count() - self.tails[window]).max(1) as f64
+        self.sums.means[window][joint]
     }
 
     /// What the shortest window's mean was at this instant.
     pub fn earlier(&self, to_ns: i64) -> JointArray {
         // The window is open where it begins.
         let from_ns = to_ns - (WINDOWS_S[SHORTEST] * 1e9) as i64 + 1;
-        self.rows.mean(from_ns, to_ns)
+        self.sums.rows.mean(from_ns, to_ns)
     }
 }
 
@@ -172,6 +131,8 @@ impl Means {
 pub(crate) struct Windows {
     means: Means,
     learnt: Learnt,
+    /// What is known of a standing arm, if it is heeded.
+    at_rest: Option<Rest>,
     /// Class of each joint's present speed.
     bins: [usize; MAX_JOINTS],
     /// Mean residual of the contact that goes on, as it is followed, and of the one below it.
@@ -194,6 +155,7 @@ impl Windows {
         Self {
             means: Means::new(fast, settings),
             learnt: learnt.clone(),
+            at_rest: None,
             bins: [0; MAX_JOINTS],
             held: [0.0; MAX_JOINTS],
             base: [0.0; MAX_JOINTS],
@@ -203,8 +165,19 @@ impl Windows {
         }
     }
 
+    /// From here on a standing arm is held against what it was before it was touched, if that was learnt; at this `threshold` there should be
+    /// so many false alarms an hour.
+    pub fn heed_rest(&mut self, threshold: f64, per_hour: f64) {
+        let rest = self.learnt.rest.as_ref();
+        self.at_rest =
+            rest.map(|rest| Rest::new(rest, self.learnt.joints.len(), threshold, per_hour));
+    }
+
     pub fn reset(&mut self) {
         self.means.reset();
+        if let Some(rest) = &mut self.at_rest {
+            rest.reset();
+        }
         self.score = 0.0;
     }
 
@@ -212,7 +185,7 @@ impl Windows {
         self.means.ready()
     }
 
-    /// The score of the next sample: the most unusual window's; below `usual`, drift is followed.
+    /// The score of the next sample: the most unusual window's, or that of a standing arm; below `usual`, drift is followed.
     pub fn score(&mut self, sample: &TwinState, usual: Option<f64>) -> f64 {
         let follow = usual.is_some_and(|usual| self.score < usual);
         self.means.push(sample, follow);
@@ -227,6 +200,9 @@ impl Windows {
                 self.most = w;
             }
         }
+        let at_rest = (self.at_rest.as_mut())
+            .and_then(|rest| rest.score(sample, usual.is_some()));
+        self.score = at_rest.map_or(self.score, |score| score.max(self.score));
         self.score
     }
 
@@ -237,9 +213,11 @@ impl Windows {
         }
         self.length_of(window, |joint| {
             let newest = self.mean(SHORTEST, joint);
-            let margin = BORNE_OUT * self.noise(SHORTEST, joint);
-            let mean = self.mean(window, joint);
-            mean.max(newest - margin).min(newest + margin)
+            borne_out(
+                self.mean(window, joint),
+                newest,
+                self.noise(SHORTEST, joint),
+            )
         })
     }
 
