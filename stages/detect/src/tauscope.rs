@@ -3,7 +3,7 @@
 //! The noise of a residual is not the same in every joint, at every speed and over every length of time:
 //! friction is least certain where a joint turns round, joints err together, and what is small beside
 //! one sample is large beside the mean of thirty. All of that is learnt from contact-free recordings
-//! ([`Learnt`]). The score is the largest, over three windows, of the Mahalanobis length of the mean residual, in
+//! ([`Learnt`]). The score is the largest, over windows of 10 ms to 0.2 s, of the Mahalanobis length of the mean residual, in
 //! units of what that window's length reaches at most in one of a thousand contact-free samples. Slow drift (warming up)
 //! is followed while nothing touches the robot.
 //!
@@ -220,8 +220,8 @@ impl Detector for Tauscope {
         }
         let contact = self.watch.contact_ns().map(|contact_ns| Seen {
             contact_ns,
-            joints: Some(Place::loaded(&self.windows)),
-            place: self.place.locate(sample, &self.windows),
+            joints: Some(Place::loaded(&self.windows, contact_ns)),
+            place: self.place.locate(sample, &self.windows, contact_ns),
         });
         Judgement {
             score,

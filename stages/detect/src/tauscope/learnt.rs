@@ -42,6 +42,8 @@ pub(super) const ENOUGH_S: f64 = 20.0;
 /// A joint's noise and the joints' correlations count half once they are from so much; until then noise is held to what is usual of
 /// all joints (the median), and correlations to none \[s\].
 const HALF_S: f64 = 2.0;
+/// The last window is used where its noise is less than this share of that of the one before it.
+const PAYS: f64 = 0.9;
 /// No joint's noise is believed below this share of what is usual of all joints.
 const LEAST_NOISE: f64 = 0.02;
 
@@ -145,6 +147,9 @@ impl Learnt {
             kinds: None,
         };
         learnt.windows = learnt.noise(pieces, follow);
+        if !learnt.last_pays() {
+            learnt.windows.pop();
+        }
         learnt.hold_noise();
         learnt.correlate(pieces, follow);
         learnt.measure_usual(pieces, follow);
@@ -163,7 +168,8 @@ impl Learnt {
                 && window.noise.len() == n
                 && window.noise.iter().all(|noise| noise.len() == BINS)
         };
-        let whole = self.windows.len() == WINDOWS_S.len() && self.windows.iter().all(fits);
+        let whole = (WINDOWS_S.len() - 1..=WINDOWS_S.len()).contains(&self.windows.len())
+            && self.windows.iter().all(fits);
         if !whole {
             let windows = WINDOWS_S.len();
             return Some(format!(
@@ -192,7 +198,7 @@ impl Learnt {
         let n = self.joints.len();
         let mut sums = vec![vec![[(0.0, 0.0); BINS]; n]; WINDOWS_S.len()];
         for piece in all {
-            let mut means = Means::new(self.fast(), follow);
+            let mut means = Means::new(self.fast(), follow, WINDOWS_S.len());
             for (sample, is_free) in marked(piece) {
                 restart(&mut means, sample);
                 means.push(sample, is_free);
@@ -227,6 +233,18 @@ impl Learnt {
                 usual: 1.0,
             })
             .collect()
+    }
+
+    /// Whether the last window averages enough noise away (mean of the joints' logarithms) for what it tells later than the one before it.
+    fn last_pays(&self) -> bool {
+        let [.., before, last] = &self.windows[..] else {
+            return false;
+        };
+        let noise = |window: &LearntWindow| -> f64 {
+            let all = window.noise.iter().flatten();
+            all.clone().map(|noise| noise.ln()).sum::<f64>() / all.count().max(1) as f64
+        };
+        noise(last) - noise(before) < PAYS.ln()
     }
 
     /// How far what was learnt is believed, of 1.
@@ -285,7 +303,7 @@ impl Learnt {
     fn correlate(&mut self, all: &[Piece<'_>], follow: Follow) {
         let n = self.joints.len();
         let believed = BELIEVED * self.believed();
-        let mut products = vec![DMatrix::<f64>::zeros(n, n); WINDOWS_S.len()];
+        let mut products = vec![DMatrix::<f64>::zeros(n, n); self.windows.len()];
         self.each(all, follow, |_, windows, _| {
             for (w, product) in products.iter_mut().enumerate() {
                 let z: Vec<f64> = (0..n)
@@ -314,7 +332,7 @@ impl Learnt {
     }
 
     fn measure_usual(&mut self, all: &[Piece<'_>], follow: Follow) {
-        let mut lengths = vec![Vec::new(); WINDOWS_S.len()];
+        let mut lengths = vec![Vec::new(); self.windows.len()];
         self.each(all, follow, |_, windows, _| {
             for (w, lengths) in lengths.iter_mut().enumerate() {
                 lengths.push(windows.length(w));

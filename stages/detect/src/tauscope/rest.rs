@@ -14,7 +14,7 @@ use tauscope_bus::{JointArray, MAX_JOINTS, TwinState, flags};
 use super::learnt::{ENOUGH_S, Piece, marked, quantile};
 use super::sums::Sums;
 use super::tail::{Peaks, Tail};
-use super::windows::{LONGEST, MIDDLE, SHORTEST, WINDOWS_S, borne_out};
+use super::windows::{LONG, MIDDLE, SHORTEST, WINDOWS_S, borne_out};
 
 /// An arm stands once no joint has been further than this from where it was \[rad, m\], nor faster than this \[rad/s, m/s\], for so long \[s\].
 const WITHIN: f64 = 0.01;
@@ -59,19 +59,16 @@ impl LearntRest {
         self.noise.len() == WINDOWS_S.len() && self.noise.iter().all(|noise| noise.len() == joints)
     }
 
-    /// Squared length of a window's change as far as the newest samples bear it out.
-    fn length(&self, window: usize, changes: &Changes) -> f64 {
-        let newest = self.noise[SHORTEST].iter().zip(&changes[SHORTEST]);
-        (changes[window].iter().zip(&self.noise[window]).zip(newest))
-            .map(|((change, noise), (of_newest, newest))| {
-                (borne_out(*change, *newest, *of_newest) / noise).powi(2)
-            })
-            .sum()
-    }
-
-    /// Root of the largest length of all windows, in units of the usual.
+    /// Root of the largest squared length of the windows' changes, in units of the usual.
     fn size(&self, changes: &Changes) -> f64 {
-        let lengths = (0..WINDOWS_S.len()).map(|w| self.length(w, changes));
+        let joints = self.noise[SHORTEST].len();
+        let changes = borne_out(changes, WINDOWS_S.len(), joints, |w, j| self.noise[w][j]);
+        let lengths = changes.iter().zip(&self.noise).map(|(changes, noise)| {
+            let units = changes.iter().zip(noise);
+            units
+                .map(|(change, noise)| (change / noise).powi(2))
+                .sum::<f64>()
+        });
         (lengths.fold(0.0, f64::max) / self.usual).sqrt()
     }
 }
@@ -142,7 +139,7 @@ struct Base {
 impl Base {
     fn new() -> Self {
         Self {
-            sums: Sums::new(),
+            sums: Sums::new(WINDOWS_S.len()),
             stand: Stand::default(),
             mean: None,
             newest_ns: 0,
@@ -170,7 +167,7 @@ impl Base {
             }
             self.newest_ns = now_ns;
         }
-        let mean = *self.mean.get_or_insert(self.sums.means[LONGEST]);
+        let mean = *self.mean.get_or_insert(self.sums.means[LONG]);
         let mut changes = self.sums.means;
         for window in &mut changes {
             for (change, mean) in window.iter_mut().zip(&mean) {
@@ -187,7 +184,7 @@ impl Base {
             return;
         };
         let share = dt_s / (FOLLOW_S + dt_s);
-        for (mean, newest) in mean.iter_mut().zip(&self.sums.means[LONGEST]) {
+        for (mean, newest) in mean.iter_mut().zip(&self.sums.means[LONG]) {
             *mean += share * (newest - *mean);
         }
     }

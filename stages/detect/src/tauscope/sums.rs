@@ -8,7 +8,7 @@ use super::windows::WINDOWS_S;
 /// Most samples of a window.
 const CAPACITY: usize = 1024;
 
-/// Running means of rows over each window.
+/// Running means of rows over the first windows.
 #[derive(Debug)]
 pub(super) struct Sums {
     pub rows: Ring<CAPACITY>,
@@ -17,15 +17,18 @@ pub(super) struct Sums {
     sums: [JointArray; WINDOWS_S.len()],
     /// By window and joint.
     pub means: [JointArray; WINDOWS_S.len()],
+    windows: usize,
 }
 
 impl Sums {
-    pub fn new() -> Self {
+    /// Over so many windows.
+    pub fn new(windows: usize) -> Self {
         Self {
             rows: Ring::new(),
             tails: [0; WINDOWS_S.len()],
             sums: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
             means: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
+            windows,
         }
     }
 
@@ -47,7 +50,7 @@ impl Sums {
     pub fn push(&mut self, now_ns: i64, row: &JointArray, n: usize) {
         self.rows.push(now_ns, row);
         let head = self.rows.count();
-        for (w, length_s) in WINDOWS_S.iter().enumerate() {
+        for (w, length_s) in WINDOWS_S.iter().enumerate().take(self.windows) {
             let sums = &mut self.sums[w][..n];
             for (sum, value) in sums.iter_mut().zip(row) {
                 *sum += value;
@@ -68,7 +71,7 @@ impl Sums {
         if self.rows.is_round() {
             self.sum_anew(n);
         }
-        for (w, means) in self.means.iter_mut().enumerate() {
+        for (w, means) in self.means.iter_mut().enumerate().take(self.windows) {
             let share = ((head - self.tails[w]).max(1) as f64).recip();
             for (mean, sum) in means[..n].iter_mut().zip(&self.sums[w]) {
                 *mean = sum * share;

@@ -6,23 +6,35 @@ use super::learnt::{Learnt, bin};
 use super::rest::Rest;
 use super::sums::Sums;
 
-/// Lengths of the windows \[s\].
-pub(crate) const WINDOWS_S: [f64; 3] = [0.01, 0.03, 0.1];
+/// Lengths of the windows \[s\]; the last one is used where it pays.
+pub(crate) const WINDOWS_S: [f64; 4] = [0.01, 0.03, 0.1, 0.2];
 /// The window that tells how a contact begins.
 pub(crate) const SHORTEST: usize = 0;
 /// The window that a contact is followed by.
 pub(crate) const MIDDLE: usize = 1;
 /// The window that tells what is usual just now.
-pub(super) const LONGEST: usize = WINDOWS_S.len() - 1;
-/// So much of its usual noise a longer window's mean may be away from the shortest's: what has gone is not told any longer.
-const BORNE_OUT: f64 = 6.0;
+pub(super) const LONG: usize = 2;
+/// So much of the usual noise of the next shorter window's mean a longer one's may be away from it: what has gone is not told any longer.
+const BORNE_OUT: f64 = 2.0;
 /// How long a joint that was slow counts as slow \[s\].
 const SLOW_MEMORY_S: f64 = 0.3;
 
-/// A longer window's mean as far as the `newest` samples' mean, with this noise, bears it out.
-pub(super) fn borne_out(mean: f64, newest: f64, noise: f64) -> f64 {
-    let margin = BORNE_OUT * noise;
-    mean.max(newest - margin).min(newest + margin)
+/// Means over the windows as far as those over the next shorter ones bear them out, with these `noise`s by window and joint.
+pub(super) fn borne_out(
+    means: &[JointArray; WINDOWS_S.len()],
+    windows: usize,
+    joints: usize,
+    noise: impl Fn(usize, usize) -> f64,
+) -> [JointArray; WINDOWS_S.len()] {
+    let mut borne_out = *means;
+    for w in 1..windows {
+        for j in 0..joints {
+            let newer = borne_out[w - 1][j];
+            let margin = BORNE_OUT * noise(w - 1, j);
+            borne_out[w][j] = means[w][j].max(newer - margin).min(newer + margin);
+        }
+    }
+    borne_out
 }
 
 /// How the slow part of a residual is had.
@@ -50,10 +62,10 @@ pub(crate) struct Means {
 }
 
 impl Means {
-    /// For joints whose usual speeds go up to `fast` \[rad/s\].
-    pub fn new(fast: JointArray, settings: Follow) -> Self {
+    /// For joints whose usual speeds go up to `fast` \[rad/s\], over the first so many `windows`.
+    pub fn new(fast: JointArray, settings: Follow, windows: usize) -> Self {
         Self {
-            sums: Sums::new(),
+            sums: Sums::new(windows),
             offset: [0.0; MAX_JOINTS],
             settings,
             step: (0.0, 0.0),
@@ -68,10 +80,10 @@ impl Means {
         self.offset = [0.0; MAX_JOINTS];
     }
 
-    /// Whether the longest window is full, and the offset known.
+    /// Whether the windows are full (the last one is as good as the one before it until then), and the offset known.
     pub fn ready(&self) -> bool {
         let newest = self.sums.newest_ns();
-        let longest = WINDOWS_S[WINDOWS_S.len() - 1];
+        let longest = WINDOWS_S[LONG];
         (newest - self.start_ns) as f64 * 1e-9 >= longest.max(self.settings.offset_from_first_s)
     }
 
@@ -135,13 +147,13 @@ pub(crate) struct Windows {
     at_rest: Option<Rest>,
     /// Class of each joint's present speed.
     bins: [usize; MAX_JOINTS],
+    /// By window and joint, the mean residual as far as the newest samples bear it out.
+    borne_out: [JointArray; WINDOWS_S.len()],
     /// Mean residual of the contact that goes on, as it is followed, and of the one below it.
     held: JointArray,
     base: JointArray,
     /// Mean residual when the score was usual last.
     rest: JointArray,
-    /// The window whose mean is most unusual.
-    pub most: usize,
     /// How unusual: the newest score.
     score: f64,
 }
@@ -153,14 +165,14 @@ impl Windows {
             *fast = joint.fast_rad_s;
         }
         Self {
-            means: Means::new(fast, settings),
+            means: Means::new(fast, settings, learnt.windows.len()),
             learnt: learnt.clone(),
             at_rest: None,
             bins: [0; MAX_JOINTS],
+            borne_out: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
             held: [0.0; MAX_JOINTS],
             base: [0.0; MAX_JOINTS],
             rest: [0.0; MAX_JOINTS],
-            most: 0,
             score: 0.0,
         }
     }
@@ -192,13 +204,15 @@ impl Windows {
         for (j, joint) in self.learnt.joints.iter().enumerate() {
             self.bins[j] = bin(joint, self.means.slow[j]);
         }
+        self.borne_out = borne_out(
+            &self.means.sums.means,
+            self.learnt.windows.len(),
+            self.joints(),
+            |w, j| self.noise(w, j),
+        );
         self.score = 0.0;
-        for w in 0..WINDOWS_S.len() {
-            let score = self.length(w) / self.learnt.windows[w].usual;
-            if score > self.score {
-                self.score = score;
-                self.most = w;
-            }
+        for w in 0..self.learnt.windows.len() {
+            self.score = (self.length(w) / self.learnt.windows[w].usual).max(self.score);
         }
         let at_rest = (self.at_rest.as_mut())
             .and_then(|rest| rest.score(sample, usual.is_some()));
@@ -206,19 +220,19 @@ impl Windows {
         self.score
     }
 
+    /// The longest window that holds nothing from before this instant, or the shortest.
+    pub fn since(&self, instant_ns: i64) -> usize {
+        let s = (self.means.sums.newest_ns() - instant_ns) as f64 * 1e-9;
+        let windows = &WINDOWS_S[..self.learnt.windows.len()];
+        windows
+            .iter()
+            .rposition(|length_s| *length_s <= s)
+            .unwrap_or(SHORTEST)
+    }
+
     /// Squared Mahalanobis length of the mean residual over a window, as far as the newest samples bear it out.
     pub fn length(&self, window: usize) -> f64 {
-        if window == SHORTEST {
-            return self.length_of(window, |joint| self.mean(window, joint));
-        }
-        self.length_of(window, |joint| {
-            let newest = self.mean(SHORTEST, joint);
-            borne_out(
-                self.mean(window, joint),
-                newest,
-                self.noise(SHORTEST, joint),
-            )
-        })
+        self.length_of(window, |joint| self.borne_out[window][joint])
     }
 
     fn length_of(&self, window: usize, mean: impl Fn(usize) -> f64) -> f64 {
@@ -250,7 +264,7 @@ impl Windows {
 
     /// Takes the residual for what it is without a contact.
     pub fn rest(&mut self) {
-        self.rest = std::array::from_fn(|j| self.mean(LONGEST, j));
+        self.rest = std::array::from_fn(|j| self.mean(LONG, j));
     }
 
     /// How the mean residual over the shortest window has changed since this instant \[effort unit\].
