@@ -138,6 +138,17 @@ impl Means {
     }
 }
 
+/// How the residual has changed against the contact that goes on: products in the metric of what is usual.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Change {
+    /// Of the change with itself.
+    pub size: f64,
+    /// With the contact as it has been followed.
+    pub along: f64,
+    /// Of that with itself.
+    pub held: f64,
+}
+
 /// Means of the residual, whitened.
 #[derive(Debug)]
 pub(crate) struct Windows {
@@ -299,10 +310,27 @@ impl Windows {
         self.length_of(MIDDLE, |joint| self.held[joint]) / self.learnt.windows[MIDDLE].usual
     }
 
-    /// How unusual the residual's change is against the contact as it has been followed.
-    pub fn change(&self) -> f64 {
-        self.length_of(MIDDLE, |j| self.mean(MIDDLE, j) - self.held[j])
-            / self.learnt.windows[MIDDLE].usual
+    /// How unusual the residual's change is against the contact as it has been followed, and how that lies to the contact.
+    pub fn change(&self) -> Change {
+        let n = self.joints();
+        let (mut change, mut held) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
+        for j in 0..n {
+            let noise = self.noise(MIDDLE, j);
+            change[j] = (self.mean(MIDDLE, j) - self.held[j]) / noise;
+            held[j] = self.held[j] / noise;
+        }
+        let inverse = &self.learnt.windows[MIDDLE].inverse_correlation;
+        let product = |a: &JointArray, b: &JointArray| -> f64 {
+            let rows = inverse.chunks_exact(n).zip(a);
+            rows.map(|(row, a)| a * row.iter().zip(b).map(|(entry, b)| entry * b).sum::<f64>())
+                .sum()
+        };
+        let usual = self.learnt.windows[MIDDLE].usual;
+        Change {
+            size: product(&change, &change) / usual,
+            along: product(&change, &held) / usual,
+            held: product(&held, &held) / usual,
+        }
     }
 
     /// Its usual size at the joint's present speed \[effort unit\].
