@@ -235,11 +235,15 @@ impl Learnt {
             .collect()
     }
 
-    /// Whether the last window averages enough noise away (mean of the joints' logarithms) for what it tells later than the one before it.
+    /// Whether the last window averages enough noise away (mean of the joints' logarithms) for what it tells later than the one before it, and
+    /// enough was seen to tell.
     fn last_pays(&self) -> bool {
         let [.., before, last] = &self.windows[..] else {
             return false;
         };
+        if self.free_s.is_some_and(|free_s| free_s < ENOUGH_S) {
+            return false;
+        }
         let noise = |window: &LearntWindow| -> f64 {
             let all = window.noise.iter().flatten();
             all.clone().map(|noise| noise.ln()).sum::<f64>() / all.count().max(1) as f64

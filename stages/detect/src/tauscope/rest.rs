@@ -31,7 +31,7 @@ const OVER_AFTER_S: f64 = 0.1;
 const CREEPS: f64 = 0.5;
 const FADES_S: f64 = 1.5;
 /// What a standing arm does is learnt from at least so much of it \[s\], and from at most so many samples.
-const LEAST_S: f64 = 3.0;
+const LEAST_S: f64 = 10.0;
 const MOST_SAMPLES: usize = 20_000;
 /// A joint's noise is what this share of its changes stays below: what an arm does that is about to move is not noise.
 const WITHIN_NOISE: f64 = 0.683;
