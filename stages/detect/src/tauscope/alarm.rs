@@ -137,8 +137,7 @@ impl Watch {
         let waits =
             self.waits_since_ns.is_some() && change.size > RELEASE * CHANGE * self.threshold;
         let along = change.along / (change.size * change.held).sqrt().max(f64::MIN_POSITIVE);
-        let is_other =
-            change.size > SWELL * change.held || self.tells_kinds && along < ELSEWHERE;
+        let is_other = change.size > SWELL * change.held || self.tells_kinds && along < ELSEWHERE;
         let again = rested
             && score >= self.threshold
             && windows.grows()

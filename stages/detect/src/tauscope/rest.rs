@@ -350,9 +350,8 @@ impl Rest {
         for ((unit, change), noise) in units.iter_mut().zip(change).zip(noise) {
             *unit = change / noise;
         }
-        let product = |a: &JointArray, b: &JointArray| -> f64 {
-            a.iter().zip(b).map(|(a, b)| a * b).sum()
-        };
+        let product =
+            |a: &JointArray, b: &JointArray| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
         let size = (product(&units, &units) / self.learnt.usual).sqrt();
         if size > self.size {
             (self.largest, self.size) = (units, size);

@@ -225,8 +225,7 @@ impl Windows {
         for w in 0..self.learnt.windows.len() {
             self.score = (self.length(w) / self.learnt.windows[w].usual).max(self.score);
         }
-        let at_rest = (self.at_rest.as_mut())
-            .and_then(|rest| rest.score(sample, usual.is_some()));
+        let at_rest = (self.at_rest.as_mut()).and_then(|rest| rest.score(sample, usual.is_some()));
         self.score = at_rest.map_or(self.score, |score| score.max(self.score));
         self.score
     }
