@@ -19,6 +19,7 @@
 mod alarm;
 mod kinds;
 mod learnt;
+mod pieces;
 mod place;
 mod points;
 mod rest;

@@ -32,7 +32,7 @@ fn arm(seed: u64, seconds: i64) -> Vec<TwinState> {
             sample.header.flags = flags::READY;
             let speed = if moves { 0.5 } else { 0.0 };
             position += 0.01 * speed;
-            for j in 0..JOINTS {
+            for (j, held) in friction.iter().enumerate() {
                 sample.position[j] = position;
                 sample.velocity[j] = speed;
                 let noise: f64 = (0..12).map(|_| random.random_range(-0.5..0.5)).sum();
@@ -40,7 +40,7 @@ fn arm(seed: u64, seconds: i64) -> Vec<TwinState> {
                     // What the twin does not know of friction in motion.
                     1.5 * (0.05 * k as f64 + j as f64).sin()
                 } else {
-                    friction[j]
+                    *held
                 };
                 sample.effort[j] = 0.05 * noise + error;
             }

@@ -7,12 +7,13 @@ use tauscope_bus::{MAX_JOINTS, TwinState, flags};
 
 use super::NAME;
 use super::kinds::Kinds;
+use super::pieces::{Piece, free, free_s, marked, pieces, quantile};
 use super::rest::{self, LearntRest};
 use super::smallest::Smallest;
 use super::tail::{Peaks, Tail};
 use super::windows::{Follow, Means, WINDOWS_S, Windows};
 use crate::joints;
-use crate::lesson::{LearnError, Lesson, Lessons};
+use crate::lesson::{LearnError, Lessons};
 use crate::rate;
 
 /// Where speeds are divided, as shares of a joint's usual highest speed.
@@ -29,12 +30,8 @@ const PRIOR_SAMPLES: f64 = 200.0;
 const BELIEVED: f64 = 0.95;
 /// The share of contact-free samples that stays below the unit of a window's score.
 const USUAL: f64 = 0.999;
-/// So much around a labelled contact is left out \[ns\].
-const BEFORE_NS: i64 = 50_000_000;
-const AFTER_NS: i64 = 1_000_000_000;
-/// In how many parts data is held out from what its noise is learnt from, and of how many pieces at least.
+/// In how many parts data is held out from what its noise is learnt from.
 const FOLDS: usize = 4;
-const LEAST_PIECES: usize = 8;
 /// The least that can be learnt from \[samples\].
 const LEAST_SAMPLES: usize = 500;
 /// With less than this a tail cannot be told, nor how often a threshold is exceeded \[s\].
@@ -235,8 +232,7 @@ impl Learnt {
             .collect()
     }
 
-    /// Whether the last window averages enough noise away (mean of the joints' logarithms) for what it tells later than the one before it, and
-    /// enough was seen to tell.
+    /// Whether the last window averages enough noise away (mean of logarithms) to be worth its delay, and enough was seen to tell.
     fn last_pays(&self) -> bool {
         let [.., before, last] = &self.windows[..] else {
             return false;
@@ -376,17 +372,6 @@ fn held_out_peaks(all: &[Piece<'_>], joint_names: &[String], follow: Follow) -> 
     peaks
 }
 
-/// How long nothing touched the robot \[s\].
-fn free_s(all: &[Piece<'_>]) -> f64 {
-    let of_piece = |piece: &Piece<'_>| {
-        let mut stamps = piece.samples.iter().map(|sample| sample.header.stamp_ns);
-        let (first, last) = (stamps.next(), stamps.next_back());
-        let long_s = first.zip(last).map_or(0.0, |(a, b)| (b - a) as f64 * 1e-9);
-        long_s * free(piece).count() as f64 / piece.samples.len().max(1) as f64
-    };
-    all.iter().map(of_piece).sum()
-}
-
 fn too_little(found: usize) -> LearnError {
     LearnError::TooLittle {
         detector: NAME,
@@ -412,53 +397,4 @@ fn speeds(all: &[Piece<'_>], joint_names: &[String]) -> Vec<LearntJoint> {
             }
         })
         .collect()
-}
-
-/// The value below which a share of all is; 0 of none.
-pub(super) fn quantile(values: &mut [f64], share: f64) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let last = values.len().saturating_sub(1);
-    let at = (last as f64 * share).round() as usize;
-    values.get(at).copied().unwrap_or(0.0)
-}
-
-/// A stretch of a recording.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Piece<'a> {
-    samples: &'a [TwinState],
-    lesson: &'a Lesson,
-}
-
-/// All recordings; few ones in equal pieces, so that there are some for each fold, unless each must begin where it does.
-pub(super) fn pieces<'a>(lessons: &Lessons<'a>, follow: Follow) -> Vec<Piece<'a>> {
-    let all = || lessons.train.iter().chain(lessons.validation);
-    let each = if follow.offset_from_first_s > 0.0 {
-        1
-    } else {
-        LEAST_PIECES.div_ceil(all().count().max(1))
-    };
-    all()
-        .flat_map(|lesson| {
-            let length = lesson.samples.len().div_ceil(each).max(1);
-            let parts = lesson.samples.chunks(length);
-            parts.map(move |samples| Piece { samples, lesson })
-        })
-        .collect()
-}
-
-/// Settled samples of a piece, and whether nothing touched the robot then.
-pub(super) fn marked<'a>(piece: &Piece<'a>) -> impl Iterator<Item = (&'a TwinState, bool)> {
-    let Piece { samples, lesson } = *piece;
-    let settled = samples.iter().filter(|s| s.header.has(flags::READY));
-    settled.map(move |sample| {
-        let stamp = sample.header.stamp_ns;
-        let touched = lesson.contacts.iter().flatten().any(|contact| {
-            stamp >= contact.on_ns - BEFORE_NS && stamp <= contact.off_ns + AFTER_NS
-        });
-        (sample, !touched)
-    })
-}
-
-fn free<'a>(piece: &Piece<'a>) -> impl Iterator<Item = &'a TwinState> {
-    marked(piece).filter_map(|(sample, is_free)| is_free.then_some(sample))
 }

@@ -11,7 +11,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState, flags};
 
-use super::learnt::{ENOUGH_S, Piece, marked, quantile};
+use super::learnt::ENOUGH_S;
+use super::pieces::{Piece, marked, quantile};
 use super::sums::Sums;
 use super::tail::{Peaks, Tail};
 use super::windows::{LONG, MIDDLE, SHORTEST, WINDOWS_S, borne_out};

@@ -5,7 +5,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tauscope_bus::MAX_JOINTS;
 
-use super::learnt::{Learnt, pieces};
+use super::learnt::Learnt;
+use super::pieces::pieces;
 use super::place::Place;
 use super::windows::Follow;
 use crate::lesson::Lessons;

@@ -14,7 +14,7 @@ pub(super) struct Sums {
     pub rows: Ring<CAPACITY>,
     /// First row of each window.
     tails: [usize; WINDOWS_S.len()],
-    sums: [JointArray; WINDOWS_S.len()],
+    totals: [JointArray; WINDOWS_S.len()],
     /// By window and joint.
     pub means: [JointArray; WINDOWS_S.len()],
     windows: usize,
@@ -26,7 +26,7 @@ impl Sums {
         Self {
             rows: Ring::new(),
             tails: [0; WINDOWS_S.len()],
-            sums: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
+            totals: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
             means: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
             windows,
         }
@@ -35,7 +35,7 @@ impl Sums {
     pub fn reset(&mut self) {
         self.rows.reset();
         self.tails = [0; WINDOWS_S.len()];
-        self.sums = [[0.0; MAX_JOINTS]; WINDOWS_S.len()];
+        self.totals = [[0.0; MAX_JOINTS]; WINDOWS_S.len()];
     }
 
     pub fn is_empty(&self) -> bool {
@@ -51,7 +51,7 @@ impl Sums {
         self.rows.push(now_ns, row);
         let head = self.rows.count();
         for (w, length_s) in WINDOWS_S.iter().enumerate().take(self.windows) {
-            let sums = &mut self.sums[w][..n];
+            let sums = &mut self.totals[w][..n];
             for (sum, value) in sums.iter_mut().zip(row) {
                 *sum += value;
             }
@@ -73,14 +73,14 @@ impl Sums {
         }
         for (w, means) in self.means.iter_mut().enumerate().take(self.windows) {
             let share = ((head - self.tails[w]).max(1) as f64).recip();
-            for (mean, sum) in means[..n].iter_mut().zip(&self.sums[w]) {
+            for (mean, sum) in means[..n].iter_mut().zip(&self.totals[w]) {
                 *mean = sum * share;
             }
         }
     }
 
     fn sum_anew(&mut self, n: usize) {
-        for (sum, &tail) in self.sums.iter_mut().zip(&self.tails) {
+        for (sum, &tail) in self.totals.iter_mut().zip(&self.tails) {
             *sum = [0.0; MAX_JOINTS];
             for k in tail..self.rows.count() {
                 let row = &self.rows.row(k).1;

@@ -7,7 +7,7 @@ use super::joint::{Block, BlockSettings, Currents};
 /// The joints' blocks. No allocation per sample.
 #[derive(Debug, Clone)]
 pub(crate) struct Blocks {
-    blocks: Vec<Block>,
+    joints: Vec<Block>,
     newest_ns: Option<i64>,
     newest: Step,
 }
@@ -26,7 +26,7 @@ pub(super) struct Step {
 impl Blocks {
     pub(super) fn new(settings: BlockSettings, joints: usize) -> Self {
         Self {
-            blocks: vec![Block::new(settings); joints],
+            joints: vec![Block::new(settings); joints],
             newest_ns: None,
             newest: Step::default(),
         }
@@ -43,7 +43,7 @@ impl Blocks {
         let goes_on = dt_s.filter(|dt_s| *dt_s >= 0.0 && !sample.header.has(flags::RESET));
         self.newest.anew = goes_on.is_none();
         self.newest.dt_s = goes_on.unwrap_or(0.0);
-        for (j, block) in self.blocks.iter_mut().enumerate() {
+        for (j, block) in self.joints.iter_mut().enumerate() {
             let (measured, expected) = (sample.effort[j], sample.expected_effort[j]);
             if self.newest.anew {
                 block.reset(measured, expected);
