@@ -241,7 +241,7 @@ pub fn smallest(judged: &[Judged<'_>]) -> Vec<Table> {
         let forces = wishes.map(|per_hour| settings.smallest_forces(per_hour));
         let mut table = Table::new(
             format!("Smallest force found, {}", one.label),
-            "Once it has lasted 0.1 s, in half and in nine of ten of the postures and directions of the contact-free recordings [N]; by the false alarms that are put up with.",
+            "Once it has lasted 0.2 s, in half and in nine of ten of the postures and directions of the contact-free recordings [N]; by the false alarms that are put up with.",
             &["link"],
         );
         for said in [format!("{wish} an hour"), "one an hour".to_owned(), "one a week".to_owned()] {

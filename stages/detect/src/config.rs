@@ -327,6 +327,14 @@ pub enum ConfigError {
         /// The detector.
         detector: &'static str,
     },
+    /// A detector that needs torques, where no effort can be turned into one.
+    #[error(
+        "{detector} needs torques, and of no joint is it known how much effort is 1 N m: give `torque_constants_nm_per_a`"
+    )]
+    NoTorque {
+        /// The detector.
+        detector: &'static str,
+    },
     /// A sensor without its first bias.
     #[error(
         "{detector} has no `bias`: give the smallest effort that is a collision, joint by joint in URDF order and in the effort's unit, or let `tauscope evaluate` learn it from contact-free recordings"

@@ -54,7 +54,7 @@ impl MomentumObserver {
     /// An observer with the gain K \[1/s\] for the robot of `setup`; `detector` asks for it.
     ///
     /// # Errors
-    /// If `setup` has no model.
+    /// If `setup` has no model, or no joint whose effort can be turned into a torque.
     pub fn new(
         setup: &Setup,
         gain_per_s: f64,
@@ -64,6 +64,9 @@ impl MomentumObserver {
             return Err(ConfigError::NoModel { detector });
         };
         let known = |per_nm: f64| per_nm.is_finite() && per_nm != 0.0;
+        if !(setup.joints.iter()).any(|joint| known(joint.effort_per_nm)) {
+            return Err(ConfigError::NoTorque { detector });
+        }
         let new = || Inertia::new(model.clone());
         Ok(Self {
             gain_per_s,

@@ -4,9 +4,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::contact_signals::{SignalSettings, Signals};
 use crate::momentum::Inertia;
+use crate::virtual_collision_sensor::{BlockSettings, Blocks};
 
 /// Handed to detectors by [`Setup::shared`](crate::Setup::shared), it lets them take from one another what they derive alike: the
-/// arm's inertia in motion, and the signals after Salt Ducaju et al. where the settings are the same.
+/// arm's inertia in motion, and where the settings are the same the signals after Salt Ducaju et al. and what the currents do after Indri et al.
 ///
 /// Only detectors that are given the very same samples one after the other may share, such as the
 /// detectors behind one twin in a replay: whoever sees a sample first derives, the others find it done.
@@ -17,6 +18,7 @@ pub struct Shared(Arc<Mutex<Derived>>);
 struct Derived {
     inertia: Option<Arc<Mutex<Inertia>>>,
     signals: Vec<(SignalSettings, Arc<Mutex<Signals>>)>,
+    blocks: Vec<(BlockSettings, Arc<Mutex<Blocks>>)>,
 }
 
 impl Shared {
@@ -30,14 +32,24 @@ impl Shared {
     /// The signals that are shared under these settings; `own` where nobody has asked yet.
     pub(crate) fn signals(&self, settings: &SignalSettings, own: Signals) -> Tap<Signals> {
         let mut derived = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut all = derived.signals.iter();
-        if let Some((_, signals)) = all.find(|(of, _)| of == settings) {
-            return Tap::Shared(Arc::clone(signals));
-        }
-        let own = shared(own);
-        derived.signals.push((*settings, Arc::clone(&own)));
-        Tap::Shared(own)
+        under(&mut derived.signals, *settings, own)
     }
+
+    /// What the joints' currents do under these settings; `own` where nobody has asked yet.
+    pub(crate) fn blocks(&self, settings: BlockSettings, own: Blocks) -> Tap<Blocks> {
+        let mut derived = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        under(&mut derived.blocks, settings, own)
+    }
+}
+
+/// What `all` has under these settings, or else `own` from now on.
+fn under<S: PartialEq, T>(all: &mut Vec<(S, Arc<Mutex<T>>)>, settings: S, own: T) -> Tap<T> {
+    if let Some((_, value)) = all.iter().find(|(of, _)| *of == settings) {
+        return Tap::Shared(Arc::clone(value));
+    }
+    let own = shared(own);
+    all.push((settings, Arc::clone(&own)));
+    Tap::Shared(own)
 }
 
 fn shared<T>(value: T) -> Arc<Mutex<T>> {

@@ -3,7 +3,7 @@
 //! The noise of a residual is not the same in every joint, at every speed and over every length of time:
 //! friction is least certain where a joint turns round, joints err together, and what is small beside
 //! one sample is large beside the mean of thirty. All of that is learnt from contact-free recordings
-//! ([`Learnt`]). The score is the largest, over three windows, of the Mahalanobis length of the mean residual, in
+//! ([`Learnt`]). The score is the largest, over windows of 10 ms to 0.2 s, of the Mahalanobis length of the mean residual, in
 //! units of what that window's length reaches at most in one of a thousand contact-free samples. Slow drift (warming up)
 //! is followed while nothing touches the robot.
 //!
@@ -19,10 +19,13 @@
 mod alarm;
 mod kinds;
 mod learnt;
+mod pieces;
 mod place;
 mod points;
+mod rest;
 mod ring;
 mod smallest;
+mod sums;
 mod tail;
 mod windows;
 
@@ -41,6 +44,7 @@ use learnt::ENOUGH_S;
 pub use learnt::{Learnt, LearntJoint, LearntWindow};
 use nalgebra::Vector6;
 use place::Place;
+pub use rest::LearntRest;
 use ring::Ring;
 pub use smallest::Smallest;
 pub use tail::Tail;
@@ -217,8 +221,8 @@ impl Detector for Tauscope {
         }
         let contact = self.watch.contact_ns().map(|contact_ns| Seen {
             contact_ns,
-            joints: Some(Place::loaded(&self.windows)),
-            place: self.place.locate(sample, &self.windows),
+            joints: Some(Place::loaded(&self.windows, contact_ns)),
+            place: self.place.locate(sample, &self.windows, contact_ns),
         });
         Judgement {
             score,
@@ -234,10 +238,13 @@ impl Detector for Tauscope {
 impl Tauscope {
     /// One that takes its time to tell the kinds if `tells_kinds`.
     fn new(learnt: &Learnt, settings: &Settings, setup: &Setup, tells_kinds: bool) -> Self {
-        let threshold = learnt.tail.threshold(settings.false_alarms_per_hour);
+        let per_hour = settings.false_alarms_per_hour;
+        let threshold = learnt.tail.threshold(per_hour);
+        let mut windows = Windows::new(learnt, settings.follow());
+        windows.heed_rest(threshold, per_hour);
         Self {
             rate: Rate::new(learnt.rate_hz),
-            windows: Windows::new(learnt, settings.follow()),
+            windows,
             moved: Ring::new(),
             place: Place::new(setup),
             watch: Watch::new(threshold, tells_kinds),

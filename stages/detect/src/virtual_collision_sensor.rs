@@ -17,6 +17,7 @@
 //! Efforts are in the cell's unit (N m or A) throughout; what is learnt goes by the joint's name.
 
 mod bias;
+mod blocks;
 mod first_bias;
 mod joint;
 mod learnt;
@@ -37,8 +38,9 @@ use crate::config::ConfigError;
 use crate::lesson::{LearnError, Lessons};
 use crate::stage::Setup;
 pub use bias::LearningState;
+pub(crate) use blocks::Blocks;
 pub use first_bias::FirstBias;
-pub(crate) use joint::Tuning;
+pub(crate) use joint::{BlockSettings, Tuning};
 pub use learnt::{Learnt, LearntJoint};
 pub use phase::Phase;
 use sensor::Learning;
@@ -115,9 +117,11 @@ pub enum Learn {
 impl Settings {
     fn tuning(&self) -> Tuning {
         Tuning {
-            cutoff_hz: self.cutoff_hz,
-            period_s: self.model_error_period_s,
-            delta: self.delta,
+            block: BlockSettings {
+                cutoff_hz: self.cutoff_hz,
+                period_s: self.model_error_period_s,
+                delta: self.delta,
+            },
             alpha: self.alpha,
             time_constant_s: self.adaptation_s,
         }
@@ -145,7 +149,13 @@ pub(crate) fn build(
         duration_s: settings.learning_s,
         at_start: settings.learn == Learn::AtStart,
     };
-    let mut sensor = Sensor::new(NAME, settings.tuning(), &bias, hold_s);
+    let mut sensor = Sensor::new(
+        NAME,
+        settings.tuning(),
+        &bias,
+        hold_s,
+        setup.shared.as_ref(),
+    );
     sensor.let_learn(learning, &setup.joint_names, learnt);
     Ok(sensor)
 }

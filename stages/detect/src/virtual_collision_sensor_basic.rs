@@ -9,7 +9,9 @@ use serde::{Deserialize, Serialize};
 use crate::config::ConfigError;
 use crate::lesson::{LearnError, Lessons};
 use crate::stage::Setup;
-use crate::virtual_collision_sensor::{FirstBias, Sensor, Tuning, first_bias, learn_first_bias};
+use crate::virtual_collision_sensor::{
+    BlockSettings, FirstBias, Sensor, Tuning, first_bias, learn_first_bias,
+};
 
 /// Canonical name.
 pub(crate) const NAME: &str = "virtual_collision_sensor_basic";
@@ -47,9 +49,11 @@ impl Default for Settings {
 impl Settings {
     fn tuning(&self) -> Tuning {
         Tuning {
-            cutoff_hz: self.cutoff_hz,
-            period_s: self.model_error_period_s,
-            delta: self.delta,
+            block: BlockSettings {
+                cutoff_hz: self.cutoff_hz,
+                period_s: self.model_error_period_s,
+                delta: self.delta,
+            },
             alpha: 1.0,
             // Nothing adapts.
             time_constant_s: 1.0,
@@ -67,7 +71,13 @@ pub(crate) fn build(
     hold_s: f64,
 ) -> Result<Sensor, ConfigError> {
     let bias = first_bias(NAME, settings.bias.as_ref(), setup)?;
-    Ok(Sensor::new(NAME, settings.tuning(), &bias, hold_s))
+    Ok(Sensor::new(
+        NAME,
+        settings.tuning(),
+        &bias,
+        hold_s,
+        setup.shared.as_ref(),
+    ))
 }
 
 /// Learns the bias from the recordings `lessons` is trained on: per joint twice the smallest bias that

@@ -166,6 +166,13 @@ fn a_joint_of_unknown_torque_constant_tells_nothing() {
 }
 
 #[test]
+fn where_no_torque_is_known_it_says_so_instead_of_telling_nothing() {
+    let error = MomentumObserver::new(&setup(f64::NAN), 100.0, "test").unwrap_err();
+    assert_eq!(error, ConfigError::NoTorque { detector: "test" });
+    assert!(error.to_string().contains("torque_constants_nm_per_a"));
+}
+
+#[test]
 fn a_reset_forgets_and_a_repeated_stamp_changes_nothing() {
     let mut arm = Arm::new(1.0, 1.0, 0.0);
     let mut observer = MomentumObserver::new(&setup(1.0), 100.0, "test").unwrap();

@@ -6,7 +6,8 @@ use tauscope_bus::{Detection, Emit, LinkError, Stage, TwinState, flags};
 use tauscope_detect::fisher_discriminant::Discriminant;
 use tauscope_detect::{
     Config, Detect, JointSetup, Setup, Shared, Threshold, contact_classifier, fisher_discriminant,
-    frequency_classifier, momentum_observer,
+    frequency_classifier, momentum_observer, virtual_collision_sensor,
+    virtual_collision_sensor_basic,
 };
 use tauscope_dynamics::Model;
 
@@ -57,6 +58,7 @@ fn what_is_shared_changes_nothing() {
         weights: [-1.0; 6],
         bound: 0.0,
     });
+    let bias = || Some(virtual_collision_sensor::FirstBias::InOrder(vec![0.5; 2]));
     let configs = [
         Config {
             momentum_observer: Some(momentum_observer::Settings::default()),
@@ -81,6 +83,22 @@ fn what_is_shared_changes_nothing() {
             frequency_classifier: Some(frequency_classifier::Settings::default()),
             ..Config::default()
         },
+        Config {
+            virtual_collision_sensor_basic: Some(virtual_collision_sensor_basic::Settings {
+                bias: bias(),
+                ..Default::default()
+            }),
+            ..Config::default()
+        },
+        Config {
+            virtual_collision_sensor: Some(virtual_collision_sensor::Settings {
+                bias: bias(),
+                learn: virtual_collision_sensor::Learn::AtStart,
+                learning_s: 0.5,
+                ..Default::default()
+            }),
+            ..Config::default()
+        },
     ];
     let run = |shared: Option<Shared>| {
         let joint = JointSetup {
@@ -91,6 +109,7 @@ fn what_is_shared_changes_nothing() {
         };
         let setup = Setup {
             joints: vec![joint; 2],
+            joint_names: vec!["a".to_owned(), "b".to_owned()],
             model: Some(Model::from_urdf(ARM).unwrap()),
             shared,
             ..Setup::default()

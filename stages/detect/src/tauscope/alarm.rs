@@ -9,8 +9,10 @@ const HOLD_S: f64 = 0.1;
 /// Another contact on top of one: the residual changes by this many times the threshold against what it has been, which is
 /// followed with this time constant, and grows (else it is a release); not sooner than this after the last alarm \[s\].
 const CHANGE: f64 = 2.0;
-/// Where no kinds are told apart, one contact may swell and still be one: the change must be this share of what it has been as well.
+/// One contact may swell and still be one: the change must be this share of what it has been as well.
 const SWELL: f64 = 0.5;
+/// Where kinds are told apart, it is another one, too, if the change points elsewhere: no more than this share of it along the contact (the cosine).
+const ELSEWHERE: f64 = 0.92;
 const FOLLOW_S: f64 = 0.15;
 const AGAIN_S: f64 = 0.25;
 /// Where kinds are told, the alarm waits so long for the force to show where it points \[s\].
@@ -131,13 +133,16 @@ impl Watch {
             return None;
         }
         let rested = now_ns - alarm.raised_ns > ns(AGAIN_S);
-        let swell = if self.tells_kinds { 0.0 } else { SWELL };
         let change = windows.change();
-        let waits = self.waits_since_ns.is_some() && change > RELEASE * CHANGE * self.threshold;
+        let waits =
+            self.waits_since_ns.is_some() && change.size > RELEASE * CHANGE * self.threshold;
+        let along = change.along / (change.size * change.held).sqrt().max(f64::MIN_POSITIVE);
+        let is_other = change.size > SWELL * change.held || self.tells_kinds && along < ELSEWHERE;
         let again = rested
             && score >= self.threshold
             && windows.grows()
-            && change > (CHANGE * self.threshold).max(swell * windows.held());
+            && change.size > CHANGE * self.threshold
+            && is_other;
         if !(again || waits) {
             self.waits_since_ns = None;
             windows.hold(1.0 - (-dt_s / FOLLOW_S).exp());

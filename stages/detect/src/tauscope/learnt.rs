@@ -7,11 +7,13 @@ use tauscope_bus::{MAX_JOINTS, TwinState, flags};
 
 use super::NAME;
 use super::kinds::Kinds;
+use super::pieces::{Piece, free, free_s, marked, pieces, quantile};
+use super::rest::{self, LearntRest};
 use super::smallest::Smallest;
-use super::tail::{BLOCK_S, Tail};
+use super::tail::{Peaks, Tail};
 use super::windows::{Follow, Means, WINDOWS_S, Windows};
 use crate::joints;
-use crate::lesson::{LearnError, Lesson, Lessons};
+use crate::lesson::{LearnError, Lessons};
 use crate::rate;
 
 /// Where speeds are divided, as shares of a joint's usual highest speed.
@@ -28,12 +30,8 @@ const PRIOR_SAMPLES: f64 = 200.0;
 const BELIEVED: f64 = 0.95;
 /// The share of contact-free samples that stays below the unit of a window's score.
 const USUAL: f64 = 0.999;
-/// So much around a labelled contact is left out \[ns\].
-const BEFORE_NS: i64 = 50_000_000;
-const AFTER_NS: i64 = 1_000_000_000;
-/// In how many parts data is held out from what its noise is learnt from, and of how many pieces at least.
+/// In how many parts data is held out from what its noise is learnt from.
 const FOLDS: usize = 4;
-const LEAST_PIECES: usize = 8;
 /// The least that can be learnt from \[samples\].
 const LEAST_SAMPLES: usize = 500;
 /// With less than this a tail cannot be told, nor how often a threshold is exceeded \[s\].
@@ -41,6 +39,8 @@ pub(super) const ENOUGH_S: f64 = 20.0;
 /// A joint's noise and the joints' correlations count half once they are from so much; until then noise is held to what is usual of
 /// all joints (the median), and correlations to none \[s\].
 const HALF_S: f64 = 2.0;
+/// The last window is used where its noise is less than this share of that of the one before it.
+const PAYS: f64 = 0.9;
 /// No joint's noise is believed below this share of what is usual of all joints.
 const LEAST_NOISE: f64 = 0.02;
 
@@ -54,6 +54,9 @@ pub struct Learnt {
     pub joints: Vec<LearntJoint>,
     /// By window.
     pub windows: Vec<LearntWindow>,
+    /// Of a standing arm, where there was enough of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rest: Option<LearntRest>,
     /// How often the score exceeds what by chance.
     pub tail: Tail,
     /// How much of contact-free time all of it is from \[s\].
@@ -119,6 +122,7 @@ impl Learnt {
         } else {
             Tail::new(held_out_peaks(&all, joint_names, follow))
         };
+        learnt.rest = rest::learn(joint_names.len(), &all, |noise| learnt.hold(noise));
         Ok(learnt)
     }
 
@@ -128,6 +132,7 @@ impl Learnt {
             rate_hz: 0.0,
             joints: speeds(pieces, joint_names),
             windows: Vec::new(),
+            rest: None,
             tail: Tail {
                 level: 0.0,
                 per_hour: 1.0,
@@ -139,6 +144,9 @@ impl Learnt {
             kinds: None,
         };
         learnt.windows = learnt.noise(pieces, follow);
+        if !learnt.last_pays() {
+            learnt.windows.pop();
+        }
         learnt.hold_noise();
         learnt.correlate(pieces, follow);
         learnt.measure_usual(pieces, follow);
@@ -157,11 +165,17 @@ impl Learnt {
                 && window.noise.len() == n
                 && window.noise.iter().all(|noise| noise.len() == BINS)
         };
-        let whole = self.windows.len() == WINDOWS_S.len() && self.windows.iter().all(fits);
+        let whole = (WINDOWS_S.len() - 1..=WINDOWS_S.len()).contains(&self.windows.len())
+            && self.windows.iter().all(fits);
         if !whole {
             let windows = WINDOWS_S.len();
             return Some(format!(
                 "is not whole: it needs noise by {n} joints and {BINS} speeds for each of {windows} windows"
+            ));
+        }
+        if self.rest.as_ref().is_some_and(|rest| !rest.is_whole(n)) {
+            return Some(format!(
+                "is not whole: at rest it needs noise by {n} joints for each window"
             ));
         }
         let is_rate = self.rate_hz > 0.0;
@@ -181,7 +195,7 @@ impl Learnt {
         let n = self.joints.len();
         let mut sums = vec![vec![[(0.0, 0.0); BINS]; n]; WINDOWS_S.len()];
         for piece in all {
-            let mut means = Means::new(self.fast(), follow);
+            let mut means = Means::new(self.fast(), follow, WINDOWS_S.len());
             for (sample, is_free) in marked(piece) {
                 restart(&mut means, sample);
                 means.push(sample, is_free);
@@ -218,6 +232,21 @@ impl Learnt {
             .collect()
     }
 
+    /// Whether the last window averages enough noise away (mean of logarithms) to be worth its delay, and enough was seen to tell.
+    fn last_pays(&self) -> bool {
+        let [.., before, last] = &self.windows[..] else {
+            return false;
+        };
+        if self.free_s.is_some_and(|free_s| free_s < ENOUGH_S) {
+            return false;
+        }
+        let noise = |window: &LearntWindow| -> f64 {
+            let all = window.noise.iter().flatten();
+            all.clone().map(|noise| noise.ln()).sum::<f64>() / all.count().max(1) as f64
+        };
+        noise(last) - noise(before) < PAYS.ln()
+    }
+
     /// How far what was learnt is believed, of 1.
     fn believed(&self) -> f64 {
         let free_s = self.free_s.unwrap_or(f64::INFINITY);
@@ -230,14 +259,23 @@ impl Learnt {
 
     /// Holds the joints' noise to what is usual of all of them, the more the less it was learnt from.
     fn hold_noise(&mut self) {
-        let believed = self.believed();
-        for window in &mut self.windows {
+        let mut windows = std::mem::take(&mut self.windows);
+        for window in &mut windows {
             let mut of_all: Vec<f64> = window.noise.iter().flatten().copied().collect();
-            let usual = quantile(&mut of_all, 0.5);
-            for noise in window.noise.iter_mut().flatten() {
-                let least = noise.max(LEAST_NOISE * usual);
-                *noise = least.powf(believed) * usual.powf(1.0 - believed);
+            self.hold(&mut of_all);
+            for (noise, held) in window.noise.iter_mut().flatten().zip(of_all) {
+                *noise = held;
             }
+        }
+        self.windows = windows;
+    }
+
+    fn hold(&self, noise: &mut [f64]) {
+        let believed = self.believed();
+        let usual = quantile(&mut noise.to_vec(), 0.5);
+        for noise in noise {
+            let least = noise.max(LEAST_NOISE * usual);
+            *noise = least.powf(believed) * usual.powf(1.0 - believed);
         }
     }
 
@@ -265,7 +303,7 @@ impl Learnt {
     fn correlate(&mut self, all: &[Piece<'_>], follow: Follow) {
         let n = self.joints.len();
         let believed = BELIEVED * self.believed();
-        let mut products = vec![DMatrix::<f64>::zeros(n, n); WINDOWS_S.len()];
+        let mut products = vec![DMatrix::<f64>::zeros(n, n); self.windows.len()];
         self.each(all, follow, |_, windows, _| {
             for (w, product) in products.iter_mut().enumerate() {
                 let z: Vec<f64> = (0..n)
@@ -294,7 +332,7 @@ impl Learnt {
     }
 
     fn measure_usual(&mut self, all: &[Piece<'_>], follow: Follow) {
-        let mut lengths = vec![Vec::new(); WINDOWS_S.len()];
+        let mut lengths = vec![Vec::new(); self.windows.len()];
         self.each(all, follow, |_, windows, _| {
             for (w, lengths) in lengths.iter_mut().enumerate() {
                 lengths.push(windows.length(w));
@@ -307,16 +345,11 @@ impl Learnt {
 
     /// The largest score of each block of contact-free time.
     fn peaks(&self, all: &[Piece<'_>], follow: Follow) -> Vec<f64> {
-        let mut peaks: Vec<(i64, f64)> = Vec::new();
-        let length_ns = (BLOCK_S * 1e9) as i64;
+        let mut peaks = Peaks::default();
         self.each(all, follow, |sample, _, score| {
-            let block = sample.header.stamp_ns.div_euclid(length_ns);
-            match peaks.last_mut() {
-                Some((last, peak)) if *last == block => *peak = peak.max(score),
-                _ => peaks.push((block, score)),
-            }
+            peaks.add(sample.header.stamp_ns, score);
         });
-        peaks.into_iter().map(|(_, peak)| peak).collect()
+        peaks.into_blocks()
     }
 }
 
@@ -337,17 +370,6 @@ fn held_out_peaks(all: &[Piece<'_>], joint_names: &[String], follow: Follow) -> 
         peaks.extend(Learnt::usual(&others, joint_names, follow).peaks(&part(true), follow));
     }
     peaks
-}
-
-/// How long nothing touched the robot \[s\].
-fn free_s(all: &[Piece<'_>]) -> f64 {
-    let of_piece = |piece: &Piece<'_>| {
-        let mut stamps = piece.samples.iter().map(|sample| sample.header.stamp_ns);
-        let (first, last) = (stamps.next(), stamps.next_back());
-        let long_s = first.zip(last).map_or(0.0, |(a, b)| (b - a) as f64 * 1e-9);
-        long_s * free(piece).count() as f64 / piece.samples.len().max(1) as f64
-    };
-    all.iter().map(of_piece).sum()
 }
 
 fn too_little(found: usize) -> LearnError {
@@ -375,53 +397,4 @@ fn speeds(all: &[Piece<'_>], joint_names: &[String]) -> Vec<LearntJoint> {
             }
         })
         .collect()
-}
-
-/// The value below which a share of all is; 0 of none.
-fn quantile(values: &mut [f64], share: f64) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let last = values.len().saturating_sub(1);
-    let at = (last as f64 * share).round() as usize;
-    values.get(at).copied().unwrap_or(0.0)
-}
-
-/// A stretch of a recording.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Piece<'a> {
-    samples: &'a [TwinState],
-    lesson: &'a Lesson,
-}
-
-/// All recordings; few ones in equal pieces, so that there are some for each fold, unless each must begin where it does.
-pub(super) fn pieces<'a>(lessons: &Lessons<'a>, follow: Follow) -> Vec<Piece<'a>> {
-    let all = || lessons.train.iter().chain(lessons.validation);
-    let each = if follow.offset_from_first_s > 0.0 {
-        1
-    } else {
-        LEAST_PIECES.div_ceil(all().count().max(1))
-    };
-    all()
-        .flat_map(|lesson| {
-            let length = lesson.samples.len().div_ceil(each).max(1);
-            let parts = lesson.samples.chunks(length);
-            parts.map(move |samples| Piece { samples, lesson })
-        })
-        .collect()
-}
-
-/// Settled samples of a piece, and whether nothing touched the robot then.
-fn marked<'a>(piece: &Piece<'a>) -> impl Iterator<Item = (&'a TwinState, bool)> {
-    let Piece { samples, lesson } = *piece;
-    let settled = samples.iter().filter(|s| s.header.has(flags::READY));
-    settled.map(move |sample| {
-        let stamp = sample.header.stamp_ns;
-        let touched = lesson.contacts.iter().flatten().any(|contact| {
-            stamp >= contact.on_ns - BEFORE_NS && stamp <= contact.off_ns + AFTER_NS
-        });
-        (sample, !touched)
-    })
-}
-
-fn free<'a>(piece: &Piece<'a>) -> impl Iterator<Item = &'a TwinState> {
-    marked(piece).filter_map(|(sample, is_free)| is_free.then_some(sample))
 }

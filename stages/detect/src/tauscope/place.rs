@@ -169,9 +169,9 @@ impl Place {
         }
     }
 
-    /// The joints that are loaded: bit j for joint j.
-    pub fn loaded(windows: &Windows) -> u32 {
-        let w = windows.most;
+    /// The joints that a contact which began at this instant loads: bit j for joint j.
+    pub fn loaded(windows: &Windows, contact_ns: i64) -> u32 {
+        let w = windows.since(contact_ns);
         (0..windows.joints())
             .filter(|&j| windows.excess(w, j).abs() > LOADED * windows.noise(w, j))
             .fold(0, |mask, j| mask | 1 << j)
@@ -185,8 +185,13 @@ impl Place {
     }
 
     /// The link for which there is most evidence since the contact began, and the mean of the forces that a sample allows which is no
-    /// older than [`EVERY_NS`]. To be called with each sample of a contact.
-    pub fn locate(&mut self, sample: &TwinState, windows: &Windows) -> Option<Contact> {
+    /// older than [`EVERY_NS`]. To be called with each sample of a contact, which began at `contact_ns`.
+    pub fn locate(
+        &mut self,
+        sample: &TwinState,
+        windows: &Windows,
+        contact_ns: i64,
+    ) -> Option<Contact> {
         let now_ns = sample.header.stamp_ns;
         let newest = self.newest.filter(|(at_ns, _)| now_ns - at_ns < EVERY_NS);
         if let Some((_, contact)) = newest {
@@ -194,11 +199,12 @@ impl Place {
         }
         let points = self.points.as_mut()?;
         let n = windows.joints();
+        let window = windows.since(contact_ns);
         let mut residual = [0.0; MAX_JOINTS];
         for (j, residual) in residual.iter_mut().enumerate().take(n) {
-            *residual = windows.excess(windows.most, j);
+            *residual = windows.excess(window, j);
         }
-        let load = Load::new(&residual, windows, windows.most, &self.effort_per_nm);
+        let load = Load::new(&residual, windows, window, &self.effort_per_nm);
         let before_ns = self.newest.map_or(now_ns, |(at_ns, _)| at_ns);
         let share = ((now_ns - before_ns) as f64 * 1e-9 / CORRELATED_S).clamp(1e-3, 1.0);
         self.gathered += share;

@@ -5,9 +5,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tauscope_bus::MAX_JOINTS;
 
-use super::learnt::{Learnt, pieces};
+use super::learnt::Learnt;
+use super::pieces::pieces;
 use super::place::Place;
-use super::windows::{Follow, WINDOWS_S};
+use super::windows::Follow;
 use crate::lesson::Lessons;
 use crate::stage::Setup;
 
@@ -41,7 +42,7 @@ pub(crate) fn smallest(
     let Some(mut points) = place.into_points() else {
         return Vec::new();
     };
-    let w = WINDOWS_S.len() - 1;
+    let w = learnt.windows.len() - 1;
     let n = learnt.joints.len();
     // By link in order, the score of 1 N.
     let mut scores: Vec<(usize, Vec<f64>)> = Vec::new();

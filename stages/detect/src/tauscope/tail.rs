@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Length of the blocks whose largest score counts \[s\].
-pub(crate) const BLOCK_S: f64 = 1.0;
+const BLOCK_S: f64 = 1.0;
 /// Share of the blocks above the level from which the tail is told.
 const ABOVE: f64 = 0.15;
 /// Where too little was seen to tell a tail, its scale as a share of the largest score's root.
@@ -25,6 +25,26 @@ pub struct Tail {
     pub scale: f64,
     /// Shape of it.
     pub shape: f64,
+}
+
+/// Collects the largest score of each block.
+#[derive(Debug, Default)]
+pub(crate) struct Peaks(Vec<(i64, f64)>);
+
+impl Peaks {
+    /// Takes the next score.
+    pub fn add(&mut self, stamp_ns: i64, score: f64) {
+        let block = stamp_ns.div_euclid((BLOCK_S * 1e9) as i64);
+        match self.0.last_mut() {
+            Some((last, peak)) if *last == block => *peak = peak.max(score),
+            _ => self.0.push((block, score)),
+        }
+    }
+
+    /// By block.
+    pub fn into_blocks(self) -> Vec<f64> {
+        self.0.into_iter().map(|(_, peak)| peak).collect()
+    }
 }
 
 impl Tail {

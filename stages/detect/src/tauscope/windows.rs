@@ -3,18 +3,39 @@
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 
 use super::learnt::{Learnt, bin};
-use super::ring::Ring;
+use super::rest::Rest;
+use super::sums::Sums;
 
-/// Lengths of the windows \[s\].
-pub(crate) const WINDOWS_S: [f64; 3] = [0.01, 0.03, 0.1];
+/// Lengths of the windows \[s\]; the last one is used where it pays.
+pub(crate) const WINDOWS_S: [f64; 4] = [0.01, 0.03, 0.1, 0.2];
 /// The window that tells how a contact begins.
 pub(crate) const SHORTEST: usize = 0;
 /// The window that a contact is followed by.
-const MIDDLE: usize = 1;
+pub(crate) const MIDDLE: usize = 1;
 /// The window that tells what is usual just now.
-const LONGEST: usize = WINDOWS_S.len() - 1;
+pub(super) const LONG: usize = 2;
+/// So much of the usual noise of the next shorter window's mean a longer one's may be away from it: what has gone is not told any longer.
+const BORNE_OUT: f64 = 2.0;
 /// How long a joint that was slow counts as slow \[s\].
 const SLOW_MEMORY_S: f64 = 0.3;
+
+/// Means over the windows as far as those over the next shorter ones bear them out, with these `noise`s by window and joint.
+pub(super) fn borne_out(
+    means: &[JointArray; WINDOWS_S.len()],
+    windows: usize,
+    joints: usize,
+    noise: impl Fn(usize, usize) -> f64,
+) -> [JointArray; WINDOWS_S.len()] {
+    let mut borne_out = *means;
+    for w in 1..windows {
+        for j in 0..joints {
+            let newer = borne_out[w - 1][j];
+            let margin = BORNE_OUT * noise(w - 1, j);
+            borne_out[w][j] = means[w][j].max(newer - margin).min(newer + margin);
+        }
+    }
+    borne_out
+}
 
 /// How the slow part of a residual is had.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,16 +46,10 @@ pub(crate) struct Follow {
     pub offset_from_first_s: f64,
 }
 
-/// Most samples of a window.
-const CAPACITY: usize = 1024;
-
-/// Running means over each window.
+/// Running means of the residual over each window.
 #[derive(Debug)]
 pub(crate) struct Means {
-    rows: Ring<CAPACITY>,
-    /// First row of each window.
-    tails: [usize; WINDOWS_S.len()],
-    sums: [JointArray; WINDOWS_S.len()],
+    sums: Sums,
     /// The slow part of the residual.
     offset: JointArray,
     settings: Follow,
@@ -47,12 +62,10 @@ pub(crate) struct Means {
 }
 
 impl Means {
-    /// For joints whose usual speeds go up to `fast` \[rad/s\].
-    pub fn new(fast: JointArray, settings: Follow) -> Self {
+    /// For joints whose usual speeds go up to `fast` \[rad/s\], over the first so many `windows`.
+    pub fn new(fast: JointArray, settings: Follow, windows: usize) -> Self {
         Self {
-            rows: Ring::new(),
-            tails: [0; WINDOWS_S.len()],
-            sums: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
+            sums: Sums::new(windows),
             offset: [0.0; MAX_JOINTS],
             settings,
             step: (0.0, 0.0),
@@ -63,28 +76,22 @@ impl Means {
     }
 
     pub fn reset(&mut self) {
-        self.rows.reset();
-        self.tails = [0; WINDOWS_S.len()];
-        self.sums = [[0.0; MAX_JOINTS]; WINDOWS_S.len()];
+        self.sums.reset();
         self.offset = [0.0; MAX_JOINTS];
     }
 
-    /// Whether the longest window is full, and the offset known.
+    /// Whether the windows are full (the last one is as good as the one before it until then), and the offset known.
     pub fn ready(&self) -> bool {
-        let newest = self.newest_ns();
-        let longest = WINDOWS_S[WINDOWS_S.len() - 1];
+        let newest = self.sums.newest_ns();
+        let longest = WINDOWS_S[LONG];
         (newest - self.start_ns) as f64 * 1e-9 >= longest.max(self.settings.offset_from_first_s)
-    }
-
-    fn newest_ns(&self) -> i64 {
-        self.rows.row(self.rows.count().max(1) - 1).0
     }
 
     /// Takes a sample; slow drift is followed if `follow`.
     pub fn push(&mut self, sample: &TwinState, follow: bool) {
         let n = sample.header.joint_count as usize;
         let now = sample.header.stamp_ns;
-        let is_first = self.rows.count() == 0;
+        let is_first = self.sums.is_empty();
         if is_first {
             self.start_ns = now;
             self.slow = sample.velocity.map(f64::abs);
@@ -92,7 +99,7 @@ impl Means {
         let dt_s = if is_first {
             0.0
         } else {
-            (now - self.newest_ns()) as f64 * 1e-9
+            (now - self.sums.newest_ns()) as f64 * 1e-9
         };
         let since_s = (now - self.start_ns) as f64 * 1e-9;
         let first = since_s < self.settings.offset_from_first_s;
@@ -115,54 +122,31 @@ impl Means {
             let recovered = self.slow[j] + recovery * self.fast[j];
             self.slow[j] = recovered.min(sample.velocity[j].abs());
         }
-        self.rows.push(now, &row);
-        let head = self.rows.count();
-        for (w, length_s) in WINDOWS_S.iter().enumerate() {
-            let sums = &mut self.sums[w][..n];
-            for (sum, value) in sums.iter_mut().zip(&row) {
-                *sum += value;
-            }
-            let begin = now - (length_s * 1e9) as i64;
-            while self.tails[w] + 1 < head {
-                let (stamp, old) = self.rows.row(self.tails[w]);
-                if *stamp > begin && self.rows.is_kept(self.tails[w]) {
-                    break;
-                }
-                for (sum, value) in sums.iter_mut().zip(old) {
-                    *sum -= value;
-                }
-                self.tails[w] += 1;
-            }
-        }
-        // Rounding is not to add up.
-        if self.rows.is_round() {
-            self.sum_anew(n);
-        }
-    }
-
-    fn sum_anew(&mut self, n: usize) {
-        for (sum, &tail) in self.sums.iter_mut().zip(&self.tails) {
-            *sum = [0.0; MAX_JOINTS];
-            for k in tail..self.rows.count() {
-                let row = &self.rows.row(k).1;
-                for j in 0..n {
-                    sum[j] += row[j];
-                }
-            }
-        }
+        self.sums.push(now, &row, n);
     }
 
     /// Mean residual of a joint over a window \[effort unit\].
     pub fn mean(&self, window: usize, joint: usize) -> f64 {
-        self.sums[window][joint] / (self.rows.count() - self.tails[window]).max(1) as f64
+        self.sums.means[window][joint]
     }
 
     /// What the shortest window's mean was at this instant.
     pub fn earlier(&self, to_ns: i64) -> JointArray {
         // The window is open where it begins.
         let from_ns = to_ns - (WINDOWS_S[SHORTEST] * 1e9) as i64 + 1;
-        self.rows.mean(from_ns, to_ns)
+        self.sums.rows.mean(from_ns, to_ns)
     }
+}
+
+/// How the residual has changed against the contact that goes on: products in the metric of what is usual.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Change {
+    /// Of the change with itself.
+    pub size: f64,
+    /// With the contact as it has been followed.
+    pub along: f64,
+    /// Of that with itself.
+    pub held: f64,
 }
 
 /// Means of the residual, whitened.
@@ -170,15 +154,17 @@ impl Means {
 pub(crate) struct Windows {
     means: Means,
     learnt: Learnt,
+    /// What is known of a standing arm, if it is heeded.
+    at_rest: Option<Rest>,
     /// Class of each joint's present speed.
     bins: [usize; MAX_JOINTS],
+    /// By window and joint, the mean residual as far as the newest samples bear it out.
+    borne_out: [JointArray; WINDOWS_S.len()],
     /// Mean residual of the contact that goes on, as it is followed, and of the one below it.
     held: JointArray,
     base: JointArray,
     /// Mean residual when the score was usual last.
     rest: JointArray,
-    /// The window whose mean is most unusual.
-    pub most: usize,
     /// How unusual: the newest score.
     score: f64,
 }
@@ -190,19 +176,31 @@ impl Windows {
             *fast = joint.fast_rad_s;
         }
         Self {
-            means: Means::new(fast, settings),
+            means: Means::new(fast, settings, learnt.windows.len()),
             learnt: learnt.clone(),
+            at_rest: None,
             bins: [0; MAX_JOINTS],
+            borne_out: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
             held: [0.0; MAX_JOINTS],
             base: [0.0; MAX_JOINTS],
             rest: [0.0; MAX_JOINTS],
-            most: 0,
             score: 0.0,
         }
     }
 
+    /// From here on a standing arm is held against what it was before it was touched, if that was learnt; at this `threshold` there should be
+    /// so many false alarms an hour.
+    pub fn heed_rest(&mut self, threshold: f64, per_hour: f64) {
+        let rest = self.learnt.rest.as_ref();
+        self.at_rest =
+            rest.map(|rest| Rest::new(rest, self.learnt.joints.len(), threshold, per_hour));
+    }
+
     pub fn reset(&mut self) {
         self.means.reset();
+        if let Some(rest) = &mut self.at_rest {
+            rest.reset();
+        }
         self.score = 0.0;
     }
 
@@ -210,27 +208,41 @@ impl Windows {
         self.means.ready()
     }
 
-    /// The score of the next sample: the most unusual window's; below `usual`, drift is followed.
+    /// The score of the next sample: the most unusual window's, or that of a standing arm; below `usual`, drift is followed.
     pub fn score(&mut self, sample: &TwinState, usual: Option<f64>) -> f64 {
         let follow = usual.is_some_and(|usual| self.score < usual);
         self.means.push(sample, follow);
         for (j, joint) in self.learnt.joints.iter().enumerate() {
             self.bins[j] = bin(joint, self.means.slow[j]);
         }
+        self.borne_out = borne_out(
+            &self.means.sums.means,
+            self.learnt.windows.len(),
+            self.joints(),
+            |w, j| self.noise(w, j),
+        );
         self.score = 0.0;
-        for w in 0..WINDOWS_S.len() {
-            let score = self.length(w) / self.learnt.windows[w].usual;
-            if score > self.score {
-                self.score = score;
-                self.most = w;
-            }
+        for w in 0..self.learnt.windows.len() {
+            self.score = (self.length(w) / self.learnt.windows[w].usual).max(self.score);
         }
+        let at_rest = (self.at_rest.as_mut()).and_then(|rest| rest.score(sample, usual.is_some()));
+        self.score = at_rest.map_or(self.score, |score| score.max(self.score));
         self.score
     }
 
-    /// Squared Mahalanobis length of the mean residual over a window.
+    /// The longest window that holds nothing from before this instant, or the shortest.
+    pub fn since(&self, instant_ns: i64) -> usize {
+        let s = (self.means.sums.newest_ns() - instant_ns) as f64 * 1e-9;
+        let windows = &WINDOWS_S[..self.learnt.windows.len()];
+        windows
+            .iter()
+            .rposition(|length_s| *length_s <= s)
+            .unwrap_or(SHORTEST)
+    }
+
+    /// Squared Mahalanobis length of the mean residual over a window, as far as the newest samples bear it out.
     pub fn length(&self, window: usize) -> f64 {
-        self.length_of(window, |joint| self.mean(window, joint))
+        self.length_of(window, |joint| self.borne_out[window][joint])
     }
 
     fn length_of(&self, window: usize, mean: impl Fn(usize) -> f64) -> f64 {
@@ -262,7 +274,7 @@ impl Windows {
 
     /// Takes the residual for what it is without a contact.
     pub fn rest(&mut self) {
-        self.rest = std::array::from_fn(|j| self.mean(LONGEST, j));
+        self.rest = std::array::from_fn(|j| self.mean(LONG, j));
     }
 
     /// How the mean residual over the shortest window has changed since this instant \[effort unit\].
@@ -297,10 +309,27 @@ impl Windows {
         self.length_of(MIDDLE, |joint| self.held[joint]) / self.learnt.windows[MIDDLE].usual
     }
 
-    /// How unusual the residual's change is against the contact as it has been followed.
-    pub fn change(&self) -> f64 {
-        self.length_of(MIDDLE, |j| self.mean(MIDDLE, j) - self.held[j])
-            / self.learnt.windows[MIDDLE].usual
+    /// How unusual the residual's change is against the contact as it has been followed, and how that lies to the contact.
+    pub fn change(&self) -> Change {
+        let n = self.joints();
+        let (mut change, mut held) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
+        for j in 0..n {
+            let noise = self.noise(MIDDLE, j);
+            change[j] = (self.mean(MIDDLE, j) - self.held[j]) / noise;
+            held[j] = self.held[j] / noise;
+        }
+        let inverse = &self.learnt.windows[MIDDLE].inverse_correlation;
+        let product = |a: &JointArray, b: &JointArray| -> f64 {
+            let rows = inverse.chunks_exact(n).zip(a);
+            rows.map(|(row, a)| a * row.iter().zip(b).map(|(entry, b)| entry * b).sum::<f64>())
+                .sum()
+        };
+        let usual = self.learnt.windows[MIDDLE].usual;
+        Change {
+            size: product(&change, &change) / usual,
+            along: product(&change, &held) / usual,
+            held: product(&held, &held) / usual,
+        }
     }
 
     /// Its usual size at the joint's present speed \[effort unit\].

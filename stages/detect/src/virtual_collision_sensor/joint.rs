@@ -6,19 +6,39 @@ use super::noise::MeasurementNoise;
 use super::phase::{Phase, PhaseMachine};
 use super::trend::{NoiseBounds, Trend};
 
-/// What a joint's block works with.
+/// What tells what a joint's currents do.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Tuning {
+pub(crate) struct BlockSettings {
     /// Cutoff of the low-pass on both currents \[Hz\].
     pub cutoff_hz: f64,
     /// Time between two updates of the model error in the steady state, `T_s` \[s\].
     pub period_s: f64,
     /// Weight of equation 9.
     pub delta: f64,
+}
+
+/// What a joint's block works with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Tuning {
+    /// What tells what its currents do.
+    pub block: BlockSettings,
     /// Factor of equation 17.
     pub alpha: f64,
     /// Time constant of the adaptation, equation 14 \[s\].
     pub time_constant_s: f64,
+}
+
+/// What a joint's currents do.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Currents {
+    /// The state of figure 6.
+    pub phase: Phase,
+    /// |R|, equation 1 \[effort unit\].
+    pub residue: f64,
+    /// Estimated model error \[effort unit\].
+    pub model_error: f64,
+    /// What noise may add \[effort unit\].
+    pub noise: f64,
 }
 
 /// What a joint's block makes of a sample.
@@ -47,35 +67,32 @@ impl Reading {
     }
 }
 
-/// One joint.
+/// What tells what one joint's currents do, whatever the bias.
 #[derive(Debug, Clone)]
-pub(super) struct Joint {
-    tuning: Tuning,
+pub(super) struct Block {
+    omega_rad_s: f64,
     measured: Trend,
     expected: Trend,
     noise: NoiseBounds,
     measurement: MeasurementNoise,
     machine: PhaseMachine,
     model_error: ModelError,
-    /// Learning and adaptation.
-    pub bias: Bias,
 }
 
-impl Joint {
-    pub fn new(tuning: Tuning, bias: Bias) -> Self {
+impl Block {
+    pub fn new(settings: BlockSettings) -> Self {
         Self {
-            tuning,
-            measured: Trend::new(tuning.cutoff_hz),
-            expected: Trend::new(tuning.cutoff_hz),
+            omega_rad_s: std::f64::consts::TAU * settings.cutoff_hz,
+            measured: Trend::new(settings.cutoff_hz),
+            expected: Trend::new(settings.cutoff_hz),
             noise: NoiseBounds::default(),
-            measurement: MeasurementNoise::new(tuning.cutoff_hz),
+            measurement: MeasurementNoise::new(settings.cutoff_hz),
             machine: PhaseMachine::default(),
-            model_error: ModelError::new(tuning.period_s, tuning.delta),
-            bias,
+            model_error: ModelError::new(settings.period_s, settings.delta),
         }
     }
 
-    /// Starts anew at these currents. What was learnt is of the robot, and stays.
+    /// Starts anew at these currents.
     pub fn reset(&mut self, measured: f64, expected: f64) {
         self.measured.reset(measured);
         self.expected.reset(expected);
@@ -86,13 +103,15 @@ impl Joint {
     }
 
     /// Takes the next currents, `dt_s` seconds after the ones before.
-    pub fn update(&mut self, dt_s: f64, measured: f64, expected: f64) -> Reading {
+    pub fn update(&mut self, dt_s: f64, measured: f64, expected: f64) -> Currents {
         self.measured.update(dt_s, measured);
         self.expected.update(dt_s, expected);
-        let omega = std::f64::consts::TAU * self.tuning.cutoff_hz;
-        let phase = self
-            .machine
-            .update(&self.measured, &self.expected, &self.noise, omega);
+        let phase = self.machine.update(
+            &self.measured,
+            &self.expected,
+            &self.noise,
+            self.omega_rad_s,
+        );
         self.noise
             .update(dt_s, self.measured.rate - self.expected.rate);
         // Equation 1.
@@ -100,14 +119,37 @@ impl Joint {
         let model_error = self
             .model_error
             .update(dt_s, residue, phase == Phase::Steady);
-        let noise = self.measurement.update(dt_s, measured - expected);
-        self.bias.advance(dt_s);
-        let bias = self.bias.value(self.tuning.time_constant_s);
-        Reading {
+        Currents {
             phase,
             residue,
             model_error,
-            threshold: self.tuning.alpha * (model_error + bias) + noise,
+            noise: self.measurement.update(dt_s, measured - expected),
+        }
+    }
+}
+
+/// One joint: what its currents are held against. What was learnt is of the robot, and stays for good.
+#[derive(Debug, Clone)]
+pub(super) struct Joint {
+    tuning: Tuning,
+    /// Learning and adaptation.
+    pub bias: Bias,
+}
+
+impl Joint {
+    pub fn new(tuning: Tuning, bias: Bias) -> Self {
+        Self { tuning, bias }
+    }
+
+    /// Holds what the currents do, `dt_s` seconds after the sample before, against the threshold.
+    pub fn read(&mut self, dt_s: f64, currents: &Currents) -> Reading {
+        self.bias.advance(dt_s);
+        let bias = self.bias.value(self.tuning.time_constant_s);
+        Reading {
+            phase: currents.phase,
+            residue: currents.residue,
+            model_error: currents.model_error,
+            threshold: self.tuning.alpha * (currents.model_error + bias) + currents.noise,
         }
     }
 
@@ -159,16 +201,20 @@ mod tests {
 
     #[test]
     fn the_threshold_is_alpha_times_model_error_and_bias() {
-        let tuning = Tuning {
+        let block = BlockSettings {
             cutoff_hz: 15.0,
             period_s: 0.2,
             delta: 0.5,
+        };
+        let tuning = Tuning {
+            block,
             alpha: 1.1,
             time_constant_s: 60.0,
         };
-        let mut joint = Joint::new(tuning, Bias::new(0.5));
-        joint.reset(3.0, 1.0);
-        let reading = joint.update(0.002, 3.0, 1.0);
+        let mut block = Block::new(block);
+        block.reset(3.0, 1.0);
+        let currents = block.update(0.002, 3.0, 1.0);
+        let reading = Joint::new(tuning, Bias::new(0.5)).read(0.002, &currents);
         assert_eq!(reading.phase, Phase::Steady);
         assert!((reading.residue - 2.0).abs() < 1e-12);
         assert!((reading.model_error - 2.0).abs() < 1e-12);

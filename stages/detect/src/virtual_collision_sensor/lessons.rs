@@ -3,6 +3,7 @@
 use tauscope_bus::flags;
 
 use super::bias::Bias;
+use super::blocks::Blocks;
 use super::joint::{Joint, Tuning};
 use crate::lesson::{LearnError, Lesson};
 use tauscope_dynamics::lowpass::Butterworth2;
@@ -44,25 +45,27 @@ pub(super) fn needed(
     let mut joints = vec![Joint::new(tuning, Bias::new(f64::INFINITY)); joint_count];
     let mut residues = vec![0.0; joint_count];
     let (mut seen, mut seen_s) = (0_u64, 0.0);
-    let settling_s = Butterworth2::new(tuning.cutoff_hz).settling_time_s() + tuning.period_s;
+    let settling_s =
+        Butterworth2::new(tuning.block.cutoff_hz).settling_time_s() + tuning.block.period_s;
     for lesson in lessons {
-        let (mut previous_ns, mut elapsed_s) = (None, 0.0);
+        let mut blocks = Blocks::new(tuning.block, joint_count);
+        let (mut newest_ns, mut elapsed_s) = (None, 0.0);
         for sample in &lesson.samples {
             let stamp_ns = sample.header.stamp_ns;
-            let mut dt_s = previous_ns.map_or(-1.0, |before| (stamp_ns - before) as f64 * 1e-9);
-            previous_ns = Some(stamp_ns);
-            if dt_s < 0.0 || sample.header.has(flags::RESET) {
-                (dt_s, elapsed_s) = (0.0, 0.0);
-                for (j, joint) in joints.iter_mut().enumerate() {
-                    joint.reset(sample.effort[j], sample.expected_effort[j]);
-                }
+            if newest_ns.replace(stamp_ns) == Some(stamp_ns) {
+                continue;
+            }
+            let step = blocks.update(sample);
+            let dt_s = step.dt_s;
+            if step.anew {
+                elapsed_s = 0.0;
             }
             elapsed_s += dt_s;
             let counts = elapsed_s >= settling_s
                 && sample.header.has(flags::READY)
                 && !is_touched(lesson, stamp_ns);
             for (j, joint) in joints.iter_mut().enumerate() {
-                let reading = joint.update(dt_s, sample.effort[j], sample.expected_effort[j]);
+                let reading = joint.read(dt_s, &step.currents[j]);
                 if counts {
                     joint.estimate_bias(&reading);
                     residues[j] += reading.residue;

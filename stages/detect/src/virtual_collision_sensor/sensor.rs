@@ -5,10 +5,12 @@ use tauscope_bus::{TwinState, flags};
 use tauscope_dynamics::lowpass::Butterworth2;
 
 use super::bias::{Bias, LearningState, Service};
+use super::blocks::Blocks;
 use super::joint::{Joint, Reading, Tuning};
 use super::learnt::Learnt;
 use super::validity::Validity;
 use crate::detector::{Detector, Judgement, Seen, Verdict};
+use crate::shared::{Shared, Tap};
 
 /// A ratio from here on may already belong to a collision: where the search for its beginning stops.
 const LOW_RATIO: f64 = 0.5;
@@ -48,6 +50,7 @@ pub(crate) struct Sensor {
     name: &'static str,
     /// Names for what was learnt; empty where nothing is.
     joint_names: Vec<String>,
+    blocks: Tap<Blocks>,
     joints: Vec<Joint>,
     validity: Vec<Validity>,
     learning: Option<Learning>,
@@ -55,8 +58,8 @@ pub(crate) struct Sensor {
     asked: bool,
     settling_s: f64,
     hold_ns: i64,
-    /// Stamp of the sample before, and how long ago everything began anew.
-    previous_ns: Option<i64>,
+    /// Newest stamp, and how long ago everything began anew.
+    newest_ns: Option<i64>,
     elapsed_s: f64,
     newest_low_ns: Option<i64>,
     alarm: Option<Alarm>,
@@ -64,12 +67,23 @@ pub(crate) struct Sensor {
 }
 
 impl Sensor {
-    /// A sensor with the first bias of each joint; it learns nothing.
-    pub(crate) fn new(name: &'static str, tuning: Tuning, first: &[f64], hold_s: f64) -> Self {
+    /// A sensor with the first bias of each joint; it learns nothing. What the currents do it may have `shared`.
+    pub(crate) fn new(
+        name: &'static str,
+        tuning: Tuning,
+        first: &[f64],
+        hold_s: f64,
+        shared: Option<&Shared>,
+    ) -> Self {
         let joints = first.iter();
+        let blocks = Blocks::new(tuning.block, first.len());
         Self {
             name,
             joint_names: Vec::new(),
+            blocks: match shared {
+                Some(shared) => shared.blocks(tuning.block, blocks),
+                None => Tap::own(blocks),
+            },
             joints: (joints
                 .clone()
                 .map(|&first| Joint::new(tuning, Bias::new(first))))
@@ -78,9 +92,10 @@ impl Sensor {
             learning: None,
             state: LearningState::default(),
             asked: false,
-            settling_s: Butterworth2::new(tuning.cutoff_hz).settling_time_s() + tuning.period_s,
+            settling_s: Butterworth2::new(tuning.block.cutoff_hz).settling_time_s()
+                + tuning.block.period_s,
             hold_ns: (hold_s * 1e9) as i64,
-            previous_ns: None,
+            newest_ns: None,
             elapsed_s: 0.0,
             newest_low_ns: None,
             alarm: None,
@@ -106,10 +121,7 @@ impl Sensor {
     }
 
     /// Clears what belongs to the signals; what was learnt stays.
-    fn reset(&mut self, sample: &TwinState) {
-        for (j, joint) in self.joints.iter_mut().enumerate() {
-            joint.reset(sample.effort[j], sample.expected_effort[j]);
-        }
+    fn reset(&mut self) {
         for validity in &mut self.validity {
             validity.reset();
         }
@@ -188,17 +200,13 @@ impl Detector for Sensor {
 
     fn judge(&mut self, sample: &TwinState) -> Judgement {
         let stamp_ns = sample.header.stamp_ns;
-        let dt_s = self
-            .previous_ns
-            .replace(stamp_ns)
-            .map(|before| (stamp_ns - before) as f64 * 1e-9);
-        let dt_s = match dt_s {
-            Some(dt_s) if dt_s >= 0.0 && !sample.header.has(flags::RESET) => dt_s,
-            _ => {
-                self.reset(sample);
-                0.0
-            }
-        };
+        let step = self.blocks.with(|blocks| *blocks.update(sample));
+        // What others have asked for at the same stamp is no step of this one's time.
+        let is_new = self.newest_ns.replace(stamp_ns) != Some(stamp_ns);
+        let dt_s = if is_new { step.dt_s } else { 0.0 };
+        if step.anew && is_new {
+            self.reset();
+        }
         if sample.header.has(flags::LEARN) {
             // The paper's AdaptReq.
             self.asked = true;
@@ -217,7 +225,7 @@ impl Detector for Sensor {
         let (mut score, mut ratio) = (0.0_f64, 0.0_f64);
         let (mut colliding, mut wrong, mut doubtful) = (0, 0, false);
         for (j, joint) in self.joints.iter_mut().enumerate() {
-            let reading: Reading = joint.update(dt_s, sample.effort[j], sample.expected_effort[j]);
+            let reading: Reading = joint.read(dt_s, &step.currents[j]);
             let of_joint = reading.ratio();
             ratio = ratio.max(of_joint);
             if reading.phase.is_tested() {

@@ -1,0 +1,72 @@
+//! What is learnt from: stretches of recordings, and what in them nothing touched.
+
+use tauscope_bus::{TwinState, flags};
+
+use super::windows::Follow;
+use crate::lesson::{Lesson, Lessons};
+
+/// So much around a labelled contact is left out \[ns\].
+const BEFORE_NS: i64 = 50_000_000;
+const AFTER_NS: i64 = 1_000_000_000;
+/// Data is cut in at least so many pieces, so that there are some for each part that is held out.
+const LEAST_PIECES: usize = 8;
+
+/// A stretch of a recording.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Piece<'a> {
+    pub samples: &'a [TwinState],
+    lesson: &'a Lesson,
+}
+
+/// All recordings; few ones in equal pieces, so that there are some for each fold, unless each must begin where it does.
+pub(super) fn pieces<'a>(lessons: &Lessons<'a>, follow: Follow) -> Vec<Piece<'a>> {
+    let all = || lessons.train.iter().chain(lessons.validation);
+    let each = if follow.offset_from_first_s > 0.0 {
+        1
+    } else {
+        LEAST_PIECES.div_ceil(all().count().max(1))
+    };
+    all()
+        .flat_map(|lesson| {
+            let length = lesson.samples.len().div_ceil(each).max(1);
+            let parts = lesson.samples.chunks(length);
+            parts.map(move |samples| Piece { samples, lesson })
+        })
+        .collect()
+}
+
+/// Settled samples of a piece, and whether nothing touched the robot then.
+pub(super) fn marked<'a>(piece: &Piece<'a>) -> impl Iterator<Item = (&'a TwinState, bool)> {
+    let Piece { samples, lesson } = *piece;
+    let settled = samples.iter().filter(|s| s.header.has(flags::READY));
+    settled.map(move |sample| {
+        let stamp = sample.header.stamp_ns;
+        let touched = lesson.contacts.iter().flatten().any(|contact| {
+            stamp >= contact.on_ns - BEFORE_NS && stamp <= contact.off_ns + AFTER_NS
+        });
+        (sample, !touched)
+    })
+}
+
+pub(super) fn free<'a>(piece: &Piece<'a>) -> impl Iterator<Item = &'a TwinState> {
+    marked(piece).filter_map(|(sample, is_free)| is_free.then_some(sample))
+}
+
+/// How long nothing touched the robot \[s\].
+pub(super) fn free_s(all: &[Piece<'_>]) -> f64 {
+    let of_piece = |piece: &Piece<'_>| {
+        let mut stamps = piece.samples.iter().map(|sample| sample.header.stamp_ns);
+        let (first, last) = (stamps.next(), stamps.next_back());
+        let long_s = first.zip(last).map_or(0.0, |(a, b)| (b - a) as f64 * 1e-9);
+        long_s * free(piece).count() as f64 / piece.samples.len().max(1) as f64
+    };
+    all.iter().map(of_piece).sum()
+}
+
+/// The value below which a share of all is; 0 of none.
+pub(super) fn quantile(values: &mut [f64], share: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let last = values.len().saturating_sub(1);
+    let at = (last as f64 * share).round() as usize;
+    values.get(at).copied().unwrap_or(0.0)
+}

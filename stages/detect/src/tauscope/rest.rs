@@ -1,0 +1,368 @@
+//! What a standing arm's effort is held against: what it was before it was touched.
+//!
+//! Static friction holds what it likes: where an arm came to rest, what its effort lacks or exceeds is unknown to within all that friction can
+//! hold, but it stays. So while the arm stands, the effort's *change* counts, in units of how much it changes while nothing touches the arm; no twin
+//! is needed for that. An arm that is about to move changes its effort, too, so a change counts once it has been there for a while and the
+//! arm still stands. A touch leaves friction otherwise than it was, and it creeps for seconds: a contact is over where the change has lost most
+//! of what it had along the contact, whatever else has stayed. What it is then is the new rest, and for a while so much of the contact's size
+//! is needed for another one as may be creep.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tauscope_bus::{JointArray, MAX_JOINTS, TwinState, flags};
+
+use super::learnt::ENOUGH_S;
+use super::pieces::{Piece, marked, quantile};
+use super::sums::Sums;
+use super::tail::{Peaks, Tail};
+use super::windows::{LONG, MIDDLE, SHORTEST, WINDOWS_S, borne_out};
+
+/// An arm stands once no joint has been further than this from where it was \[rad, m\], nor faster than this \[rad/s, m/s\], for so long \[s\].
+const WITHIN: f64 = 0.01;
+const SLOW: f64 = 0.03;
+const STANDS_AFTER_S: f64 = 1.5;
+/// A change counts once it has been there for so long to twice as long \[s\].
+const LASTS_S: f64 = 0.075;
+/// Time constant with which the effort at rest is followed while nothing touches the arm \[s\].
+const FOLLOW_S: f64 = 1.0;
+/// A contact is over where less than this share of it is left, for so long \[s\].
+const LEFT: f64 = 0.35;
+const OVER_AFTER_S: f64 = 0.1;
+/// So much of a contact may creep behind it, and how fast that fades \[s\].
+const CREEPS: f64 = 0.5;
+const FADES_S: f64 = 1.5;
+/// What a standing arm does is learnt from at least so much of it \[s\], and from at most so many samples.
+const LEAST_S: f64 = 10.0;
+const MOST_SAMPLES: usize = 20_000;
+/// A joint's noise is what this share of its changes stays below: what an arm does that is about to move is not noise.
+const WITHIN_NOISE: f64 = 0.683;
+/// The share of contact-free samples whose change stays below the unit of the score.
+const USUAL: f64 = 0.99;
+
+/// By window and joint.
+type Changes = [JointArray; WINDOWS_S.len()];
+
+/// How the mean effort of a standing arm changes while nothing touches it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LearntRest {
+    /// By window and joint, what two of three changes stay below \[effort unit\].
+    pub noise: Vec<Vec<f64>>,
+    /// Squared length in units of that noise that one of a hundred contact-free samples exceeds.
+    pub usual: f64,
+    /// How often the score exceeds what by chance.
+    pub tail: Tail,
+}
+
+impl LearntRest {
+    /// Whether it holds what `joints` need.
+    pub(super) fn is_whole(&self, joints: usize) -> bool {
+        self.noise.len() == WINDOWS_S.len() && self.noise.iter().all(|noise| noise.len() == joints)
+    }
+
+    /// Root of the largest squared length of the windows' changes, in units of the usual.
+    fn size(&self, changes: &Changes) -> f64 {
+        let joints = self.noise[SHORTEST].len();
+        let changes = borne_out(changes, WINDOWS_S.len(), joints, |w, j| self.noise[w][j]);
+        let lengths = changes.iter().zip(&self.noise).map(|(changes, noise)| {
+            let units = changes.iter().zip(noise);
+            units
+                .map(|(change, noise)| (change / noise).powi(2))
+                .sum::<f64>()
+        });
+        (lengths.fold(0.0, f64::max) / self.usual).sqrt()
+    }
+}
+
+/// Tells whether the arm stands.
+#[derive(Debug, Default)]
+struct Stand {
+    at: JointArray,
+    since_ns: Option<i64>,
+}
+
+impl Stand {
+    /// Takes the next sample; whether the arm stands.
+    fn step(&mut self, sample: &TwinState, joints: usize) -> bool {
+        let now_ns = sample.header.stamp_ns;
+        let away = |(q, at): (&f64, &f64)| (q - at).abs() > WITHIN;
+        let moves = sample.position[..joints].iter().zip(&self.at).any(away)
+            || sample.velocity[..joints].iter().any(|v| v.abs() > SLOW);
+        match self.since_ns {
+            Some(since_ns) if !moves => (now_ns - since_ns) as f64 * 1e-9 >= STANDS_AFTER_S,
+            _ => {
+                self.at = sample.position;
+                self.since_ns = Some(now_ns);
+                false
+            }
+        }
+    }
+}
+
+/// How long what has lasted: the least of late.
+#[derive(Debug)]
+struct Lasting {
+    begin_ns: i64,
+    /// Since then, and in the stretch before; infinite where there is none.
+    least: f64,
+    before: f64,
+}
+
+impl Lasting {
+    fn new(begin_ns: i64) -> Self {
+        Self {
+            begin_ns,
+            least: f64::INFINITY,
+            before: 0.0,
+        }
+    }
+
+    fn step(&mut self, now_ns: i64, value: f64) -> f64 {
+        if (now_ns - self.begin_ns) as f64 * 1e-9 >= LASTS_S {
+            self.begin_ns = now_ns;
+            self.before = std::mem::replace(&mut self.least, f64::INFINITY);
+        }
+        self.least = self.least.min(value);
+        self.least.min(self.before)
+    }
+}
+
+/// The effort of a standing arm.
+#[derive(Debug)]
+struct Base {
+    sums: Sums,
+    stand: Stand,
+    /// Mean effort at rest, while the arm stands and that is known.
+    mean: Option<JointArray>,
+    newest_ns: i64,
+}
+
+impl Base {
+    fn new() -> Self {
+        Self {
+            sums: Sums::new(WINDOWS_S.len()),
+            stand: Stand::default(),
+            mean: None,
+            newest_ns: 0,
+        }
+    }
+
+    fn reset(&mut self) {
+        self.sums.reset();
+        self.stand = Stand::default();
+        self.mean = None;
+    }
+
+    /// Takes the next sample: how the mean effort over each window has changed against that at rest; nothing while the arm moves, or if it came
+    /// to rest when it was not `free` of contacts.
+    fn changes(&mut self, sample: &TwinState, joints: usize, free: bool) -> Option<Changes> {
+        let now_ns = sample.header.stamp_ns;
+        self.sums.push(now_ns, &sample.effort, joints);
+        if !self.stand.step(sample, joints) {
+            self.mean = None;
+            return None;
+        }
+        if self.mean.is_none() {
+            if !free {
+                return None;
+            }
+            self.newest_ns = now_ns;
+        }
+        let mean = *self.mean.get_or_insert(self.sums.means[LONG]);
+        let mut changes = self.sums.means;
+        for window in &mut changes {
+            for (change, mean) in window.iter_mut().zip(&mean) {
+                *change -= mean;
+            }
+        }
+        Some(changes)
+    }
+
+    /// What has changed may creep: it is followed, or not.
+    fn follow(&mut self, now_ns: i64, follows: bool) {
+        let dt_s = (now_ns - std::mem::replace(&mut self.newest_ns, now_ns)) as f64 * 1e-9;
+        let Some(mean) = self.mean.as_mut().filter(|_| follows) else {
+            return;
+        };
+        let share = dt_s / (FOLLOW_S + dt_s);
+        for (mean, newest) in mean.iter_mut().zip(&self.sums.means[LONG]) {
+            *mean += share * (newest - *mean);
+        }
+    }
+}
+
+/// Hands out each change of a standing arm that nothing touches, with its stamp and whether it is the first since the arm came to rest.
+fn each(all: &[Piece<'_>], joints: usize, mut visit: impl FnMut(i64, bool, &Changes)) {
+    for piece in all {
+        let mut base = Base::new();
+        let mut is_first = true;
+        for (sample, is_free) in marked(piece) {
+            // What was before a contact is not what is behind it.
+            if sample.header.has(flags::RESET) || !is_free {
+                base.reset();
+            }
+            let changes = base.changes(sample, joints, is_free);
+            let now_ns = sample.header.stamp_ns;
+            base.follow(now_ns, true);
+            match changes {
+                Some(changes) => visit(now_ns, std::mem::take(&mut is_first), &changes),
+                None => is_first = true,
+            }
+        }
+    }
+}
+
+/// Learns from contact-free samples, where an arm stands long enough in them; `hold` keeps noise within what can be believed.
+pub(super) fn learn(
+    joints: usize,
+    all: &[Piece<'_>],
+    hold: impl Fn(&mut [f64]),
+) -> Option<LearntRest> {
+    let (mut count, mut stood_ns, mut newest_ns) = (0, 0, 0);
+    each(all, joints, |now_ns, is_first, _| {
+        count += 1;
+        let before_ns = std::mem::replace(&mut newest_ns, now_ns);
+        stood_ns += if is_first { 0 } else { now_ns - before_ns };
+    });
+    let stood_s = stood_ns as f64 * 1e-9;
+    if stood_s < LEAST_S {
+        return None;
+    }
+    let every = count / MOST_SAMPLES + 1;
+    let mut sizes = vec![vec![Vec::new(); joints]; WINDOWS_S.len()];
+    let mut number = 0;
+    each(all, joints, |_, _, changes| {
+        number += 1;
+        if number % every == 0 {
+            for (sizes, changes) in sizes.iter_mut().zip(changes) {
+                for (sizes, change) in sizes.iter_mut().zip(changes) {
+                    sizes.push(change.abs());
+                }
+            }
+        }
+    });
+    let noise = |sizes: &mut Vec<Vec<f64>>| {
+        let of_joint = |sizes: &mut Vec<f64>| quantile(sizes, WITHIN_NOISE).max(1e-9);
+        let mut noise: Vec<f64> = sizes.iter_mut().map(of_joint).collect();
+        hold(&mut noise);
+        noise
+    };
+    let mut learnt = LearntRest {
+        noise: sizes.iter_mut().map(noise).collect(),
+        usual: 1.0,
+        tail: Tail::of_few(&[]),
+    };
+    let (mut peaks, mut scores) = (Peaks::default(), Vec::with_capacity(count));
+    let mut lasting = Lasting::new(0);
+    each(all, joints, |now_ns, is_first, changes| {
+        if is_first {
+            lasting = Lasting::new(now_ns);
+        }
+        let score = lasting.step(now_ns, learnt.size(changes)).powi(2);
+        scores.push(score);
+        peaks.add(now_ns, score);
+    });
+    learnt.usual = quantile(&mut scores, USUAL).max(1e-9);
+    let blocks: Vec<f64> = (peaks.into_blocks().iter())
+        .map(|peak| peak / learnt.usual)
+        .collect();
+    learnt.tail = if stood_s < ENOUGH_S {
+        Tail::of_few(&blocks)
+    } else {
+        Tail::new(blocks)
+    };
+    Some(learnt)
+}
+
+/// How unusual a standing arm's effort is.
+#[derive(Debug)]
+pub(super) struct Rest {
+    learnt: LearntRest,
+    joints: usize,
+    /// What a score is multiplied by, so that it is exceeded by chance as often as that of a moving arm.
+    scale: f64,
+    base: Base,
+    lasting: Lasting,
+    /// The contact that goes on: the change where it was largest, in units of noise, and its size; since when it seems to be over.
+    largest: JointArray,
+    size: f64,
+    over_since_ns: Option<i64>,
+    /// Size of the contact before, and when it was over.
+    before: Option<(f64, i64)>,
+}
+
+impl Rest {
+    /// One whose score is as unusual at this `threshold` as there should be false alarms an hour.
+    pub fn new(learnt: &LearntRest, joints: usize, threshold: f64, per_hour: f64) -> Self {
+        Self {
+            learnt: learnt.clone(),
+            joints,
+            scale: threshold / learnt.tail.threshold(per_hour),
+            base: Base::new(),
+            lasting: Lasting::new(0),
+            largest: [0.0; MAX_JOINTS],
+            size: 0.0,
+            over_since_ns: None,
+            before: None,
+        }
+    }
+
+    pub fn reset(&mut self) {
+        self.base.reset();
+        self.forget_contact();
+        self.before = None;
+    }
+
+    fn forget_contact(&mut self) {
+        self.largest = [0.0; MAX_JOINTS];
+        self.size = 0.0;
+        self.over_since_ns = None;
+    }
+
+    /// The score of the next sample; nothing while the arm moves, nor where it came to rest while something touched it. While it is `free` of
+    /// contacts creep is followed.
+    pub fn score(&mut self, sample: &TwinState, free: bool) -> Option<f64> {
+        let now_ns = sample.header.stamp_ns;
+        let Some(changes) = self.base.changes(sample, self.joints, free) else {
+            self.forget_contact();
+            self.before = None;
+            self.lasting = Lasting::new(now_ns);
+            return None;
+        };
+        let creep = self.before.map_or(0.0, |(size, over_ns)| {
+            CREEPS * size * (-((now_ns - over_ns) as f64 * 1e-9) / FADES_S).exp()
+        });
+        let size = self.learnt.size(&changes) / (1.0 + creep);
+        self.base.follow(now_ns, free);
+        if free {
+            self.forget_contact();
+        } else if self.is_over(now_ns, &changes[MIDDLE]) {
+            self.before = Some((self.size, now_ns));
+            self.forget_contact();
+            self.base.mean = Some(self.base.sums.means[MIDDLE]);
+        }
+        Some(self.scale * self.lasting.step(now_ns, size).powi(2))
+    }
+
+    /// Whether the contact that goes on is over.
+    fn is_over(&mut self, now_ns: i64, change: &JointArray) -> bool {
+        let mut units = [0.0; MAX_JOINTS];
+        let noise = self.learnt.noise[MIDDLE].iter();
+        for ((unit, change), noise) in units.iter_mut().zip(change).zip(noise) {
+            *unit = change / noise;
+        }
+        let product =
+            |a: &JointArray, b: &JointArray| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+        let size = (product(&units, &units) / self.learnt.usual).sqrt();
+        if size > self.size {
+            (self.largest, self.size) = (units, size);
+        }
+        let whole = product(&self.largest, &self.largest);
+        if product(&self.largest, &units) >= LEFT * whole {
+            self.over_since_ns = None;
+            return false;
+        }
+        let since_ns = *self.over_since_ns.get_or_insert(now_ns);
+        (now_ns - since_ns) as f64 * 1e-9 >= OVER_AFTER_S
+    }
+}

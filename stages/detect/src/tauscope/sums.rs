@@ -1,0 +1,93 @@
+//! Means over windows that end at the newest sample.
+
+use tauscope_bus::{JointArray, MAX_JOINTS};
+
+use super::ring::Ring;
+use super::windows::WINDOWS_S;
+
+/// Most samples of a window.
+const CAPACITY: usize = 1024;
+
+/// Running means of rows over the first windows.
+#[derive(Debug)]
+pub(super) struct Sums {
+    pub rows: Ring<CAPACITY>,
+    /// First row of each window.
+    tails: [usize; WINDOWS_S.len()],
+    totals: [JointArray; WINDOWS_S.len()],
+    /// By window and joint.
+    pub means: [JointArray; WINDOWS_S.len()],
+    windows: usize,
+}
+
+impl Sums {
+    /// Over so many windows.
+    pub fn new(windows: usize) -> Self {
+        Self {
+            rows: Ring::new(),
+            tails: [0; WINDOWS_S.len()],
+            totals: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
+            means: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
+            windows,
+        }
+    }
+
+    pub fn reset(&mut self) {
+        self.rows.reset();
+        self.tails = [0; WINDOWS_S.len()];
+        self.totals = [[0.0; MAX_JOINTS]; WINDOWS_S.len()];
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.rows.count() == 0
+    }
+
+    pub fn newest_ns(&self) -> i64 {
+        self.rows.row(self.rows.count().max(1) - 1).0
+    }
+
+    /// Takes the next row, of `n` joints.
+    pub fn push(&mut self, now_ns: i64, row: &JointArray, n: usize) {
+        self.rows.push(now_ns, row);
+        let head = self.rows.count();
+        for (w, length_s) in WINDOWS_S.iter().enumerate().take(self.windows) {
+            let sums = &mut self.totals[w][..n];
+            for (sum, value) in sums.iter_mut().zip(row) {
+                *sum += value;
+            }
+            let begin = now_ns - (length_s * 1e9) as i64;
+            while self.tails[w] + 1 < head {
+                let (stamp, old) = self.rows.row(self.tails[w]);
+                if *stamp > begin && self.rows.is_kept(self.tails[w]) {
+                    break;
+                }
+                for (sum, value) in sums.iter_mut().zip(old) {
+                    *sum -= value;
+                }
+                self.tails[w] += 1;
+            }
+        }
+        // Rounding is not to add up.
+        if self.rows.is_round() {
+            self.sum_anew(n);
+        }
+        for (w, means) in self.means.iter_mut().enumerate().take(self.windows) {
+            let share = ((head - self.tails[w]).max(1) as f64).recip();
+            for (mean, sum) in means[..n].iter_mut().zip(&self.totals[w]) {
+                *mean = sum * share;
+            }
+        }
+    }
+
+    fn sum_anew(&mut self, n: usize) {
+        for (sum, &tail) in self.totals.iter_mut().zip(&self.tails) {
+            *sum = [0.0; MAX_JOINTS];
+            for k in tail..self.rows.count() {
+                let row = &self.rows.row(k).1;
+                for j in 0..n {
+                    sum[j] += row[j];
+                }
+            }
+        }
+    }
+}
