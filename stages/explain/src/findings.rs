@@ -140,20 +140,7 @@ pub fn of(
         if effect.name == "torque_saturation" {
             parameters.insert("mode".to_owned(), Value::from("sensor"));
         }
-        if let Some(curve) = &active.curve {
-            let against = serde_json::to_value(curve.against).unwrap_or(Value::Null);
-            parameters.insert("against".to_owned(), against);
-            parameters.insert("by_direction".to_owned(), Value::from(curve.by_direction));
-            let values = active.values_at_knots(curve);
-            let all = values.iter().zip(&curve.knots);
-            if let Some((most, at)) = all.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs())) {
-                parameters.insert("largest_nm".to_owned(), number(*most));
-                parameters.insert("largest_at".to_owned(), number(*at));
-            }
-            if let Some(period) = curve.period {
-                parameters.insert("period_s".to_owned(), Value::from(period));
-            }
-        }
+        describe_curve(active, &mut parameters);
         let (joint, link) = place_of(input, joints, &active.hypothesis);
         let place = joint.clone().or_else(|| link.clone()).unwrap_or_default();
         let when = when(search, active, &mut parameters, &mut intervals);
@@ -207,6 +194,25 @@ pub fn of(
         .findings
         .sort_by(|a, b| b.explains.total_cmp(&a.explains));
     named
+}
+
+/// What a curve is drawn against, and where it is largest.
+fn describe_curve(active: &Active, parameters: &mut BTreeMap<String, Value>) {
+    let Some(curve) = &active.curve else {
+        return;
+    };
+    let against = serde_json::to_value(curve.against).unwrap_or(Value::Null);
+    parameters.insert("against".to_owned(), against);
+    parameters.insert("by_direction".to_owned(), Value::from(curve.by_direction));
+    let values = active.values_at_knots(curve);
+    let all = values.iter().zip(&curve.knots);
+    if let Some((most, at)) = all.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs())) {
+        parameters.insert("largest_nm".to_owned(), number(*most));
+        parameters.insert("largest_at".to_owned(), number(*at));
+    }
+    if let Some(period) = curve.period {
+        parameters.insert("period_s".to_owned(), Value::from(period));
+    }
 }
 
 /// A weaker force at a link's frame is none \[N\].

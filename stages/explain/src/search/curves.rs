@@ -86,7 +86,7 @@ impl Search<'_> {
             // Friction it is, whatever bends its curve.
             let shaped = |i: &usize| !is_plain_friction(best.fit.actives[*i].hypothesis);
             let shaped: Vec<usize> = own.iter().copied().filter(shaped).collect();
-            let plain = self.with_plain_friction(self.stripped(best, &shaped, joint), joint);
+            let plain = self.with_plain_friction(&self.stripped(best, &shaped, joint), joint);
             let bent = self.with_curve(&plain, joint);
             let bent = bent.filter(|e| e.fit.actives.last().is_some_and(Active::is_friction_curve));
             if let Some(bent) = bent
@@ -155,7 +155,7 @@ impl Search<'_> {
     }
 
     /// The explanation with Coulomb and viscous friction in a joint, which a curve of friction goes with.
-    fn with_plain_friction(&self, from: Explanation, joint: usize) -> Explanation {
+    fn with_plain_friction(&self, from: &Explanation, joint: usize) -> Explanation {
         let plain = self.hypotheses.iter().filter(|h| {
             let missing = from.fit.actives.iter().all(|a| a.hypothesis != **h);
             h.place.joint == joint && is_plain_friction(**h) && missing
