@@ -88,7 +88,13 @@ impl Scales {
             if let Some(interval) = intervals.get_mut(name) {
                 let wider = |end: f64| {
                     let own = end / scale.gain - known;
-                    known + own.signum() * own.hypot(HALF_WIDTH_95 * share * known)
+                    let wide = known + own.signum() * own.hypot(HALF_WIDTH_95 * share * known);
+                    // No scale turns a sign.
+                    if wide * end < 0.0 || end == 0.0 {
+                        0.0
+                    } else {
+                        wide
+                    }
                 };
                 *interval = interval.map(wider);
             }
