@@ -5,7 +5,7 @@ use tauscope_dynamics::lowpass::Butterworth2;
 
 /// Standard deviations that noise may make of a residue. What is Gaussian, behind a low-pass of 15 Hz, reaches
 /// more on top of what was learnt once in some thousand cycles.
-const SIGMAS: f64 = 4.0;
+const SIGMAS: f64 = 4.5;
 /// Memory of the estimate \[s\].
 const MEMORY_S: f64 = 10.0;
 /// A second difference counts as no more than this many of its standard deviations: a collision is no noise.
