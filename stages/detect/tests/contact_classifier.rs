@@ -2,9 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+mod common;
+
 use std::sync::LazyLock;
 
-use tauscope_bus::{Detection, Emit, EventKind, Header, LinkError, Stage, TwinState, flags};
+use common::Out;
+use tauscope_bus::{Detection, EventKind, Header, Stage, TwinState, flags};
 use tauscope_detect::contact_signals::SignalSettings;
 use tauscope_detect::{
     Config, ConfigError, ContactKind, Detect, JointSetup, LabelledContact, LearnError, Lesson,
@@ -82,18 +85,6 @@ fn sample(ms: i64, qd: [f64; 3], force_n: [f64; 3]) -> TwinState {
         sample.effort[j] = 3.0 - external;
     }
     sample
-}
-
-#[derive(Default)]
-struct Out(Vec<Detection>);
-
-impl Emit<Detection> for Out {
-    fn emit(&mut self, write: &mut dyn FnMut(&mut Detection)) -> Result<(), LinkError> {
-        let mut sample = Detection::default();
-        write(&mut sample);
-        self.0.push(sample);
-        Ok(())
-    }
 }
 
 fn classifier() -> Config {

@@ -2,7 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-use tauscope_bus::{Detection, Emit, LinkError, Stage, TwinState, flags};
+mod common;
+
+use common::Out;
+use tauscope_bus::{Detection, Stage, TwinState, flags};
 use tauscope_detect::fisher_discriminant::Discriminant;
 use tauscope_detect::{
     Config, Detect, JointSetup, Setup, Shared, Threshold, contact_classifier, fisher_discriminant,
@@ -18,18 +21,6 @@ const ARM: &str = r#"<robot name="arm">
   <joint name="a" type="continuous"><parent link="base"/><child link="upper"/><axis xyz="0 0 1"/></joint>
   <joint name="b" type="continuous"><origin xyz="0 0 0.5"/><parent link="upper"/><child link="lower"/><axis xyz="0 1 0"/></joint>
 </robot>"#;
-
-#[derive(Default)]
-struct Out(Vec<Detection>);
-
-impl Emit<Detection> for Out {
-    fn emit(&mut self, write: &mut dyn FnMut(&mut Detection)) -> Result<(), LinkError> {
-        let mut detection = Detection::default();
-        write(&mut detection);
-        self.0.push(detection);
-        Ok(())
-    }
-}
 
 /// Swings and pushes, with a new beginning and a repeated stamp within.
 fn samples() -> Vec<TwinState> {

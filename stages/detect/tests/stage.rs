@@ -2,9 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+mod common;
+
 use std::collections::BTreeMap;
 
-use tauscope_bus::{Detection, Emit, EventKind, Header, LinkError, Stage, TwinState, flags};
+use common::Out;
+use tauscope_bus::{Detection, EventKind, Header, Stage, TwinState, flags};
 use tauscope_detect::{
     Config, ConfigError, Detect, JointSetup, ScoreStatistics, Setup, Threshold, naive_difference,
     twin_regression,
@@ -48,18 +51,6 @@ fn twin_regression() -> Config {
     Config {
         twin_regression: Some(twin_regression::Settings::default()),
         ..Config::default()
-    }
-}
-
-#[derive(Default)]
-struct Out(Vec<Detection>);
-
-impl Emit<Detection> for Out {
-    fn emit(&mut self, write: &mut dyn FnMut(&mut Detection)) -> Result<(), LinkError> {
-        let mut sample = Detection::default();
-        write(&mut sample);
-        self.0.push(sample);
-        Ok(())
     }
 }
 

@@ -2,10 +2,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+mod common;
+
+use common::Out;
 use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use tauscope_bus::{Detection, Emit, EventKind, LinkError, Stage, TwinState, flags};
+use tauscope_bus::{Detection, EventKind, Stage, TwinState, flags};
 use tauscope_detect::{
     Config, ConfigError, ContactKind, Detect, JointSetup, LabelledContact, LearnError, Lesson,
     Lessons, Setup, tauscope,
@@ -74,18 +77,6 @@ fn detector(settings: tauscope::Settings) -> Detect {
         ..Config::default()
     };
     Detect::new(&config, setup()).unwrap()
-}
-
-#[derive(Default)]
-struct Out(Vec<Detection>);
-
-impl Emit<Detection> for Out {
-    fn emit(&mut self, write: &mut dyn FnMut(&mut Detection)) -> Result<(), LinkError> {
-        let mut sample = Detection::default();
-        write(&mut sample);
-        self.0.push(sample);
-        Ok(())
-    }
 }
 
 fn run(detector: &mut Detect, samples: &[TwinState]) -> Vec<Detection> {

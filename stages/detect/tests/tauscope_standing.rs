@@ -2,9 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+mod common;
+
+use common::Out;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use tauscope_bus::{Detection, Emit, EventKind, LinkError, Stage, TwinState, flags};
+use tauscope_bus::{Detection, EventKind, Stage, TwinState, flags};
 use tauscope_detect::{Config, Detect, JointSetup, Lesson, Lessons, Setup, tauscope};
 
 const JOINTS: usize = 3;
@@ -81,18 +84,6 @@ fn detector() -> Detect {
         ..Config::default()
     };
     Detect::new(&config, setup()).unwrap()
-}
-
-#[derive(Default)]
-struct Out(Vec<Detection>);
-
-impl Emit<Detection> for Out {
-    fn emit(&mut self, write: &mut dyn FnMut(&mut Detection)) -> Result<(), LinkError> {
-        let mut detection = Detection::default();
-        write(&mut detection);
-        self.0.push(detection);
-        Ok(())
-    }
 }
 
 /// When alarms begin and end \[s\].

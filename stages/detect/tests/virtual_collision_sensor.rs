@@ -3,7 +3,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-use tauscope_bus::{Detection, Emit, EventKind, Header, LinkError, Stage, TwinState, flags};
+mod common;
+
+use common::Out;
+use tauscope_bus::{Detection, EventKind, Header, Stage, TwinState, flags};
 use tauscope_detect::virtual_collision_sensor::{FirstBias, Learn, Learnt};
 use tauscope_detect::{
     Config, ConfigError, ContactKind, Detect, JointSetup, LabelledContact, LearnError, Lesson,
@@ -135,18 +138,6 @@ fn settings() -> adaptive::Settings {
         bias: Some(FirstBias::InOrder(vec![BIAS; 2])),
         learning_s: 12.0,
         ..adaptive::Settings::default()
-    }
-}
-
-#[derive(Default)]
-struct Out(Vec<Detection>);
-
-impl Emit<Detection> for Out {
-    fn emit(&mut self, write: &mut dyn FnMut(&mut Detection)) -> Result<(), LinkError> {
-        let mut sample = Detection::default();
-        write(&mut sample);
-        self.0.push(sample);
-        Ok(())
     }
 }
 

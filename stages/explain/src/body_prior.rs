@@ -152,7 +152,7 @@ fn slope_of_trace(body: &Inertia) -> [f64; BODY] {
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use std::collections::BTreeSet;
 
     use tauscope_dynamics::Model;
@@ -160,16 +160,18 @@ mod tests {
     use super::*;
     use crate::library;
 
-    const ARM: &str = include_str!("../../../tests/data/demo_arm.urdf");
+    pub const ARM: &str = include_str!("../../../tests/data/demo_arm.urdf");
 
-    fn carried(body: Inertia) -> Vec<Active> {
+    /// A payload.
+    pub fn carried(body: Inertia) -> Vec<Active> {
         let model = Model::from_urdf(ARM).unwrap();
         let all = library::hypotheses(&model, true, &BTreeSet::new());
         let payload = all.iter().find(|h| h.effect.name == "payload").unwrap();
         vec![payload.with(body.parameters().to_vec())]
     }
 
-    fn free() -> Vec<(usize, usize)> {
+    /// All its coordinates.
+    pub fn free() -> Vec<(usize, usize)> {
         (0..BODY).map(|c| (0, c)).collect()
     }
 

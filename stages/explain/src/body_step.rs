@@ -171,20 +171,8 @@ mod tests {
 
     use super::*;
     use crate::body_prior::log_density;
+    use crate::body_prior::tests::{ARM, carried, free};
     use crate::library;
-
-    const ARM: &str = include_str!("../../../tests/data/demo_arm.urdf");
-
-    fn carried(body: Inertia) -> Vec<Active> {
-        let model = Model::from_urdf(ARM).unwrap();
-        let all = library::hypotheses(&model, true, &BTreeSet::new());
-        let payload = all.iter().find(|h| h.effect.name == "payload").unwrap();
-        vec![payload.with(body.parameters().to_vec())]
-    }
-
-    fn free() -> Vec<(usize, usize)> {
-        (0..BODY).map(|c| (0, c)).collect()
-    }
 
     /// Normal equations that ask for a body as precisely as these standard deviations say.
     fn asking(
