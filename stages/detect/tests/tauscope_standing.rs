@@ -7,7 +7,7 @@ mod common;
 use common::Out;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use tauscope_bus::{Detection, EventKind, Stage, TwinState, flags};
+use tauscope_bus::{EventKind, Stage, TwinState, flags};
 use tauscope_detect::{Config, Detect, JointSetup, Lesson, Lessons, Setup, tauscope};
 
 const JOINTS: usize = 3;

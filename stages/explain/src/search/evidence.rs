@@ -160,6 +160,10 @@ pub fn is_open_wave(active: &Active) -> bool {
         && (cycles - cycles.round()).abs() > NEARLY_WHOLE
 }
 
+/// A wall gives way by no more than this, and is within reach: what is softer or farther is a force that is always there.
+const SOFTEST_WALL_N_PER_M: f64 = 5.0;
+const FARTHEST_WALL_M: f64 = 1.49;
+
 /// A stronger force is none that pushes a robot \[N\]: it hardly acts on the joints that would feel a weaker one elsewhere.
 const STRONGEST_N: f64 = 1000.0;
 
@@ -185,7 +189,7 @@ pub fn at_bound(active: &Active) -> bool {
 }
 
 /// Whether the numbers are ones that a robot may have: a link's mass stays above nothing and within twice what its URDF says,
-/// its centre within the link, a push is not beyond all strength, a gear is no soft spring, and friction is neither of one direction
+/// its centre within the link, a push is not beyond all strength, a wall is neither soft nor out of reach, a gear is no soft spring, and friction is neither of one direction
 /// alone nor falls to nothing with speed or warmth.
 pub fn plausible(active: &Active, model: &Model) -> bool {
     let x = &active.coordinates;
@@ -201,6 +205,7 @@ pub fn plausible(active: &Active, model: &Model) -> bool {
                 .sqrt();
             shift_m < FAR_OFF_M.max(MOST_GYRATIONS * link.gyration_radius_m())
         }
+        "contact_wall" => x[0] >= SOFTEST_WALL_N_PER_M && x[3].abs() < FARTHEST_WALL_M,
         "external_push" => x[..3].iter().map(|f| f * f).sum::<f64>().sqrt() < STRONGEST_N,
         "joint_elasticity" => (x[1] / x[0].max(1e-12)).sqrt() >= SOFTEST_RAD_S,
         "temperature_viscous" => x[0] >= LEAST_LEFT * (x[0] + x[1]),
