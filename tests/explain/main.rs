@@ -6,6 +6,7 @@
 mod bad_input;
 #[path = "../common/mod.rs"]
 mod common;
+mod simulated;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
