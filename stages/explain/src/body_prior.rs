@@ -1,4 +1,4 @@
-//! What is known of a body before anything is measured: it has mass in every direction, and is about a hand wide.
+//! What is known of a body before anything is measured: it has mass in every direction, and is as wide as a gripper.
 //!
 //! A motion that hardly shows an inertia leaves it with any sign. Held at the edge of what a body can be, it would be a corner in
 //! which a search gets stuck, with intervals that know nothing of the edge. A smooth prior keeps away from the edge without one.
@@ -9,7 +9,7 @@ use tauscope_dynamics::Inertia;
 use crate::active::{Active, BODY};
 
 /// Standard deviation of the density of a body that nothing is known of, in each direction \[m\].
-const USUAL_SPREAD_M: f64 = 0.1;
+const USUAL_SPREAD_M: f64 = 0.05;
 /// What was no body begins with at least this share of the usual variance in each direction.
 const FIRST_SHARE: f64 = 0.1;
 /// Logarithm of the prior density of all bodies, but for a constant; minus infinity if one of them is none.

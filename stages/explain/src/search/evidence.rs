@@ -1,7 +1,7 @@
 //! What counts as evidence for a piece of physics, and how much of it is asked for.
 
 use nalgebra::{DMatrix, DVector};
-use tauscope_dynamics::Model;
+use tauscope_dynamics::{Limits, Model};
 use tauscope_dynamics::terms::{CoordinateKind, Scale};
 
 use crate::active::{Active, Column, Hypothesis};
@@ -164,6 +164,17 @@ pub fn is_open_wave(active: &Active) -> bool {
 const SOFTEST_WALL_N_PER_M: f64 = 5.0;
 const FARTHEST_WALL_M: f64 = 1.49;
 
+/// A spring hangs loose within the range of its joint or this many times its width beside it: farther off it is a constant effort. Where the
+/// URDF knows no range it is taken to be a turn either way.
+const LOOSE_BESIDE: f64 = 1.0;
+
+fn hangs_loose_near(limits: &Limits, rest: f64) -> bool {
+    let turn = std::f64::consts::TAU;
+    let (lower, upper) = (limits.lower.unwrap_or(-turn), limits.upper.unwrap_or(turn));
+    let beside = LOOSE_BESIDE * (upper - lower);
+    (lower - beside..=upper + beside).contains(&rest)
+}
+
 /// A stronger force is none that pushes a robot \[N\]: it hardly acts on the joints that would feel a weaker one elsewhere.
 const STRONGEST_N: f64 = 1000.0;
 
@@ -189,7 +200,7 @@ pub fn at_bound(active: &Active) -> bool {
 }
 
 /// Whether the numbers are ones that a robot may have: a link's mass stays above nothing and within twice what its URDF says,
-/// its centre within the link, a push is not beyond all strength, a wall is neither soft nor out of reach, a gear is no soft spring, and friction is neither of one direction
+/// its centre within the link, a push is not beyond all strength, a wall is neither soft nor out of reach, a spring hangs loose somewhere, a gear is no soft spring, and friction is neither of one direction
 /// alone nor falls to nothing with speed or warmth.
 pub fn plausible(active: &Active, model: &Model) -> bool {
     let x = &active.coordinates;
@@ -207,6 +218,10 @@ pub fn plausible(active: &Active, model: &Model) -> bool {
         }
         "contact_wall" => x[0] >= SOFTEST_WALL_N_PER_M && x[3].abs() < FARTHEST_WALL_M,
         "external_push" => x[..3].iter().map(|f| f * f).sum::<f64>().sqrt() < STRONGEST_N,
+        "cable_spring" => {
+            let joint = &model.joints()[active.hypothesis.place.joint];
+            hangs_loose_near(&joint.limits, active.parameters()[1])
+        }
         "joint_elasticity" => (x[1] / x[0].max(1e-12)).sqrt() >= SOFTEST_RAD_S,
         "temperature_viscous" => x[0] >= LEAST_LEFT * (x[0] + x[1]),
         "stribeck_friction" => x[0] >= LEAST_SLIDING * (x[0] + x[1]),
