@@ -6,8 +6,9 @@
 mod curves;
 mod evidence;
 mod exchange;
+mod simpler;
 
-use tauscope_dynamics::terms::{Layer, effect};
+use tauscope_dynamics::terms::Layer;
 
 use crate::across::carries_over;
 use crate::active::{Active, Hypothesis};
@@ -15,30 +16,20 @@ use crate::drive::is_drive;
 use crate::fit::Fit;
 use crate::parallel;
 use crate::problem::Problem;
-use crate::propose::{Base, Proposal, penalty};
+use crate::propose::{Base, Proposal};
 use crate::windows::{TimeKind, time_kind};
 use crate::worth;
 
 use curves::{CURVE_EVIDENCE, CURVE_SIZE, is_drawn_already};
 pub use evidence::{Explanation, LEAST_EVIDENCE, LEAST_SIZE, has_rotor, plausible};
 use evidence::{
-    ROTOR, at_bound, describe, is_timely, matters, most_at_one_place, needs, overwhelming, wald,
-    worse_joints,
+    ROTOR, describe, is_timely, matters, most_at_one_place, needs, overwhelming, wald, worse_joints,
 };
+use simpler::MORE_THAN_SIMPLE;
 
 /// Where much is left that no name fits, what a name must explain of it while there is more to be found, and in the end.
 const LOUD_SIZE: f64 = 0.25;
 const NAMED_SIZE: f64 = 0.5;
-/// Effects that contain a simpler one, whose only number is their first.
-const SIMPLER: [(&str, &str); 7] = [
-    ("friction_step", "coulomb_friction"),
-    ("stribeck_friction", "coulomb_friction"),
-    ("asymmetric_coulomb", "coulomb_friction"),
-    ("presliding_hysteresis", "coulomb_friction"),
-    ("temperature_viscous", "viscous_friction"),
-    ("joint_elasticity", "rotor_inertia"),
-    ("backlash", "rotor_inertia"),
-];
 /// Nearer than this \[nats\], or than this share of the evidence for either, two rivals cannot be told apart.
 const TIE: f64 = 5.0;
 const TIE_SHARE: f64 = 0.01;
@@ -62,9 +53,6 @@ pub struct Search<'a> {
     /// Called now and then with a text.
     pub say: &'a (dyn Fn(&str) + Sync),
 }
-
-/// What contains a simpler effect must be ahead of it by this \[nats\], odds of twenty to one.
-const MORE_THAN_SIMPLE: f64 = 3.0;
 
 /// By how much a rival may be behind \[nats\] and still not be told from what has so much evidence.
 pub fn tie(evidence: f64) -> f64 {
@@ -114,31 +102,6 @@ impl Search<'_> {
             }
         }
         self.plainer(self.culled(best), |_| MORE_THAN_SIMPLE)
-    }
-
-    /// Puts the simpler effect that a piece contains in its place, where it is not ahead by `enough` for the evidence for it
-    /// \[nats\]; more is asked of a shape that ends its range.
-    fn plainer(&self, mut best: Explanation, enough: impl Fn(f64) -> f64) -> Explanation {
-        for piece in exchange::pieces(&best) {
-            let Some(index) = exchange::place_of(&best, piece) else {
-                continue;
-            };
-            let less = self.less(&best, index);
-            let worth = &self.problem.worth;
-            let evidence = best.ahead_of(&less, worth);
-            let enough = if at_bound(&best.fit.actives[index]) {
-                tie(evidence)
-            } else {
-                enough(evidence)
-            };
-            if let Some(simple) = self.simpler(&best, &less, index)
-                && best.ahead_of(&simple, worth) < enough
-            {
-                (self.say)(&format!("~ {}", describe(&simple)));
-                best = simple;
-            }
-        }
-        best
     }
 
     /// Takes out the names that explain less than half of what is left where they are and that is far above the noise: there
@@ -352,40 +315,6 @@ impl Search<'_> {
             }
             return best;
         }
-    }
-
-    /// The explanation `less` with the simpler effect that the piece taken out of `best` contains, if there is evidence for it: a
-    /// friction that does not step is still friction.
-    fn simpler(&self, best: &Explanation, less: &Explanation, index: usize) -> Option<Explanation> {
-        let Active {
-            hypothesis,
-            coordinates,
-            ..
-        } = &best.fit.actives[index];
-        let (_, name) = SIMPLER
-            .iter()
-            .find(|(of, _)| *of == hypothesis.effect.name)?;
-        let simple = Hypothesis {
-            effect: effect(name)?,
-            place: hypothesis.place,
-        };
-        let there = |a: &Active| a.hypothesis == simple;
-        if !self.hypotheses.contains(&simple) || less.fit.actives.iter().any(there) {
-            return None;
-        }
-        let joints = Fit::joints_of(&simple, self.problem.joints);
-        let library = (self.hypotheses.len() as f64).ln();
-        let penalty = penalty(&less.fit, library, 1, simple.only_joint());
-        let fit = less
-            .fit
-            .with(self.problem, simple.with(vec![coordinates[0]]));
-        let with = Explanation {
-            fit: fit.refined_at(self.problem, Some(&joints), less.fit.likelihood()),
-            penalties: [&less.penalties[..], &[penalty]].concat(),
-        };
-        let worth = &self.problem.worth;
-        let evident = with.ahead_of(less, worth) >= LEAST_EVIDENCE || overwhelming(&with, less);
-        evident.then_some(with)
     }
 
     /// Whether one of the pieces is needed, to judge by the explanation without it.

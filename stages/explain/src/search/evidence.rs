@@ -1,8 +1,8 @@
 //! What counts as evidence for a piece of physics, and how much of it is asked for.
 
 use nalgebra::{DMatrix, DVector};
-use tauscope_dynamics::{Limits, Model};
 use tauscope_dynamics::terms::{CoordinateKind, Scale};
+use tauscope_dynamics::{Limits, Model};
 
 use crate::active::{Active, Column, Hypothesis};
 use crate::fit::Fit;
