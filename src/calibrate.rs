@@ -110,6 +110,7 @@ impl Job<'_> {
         for (name, fit) in self.cell.facts.joint_names.iter().zip(&fits) {
             let joint = JointCorrection {
                 gain: fit.gain,
+                gain_deviation: None,
                 offset: fit.offset,
                 noise: None,
                 explained: Some(fit.explained),

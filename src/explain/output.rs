@@ -165,14 +165,10 @@ fn robot_text(
     made: &mut Made,
 ) -> Option<String> {
     let urdf = request.cell.facts.urdf.as_ref().filter(|_| kept.bodies)?;
-    let start = kept.start.iter();
-    let gains = start
-        .clone()
-        .flat_map(|start| &start.gain)
-        .chain(&outcome.gain);
-    let offsets = start.flat_map(|start| &start.offset);
-    let is_bare = gains.clone().all(|gain| (gain - 1.0).abs() < f64::EPSILON)
-        && offsets.clone().all(|offset| offset.abs() < f64::EPSILON);
+    let mut gains = outcome.gain.iter();
+    let mut offsets = kept.start.iter().flat_map(|start| &start.offset);
+    let is_bare = gains.all(|gain| (gain - 1.0).abs() < f64::EPSILON)
+        && offsets.all(|offset| offset.abs() < f64::EPSILON);
     if !is_bare {
         return None;
     }

@@ -6,6 +6,7 @@ use std::path::Path;
 use tauscope_archive::Recording as Archive;
 use tauscope_dynamics::Model;
 use tauscope_explain::{Input, Recording, RecordingTopics, Start};
+use tauscope_twin::JointCorrection;
 
 use super::input::{Named, Request};
 use crate::report::{Problem, Report};
@@ -123,6 +124,7 @@ fn start(request: &Request, report: &mut Report) -> Option<Start> {
         Ok(correction) => Some(Start {
             terms: correction.terms,
             gain: correction.joints.iter().map(|joint| joint.gain).collect(),
+            gain_deviation: correction.joints.iter().map(gain_deviation).collect(),
             offset: correction.joints.iter().map(|joint| joint.offset).collect(),
         }),
         Err(error) => {
@@ -130,4 +132,19 @@ fn start(request: &Request, report: &mut Report) -> Option<Start> {
             None
         }
     }
+}
+
+/// Of the variance of a joint's effort a line must explain this much if its slope is to be the drive's.
+const LEAST_EXPLAINED: f64 = 0.5;
+
+/// How well a file knows a joint's gain: not at all where the line that it is the slope of explains little.
+fn gain_deviation(joint: &JointCorrection) -> f64 {
+    let of_line = joint.explained.map_or(0.0, |explained| {
+        if explained < LEAST_EXPLAINED {
+            f64::INFINITY
+        } else {
+            0.0
+        }
+    });
+    joint.gain_deviation.unwrap_or(of_line)
 }

@@ -49,9 +49,13 @@ pub fn file(
     file.provenance.clone_from(provenance);
     for (index, name) in request.cell.facts.joint_names.iter().enumerate() {
         let start = kept.start.as_ref();
-        let start_gain = start.map_or(1.0, |start| start.gain[index]);
+        let gain = outcome.gain.get(index).copied().unwrap_or(1.0);
+        let deviation = outcome.gain_deviation.get(index).copied();
         let joint = JointCorrection {
-            gain: start_gain * outcome.gain.get(index).copied().unwrap_or(1.0),
+            gain,
+            gain_deviation: deviation
+                .map(|known| if known.is_finite() { known } else { gain.abs() })
+                .filter(|known| *known > 0.0),
             offset: start.map_or(0.0, |start| start.offset[index]),
             ..JointCorrection::default()
         };

@@ -1,5 +1,7 @@
 //! Several things at once, in the simulated cell.
 
+use std::path::Path;
+
 use super::common::{Out, bundled, tauscope, write};
 use super::{explain, named, pair, report};
 
@@ -23,6 +25,18 @@ const CARRIED: [(&str, f64); 9] = [
 ];
 
 const HARDLY_SHOWN: [&str; 2] = ["ixx_kgm2", "iyy_kgm2"];
+
+/// Simulates a scenario into a folder.
+fn simulate(folder: &Path, text: &str) {
+    let scenario = write(&folder.join("scenario.yaml"), text);
+    let mut simulate = tauscope();
+    simulate
+        .arg("simulate")
+        .arg(scenario)
+        .arg("--out")
+        .arg(folder);
+    assert_eq!(Out::of(simulate).code, 0);
+}
 
 fn scenario() -> String {
     let numbers = |of: &[(&str, f64)]| {
@@ -49,14 +63,7 @@ fn scenario() -> String {
 fn a_wall_and_something_carried_for_a_while_are_both_told_within_their_intervals() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
-    let scenario = write(&path("scenario.yaml"), &scenario());
-    let mut simulate = tauscope();
-    simulate
-        .arg("simulate")
-        .arg(scenario)
-        .arg("--out")
-        .arg(folder.path());
-    assert_eq!(Out::of(simulate).code, 0);
+    simulate(folder.path(), &scenario());
     let recordings = ["r0.mcap", "r1.mcap", "r2.mcap", "r3.mcap"].map(path);
     let [r0, r1, r2, r3] = recordings.each_ref().map(|path| path.to_str().unwrap());
     let robot = bundled().join("demo_arm.urdf");
@@ -95,4 +102,99 @@ fn a_wall_and_something_carried_for_a_while_are_both_told_within_their_intervals
             );
         }
     }
+}
+
+/// An arm whose joints rub and whose currents nobody can scale, with more `physics` than that; recordings begin with `name`.
+fn in_amperes(name: &str, seed: u32, physics: &str) -> String {
+    let viscous = (1..=7).map(|j| {
+        format!("- {{effect: viscous_friction, joint: joint{j}, parameters: {{viscous_nms_per_rad: {}}}}}\n", 2.4 / f64::from(j))
+    });
+    let coulomb = (1..=7).map(|j| {
+        format!(
+            "- {{effect: coulomb_friction, joint: joint{j}, parameters: {{coulomb_nm: {}}}}}\n",
+            1.8 / f64::from(j)
+        )
+    });
+    let points = "{points: {speed: 0.5, acceleration_rad_s2: 4, rest_s: [0.1, 0.3], range: 0.6, min_height_m: 0.13}}";
+    let waves =
+        "{fourier: {period_s: 10, harmonics: 5, speed: 0.6, acceleration_rad_s2: 5, range: 0.6}}";
+    let recordings = [points, waves, points].into_iter().enumerate();
+    let recordings = recordings
+        .map(|(k, motion)| format!("- {{name: {name}{k}, duration_s: 12, motion: {motion}}}\n"));
+    format!(
+        "version: 1\nname: {name}\nrobot: {}\nseed: {seed}\nrate_hz: 100\nphysics:\n{}{}\
+         - {{effect: load_dependent_friction, joint: joint2, parameters: {{coefficient: 0.06}}}}\n{physics}\
+         effort_unit: A\ntorque_constants_nm_per_a: {{joint1: 11, joint2: 10, joint3: 8, joint4: 8, joint5: 6, joint6: 5, joint7: 5}}\n\
+         sensors: {{velocity_noise_rad_s: 0.001, effort_noise_of_limit: 0.002}}\nrecordings:\n{}",
+        bundled().join("demo_arm.urdf").display(),
+        viscous.collect::<String>(),
+        coulomb.collect::<String>(),
+        recordings.collect::<String>()
+    )
+}
+
+#[test]
+fn what_an_arm_carries_is_weighed_beside_the_twin_of_the_unloaded_arm_in_amperes_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let payload = "- {effect: payload, parameters: {mass_kg: 0.8, com_x_m: 0.01, com_y_m: -0.02, com_z_m: 0.06, \
+                   ixx_kgm2: 0.001, iyy_kgm2: 0.001, izz_kgm2: 0.001}}\n";
+    simulate(folder.path(), &in_amperes("free", 5, ""));
+    simulate(folder.path(), &in_amperes("loaded", 6, payload));
+    let robot = bundled().join("demo_arm.urdf");
+    let (free, loaded) = (folder.path().join("free"), folder.path().join("loaded"));
+    let twin = free.join("twin.yaml");
+    let names = |name: &str| {
+        [0, 1, 2].map(|k| {
+            folder
+                .path()
+                .join(format!("{name}{k}.mcap"))
+                .to_str()
+                .unwrap()
+                .to_owned()
+        })
+    };
+    let run = |out: &Path, recordings: &[String; 3], more: &[&str]| {
+        let mut arguments = vec![
+            "--robot",
+            robot.to_str().unwrap(),
+            "--effort-unit",
+            "A",
+            "--fit",
+        ];
+        arguments.extend([
+            recordings[0].as_str(),
+            &recordings[1],
+            "--holdout",
+            &recordings[2],
+        ]);
+        arguments.extend(more);
+        explain(out, &arguments);
+    };
+    run(&free, &names("free"), &[]);
+    run(
+        &loaded,
+        &names("loaded"),
+        &["--twin", twin.to_str().unwrap()],
+    );
+    let report = report(&loaded);
+    assert_eq!(
+        named(&report),
+        [pair("payload", "tool")],
+        "{}",
+        report["findings"]
+    );
+    let finding = &report["findings"][0];
+    let [low, high] = [0, 1].map(|end| finding["intervals_95"]["mass_kg"][end].as_f64().unwrap());
+    assert!(
+        low < 0.8 && 0.8 < high && high - low < 0.4,
+        "{low} to {high} kg"
+    );
+    let of = |which: &str| -> f64 {
+        let joints = report[which].as_array().unwrap().iter();
+        joints
+            .filter_map(serde_json::Value::as_f64)
+            .map(|rms| rms * rms)
+            .sum()
+    };
+    assert!(of("holdout_rms_after") < 0.05 * of("holdout_rms_before"));
 }

@@ -15,6 +15,7 @@ use crate::recording::Recording;
 use crate::search::{Explanation, Search, plausible};
 use crate::track::Track;
 use crate::windows::{TimeKind, time_kind};
+use crate::words;
 
 /// What the arm bears at the beginning of a recording is what it bears without anything that comes and goes \[s\].
 const BEGINNING_S: f64 = 1.0;
@@ -28,7 +29,10 @@ pub fn start_at_measured(track: &mut Track, recording: &Recording, unit_nm: &[f6
         return;
     }
     for (j, unit) in unit_nm.iter().enumerate() {
-        let off = |k: usize| recording.effort[k * n + j] * unit - track.rigid[k * n + j];
+        let off = |k: usize| {
+            let at = k * n + j;
+            (recording.effort[at] - track.beside[at]) * unit - track.rigid[at]
+        };
         let mean = (0..samples).map(off).sum::<f64>() / samples as f64;
         for value in track.rigid.iter_mut().skip(j).step_by(n) {
             *value += mean;
@@ -227,11 +231,15 @@ impl Setup<'_> {
             "No joint moves: what lasts cannot be told from the load at rest, and what the arm bears in the first {BEGINNING_S} s of \
              each recording is taken for what it always bears there."
         ));
-        if self.is_unscaled() {
-            named.notes.push(
-                "Nobody knows the drives' scales: forces are as if each joint had 1 N m/A."
-                    .to_owned(),
-            );
+        if !self.unscaled.is_empty() {
+            let of = |&(j, _): &(usize, f64)| {
+                format!("{} {} N m/A", joints[j], words::number(self.unit_nm[j]))
+            };
+            let taken: Vec<String> = self.unscaled.iter().map(of).collect();
+            named.notes.push(format!(
+                "Nobody knows the scales of these drives, and forces hang on what they were taken for: {}.",
+                taken.join(", ")
+            ));
         }
         let problem = self.problem(&input.fit, &rests_count)?;
         Ok(Ok(Judged {

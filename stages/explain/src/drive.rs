@@ -60,9 +60,9 @@ pub fn is_drive(hypothesis: &Hypothesis) -> bool {
     hypothesis.effect.name == DRIVE_GAIN.name
 }
 
-/// The scale of each joint, 1 at first.
-pub fn unknown_gains(joints: usize) -> Vec<Active> {
-    let one = |joint| {
+/// The scales of joints that nobody knows, as they are at first.
+pub fn unknown_gains(first: &[(usize, f64)]) -> Vec<Active> {
+    let one = |&(joint, gain): &(usize, f64)| {
         let place = Whereabouts {
             joint,
             ..Whereabouts::default()
@@ -71,12 +71,12 @@ pub fn unknown_gains(joints: usize) -> Vec<Active> {
             effect: &DRIVE_GAIN,
             place,
         }
-        .with(vec![0.0])
+        .with(vec![gain - 1.0])
     };
-    (0..joints).map(one).collect()
+    first.iter().map(one).collect()
 }
 
-/// The scale of each joint in an explanation; 1 where it is none of the question.
+/// The scale of each joint in an explanation; 1 where it is out of the question.
 pub fn gains(actives: &[Active], joints: usize) -> Vec<f64> {
     let mut gains = vec![1.0; joints];
     for active in actives.iter().filter(|active| is_drive(&active.hypothesis)) {

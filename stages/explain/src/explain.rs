@@ -3,9 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use tauscope_dynamics::Model;
-use tauscope_dynamics::terms::{Physics, Site, TermError, TermSpec};
+use tauscope_dynamics::terms::{Layer, Site, TermError, TermSpec};
 
-use crate::active::Hypothesis;
+use crate::active::{Active, Hypothesis};
 use crate::at_rest;
 use crate::audit;
 use crate::drive;
@@ -16,7 +16,9 @@ use crate::locate;
 use crate::problem::Problem;
 use crate::recording::Recording;
 use crate::report::{RecordingPicture, Report, Undetectable, Verdict};
+use crate::start::{Start, in_recorded_units};
 use crate::track::Track;
+use crate::windows::{TimeKind, time_kind};
 
 /// What is to be explained.
 #[derive(Debug)]
@@ -41,17 +43,6 @@ pub struct Input {
     pub without: BTreeSet<String>,
 }
 
-/// A corrected twin.
-#[derive(Debug, Clone, Default)]
-pub struct Start {
-    /// Its physics.
-    pub terms: Vec<TermSpec>,
-    /// Gain of each joint's bodies \[effort unit per model unit\].
-    pub gain: Vec<f64>,
-    /// Offset of each joint \[effort unit\].
-    pub offset: Vec<f64>,
-}
-
 /// What came of it.
 #[derive(Debug)]
 pub struct Outcome {
@@ -61,6 +52,8 @@ pub struct Outcome {
     pub terms: Vec<TermSpec>,
     /// Gain of each joint's bodies \[effort unit per model unit\].
     pub gain: Vec<f64>,
+    /// Standard deviation of each gain that stands for a torque constant; infinite where it is not identifiable.
+    pub gain_deviation: Vec<f64>,
     /// The corrected twin's effort on each hold-out recording: row-major, one row per recorded row \[effort unit\].
     pub predictions: Vec<(String, Vec<f64>)>,
     /// What is drawn.
@@ -86,10 +79,11 @@ pub fn explain(
     if input.holdout.is_empty() && !at_rest {
         hold_out_some(&mut input);
     }
-    let unit_nm = input
+    let constants = input
         .torque_constants_nm_per_a
         .clone()
         .unwrap_or_else(|| vec![1.0; joints.len()]);
+    let (unit_nm, unscaled) = scales(&input, &constants, at_rest);
     let session_start_ns = input
         .fit
         .iter()
@@ -97,17 +91,28 @@ pub fn explain(
         .map(|recording| recording.start_ns)
         .min()
         .unwrap_or(0);
-    let setup = Setup {
+    let mut setup = Setup {
         input: &input,
+        constants: &constants,
         unit_nm: &unit_nm,
+        unscaled,
+        loads: Vec::new(),
         session_start_ns,
         at_rest,
     };
-    let judged = if at_rest {
+    let mut judged = if at_rest {
         setup.at_rest(progress)?
     } else {
         setup.in_motion(progress)?
     };
+    if let Ok(first) = &judged
+        && input.start.as_ref().is_some_and(Start::needs_load)
+    {
+        setup.loads = setup.bodies(&first.found);
+        if !setup.loads.is_empty() && !at_rest {
+            judged = setup.in_motion(progress)?;
+        }
+    }
     let judged = match judged {
         Ok(judged) => judged,
         Err(reason) => return Ok(not_evaluated(&input, joints, reason)),
@@ -153,10 +158,12 @@ pub fn explain(
         holdout_predictions: BTreeMap::new(),
     };
     progress(1.0, "done");
+    let (gain, gain_deviation) = setup.final_gains(&found, &named.gain_deviation);
     Ok(Outcome {
         report,
         terms: setup.lasting_terms(&found),
-        gain: drive::gains(&found.actives, unit_nm.len()),
+        gain,
+        gain_deviation,
         predictions: proof.predictions,
         pictures: proof.pictures,
         trajectories: named.trajectories,
@@ -209,16 +216,44 @@ fn not_evaluated(input: &Input, joints: Vec<String>, reason: String) -> Outcome 
         },
         terms: Vec::new(),
         gain: Vec::new(),
+        gain_deviation: Vec::new(),
         predictions: Vec::new(),
         pictures: Vec::new(),
         trajectories: Vec::new(),
     }
 }
 
+/// N m per recorded unit by joint, and the joints of which nobody knows it, with the gain that their bodies are taken by at first.
+fn scales(input: &Input, constants: &[f64], at_rest: bool) -> (Vec<f64>, Vec<(usize, f64)>) {
+    if input.effort_unit != "A" || input.torque_constants_nm_per_a.is_some() {
+        return (constants.to_vec(), Vec::new());
+    }
+    let joints = 0..constants.len();
+    let Some(start) = &input.start else {
+        return (constants.to_vec(), joints.map(|j| (j, 1.0)).collect());
+    };
+    let unknown = joints.filter(|&j| !start.is_scale_known(j));
+    let unknown = unknown.map(|j| (j, start.gain[j])).collect();
+    // At rest nothing would tell them.
+    let units_nm = if at_rest {
+        start.likely_units_nm()
+    } else {
+        start.units_nm()
+    };
+    (units_nm, unknown)
+}
+
 /// What every step needs.
 pub(crate) struct Setup<'a> {
     pub input: &'a Input,
+    /// Torque constants by joint \[N m/A\]; 1 where there are none.
+    constants: &'a [f64],
+    /// N m per recorded unit by joint; 1 where nobody knows it.
     pub unit_nm: &'a [f64],
+    /// Joints of which nobody knows the scale between the recordings' unit and N m, and the gain of their bodies at first.
+    pub unscaled: Vec<(usize, f64)>,
+    /// New bodies that were found and that the start's physics has to bear.
+    loads: Vec<TermSpec>,
     session_start_ns: i64,
     /// Whether no joint moves.
     pub at_rest: bool,
@@ -227,50 +262,31 @@ pub(crate) struct Setup<'a> {
 impl Setup<'_> {
     pub fn hypotheses(&self) -> Vec<Hypothesis> {
         let input = self.input;
-        let mut without = input.without.clone();
-        if self.is_unscaled() {
-            // The scale of each joint is free as it is.
-            without.insert("torque_gain".to_owned());
-        }
-        library::hypotheses(&input.model, input.bodies, &without)
-    }
-
-    /// Whether nobody knows the scale between the recordings' unit and N m.
-    pub fn is_unscaled(&self) -> bool {
-        let input = self.input;
-        input.effort_unit == "A"
-            && input.torque_constants_nm_per_a.is_none()
-            && input.start.is_none()
-    }
-
-    /// Terms of the start, in N m.
-    fn start_physics(&self) -> Result<Physics, TermError> {
-        let n = self.input.model.dof();
-        let terms = match &self.input.start {
-            Some(start) => start
-                .terms
-                .iter()
-                .map(|spec| spec.build(&self.input.model))
-                .collect::<Result<_, _>>()?,
-            None => Vec::new(),
-        };
-        Ok(Physics::new(terms, n))
+        let mut all = library::hypotheses(&input.model, input.bodies, &input.without);
+        // The scale of such a joint is free as it is.
+        let unscaled = |joint: usize| self.unscaled.iter().any(|(other, _)| *other == joint);
+        all.retain(|h| h.effect.name != "torque_gain" || !unscaled(h.place.joint));
+        all
     }
 
     pub fn track(&self, recording: &Recording, motion_cutoff_hz: f64) -> Result<Track, TermError> {
         let session_s = (recording.start_ns - self.session_start_ns) as f64 * 1e-9;
         let model = &self.input.model;
-        let mut track = Track::new(recording, session_s, model, motion_cutoff_hz, self.unit_nm);
+        let mut track = Track::new(
+            recording,
+            session_s,
+            model,
+            motion_cutoff_hz,
+            self.constants,
+        );
         if let Some(start) = &self.input.start {
-            let n = self.unit_nm.len();
-            for (k, value) in track.rigid.iter_mut().enumerate() {
-                *value *= start.gain[k % n];
-            }
-            let mut physics = self.start_physics()?;
-            track.rigid = track.run(&mut physics, &track.rigid);
-            for (k, value) in track.rigid.iter_mut().enumerate() {
-                *value += start.offset[k % n] * self.unit_nm[k % n];
-            }
+            start.apply(
+                &mut track,
+                model,
+                &self.loads,
+                self.constants,
+                &self.first_gains(),
+            )?;
         }
         // Not of recordings held out: what is predicted for them comes from the motion alone.
         let fitted = self
@@ -306,6 +322,55 @@ impl Setup<'_> {
         ))
     }
 
+    /// What the bodies of each joint are taken by at first, from the model's unit into the recording's.
+    fn first_gains(&self) -> Vec<f64> {
+        let mut gains: Vec<f64> = self.unit_nm.iter().map(|unit| 1.0 / unit).collect();
+        if !self.at_rest {
+            for &(joint, gain) in &self.unscaled {
+                gains[joint] = gain;
+            }
+        }
+        gains
+    }
+
+    /// Gain of each joint's bodies in the corrected twin, and its standard deviation, given those of the gains that were fitted.
+    fn final_gains(&self, found: &Fit, fitted: &[(usize, f64)]) -> (Vec<f64>, Vec<f64>) {
+        let n = self.unit_nm.len();
+        let start = self.input.start.as_ref();
+        let mut gain = start.map_or_else(|| vec![1.0; n], |start| start.gain.clone());
+        let mut deviation =
+            start.map_or_else(|| vec![0.0; n], |start| start.gain_deviation.clone());
+        let of_fit = drive::gains(&found.actives, n);
+        for &(joint, of_gain) in fitted {
+            (gain[joint], deviation[joint]) = (of_fit[joint], of_gain);
+        }
+        (gain, deviation)
+    }
+
+    /// A piece of physics as files hold it.
+    fn spec(&self, active: &Active) -> TermSpec {
+        let model = &self.input.model;
+        let place = active.hypothesis.place;
+        let site = Site {
+            model,
+            joint: place.joint,
+            source: place.source,
+            link: place.link,
+        };
+        TermSpec::of(&*active.term_for(model), &site)
+    }
+
+    /// The bodies of an explanation that its gears bear for long.
+    fn bodies(&self, found: &Fit) -> Vec<TermSpec> {
+        let of_bodies = |active: &&Active| {
+            let hypothesis = active.hypothesis;
+            let lasts = !matches!(time_kind(hypothesis), TimeKind::Once);
+            hypothesis.effect.layer == Layer::Body && !drive::is_drive(&hypothesis) && lasts
+        };
+        let bodies = found.actives.iter().filter(of_bodies);
+        bodies.map(|active| self.spec(active)).collect()
+    }
+
     /// What a corrected twin keeps: not what came and went.
     fn lasting_terms(&self, found: &Fit) -> Vec<TermSpec> {
         let mut terms = self
@@ -313,19 +378,18 @@ impl Setup<'_> {
             .start
             .as_ref()
             .map_or_else(Vec::new, |start| start.terms.clone());
-        let model = &self.input.model;
         for active in &found.actives {
             if drive::is_drive(&active.hypothesis) || !findings::lasts(active.hypothesis) {
                 continue;
             }
-            let place = active.hypothesis.place;
-            let site = Site {
-                model,
-                joint: place.joint,
-                source: place.source,
-                link: place.link,
-            };
-            terms.push(TermSpec::of(&*active.term_for(model), &site));
+            let term = self.spec(active);
+            // With torque constants the terms of a twin are in N m, else in what was recorded.
+            let recorded = self.input.torque_constants_nm_per_a.is_none();
+            terms.push(if recorded {
+                in_recorded_units(&term, &self.input.model, self.unit_nm)
+            } else {
+                term
+            });
         }
         terms
     }

@@ -22,7 +22,7 @@ use crate::windows::{TimeKind, time_kind};
 use crate::words;
 
 use contest::contest;
-use scales::Scales;
+use scales::{Scales, StartScales};
 pub use undetectable::undetectable;
 use waves::merge_waves;
 
@@ -42,6 +42,8 @@ pub struct Named {
     pub trajectories: Vec<(String, String)>,
     /// On the scales of drives.
     pub notes: Vec<String>,
+    /// Standard deviations of the gains that were fitted, by joint.
+    pub gain_deviation: Vec<(usize, f64)>,
 }
 
 impl Named {
@@ -106,8 +108,10 @@ pub fn of(
     let spread = covariance(search.problem, fit);
     let total = mismatch(before, fit, before);
     let scales = Scales::of(search.problem, fit, &spread);
+    let of_start = StartScales::of(input);
     let mut named = Named {
         notes: scales.notes(joints),
+        gain_deviation: scales.deviations().collect(),
         ..Named::default()
     };
     for (index, active) in fit.actives.iter().enumerate() {
@@ -146,6 +150,7 @@ pub fn of(
         let when = when(search, active, &mut parameters, &mut intervals);
         drop_no_force(&mut parameters, &mut intervals);
         let in_amperes = scales.to_nm(active.hypothesis, &mut parameters, &mut intervals);
+        of_start.widen(active.hypothesis, &parameters, &mut intervals);
         let mut sentence = words::sentence(active, &place, &parameters, &intervals, joints);
         if in_amperes {
             sentence = words::in_amperes(&sentence);

@@ -25,13 +25,7 @@ impl Setup<'_> {
         }
         let hypotheses = self.hypotheses();
         // Where nobody knows the scale of the drives, the twin is only one once they are fitted.
-        let drives = || {
-            if self.is_unscaled() {
-                drive::unknown_gains(joints.len())
-            } else {
-                Vec::new()
-            }
-        };
+        let drives = || drive::unknown_gains(&self.unscaled);
         let say = |text: &str| {
             // Nobody knows how many rounds there will be: each takes a share of what is left.
             progress(0.1, text);

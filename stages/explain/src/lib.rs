@@ -32,6 +32,7 @@ pub mod report;
 pub mod search;
 pub mod smoother;
 mod standstill;
+mod start;
 pub mod track;
 mod trial;
 mod unknown;
@@ -41,5 +42,6 @@ pub mod windows;
 mod words;
 mod worth;
 
-pub use explain::{Input, Outcome, Start, explain};
+pub use explain::{Input, Outcome, explain};
 pub use recording::{Recording, RecordingError, RecordingTopics};
+pub use start::Start;

@@ -119,11 +119,14 @@ impl Problem {
             for j in 0..n {
                 let counts = track.counts(j, moves[j] && !rests_count[j], cutoff_hz);
                 let filter = LowPass::weighted(&track.time_s, cutoff_hz, |k| counts[k]);
-                let mut signal: Vec<f64> = (0..full.len())
-                    .map(|k| recording.effort[k * n + j] * unit_nm[j])
-                    .collect();
-                let largest = signal.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+                let of_joint = (0..full.len()).map(|k| k * n + j);
+                let largest = of_joint.clone().fold(0.0_f64, |most, at| {
+                    most.max((recording.effort[at] * unit_nm[j]).abs())
+                });
                 problem.largest_effort[j] = problem.largest_effort[j].max(largest);
+                let mut signal: Vec<f64> = of_joint
+                    .map(|at| (recording.effort[at] - full.beside[at]) * unit_nm[j])
+                    .collect();
                 let rate = (full.len() - 1) as f64 / recording.duration_s();
                 variances[j].push(white_variance(&signal) * cutoff_hz * 0.95 / (0.5 * rate));
                 if kept.len() < full.len() {

@@ -57,7 +57,7 @@ impl Setup<'_> {
         let mut physics = Physics::new(terms, self.unit_nm.len());
         let mut effort = track.run(&mut physics, &track.rigid);
         for (k, value) in effort.iter_mut().enumerate() {
-            *value /= self.unit_nm[k % self.unit_nm.len()];
+            *value = *value / self.unit_nm[k % self.unit_nm.len()] + track.beside[k];
         }
         effort
     }

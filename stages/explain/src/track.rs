@@ -34,17 +34,19 @@ pub struct Track {
     pub acceleration: Vec<f64>,
     /// What the twin says \[N m or N\].
     pub rigid: Vec<f64>,
+    /// What a corrected twin says beside its bodies \[the recording's unit\].
+    pub beside: Vec<f64>,
 }
 
 impl Track {
     /// The motion of a recording, at all its samples, and what the twin says of it. Motion is smoothed with half
-    /// amplitude at `motion_cutoff_hz`; `unit_nm` turns the recording's unit into N m, by joint.
+    /// amplitude at `motion_cutoff_hz`; `constants` turn the recording's unit into the model's, by joint.
     pub fn new(
         recording: &Recording,
         session_s: f64,
         model: &Model,
         motion_cutoff_hz: f64,
-        unit_nm: &[f64],
+        constants: &[f64],
     ) -> Self {
         let n = model.dof();
         let count = recording.len();
@@ -57,6 +59,7 @@ impl Track {
             velocity: vec![0.0; n * count],
             acceleration: vec![0.0; n * count],
             rigid: vec![0.0; n * count],
+            beside: vec![0.0; n * count],
         };
         for j in 0..n {
             let measured: Vec<f64> = (0..count).map(|k| recording.position[k * n + j]).collect();
@@ -83,7 +86,7 @@ impl Track {
             }
         } else {
             for (k, value) in recording.reference.iter().enumerate() {
-                track.rigid[k] = value * unit_nm[k % n];
+                track.rigid[k] = value * constants[k % n];
             }
         }
         track
@@ -135,6 +138,7 @@ impl Track {
             velocity: rows(&self.velocity),
             acceleration: rows(&self.acceleration),
             rigid: rows(&self.rigid),
+            beside: rows(&self.beside),
         }
     }
 
@@ -317,6 +321,7 @@ mod tests {
             velocity: vec![0.0; 100],
             acceleration: vec![0.0; 100],
             rigid: vec![0.0; 100],
+            beside: vec![0.0; 100],
         };
         track.sharpen_velocity(&recording, None);
         assert!(

@@ -62,6 +62,12 @@ pub fn is_of_effort(parameter: &str) -> bool {
     unit.starts_with("N m") || unit == "kg m²"
 }
 
+/// Whether a parameter of a body or a force grows with the effort that it is read from.
+pub fn grows_with_effort(parameter: &str) -> bool {
+    let whole = ["mass_kg", "stiffness_n_per_m"].contains(&parameter);
+    whole || parameter.starts_with("force_") || parameter.starts_with("delta_")
+}
+
 /// A sentence on an effort whose numbers are in A.
 pub fn in_amperes(sentence: &str) -> String {
     sentence.replace("N m", "A").replace("kg m²", "A s²/rad")

@@ -68,6 +68,10 @@ pub struct Filters {
 pub struct JointCorrection {
     /// Gain \[effort unit per model unit\].
     pub gain: f64,
+    /// Standard deviation of the gain, where it stands for a torque constant that nobody gave; as large as the gain where the motion
+    /// does not tell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain_deviation: Option<f64>,
     /// Offset \[effort unit\].
     pub offset: f64,
     /// Standard deviation of the filtered residual on the contact-free recordings \[effort unit\].
@@ -83,6 +87,7 @@ impl Default for JointCorrection {
     fn default() -> Self {
         Self {
             gain: 1.0,
+            gain_deviation: None,
             offset: 0.0,
             noise: None,
             explained: None,

@@ -8,13 +8,12 @@ use tauscope_dynamics::terms::Layer;
 
 use crate::active::Hypothesis;
 use crate::drive::{is_drive, off_with_the_links};
+use crate::explain::Input;
 use crate::fit::Fit;
 use crate::interval::{HALF_WIDTH_95, parameter_deviations};
 use crate::problem::Problem;
+use crate::start::KNOWN;
 use crate::words;
-
-/// A known scale is at least this many times its own deviation.
-const KNOWN: f64 = 5.0;
 
 /// The scale of one drive \[A per N m\].
 #[derive(Debug, Clone, Copy)]
@@ -86,20 +85,74 @@ impl Scales {
             let known = number / scale.gain;
             *value = Value::from(known);
             if let Some(interval) = intervals.get_mut(name) {
-                let wider = |end: f64| {
-                    let own = end / scale.gain - known;
-                    let wide = known + own.signum() * own.hypot(HALF_WIDTH_95 * share * known);
-                    // No scale turns a sign.
-                    if wide * end < 0.0 || end == 0.0 {
-                        0.0
-                    } else {
-                        wide
-                    }
-                };
-                *interval = interval.map(wider);
+                *interval = wider(interval.map(|end| end / scale.gain), known, share);
             }
         }
         false
+    }
+
+    /// Joints, and how well their scales are known \[A per N m\].
+    pub fn deviations(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.0.iter().map(|scale| (scale.joint, scale.deviation))
+    }
+}
+
+/// An interval about a number that a scale goes into, known but for this share of it.
+fn wider(interval: [f64; 2], number: f64, share: f64) -> [f64; 2] {
+    interval.map(|end| {
+        let own = end - number;
+        let wide = number + own.signum() * own.hypot(HALF_WIDTH_95 * share * number);
+        // No scale turns a sign.
+        if wide * end < 0.0 || end == 0.0 {
+            0.0
+        } else {
+            wide
+        }
+    })
+}
+
+/// How well the scales of a corrected twin are known that was started from, by joint, as shares of them.
+#[derive(Debug)]
+pub struct StartScales(Vec<f64>);
+
+impl StartScales {
+    /// Nothing to widen where the recordings are in N m or torque constants are known.
+    pub fn of(input: &Input) -> Self {
+        let unknown = input.effort_unit == "A" && input.torque_constants_nm_per_a.is_none();
+        let start = input.start.as_ref().filter(|_| unknown);
+        let share = |start: &crate::Start| {
+            let each = start.gain.iter().zip(&start.gain_deviation);
+            each.map(|(gain, deviation)| deviation / gain.abs())
+                .collect()
+        };
+        Self(start.map_or_else(Vec::new, share))
+    }
+
+    /// Counts in the intervals of an effect that its numbers are no better known than the scale: of its own joint, or of the joint
+    /// whose is known best where all joints feel it.
+    pub fn widen(
+        &self,
+        hypothesis: Hypothesis,
+        parameters: &BTreeMap<String, Value>,
+        intervals: &mut BTreeMap<String, [f64; 2]>,
+    ) {
+        let best = self.0.iter().fold(f64::INFINITY, |best, s| best.min(*s));
+        let share = match hypothesis.only_joint() {
+            Some(joint) => self.0.get(joint).copied().unwrap_or(0.0),
+            None => best,
+        };
+        // A scale that nobody knows is part of the fit.
+        if !share.is_finite() || share * KNOWN >= 1.0 {
+            return;
+        }
+        for (name, interval) in intervals {
+            let scaled = words::is_of_effort(name) || words::grows_with_effort(name);
+            if let Some(number) = parameters.get(name).and_then(Value::as_f64)
+                && scaled
+            {
+                *interval = wider(*interval, number, share);
+            }
+        }
     }
 }
 

@@ -1,0 +1,144 @@
+//! A corrected twin to start from: what is new is told beside what it knows already.
+
+use tauscope_dynamics::Model;
+use tauscope_dynamics::terms::{Against, Layer, Physics, PlaceKind, TermError, TermSpec};
+
+use crate::track::Track;
+use crate::words;
+
+/// A known scale is at least this many times its own deviation.
+pub const KNOWN: f64 = 5.0;
+
+/// And one that is better than none.
+const LIKELY: f64 = 2.0;
+
+/// A corrected twin.
+#[derive(Debug, Clone, Default)]
+pub struct Start {
+    /// Its physics.
+    pub terms: Vec<TermSpec>,
+    /// Gain of each joint's bodies \[effort unit per model unit\].
+    pub gain: Vec<f64>,
+    /// Standard deviation of each gain, where it stands for a torque constant: infinite where the gain is not identifiable.
+    pub gain_deviation: Vec<f64>,
+    /// Offset of each joint \[effort unit\].
+    pub offset: Vec<f64>,
+}
+
+impl Start {
+    /// Whether the gain of a joint tells how many N m its effort is.
+    pub fn is_scale_known(&self, joint: usize) -> bool {
+        self.gain[joint] > KNOWN * self.gain_deviation[joint]
+    }
+
+    /// N m per recorded unit by joint, where the gains stand for torque constants; 1 where a gain tells nothing.
+    pub fn units_nm(&self) -> Vec<f64> {
+        let of = |joint| {
+            if self.is_scale_known(joint) {
+                1.0 / self.gain[joint]
+            } else {
+                1.0
+            }
+        };
+        (0..self.gain.len()).map(of).collect()
+    }
+
+    /// The likeliest N m per recorded unit by joint, where the gains stand for torque constants: of a gain that tells next to nothing
+    /// the middle one of the others.
+    pub fn likely_units_nm(&self) -> Vec<f64> {
+        let joints = 0..self.gain.len();
+        let tells = |&j: &usize| self.gain[j] > LIKELY * self.gain_deviation[j];
+        let mut told: Vec<f64> = (joints.clone().filter(tells))
+            .map(|j| 1.0 / self.gain[j])
+            .collect();
+        told.sort_by(f64::total_cmp);
+        let middle = told.get(told.len() / 2).copied().unwrap_or(1.0);
+        let of = |j| {
+            if tells(&j) {
+                1.0 / self.gain[j]
+            } else {
+                middle
+            }
+        };
+        joints.map(of).collect()
+    }
+
+    /// Whether something of it depends on what the gears transmit.
+    pub fn needs_load(&self) -> bool {
+        let needs = |term: &TermSpec| {
+            let against = term.table.as_ref().map(|table| table.against);
+            term.effect == "load_dependent_friction" || against == Some(Against::Load)
+        };
+        self.terms.iter().any(needs)
+    }
+
+    /// Puts the twin's bodies into what bodies cost along a track, and all else it says beside them: so that what a new body costs
+    /// is on the same scale as the old ones. `loads` are new bodies that the gears are known to bear, too. `constants` turn the
+    /// recording's unit into the model's, and `gain` is what the bodies of each joint are taken by, from the model's unit into the
+    /// recording's.
+    ///
+    /// # Errors
+    /// If a term cannot be built for the robot.
+    pub fn apply(
+        &self,
+        track: &mut Track,
+        model: &Model,
+        loads: &[TermSpec],
+        constants: &[f64],
+        gain: &[f64],
+    ) -> Result<(), TermError> {
+        let n = gain.len();
+        let of_bodies = |spec: &&TermSpec| spec.effect().is_ok_and(|e| e.layer == Layer::Body);
+        let (bodies, beside): (Vec<_>, Vec<_>) = self.terms.iter().partition(of_bodies);
+        let run = |track: &Track, terms: &[&TermSpec], from: &[f64]| {
+            let built = terms.iter().map(|spec| spec.build(model));
+            let mut physics = Physics::new(built.collect::<Result<_, _>>()?, n);
+            Ok(track.run(&mut physics, from))
+        };
+        track.rigid = run(track, &bodies, &track.rigid)?;
+        let borne = run(track, &loads.iter().collect::<Vec<_>>(), &track.rigid)?;
+        let scaled = borne.iter().enumerate();
+        let effort: Vec<f64> = scaled.map(|(k, x)| x * self.gain[k % n]).collect();
+        track.beside = run(track, &beside, &effort)?;
+        for (k, value) in track.beside.iter_mut().enumerate() {
+            let j = k % n;
+            *value = *value / constants[j] + self.offset[j] - gain[j] * borne[k];
+        }
+        Ok(())
+    }
+}
+
+/// A term told in N m, in the units that the recordings are in, by joint \[N m per recorded unit\].
+pub fn in_recorded_units(term: &TermSpec, model: &Model, units_nm: &[f64]) -> TermSpec {
+    let mut term = term.clone();
+    let at = |name: &Option<String>| name.as_ref().and_then(|name| model.joint_index(name));
+    let Ok(effect) = term.effect() else {
+        return term;
+    };
+    let Some(joint) = at(&term.joint).filter(|_| effect.layer != Layer::Body) else {
+        return term;
+    };
+    for (name, value) in &mut term.parameters {
+        if words::is_of_effort(name) {
+            *value /= units_nm[joint];
+        }
+    }
+    if effect.place == PlaceKind::TwoJoints
+        && let Some(source) = at(&term.source_joint)
+        && let Some(coefficient) = term.parameters.get_mut("coefficient")
+    {
+        *coefficient *= units_nm[source] / units_nm[joint];
+    }
+    if let Some(table) = &mut term.table {
+        let of_joint = at(&table.of_joint).unwrap_or(joint);
+        for value in &mut table.values {
+            *value /= units_nm[joint];
+        }
+        if table.against == Against::Load {
+            for knot in &mut table.knots {
+                *knot /= units_nm[of_joint];
+            }
+        }
+    }
+    term
+}
