@@ -36,7 +36,7 @@ const TIE_SHARE: f64 = 0.01;
 /// How many proposals of a round are refined before one is taken.
 const REFINED: usize = 3;
 /// More pieces of physics than this are not looked for.
-const MOST_PIECES: usize = 24;
+const MOST_PIECES: usize = 48;
 /// An exchange must gain this \[nats\].
 const LEAST_GAIN: f64 = 0.5;
 /// So often pieces are added and all exchanged again.
