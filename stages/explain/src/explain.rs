@@ -11,12 +11,13 @@ use crate::audit;
 use crate::drive;
 use crate::findings::{self, Named};
 use crate::fit::Fit;
+use crate::friction;
 use crate::library;
 use crate::locate;
 use crate::problem::Problem;
 use crate::recording::Recording;
 use crate::report::{RecordingPicture, Report, Undetectable, Verdict};
-use crate::start::{Start, in_recorded_units};
+use crate::start::{Start, scales};
 use crate::track::Track;
 use crate::windows::{TimeKind, time_kind};
 
@@ -223,26 +224,6 @@ fn not_evaluated(input: &Input, joints: Vec<String>, reason: String) -> Outcome 
     }
 }
 
-/// N m per recorded unit by joint, and the joints of which nobody knows it, with the gain that their bodies are taken by at first.
-fn scales(input: &Input, constants: &[f64], at_rest: bool) -> (Vec<f64>, Vec<(usize, f64)>) {
-    if input.effort_unit != "A" || input.torque_constants_nm_per_a.is_some() {
-        return (constants.to_vec(), Vec::new());
-    }
-    let joints = 0..constants.len();
-    let Some(start) = &input.start else {
-        return (constants.to_vec(), joints.map(|j| (j, 1.0)).collect());
-    };
-    let unknown = joints.filter(|&j| !start.is_scale_known(j));
-    let unknown = unknown.map(|j| (j, start.gain[j])).collect();
-    // At rest nothing would tell them.
-    let units_nm = if at_rest {
-        start.likely_units_nm()
-    } else {
-        start.units_nm()
-    };
-    (units_nm, unknown)
-}
-
 /// What every step needs.
 pub(crate) struct Setup<'a> {
     pub input: &'a Input,
@@ -312,14 +293,23 @@ impl Setup<'_> {
             .iter()
             .map(|recording| self.track(recording, motion_cutoff_hz))
             .collect::<Result<Vec<_>, _>>()?;
-        Ok(Problem::new(
+        let mut problem = Problem::new(
             &self.input.model,
             recordings,
             tracks,
             cutoff_hz,
             self.unit_nm,
             rests_count,
-        ))
+        );
+        if let Some(start) = &self.input.start {
+            problem.known_friction = start.friction(&self.input.model);
+            if self.input.torque_constants_nm_per_a.is_none() {
+                for (known, unit) in problem.known_friction.iter_mut().zip(self.unit_nm) {
+                    *known = known.map(|value| value * unit);
+                }
+            }
+        }
+        Ok(problem)
     }
 
     /// What the bodies of each joint are taken by at first, from the model's unit into the recording's.
@@ -384,12 +374,12 @@ impl Setup<'_> {
             }
             let term = self.spec(active);
             // With torque constants the terms of a twin are in N m, else in what was recorded.
-            let recorded = self.input.torque_constants_nm_per_a.is_none();
-            terms.push(if recorded {
-                in_recorded_units(&term, &self.input.model, self.unit_nm)
+            let term = if self.input.torque_constants_nm_per_a.is_none() {
+                friction::in_recorded_units(&term, &self.input.model, self.unit_nm)
             } else {
                 term
-            });
+            };
+            friction::add(term, &mut terms);
         }
         terms
     }

@@ -133,7 +133,8 @@ pub fn of(
             let vague = parameter.name.contains("time") && *deviation > VAGUE_S;
             if deviation.is_finite() && !vague {
                 let half = HALF_WIDTH_95 * deviation;
-                let low = (value - half).max(parameter.minimum);
+                let least = search.problem.least(active.hypothesis, parameter.minimum);
+                let low = (value - half).max(least);
                 intervals.insert(parameter.name.to_owned(), [low, value + half]);
             }
         }

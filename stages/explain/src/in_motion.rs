@@ -39,12 +39,16 @@ impl Setup<'_> {
         let moving = search.first_guess(drives(), penalties);
         // Where friction is not set-valued, standstills tell as much as motion.
         progress(0.3, "standstills");
+        let dry = (input.start.as_ref()).map_or_else(
+            || vec![false; joints.len()],
+            |start| start.is_dry(&input.model),
+        );
         let rests_count: Vec<bool> = (0..joints.len())
             .map(|j| {
                 let holds = |a: &Active| {
                     a.hypothesis.only_joint() == Some(j) && a.is_set_valued(&input.model)
                 };
-                !moving.fit.actives.iter().any(holds)
+                !dry[j] && !moving.fit.actives.iter().any(holds)
             })
             .collect();
         let problem = if rests_count.contains(&true) {

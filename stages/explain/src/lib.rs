@@ -14,6 +14,7 @@ mod efforts;
 pub mod explain;
 mod findings;
 pub mod fit;
+mod friction;
 pub mod html;
 mod in_motion;
 pub mod interval;

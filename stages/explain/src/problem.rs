@@ -5,9 +5,11 @@ use std::sync::{Arc, OnceLock};
 use tauscope_dynamics::terms::Expansion;
 use tauscope_dynamics::{Data, Model};
 
+use crate::active::Hypothesis;
 use crate::bodies::UnitCosts;
 use crate::columns::ColumnCache;
 use crate::efforts::Efforts;
+use crate::friction;
 use crate::recording::Recording;
 use crate::smoother::LowPass;
 use crate::track::{FitTrack, Track, moving_joints, spaced, thinned};
@@ -51,6 +53,8 @@ pub struct Problem {
     pub cutoff_hz: f64,
     /// Independent samples that a row of noise is worth, by joint.
     pub worth: Vec<f64>,
+    /// Coulomb and viscous friction by joint that the twin has already: by so much they may be less.
+    pub known_friction: Vec<[f64; 2]>,
     /// Columns that were computed before.
     pub cache: Arc<ColumnCache>,
     /// What unit bodies cost.
@@ -95,6 +99,7 @@ impl Problem {
             largest_effort: vec![0.0; n],
             cutoff_hz,
             worth: Vec::new(),
+            known_friction: vec![[0.0; 2]; n],
             cache: Arc::default(),
             units: Arc::default(),
             bare: OnceLock::new(),
@@ -163,6 +168,13 @@ impl Problem {
         }
         problem.worth = worth(&problem);
         problem
+    }
+
+    /// The least that a factor of a hypothesis may be: a friction that the twin has already may be less.
+    pub fn least(&self, hypothesis: Hypothesis, minimum: f64) -> f64 {
+        friction::plain(hypothesis.effect.name).map_or(minimum, |which| {
+            minimum - self.known_friction[hypothesis.place.joint][which]
+        })
     }
 
     /// The same where one recording does not count.

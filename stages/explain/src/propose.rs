@@ -115,7 +115,11 @@ impl<'a> Base<'a> {
         columns: &[C],
     ) -> Option<f64> {
         let trial = self.trial(alone, columns);
-        trial.gain(self.problem, &self.factored, &minimum(hypothesis))
+        trial.gain(
+            self.problem,
+            &self.factored,
+            &minimum(self.problem, hypothesis),
+        )
     }
 
     /// The same at one shape.
@@ -230,7 +234,8 @@ impl<'a> Base<'a> {
         columns: &[C],
     ) -> Option<Proposal> {
         let factors = hypothesis.factors();
-        let (values, gain, size) = self.try_columns(alone, columns, &minimum(hypothesis))?;
+        let minimum = minimum(self.problem, hypothesis);
+        let (values, gain, size) = self.try_columns(alone, columns, &minimum)?;
         let mut coordinates = shape.to_vec();
         for (&i, value) in factors.iter().zip(values) {
             coordinates[i] = value;
@@ -255,12 +260,12 @@ pub fn penalty(fit: &Fit, library: f64, free: usize, only_joint: Option<usize>) 
 }
 
 /// The least that the factors of a hypothesis may be.
-fn minimum(hypothesis: Hypothesis) -> Vec<f64> {
+fn minimum(problem: &Problem, hypothesis: Hypothesis) -> Vec<f64> {
     let factors = hypothesis.factors();
     let of = factors
         .iter()
         .map(|&i| match hypothesis.effect.coordinates[i].kind {
-            CoordinateKind::Factor { minimum, .. } => minimum,
+            CoordinateKind::Factor { minimum, .. } => problem.least(hypothesis, minimum),
             _ => f64::NEG_INFINITY,
         });
     of.collect()

@@ -183,7 +183,9 @@ impl Fit {
 /// Lowest and highest value of a coordinate.
 fn bounds(problem: &Problem, active: &Active, c: usize) -> (f64, f64) {
     match active.kind(c) {
-        CoordinateKind::Factor { minimum, .. } => (minimum, f64::INFINITY),
+        CoordinateKind::Factor { minimum, .. } => {
+            (problem.least(active.hypothesis, minimum), f64::INFINITY)
+        }
         CoordinateKind::Shape {
             lower,
             upper,

@@ -1,10 +1,12 @@
 //! A corrected twin to start from: what is new is told beside what it knows already.
 
 use tauscope_dynamics::Model;
-use tauscope_dynamics::terms::{Against, Layer, Physics, PlaceKind, TermError, TermSpec};
+use tauscope_dynamics::terms::{Against, Layer, Physics, TermError, TermSpec};
 
+use crate::active::{Hypothesis, Whereabouts};
+use crate::explain::Input;
+use crate::friction;
 use crate::track::Track;
-use crate::words;
 
 /// A known scale is at least this many times its own deviation.
 pub const KNOWN: f64 = 5.0;
@@ -72,6 +74,40 @@ impl Start {
         self.terms.iter().any(needs)
     }
 
+    /// By joint, whether it has friction that takes any value at rest.
+    pub fn is_dry(&self, model: &Model) -> Vec<bool> {
+        let mut dry = vec![false; model.dof()];
+        for spec in &self.terms {
+            let joint = (spec.joint.as_ref()).and_then(|name| model.joint_index(name));
+            let (Some(joint), Ok(effect)) = (joint, spec.effect()) else {
+                continue;
+            };
+            let place = Whereabouts {
+                joint,
+                ..Whereabouts::default()
+            };
+            dry[joint] |= match &spec.table {
+                Some(table) => table.by_direction,
+                None => Hypothesis { effect, place }.is_set_valued(model),
+            };
+        }
+        dry
+    }
+
+    /// Coulomb and viscous friction by joint, in units of its terms: by so much they may have fallen since.
+    pub fn friction(&self, model: &Model) -> Vec<[f64; 2]> {
+        let mut all = vec![[0.0; 2]; model.dof()];
+        for spec in &self.terms {
+            let joint = (spec.joint.as_ref()).and_then(|name| model.joint_index(name));
+            if let Some(joint) = joint {
+                for (sum, own) in all[joint].iter_mut().zip(friction::of(spec)) {
+                    *sum += own;
+                }
+            }
+        }
+        all
+    }
+
     /// Puts the twin's bodies into what bodies cost along a track, and all else it says beside them: so that what a new body costs
     /// is on the same scale as the old ones. `loads` are new bodies that the gears are known to bear, too. `constants` turn the
     /// recording's unit into the model's, and `gain` is what the bodies of each joint are taken by, from the model's unit into the
@@ -108,37 +144,22 @@ impl Start {
     }
 }
 
-/// A term told in N m, in the units that the recordings are in, by joint \[N m per recorded unit\].
-pub fn in_recorded_units(term: &TermSpec, model: &Model, units_nm: &[f64]) -> TermSpec {
-    let mut term = term.clone();
-    let at = |name: &Option<String>| name.as_ref().and_then(|name| model.joint_index(name));
-    let Ok(effect) = term.effect() else {
-        return term;
+/// N m per recorded unit by joint, and the joints of which nobody knows it, with the gain that their bodies are taken by at first.
+pub fn scales(input: &Input, constants: &[f64], at_rest: bool) -> (Vec<f64>, Vec<(usize, f64)>) {
+    if input.effort_unit != "A" || input.torque_constants_nm_per_a.is_some() {
+        return (constants.to_vec(), Vec::new());
+    }
+    let joints = 0..constants.len();
+    let Some(start) = &input.start else {
+        return (constants.to_vec(), joints.map(|j| (j, 1.0)).collect());
     };
-    let Some(joint) = at(&term.joint).filter(|_| effect.layer != Layer::Body) else {
-        return term;
+    let unknown = joints.filter(|&j| !start.is_scale_known(j));
+    let unknown = unknown.map(|j| (j, start.gain[j])).collect();
+    // At rest nothing would tell them.
+    let units_nm = if at_rest {
+        start.likely_units_nm()
+    } else {
+        start.units_nm()
     };
-    for (name, value) in &mut term.parameters {
-        if words::is_of_effort(name) {
-            *value /= units_nm[joint];
-        }
-    }
-    if effect.place == PlaceKind::TwoJoints
-        && let Some(source) = at(&term.source_joint)
-        && let Some(coefficient) = term.parameters.get_mut("coefficient")
-    {
-        *coefficient *= units_nm[source] / units_nm[joint];
-    }
-    if let Some(table) = &mut term.table {
-        let of_joint = at(&table.of_joint).unwrap_or(joint);
-        for value in &mut table.values {
-            *value /= units_nm[joint];
-        }
-        if table.against == Against::Load {
-            for knot in &mut table.knots {
-                *knot /= units_nm[of_joint];
-            }
-        }
-    }
-    term
+    (units_nm, unknown)
 }

@@ -6,6 +6,7 @@ use serde_json::Value;
 use tauscope_dynamics::terms::Against;
 
 use crate::active::Active;
+use crate::friction;
 
 /// `value` with three significant digits and no trailing zeros, e.g. `4.1`, `0.0235`, `21`.
 pub fn number(value: f64) -> String {
@@ -93,6 +94,21 @@ pub fn name(effect: &str) -> String {
     }
 }
 
+/// A friction that is less than the twin says.
+fn less_friction(
+    effect: &str,
+    place: &str,
+    parameters: &BTreeMap<String, Value>,
+) -> Option<String> {
+    friction::plain(effect)?;
+    let (parameter, value) = parameters.iter().next()?;
+    let value = value.as_f64().filter(|value| *value < 0.0)?;
+    let (less, unit, name) = (number(-value), unit(parameter), name(effect));
+    Some(format!(
+        "Joint {place} has {less} {unit} less {name} than the twin says."
+    ))
+}
+
 /// A finding in a sentence; `place` is what the joint or link is called.
 #[expect(clippy::too_many_lines, reason = "one sentence per effect")]
 pub fn sentence(
@@ -116,6 +132,9 @@ pub fn sentence(
         format!("{} {}{between}", number(value), unit(parameter)).replace("  ", " ")
     };
     let left_out = "that the twin leaves out";
+    if let Some(less) = less_friction(effect, place, parameters) {
+        return less;
+    }
     match effect {
         "viscous_friction" => format!(
             "Joint {place} has viscous friction of {} {left_out}.",
