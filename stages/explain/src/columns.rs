@@ -9,6 +9,7 @@ use crate::active::{Active, Column, Hypothesis, Whereabouts};
 use crate::bodies::{self, TrackEfforts};
 use crate::efforts::{Efforts, change, column, recorded_on_top, scale, silent, subtract};
 use crate::fit::Fit;
+use crate::parts::feeds;
 use crate::problem::Problem;
 use crate::search::has_rotor;
 
@@ -183,8 +184,8 @@ fn computed(
     gains: &[f64],
 ) -> Columns {
     let record = hypothesis.effect.layer == Layer::Record;
-    let spreads = !record && others.iter().any(Active::is_coupling);
-    let joint = hypothesis.only_joint().filter(|_| !spreads);
+    let joint = hypothesis.only_joint();
+    let joint = joint.filter(|&joint| record || !feeds(others, joint));
     let steps = steps(hypothesis);
     let mut coordinates = shape.to_vec();
     for &(i, _) in &steps {

@@ -143,7 +143,7 @@ impl Fit {
                 joint,
             );
         }
-        let joint = joint.filter(|_| !self.parts.is_coupled());
+        let joint = joint.filter(|&joint| !self.parts.feeds(joint));
         let changed = change(problem, &self.actives, self.efforts(problem), active, gains);
         column(problem, &changed, joint)
     }
@@ -248,7 +248,7 @@ impl Fit {
             let mut all = self.actives.clone();
             all[index] = there;
             let changed = record(problem, &all, &self.efforts(problem).mechanical);
-            joint = hypothesis.only_joint().filter(|_| !self.parts.is_coupled());
+            joint = (hypothesis.only_joint()).filter(|&joint| !self.parts.feeds(joint));
             values = column(problem, &changed, joint).values;
             let rows = joint.map_or(0..problem.joints * problem.rows, |j| problem.joint_rows(j));
             let explained = problem.measured[rows.clone()]

@@ -23,8 +23,8 @@ pub struct Parts {
     columns: Vec<Option<Arc<Column>>>,
     /// What the gears transmit, if a part depends on it.
     load: Option<Arc<TrackEfforts>>,
-    /// Whether a joint's recording feels another joint's.
-    coupled: bool,
+    /// Joints whose recording another joint's feels.
+    feeds: Vec<bool>,
 }
 
 impl Parts {
@@ -35,7 +35,9 @@ impl Parts {
             transformed: transformed(actives, problem.joints),
             columns: Vec::with_capacity(actives.len()),
             load: None,
-            coupled: actives.iter().any(Active::is_coupling),
+            feeds: (0..problem.joints)
+                .map(|joint| feeds(actives, joint))
+                .collect(),
         };
         if actives.iter().any(Active::needs_load) {
             let known = before.filter(|(others, _)| same_bodies(actives, others));
@@ -74,17 +76,16 @@ impl Parts {
     pub fn is_plain(&self, hypothesis: &Hypothesis) -> bool {
         let of_record = hypothesis.effect.layer == Layer::Record && !is_bias(hypothesis);
         !of_record
-            && !self.coupled
             && !is_drive(hypothesis)
             && match hypothesis.only_joint() {
-                Some(joint) => !self.transformed[joint],
+                Some(joint) => !self.transformed[joint] && !self.feeds[joint],
                 None => !self.transformed.contains(&true),
             }
     }
 
-    /// Whether a joint's recording feels another joint's.
-    pub fn is_coupled(&self) -> bool {
-        self.coupled
+    /// Whether another joint's recording feels a joint's.
+    pub fn feeds(&self, joint: usize) -> bool {
+        self.feeds[joint]
     }
 
     /// What the gears transmit, if a part depends on it.
@@ -193,6 +194,14 @@ fn add(into: &mut [f64], what: &[f64]) {
 
 fn is_bias(hypothesis: &Hypothesis) -> bool {
     hypothesis.effect.name == "torque_bias"
+}
+
+/// Whether another joint's recording feels a joint's.
+pub fn feeds(actives: &[Active], joint: usize) -> bool {
+    let couplings = actives.iter().filter(|active| active.is_coupling());
+    couplings
+        .map(|active| active.hypothesis.place.source)
+        .any(|source| source == joint)
 }
 
 /// The joints whose recording something transforms; an offset alone does not.

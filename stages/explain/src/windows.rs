@@ -76,17 +76,23 @@ impl Base<'_> {
         let all = columns(problem, self.fit, hypothesis, &shape);
         // With the change before everything, the second factor's column is the whole effect.
         let whole = all.factors.last()?;
-        let joint = whole.joint?;
+        let joint = hypothesis.only_joint()?;
         let split = |first: usize| {
             let (mut before, mut after) = (Column::clone(whole), Column::clone(whole));
-            before.values[first..].fill(0.0);
-            after.values[..first].fill(0.0);
+            // Of each joint that the column goes over.
+            for block in before.values.chunks_mut(problem.rows) {
+                block[first..].fill(0.0);
+            }
+            for block in after.values.chunks_mut(problem.rows) {
+                block[..first].fill(0.0);
+            }
             [before, after]
         };
         let weight = &problem.weight[problem.joint_rows(joint)];
+        let own = whole.of_joint(joint, problem.rows)?;
         let moves = |(value, weight): (&f64, &f64)| *value != 0.0 && *weight > 0.0;
         let rows: Vec<usize> = (0..problem.rows)
-            .filter(|&row| moves((&whole.values[row], &weight[row])))
+            .filter(|&row| moves((&own[row], &weight[row])))
             .collect();
         let mut times = Vec::new();
         for track in &problem.tracks {

@@ -3,7 +3,7 @@
 use super::{Explanation, LEAST_GAIN, Search, describe};
 use crate::active::Hypothesis;
 use crate::drive::is_drive;
-use crate::propose::Proposal;
+use crate::propose::{Base, Proposal};
 use crate::windows::{TimeKind, time_kind};
 
 /// A rival may gain this much less to first order than what it is to replace.
@@ -48,7 +48,8 @@ impl Search<'_> {
         if pushes.len() > 1 {
             let less = |from: Explanation, index: &usize| self.less(&from, *index);
             let without = pushes.iter().rev().fold(best.clone(), less);
-            if let Some(better) = self.replaced(&best, &without, pushes[0]) {
+            let better = self.replaced(&best, &without, pushes[0]);
+            if let Some(better) = better.or_else(|| self.walled(&best, &without)) {
                 (self.say)(&format!("== {}", describe(&better)));
                 best = better;
             }
@@ -75,6 +76,18 @@ impl Search<'_> {
             }
         }
         best
+    }
+
+    /// The better explanation that a wall makes in the place of all pushes, if it does: where it is, only a search tells, so that what
+    /// it gains at first is no measure.
+    fn walled(&self, best: &Explanation, without: &Explanation) -> Option<Explanation> {
+        let wall = |h: &&Hypothesis| h.effect.name == "contact_wall";
+        let wall = self.hypotheses.iter().find(wall)?;
+        let base = Base::new(self.problem, &without.fit, self.hypotheses.len());
+        let proposal = base.propose_in_time(*wall)?;
+        let walled = self.joined(without, &proposal, best.fit.likelihood());
+        let walled = self.pruned(walled);
+        (walled.ahead_of(best, &self.problem.worth) > LEAST_GAIN).then_some(walled)
     }
 
     /// The better explanation that a rival makes in place of what `without` lacks, if one does; one of the pieces taken
