@@ -25,7 +25,7 @@ const LEAST_SIZE_BESIDE_CURVE: f64 = 3.0;
 /// Evidence that needs no account of correlation, if rows counted in full \[nats\].
 const OVERWHELMING: f64 = 40.0;
 /// And what is left over what is then left; a curve, which bends to any slow noise, must do much more.
-const FAIR_SHARE: f64 = 1.3;
+const FAIR_SHARE: f64 = 1.8;
 const FAIR_SHARE_OF_CURVE: f64 = 3.0;
 /// What began or ended so much beside a recording began or ended with it \[s\].
 const BESIDE_S: f64 = 0.5;
