@@ -24,8 +24,10 @@ const INTERVAL_EVIDENCE: f64 = 40.0;
 const LEAST_SIZE_BESIDE_CURVE: f64 = 3.0;
 /// Evidence that needs no account of correlation, if rows counted in full \[nats\].
 const OVERWHELMING: f64 = 40.0;
-/// And what is left over what is then left; a curve, which bends to any slow noise, must do much more.
+/// And what is left over what is then left: of what lasts, which may follow slow noise all the time; of what comes and goes; and of a
+/// curve, which bends to any slow noise and must do much more.
 const FAIR_SHARE: f64 = 1.8;
+const FAIR_SHARE_FOR_A_WHILE: f64 = 1.3;
 const FAIR_SHARE_OF_CURVE: f64 = 3.0;
 /// What began or ended so much beside a recording began or ended with it \[s\].
 const BESIDE_S: f64 = 0.5;
@@ -53,9 +55,14 @@ impl Explanation {
 /// in full: however correlated the rest is, that much is no chance.
 pub fn overwhelming(explanation: &Explanation, other: &Explanation) -> bool {
     let white = vec![1.0; other.fit.variance.len()];
-    let curves = |e: &Explanation| e.fit.actives.iter().filter(|a| a.curve.is_some()).count();
-    let share = if curves(explanation) > curves(other) {
+    let more = |is: &dyn Fn(&Active) -> bool| {
+        let count = |e: &Explanation| e.fit.actives.iter().filter(|a| is(a)).count();
+        count(explanation) > count(other)
+    };
+    let share = if more(&|a| a.curve.is_some()) {
         FAIR_SHARE_OF_CURVE
+    } else if more(&|a| time_kind(a.hypothesis) == TimeKind::Once) {
+        FAIR_SHARE_FOR_A_WHILE
     } else {
         FAIR_SHARE
     };

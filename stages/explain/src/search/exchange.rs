@@ -82,12 +82,20 @@ impl Search<'_> {
     /// it gains at first is no measure.
     fn walled(&self, best: &Explanation, without: &Explanation) -> Option<Explanation> {
         let wall = |h: &&Hypothesis| h.effect.name == "contact_wall";
-        let wall = self.hypotheses.iter().find(wall)?;
+        let hypothesis = self.hypotheses.iter().find(wall)?;
         let base = Base::new(self.problem, &without.fit, self.hypotheses.len());
-        let proposal = base.propose_in_time(*wall)?;
+        let proposal = base.propose_in_time(*hypothesis)?;
         let walled = self.joined(without, &proposal, best.fit.likelihood());
-        let walled = self.pruned(walled);
-        (walled.ahead_of(best, &self.problem.worth) > LEAST_GAIN).then_some(walled)
+        // Pushes are evident by rows that count in full, whatever is left beside them.
+        let white = vec![1.0; self.problem.joints];
+        let is_better = |e: &Explanation| {
+            let stands = e.fit.actives.iter().any(|a| wall(&&a.hypothesis));
+            stands
+                && e.ahead_of(best, &white) > LEAST_GAIN
+                && e.ahead_of(best, &self.problem.worth) > LEAST_GAIN
+        };
+        let walled = is_better(&walled).then(|| self.pruned(walled))?;
+        is_better(&walled).then_some(walled)
     }
 
     /// The better explanation that a rival makes in place of what `without` lacks, if one does; one of the pieces taken
