@@ -88,6 +88,9 @@ pub(super) fn add<'a>(
     Ok((Cow::Owned(open), Some(concealed)))
 }
 
+/// What bodies weigh, for good: one of these at most.
+const MASSES: [&str; 3] = ["payload", "link_mass", "link_com"];
+
 fn draw(
     spec: &ConcealSpec,
     scenario: &Scenario,
@@ -101,9 +104,14 @@ fn draw(
     let mut rng = ChaCha8Rng::seed_from_u64(spec.seed);
     names.shuffle(&mut rng);
     let mut plan = Plan::new(scenario, model)?;
+    let is_mass = |name: &str| MASSES.contains(&name);
     for name in names {
         if effects.len() == spec.count as usize {
             break;
+        }
+        // What a link weighs more and what the tool carries may be one body.
+        if is_mass(name) && effects.iter().any(|other| is_mass(&other.term.effect)) {
+            continue;
         }
         for _ in 0..PLACES {
             let candidate = candidate(name, &plan, &mut rng);

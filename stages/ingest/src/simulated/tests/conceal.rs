@@ -70,6 +70,12 @@ fn several_are_different_ones_in_different_joints() {
     let different: BTreeSet<_> = joints.iter().collect();
     assert_eq!(joints.len(), different.len());
     assert!(concealed("seed: 5, count: 0").unwrap().effects.is_empty());
+    let masses = concealed("seed: 5, effects: [payload, link_mass, link_com], count: 2");
+    assert!(
+        masses
+            .unwrap_err()
+            .starts_with("conceal: only 1 of 2 effects can be seen")
+    );
 }
 
 #[test]
