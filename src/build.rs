@@ -161,12 +161,11 @@ pub fn detect_setup(
     let correction = correction(model, cell)?;
     let constants = cell.facts.torque_constants_nm_per_a.as_deref();
     let joints = correction.joints.iter().enumerate().map(|(index, joint)| {
-        // The regression's gain is no drive gain where friction outweighs what the model knows: it
-        // stands for one only where nothing else is known and the model explains the effort.
+        // A gain is no drive's where friction outweighs what the model knows.
         let effort_per_nm = match (cell.facts.effort_unit, constants) {
             (EffortUnit::Nm, _) => 1.0,
             (EffortUnit::A, Some(constants)) => 1.0 / constants[index],
-            (EffortUnit::A, None) if joint.explained.is_some_and(|share| share > 0.5) => joint.gain,
+            (EffortUnit::A, None) if joint.tells_torque() => joint.gain,
             (EffortUnit::A, None) => f64::NAN,
         };
         tauscope_detect::JointSetup {

@@ -211,7 +211,11 @@ impl Job<'_> {
             let states = graph.source("ingest", Box::new(source))?;
             let twins = graph.stage("twin", Box::new(twin), &states)?;
             let input = graph.listen::<TwinState>(&twins)?;
-            graph.sink("calibration", Box::new(Settled(take)), vec![input]);
+            graph.sink(
+                "calibration",
+                Box::new(Settled { take, reset: true }),
+                vec![input],
+            );
             let counts = graph.run(progress)?;
             Ok(counts.iter().map(|stage| stage.dropped).sum())
         };
@@ -257,15 +261,26 @@ impl Job<'_> {
     }
 }
 
-/// Hands every sample whose filters have settled to a closure.
-struct Settled<'a>(&'a mut (dyn FnMut(&TwinState) + Send));
+/// Hands every sample whose filters have settled to a closure; the first one after a reset says so.
+struct Settled<'a> {
+    take: &'a mut (dyn FnMut(&TwinState) + Send),
+    reset: bool,
+}
 
 impl Sink for Settled<'_> {
     fn accept(&mut self, _from: &str, sample: SampleRef<'_>) -> Result<(), StageError> {
-        if let SampleRef::TwinState(sample) = sample
-            && sample.header.has(flags::READY)
-        {
-            (self.0)(sample);
+        let SampleRef::TwinState(sample) = sample else {
+            return Ok(());
+        };
+        self.reset |= sample.header.has(flags::RESET);
+        if sample.header.has(flags::READY) {
+            if std::mem::take(&mut self.reset) {
+                let mut first = *sample;
+                first.header.flags |= flags::RESET;
+                (self.take)(&first);
+            } else {
+                (self.take)(sample);
+            }
         }
         Ok(())
     }

@@ -134,17 +134,12 @@ fn start(request: &Request, report: &mut Report) -> Option<Start> {
     }
 }
 
-/// Of the variance of a joint's effort a line must explain this much if its slope is to be the drive's.
-const LEAST_EXPLAINED: f64 = 0.5;
-
-/// How well a file knows a joint's gain: not at all where the line that it is the slope of explains little.
+/// How well a file knows a joint's gain.
 fn gain_deviation(joint: &JointCorrection) -> f64 {
-    let of_line = joint.explained.map_or(0.0, |explained| {
-        if explained < LEAST_EXPLAINED {
-            f64::INFINITY
-        } else {
-            0.0
-        }
-    });
+    let of_line = if joint.tells_torque() {
+        0.0
+    } else {
+        f64::INFINITY
+    };
     joint.gain_deviation.unwrap_or(of_line)
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::detector::Detector;
 use crate::learned::TrainedError;
-use crate::stage::Setup;
+use crate::stage::{JointSetup, Setup};
 use crate::virtual_collision_sensor::Learnt;
 use crate::{
     contact_classifier, fisher_discriminant, frequency_classifier, lstm_momentum_observer,
@@ -162,15 +162,17 @@ impl Config {
         }
     }
 
-    /// Every detector that only a threshold is wanting to, with its usual settings.
+    /// Every detector that only a threshold is wanting to, with its usual settings; none that needs torques where no joint tells any.
     ///
     /// # Errors
     /// If `setup` lacks what one of them needs.
     pub fn every(setup: &Setup) -> Result<Vec<Box<dyn Detector>>, ConfigError> {
+        let tells_torque = setup.joints.iter().any(JointSetup::tells_torque);
         let all = Self {
             twin_regression: Some(twin_regression::Settings::default()),
             naive_difference: Some(naive_difference::Settings::default()),
-            momentum_observer: (setup.model.is_some()).then(momentum_observer::Settings::default),
+            momentum_observer: (setup.model.is_some() && tells_torque)
+                .then(momentum_observer::Settings::default),
             ..Self::default()
         };
         all.detectors(setup)

@@ -25,7 +25,7 @@ use tauscope_dynamics::{Data, InertialEffort, Model};
 
 use crate::config::ConfigError;
 use crate::shared::Tap;
-use crate::stage::Setup;
+use crate::stage::{JointSetup, Setup};
 
 /// The papers' gain \[1/s\].
 pub const DEFAULT_GAIN_PER_S: f64 = 100.0;
@@ -63,8 +63,7 @@ impl MomentumObserver {
         let Some(model) = &setup.model else {
             return Err(ConfigError::NoModel { detector });
         };
-        let known = |per_nm: f64| per_nm.is_finite() && per_nm != 0.0;
-        if !(setup.joints.iter()).any(|joint| known(joint.effort_per_nm)) {
+        if !setup.joints.iter().any(JointSetup::tells_torque) {
             return Err(ConfigError::NoTorque { detector });
         }
         let new = || Inertia::new(model.clone());
@@ -75,8 +74,13 @@ impl MomentumObserver {
                 None => Tap::own(new()),
             },
             nm_per_effort: (setup.joints.iter())
-                .map(|joint| Some(joint.effort_per_nm).filter(|&per_nm| known(per_nm)))
-                .map(|per_nm| per_nm.map_or(0.0, f64::recip))
+                .map(|joint| {
+                    if joint.tells_torque() {
+                        joint.effort_per_nm.recip()
+                    } else {
+                        0.0
+                    }
+                })
                 .collect(),
             before_ns: None,
             excess: [0.0; MAX_JOINTS],

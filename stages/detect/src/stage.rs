@@ -71,6 +71,13 @@ pub struct JointSetup {
     pub effort_per_nm: f64,
 }
 
+impl JointSetup {
+    /// Whether its effort tells a torque.
+    pub fn tells_torque(&self) -> bool {
+        self.effort_per_nm.is_finite() && self.effort_per_nm != 0.0
+    }
+}
+
 /// A detector's score on contact-free data.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScoreStatistics {

@@ -83,6 +83,22 @@ pub struct JointCorrection {
     pub explained: Option<f64>,
 }
 
+/// A line's slope is a drive's gain where the line explains more than this share of the effort's variance,
+const EXPLAINED: f64 = 0.5;
+/// and a fitted gain is one where it is this many times its standard deviation.
+const KNOWN: f64 = 5.0;
+
+impl JointCorrection {
+    /// Whether the gain tells how much effort 1 N m is, where no torque constant does.
+    pub fn tells_torque(&self) -> bool {
+        match (self.gain_deviation, self.explained) {
+            (Some(deviation), _) => self.gain > KNOWN * deviation,
+            (None, Some(explained)) => explained > EXPLAINED,
+            (None, None) => false,
+        }
+    }
+}
+
 impl Default for JointCorrection {
     fn default() -> Self {
         Self {

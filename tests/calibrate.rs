@@ -1,0 +1,45 @@
+//! `tauscope calibrate` on several recordings.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+mod common;
+
+use std::collections::BTreeMap;
+
+use common::{Out, bundled, tauscope};
+use tauscope_twin::TwinFile;
+
+/// By detector, samples and mean of its score on bundled recordings, in this order.
+fn scores(recordings: [&str; 2]) -> BTreeMap<String, (u64, f64)> {
+    let folder = tempfile::tempdir().unwrap();
+    let twin = folder.path().join("twin.yaml");
+    let mut calibrate = tauscope();
+    calibrate
+        .args(["calibrate", "--robot"])
+        .arg(bundled().join("demo_arm.urdf"))
+        .args(recordings.map(|name| bundled().join(name)))
+        .arg("--out")
+        .arg(&twin);
+    let out = Out::of(calibrate);
+    assert_eq!(out.code, 0, "{}", out.stderr);
+    let file: TwinFile = serde_saphyr::from_str(&std::fs::read_to_string(twin).unwrap()).unwrap();
+    let of = |(name, score): (String, tauscope_twin::ScoreStatistics)| {
+        (name, (score.samples, score.mean))
+    };
+    file.scores.into_iter().map(of).collect()
+}
+
+#[test]
+fn a_detector_begins_anew_with_each_recording_whichever_was_recorded_first() {
+    let forth = scores(["demo_train_points.mcap", "demo_train_sweep.mcap"]);
+    let back = scores(["demo_train_sweep.mcap", "demo_train_points.mcap"]);
+    assert_eq!(forth.len(), 3);
+    for (detector, (samples, mean)) in &forth {
+        let (other_samples, other_mean) = back[detector];
+        assert_eq!(*samples, other_samples, "{detector}");
+        assert!(
+            (mean / other_mean - 1.0).abs() < 1e-6,
+            "{detector}: {mean} and {other_mean}"
+        );
+    }
+}
