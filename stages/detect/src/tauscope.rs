@@ -17,6 +17,7 @@
 //! Isolation, and Identification", 2017, sections V and VI).
 
 mod alarm;
+mod friction;
 mod kinds;
 mod learnt;
 mod pieces;
@@ -39,6 +40,7 @@ use crate::lesson::{LearnError, Lessons};
 use crate::rate::Rate;
 use crate::stage::Setup;
 use alarm::Watch;
+pub use friction::LearntFriction;
 pub use kinds::Kinds;
 use learnt::ENOUGH_S;
 pub use learnt::{Learnt, LearntJoint, LearntWindow};

@@ -3,11 +3,12 @@
 use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tauscope_bus::{MAX_JOINTS, TwinState, flags};
+use tauscope_bus::{TwinState, flags};
 
 use super::NAME;
+use super::friction::{LearntFriction, Shown};
 use super::kinds::Kinds;
-use super::pieces::{Piece, free, free_s, marked, pieces, quantile};
+use super::pieces::{FOLDS, Piece, free, free_s, marked, pieces, quantile};
 use super::rest::{self, LearntRest};
 use super::smallest::Smallest;
 use super::tail::{Peaks, Tail};
@@ -24,14 +25,14 @@ const BINS: usize = 5;
 const FAST: f64 = 0.95;
 /// Speed below which a joint is not taken to move at all \[rad/s\].
 const LEAST_FAST_RAD_S: f64 = 0.01;
-/// The noise of a class of speed is taken for the joint's where it has no more samples than this.
-const PRIOR_SAMPLES: f64 = 200.0;
+/// The noise of a class of speed is taken for the joint's where it has not lasted longer than this \[s\].
+const PRIOR_S: f64 = 2.0;
 /// Correlations are believed to this share.
 const BELIEVED: f64 = 0.95;
 /// The share of contact-free samples that stays below the unit of a window's score.
 const USUAL: f64 = 0.999;
-/// In how many parts data is held out from what its noise is learnt from.
-const FOLDS: usize = 4;
+/// A sample lasts no longer than this \[s\].
+const MOST_STEP_S: f64 = 0.05;
 /// The least that can be learnt from \[samples\].
 const LEAST_SAMPLES: usize = 500;
 /// With less than this a tail cannot be told, nor how often a threshold is exceeded \[s\].
@@ -78,6 +79,9 @@ pub struct LearntJoint {
     pub name: String,
     /// Its usual highest speed \[rad/s\], by which speeds are classed.
     pub fast_rad_s: f64,
+    /// What the twin leaves out over its velocity, where that was told.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction: Option<LearntFriction>,
 }
 
 /// The mean residual over one window.
@@ -143,6 +147,7 @@ impl Learnt {
             smallest: Vec::new(),
             kinds: None,
         };
+        learnt.rub(pieces);
         learnt.windows = learnt.noise(pieces, follow);
         if !learnt.last_pays() {
             learnt.windows.pop();
@@ -179,15 +184,36 @@ impl Learnt {
             ));
         }
         let is_rate = self.rate_hz > 0.0;
-        (!is_rate).then(|| "has a rate that is not above 0".to_owned())
+        if !is_rate {
+            return Some("has a rate that is not above 0".to_owned());
+        }
+        let rubs = self
+            .joints
+            .iter()
+            .filter_map(|joint| joint.friction.as_ref());
+        let whole = rubs.into_iter().all(LearntFriction::is_whole);
+        (!whole).then(|| "is not whole: a joint's friction".to_owned())
     }
 
-    fn fast(&self) -> [f64; MAX_JOINTS] {
-        let mut fast = [0.0; MAX_JOINTS];
-        for (fast, joint) in fast.iter_mut().zip(&self.joints) {
-            *fast = joint.fast_rad_s;
+    /// Tells friction that the twin leaves out, where enough was seen of it.
+    fn rub(&mut self, all: &[Piece<'_>]) {
+        if self.free_s.is_some_and(|free_s| free_s < ENOUGH_S) {
+            return;
         }
-        fast
+        for (j, joint) in self.joints.iter_mut().enumerate() {
+            let mut shown: Vec<Shown> = all.iter().map(|piece| Shown::of(piece.fold)).collect();
+            for (shown, piece) in shown.iter_mut().zip(all) {
+                let mut before_ns = None;
+                for sample in free(piece) {
+                    let now_ns = sample.header.stamp_ns;
+                    let dt_s = (now_ns - before_ns.replace(now_ns).unwrap_or(now_ns)) as f64 * 1e-9;
+                    let residual = sample.effort[j] - sample.expected_effort[j];
+                    let dt_s = dt_s.min(MOST_STEP_S);
+                    shown.add(dt_s, sample.velocity[j], joint.fast_rad_s, residual);
+                }
+            }
+            joint.friction = LearntFriction::new(&shown);
+        }
     }
 
     /// Root mean square of the means by window, joint and class of speed.
@@ -195,7 +221,7 @@ impl Learnt {
         let n = self.joints.len();
         let mut sums = vec![vec![[(0.0, 0.0); BINS]; n]; WINDOWS_S.len()];
         for piece in all {
-            let mut means = Means::new(self.fast(), follow, WINDOWS_S.len());
+            let mut means = Means::new(&self.joints, follow, WINDOWS_S.len());
             for (sample, is_free) in marked(piece) {
                 restart(&mut means, sample);
                 means.push(sample, is_free);
@@ -205,19 +231,21 @@ impl Learnt {
                 for (w, sums) in sums.iter_mut().enumerate() {
                     for j in 0..n {
                         let (square, count) = &mut sums[j][bin(&self.joints[j], means.slow[j])];
-                        *square += means.mean(w, j).powi(2);
+                        *square += means.mean(w, j).powi(2) + means.doubt(j).powi(2);
                         *count += 1.0;
                     }
                 }
             }
         }
+        let samples: f64 = all.iter().map(|piece| free(piece).count() as f64).sum();
+        let prior = PRIOR_S * samples / self.free_s.unwrap_or(0.0).max(PRIOR_S);
         let one = |bins: &[(f64, f64); BINS]| -> Vec<f64> {
             let (square, count) = bins
                 .iter()
                 .fold((0.0, 0.0), |(s, c), (square, n)| (s + square, c + n));
             let overall = square / f64::max(count, 1.0);
             let of = |(square, count): &(f64, f64)| {
-                ((square + PRIOR_SAMPLES * overall) / (count + PRIOR_SAMPLES))
+                ((square + prior * overall) / (count + prior))
                     .sqrt()
                     .max(1e-9)
             };
@@ -358,9 +386,9 @@ fn held_out_peaks(all: &[Piece<'_>], joint_names: &[String], follow: Follow) -> 
     let mut peaks = Vec::new();
     for fold in 0..FOLDS {
         let part = |held_out: bool| -> Vec<Piece<'_>> {
-            let pieces = all.iter().enumerate();
-            let pieces = pieces.filter(|(i, _)| (i % FOLDS == fold) == held_out);
-            pieces.map(|(_, piece)| *piece).collect()
+            let pieces = all.iter();
+            let pieces = pieces.filter(|piece| (piece.fold == fold) == held_out);
+            pieces.copied().collect()
         };
         let others = match part(false) {
             // A single piece: nothing is left to learn from without it.
@@ -394,6 +422,7 @@ fn speeds(all: &[Piece<'_>], joint_names: &[String]) -> Vec<LearntJoint> {
             LearntJoint {
                 name: name.clone(),
                 fast_rad_s: quantile(&mut speeds, FAST).max(LEAST_FAST_RAD_S),
+                friction: None,
             }
         })
         .collect()

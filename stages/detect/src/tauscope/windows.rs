@@ -2,7 +2,8 @@
 
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 
-use super::learnt::{Learnt, bin};
+use super::friction::Usual;
+use super::learnt::{Learnt, LearntJoint, bin};
 use super::rest::Rest;
 use super::sums::Sums;
 
@@ -50,8 +51,8 @@ pub(crate) struct Follow {
 #[derive(Debug)]
 pub(crate) struct Means {
     sums: Sums,
-    /// The slow part of the residual.
-    offset: JointArray,
+    /// The residual that is usual just now, by joint.
+    usual: Vec<Usual>,
     settings: Follow,
     /// Step \[s\], and how much of the residual's drift is followed in it; kept, for clocks are often even.
     step: (f64, f64),
@@ -62,11 +63,16 @@ pub(crate) struct Means {
 }
 
 impl Means {
-    /// For joints whose usual speeds go up to `fast` \[rad/s\], over the first so many `windows`.
-    pub fn new(fast: JointArray, settings: Follow, windows: usize) -> Self {
+    /// For these joints, over the first so many `windows`.
+    pub fn new(joints: &[LearntJoint], settings: Follow, windows: usize) -> Self {
+        let mut fast = [0.0; MAX_JOINTS];
+        for (fast, joint) in fast.iter_mut().zip(joints) {
+            *fast = joint.fast_rad_s;
+        }
+        let usual = |joint: &LearntJoint| Usual::new(joint.fast_rad_s, joint.friction.as_ref());
         Self {
             sums: Sums::new(windows),
-            offset: [0.0; MAX_JOINTS],
+            usual: joints.iter().map(usual).collect(),
             settings,
             step: (0.0, 0.0),
             slow: [0.0; MAX_JOINTS],
@@ -77,7 +83,7 @@ impl Means {
 
     pub fn reset(&mut self) {
         self.sums.reset();
-        self.offset = [0.0; MAX_JOINTS];
+        self.usual.iter_mut().for_each(Usual::reset);
     }
 
     /// Whether the windows are full (the last one is as good as the one before it until then), and the offset known.
@@ -89,7 +95,7 @@ impl Means {
 
     /// Takes a sample; slow drift is followed if `follow`.
     pub fn push(&mut self, sample: &TwinState, follow: bool) {
-        let n = sample.header.joint_count as usize;
+        let n = self.usual.len();
         let now = sample.header.stamp_ns;
         let is_first = self.sums.is_empty();
         if is_first {
@@ -109,16 +115,16 @@ impl Means {
         let drift = self.step.1;
         let recovery = dt_s / SLOW_MEMORY_S;
         let mut row = [0.0; MAX_JOINTS];
-        for (j, value) in row.iter_mut().enumerate().take(n) {
+        for (j, (value, usual)) in row.iter_mut().zip(&mut self.usual).enumerate() {
             let residual = sample.effort[j] - sample.expected_effort[j];
+            let left = residual - usual.at(sample.velocity[j]);
             if first {
                 // The mean of the first seconds, as it grows.
-                let share = dt_s / (since_s + dt_s).max(1e-9);
-                self.offset[j] += share * (residual - self.offset[j]);
+                usual.offset(left, dt_s / (since_s + dt_s).max(1e-9));
             } else if follow {
-                self.offset[j] += drift * (residual - self.offset[j]);
+                usual.follow(left, drift);
             }
-            *value = residual - self.offset[j];
+            *value = residual - usual.at(sample.velocity[j]);
             let recovered = self.slow[j] + recovery * self.fast[j];
             self.slow[j] = recovered.min(sample.velocity[j].abs());
         }
@@ -128,6 +134,11 @@ impl Means {
     /// Mean residual of a joint over a window \[effort unit\].
     pub fn mean(&self, window: usize, joint: usize) -> f64 {
         self.sums.means[window][joint]
+    }
+
+    /// How far the usual residual of a joint may be wrong \[effort unit\].
+    pub fn doubt(&self, joint: usize) -> f64 {
+        self.usual[joint].doubt()
     }
 
     /// What the shortest window's mean was at this instant.
@@ -171,12 +182,8 @@ pub(crate) struct Windows {
 
 impl Windows {
     pub fn new(learnt: &Learnt, settings: Follow) -> Self {
-        let mut fast = [0.0; MAX_JOINTS];
-        for (fast, joint) in fast.iter_mut().zip(&learnt.joints) {
-            *fast = joint.fast_rad_s;
-        }
         Self {
-            means: Means::new(fast, settings, learnt.windows.len()),
+            means: Means::new(&learnt.joints, settings, learnt.windows.len()),
             learnt: learnt.clone(),
             at_rest: None,
             bins: [0; MAX_JOINTS],
