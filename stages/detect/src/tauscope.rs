@@ -17,7 +17,6 @@
 //! Isolation, and Identification", 2017, sections V and VI).
 
 mod alarm;
-mod friction;
 mod kinds;
 mod learnt;
 mod pieces;
@@ -28,6 +27,7 @@ mod ring;
 mod smallest;
 mod sums;
 mod tail;
+mod usual;
 mod windows;
 
 use schemars::JsonSchema;
@@ -40,7 +40,6 @@ use crate::lesson::{LearnError, Lessons};
 use crate::rate::Rate;
 use crate::stage::Setup;
 use alarm::Watch;
-pub use friction::LearntFriction;
 pub use kinds::Kinds;
 use learnt::ENOUGH_S;
 pub use learnt::{Learnt, LearntJoint, LearntWindow};
@@ -50,6 +49,7 @@ pub use rest::LearntRest;
 use ring::Ring;
 pub use smallest::Smallest;
 pub use tail::Tail;
+pub use usual::LearntUsual;
 use windows::{Follow, Windows};
 
 /// Canonical name.

@@ -6,12 +6,12 @@ use serde::{Deserialize, Serialize};
 use tauscope_bus::{TwinState, flags};
 
 use super::NAME;
-use super::friction::{LearntFriction, Shown};
 use super::kinds::Kinds;
 use super::pieces::{FOLDS, Piece, free, free_s, marked, pieces, quantile};
 use super::rest::{self, LearntRest};
 use super::smallest::Smallest;
 use super::tail::{Peaks, Tail};
+use super::usual::LearntUsual;
 use super::windows::{Follow, Means, WINDOWS_S, Windows};
 use crate::joints;
 use crate::lesson::{LearnError, Lessons};
@@ -31,8 +31,8 @@ const PRIOR_S: f64 = 2.0;
 const BELIEVED: f64 = 0.95;
 /// The share of contact-free samples that stays below the unit of a window's score.
 const USUAL: f64 = 0.999;
-/// A sample lasts no longer than this \[s\].
-const MOST_STEP_S: f64 = 0.05;
+/// No less than this share of a mean square is there without unrest.
+const QUIET: f64 = 0.25;
 /// The least that can be learnt from \[samples\].
 const LEAST_SAMPLES: usize = 500;
 /// With less than this a tail cannot be told, nor how often a threshold is exceeded \[s\].
@@ -79,21 +79,66 @@ pub struct LearntJoint {
     pub name: String,
     /// Its usual highest speed \[rad/s\], by which speeds are classed.
     pub fast_rad_s: f64,
-    /// What the twin leaves out over its velocity, where that was told.
+    /// What of its residual is usual, where that was told.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub friction: Option<LearntFriction>,
+    pub usual: Option<LearntUsual>,
 }
 
 /// The mean residual over one window.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LearntWindow {
-    /// Root mean square by joint and class of speed \[effort unit\].
+    /// Root mean square by joint and class of speed, where the expected effort does not change \[effort unit\].
     pub noise: Vec<Vec<f64>>,
+    /// By joint, the share of what the expected effort has changed by of late that adds to it.
+    pub unquiet: Vec<f64>,
     /// Inverse of the joints' correlation, row by row.
     pub inverse_correlation: Vec<f64>,
     /// Squared Mahalanobis length that one of a thousand contact-free samples exceeds.
     pub usual: f64,
+}
+
+/// Squares of means of a residual, of unrest, and of both with each other.
+#[derive(Debug, Clone, Copy, Default)]
+struct Seen {
+    count: f64,
+    square: f64,
+    unrest: f64,
+    both: f64,
+    unrest_twice: f64,
+}
+
+impl Seen {
+    fn add(&mut self, square: f64, unrest: f64) {
+        self.count += 1.0;
+        self.square += square;
+        self.unrest += unrest;
+        self.both += square * unrest;
+        self.unrest_twice += unrest * unrest;
+    }
+
+    fn and(mut self, other: &Self) -> Self {
+        self.count += other.count;
+        self.square += other.square;
+        self.unrest += other.unrest;
+        self.both += other.both;
+        self.unrest_twice += other.unrest_twice;
+        self
+    }
+
+    /// The share of squared unrest that adds to the mean square, by least squares.
+    fn unrest_adds(&self) -> f64 {
+        let with = self.both - self.square * self.unrest / self.count.max(1.0);
+        let alone = self.unrest_twice - self.unrest * self.unrest / self.count.max(1.0);
+        let found = with / alone.max(f64::MIN_POSITIVE);
+        let most = (1.0 - QUIET) * self.square / self.unrest.max(f64::MIN_POSITIVE);
+        found.clamp(0.0, most)
+    }
+
+    /// Mean square without what unrest adds.
+    fn quiet(&self, adds: f64) -> f64 {
+        (self.square - adds * self.unrest).max(QUIET * self.square) / self.count.max(1.0)
+    }
 }
 
 /// The class of a speed.
@@ -147,7 +192,7 @@ impl Learnt {
             smallest: Vec::new(),
             kinds: None,
         };
-        learnt.rub(pieces);
+        learnt.tell_usual(pieces);
         learnt.windows = learnt.noise(pieces, follow);
         if !learnt.last_pays() {
             learnt.windows.pop();
@@ -167,6 +212,7 @@ impl Learnt {
         let n = joint_names.len();
         let fits = |window: &LearntWindow| {
             window.inverse_correlation.len() == n * n
+                && window.unquiet.len() == n
                 && window.noise.len() == n
                 && window.noise.iter().all(|noise| noise.len() == BINS)
         };
@@ -187,39 +233,25 @@ impl Learnt {
         if !is_rate {
             return Some("has a rate that is not above 0".to_owned());
         }
-        let rubs = self
-            .joints
-            .iter()
-            .filter_map(|joint| joint.friction.as_ref());
-        let whole = rubs.into_iter().all(LearntFriction::is_whole);
-        (!whole).then(|| "is not whole: a joint's friction".to_owned())
+        let mut usual = self.joints.iter().filter_map(|joint| joint.usual.as_ref());
+        (!usual.all(LearntUsual::is_whole))
+            .then(|| "is not whole: what of a joint's residual is usual".to_owned())
     }
 
-    /// Tells friction that the twin leaves out, where enough was seen of it.
-    fn rub(&mut self, all: &[Piece<'_>]) {
+    /// Tells what of the residual is usual, where enough was seen of it.
+    fn tell_usual(&mut self, all: &[Piece<'_>]) {
         if self.free_s.is_some_and(|free_s| free_s < ENOUGH_S) {
             return;
         }
         for (j, joint) in self.joints.iter_mut().enumerate() {
-            let mut shown: Vec<Shown> = all.iter().map(|piece| Shown::of(piece.fold)).collect();
-            for (shown, piece) in shown.iter_mut().zip(all) {
-                let mut before_ns = None;
-                for sample in free(piece) {
-                    let now_ns = sample.header.stamp_ns;
-                    let dt_s = (now_ns - before_ns.replace(now_ns).unwrap_or(now_ns)) as f64 * 1e-9;
-                    let residual = sample.effort[j] - sample.expected_effort[j];
-                    let dt_s = dt_s.min(MOST_STEP_S);
-                    shown.add(dt_s, sample.velocity[j], joint.fast_rad_s, residual);
-                }
-            }
-            joint.friction = LearntFriction::new(&shown);
+            joint.usual = LearntUsual::new(all, j, joint.fast_rad_s);
         }
     }
 
-    /// Root mean square of the means by window, joint and class of speed.
+    /// Root mean square of the means by window, joint and class of speed, and what unrest adds to it.
     fn noise(&self, all: &[Piece<'_>], follow: Follow) -> Vec<LearntWindow> {
         let n = self.joints.len();
-        let mut sums = vec![vec![[(0.0, 0.0); BINS]; n]; WINDOWS_S.len()];
+        let mut seen = vec![vec![[Seen::default(); BINS]; n]; WINDOWS_S.len()];
         for piece in all {
             let mut means = Means::new(&self.joints, follow, WINDOWS_S.len());
             for (sample, is_free) in marked(piece) {
@@ -228,36 +260,39 @@ impl Learnt {
                 if !(is_free && means.ready()) {
                     continue;
                 }
-                for (w, sums) in sums.iter_mut().enumerate() {
+                for (w, seen) in seen.iter_mut().enumerate() {
                     for j in 0..n {
-                        let (square, count) = &mut sums[j][bin(&self.joints[j], means.slow[j])];
-                        *square += means.mean(w, j).powi(2) + means.doubt(j).powi(2);
-                        *count += 1.0;
+                        let square = means.mean(w, j).powi(2) + means.doubt(j).powi(2);
+                        seen[j][bin(&self.joints[j], means.slow[j])]
+                            .add(square, means.unrest(j).powi(2));
                     }
                 }
             }
         }
         let samples: f64 = all.iter().map(|piece| free(piece).count() as f64).sum();
         let prior = PRIOR_S * samples / self.free_s.unwrap_or(0.0).max(PRIOR_S);
-        let one = |bins: &[(f64, f64); BINS]| -> Vec<f64> {
-            let (square, count) = bins
-                .iter()
-                .fold((0.0, 0.0), |(s, c), (square, n)| (s + square, c + n));
-            let overall = square / f64::max(count, 1.0);
-            let of = |(square, count): &(f64, f64)| {
-                ((square + prior * overall) / (count + prior))
-                    .sqrt()
-                    .max(1e-9)
-            };
-            bins.iter().map(of).collect()
-        };
-        sums.iter()
-            .map(|joints| LearntWindow {
-                noise: joints.iter().map(one).collect(),
+        let enough = self.free_s.is_none_or(|free_s| free_s >= ENOUGH_S);
+        let window = |joints: &Vec<[Seen; BINS]>| {
+            let (mut noise, mut unquiet) = (Vec::with_capacity(n), Vec::with_capacity(n));
+            for bins in joints {
+                let all = bins.iter().fold(Seen::default(), |a, b| a.and(b));
+                let adds = if enough { all.unrest_adds() } else { 0.0 };
+                let overall = all.quiet(adds);
+                let of = |seen: &Seen| {
+                    let square = seen.quiet(adds) * seen.count + prior * overall;
+                    (square / (seen.count + prior)).sqrt().max(1e-9)
+                };
+                noise.push(bins.iter().map(of).collect());
+                unquiet.push(adds.sqrt());
+            }
+            LearntWindow {
+                noise,
+                unquiet,
                 inverse_correlation: DMatrix::identity(n, n).as_slice().to_vec(),
                 usual: 1.0,
-            })
-            .collect()
+            }
+        };
+        seen.iter().map(window).collect()
     }
 
     /// Whether the last window averages enough noise away (mean of logarithms) to be worth its delay, and enough was seen to tell.
@@ -422,7 +457,7 @@ fn speeds(all: &[Piece<'_>], joint_names: &[String]) -> Vec<LearntJoint> {
             LearntJoint {
                 name: name.clone(),
                 fast_rad_s: quantile(&mut speeds, FAST).max(LEAST_FAST_RAD_S),
-                friction: None,
+                usual: None,
             }
         })
         .collect()

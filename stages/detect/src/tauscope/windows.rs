@@ -2,10 +2,10 @@
 
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 
-use super::friction::Usual;
 use super::learnt::{Learnt, LearntJoint, bin};
 use super::rest::Rest;
 use super::sums::Sums;
+use super::usual::{Step, Usual};
 
 /// Lengths of the windows \[s\]; the last one is used where it pays.
 pub(crate) const WINDOWS_S: [f64; 4] = [0.01, 0.03, 0.1, 0.2];
@@ -55,7 +55,7 @@ pub(crate) struct Means {
     usual: Vec<Usual>,
     settings: Follow,
     /// Step \[s\], and how much of the residual's drift is followed in it; kept, for clocks are often even.
-    step: (f64, f64),
+    step: (Step, f64),
     /// Smallest speed of late, by joint.
     pub slow: JointArray,
     fast: JointArray,
@@ -69,12 +69,12 @@ impl Means {
         for (fast, joint) in fast.iter_mut().zip(joints) {
             *fast = joint.fast_rad_s;
         }
-        let usual = |joint: &LearntJoint| Usual::new(joint.fast_rad_s, joint.friction.as_ref());
+        let usual = |joint: &LearntJoint| Usual::new(joint.fast_rad_s, joint.usual.as_ref());
         Self {
             sums: Sums::new(windows),
             usual: joints.iter().map(usual).collect(),
             settings,
-            step: (0.0, 0.0),
+            step: (Step::of(0.0), 0.0),
             slow: [0.0; MAX_JOINTS],
             fast,
             start_ns: 0,
@@ -109,22 +109,25 @@ impl Means {
         };
         let since_s = (now - self.start_ns) as f64 * 1e-9;
         let first = since_s < self.settings.offset_from_first_s;
-        if dt_s.to_bits() != self.step.0.to_bits() {
-            self.step = (dt_s, 1.0 - (-dt_s / self.settings.drift_s).exp());
+        if !self.step.0.lasts(dt_s) {
+            let drift = 1.0 - (-dt_s / self.settings.drift_s).exp();
+            self.step = (Step::of(dt_s), drift);
         }
-        let drift = self.step.1;
+        let (step, drift) = &self.step;
         let recovery = dt_s / SLOW_MEMORY_S;
         let mut row = [0.0; MAX_JOINTS];
         for (j, (value, usual)) in row.iter_mut().zip(&mut self.usual).enumerate() {
             let residual = sample.effort[j] - sample.expected_effort[j];
-            let left = residual - usual.at(sample.velocity[j]);
-            if first {
+            let left = residual - usual.next(step, sample.velocity[j], sample.expected_effort[j]);
+            let followed = if first {
                 // The mean of the first seconds, as it grows.
-                usual.offset(left, dt_s / (since_s + dt_s).max(1e-9));
+                usual.offset(left, dt_s / (since_s + dt_s).max(1e-9))
             } else if follow {
-                usual.follow(left, drift);
-            }
-            *value = residual - usual.at(sample.velocity[j]);
+                usual.follow(left, *drift)
+            } else {
+                0.0
+            };
+            *value = left - followed;
             let recovered = self.slow[j] + recovery * self.fast[j];
             self.slow[j] = recovered.min(sample.velocity[j].abs());
         }
@@ -139,6 +142,11 @@ impl Means {
     /// How far the usual residual of a joint may be wrong \[effort unit\].
     pub fn doubt(&self, joint: usize) -> f64 {
         self.usual[joint].doubt()
+    }
+
+    /// How much the expected effort of a joint has changed of late \[effort unit\].
+    pub fn unrest(&self, joint: usize) -> f64 {
+        self.usual[joint].unrest()
     }
 
     /// What the shortest window's mean was at this instant.
@@ -167,8 +175,8 @@ pub(crate) struct Windows {
     learnt: Learnt,
     /// What is known of a standing arm, if it is heeded.
     at_rest: Option<Rest>,
-    /// Class of each joint's present speed.
-    bins: [usize; MAX_JOINTS],
+    /// By window and joint, the noise at the present speed and unrest.
+    noise: [JointArray; WINDOWS_S.len()],
     /// By window and joint, the mean residual as far as the newest samples bear it out.
     borne_out: [JointArray; WINDOWS_S.len()],
     /// Mean residual of the contact that goes on, as it is followed, and of the one below it.
@@ -186,7 +194,7 @@ impl Windows {
             means: Means::new(&learnt.joints, settings, learnt.windows.len()),
             learnt: learnt.clone(),
             at_rest: None,
-            bins: [0; MAX_JOINTS],
+            noise: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
             borne_out: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
             held: [0.0; MAX_JOINTS],
             base: [0.0; MAX_JOINTS],
@@ -220,13 +228,17 @@ impl Windows {
         let follow = usual.is_some_and(|usual| self.score < usual);
         self.means.push(sample, follow);
         for (j, joint) in self.learnt.joints.iter().enumerate() {
-            self.bins[j] = bin(joint, self.means.slow[j]);
+            let bin = bin(joint, self.means.slow[j]);
+            let unrest = self.means.unrest(j);
+            for (noise, window) in self.noise.iter_mut().zip(&self.learnt.windows) {
+                noise[j] = window.noise[j][bin].hypot(window.unquiet[j] * unrest);
+            }
         }
         self.borne_out = borne_out(
             &self.means.sums.means,
             self.learnt.windows.len(),
             self.joints(),
-            |w, j| self.noise(w, j),
+            |w, j| self.noise[w][j],
         );
         self.score = 0.0;
         for w in 0..self.learnt.windows.len() {
@@ -339,9 +351,9 @@ impl Windows {
         }
     }
 
-    /// Its usual size at the joint's present speed \[effort unit\].
+    /// Its usual size at the joint's present speed and unrest \[effort unit\].
     pub fn noise(&self, window: usize, joint: usize) -> f64 {
-        self.learnt.windows[window].noise[joint][self.bins[joint]]
+        self.noise[window][joint]
     }
 
     /// Inverse of the correlation of the joints' means over a window, row by row.
