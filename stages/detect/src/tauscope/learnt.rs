@@ -276,7 +276,15 @@ impl Learnt {
             let (mut noise, mut unquiet) = (Vec::with_capacity(n), Vec::with_capacity(n));
             for bins in joints {
                 let all = bins.iter().fold(Seen::default(), |a, b| a.and(b));
-                let adds = if enough { all.unrest_adds() } else { 0.0 };
+                let adds = if enough {
+                    all.unrest_adds()
+                        * std::env::var("TS_C")
+                            .ok()
+                            .and_then(|x| x.parse::<f64>().ok())
+                            .unwrap_or(1.0)
+                } else {
+                    0.0
+                };
                 let overall = all.quiet(adds);
                 let of = |seen: &Seen| {
                     let square = seen.quiet(adds) * seen.count + prior * overall;

@@ -23,7 +23,9 @@ const PRIOR_S: f64 = 1.0;
 const PAYS: f64 = 0.6;
 /// They are believed to be right to this share of what they say.
 const RIGHT_TO: f64 = 0.1;
-/// For so long a joint is unquiet whose expected effort has changed \[s\].
+/// The measured effort is smoothed over so long before its changes are told \[s\].
+const SMOOTH_S: f64 = 0.005;
+/// For so long a joint is unquiet whose effort has changed \[s\].
 const CALMS_S: f64 = 0.1;
 /// A joint's usual largest change of expected effort: this share of its samples changes less.
 const LIVELY: f64 = 0.95;
@@ -70,13 +72,13 @@ fn shown(
             let now_ns = sample.header.stamp_ns;
             let dt_s = (now_ns - before_ns.replace(now_ns).unwrap_or(now_ns)) as f64 * 1e-9;
             let dt_s = dt_s.clamp(0.0, MOST_STEP_S);
-            let expected = sample.expected_effort[joint];
-            usual.step(&Step::of(dt_s), expected);
+            let efforts = [sample.effort[joint], sample.expected_effort[joint]];
+            usual.step(&Step::of(dt_s), efforts);
             if !is_free {
                 continue;
             }
-            visit(usual.change.abs());
-            let residual = sample.effort[joint] - expected;
+            visit(usual.expected.now.abs());
+            let residual = efforts[0] - efforts[1];
             let row = usual.features(sample.velocity[joint]).push(residual);
             of_piece.ger(dt_s, &row, &row, 1.0);
         }
@@ -147,8 +149,9 @@ impl LearntUsual {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step {
     dt_s: f64,
-    /// So much of the expected effort's change is forgotten, and so much of the unrest stays.
+    /// Shares of what is new that are taken over: of an effort that is followed, and of one that is smoothed; and the share of unrest that stays.
     late: f64,
+    smooth: f64,
     stays: f64,
 }
 
@@ -157,6 +160,7 @@ impl Step {
         Self {
             dt_s,
             late: 1.0 - (-dt_s / LATE_S).exp(),
+            smooth: 1.0 - (-dt_s / SMOOTH_S).exp(),
             stays: (-dt_s / CALMS_S).exp(),
         }
     }
@@ -177,10 +181,29 @@ pub(super) struct Usual {
     /// How fast each feature is followed; nothing where only the constant is.
     pace: Option<SMatrix<f64, FEATURES, FEATURES>>,
     newest: Features,
-    /// The expected effort of late, and how much it has changed against that.
+    expected: Changes,
+    measured: Changes,
+    /// The measured effort, smoothed.
+    smooth: f64,
+}
+
+/// How an effort changes.
+#[derive(Debug, Clone, Default)]
+struct Changes {
+    /// What it has been of late.
     late: Option<f64>,
-    change: f64,
-    unrest: f64,
+    /// How much it has changed against that, now, and the most of late.
+    now: f64,
+    most: f64,
+}
+
+impl Changes {
+    fn step(&mut self, step: &Step, effort: f64) {
+        let late = self.late.get_or_insert(effort);
+        self.now = effort - *late;
+        *late += step.late * self.now;
+        self.most = (step.stays * self.most).max(self.now.abs());
+    }
 }
 
 impl Usual {
@@ -197,36 +220,38 @@ impl Usual {
             weights,
             pace: learnt.map(|learnt| SMatrix::from_row_slice(&learnt.inverse_products)),
             newest: Features::zeros(),
-            late: None,
-            change: 0.0,
-            unrest: 0.0,
+            expected: Changes::default(),
+            measured: Changes::default(),
+            smooth: 0.0,
         }
     }
 
     /// A recording begins: what lay below the residual is not known any longer; how the joint rubs is.
     pub fn reset(&mut self) {
         self.weights[0] = self.constant;
-        self.late = None;
-        self.unrest = 0.0;
+        self.expected = Changes::default();
+        self.measured = Changes::default();
     }
 
-    fn step(&mut self, step: &Step, expected: f64) {
-        let late = self.late.get_or_insert(expected);
-        self.change = expected - *late;
-        *late += step.late * self.change;
-        self.unrest = (step.stays * self.unrest).max(self.change.abs());
+    fn step(&mut self, step: &Step, [measured, expected]: [f64; 2]) {
+        if self.measured.late.is_none() {
+            self.smooth = measured;
+        }
+        self.smooth += step.smooth * (measured - self.smooth);
+        self.measured.step(step, self.smooth);
+        self.expected.step(step, expected);
     }
 
     fn features(&self, velocity: f64) -> Features {
         let v = velocity / self.fast;
         let coulomb = SETS_IN.map(|sets_in| v / v.hypot(sets_in));
-        let late = self.change / self.lively;
+        let late = self.expected.now / self.lively;
         Features::from([1.0, v, coulomb[0], coulomb[1], late])
     }
 
-    /// The next sample: what of its residual is usual.
-    pub fn next(&mut self, step: &Step, velocity: f64, expected: f64) -> f64 {
-        self.step(step, expected);
+    /// The next sample, with its measured and expected effort: what of its residual is usual.
+    pub fn next(&mut self, step: &Step, velocity: f64, efforts: [f64; 2]) -> f64 {
+        self.step(step, efforts);
         if self.pace.is_none() {
             return self.weights[0];
         }
@@ -258,8 +283,9 @@ impl Usual {
         RIGHT_TO * (self.weights.dot(&self.newest) - self.weights[0])
     }
 
-    /// How much the expected effort has changed of late \[effort unit\].
+    /// How much both efforts have changed of late \[effort unit\]: the twin is late where the arm is driven. What touches an arm changes one
+    /// of them alone: the measured effort of one that stays on its path, the expected effort of one that gives way.
     pub fn unrest(&self) -> f64 {
-        self.unrest
+        self.expected.most.min(self.measured.most)
     }
 }

@@ -117,8 +117,8 @@ impl Means {
         let recovery = dt_s / SLOW_MEMORY_S;
         let mut row = [0.0; MAX_JOINTS];
         for (j, (value, usual)) in row.iter_mut().zip(&mut self.usual).enumerate() {
-            let residual = sample.effort[j] - sample.expected_effort[j];
-            let left = residual - usual.next(step, sample.velocity[j], sample.expected_effort[j]);
+            let efforts = [sample.effort[j], sample.expected_effort[j]];
+            let left = efforts[0] - efforts[1] - usual.next(step, sample.velocity[j], efforts);
             let followed = if first {
                 // The mean of the first seconds, as it grows.
                 usual.offset(left, dt_s / (since_s + dt_s).max(1e-9))
@@ -144,7 +144,7 @@ impl Means {
         self.usual[joint].doubt()
     }
 
-    /// How much the expected effort of a joint has changed of late \[effort unit\].
+    /// How much both efforts of a joint have changed of late \[effort unit\].
     pub fn unrest(&self, joint: usize) -> f64 {
         self.usual[joint].unrest()
     }
