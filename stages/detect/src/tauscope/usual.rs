@@ -29,6 +29,8 @@ const SMOOTH_S: f64 = 0.005;
 const CALMS_S: f64 = 0.1;
 /// A joint's usual largest change of expected effort: this share of its samples changes less.
 const LIVELY: f64 = 0.95;
+/// What is left of a residual stays for so long: samples closer than that tell the same \[s\].
+const CORRELATED_S: f64 = 0.5;
 /// A sample lasts no longer than this \[s\].
 const MOST_STEP_S: f64 = 0.05;
 
@@ -47,8 +49,10 @@ pub struct LearntUsual {
     /// What the residual is by feature: 1, v, v / √(v² + 0.1²), v / √(v² + 0.02²) and u, with v the velocity in shares of the usual highest, and u the
     /// change of expected effort in shares of the usual largest \[effort unit\].
     pub weights: [f64; FEATURES],
-    /// Inverse of the features' mean products with each other, row by row: how fast each is followed.
+    /// Inverse of the features' mean products with each other, row by row: how fast each is followed, and how little each is known.
     pub inverse_products: Vec<f64>,
+    /// How much contact-free time the weights are from \[s\].
+    pub from_s: f64,
 }
 
 /// What stretches of recordings show of a joint, by the part of the data that they are held out with.
@@ -136,12 +140,14 @@ impl LearntUsual {
             lively,
             weights: weights.into(),
             inverse_products: products.try_inverse()?.as_slice().to_vec(),
+            from_s: lasts_s,
         })
     }
 
     /// Whether it holds what it needs.
     pub(super) fn is_whole(&self) -> bool {
-        self.inverse_products.len() == FEATURES * FEATURES && self.lively > 0.0
+        let products = self.inverse_products.len() == FEATURES * FEATURES;
+        products && self.lively > 0.0 && self.from_s > 0.0
     }
 }
 
@@ -180,7 +186,11 @@ pub(super) struct Usual {
     weights: Features,
     /// How fast each feature is followed; nothing where only the constant is.
     pace: Option<SMatrix<f64, FEATURES, FEATURES>>,
+    /// The newest features, and how much of that moves the weights.
     newest: Features,
+    turn: Features,
+    /// So many samples that tell something of their own the weights are from.
+    worth: f64,
     expected: Changes,
     measured: Changes,
     /// The measured effort, smoothed.
@@ -220,6 +230,8 @@ impl Usual {
             weights,
             pace: learnt.map(|learnt| SMatrix::from_row_slice(&learnt.inverse_products)),
             newest: Features::zeros(),
+            turn: Features::zeros(),
+            worth: learnt.map_or(1.0, |learnt| learnt.from_s / CORRELATED_S),
             expected: Changes::default(),
             measured: Changes::default(),
             smooth: 0.0,
@@ -252,21 +264,21 @@ impl Usual {
     /// The next sample, with its measured and expected effort: what of its residual is usual.
     pub fn next(&mut self, step: &Step, velocity: f64, efforts: [f64; 2]) -> f64 {
         self.step(step, efforts);
-        if self.pace.is_none() {
+        let Some(pace) = &self.pace else {
             return self.weights[0];
-        }
+        };
         self.newest = self.features(velocity);
+        self.turn = pace * self.newest;
         self.weights.dot(&self.newest)
     }
 
     /// Follows what was `left` of the residual by this share; by how much that changes what is usual.
     pub fn follow(&mut self, left: f64, share: f64) -> f64 {
-        let Some(pace) = &self.pace else {
+        if self.pace.is_none() {
             return self.offset(left, share);
-        };
-        let turn = pace * self.newest * (share * left);
-        self.weights += turn;
-        turn.dot(&self.newest)
+        }
+        self.weights += self.turn * (share * left);
+        share * left * self.turn.dot(&self.newest)
     }
 
     /// Takes what was `left` of the residual for a constant by this share; by how much that changes what is usual.
@@ -281,6 +293,12 @@ impl Usual {
             return 0.0;
         }
         RIGHT_TO * (self.weights.dot(&self.newest) - self.weights[0])
+    }
+
+    /// How many times its square the noise is of a sample that is as unlike what was learnt from as this one: what was told of it is itself no
+    /// better known (the variance of a prediction, as of any linear regression).
+    pub fn strange(&self) -> f64 {
+        1.0 + self.turn.dot(&self.newest) / self.worth
     }
 
     /// How much both efforts have changed of late \[effort unit\]: the twin is late where the arm is driven. What touches an arm changes one

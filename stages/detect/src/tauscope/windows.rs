@@ -144,6 +144,11 @@ impl Means {
         self.usual[joint].doubt()
     }
 
+    /// How much larger the noise of a joint is than usual, for all that is known of such a motion.
+    pub fn strange(&self, joint: usize) -> f64 {
+        self.usual[joint].strange().sqrt()
+    }
+
     /// How much both efforts of a joint have changed of late \[effort unit\].
     pub fn unrest(&self, joint: usize) -> f64 {
         self.usual[joint].unrest()
@@ -229,9 +234,10 @@ impl Windows {
         self.means.push(sample, follow);
         for (j, joint) in self.learnt.joints.iter().enumerate() {
             let bin = bin(joint, self.means.slow[j]);
-            let unrest = self.means.unrest(j);
+            let (unrest, strange) = (self.means.unrest(j), self.means.strange(j));
             for (noise, window) in self.noise.iter_mut().zip(&self.learnt.windows) {
-                noise[j] = window.noise[j][bin].hypot(window.unquiet[j] * unrest);
+                let usual = window.noise[j][bin] * strange;
+                noise[j] = usual.hypot(window.unquiet[j] * unrest);
             }
         }
         self.borne_out = borne_out(
