@@ -7,7 +7,7 @@ use crate::lesson::{Lesson, Lessons};
 
 /// So much around a labelled contact is left out \[ns\].
 const BEFORE_NS: i64 = 50_000_000;
-const AFTER_NS: i64 = 1_000_000_000;
+const AFTER_NS: i64 = 400_000_000;
 /// Data is cut in at least so many pieces, so that there are some for each part that is held out.
 const LEAST_PIECES: usize = 8;
 /// In how many parts data is held out from what its noise is learnt from.
