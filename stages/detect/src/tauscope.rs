@@ -25,6 +25,7 @@ mod points;
 mod rest;
 mod ring;
 mod smallest;
+mod stand;
 mod sums;
 mod tail;
 mod usual;
@@ -218,7 +219,9 @@ impl Detector for Tauscope {
             };
         }
         let now_ns = sample.header.stamp_ns;
-        if let Some(since_ns) = self.watch.step(now_ns, score, &mut self.windows) {
+        if self.windows.settle(sample, free) {
+            self.watch.end();
+        } else if let Some(since_ns) = self.watch.step(now_ns, score, &mut self.windows) {
             self.tell(sample, since_ns);
         }
         let contact = self.watch.contact_ns().map(|contact_ns| Seen {

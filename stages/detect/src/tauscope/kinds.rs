@@ -114,7 +114,9 @@ fn usual() -> Moments {
     const WORTH: f64 = 100.0;
     let three = |x: [f64; 3]| Vector6::new(x[0], x[1], x[2], 0.0, 0.0, 0.0);
     let mut scatter = Matrix6::zeros();
-    let covariance = Matrix3::new(0.177, 0.028, -0.016, 0.028, 0.654, 0.079, -0.016, 0.079, 0.327);
+    let covariance = Matrix3::new(
+        0.177, 0.028, -0.016, 0.028, 0.654, 0.079, -0.016, 0.079, 0.327,
+    );
     scatter
         .fixed_view_mut::<3, 3>(0, 0)
         .copy_from(&(covariance * (2.0 * WORTH)));

@@ -171,6 +171,10 @@ impl Step {
         }
     }
 
+    pub fn dt_s(&self) -> f64 {
+        self.dt_s
+    }
+
     /// Whether it lasts exactly so long.
     pub fn lasts(&self, dt_s: f64) -> bool {
         self.dt_s.to_bits() == dt_s.to_bits()

@@ -4,6 +4,7 @@ use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 
 use super::learnt::{Learnt, LearntJoint, bin};
 use super::rest::Rest;
+use super::stand::{End, Stand};
 use super::sums::Sums;
 use super::usual::{Step, Usual};
 
@@ -17,6 +18,14 @@ pub(crate) const MIDDLE: usize = 1;
 pub(super) const LONG: usize = 2;
 /// So much of the usual noise of the next shorter window's mean a longer one's may be away from it: what has gone is not told any longer.
 const BORNE_OUT: f64 = 2.0;
+/// A standing arm that is pushed gives way no faster than this \[rad/s, m/s\].
+const SLOW: f64 = 0.1;
+/// Where a standing arm has come to rest behind a contact is followed for so long, with this time constant; with which it is forgotten once the
+/// arm moves, too \[s\].
+const CREEPS_S: f64 = 1.5;
+/// So much of the contact may creep.
+const CREEPS: f64 = 0.1;
+const SETTLES_S: f64 = 0.3;
 /// How long a joint that was slow counts as slow \[s\].
 const SLOW_MEMORY_S: f64 = 0.3;
 
@@ -53,6 +62,8 @@ pub(crate) struct Means {
     sums: Sums,
     /// The residual that is usual just now, by joint.
     usual: Vec<Usual>,
+    /// What is left of the residual where the arm has come to rest behind a contact.
+    settled: JointArray,
     settings: Follow,
     /// Step \[s\], and how much of the residual's drift is followed in it; kept, for clocks are often even.
     step: (Step, f64),
@@ -73,6 +84,7 @@ impl Means {
         Self {
             sums: Sums::new(windows),
             usual: joints.iter().map(usual).collect(),
+            settled: [0.0; MAX_JOINTS],
             settings,
             step: (Step::of(0.0), 0.0),
             slow: [0.0; MAX_JOINTS],
@@ -84,6 +96,7 @@ impl Means {
     pub fn reset(&mut self) {
         self.sums.reset();
         self.usual.iter_mut().for_each(Usual::reset);
+        self.settled = [0.0; MAX_JOINTS];
     }
 
     /// Whether the windows are full (the last one is as good as the one before it until then), and the offset known.
@@ -127,11 +140,29 @@ impl Means {
             } else {
                 0.0
             };
-            *value = left - followed;
+            *value = left - followed - self.settled[j];
             let recovered = self.slow[j] + recovery * self.fast[j];
             self.slow[j] = recovered.min(sample.velocity[j].abs());
         }
         self.sums.push(now, &row, n);
+    }
+
+    /// The arm has come to rest with the residual as it is.
+    fn settle(&mut self) {
+        let left = self.sums.means[MIDDLE];
+        for (settled, left) in self.settled.iter_mut().zip(&left) {
+            *settled += left;
+        }
+        self.sums.shift(&left, self.usual.len());
+    }
+
+    /// Where the arm has come to rest creeps, or is forgotten if it `moves`.
+    fn creep(&mut self, moves: bool) {
+        let dt_s = self.step.0.dt_s();
+        let share = dt_s / (SETTLES_S + dt_s);
+        for (settled, left) in self.settled.iter_mut().zip(&self.sums.means[MIDDLE]) {
+            *settled += share * if moves { -*settled } else { *left };
+        }
     }
 
     /// Mean residual of a joint over a window \[effort unit\].
@@ -173,6 +204,13 @@ pub(crate) struct Change {
     pub held: f64,
 }
 
+/// A contact with a standing arm that is over: when, and the root of its score.
+#[derive(Debug, Clone, Copy)]
+struct Settled {
+    at_ns: i64,
+    size: f64,
+}
+
 /// Means of the residual, whitened.
 #[derive(Debug)]
 pub(crate) struct Windows {
@@ -180,6 +218,10 @@ pub(crate) struct Windows {
     learnt: Learnt,
     /// What is known of a standing arm, if it is heeded.
     at_rest: Option<Rest>,
+    stand: Stand,
+    /// The contact with a standing arm that goes on, and when one was over.
+    end: End,
+    settled: Option<Settled>,
     /// By window and joint, the noise at the present speed and unrest.
     noise: [JointArray; WINDOWS_S.len()],
     /// By window and joint, the mean residual as far as the newest samples bear it out.
@@ -199,6 +241,9 @@ impl Windows {
             means: Means::new(&learnt.joints, settings, learnt.windows.len()),
             learnt: learnt.clone(),
             at_rest: None,
+            stand: Stand::new(SLOW),
+            end: End::default(),
+            settled: None,
             noise: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
             borne_out: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
             held: [0.0; MAX_JOINTS],
@@ -221,6 +266,9 @@ impl Windows {
         if let Some(rest) = &mut self.at_rest {
             rest.reset();
         }
+        self.stand.reset();
+        self.end.forget();
+        self.settled = None;
         self.score = 0.0;
     }
 
@@ -250,9 +298,59 @@ impl Windows {
         for w in 0..self.learnt.windows.len() {
             self.score = (self.length(w) / self.learnt.windows[w].usual).max(self.score);
         }
+        self.score /= self.creep(sample.header.stamp_ns);
         let at_rest = (self.at_rest.as_mut()).and_then(|rest| rest.score(sample, usual.is_some()));
         self.score = at_rest.map_or(self.score, |score| score.max(self.score));
         self.score
+    }
+
+    /// By how much a score is less, for creep behind a contact with a standing arm.
+    fn creep(&self, now_ns: i64) -> f64 {
+        self.settled.map_or(1.0, |over| {
+            let fades = (-((now_ns - over.at_ns) as f64 * 1e-9) / CREEPS_S).exp();
+            (1.0 + CREEPS * over.size * fades).powi(2)
+        })
+    }
+
+    /// Heeds where a standing arm comes to rest behind a contact: to be called with each sample that is judged, `free` of contacts or not. Whether a
+    /// contact is over.
+    pub fn settle(&mut self, sample: &TwinState, free: bool) -> bool {
+        let now_ns = sample.header.stamp_ns;
+        if !self.stand.step(sample, self.joints()) {
+            self.end.forget();
+            if self.settled.is_some() {
+                self.means.creep(true);
+            }
+            return false;
+        }
+        if free {
+            self.end.forget();
+            let creeps = |over: Settled| ((now_ns - over.at_ns) as f64 * 1e-9) < CREEPS_S;
+            if self.settled.is_some_and(creeps) {
+                self.means.creep(false);
+            }
+            return false;
+        }
+        let (mut units, mut changed) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
+        for j in 0..self.joints() {
+            let noise = self.noise(MIDDLE, j);
+            units[j] = self.excess(MIDDLE, j) / noise;
+            changed[j] = (self.mean(MIDDLE, j) - self.mean(LONG, j)) / noise;
+        }
+        if !self.end.step(now_ns, &units, &changed) {
+            return false;
+        }
+        let size = (self.end.whole() / self.learnt.windows[MIDDLE].usual).sqrt();
+        self.end.forget();
+        self.means.settle();
+        if let Some(rest) = &mut self.at_rest {
+            rest.settle();
+        }
+        self.settled = Some(Settled {
+            at_ns: now_ns,
+            size,
+        });
+        true
     }
 
     /// The longest window that holds nothing from before this instant, or the shortest.
