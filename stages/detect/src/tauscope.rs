@@ -19,6 +19,8 @@
 mod alarm;
 mod kinds;
 mod learnt;
+mod means;
+mod noise;
 mod pieces;
 mod place;
 mod points;
@@ -44,6 +46,7 @@ use alarm::Watch;
 pub use kinds::Kinds;
 use learnt::ENOUGH_S;
 pub use learnt::{Learnt, LearntJoint, LearntWindow};
+use means::Follow;
 use nalgebra::Vector6;
 use place::Place;
 pub use rest::LearntRest;
@@ -51,7 +54,7 @@ use ring::Ring;
 pub use smallest::Smallest;
 pub use tail::Tail;
 pub use usual::LearntUsual;
-use windows::{Follow, Windows};
+use windows::Windows;
 
 /// Canonical name.
 pub(crate) const NAME: &str = "tauscope";

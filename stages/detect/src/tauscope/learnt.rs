@@ -7,12 +7,14 @@ use tauscope_bus::{TwinState, flags};
 
 use super::NAME;
 use super::kinds::Kinds;
+use super::means::{Follow, WINDOWS_S};
+use super::noise;
 use super::pieces::{FOLDS, Piece, free, free_s, marked, pieces, quantile};
 use super::rest::{self, LearntRest};
 use super::smallest::Smallest;
 use super::tail::{Peaks, Tail};
 use super::usual::LearntUsual;
-use super::windows::{Follow, Means, WINDOWS_S, Windows};
+use super::windows::Windows;
 use crate::joints;
 use crate::lesson::{LearnError, Lessons};
 use crate::rate;
@@ -20,19 +22,15 @@ use crate::rate;
 /// Where speeds are divided, as shares of a joint's usual highest speed.
 const EDGES: [f64; BINS - 1] = [0.02, 0.05, 0.12, 0.3];
 /// How many classes of speed there are.
-const BINS: usize = 5;
+pub(super) const BINS: usize = 5;
 /// A joint's usual highest speed: this share of its samples is slower.
 const FAST: f64 = 0.95;
 /// Speed below which a joint is not taken to move at all \[rad/s\].
 const LEAST_FAST_RAD_S: f64 = 0.01;
-/// The noise of a class of speed is taken for the joint's where it has not lasted longer than this \[s\].
-const PRIOR_S: f64 = 2.0;
 /// Correlations are believed to this share.
 const BELIEVED: f64 = 0.95;
 /// The share of contact-free samples that stays below the unit of a window's score.
 const USUAL: f64 = 0.999;
-/// No less than this share of a mean square is there without unrest.
-const QUIET: f64 = 0.25;
 /// The least that can be learnt from \[samples\].
 const LEAST_SAMPLES: usize = 500;
 /// With less than this a tail cannot be told, nor how often a threshold is exceeded \[s\].
@@ -98,49 +96,6 @@ pub struct LearntWindow {
     pub usual: f64,
 }
 
-/// Squares of means of a residual, of unrest, and of both with each other.
-#[derive(Debug, Clone, Copy, Default)]
-struct Seen {
-    count: f64,
-    square: f64,
-    unrest: f64,
-    both: f64,
-    unrest_twice: f64,
-}
-
-impl Seen {
-    fn add(&mut self, square: f64, unrest: f64) {
-        self.count += 1.0;
-        self.square += square;
-        self.unrest += unrest;
-        self.both += square * unrest;
-        self.unrest_twice += unrest * unrest;
-    }
-
-    fn and(mut self, other: &Self) -> Self {
-        self.count += other.count;
-        self.square += other.square;
-        self.unrest += other.unrest;
-        self.both += other.both;
-        self.unrest_twice += other.unrest_twice;
-        self
-    }
-
-    /// The share of squared unrest that adds to the mean square, by least squares.
-    fn unrest_adds(&self) -> f64 {
-        let with = self.both - self.square * self.unrest / self.count.max(1.0);
-        let alone = self.unrest_twice - self.unrest * self.unrest / self.count.max(1.0);
-        let found = with / alone.max(f64::MIN_POSITIVE);
-        let most = (1.0 - QUIET) * self.square / self.unrest.max(f64::MIN_POSITIVE);
-        found.clamp(0.0, most)
-    }
-
-    /// Mean square without what unrest adds.
-    fn quiet(&self, adds: f64) -> f64 {
-        (self.square - adds * self.unrest).max(QUIET * self.square) / self.count.max(1.0)
-    }
-}
-
 /// The class of a speed.
 pub(crate) fn bin(joint: &LearntJoint, speed_rad_s: f64) -> usize {
     let share = speed_rad_s / joint.fast_rad_s;
@@ -193,7 +148,8 @@ impl Learnt {
             kinds: None,
         };
         learnt.tell_usual(pieces);
-        learnt.windows = learnt.noise(pieces, follow);
+        let free_s = learnt.free_s.unwrap_or(0.0);
+        learnt.windows = noise::learn(&learnt.joints, pieces, follow, free_s);
         if !learnt.last_pays() {
             learnt.windows.pop();
         }
@@ -246,61 +202,6 @@ impl Learnt {
         for (j, joint) in self.joints.iter_mut().enumerate() {
             joint.usual = LearntUsual::new(all, j, joint.fast_rad_s);
         }
-    }
-
-    /// Root mean square of the means by window, joint and class of speed, and what unrest adds to it.
-    fn noise(&self, all: &[Piece<'_>], follow: Follow) -> Vec<LearntWindow> {
-        let n = self.joints.len();
-        let mut seen = vec![vec![[Seen::default(); BINS]; n]; WINDOWS_S.len()];
-        for piece in all {
-            let mut means = Means::new(&self.joints, follow, WINDOWS_S.len());
-            for (sample, is_free) in marked(piece) {
-                restart(&mut means, sample);
-                means.push(sample, is_free);
-                if !(is_free && means.ready()) {
-                    continue;
-                }
-                for (w, seen) in seen.iter_mut().enumerate() {
-                    for j in 0..n {
-                        let square = means.mean(w, j).powi(2) + means.doubt(j).powi(2);
-                        seen[j][bin(&self.joints[j], means.slow[j])]
-                            .add(square, means.unrest(j).powi(2));
-                    }
-                }
-            }
-        }
-        let samples: f64 = all.iter().map(|piece| free(piece).count() as f64).sum();
-        let prior = PRIOR_S * samples / self.free_s.unwrap_or(0.0).max(PRIOR_S);
-        let enough = self.free_s.is_none_or(|free_s| free_s >= ENOUGH_S);
-        let window = |joints: &Vec<[Seen; BINS]>| {
-            let (mut noise, mut unquiet) = (Vec::with_capacity(n), Vec::with_capacity(n));
-            for bins in joints {
-                let all = bins.iter().fold(Seen::default(), |a, b| a.and(b));
-                let adds = if enough {
-                    all.unrest_adds()
-                        * std::env::var("TS_C")
-                            .ok()
-                            .and_then(|x| x.parse::<f64>().ok())
-                            .unwrap_or(1.0)
-                } else {
-                    0.0
-                };
-                let overall = all.quiet(adds);
-                let of = |seen: &Seen| {
-                    let square = seen.quiet(adds) * seen.count + prior * overall;
-                    (square / (seen.count + prior)).sqrt().max(1e-9)
-                };
-                noise.push(bins.iter().map(of).collect());
-                unquiet.push(adds.sqrt());
-            }
-            LearntWindow {
-                noise,
-                unquiet,
-                inverse_correlation: DMatrix::identity(n, n).as_slice().to_vec(),
-                usual: 1.0,
-            }
-        };
-        seen.iter().map(window).collect()
     }
 
     /// Whether the last window averages enough noise away (mean of logarithms) to be worth its delay, and enough was seen to tell.
@@ -448,12 +349,6 @@ fn too_little(found: usize) -> LearnError {
         detector: NAME,
         wanted: format!("{LEAST_SAMPLES} contact-free samples"),
         found: found.to_string(),
-    }
-}
-
-fn restart(means: &mut Means, sample: &TwinState) {
-    if sample.header.has(flags::RESET) {
-        means.reset();
     }
 }
 

@@ -2,7 +2,7 @@
 
 use tauscope_bus::{TwinState, flags};
 
-use super::windows::Follow;
+use super::means::Follow;
 use crate::lesson::{Lesson, Lessons};
 
 /// So much around a labelled contact is left out \[ns\].

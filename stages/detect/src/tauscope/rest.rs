@@ -12,11 +12,11 @@ use serde::{Deserialize, Serialize};
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState, flags};
 
 use super::learnt::ENOUGH_S;
+use super::means::{LONG, MIDDLE, SHORTEST, WINDOWS_S, borne_out};
 use super::pieces::{Piece, marked, quantile};
 use super::stand::{End, Stand};
 use super::sums::Sums;
 use super::tail::{Peaks, Tail};
-use super::windows::{LONG, MIDDLE, SHORTEST, WINDOWS_S, borne_out};
 
 /// A standing arm is no faster than this: one that is about to move changes its effort, too \[rad/s, m/s\].
 const SLOW: f64 = 0.03;

@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 use tauscope_bus::MAX_JOINTS;
 
 use super::learnt::Learnt;
+use super::means::Follow;
 use super::pieces::pieces;
 use super::place::Place;
-use super::windows::Follow;
 use crate::lesson::Lessons;
 use crate::stage::Setup;
 

@@ -2,8 +2,8 @@
 
 use tauscope_bus::{JointArray, MAX_JOINTS};
 
+use super::means::WINDOWS_S;
 use super::ring::Ring;
-use super::windows::WINDOWS_S;
 
 /// Most samples of a window.
 const CAPACITY: usize = 1024;
