@@ -12,8 +12,10 @@ const FEW: f64 = 0.25;
 /// The shape of a tail that is usual, and how many peaks that is worth.
 const USUAL_SHAPE: f64 = 0.1;
 const WORTH: f64 = 100.0;
-/// A mean of peaks is below its lower limit once in five times: so many standard deviations.
-const LIMIT: f64 = 0.84;
+/// No shape is believed that is further from 0.
+const FOUND: f64 = 0.5;
+/// A mean of peaks is below its lower limit once in ten times: so many standard deviations.
+const LIMIT: f64 = 1.28;
 /// Bounds of the tail's shape: 0 is exponential, above 0 the tail is heavier.
 const SHAPE: [f64; 2] = [0.0, 0.3];
 
@@ -84,9 +86,9 @@ impl Tail {
             .sum::<f64>()
             / n;
         let found = if a0 > 2.0 * a1 + 1e-12 {
-            2.0 - a0 / (a0 - 2.0 * a1)
+            (2.0 - a0 / (a0 - 2.0 * a1)).clamp(-FOUND, FOUND)
         } else {
-            SHAPE[1]
+            FOUND
         };
         let shape = (n * found + WORTH * USUAL_SHAPE) / (n + WORTH);
         let shape = shape.clamp(SHAPE[0], SHAPE[1]);
@@ -122,7 +124,7 @@ impl Tail {
     }
 }
 
-/// What the mean of so many exponential peaks of scale 1 is below once in five times (Wilson and Hilferty 1931).
+/// What the mean of so many exponential peaks of scale 1 is below once in ten times (Wilson and Hilferty 1931).
 fn lower_limit(peaks: f64) -> f64 {
     let share = (9.0 * peaks).recip();
     (1.0 - share - LIMIT * share.sqrt()).powi(3)

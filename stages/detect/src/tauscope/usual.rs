@@ -281,8 +281,11 @@ impl Usual {
         if self.pace.is_none() {
             return self.offset(left, share);
         }
+        let own = self.turn.dot(&self.newest);
+        // What is seen seldom is not to be followed at once.
+        let share = share * (FEATURES as f64 / own).min(1.0);
         self.weights += self.turn * (share * left);
-        share * left * self.turn.dot(&self.newest)
+        share * left * own
     }
 
     /// Takes what was `left` of the residual for a constant by this share; by how much that changes what is usual.
