@@ -111,7 +111,7 @@ pub(crate) fn learn(
 /// What is usual of the measurements, as so many contacts of either kind would tell it: a robot's own few contacts turn the
 /// discriminant towards what parts its kinds, and do not make it. From 892 contacts of simulated arms under impedance control.
 fn usual() -> Moments {
-    const WORTH: f64 = 100.0;
+    const WORTH: f64 = 40.0;
     let three = |x: [f64; 3]| Vector6::new(x[0], x[1], x[2], 0.0, 0.0, 0.0);
     let mut scatter = Matrix6::zeros();
     let covariance = Matrix3::new(
