@@ -5,7 +5,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tauscope_bus::{TwinState, flags};
 
-use super::NAME;
 use super::kinds::Kinds;
 use super::means::{Follow, WINDOWS_S};
 use super::noise;
@@ -15,6 +14,7 @@ use super::smallest::Smallest;
 use super::tail::{Peaks, Tail};
 use super::usual::LearntUsual;
 use super::windows::Windows;
+use super::{DRIFT, NAME};
 use crate::joints;
 use crate::lesson::{LearnError, Lessons};
 use crate::rate;
@@ -251,11 +251,12 @@ impl Learnt {
         }
     }
 
-    /// Runs over the contact-free samples, and hands the windows out at each.
+    /// Runs over the contact-free samples, and hands the windows out at each; drift is followed where the score is below `drifts`.
     pub(super) fn each(
         &self,
         all: &[Piece<'_>],
         follow: Follow,
+        drifts: f64,
         mut visit: impl FnMut(&TwinState, &Windows, f64),
     ) {
         for piece in all {
@@ -264,7 +265,7 @@ impl Learnt {
                 if sample.header.has(flags::RESET) {
                     windows.reset();
                 }
-                let score = windows.score(sample, is_free.then_some(f64::INFINITY));
+                let score = windows.score(sample, is_free.then_some(drifts));
                 if is_free && windows.ready() {
                     visit(sample, &windows, score);
                 }
@@ -276,7 +277,7 @@ impl Learnt {
         let n = self.joints.len();
         let believed = BELIEVED * self.believed();
         let mut products = vec![DMatrix::<f64>::zeros(n, n); self.windows.len()];
-        self.each(all, follow, |_, windows, _| {
+        self.each(all, follow, f64::INFINITY, |_, windows, _| {
             for (w, product) in products.iter_mut().enumerate() {
                 let z: Vec<f64> = (0..n)
                     .map(|j| windows.mean(w, j) / windows.noise(w, j))
@@ -305,7 +306,7 @@ impl Learnt {
 
     fn measure_usual(&mut self, all: &[Piece<'_>], follow: Follow) {
         let mut lengths = vec![Vec::new(); self.windows.len()];
-        self.each(all, follow, |_, windows, _| {
+        self.each(all, follow, f64::INFINITY, |_, windows, _| {
             for (w, lengths) in lengths.iter_mut().enumerate() {
                 lengths.push(windows.length(w));
             }
@@ -318,7 +319,8 @@ impl Learnt {
     /// The largest score of each block of contact-free time.
     fn peaks(&self, all: &[Piece<'_>], follow: Follow) -> Vec<f64> {
         let mut peaks = Peaks::default();
-        self.each(all, follow, |sample, _, score| {
+        // As it will run.
+        self.each(all, follow, DRIFT, |sample, _, score| {
             peaks.add(sample.header.stamp_ns, score);
         });
         peaks.into_blocks()
