@@ -123,7 +123,13 @@ fn what_does_not_come_back_in_other_recordings_is_not_learnt() {
 /// Lets the twin know an effort, `late` samples late.
 fn driven(mut samples: Vec<TwinState>, late: usize) -> Vec<TwinState> {
     // Steps between rest and 2.5, as of a joint that speeds up and brakes.
-    let drive = |k: usize| if k / 100 % 2 == 0 { 2.5 } else { 0.0 };
+    let drive = |k: usize| {
+        if (k / 100).is_multiple_of(2) {
+            2.5
+        } else {
+            0.0
+        }
+    };
     let ramp = |k: usize| (0..10).map(|i| drive(k.saturating_sub(i))).sum::<f64>() / 10.0;
     for (k, sample) in samples.iter_mut().enumerate() {
         let mut both = [0.0; 2];

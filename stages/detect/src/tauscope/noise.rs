@@ -62,7 +62,7 @@ impl LearntWindow {
         let n = joints.len();
         let (mut noise, mut unquiet) = (Vec::with_capacity(n), Vec::with_capacity(n));
         for bins in joints {
-            let all = bins.iter().fold(Seen::default(), |a, b| a.and(b));
+            let all = bins.iter().fold(Seen::default(), Seen::and);
             let adds = if enough { all.unrest_adds() } else { 0.0 };
             let overall = all.quiet(adds);
             let of = |seen: &Seen| {
