@@ -3,7 +3,7 @@
 //! The noise of a residual is not the same in every joint, at every speed and over every length of time:
 //! friction is least certain where a joint turns round, joints err together, and what is small beside
 //! one sample is large beside the mean of thirty. All of that is learnt from contact-free recordings
-//! ([`Learnt`]). The score is the largest, over windows of 10 ms to 0.2 s, of the Mahalanobis length of the mean residual, in
+//! ([`Learnt`]). Friction that the twin leaves out, and how late the twin is, are learnt first, and taken away ([`LearntUsual`]). The score is the largest, over windows of 10 ms to 0.2 s, of the Mahalanobis length of the mean residual, in
 //! units of what that window's length reaches at most in one of a thousand contact-free samples. Slow drift (warming up)
 //! is followed while nothing touches the robot.
 //!
@@ -11,6 +11,8 @@
 //! extrapolated from its peaks in contact-free data ([`Tail`]).
 //!
 //! Where labels tell collisions from cooperations, what parts them is learnt, too ([`Kinds`]).
+//!
+//! With a standing arm, a contact is over where most of it has gone and the rest is steady: static friction may hold that.
 //!
 //! The touched link is the one whose force explains the whitened residual best, the point of contact
 //! sought along the link (Haddadin, De Luca and Albu-Schäffer, "Robot Collisions: A Survey on Detection,
