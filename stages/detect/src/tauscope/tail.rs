@@ -146,12 +146,26 @@ mod tests {
     }
 
     #[test]
-    fn the_threshold_is_exceeded_as_often_as_was_wished() {
+    fn the_threshold_keeps_the_wish_and_is_hardly_higher_after_an_hour() {
         let tail = Tail::new(exponential(3600));
         // One in 3600 blocks: 1 + 0.5 ln 3600.
         let expected = (1.0 + 0.5 * 3600.0_f64.ln()).powi(2);
         let found = tail.threshold(1.0);
-        assert!((found / expected - 1.0).abs() < 0.1, "{found} {expected}");
+        assert!(
+            (1.0..1.2).contains(&(found / expected)),
+            "{found} {expected}"
+        );
+    }
+
+    #[test]
+    fn the_less_was_seen_the_higher_is_the_threshold() {
+        let after = |count| Tail::new(exponential(count)).threshold(5.0);
+        assert!(
+            after(60) > 1.2 * after(3600),
+            "{} {}",
+            after(60),
+            after(3600)
+        );
     }
 
     #[test]
