@@ -1,6 +1,7 @@
 //! Replay: the stages of a pipeline over a recording, in process, as fast as the machine allows, the
 //! same bytes every time.
 
+mod error;
 mod graph;
 mod observe;
 pub mod tables;
@@ -15,6 +16,7 @@ use tauscope_ingest::{ArchivedTwin, RecordedSource};
 use crate::build;
 use crate::pipeline::{Cell, Pipeline, Settings, Stage};
 
+pub use error::ReplayError;
 pub use graph::{Graph, StageCounts, Stream};
 pub use observe::Observer;
 pub use tables::{write_events, write_summary};
@@ -64,65 +66,6 @@ pub struct Replay<'a> {
     /// That source and everything that follows from it alone, by place in the pipeline.
     members: Vec<usize>,
     twin: TwinChoice,
-}
-
-/// Why a replay cannot be, or was not brought to its end.
-#[derive(Debug, thiserror::Error)]
-pub enum ReplayError {
-    /// The pipeline has no source whose place a recording could take.
-    #[error("the pipeline has no `ingest` stage in whose place the recording could be read")]
-    NoSource,
-    /// It has several.
-    #[error("the pipeline reads {}: choose one with --source", stages.join(", "))]
-    ManySources {
-        /// They.
-        stages: Vec<String>,
-    },
-    /// There is no such source.
-    #[error("the pipeline has no source named `{name}`; there is {known}")]
-    UnknownSource {
-        /// What was asked for.
-        name: String,
-        /// What there is.
-        known: String,
-    },
-    /// A table, but the pipeline does not say which column is what.
-    #[error(
-        "{}: a table needs its columns: give stage `{stage}` of the pipeline a `csv` source",
-        path.display()
-    )]
-    NoColumns {
-        /// The table.
-        path: PathBuf,
-        /// The source.
-        stage: String,
-    },
-    /// The recording cannot be read.
-    #[error(transparent)]
-    Ingest(#[from] tauscope_ingest::IngestError),
-    /// A stage cannot be built.
-    #[error(transparent)]
-    Build(#[from] build::BuildError),
-    /// What is written cannot be.
-    #[error(transparent)]
-    Record(#[from] tauscope_record::RecordError),
-    /// A stage failed on the way.
-    #[error(transparent)]
-    Stage(#[from] tauscope_bus::StageError),
-    /// A link failed.
-    #[error(transparent)]
-    Link(#[from] tauscope_bus::LinkError),
-}
-
-impl ReplayError {
-    /// Whether the arguments or files are wrong (exit code 2), rather than what happened since.
-    pub fn is_input(&self) -> bool {
-        match self {
-            Self::Ingest(error) => error.is_input(),
-            Self::Record(_) | Self::Stage(_) | Self::Link(_) => false,
-            _ => true,
-        }
-    }
 }
 
 impl<'a> Replay<'a> {

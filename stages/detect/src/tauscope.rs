@@ -3,7 +3,7 @@
 //! The noise of a residual is not the same in every joint, at every speed and over every length of time:
 //! friction is least certain where a joint turns round, joints err together, and what is small beside
 //! one sample is large beside the mean of thirty. All of that is learnt from contact-free recordings
-//! ([`Learnt`]). The score is the largest, over windows of 10 ms to 0.2 s, of the Mahalanobis length of the mean residual, in
+//! ([`Learnt`]). Friction that the twin leaves out, and how late the twin is, are learnt first, and taken away ([`LearntUsual`]). The score is the largest, over windows of 10 ms to 0.2 s, of the Mahalanobis length of the mean residual, in
 //! units of what that window's length reaches at most in one of a thousand contact-free samples. Slow drift (warming up)
 //! is followed while nothing touches the robot.
 //!
@@ -12,6 +12,8 @@
 //!
 //! Where labels tell collisions from cooperations, what parts them is learnt, too ([`Kinds`]).
 //!
+//! With a standing arm, a contact is over where most of it has gone and the rest is steady: static friction may hold that.
+//!
 //! The touched link is the one whose force explains the whitened residual best, the point of contact
 //! sought along the link (Haddadin, De Luca and Albu-Schäffer, "Robot Collisions: A Survey on Detection,
 //! Isolation, and Identification", 2017, sections V and VI).
@@ -19,14 +21,18 @@
 mod alarm;
 mod kinds;
 mod learnt;
+mod means;
+mod noise;
 mod pieces;
 mod place;
 mod points;
 mod rest;
 mod ring;
 mod smallest;
+mod stand;
 mod sums;
 mod tail;
+mod usual;
 mod windows;
 
 use schemars::JsonSchema;
@@ -42,13 +48,15 @@ use alarm::Watch;
 pub use kinds::Kinds;
 use learnt::ENOUGH_S;
 pub use learnt::{Learnt, LearntJoint, LearntWindow};
+use means::Follow;
 use nalgebra::Vector6;
 use place::Place;
 pub use rest::LearntRest;
 use ring::Ring;
 pub use smallest::Smallest;
 pub use tail::Tail;
-use windows::{Follow, Windows};
+pub use usual::LearntUsual;
+use windows::Windows;
 
 /// Canonical name.
 pub(crate) const NAME: &str = "tauscope";
@@ -216,7 +224,9 @@ impl Detector for Tauscope {
             };
         }
         let now_ns = sample.header.stamp_ns;
-        if let Some(since_ns) = self.watch.step(now_ns, score, &mut self.windows) {
+        if self.windows.settle(sample, free) {
+            self.watch.end();
+        } else if let Some(since_ns) = self.watch.step(now_ns, score, &mut self.windows) {
             self.tell(sample, since_ns);
         }
         let contact = self.watch.contact_ns().map(|contact_ns| Seen {

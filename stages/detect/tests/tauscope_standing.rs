@@ -68,9 +68,13 @@ fn setup() -> Setup {
 
 /// One that has seen an arm stand and move.
 fn detector() -> Detect {
+    taught_by(|seed| arm(seed, 60))
+}
+
+fn taught_by(arm: impl Fn(u64) -> Vec<TwinState>) -> Detect {
     let lesson = |seed| Lesson {
         name: "rec".to_owned(),
-        samples: arm(seed, 60),
+        samples: arm(seed),
         contacts: Some(Vec::new()),
     };
     let train = [lesson(1), lesson(2), lesson(3)];
@@ -88,7 +92,10 @@ fn detector() -> Detect {
 
 /// When alarms begin and end \[s\].
 fn alarms(samples: &[TwinState]) -> Vec<(f64, f64)> {
-    let mut detector = detector();
+    alarms_of(detector(), samples)
+}
+
+fn alarms_of(mut detector: Detect, samples: &[TwinState]) -> Vec<(f64, f64)> {
     let mut out = Out::default();
     for sample in samples {
         detector.accept(sample, &mut out).unwrap();
@@ -146,4 +153,54 @@ fn an_arm_that_comes_to_rest_and_starts_again_is_hardly_ever_taken_for_touched()
     let alarms = alarms(&arm(11, 300));
     // Five an hour are the wish: in five minutes none, or one by chance.
     assert!(alarms.len() <= 1, "{alarms:?}");
+}
+
+/// An arm of which the twin knows all but the noise: always on its way, or standing.
+fn known(seed: u64, seconds: i64, stands: bool) -> Vec<TwinState> {
+    let mut samples = arm(seed, seconds);
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    for (k, sample) in samples.iter_mut().enumerate() {
+        for j in 0..JOINTS {
+            sample.velocity[j] = if stands { 0.0 } else { 0.5 };
+            sample.position[j] = if stands { 0.0 } else { 0.005 * k as f64 };
+            sample.effort[j] = 0.05 * (0..12).map(|_| random.random_range(-0.5..0.5)).sum::<f64>();
+        }
+    }
+    samples
+}
+
+/// By one that has never seen an arm stand.
+fn alarms_unseen(samples: &[TwinState]) -> Vec<(f64, f64)> {
+    alarms_of(taught_by(|seed| known(seed, 30, false)), samples)
+}
+
+#[test]
+fn a_contact_is_over_where_it_has_gone_but_for_what_friction_holds_and_the_next_one_is_found() {
+    let mut samples = known(7, 12, true);
+    for (k, sample) in samples.iter_mut().enumerate().skip(300) {
+        let pushed = k < 400 || (700..800).contains(&k);
+        sample.effort[1] -= if pushed { 1.5 } else { 0.4 };
+    }
+    let alarms = alarms_unseen(&samples);
+    assert_eq!(alarms.len(), 2, "{alarms:?}");
+    let [first, second] = [alarms[0], alarms[1]];
+    assert!((3.0..3.1).contains(&first.0) && first.1 < 4.5, "{first:?}");
+    assert!(
+        (7.0..7.1).contains(&second.0) && second.1 < 8.5,
+        "{second:?}"
+    );
+}
+
+#[test]
+fn a_hand_that_keeps_its_force_is_never_forgotten() {
+    let mut samples = known(7, 60, true);
+    for sample in &mut samples[300..5500] {
+        sample.effort[1] -= 1.5;
+    }
+    let alarms = alarms_unseen(&samples);
+    assert_eq!(alarms.len(), 1, "{alarms:?}");
+    assert!(
+        alarms[0].0 < 3.1 && (55.0..55.5).contains(&alarms[0].1),
+        "{alarms:?}"
+    );
 }

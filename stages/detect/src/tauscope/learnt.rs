@@ -3,15 +3,18 @@
 use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tauscope_bus::{MAX_JOINTS, TwinState, flags};
+use tauscope_bus::{TwinState, flags};
 
-use super::NAME;
 use super::kinds::Kinds;
-use super::pieces::{Piece, free, free_s, marked, pieces, quantile};
+use super::means::{Follow, WINDOWS_S};
+use super::noise;
+use super::pieces::{FOLDS, Piece, free, free_s, marked, pieces, quantile};
 use super::rest::{self, LearntRest};
 use super::smallest::Smallest;
 use super::tail::{Peaks, Tail};
-use super::windows::{Follow, Means, WINDOWS_S, Windows};
+use super::usual::LearntUsual;
+use super::windows::Windows;
+use super::{DRIFT, NAME};
 use crate::joints;
 use crate::lesson::{LearnError, Lessons};
 use crate::rate;
@@ -19,19 +22,15 @@ use crate::rate;
 /// Where speeds are divided, as shares of a joint's usual highest speed.
 const EDGES: [f64; BINS - 1] = [0.02, 0.05, 0.12, 0.3];
 /// How many classes of speed there are.
-const BINS: usize = 5;
+pub(super) const BINS: usize = 5;
 /// A joint's usual highest speed: this share of its samples is slower.
 const FAST: f64 = 0.95;
 /// Speed below which a joint is not taken to move at all \[rad/s\].
 const LEAST_FAST_RAD_S: f64 = 0.01;
-/// The noise of a class of speed is taken for the joint's where it has no more samples than this.
-const PRIOR_SAMPLES: f64 = 200.0;
 /// Correlations are believed to this share.
 const BELIEVED: f64 = 0.95;
 /// The share of contact-free samples that stays below the unit of a window's score.
 const USUAL: f64 = 0.999;
-/// In how many parts data is held out from what its noise is learnt from.
-const FOLDS: usize = 4;
 /// The least that can be learnt from \[samples\].
 const LEAST_SAMPLES: usize = 500;
 /// With less than this a tail cannot be told, nor how often a threshold is exceeded \[s\].
@@ -78,14 +77,19 @@ pub struct LearntJoint {
     pub name: String,
     /// Its usual highest speed \[rad/s\], by which speeds are classed.
     pub fast_rad_s: f64,
+    /// What of its residual is usual, where that was told.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub usual: Option<LearntUsual>,
 }
 
 /// The mean residual over one window.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LearntWindow {
-    /// Root mean square by joint and class of speed \[effort unit\].
+    /// Root mean square by joint and class of speed, where the expected effort does not change \[effort unit\].
     pub noise: Vec<Vec<f64>>,
+    /// By joint, the share of what the expected effort has changed by of late that adds to it.
+    pub unquiet: Vec<f64>,
     /// Inverse of the joints' correlation, row by row.
     pub inverse_correlation: Vec<f64>,
     /// Squared Mahalanobis length that one of a thousand contact-free samples exceeds.
@@ -143,7 +147,9 @@ impl Learnt {
             smallest: Vec::new(),
             kinds: None,
         };
-        learnt.windows = learnt.noise(pieces, follow);
+        learnt.tell_usual(pieces);
+        let free_s = learnt.free_s.unwrap_or(0.0);
+        learnt.windows = noise::learn(&learnt.joints, pieces, follow, free_s);
         if !learnt.last_pays() {
             learnt.windows.pop();
         }
@@ -162,6 +168,7 @@ impl Learnt {
         let n = joint_names.len();
         let fits = |window: &LearntWindow| {
             window.inverse_correlation.len() == n * n
+                && window.unquiet.len() == n
                 && window.noise.len() == n
                 && window.noise.iter().all(|noise| noise.len() == BINS)
         };
@@ -179,57 +186,22 @@ impl Learnt {
             ));
         }
         let is_rate = self.rate_hz > 0.0;
-        (!is_rate).then(|| "has a rate that is not above 0".to_owned())
+        if !is_rate {
+            return Some("has a rate that is not above 0".to_owned());
+        }
+        let mut usual = self.joints.iter().filter_map(|joint| joint.usual.as_ref());
+        (!usual.all(LearntUsual::is_whole))
+            .then(|| "is not whole: what of a joint's residual is usual".to_owned())
     }
 
-    fn fast(&self) -> [f64; MAX_JOINTS] {
-        let mut fast = [0.0; MAX_JOINTS];
-        for (fast, joint) in fast.iter_mut().zip(&self.joints) {
-            *fast = joint.fast_rad_s;
+    /// Tells what of the residual is usual, where enough was seen of it.
+    fn tell_usual(&mut self, all: &[Piece<'_>]) {
+        if self.free_s.is_some_and(|free_s| free_s < ENOUGH_S) {
+            return;
         }
-        fast
-    }
-
-    /// Root mean square of the means by window, joint and class of speed.
-    fn noise(&self, all: &[Piece<'_>], follow: Follow) -> Vec<LearntWindow> {
-        let n = self.joints.len();
-        let mut sums = vec![vec![[(0.0, 0.0); BINS]; n]; WINDOWS_S.len()];
-        for piece in all {
-            let mut means = Means::new(self.fast(), follow, WINDOWS_S.len());
-            for (sample, is_free) in marked(piece) {
-                restart(&mut means, sample);
-                means.push(sample, is_free);
-                if !(is_free && means.ready()) {
-                    continue;
-                }
-                for (w, sums) in sums.iter_mut().enumerate() {
-                    for j in 0..n {
-                        let (square, count) = &mut sums[j][bin(&self.joints[j], means.slow[j])];
-                        *square += means.mean(w, j).powi(2);
-                        *count += 1.0;
-                    }
-                }
-            }
+        for (j, joint) in self.joints.iter_mut().enumerate() {
+            joint.usual = LearntUsual::new(all, j, joint.fast_rad_s);
         }
-        let one = |bins: &[(f64, f64); BINS]| -> Vec<f64> {
-            let (square, count) = bins
-                .iter()
-                .fold((0.0, 0.0), |(s, c), (square, n)| (s + square, c + n));
-            let overall = square / f64::max(count, 1.0);
-            let of = |(square, count): &(f64, f64)| {
-                ((square + PRIOR_SAMPLES * overall) / (count + PRIOR_SAMPLES))
-                    .sqrt()
-                    .max(1e-9)
-            };
-            bins.iter().map(of).collect()
-        };
-        sums.iter()
-            .map(|joints| LearntWindow {
-                noise: joints.iter().map(one).collect(),
-                inverse_correlation: DMatrix::identity(n, n).as_slice().to_vec(),
-                usual: 1.0,
-            })
-            .collect()
     }
 
     /// Whether the last window averages enough noise away (mean of logarithms) to be worth its delay, and enough was seen to tell.
@@ -279,11 +251,12 @@ impl Learnt {
         }
     }
 
-    /// Runs over the contact-free samples, and hands the windows out at each.
+    /// Runs over the contact-free samples, and hands the windows out at each; drift is followed where the score is below `drifts`.
     pub(super) fn each(
         &self,
         all: &[Piece<'_>],
         follow: Follow,
+        drifts: f64,
         mut visit: impl FnMut(&TwinState, &Windows, f64),
     ) {
         for piece in all {
@@ -292,7 +265,7 @@ impl Learnt {
                 if sample.header.has(flags::RESET) {
                     windows.reset();
                 }
-                let score = windows.score(sample, is_free.then_some(f64::INFINITY));
+                let score = windows.score(sample, is_free.then_some(drifts));
                 if is_free && windows.ready() {
                     visit(sample, &windows, score);
                 }
@@ -304,7 +277,7 @@ impl Learnt {
         let n = self.joints.len();
         let believed = BELIEVED * self.believed();
         let mut products = vec![DMatrix::<f64>::zeros(n, n); self.windows.len()];
-        self.each(all, follow, |_, windows, _| {
+        self.each(all, follow, f64::INFINITY, |_, windows, _| {
             for (w, product) in products.iter_mut().enumerate() {
                 let z: Vec<f64> = (0..n)
                     .map(|j| windows.mean(w, j) / windows.noise(w, j))
@@ -333,7 +306,7 @@ impl Learnt {
 
     fn measure_usual(&mut self, all: &[Piece<'_>], follow: Follow) {
         let mut lengths = vec![Vec::new(); self.windows.len()];
-        self.each(all, follow, |_, windows, _| {
+        self.each(all, follow, f64::INFINITY, |_, windows, _| {
             for (w, lengths) in lengths.iter_mut().enumerate() {
                 lengths.push(windows.length(w));
             }
@@ -346,7 +319,8 @@ impl Learnt {
     /// The largest score of each block of contact-free time.
     fn peaks(&self, all: &[Piece<'_>], follow: Follow) -> Vec<f64> {
         let mut peaks = Peaks::default();
-        self.each(all, follow, |sample, _, score| {
+        // As it will run.
+        self.each(all, follow, DRIFT, |sample, _, score| {
             peaks.add(sample.header.stamp_ns, score);
         });
         peaks.into_blocks()
@@ -358,9 +332,9 @@ fn held_out_peaks(all: &[Piece<'_>], joint_names: &[String], follow: Follow) -> 
     let mut peaks = Vec::new();
     for fold in 0..FOLDS {
         let part = |held_out: bool| -> Vec<Piece<'_>> {
-            let pieces = all.iter().enumerate();
-            let pieces = pieces.filter(|(i, _)| (i % FOLDS == fold) == held_out);
-            pieces.map(|(_, piece)| *piece).collect()
+            let pieces = all.iter();
+            let pieces = pieces.filter(|piece| (piece.fold == fold) == held_out);
+            pieces.copied().collect()
         };
         let others = match part(false) {
             // A single piece: nothing is left to learn from without it.
@@ -380,12 +354,6 @@ fn too_little(found: usize) -> LearnError {
     }
 }
 
-fn restart(means: &mut Means, sample: &TwinState) {
-    if sample.header.has(flags::RESET) {
-        means.reset();
-    }
-}
-
 fn speeds(all: &[Piece<'_>], joint_names: &[String]) -> Vec<LearntJoint> {
     (joint_names.iter().enumerate())
         .map(|(j, name)| {
@@ -394,6 +362,7 @@ fn speeds(all: &[Piece<'_>], joint_names: &[String]) -> Vec<LearntJoint> {
             LearntJoint {
                 name: name.clone(),
                 fast_rad_s: quantile(&mut speeds, FAST).max(LEAST_FAST_RAD_S),
+                usual: None,
             }
         })
         .collect()

@@ -2,19 +2,23 @@
 
 use tauscope_bus::{TwinState, flags};
 
-use super::windows::Follow;
+use super::means::Follow;
 use crate::lesson::{Lesson, Lessons};
 
 /// So much around a labelled contact is left out \[ns\].
 const BEFORE_NS: i64 = 50_000_000;
-const AFTER_NS: i64 = 1_000_000_000;
+const AFTER_NS: i64 = 400_000_000;
 /// Data is cut in at least so many pieces, so that there are some for each part that is held out.
 const LEAST_PIECES: usize = 8;
+/// In how many parts data is held out from what its noise is learnt from.
+pub(super) const FOLDS: usize = 4;
 
 /// A stretch of a recording.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Piece<'a> {
     pub samples: &'a [TwinState],
+    /// The part of the data that it is held out with: pieces of one recording together, where there are enough recordings.
+    pub fold: usize,
     lesson: &'a Lesson,
 }
 
@@ -26,18 +30,34 @@ pub(super) fn pieces<'a>(lessons: &Lessons<'a>, follow: Follow) -> Vec<Piece<'a>
     } else {
         LEAST_PIECES.div_ceil(all().count().max(1))
     };
+    let recordings_do = all().count() >= FOLDS;
     all()
-        .flat_map(|lesson| {
+        .enumerate()
+        .flat_map(|(number, lesson)| {
             let length = lesson.samples.len().div_ceil(each).max(1);
-            let parts = lesson.samples.chunks(length);
-            parts.map(move |samples| Piece { samples, lesson })
+            let parts = lesson.samples.chunks(length).enumerate();
+            parts.map(move |(part, samples)| {
+                let of_all = if recordings_do {
+                    number
+                } else {
+                    number * each + part
+                };
+                let fold = of_all % FOLDS;
+                Piece {
+                    samples,
+                    fold,
+                    lesson,
+                }
+            })
         })
         .collect()
 }
 
 /// Settled samples of a piece, and whether nothing touched the robot then.
 pub(super) fn marked<'a>(piece: &Piece<'a>) -> impl Iterator<Item = (&'a TwinState, bool)> {
-    let Piece { samples, lesson } = *piece;
+    let Piece {
+        samples, lesson, ..
+    } = *piece;
     let settled = samples.iter().filter(|s| s.header.has(flags::READY));
     settled.map(move |sample| {
         let stamp = sample.header.stamp_ns;

@@ -12,22 +12,18 @@ use serde::{Deserialize, Serialize};
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState, flags};
 
 use super::learnt::ENOUGH_S;
+use super::means::{LONG, MIDDLE, SHORTEST, WINDOWS_S, borne_out};
 use super::pieces::{Piece, marked, quantile};
+use super::stand::{End, Stand};
 use super::sums::Sums;
 use super::tail::{Peaks, Tail};
-use super::windows::{LONG, MIDDLE, SHORTEST, WINDOWS_S, borne_out};
 
-/// An arm stands once no joint has been further than this from where it was \[rad, m\], nor faster than this \[rad/s, m/s\], for so long \[s\].
-const WITHIN: f64 = 0.01;
+/// A standing arm is no faster than this: one that is about to move changes its effort, too \[rad/s, m/s\].
 const SLOW: f64 = 0.03;
-const STANDS_AFTER_S: f64 = 1.5;
 /// A change counts once it has been there for so long to twice as long \[s\].
 const LASTS_S: f64 = 0.075;
 /// Time constant with which the effort at rest is followed while nothing touches the arm \[s\].
 const FOLLOW_S: f64 = 1.0;
-/// A contact is over where less than this share of it is left, for so long \[s\].
-const LEFT: f64 = 0.35;
-const OVER_AFTER_S: f64 = 0.1;
 /// So much of a contact may creep behind it, and how fast that fades \[s\].
 const CREEPS: f64 = 0.5;
 const FADES_S: f64 = 1.5;
@@ -38,6 +34,9 @@ const MOST_SAMPLES: usize = 20_000;
 const WITHIN_NOISE: f64 = 0.683;
 /// The share of contact-free samples whose change stays below the unit of the score.
 const USUAL: f64 = 0.99;
+
+/// What has gone is gone, however the rest changes.
+const STEADY: JointArray = [0.0; MAX_JOINTS];
 
 /// By window and joint.
 type Changes = [JointArray; WINDOWS_S.len()];
@@ -71,31 +70,6 @@ impl LearntRest {
                 .sum::<f64>()
         });
         (lengths.fold(0.0, f64::max) / self.usual).sqrt()
-    }
-}
-
-/// Tells whether the arm stands.
-#[derive(Debug, Default)]
-struct Stand {
-    at: JointArray,
-    since_ns: Option<i64>,
-}
-
-impl Stand {
-    /// Takes the next sample; whether the arm stands.
-    fn step(&mut self, sample: &TwinState, joints: usize) -> bool {
-        let now_ns = sample.header.stamp_ns;
-        let away = |(q, at): (&f64, &f64)| (q - at).abs() > WITHIN;
-        let moves = sample.position[..joints].iter().zip(&self.at).any(away)
-            || sample.velocity[..joints].iter().any(|v| v.abs() > SLOW);
-        match self.since_ns {
-            Some(since_ns) if !moves => (now_ns - since_ns) as f64 * 1e-9 >= STANDS_AFTER_S,
-            _ => {
-                self.at = sample.position;
-                self.since_ns = Some(now_ns);
-                false
-            }
-        }
     }
 }
 
@@ -141,7 +115,7 @@ impl Base {
     fn new() -> Self {
         Self {
             sums: Sums::new(WINDOWS_S.len()),
-            stand: Stand::default(),
+            stand: Stand::new(SLOW),
             mean: None,
             newest_ns: 0,
         }
@@ -149,7 +123,7 @@ impl Base {
 
     fn reset(&mut self) {
         self.sums.reset();
-        self.stand = Stand::default();
+        self.stand.reset();
         self.mean = None;
     }
 
@@ -283,10 +257,8 @@ pub(super) struct Rest {
     scale: f64,
     base: Base,
     lasting: Lasting,
-    /// The contact that goes on: the change where it was largest, in units of noise, and its size; since when it seems to be over.
-    largest: JointArray,
-    size: f64,
-    over_since_ns: Option<i64>,
+    /// The contact that goes on.
+    end: End,
     /// Size of the contact before, and when it was over.
     before: Option<(f64, i64)>,
 }
@@ -300,23 +272,26 @@ impl Rest {
             scale: threshold / learnt.tail.threshold(per_hour),
             base: Base::new(),
             lasting: Lasting::new(0),
-            largest: [0.0; MAX_JOINTS],
-            size: 0.0,
-            over_since_ns: None,
+            end: End::default(),
             before: None,
         }
     }
 
     pub fn reset(&mut self) {
         self.base.reset();
-        self.forget_contact();
+        self.end.forget();
         self.before = None;
     }
 
-    fn forget_contact(&mut self) {
-        self.largest = [0.0; MAX_JOINTS];
-        self.size = 0.0;
-        self.over_since_ns = None;
+    /// The contact that goes on is over: what is left is the new rest, and may creep.
+    pub fn settle(&mut self) {
+        if self.base.mean.is_none() {
+            return;
+        }
+        let size = (self.end.whole() / self.learnt.usual).sqrt();
+        self.before = Some((size, self.base.newest_ns));
+        self.end.forget();
+        self.base.mean = Some(self.base.sums.means[MIDDLE]);
     }
 
     /// The score of the next sample; nothing while the arm moves, nor where it came to rest while something touched it. While it is `free` of
@@ -324,7 +299,7 @@ impl Rest {
     pub fn score(&mut self, sample: &TwinState, free: bool) -> Option<f64> {
         let now_ns = sample.header.stamp_ns;
         let Some(changes) = self.base.changes(sample, self.joints, free) else {
-            self.forget_contact();
+            self.end.forget();
             self.before = None;
             self.lasting = Lasting::new(now_ns);
             return None;
@@ -335,34 +310,23 @@ impl Rest {
         let size = self.learnt.size(&changes) / (1.0 + creep);
         self.base.follow(now_ns, free);
         if free {
-            self.forget_contact();
-        } else if self.is_over(now_ns, &changes[MIDDLE]) {
-            self.before = Some((self.size, now_ns));
-            self.forget_contact();
-            self.base.mean = Some(self.base.sums.means[MIDDLE]);
+            self.end.forget();
+        } else if self
+            .end
+            .step(now_ns, &self.units(&changes[MIDDLE]), &STEADY)
+        {
+            self.settle();
         }
         Some(self.scale * self.lasting.step(now_ns, size).powi(2))
     }
 
-    /// Whether the contact that goes on is over.
-    fn is_over(&mut self, now_ns: i64, change: &JointArray) -> bool {
+    /// A change in units of noise.
+    fn units(&self, change: &JointArray) -> JointArray {
         let mut units = [0.0; MAX_JOINTS];
         let noise = self.learnt.noise[MIDDLE].iter();
         for ((unit, change), noise) in units.iter_mut().zip(change).zip(noise) {
             *unit = change / noise;
         }
-        let product =
-            |a: &JointArray, b: &JointArray| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
-        let size = (product(&units, &units) / self.learnt.usual).sqrt();
-        if size > self.size {
-            (self.largest, self.size) = (units, size);
-        }
-        let whole = product(&self.largest, &self.largest);
-        if product(&self.largest, &units) >= LEFT * whole {
-            self.over_since_ns = None;
-            return false;
-        }
-        let since_ns = *self.over_since_ns.get_or_insert(now_ns);
-        (now_ns - since_ns) as f64 * 1e-9 >= OVER_AFTER_S
+        units
     }
 }

@@ -32,6 +32,15 @@ impl<const CAPACITY: usize> Ring<CAPACITY> {
         self.count += 1;
     }
 
+    /// Takes as much from all rows.
+    pub fn shift(&mut self, by: &JointArray) {
+        for (_, row) in &mut self.rows {
+            for (value, by) in row.iter_mut().zip(by) {
+                *value -= by;
+            }
+        }
+    }
+
     /// A row by its number; only the newest [`Ring::is_kept`].
     pub fn row(&self, number: usize) -> &(i64, JointArray) {
         &self.rows[number % CAPACITY]

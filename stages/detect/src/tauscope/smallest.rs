@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 use tauscope_bus::MAX_JOINTS;
 
 use super::learnt::Learnt;
+use super::means::Follow;
 use super::pieces::pieces;
 use super::place::Place;
-use super::windows::Follow;
 use crate::lesson::Lessons;
 use crate::stage::Setup;
 
@@ -47,35 +47,40 @@ pub(crate) fn smallest(
     // By link in order, the score of 1 N.
     let mut scores: Vec<(usize, Vec<f64>)> = Vec::new();
     let mut count = 0;
-    learnt.each(&pieces(lessons, follow), follow, |sample, windows, _| {
-        count += 1;
-        if count % EVERY != 0 {
-            return;
-        }
-        let inverse = windows.inverse_correlation(w);
-        let usual = learnt.windows[w].usual;
-        points.each_link(sample, |_, link| {
-            let of_link = scores.iter().position(|(of, _)| *of == link.link);
-            let at = of_link.unwrap_or_else(|| {
-                scores.push((link.link, Vec::new()));
-                scores.len() - 1
-            });
-            for (arm, _) in link.around() {
-                let mut information = Vector3::<f64>::zeros();
-                let mut rows = [Vector3::zeros(); MAX_JOINTS];
-                for (a, row) in rows.iter_mut().enumerate().take(n) {
-                    *row = link.moved(a, &arm) * (per_nm[a] / windows.noise(w, a));
-                }
-                for a in 0..n {
-                    for b in 0..n {
-                        information += rows[a].component_mul(&rows[b]) * inverse[a * n + b];
-                    }
-                }
-                let score = information.iter().map(|score| score / usual);
-                scores[at].1.extend(score);
+    learnt.each(
+        &pieces(lessons, follow),
+        follow,
+        f64::INFINITY,
+        |sample, windows, _| {
+            count += 1;
+            if count % EVERY != 0 {
+                return;
             }
-        });
-    });
+            let inverse = windows.inverse_correlation(w);
+            let usual = learnt.windows[w].usual;
+            points.each_link(sample, |_, link| {
+                let of_link = scores.iter().position(|(of, _)| *of == link.link);
+                let at = of_link.unwrap_or_else(|| {
+                    scores.push((link.link, Vec::new()));
+                    scores.len() - 1
+                });
+                for (arm, _) in link.around() {
+                    let mut information = Vector3::<f64>::zeros();
+                    let mut rows = [Vector3::zeros(); MAX_JOINTS];
+                    for (a, row) in rows.iter_mut().enumerate().take(n) {
+                        *row = link.moved(a, &arm) * (per_nm[a] / windows.noise(w, a));
+                    }
+                    for a in 0..n {
+                        for b in 0..n {
+                            information += rows[a].component_mul(&rows[b]) * inverse[a * n + b];
+                        }
+                    }
+                    let score = information.iter().map(|score| score / usual);
+                    scores[at].1.extend(score);
+                }
+            });
+        },
+    );
     let points = &points;
     let of_link = |(link, mut scores): (usize, Vec<f64>)| {
         scores.sort_by(f64::total_cmp);

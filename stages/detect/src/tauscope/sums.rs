@@ -2,8 +2,8 @@
 
 use tauscope_bus::{JointArray, MAX_JOINTS};
 
+use super::means::WINDOWS_S;
 use super::ring::Ring;
-use super::windows::WINDOWS_S;
 
 /// Most samples of a window.
 const CAPACITY: usize = 1024;
@@ -71,6 +71,18 @@ impl Sums {
         if self.rows.is_round() {
             self.sum_anew(n);
         }
+        self.divide(n);
+    }
+
+    /// Takes as much from all rows.
+    pub fn shift(&mut self, by: &JointArray, n: usize) {
+        self.rows.shift(by);
+        self.sum_anew(n);
+        self.divide(n);
+    }
+
+    fn divide(&mut self, n: usize) {
+        let head = self.rows.count();
         for (w, means) in self.means.iter_mut().enumerate().take(self.windows) {
             let share = ((head - self.tails[w]).max(1) as f64).recip();
             for (mean, sum) in means[..n].iter_mut().zip(&self.totals[w]) {

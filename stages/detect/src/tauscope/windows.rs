@@ -1,142 +1,17 @@
-//! Means of the residual over windows that end at the newest sample, and how unusual they are.
+//! How unusual the residual's means over windows that end at the newest sample are.
 
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 
 use super::learnt::{Learnt, bin};
+use super::means::{Follow, LONG, MIDDLE, Means, SHORTEST, WINDOWS_S, borne_out};
 use super::rest::Rest;
-use super::sums::Sums;
+use super::stand::{End, Stand};
 
-/// Lengths of the windows \[s\]; the last one is used where it pays.
-pub(crate) const WINDOWS_S: [f64; 4] = [0.01, 0.03, 0.1, 0.2];
-/// The window that tells how a contact begins.
-pub(crate) const SHORTEST: usize = 0;
-/// The window that a contact is followed by.
-pub(crate) const MIDDLE: usize = 1;
-/// The window that tells what is usual just now.
-pub(super) const LONG: usize = 2;
-/// So much of the usual noise of the next shorter window's mean a longer one's may be away from it: what has gone is not told any longer.
-const BORNE_OUT: f64 = 2.0;
-/// How long a joint that was slow counts as slow \[s\].
-const SLOW_MEMORY_S: f64 = 0.3;
-
-/// Means over the windows as far as those over the next shorter ones bear them out, with these `noise`s by window and joint.
-pub(super) fn borne_out(
-    means: &[JointArray; WINDOWS_S.len()],
-    windows: usize,
-    joints: usize,
-    noise: impl Fn(usize, usize) -> f64,
-) -> [JointArray; WINDOWS_S.len()] {
-    let mut borne_out = *means;
-    for w in 1..windows {
-        for j in 0..joints {
-            let newer = borne_out[w - 1][j];
-            let margin = BORNE_OUT * noise(w - 1, j);
-            borne_out[w][j] = means[w][j].max(newer - margin).min(newer + margin);
-        }
-    }
-    borne_out
-}
-
-/// How the slow part of a residual is had.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Follow {
-    /// Time constant \[s\].
-    pub drift_s: f64,
-    /// The mean of so much at the beginning \[s\]; 0 for none.
-    pub offset_from_first_s: f64,
-}
-
-/// Running means of the residual over each window.
-#[derive(Debug)]
-pub(crate) struct Means {
-    sums: Sums,
-    /// The slow part of the residual.
-    offset: JointArray,
-    settings: Follow,
-    /// Step \[s\], and how much of the residual's drift is followed in it; kept, for clocks are often even.
-    step: (f64, f64),
-    /// Smallest speed of late, by joint.
-    pub slow: JointArray,
-    fast: JointArray,
-    start_ns: i64,
-}
-
-impl Means {
-    /// For joints whose usual speeds go up to `fast` \[rad/s\], over the first so many `windows`.
-    pub fn new(fast: JointArray, settings: Follow, windows: usize) -> Self {
-        Self {
-            sums: Sums::new(windows),
-            offset: [0.0; MAX_JOINTS],
-            settings,
-            step: (0.0, 0.0),
-            slow: [0.0; MAX_JOINTS],
-            fast,
-            start_ns: 0,
-        }
-    }
-
-    pub fn reset(&mut self) {
-        self.sums.reset();
-        self.offset = [0.0; MAX_JOINTS];
-    }
-
-    /// Whether the windows are full (the last one is as good as the one before it until then), and the offset known.
-    pub fn ready(&self) -> bool {
-        let newest = self.sums.newest_ns();
-        let longest = WINDOWS_S[LONG];
-        (newest - self.start_ns) as f64 * 1e-9 >= longest.max(self.settings.offset_from_first_s)
-    }
-
-    /// Takes a sample; slow drift is followed if `follow`.
-    pub fn push(&mut self, sample: &TwinState, follow: bool) {
-        let n = sample.header.joint_count as usize;
-        let now = sample.header.stamp_ns;
-        let is_first = self.sums.is_empty();
-        if is_first {
-            self.start_ns = now;
-            self.slow = sample.velocity.map(f64::abs);
-        }
-        let dt_s = if is_first {
-            0.0
-        } else {
-            (now - self.sums.newest_ns()) as f64 * 1e-9
-        };
-        let since_s = (now - self.start_ns) as f64 * 1e-9;
-        let first = since_s < self.settings.offset_from_first_s;
-        if dt_s.to_bits() != self.step.0.to_bits() {
-            self.step = (dt_s, 1.0 - (-dt_s / self.settings.drift_s).exp());
-        }
-        let drift = self.step.1;
-        let recovery = dt_s / SLOW_MEMORY_S;
-        let mut row = [0.0; MAX_JOINTS];
-        for (j, value) in row.iter_mut().enumerate().take(n) {
-            let residual = sample.effort[j] - sample.expected_effort[j];
-            if first {
-                // The mean of the first seconds, as it grows.
-                let share = dt_s / (since_s + dt_s).max(1e-9);
-                self.offset[j] += share * (residual - self.offset[j]);
-            } else if follow {
-                self.offset[j] += drift * (residual - self.offset[j]);
-            }
-            *value = residual - self.offset[j];
-            let recovered = self.slow[j] + recovery * self.fast[j];
-            self.slow[j] = recovered.min(sample.velocity[j].abs());
-        }
-        self.sums.push(now, &row, n);
-    }
-
-    /// Mean residual of a joint over a window \[effort unit\].
-    pub fn mean(&self, window: usize, joint: usize) -> f64 {
-        self.sums.means[window][joint]
-    }
-
-    /// What the shortest window's mean was at this instant.
-    pub fn earlier(&self, to_ns: i64) -> JointArray {
-        // The window is open where it begins.
-        let from_ns = to_ns - (WINDOWS_S[SHORTEST] * 1e9) as i64 + 1;
-        self.sums.rows.mean(from_ns, to_ns)
-    }
-}
+/// A standing arm that is pushed gives way no faster than this \[rad/s, m/s\].
+const SLOW: f64 = 0.1;
+/// What is left behind a contact with a standing arm creeps for so long \[s\], by so much of the contact.
+const CREEPS_S: f64 = 1.5;
+const CREEPS: f64 = 0.1;
 
 /// How the residual has changed against the contact that goes on: products in the metric of what is usual.
 #[derive(Debug, Clone, Copy)]
@@ -149,6 +24,13 @@ pub(crate) struct Change {
     pub held: f64,
 }
 
+/// A contact with a standing arm that is over: when, and the root of its score.
+#[derive(Debug, Clone, Copy)]
+struct Settled {
+    at_ns: i64,
+    size: f64,
+}
+
 /// Means of the residual, whitened.
 #[derive(Debug)]
 pub(crate) struct Windows {
@@ -156,8 +38,12 @@ pub(crate) struct Windows {
     learnt: Learnt,
     /// What is known of a standing arm, if it is heeded.
     at_rest: Option<Rest>,
-    /// Class of each joint's present speed.
-    bins: [usize; MAX_JOINTS],
+    stand: Stand,
+    /// The contact with a standing arm that goes on, and when one was over.
+    end: End,
+    settled: Option<Settled>,
+    /// By window and joint, the noise at the present speed and unrest.
+    noise: [JointArray; WINDOWS_S.len()],
     /// By window and joint, the mean residual as far as the newest samples bear it out.
     borne_out: [JointArray; WINDOWS_S.len()],
     /// Mean residual of the contact that goes on, as it is followed, and of the one below it.
@@ -171,15 +57,14 @@ pub(crate) struct Windows {
 
 impl Windows {
     pub fn new(learnt: &Learnt, settings: Follow) -> Self {
-        let mut fast = [0.0; MAX_JOINTS];
-        for (fast, joint) in fast.iter_mut().zip(&learnt.joints) {
-            *fast = joint.fast_rad_s;
-        }
         Self {
-            means: Means::new(fast, settings, learnt.windows.len()),
+            means: Means::new(&learnt.joints, settings, learnt.windows.len()),
             learnt: learnt.clone(),
             at_rest: None,
-            bins: [0; MAX_JOINTS],
+            stand: Stand::new(SLOW),
+            end: End::default(),
+            settled: None,
+            noise: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
             borne_out: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
             held: [0.0; MAX_JOINTS],
             base: [0.0; MAX_JOINTS],
@@ -201,6 +86,9 @@ impl Windows {
         if let Some(rest) = &mut self.at_rest {
             rest.reset();
         }
+        self.stand.reset();
+        self.end.forget();
+        self.settled = None;
         self.score = 0.0;
     }
 
@@ -213,26 +101,81 @@ impl Windows {
         let follow = usual.is_some_and(|usual| self.score < usual);
         self.means.push(sample, follow);
         for (j, joint) in self.learnt.joints.iter().enumerate() {
-            self.bins[j] = bin(joint, self.means.slow[j]);
+            let bin = bin(joint, self.means.slow[j]);
+            let (unrest, strange) = (self.means.unrest(j), self.means.strange(j));
+            for (noise, window) in self.noise.iter_mut().zip(&self.learnt.windows) {
+                let usual = window.noise[j][bin] * strange;
+                noise[j] = usual.hypot(window.unquiet[j] * unrest);
+            }
         }
         self.borne_out = borne_out(
-            &self.means.sums.means,
+            self.means.all(),
             self.learnt.windows.len(),
             self.joints(),
-            |w, j| self.noise(w, j),
+            |w, j| self.noise[w][j],
         );
         self.score = 0.0;
         for w in 0..self.learnt.windows.len() {
             self.score = (self.length(w) / self.learnt.windows[w].usual).max(self.score);
         }
+        self.score /= self.creep(sample.header.stamp_ns);
         let at_rest = (self.at_rest.as_mut()).and_then(|rest| rest.score(sample, usual.is_some()));
         self.score = at_rest.map_or(self.score, |score| score.max(self.score));
         self.score
     }
 
+    /// By how much a score is less, for creep behind a contact with a standing arm.
+    fn creep(&self, now_ns: i64) -> f64 {
+        self.settled.map_or(1.0, |over| {
+            let fades = (-((now_ns - over.at_ns) as f64 * 1e-9) / CREEPS_S).exp();
+            (1.0 + CREEPS * over.size * fades).powi(2)
+        })
+    }
+
+    /// Heeds where a standing arm comes to rest behind a contact: to be called with each sample that is judged, `free` of contacts or not. Whether a
+    /// contact is over.
+    pub fn settle(&mut self, sample: &TwinState, free: bool) -> bool {
+        let now_ns = sample.header.stamp_ns;
+        if !self.stand.step(sample, self.joints()) {
+            self.end.forget();
+            if self.settled.is_some() {
+                self.means.creep(true);
+            }
+            return false;
+        }
+        if free {
+            self.end.forget();
+            let creeps = |over: Settled| ((now_ns - over.at_ns) as f64 * 1e-9) < CREEPS_S;
+            if self.settled.is_some_and(creeps) {
+                self.means.creep(false);
+            }
+            return false;
+        }
+        let (mut units, mut changed) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
+        for j in 0..self.joints() {
+            let noise = self.noise(MIDDLE, j);
+            units[j] = self.excess(MIDDLE, j) / noise;
+            changed[j] = (self.mean(MIDDLE, j) - self.mean(LONG, j)) / noise;
+        }
+        if !self.end.step(now_ns, &units, &changed) {
+            return false;
+        }
+        let size = (self.end.whole() / self.learnt.windows[MIDDLE].usual).sqrt();
+        self.end.forget();
+        self.means.settle();
+        if let Some(rest) = &mut self.at_rest {
+            rest.settle();
+        }
+        self.settled = Some(Settled {
+            at_ns: now_ns,
+            size,
+        });
+        true
+    }
+
     /// The longest window that holds nothing from before this instant, or the shortest.
     pub fn since(&self, instant_ns: i64) -> usize {
-        let s = (self.means.sums.newest_ns() - instant_ns) as f64 * 1e-9;
+        let s = (self.means.newest_ns() - instant_ns) as f64 * 1e-9;
         let windows = &WINDOWS_S[..self.learnt.windows.len()];
         windows
             .iter()
@@ -332,9 +275,9 @@ impl Windows {
         }
     }
 
-    /// Its usual size at the joint's present speed \[effort unit\].
+    /// Its usual size at the joint's present speed and unrest \[effort unit\].
     pub fn noise(&self, window: usize, joint: usize) -> f64 {
-        self.learnt.windows[window].noise[joint][self.bins[joint]]
+        self.noise[window][joint]
     }
 
     /// Inverse of the correlation of the joints' means over a window, row by row.

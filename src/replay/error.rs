@@ -1,0 +1,64 @@
+//! Why a replay cannot be, or was not brought to its end.
+
+use std::path::PathBuf;
+
+use crate::build;
+
+/// Why a replay cannot be, or was not brought to its end.
+#[derive(Debug, thiserror::Error)]
+pub enum ReplayError {
+    /// The pipeline has no source whose place a recording could take.
+    #[error("the pipeline has no `ingest` stage in whose place the recording could be read")]
+    NoSource,
+    /// It has several.
+    #[error("the pipeline reads {}: choose one with --source", stages.join(", "))]
+    ManySources {
+        /// They.
+        stages: Vec<String>,
+    },
+    /// There is no such source.
+    #[error("the pipeline has no source named `{name}`; there is {known}")]
+    UnknownSource {
+        /// What was asked for.
+        name: String,
+        /// What there is.
+        known: String,
+    },
+    /// A table, but the pipeline does not say which column is what.
+    #[error(
+        "{}: a table needs its columns: give stage `{stage}` of the pipeline a `csv` source",
+        path.display()
+    )]
+    NoColumns {
+        /// The table.
+        path: PathBuf,
+        /// The source.
+        stage: String,
+    },
+    /// The recording cannot be read.
+    #[error(transparent)]
+    Ingest(#[from] tauscope_ingest::IngestError),
+    /// A stage cannot be built.
+    #[error(transparent)]
+    Build(#[from] build::BuildError),
+    /// What is written cannot be.
+    #[error(transparent)]
+    Record(#[from] tauscope_record::RecordError),
+    /// A stage failed on the way.
+    #[error(transparent)]
+    Stage(#[from] tauscope_bus::StageError),
+    /// A link failed.
+    #[error(transparent)]
+    Link(#[from] tauscope_bus::LinkError),
+}
+
+impl ReplayError {
+    /// Whether the arguments or files are wrong (exit code 2), rather than what happened since.
+    pub fn is_input(&self) -> bool {
+        match self {
+            Self::Ingest(error) => error.is_input(),
+            Self::Record(_) | Self::Stage(_) | Self::Link(_) => false,
+            _ => true,
+        }
+    }
+}

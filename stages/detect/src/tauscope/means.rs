@@ -1,0 +1,196 @@
+//! Means of the residual over windows that end at the newest sample.
+
+use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
+
+use super::learnt::LearntJoint;
+use super::sums::Sums;
+use super::usual::{Step, Usual};
+
+/// Lengths of the windows \[s\]; the last one is used where it pays.
+pub(crate) const WINDOWS_S: [f64; 4] = [0.01, 0.03, 0.1, 0.2];
+/// The window that tells how a contact begins.
+pub(crate) const SHORTEST: usize = 0;
+/// The window that a contact is followed by.
+pub(crate) const MIDDLE: usize = 1;
+/// The window that tells what is usual just now.
+pub(super) const LONG: usize = 2;
+/// So much of the usual noise of the next shorter window's mean a longer one's may be away from it: what has gone is not told any longer.
+const BORNE_OUT: f64 = 2.0;
+/// How long a joint that was slow counts as slow \[s\].
+const SLOW_MEMORY_S: f64 = 0.3;
+/// Time constant with which creep of a standing arm is followed behind a contact, and where it stood is forgotten once it moves \[s\].
+const SETTLES_S: f64 = 0.3;
+
+/// Means over the windows as far as those over the next shorter ones bear them out, with these `noise`s by window and joint.
+pub(super) fn borne_out(
+    means: &[JointArray; WINDOWS_S.len()],
+    windows: usize,
+    joints: usize,
+    noise: impl Fn(usize, usize) -> f64,
+) -> [JointArray; WINDOWS_S.len()] {
+    let mut borne_out = *means;
+    for w in 1..windows {
+        for j in 0..joints {
+            let newer = borne_out[w - 1][j];
+            let margin = BORNE_OUT * noise(w - 1, j);
+            borne_out[w][j] = means[w][j].max(newer - margin).min(newer + margin);
+        }
+    }
+    borne_out
+}
+
+/// How the slow part of a residual is had.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Follow {
+    /// Time constant \[s\].
+    pub drift_s: f64,
+    /// The mean of so much at the beginning \[s\]; 0 for none.
+    pub offset_from_first_s: f64,
+}
+
+/// Running means of the residual over each window.
+#[derive(Debug)]
+pub(crate) struct Means {
+    sums: Sums,
+    /// The residual that is usual just now, by joint.
+    usual: Vec<Usual>,
+    /// What is left of the residual where the arm has come to rest behind a contact.
+    settled: JointArray,
+    settings: Follow,
+    /// Step \[s\], and how much of the residual's drift is followed in it; kept, for clocks are often even.
+    step: (Step, f64),
+    /// Smallest speed of late, by joint.
+    pub slow: JointArray,
+    fast: JointArray,
+    start_ns: i64,
+}
+
+impl Means {
+    /// For these joints, over the first so many `windows`.
+    pub fn new(joints: &[LearntJoint], settings: Follow, windows: usize) -> Self {
+        let mut fast = [0.0; MAX_JOINTS];
+        for (fast, joint) in fast.iter_mut().zip(joints) {
+            *fast = joint.fast_rad_s;
+        }
+        let usual = |joint: &LearntJoint| Usual::new(joint.fast_rad_s, joint.usual.as_ref());
+        Self {
+            sums: Sums::new(windows),
+            usual: joints.iter().map(usual).collect(),
+            settled: [0.0; MAX_JOINTS],
+            settings,
+            step: (Step::of(0.0), 0.0),
+            slow: [0.0; MAX_JOINTS],
+            fast,
+            start_ns: 0,
+        }
+    }
+
+    pub fn reset(&mut self) {
+        self.sums.reset();
+        self.usual.iter_mut().for_each(Usual::reset);
+        self.settled = [0.0; MAX_JOINTS];
+    }
+
+    /// Whether the windows are full (the last one is as good as the one before it until then), and the offset known.
+    pub fn ready(&self) -> bool {
+        let newest = self.sums.newest_ns();
+        let longest = WINDOWS_S[LONG];
+        (newest - self.start_ns) as f64 * 1e-9 >= longest.max(self.settings.offset_from_first_s)
+    }
+
+    /// Takes a sample; slow drift is followed if `follow`.
+    pub fn push(&mut self, sample: &TwinState, follow: bool) {
+        let n = self.usual.len();
+        let now = sample.header.stamp_ns;
+        let is_first = self.sums.is_empty();
+        if is_first {
+            self.start_ns = now;
+            self.slow = sample.velocity.map(f64::abs);
+        }
+        let dt_s = if is_first {
+            0.0
+        } else {
+            (now - self.sums.newest_ns()) as f64 * 1e-9
+        };
+        let since_s = (now - self.start_ns) as f64 * 1e-9;
+        let first = since_s < self.settings.offset_from_first_s;
+        if !self.step.0.lasts(dt_s) {
+            let drift = 1.0 - (-dt_s / self.settings.drift_s).exp();
+            self.step = (Step::of(dt_s), drift);
+        }
+        let (step, drift) = &self.step;
+        let recovery = dt_s / SLOW_MEMORY_S;
+        let mut row = [0.0; MAX_JOINTS];
+        for (j, (value, usual)) in row.iter_mut().zip(&mut self.usual).enumerate() {
+            let efforts = [sample.effort[j], sample.expected_effort[j]];
+            let left = efforts[0] - efforts[1] - usual.next(step, sample.velocity[j], efforts);
+            let followed = if first {
+                // The mean of the first seconds, as it grows.
+                usual.offset(left, dt_s / (since_s + dt_s).max(1e-9))
+            } else if follow {
+                usual.follow(left, *drift)
+            } else {
+                0.0
+            };
+            *value = left - followed - self.settled[j];
+            let recovered = self.slow[j] + recovery * self.fast[j];
+            self.slow[j] = recovered.min(sample.velocity[j].abs());
+        }
+        self.sums.push(now, &row, n);
+    }
+
+    /// The arm has come to rest with the residual as it is.
+    pub fn settle(&mut self) {
+        let left = self.sums.means[MIDDLE];
+        for (settled, left) in self.settled.iter_mut().zip(&left) {
+            *settled += left;
+        }
+        self.sums.shift(&left, self.usual.len());
+    }
+
+    /// Where the arm has come to rest creeps, or is forgotten if it `moves`.
+    pub fn creep(&mut self, moves: bool) {
+        let dt_s = self.step.0.dt_s();
+        let share = dt_s / (SETTLES_S + dt_s);
+        for (settled, left) in self.settled.iter_mut().zip(&self.sums.means[MIDDLE]) {
+            *settled += share * if moves { -*settled } else { *left };
+        }
+    }
+
+    /// Mean residual of a joint over a window \[effort unit\].
+    pub fn mean(&self, window: usize, joint: usize) -> f64 {
+        self.sums.means[window][joint]
+    }
+
+    /// How far the usual residual of a joint may be wrong \[effort unit\].
+    pub fn doubt(&self, joint: usize) -> f64 {
+        self.usual[joint].doubt()
+    }
+
+    /// How much larger the noise of a joint is than usual, for all that is known of such a motion.
+    pub fn strange(&self, joint: usize) -> f64 {
+        self.usual[joint].strange().sqrt()
+    }
+
+    /// How much both efforts of a joint have changed of late \[effort unit\].
+    pub fn unrest(&self, joint: usize) -> f64 {
+        self.usual[joint].unrest()
+    }
+
+    /// By window.
+    pub fn all(&self) -> &[JointArray; WINDOWS_S.len()] {
+        &self.sums.means
+    }
+
+    /// Stamp of the newest sample.
+    pub fn newest_ns(&self) -> i64 {
+        self.sums.newest_ns()
+    }
+
+    /// What the shortest window's mean was at this instant.
+    pub fn earlier(&self, to_ns: i64) -> JointArray {
+        // The window is open where it begins.
+        let from_ns = to_ns - (WINDOWS_S[SHORTEST] * 1e9) as i64 + 1;
+        self.sums.rows.mean(from_ns, to_ns)
+    }
+}
