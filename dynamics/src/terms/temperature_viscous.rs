@@ -3,8 +3,8 @@
 use super::law::joint_law;
 use super::{Coordinate, Effect, Layer, Parameter, PlaceKind, Scale};
 
-/// Effort (Fw + Fx exp(-t/T)) qd, t since the start of the recording: the joint is cold then. No gearbox warms up within
-/// seconds: T is searched from a quarter of a minute on.
+/// Effort (Fw + Fx exp(-t/T)) qd, t since the start of the recording: the joint is cold then. No gearbox warms up at
+/// once: T is searched from 3 s on.
 pub(super) static EFFECT: Effect = Effect {
     name: "temperature_viscous",
     place: PlaceKind::Joint,

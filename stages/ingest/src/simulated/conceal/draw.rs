@@ -51,6 +51,9 @@ const PAYLOAD_RADIUS_M: f64 = 0.04;
 const MOST_OF_MASS: f64 = 0.6;
 const MOST_SHIFT_M: f64 = 0.06;
 
+/// No joint warms up faster \[s\].
+const FASTEST_WARM_UP_S: f64 = 3.2;
+
 type Parameters = Vec<(&'static str, f64)>;
 
 /// An effect at a place, of any size.
@@ -217,7 +220,7 @@ fn friction(name: &str, plan: &Plan, site: &Site, rng: &mut ChaCha8Rng) -> Optio
         "temperature_viscous" => {
             let (warm, time_s) = (
                 0.3 + 0.5 * share,
-                plan.shortest_s() * between(rng, 0.2, 0.5),
+                (plan.shortest_s() * between(rng, 0.4, 0.8)).max(FASTEST_WARM_UP_S),
             );
             drawn(efforts, move |f| {
                 vec![
