@@ -4,14 +4,14 @@
 
 mod common;
 
-use common::Out;
+use common::{Out, setup};
 use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tauscope_bus::{Detection, EventKind, Stage, TwinState, flags};
 use tauscope_detect::{
-    Config, ConfigError, ContactKind, Detect, JointSetup, LabelledContact, LearnError, Lesson,
-    Lessons, Setup, tauscope,
+    Config, ConfigError, ContactKind, Detect, LabelledContact, LearnError, Lesson, Lessons, Setup,
+    tauscope,
 };
 use tauscope_dynamics::{Data, Model, forward_kinematics, point_jacobian};
 
@@ -48,27 +48,13 @@ fn lesson(samples: Vec<TwinState>) -> Lesson {
     }
 }
 
-fn setup() -> Setup {
-    let joint = JointSetup {
-        gain: 1.0,
-        offset: 0.0,
-        noise: Some(0.1),
-        effort_per_nm: 1.0,
-    };
-    Setup {
-        joints: vec![joint; JOINTS],
-        joint_names: (1..=JOINTS).map(|j| format!("joint{j}")).collect(),
-        ..Setup::default()
-    }
-}
-
 fn learnt(settings: &tauscope::Settings) -> tauscope::Settings {
     let train = [lesson(quiet(1, 6000)), lesson(quiet(2, 6000))];
     let lessons = Lessons {
         train: &train,
         validation: &[],
     };
-    tauscope::learn(settings, &setup(), &lessons).unwrap()
+    tauscope::learn(settings, &setup(JOINTS), &lessons).unwrap()
 }
 
 fn detector(settings: tauscope::Settings) -> Detect {
@@ -76,7 +62,7 @@ fn detector(settings: tauscope::Settings) -> Detect {
         tauscope: Some(settings),
         ..Config::default()
     };
-    Detect::new(&config, setup()).unwrap()
+    Detect::new(&config, setup(JOINTS)).unwrap()
 }
 
 fn run(detector: &mut Detect, samples: &[TwinState]) -> Vec<Detection> {
@@ -153,7 +139,7 @@ fn labelled_contacts_teach_nothing() {
         train: &train,
         validation: &[],
     };
-    let learnt = tauscope::learn(&tauscope::Settings::default(), &setup(), &lessons).unwrap();
+    let learnt = tauscope::learn(&tauscope::Settings::default(), &setup(JOINTS), &lessons).unwrap();
     let noise = &learnt.learnt.unwrap().windows[0].noise[0];
     assert!(noise.iter().all(|noise| *noise < 0.3), "{noise:?}");
 }
@@ -165,7 +151,8 @@ fn too_short_a_lesson_says_how_much_is_wanted() {
         train: &train,
         validation: &[],
     };
-    let error = tauscope::learn(&tauscope::Settings::default(), &setup(), &lessons).unwrap_err();
+    let error =
+        tauscope::learn(&tauscope::Settings::default(), &setup(JOINTS), &lessons).unwrap_err();
     assert!(matches!(error, LearnError::TooLittle { .. }), "{error}");
 }
 
@@ -178,11 +165,11 @@ fn nothing_learnt_and_another_robot_are_refused() {
     let bare = config(tauscope::Settings::default());
     let refused = |config: &Config, setup| Detect::new(config, setup).err().unwrap();
     assert!(matches!(
-        refused(&bare, setup()),
+        refused(&bare, setup(JOINTS)),
         ConfigError::NotLearnt { .. }
     ));
     let learnt = learnt(&tauscope::Settings::default());
-    let (mut fewer, mut turned) = (setup(), setup());
+    let (mut fewer, mut turned) = (setup(JOINTS), setup(JOINTS));
     fewer.joints.pop();
     fewer.joint_names.pop();
     turned.joint_names.reverse();
@@ -197,10 +184,10 @@ fn nothing_learnt_and_another_robot_are_refused() {
     let mut torn = learnt;
     let windows = &mut torn.learnt.as_mut().unwrap().windows;
     windows[1].noise[0].pop();
-    let text = refused(&config(torn.clone()), setup()).to_string();
+    let text = refused(&config(torn.clone()), setup(JOINTS)).to_string();
     assert!(text.contains("is not whole"), "{text}");
     torn.learnt.as_mut().unwrap().windows.clear();
-    let text = refused(&config(torn), setup()).to_string();
+    let text = refused(&config(torn), setup(JOINTS)).to_string();
     assert!(text.contains("is not whole"), "{text}");
 }
 
@@ -239,7 +226,7 @@ fn four_minutes_of_training_keep_a_wish_under_slow_drift() {
         validation: &[],
     };
     // Five an hour by default.
-    let learnt = tauscope::learn(&tauscope::Settings::default(), &setup(), &lessons).unwrap();
+    let learnt = tauscope::learn(&tauscope::Settings::default(), &setup(JOINTS), &lessons).unwrap();
     let mut alarms = 0;
     for seed in 20..30 {
         let mut samples = quiet(seed, 12_000);
@@ -281,7 +268,7 @@ const ARM: &str = r#"<robot name="arm">
 fn with_model() -> Setup {
     Setup {
         model: Some(Model::from_urdf(ARM).unwrap()),
-        ..setup()
+        ..setup(JOINTS)
     }
 }
 
@@ -403,19 +390,22 @@ fn too_little_contact_free_time_is_said_and_the_threshold_stays_usable() {
         };
         let settings = tauscope::Settings::default();
         Config {
-            tauscope: Some(tauscope::learn(&settings, &setup(), &lessons).unwrap()),
+            tauscope: Some(tauscope::learn(&settings, &setup(JOINTS), &lessons).unwrap()),
             ..Config::default()
         }
     };
     let (little, much) = (learnt_from(600), learnt_from(6000));
-    assert_eq!(much.warning(&setup()), None);
-    let warning = little.warning(&setup()).unwrap();
+    assert_eq!(much.warning(&setup(JOINTS)), None);
+    let warning = little.warning(&setup(JOINTS)).unwrap();
     assert!(warning.contains("5.9 s"), "{warning}");
     let mut samples = quiet(3, 3000);
     for sample in &mut samples[1000..1050] {
         sample.effort[1] -= 1.5;
     }
-    let onsets = onsets(&run(&mut Detect::new(&little, setup()).unwrap(), &samples));
+    let onsets = onsets(&run(
+        &mut Detect::new(&little, setup(JOINTS)).unwrap(),
+        &samples,
+    ));
     assert_eq!(onsets.len(), 1, "{onsets:?}");
     assert!((1000..1005).contains(&onsets[0]), "{onsets:?}");
 }
@@ -431,7 +421,7 @@ fn a_joint_that_never_stirred_while_it_learnt_is_not_believed_to_be_without_nois
         train: &train,
         validation: &[],
     };
-    let learnt = tauscope::learn(&tauscope::Settings::default(), &setup(), &lessons).unwrap();
+    let learnt = tauscope::learn(&tauscope::Settings::default(), &setup(JOINTS), &lessons).unwrap();
     let noise = &learnt.learnt.unwrap().windows[0].noise;
     let (moved, still) = (noise[0][4], noise[2][4]);
     assert!(still > 0.01 * moved, "{still} {moved}");

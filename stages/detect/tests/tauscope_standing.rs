@@ -4,11 +4,11 @@
 
 mod common;
 
-use common::Out;
+use common::{Out, setup};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tauscope_bus::{EventKind, Stage, TwinState, flags};
-use tauscope_detect::{Config, Detect, JointSetup, Lesson, Lessons, Setup, tauscope};
+use tauscope_detect::{Config, Detect, Lesson, Lessons, tauscope};
 
 const JOINTS: usize = 3;
 const STEP_NS: i64 = 10_000_000;
@@ -52,20 +52,6 @@ fn arm(seed: u64, seconds: i64) -> Vec<TwinState> {
         .collect()
 }
 
-fn setup() -> Setup {
-    let joint = JointSetup {
-        gain: 1.0,
-        offset: 0.0,
-        noise: Some(0.1),
-        effort_per_nm: 1.0,
-    };
-    Setup {
-        joints: vec![joint; JOINTS],
-        joint_names: (1..=JOINTS).map(|j| format!("joint{j}")).collect(),
-        ..Setup::default()
-    }
-}
-
 /// One that has seen an arm stand and move.
 fn detector() -> Detect {
     taught_by(|seed| arm(seed, 60))
@@ -82,12 +68,13 @@ fn taught_by(arm: impl Fn(u64) -> Vec<TwinState>) -> Detect {
         train: &train,
         validation: &[],
     };
-    let settings = tauscope::learn(&tauscope::Settings::default(), &setup(), &lessons).unwrap();
+    let settings =
+        tauscope::learn(&tauscope::Settings::default(), &setup(JOINTS), &lessons).unwrap();
     let config = Config {
         tauscope: Some(settings),
         ..Config::default()
     };
-    Detect::new(&config, setup()).unwrap()
+    Detect::new(&config, setup(JOINTS)).unwrap()
 }
 
 /// When alarms begin and end \[s\].

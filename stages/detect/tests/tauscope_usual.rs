@@ -4,11 +4,11 @@
 
 mod common;
 
-use common::Out;
+use common::{Out, setup};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tauscope_bus::{Detection, EventKind, JointArray, Stage, TwinState, flags};
-use tauscope_detect::{Config, Detect, JointSetup, Lesson, Lessons, Setup, tauscope};
+use tauscope_detect::{Config, Detect, Lesson, Lessons, tauscope};
 
 const JOINTS: usize = 2;
 const STEP_NS: i64 = 10_000_000;
@@ -39,20 +39,6 @@ fn friction(velocity: f64) -> f64 {
     1.2 * (velocity / 0.03).tanh() + 0.5 * velocity
 }
 
-fn setup() -> Setup {
-    let joint = JointSetup {
-        gain: 1.0,
-        offset: 0.0,
-        noise: Some(0.1),
-        effort_per_nm: 1.0,
-    };
-    Setup {
-        joints: vec![joint; JOINTS],
-        joint_names: (1..=JOINTS).map(|j| format!("joint{j}")).collect(),
-        ..Setup::default()
-    }
-}
-
 fn learnt(all: impl IntoIterator<Item = Vec<TwinState>>) -> tauscope::Settings {
     let lesson = |samples| Lesson {
         name: "rec".to_owned(),
@@ -64,7 +50,7 @@ fn learnt(all: impl IntoIterator<Item = Vec<TwinState>>) -> tauscope::Settings {
         train: &train,
         validation: &[],
     };
-    tauscope::learn(&tauscope::Settings::default(), &setup(), &lessons).unwrap()
+    tauscope::learn(&tauscope::Settings::default(), &setup(JOINTS), &lessons).unwrap()
 }
 
 fn run(settings: tauscope::Settings, samples: &[TwinState]) -> Vec<Detection> {
@@ -72,7 +58,7 @@ fn run(settings: tauscope::Settings, samples: &[TwinState]) -> Vec<Detection> {
         tauscope: Some(settings),
         ..Config::default()
     };
-    let mut detector = Detect::new(&config, setup()).unwrap();
+    let mut detector = Detect::new(&config, setup(JOINTS)).unwrap();
     let mut out = Out::default();
     for sample in samples {
         detector.accept(sample, &mut out).unwrap();

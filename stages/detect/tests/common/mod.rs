@@ -1,6 +1,9 @@
 //! What the tests of detectors share.
 
+#![allow(dead_code, reason = "each test file uses its own part")]
+
 use tauscope_bus::{Detection, Emit, LinkError};
+use tauscope_detect::{JointSetup, Setup};
 
 /// Keeps all that a stage says.
 #[derive(Default)]
@@ -12,5 +15,20 @@ impl Emit<Detection> for Out {
         write(&mut detection);
         self.0.push(detection);
         Ok(())
+    }
+}
+
+/// A cell of so many joints, in N m, of which nothing else is known.
+pub fn setup(joints: usize) -> Setup {
+    let joint = JointSetup {
+        gain: 1.0,
+        offset: 0.0,
+        noise: Some(0.1),
+        effort_per_nm: 1.0,
+    };
+    Setup {
+        joints: vec![joint; joints],
+        joint_names: (1..=joints).map(|j| format!("joint{j}")).collect(),
+        ..Setup::default()
     }
 }
