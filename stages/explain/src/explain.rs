@@ -53,7 +53,7 @@ pub struct Outcome {
     pub terms: Vec<TermSpec>,
     /// Gain of each joint's bodies \[effort unit per model unit\].
     pub gain: Vec<f64>,
-    /// Standard deviation of each gain that stands for a torque constant; infinite where it is not identifiable.
+    /// Standard deviation of each gain that stands for a torque constant; 0 where none does.
     pub gain_deviation: Vec<f64>,
     /// The corrected twin's effort on each hold-out recording: row-major, one row per recorded row \[effort unit\].
     pub predictions: Vec<(String, Vec<f64>)>,

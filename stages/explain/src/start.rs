@@ -21,7 +21,7 @@ pub struct Start {
     pub terms: Vec<TermSpec>,
     /// Gain of each joint's bodies \[effort unit per model unit\].
     pub gain: Vec<f64>,
-    /// Standard deviation of each gain, where it stands for a torque constant: infinite where the gain is not identifiable.
+    /// Standard deviation of each gain that stands for a torque constant: 0 where it is exact, infinite where it tells nothing.
     pub gain_deviation: Vec<f64>,
     /// Offset of each joint \[effort unit\].
     pub offset: Vec<f64>,
