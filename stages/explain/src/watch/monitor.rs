@@ -4,7 +4,7 @@ mod contact;
 mod learning;
 
 use super::blocks::{BLOCK_ROWS, BLOCK_S, Known, Ring};
-use super::finding::Finding;
+use super::finding::{Cause, Finding};
 use super::judge::{Judge, STRANGE, Verdict};
 use super::moments::{JOINT_KINDS, JointScore, Reference};
 use super::rows::Row;
@@ -165,7 +165,11 @@ impl Monitor {
         let lasts = matches!(run, Some(Told::Lasting(..)));
         let (verdict, score) = self.judge.judge(&self.ring, &usual, lasts);
         self.score = score;
-        if let Verdict::Changed(finding) = verdict {
+        // What has no name may be the contact that goes on: which of the two, its end tells.
+        let undecided = |finding: &Finding| finding.cause == Cause::Unknown && self.run.is_some();
+        if let Verdict::Changed(finding) = verdict
+            && !undecided(&finding)
+        {
             let blocks = (0..self.ring.len())
                 .filter(|&back| self.ring.back(back).first_ns >= finding.since_ns)
                 .count();
