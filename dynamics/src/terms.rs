@@ -20,6 +20,7 @@ mod ghost;
 mod joint_elasticity;
 mod law;
 mod link_com;
+mod link_inertia;
 mod link_mass;
 mod load_dependent_friction;
 mod payload;
@@ -74,6 +75,7 @@ pub static EFFECTS: &[&Effect] = &[
     &payload::EFFECT,
     &link_mass::EFFECT,
     &link_com::EFFECT,
+    &link_inertia::EFFECT,
     &base_tilt::EFFECT,
     &external_push::EFFECT,
     &contact_wall::EFFECT,

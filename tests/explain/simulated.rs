@@ -103,3 +103,74 @@ fn a_wall_and_something_carried_for_a_while_are_both_told_within_their_intervals
         }
     }
 }
+
+#[test]
+fn a_link_that_is_another_body_is_described_where_no_name_fits() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let robot = bundled().join("demo_arm.urdf");
+    let waves = |name: &str, period_s: u32, speed: f64| {
+        format!(
+            "- {{name: {name}, duration_s: 8, motion: {{fourier: {{period_s: {period_s}, harmonics: 5, speed: {speed}, \
+             acceleration_rad_s2: 5, range: 0.6}}}}}}\n"
+        )
+    };
+    let text = format!(
+        "version: 1\nname: body\nrobot: {}\nseed: 8\nrate_hz: 100\nphysics:\n\
+         - {{effect: link_inertia, link: link4, parameters: {{delta_mass_kg: 0.3, delta_first_moment_x_kgm: 0.03, delta_first_moment_y_kgm: -0.02, \
+         delta_first_moment_z_kgm: 0.04, delta_origin_ixx_kgm2: 0.02, delta_origin_ixy_kgm2: 0, delta_origin_ixz_kgm2: 0, \
+         delta_origin_iyy_kgm2: 0.02, delta_origin_iyz_kgm2: 0, delta_origin_izz_kgm2: 0.01}}}}\n\
+         sensors: {{position_noise_rad: 0.00001, velocity_noise_rad_s: 0.001, effort_noise_of_limit: 0.002}}\nrecordings:\n{}{}{}",
+        robot.display(),
+        waves("r0", 8, 0.6),
+        waves("r1", 4, 0.5),
+        waves("r2", 8, 0.5)
+    );
+    simulate(folder.path(), &text);
+    let [r0, r1, r2] = ["r0.mcap", "r1.mcap", "r2.mcap"].map(path);
+    let out = path("out");
+    let mut arguments = vec![
+        "--robot",
+        robot.to_str().unwrap(),
+        "--effort-unit",
+        "Nm",
+        "--fit",
+    ];
+    arguments.extend([r0.to_str().unwrap(), r1.to_str().unwrap()]);
+    arguments.extend(["--holdout", r2.to_str().unwrap()]);
+    // Its mass and its centre are off, too: without these names a body is all that is left.
+    arguments.extend([
+        "--without",
+        "link_mass",
+        "--without",
+        "link_com",
+        "--without",
+        "payload",
+    ]);
+    explain(&out, &arguments);
+    let report = report(&out);
+    let finding = &report["findings"][0];
+    assert_eq!(
+        (&finding["effect"], &finding["link"]),
+        (&"unknown".into(), &"link4".into())
+    );
+    assert_eq!(report["verdict"], "unknown_remains");
+    let mass = finding["parameters"]["delta_mass_kg"].as_f64().unwrap();
+    assert!((mass - 0.3).abs() < 0.03, "{mass} kg");
+    let rms = |of: &str| -> Vec<f64> {
+        let all = report[of].as_array().unwrap().iter();
+        all.map(|value| value.as_f64().unwrap()).collect()
+    };
+    let [before, after, noise] =
+        ["holdout_rms_before", "holdout_rms_after", "noise_floor"].map(rms);
+    assert!(before[1] > 3.0 * noise[1] && before[3] > 3.0 * noise[3]);
+    let rest = after.iter().zip(&noise);
+    assert!(
+        rest.into_iter().all(|(after, noise)| *after < 1.2 * noise),
+        "{after:?}"
+    );
+    // The new twin and its URDF have the body.
+    let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
+    assert!(read("twin.yaml").contains("link_inertia"));
+    assert_ne!(read("robot.urdf"), std::fs::read_to_string(&robot).unwrap());
+}

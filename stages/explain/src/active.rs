@@ -24,6 +24,9 @@ pub struct Whereabouts {
 /// Inertial parameters of a body.
 pub const BODY: usize = 10;
 
+/// What describes a link's body: a change of all its inertial parameters.
+pub const UNNAMED_BODY: &str = "link_inertia";
+
 /// Slow, but fast enough for a sign.
 const SLOW_RAD_S: f64 = 0.02;
 
@@ -108,6 +111,20 @@ impl Hypothesis {
     /// Whether its first ten coordinates are those of a body, see [`Inertia::parameters`].
     fn is_body(&self) -> bool {
         self.effect.place == PlaceKind::Tool && self.effect.coordinates.len() >= BODY
+    }
+
+    /// What it is called in reports: what only describes is `unknown`.
+    pub fn said(&self) -> &'static str {
+        if self.is_unnamed_body() {
+            "unknown"
+        } else {
+            self.effect.name
+        }
+    }
+
+    /// Whether it describes a link's body without a name for what is wrong with it.
+    pub fn is_unnamed_body(&self) -> bool {
+        self.effect.name == UNNAMED_BODY
     }
 
     /// Whether all its coordinates are factors.
@@ -228,11 +245,19 @@ impl Active {
         of_effect.map_or(Coordinate::factor("value_nm").kind, |c| c.kind)
     }
 
-    /// The body that it is, if it is one.
-    pub fn body(&self) -> Option<Inertia> {
-        let ten = self.coordinates.first_chunk::<BODY>();
-        ten.filter(|_| self.hypothesis.is_body())
-            .map(|ten| Inertia::from_parameters(*ten))
+    /// The body that it is or that it makes of a link, if it does, and what the URDF says of that link.
+    pub fn body(&self, model: &Model) -> Option<(Inertia, Option<Inertia>)> {
+        let ten = Inertia::from_parameters(*self.coordinates.first_chunk::<BODY>()?);
+        if self.hypothesis.is_unnamed_body() {
+            let link = model.links()[self.hypothesis.place.link].inertia;
+            return Some((link + ten, Some(link)));
+        }
+        self.hypothesis.is_body().then_some((ten, None))
+    }
+
+    /// Whether it only describes what it does: a curve, or a body that no name fits.
+    pub fn is_unnamed(&self) -> bool {
+        self.curve.is_some() || self.hypothesis.is_unnamed_body()
     }
 
     /// Its parameters, as reports hold them.

@@ -207,6 +207,7 @@ impl Setup<'_> {
             let problem = self.problem(std::slice::from_ref(recording), &rests_count)?;
             let search = Search {
                 problem: &problem,
+                unnamed_bodies: &[],
                 hypotheses: &hypotheses,
                 say: &say,
             };

@@ -1,10 +1,10 @@
 //! A step of least squares that leaves every body one.
 
 use nalgebra::{DMatrix, DVector};
-use tauscope_dynamics::Inertia;
+use tauscope_dynamics::{Inertia, Model};
 
 use crate::active::{Active, BODY};
-use crate::body_prior::{about, bodies, density_of, of_body};
+use crate::body_prior::{Body, about, bodies, density_of, of_body};
 use crate::least_squares::solved;
 
 /// The prior weighs this much less from one round to the next, until it weighs 1.
@@ -21,14 +21,15 @@ const MOST_HALVINGS: usize = 30;
 /// prior that keeps well within (Boyd and Vandenberghe, *Convex Optimization*, 2004, section 11.3). All coordinates but those
 /// of bodies follow from these.
 pub fn body_step(
+    model: &Model,
     actives: &[Active],
     free: &[(usize, usize)],
     (normal, right): (&DMatrix<f64>, &DVector<f64>),
     used: &[bool],
     damping: f64,
 ) -> Option<DVector<f64>> {
-    let own: Vec<Own> = bodies(actives)
-        .filter(|(_, body)| body.mass_kg() > 0.0)
+    let own: Vec<Own> = bodies(model, actives)
+        .filter(|(_, body)| body.inertia.mass_kg() > 0.0)
         .map(|(i, body)| Own {
             body,
             coordinates: of_body(free, i),
@@ -78,7 +79,7 @@ pub fn body_step(
 
 /// A body before the step, and which of its parameters are free: where among the free coordinates, and which of the ten.
 struct Own {
-    body: Inertia,
+    body: Body,
     coordinates: Vec<(usize, usize)>,
 }
 
@@ -149,16 +150,24 @@ impl Within<'_> {
     }
 
     /// The bodies after a step: where their coordinates begin, what they were, and what they are.
-    fn moved(&self, step: &DVector<f64>) -> impl Iterator<Item = (usize, &Own, Inertia)> {
+    fn moved(&self, step: &DVector<f64>) -> impl Iterator<Item = (usize, &Own, Body)> {
         let mut first = 0;
         self.own.iter().map(move |own| {
             let begin = first;
             first += own.coordinates.len();
-            let mut parameters: [f64; BODY] = own.body.parameters();
+            let mut parameters: [f64; BODY] = own.body.inertia.parameters();
             for (&(_, c), step) in own.coordinates.iter().zip(step.iter().skip(begin)) {
                 parameters[c] += step;
             }
-            (begin, own, Inertia::from_parameters(parameters))
+            let inertia = Inertia::from_parameters(parameters);
+            (
+                begin,
+                own,
+                Body {
+                    inertia,
+                    ..own.body
+                },
+            )
         })
     }
 }
@@ -167,11 +176,9 @@ impl Within<'_> {
 mod tests {
     use std::collections::BTreeSet;
 
-    use tauscope_dynamics::Model;
-
     use super::*;
     use crate::body_prior::log_density;
-    use crate::body_prior::tests::{ARM, carried, free};
+    use crate::body_prior::tests::{carried, free, model};
     use crate::library;
 
     /// Normal equations that ask for a body as precisely as these standard deviations say.
@@ -208,7 +215,15 @@ mod tests {
         );
         let actives = carried(here);
         let (normal, right) = asking(&here, &wanted, [1e-6; BODY]);
-        let step = body_step(&actives, &free(), (&normal, &right), &[true; BODY], 0.0).unwrap();
+        let step = body_step(
+            &model(),
+            &actives,
+            &free(),
+            (&normal, &right),
+            &[true; BODY],
+            0.0,
+        )
+        .unwrap();
         let there = after(&actives, &step);
         for (value, wanted) in there[0].coordinates.iter().zip(wanted.parameters()) {
             assert!((value - wanted).abs() < 1e-5, "{value} instead of {wanted}");
@@ -226,9 +241,17 @@ mod tests {
         deviations[..4].fill(1e-5);
         deviations[9] = 1e-5;
         let (normal, right) = asking(&here, &wanted, deviations);
-        let step = body_step(&actives, &free(), (&normal, &right), &[true; BODY], 0.0).unwrap();
+        let step = body_step(
+            &model(),
+            &actives,
+            &free(),
+            (&normal, &right),
+            &[true; BODY],
+            0.0,
+        )
+        .unwrap();
         let there = after(&actives, &step);
-        assert!(log_density(&there).is_finite());
+        assert!(log_density(&model(), &there).is_finite());
         for c in [0, 1, 2, 3, 9] {
             let (value, wanted) = (there[0].coordinates[c], wanted.parameters()[c]);
             assert!(
@@ -242,8 +265,7 @@ mod tests {
     fn what_is_not_used_stays_and_what_is_no_body_follows() {
         let here = Inertia::new(1.0, [0.0; 3], [2e-2, 0.0, 0.0, 2e-2, 0.0, 2e-2]);
         let mut actives = carried(here);
-        let model = Model::from_urdf(ARM).unwrap();
-        let all = library::hypotheses(&model, true, &BTreeSet::new());
+        let all = library::hypotheses(&model(), true, &BTreeSet::new());
         let friction = |h: &&crate::active::Hypothesis| h.effect.name == "coulomb_friction";
         actives.push(all.iter().find(friction).unwrap().with(vec![1.0]));
         let mut all_free = free();
@@ -255,6 +277,7 @@ mod tests {
         let mut right = DVector::zeros(n);
         right[BODY] = 1e6;
         let both = body_step(
+            &model(),
             &actives,
             &all_free,
             (&normal, &right),
@@ -269,7 +292,7 @@ mod tests {
         );
         let mut used = [true; BODY + 1];
         used[BODY] = false;
-        let held = body_step(&actives, &all_free, (&normal, &right), &used, 0.0).unwrap();
+        let held = body_step(&model(), &actives, &all_free, (&normal, &right), &used, 0.0).unwrap();
         assert!(held[BODY].abs() <= 0.0);
     }
 }

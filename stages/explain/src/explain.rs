@@ -19,6 +19,7 @@ use crate::recording::Recording;
 use crate::report::{RecordingPicture, Report, Undetectable, Verdict};
 use crate::start::{Start, scales};
 use crate::track::Track;
+use crate::verdict;
 use crate::windows::{TimeKind, time_kind};
 
 /// What is to be explained.
@@ -128,17 +129,14 @@ pub fn explain(
     } = judged;
     progress(0.95, "proof");
     let proof = setup.proof(&problem, &before, &found)?;
-    let verdict = if found.actives.iter().any(|a| a.curve.is_some()) {
-        Verdict::UnknownRemains
-    } else if named.findings.is_empty() {
-        Verdict::NothingMissing
-    } else {
-        Verdict::Explained
-    };
-    let noise_floor = (0..joints.len())
+    let noise_floor: Vec<f64> = (0..joints.len())
         .map(|j| audit::white_noise(&input.fit, j, joints.len()))
         .collect();
+    let left_elsewhere = verdict::left_elsewhere(&proof, &noise_floor);
+    let verdict = verdict::verdict(&found, &named.findings, &left_elsewhere);
     let mut notes = named.notes;
+    let unit = if input.effort_unit == "A" { "A" } else { "N m" };
+    notes.extend(verdict::note(&proof, &left_elsewhere, &joints, unit));
     notes.extend(audit::notes(&input, &problem, &found, &rests_count));
     let report = Report {
         case: input.case.clone(),

@@ -1,6 +1,7 @@
 //! From the winning explanation to what is said: findings with intervals, rivals, what could have hidden.
 
 mod contest;
+mod doubt;
 mod scales;
 mod undetectable;
 mod waves;
@@ -80,6 +81,11 @@ fn place_of(
         PlaceKind::Joint | PlaceKind::TwoJoints => {
             (Some(joints[hypothesis.place.joint].clone()), None)
         }
+        PlaceKind::Link if hypothesis.is_unnamed_body() => {
+            let carrier = input.model.links()[hypothesis.place.link].joint;
+            let joint = carrier.map(|joint| joints[joint].clone());
+            (joint, link(hypothesis.place.link))
+        }
         PlaceKind::Link | PlaceKind::Tool => (None, link(hypothesis.place.link)),
         PlaceKind::Base => (None, link(input.model.base_link())),
         PlaceKind::All => (None, None),
@@ -89,7 +95,7 @@ fn place_of(
 fn rival(input: &Input, joints: &[String], hypothesis: &Hypothesis) -> Rival {
     let (joint, link) = place_of(input, joints, hypothesis);
     Rival {
-        effect: hypothesis.effect.name.to_owned(),
+        effect: hypothesis.said().to_owned(),
         joint,
         link,
     }
@@ -147,7 +153,7 @@ pub fn of(
         }
         describe_curve(active, &mut parameters);
         let (joint, link) = place_of(input, joints, &active.hypothesis);
-        let place = joint.clone().or_else(|| link.clone()).unwrap_or_default();
+        let place = link.clone().or_else(|| joint.clone()).unwrap_or_default();
         let when = when(search, active, &mut parameters, &mut intervals);
         drop_no_force(&mut parameters, &mut intervals);
         let in_amperes = scales.to_nm(active.hypothesis, &mut parameters, &mut intervals);
@@ -180,7 +186,7 @@ pub fn of(
             named.next_motions.push(next);
         }
         named.findings.push(Finding {
-            effect: effect.name.to_owned(),
+            effect: active.hypothesis.said().to_owned(),
             joint,
             link,
             parameters,
@@ -195,6 +201,7 @@ pub fn of(
             sentence,
         });
     }
+    doubt::doubt(&mut named, search.problem, &fit.actives);
     merge_waves(&mut named.findings);
     named
         .findings
@@ -347,6 +354,9 @@ pub fn summary(verdict: Verdict, findings: &[Finding], before: &[f64], after: &[
             "Nothing is missing: what the twin leaves is the noise of the measurement.".to_owned()
         }
         Verdict::NotEvaluated => "Nothing was evaluated.".to_owned(),
+        Verdict::UnknownRemains if findings.is_empty() => {
+            "The fitted recordings show nothing that is missing; those held out do, and no name is given to it.".to_owned()
+        }
         Verdict::Explained | Verdict::UnknownRemains => {
             let first = findings.first().map_or("", |f| f.sentence.as_str());
             let more = match findings.len() {

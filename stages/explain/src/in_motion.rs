@@ -8,6 +8,7 @@ use crate::drive;
 use crate::explain::{Judged, Setup};
 use crate::findings;
 use crate::fit::Fit;
+use crate::library;
 use crate::search::Search;
 
 impl Setup<'_> {
@@ -24,6 +25,11 @@ impl Setup<'_> {
             return Ok(Err(reason));
         }
         let hypotheses = self.hypotheses();
+        let unnamed_bodies = if input.bodies {
+            library::unnamed_bodies(&input.model)
+        } else {
+            Vec::new()
+        };
         // Where nobody knows the scale of the drives, the twin is only one once they are fitted.
         let drives = || drive::unknown_gains(&self.unscaled);
         let say = |text: &str| {
@@ -33,6 +39,7 @@ impl Setup<'_> {
         let search = Search {
             problem: &problem,
             hypotheses: &hypotheses,
+            unnamed_bodies: &unnamed_bodies,
             say: &say,
         };
         let penalties = vec![0.0; drives().len()];
@@ -59,6 +66,7 @@ impl Setup<'_> {
         let search = Search {
             problem: &problem,
             hypotheses: &hypotheses,
+            unnamed_bodies: &unnamed_bodies,
             say: &say,
         };
         let found = search.run(moving.fit.actives, moving.penalties);

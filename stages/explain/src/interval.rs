@@ -66,7 +66,7 @@ pub fn covariance(problem: &Problem, fit: &Fit) -> DMatrix<f64> {
         }
     }
     // What is known before counts as if it had been measured, too.
-    let (known, _) = body_prior::normal(&fit.actives, &fit.parameters());
+    let (known, _) = body_prior::normal(&problem.model, &fit.actives, &fit.parameters());
     normal += &known;
     scores += known;
     let scale: Vec<f64> = (0..p).map(|a| normal[(a, a)].max(1e-300).sqrt()).collect();

@@ -37,6 +37,7 @@ mod start;
 pub mod track;
 mod trial;
 mod unknown;
+mod verdict;
 mod wall;
 pub mod watch;
 pub mod windows;

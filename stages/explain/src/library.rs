@@ -3,9 +3,33 @@
 use std::collections::BTreeSet;
 
 use tauscope_dynamics::Model;
-use tauscope_dynamics::terms::{EFFECTS, PlaceKind};
+use tauscope_dynamics::terms::{EFFECTS, PlaceKind, effect};
 
-use crate::active::{Hypothesis, Whereabouts};
+use crate::active::{Hypothesis, UNNAMED_BODY, Whereabouts};
+
+/// The links whose bodies may be described where no name fits: those that move and have a body in the URDF, but for that at
+/// the end, where any body is a payload.
+pub fn unnamed_bodies(model: &Model) -> Vec<Hypothesis> {
+    let Some(effect) = effect(UNNAMED_BODY) else {
+        return Vec::new();
+    };
+    let tool = model.links()[model.tool_link()].joint;
+    let joints = model.joints().iter().enumerate();
+    let links = joints.filter(|(joint, _)| Some(*joint) != tool);
+    let has_body = |link: &usize| {
+        let inertia = model.links()[*link].inertia;
+        inertia.mass_kg() > 0.0 && inertia.nearest_consistent(0.0) == inertia
+    };
+    let links = links.map(|(_, joint)| joint.child_link).filter(has_body);
+    let at = |link: usize| Hypothesis {
+        effect,
+        place: Whereabouts {
+            link,
+            ..Whereabouts::default()
+        },
+    };
+    links.map(at).collect()
+}
 
 /// Every hypothesis for a robot, but for the effects named in `without`. Where the twin is a topic, `bodies`
 /// is false: nothing is known of masses and links.
@@ -13,7 +37,7 @@ pub fn hypotheses(model: &Model, bodies: bool, without: &BTreeSet<String>) -> Ve
     let joints = 0..model.dof();
     let mut all = Vec::new();
     for &effect in EFFECTS {
-        if effect.name == "unknown" || without.contains(effect.name) {
+        if ["unknown", UNNAMED_BODY].contains(&effect.name) || without.contains(effect.name) {
             continue;
         }
         let mut add = |place: Whereabouts| all.push(Hypothesis { effect, place });

@@ -1,5 +1,7 @@
 //! The proof: the corrected twin on recordings that were never fitted.
 
+use std::ops::RangeInclusive;
+
 use tauscope_dynamics::terms::{Physics, TermError};
 
 use crate::explain::Setup;
@@ -16,6 +18,8 @@ const PREDICTION_CUTOFFS: [f64; 5] = [0.75, 1.0, 1.4, 2.0, 3.0];
 const VELOCITY_CUTOFFS: [f64; 3] = [2.0, 4.0, 8.0];
 /// No smoothing above this share of the rate of rows.
 const MOST_OF_RATE: f64 = 0.4;
+/// So near to the end of a recording little is known of accelerations \[s\].
+const END_S: f64 = 0.25;
 /// Samples of a picture, at most.
 const PICTURE_SAMPLES: usize = 2000;
 
@@ -25,6 +29,8 @@ pub struct Proof {
     pub before: Vec<f64>,
     /// The same of the corrected twin.
     pub after: Vec<f64>,
+    /// The same but for the ends of the recordings, where nothing tells accelerations: of those held out and of those fitted.
+    pub within: [Vec<f64>; 2],
     /// The corrected twin's effort by hold-out recording.
     pub predictions: Vec<(String, Vec<f64>)>,
     /// What is drawn, hold-out recordings first.
@@ -138,24 +144,21 @@ impl Setup<'_> {
         let n = self.unit_nm.len();
         let names: Vec<&str> = self.input.model.joint_names().collect();
         let smoothing = self.best_smoothing(problem, found)?;
-        let (mut before, mut after, mut count) = (vec![0.0; n], vec![0.0; n], 0.0);
+        let (mut before, mut after) = (Errors::new(n), Errors::new(n));
+        let mut within = [Errors::new(n), Errors::new(n)];
         let (mut predictions, mut pictures) = (Vec::new(), Vec::new());
         let held = self.input.holdout.iter().map(|recording| (recording, true));
-        let fitted = self.input.fit.iter().map(|recording| (recording, false));
-        for (recording, held_out) in held.chain(fitted) {
+        let of_fit = self.input.fit.iter().map(|recording| (recording, false));
+        for (recording, held_out) in held.chain(of_fit) {
             let track = self.smoothed(recording, &smoothing)?;
             let predicted = self.predict(problem, found, &track);
             let rigid = self.predict(problem, scaled, &track);
+            let all = 0.0..=f64::INFINITY;
+            let end_s = recording.duration_s() - END_S;
+            within[usize::from(!held_out)].add(recording, &predicted, &(END_S..=end_s));
             if held_out {
-                for (k, measured) in recording.effort.iter().enumerate() {
-                    before[k % n] += (measured - rigid[k]).powi(2);
-                    after[k % n] += (measured - predicted[k]).powi(2);
-                }
-                count += if recording.effort.is_empty() {
-                    0.0
-                } else {
-                    recording.len() as f64
-                };
+                before.add(recording, &rigid, &all);
+                after.add(recording, &predicted, &all);
                 let rows = recording
                     .sample_of_row
                     .iter()
@@ -168,13 +171,47 @@ impl Setup<'_> {
                 ));
             }
         }
-        let rms = |sums: Vec<f64>| sums.iter().map(|s| (s / count).sqrt()).collect();
         Ok(Proof {
-            before: rms(before),
-            after: rms(after),
+            before: before.rms(),
+            after: after.rms(),
+            within: within.map(|errors| errors.rms()),
             predictions,
             pictures,
         })
+    }
+}
+
+/// Squared errors of a twin by joint, and of how many samples.
+struct Errors {
+    squares: Vec<f64>,
+    count: f64,
+}
+
+impl Errors {
+    fn new(joints: usize) -> Self {
+        Self {
+            squares: vec![0.0; joints],
+            count: 0.0,
+        }
+    }
+
+    /// Adds those of a recording between two times \[s\].
+    fn add(&mut self, recording: &Recording, twin: &[f64], during: &RangeInclusive<f64>) {
+        let n = self.squares.len();
+        let rows = recording.effort.chunks_exact(n).zip(twin.chunks_exact(n));
+        let timed = recording.time_s.iter().zip(rows);
+        for (_, (measured, twin)) in timed.filter(|(t, _)| during.contains(t)) {
+            for (sum, (measured, twin)) in self.squares.iter_mut().zip(measured.iter().zip(twin)) {
+                *sum += (measured - twin).powi(2);
+            }
+            self.count += 1.0;
+        }
+    }
+
+    /// By joint; not a number where there was nothing to compare with.
+    fn rms(&self) -> Vec<f64> {
+        let each = self.squares.iter();
+        each.map(|square| (square / self.count).sqrt()).collect()
     }
 }
 

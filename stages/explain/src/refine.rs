@@ -87,7 +87,7 @@ impl Fit {
         let mut damping = 1e-4;
         let objective = |fit: &Self| {
             let near = anchor.map_or(0.0, |anchor| anchor.log_density(&numbers(fit, &free)));
-            fit.likelihood() + body_prior::log_density(&fit.actives) + near
+            fit.likelihood() + body_prior::log_density(&problem.model, &fit.actives) + near
         };
         let mut best = objective(&fit);
         for _ in 0..MAX_ITERATIONS {
@@ -104,7 +104,14 @@ impl Fit {
             let mut gained = None;
             for _ in 0..MOST_TRIES {
                 let step = loop {
-                    let step = body_step(&fit.actives, &free, (&normal, &right), &used, damping);
+                    let step = body_step(
+                        &problem.model,
+                        &fit.actives,
+                        &free,
+                        (&normal, &right),
+                        &used,
+                        damping,
+                    );
                     let Some(out) = step.as_ref().map(|step| fit.out(problem, &free, step)) else {
                         break None;
                     };
@@ -144,7 +151,7 @@ impl Fit {
     /// The same with bodies whose mass is nowhere negative.
     fn consistent(self, problem: &Problem) -> Self {
         let mut actives = self.actives.clone();
-        if body_prior::make_consistent(&mut actives) {
+        if body_prior::make_consistent(&problem.model, &mut actives) {
             Self::beside(problem, actives, Some(&self))
         } else {
             self
@@ -175,7 +182,7 @@ impl Fit {
             let value = &mut actives[i].coordinates[c];
             *value = (*value + step).clamp(lower, upper);
         }
-        body_prior::make_consistent(&mut actives);
+        body_prior::make_consistent(&problem.model, &mut actives);
         actives
     }
 }

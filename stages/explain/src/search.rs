@@ -3,11 +3,15 @@
 //! Forward, one piece at a time, always the one with the most evidence; after each the earlier ones must prove
 //! themselves again; in the end each is taken out and every rival tried in its place.
 
+mod bodies;
 mod curves;
 mod evidence;
 mod exchange;
 mod simpler;
 
+use std::collections::BTreeSet;
+
+use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::Layer;
 
 use crate::across::carries_over;
@@ -50,8 +54,16 @@ pub struct Search<'a> {
     pub problem: &'a Problem,
     /// The library.
     pub hypotheses: &'a [Hypothesis],
+    /// Links whose bodies may be described where no name fits.
+    pub unnamed_bodies: &'a [Hypothesis],
     /// Called now and then with a text.
     pub say: &'a (dyn Fn(&str) + Sync),
+}
+
+/// The joints that carry a link.
+pub fn bearing(model: &Model, link: usize) -> BTreeSet<usize> {
+    let links = std::iter::successors(Some(link), |&link| model.links()[link].parent);
+    links.filter_map(|link| model.links()[link].joint).collect()
 }
 
 /// By how much a rival may be behind \[nats\] and still not be told from what has so much evidence.
@@ -72,6 +84,10 @@ impl Search<'_> {
         if let Some(described) = self.described_for_intervals(&best) {
             (self.say)(&format!("? {}", describe(&described)));
             best = self.named(self.pruned(described));
+        }
+        while let Some(described) = self.embodied(&best) {
+            (self.say)(&format!("? {}", describe(&described)));
+            best = self.named(described);
         }
         for joint in 0..self.problem.joints {
             if let Some(described) = self.described(&best, joint) {
@@ -112,7 +128,7 @@ impl Search<'_> {
                 .filter(|&i| {
                     let active = &best.fit.actives[i];
                     let once = time_kind(active.hypothesis) == TimeKind::Once;
-                    active.curve.is_none() && !once && !is_drive(&active.hypothesis)
+                    !active.is_unnamed() && !once && !is_drive(&active.hypothesis)
                 })
                 .collect();
             let without = parallel::map(&names, |&i| self.less(&best, i));
@@ -320,9 +336,10 @@ impl Search<'_> {
     /// Whether one of the pieces is needed, to judge by the explanation without it.
     fn is_needed(&self, best: &Explanation, less: &Explanation, index: usize) -> bool {
         let active = &best.fit.actives[index];
-        let (evidence, least) = match active.curve {
-            Some(_) => (CURVE_EVIDENCE, CURVE_SIZE - 1.0),
-            None => needs(active.hypothesis, &best.fit),
+        let (evidence, least) = if active.is_unnamed() {
+            (CURVE_EVIDENCE, CURVE_SIZE - 1.0)
+        } else {
+            needs(active.hypothesis, &best.fit)
         };
         let worth = &self.problem.worth;
         let strong = best.ahead_of(less, worth) >= evidence || overwhelming(best, less);
@@ -343,7 +360,7 @@ impl Search<'_> {
             let (evidence, size) = needs(active.hypothesis, fit);
             is_timely(self.problem, active)
                 && plausible(active, &self.problem.model)
-                && active.curve.is_none()
+                && !active.is_unnamed()
                 && 0.5 * worth * chi_square > 4.0 * evidence + 60.0
                 && chi_square > 4.0 * size * rows
         })

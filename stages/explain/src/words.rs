@@ -214,6 +214,14 @@ pub fn sentence(
             with("delta_com_y_m"),
             with("delta_com_z_m")
         ),
+        "link_inertia" => format!(
+            "Link {place} is another body than its URDF says, by {} and first moments of ({}, {}, {}), and no one name fits that: \
+             what is left depends on the motion of all joints that carry it, as its weight and inertia would.",
+            with("delta_mass_kg"),
+            with("delta_first_moment_x_kgm"),
+            with("delta_first_moment_y_kgm"),
+            with("delta_first_moment_z_kgm")
+        ),
         "base_tilt" => format!(
             "The base is tilted: roll {}, pitch {}.",
             with("roll_rad"),

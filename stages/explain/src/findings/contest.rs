@@ -29,7 +29,7 @@ pub fn contest(
         rejected: Vec::new(),
         margin: f64::INFINITY,
     };
-    if active.curve.is_some() {
+    if active.is_unnamed() {
         return result;
     }
     let efficiency = &search.problem.worth;

@@ -11,7 +11,7 @@ use crate::unknown;
 use crate::windows::{TimeKind, time_kind};
 
 use super::evidence::{is_of_position, is_open_wave, overwhelming, worse_joints};
-use super::{Explanation, Search};
+use super::{Explanation, Search, bearing};
 
 /// Evidence that a curve without a name needs \[nats\].
 pub const CURVE_EVIDENCE: f64 = 25.0;
@@ -116,7 +116,7 @@ impl Search<'_> {
     }
 
     /// The explanation with a curve in one joint in the place of all that lasted for an interval, if that does better: what comes
-    /// back at a place, or time and again, looks like many pushes.
+    /// back at a place, or time and again, looks like many pushes. They are evident, so that it need only beat them.
     pub(super) fn described_for_intervals(&self, best: &Explanation) -> Option<Explanation> {
         let once = |&i: &usize| time_kind(best.fit.actives[i].hypothesis) == TimeKind::Once;
         let intervals: Vec<usize> = (0..best.fit.actives.len()).filter(once).collect();
@@ -127,15 +127,33 @@ impl Search<'_> {
         let bare = intervals.iter().rev().fold(best.clone(), less);
         let white = vec![1.0; self.problem.joints];
         let joints = worse_joints(&bare.fit, &best.fit);
-        let with = joints
-            .iter()
-            .filter_map(|&joint| self.with_curve(&bare, joint));
-        with.filter(|with| with.ahead_of(best, &white) > CURVE_EVIDENCE)
-            .max_by(|a, b| a.ahead_of(b, &white).total_cmp(&0.0))
+        // A force that time and again acts on one joint alone of several that carry its link is none.
+        let model = &self.problem.model;
+        let is_borne =
+            |&i: &usize| bearing(model, best.fit.actives[i].hypothesis.place.link).len() > 1;
+        let local = joints.len() == 1 && intervals.iter().all(is_borne);
+        let with = joints.iter().filter_map(|&joint| {
+            let with = self.curved(&bare, joint)?;
+            let most = with.fit.variance[joint] < MOST_LEFT * bare.fit.variance[joint];
+            let does = with.ahead_of(best, &white) > CURVE_EVIDENCE;
+            (does || (local && most && self.is_evident(&with, &bare))).then_some(with)
+        });
+        with.max_by(|a, b| a.ahead_of(b, &white).total_cmp(&0.0))
     }
 
     /// The explanation with the curve that does best in a joint, if there is evidence for one and it carries over.
     fn with_curve(&self, from: &Explanation, joint: usize) -> Option<Explanation> {
+        let with = self.curved(from, joint)?;
+        self.is_evident(&with, from).then_some(with)
+    }
+
+    /// Whether there is evidence for the curve in one explanation that the other lacks.
+    fn is_evident(&self, with: &Explanation, without: &Explanation) -> bool {
+        with.ahead_of(without, &self.problem.worth) > CURVE_EVIDENCE || overwhelming(with, without)
+    }
+
+    /// The explanation with the curve that does best in a joint, if it carries over.
+    fn curved(&self, from: &Explanation, joint: usize) -> Option<Explanation> {
         let base = Base::new(self.problem, &from.fit, self.hypotheses.len());
         let curve = base.propose_curve(joint)?;
         let fit = from.fit.with(self.problem, curve.active);
@@ -149,9 +167,7 @@ impl Search<'_> {
         let fit = Fit::new(self.problem, actives);
         let penalties = [&from.penalties[..], &[curve.penalty]].concat();
         let with = Explanation { fit, penalties };
-        let evident =
-            with.ahead_of(from, &self.problem.worth) > CURVE_EVIDENCE || overwhelming(&with, from);
-        (evident && carries_over(self.problem, &with.fit, &from.fit, &[joint])).then_some(with)
+        carries_over(self.problem, &with.fit, &from.fit, &[joint]).then_some(with)
     }
 
     /// The explanation with Coulomb and viscous friction in a joint, which a curve of friction goes with.
@@ -186,6 +202,7 @@ impl Search<'_> {
     /// Takes the names of a joint back that are too many functions of its position or waves that no gear makes, or that leave much more on recordings that they were not fitted on, each left out in
     /// turn, than where they were: together they only draw a curve, which is said in their place.
     pub(super) fn upheld(&self, found: Explanation) -> Explanation {
+        let pieces = found.fit.actives.len();
         let mut best = found;
         for joint in 0..self.problem.joints {
             let local = |&i: &usize| {
@@ -223,6 +240,10 @@ impl Search<'_> {
             if left_there > MOST_LEFT.max(MOST_WORSE * left_here) {
                 best = self.with_curve(&bare, joint).unwrap_or(bare);
             }
+        }
+        if best.fit.actives.len() < pieces {
+            // What patched those names is not needed beside what stands in their place.
+            best = self.pruned(best);
         }
         best
     }

@@ -1,0 +1,44 @@
+//! A link that is another body than its URDF says.
+
+use super::ghost::Ghost;
+use super::law::array;
+use super::{Coordinate, Effect, Layer, Parameter, PlaceKind};
+use crate::Inertia;
+
+/// A change of all ten inertial parameters of a link about the origin of its frame, in the order of [`Inertia::parameters`]:
+/// what describes a body that neither another mass nor another centre of mass makes.
+pub(super) static EFFECT: Effect = Effect {
+    name: "link_inertia",
+    place: PlaceKind::Link,
+    layer: Layer::Body,
+    parameters: &[
+        Parameter::any("delta_mass_kg"),
+        Parameter::any("delta_first_moment_x_kgm"),
+        Parameter::any("delta_first_moment_y_kgm"),
+        Parameter::any("delta_first_moment_z_kgm"),
+        Parameter::any("delta_origin_ixx_kgm2"),
+        Parameter::any("delta_origin_ixy_kgm2"),
+        Parameter::any("delta_origin_ixz_kgm2"),
+        Parameter::any("delta_origin_iyy_kgm2"),
+        Parameter::any("delta_origin_iyz_kgm2"),
+        Parameter::any("delta_origin_izz_kgm2"),
+    ],
+    coordinates: &[
+        Coordinate::factor("delta_mass_kg"),
+        Coordinate::factor("delta_first_moment_x_kgm"),
+        Coordinate::factor("delta_first_moment_y_kgm"),
+        Coordinate::factor("delta_first_moment_z_kgm"),
+        Coordinate::factor("delta_origin_ixx_kgm2"),
+        Coordinate::factor("delta_origin_ixy_kgm2"),
+        Coordinate::factor("delta_origin_ixz_kgm2"),
+        Coordinate::factor("delta_origin_iyy_kgm2"),
+        Coordinate::factor("delta_origin_iyz_kgm2"),
+        Coordinate::factor("delta_origin_izz_kgm2"),
+    ],
+    to_parameters: <[f64]>::to_vec,
+    to_coordinates: <[f64]>::to_vec,
+    build: |site, values| {
+        let inertia = Inertia::from_parameters(array(values));
+        Ghost::boxed(&EFFECT, site, values, inertia, None)
+    },
+};
