@@ -4,7 +4,7 @@ mod contact;
 mod learning;
 
 use super::blocks::{BLOCK_ROWS, BLOCK_S, Known, Ring};
-use super::finding::{Cause, Finding};
+use super::finding::Finding;
 use super::judge::{Judge, STRANGE, Verdict};
 use super::moments::{JOINT_KINDS, JointScore, Reference};
 use super::rows::Row;
@@ -61,6 +61,8 @@ pub(super) struct Monitor {
     noise: Vec<Option<f64>>,
     judge: Judge,
     run: Option<Run>,
+    /// Blocks since it watches.
+    watched: usize,
     /// Share of joints that lately moved unlike ever before.
     unlike: f64,
     score: f64,
@@ -89,6 +91,7 @@ impl Monitor {
             noise: vec![None; joints],
             judge: Judge::new(joints),
             run: None,
+            watched: 0,
             unlike: 0.0,
             score: 0.0,
             window: Window::new(joints),
@@ -126,6 +129,7 @@ impl Monitor {
             self.listen();
         }
         self.ring.close();
+        self.watched += usize::from(watches);
         if watches { self.watch() } else { self.learn() }
     }
 
@@ -165,11 +169,7 @@ impl Monitor {
         let lasts = matches!(run, Some(Told::Lasting(..)));
         let (verdict, score) = self.judge.judge(&self.ring, &usual, lasts);
         self.score = score;
-        // What has no name may be the contact that goes on: which of the two, its end tells.
-        let undecided = |finding: &Finding| finding.cause == Cause::Unknown && self.run.is_some();
-        if let Verdict::Changed(finding) = verdict
-            && !undecided(&finding)
-        {
+        if let Verdict::Changed(finding) = verdict {
             let blocks = (0..self.ring.len())
                 .filter(|&back| self.ring.back(back).first_ns >= finding.since_ns)
                 .count();
@@ -189,8 +189,9 @@ impl Monitor {
             _ => {}
         }
         let drifted = verdict == Verdict::Drifted && self.ring.len() == FRESH;
-        if self.is_unlike() || lasts || drifted {
-            // Another program, or the arm crept away: nothing can be said before it is known.
+        let unseen = matches!(run, Some(Told::Unseen));
+        if self.is_unlike() || lasts || unseen || drifted {
+            // Another program, or the arm crept away, or it was not known in the first place: nothing can be said before it is.
             self.phase = Phase::Learning { told: false };
             self.ring.keep(PROGRAM);
             self.judge.forget();

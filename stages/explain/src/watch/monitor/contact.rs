@@ -24,12 +24,16 @@ pub(super) struct Run {
     blocks: usize,
     loud: usize,
     quiet: usize,
+    /// Whether there was quiet before it since the arm is watched.
+    seen: bool,
 }
 
 /// What became of a run of loud blocks.
 pub(super) enum Told {
     Contact(Finding),
     Lasting(Finding, usize),
+    /// It lasts since before anything was watched: nobody saw it begin.
+    Unseen,
 }
 
 impl Monitor {
@@ -46,6 +50,7 @@ impl Monitor {
                     blocks: 1,
                     loud: 1,
                     quiet: 0,
+                    seen: self.watched > QUIET,
                 });
                 return None;
             }
@@ -89,6 +94,9 @@ impl Monitor {
             return Some(Told::Contact(finding));
         }
         if run.blocks > LONGEST_CONTACT && 2 * run.loud > run.blocks {
+            if !run.seen {
+                return Some(Told::Unseen);
+            }
             finding.cause = Cause::Unknown;
             return Some(Told::Lasting(finding, run.blocks));
         }

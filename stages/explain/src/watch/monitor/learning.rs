@@ -26,6 +26,7 @@ impl Monitor {
         self.learn_scales();
         self.ring.keep(0);
         self.run = None;
+        self.watched = 0;
         self.phase = Phase::Watching;
         told.then_some(News::Learned)
     }
