@@ -123,7 +123,7 @@ pub fn explain(
         problem,
         before,
         found,
-        named,
+        mut named,
         undetectable,
         rests_count,
     } = judged;
@@ -134,6 +134,9 @@ pub fn explain(
         .collect();
     let left_elsewhere = verdict::left_elsewhere(&proof, &noise_floor);
     let verdict = verdict::verdict(&found, &named.findings, &left_elsewhere);
+    if !left_elsewhere.is_empty() {
+        findings::doubt_patches(&mut named.findings);
+    }
     let mut notes = named.notes;
     let unit = if input.effort_unit == "A" { "A" } else { "N m" };
     notes.extend(verdict::note(&proof, &left_elsewhere, &joints, unit));

@@ -23,6 +23,7 @@ use crate::windows::{TimeKind, time_kind};
 use crate::words;
 
 use contest::contest;
+pub use doubt::doubt_patches;
 use scales::{Scales, StartScales};
 pub use undetectable::undetectable;
 use waves::merge_waves;

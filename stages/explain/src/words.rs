@@ -42,6 +42,7 @@ pub fn unit(parameter: &str) -> &'static str {
         ("_n_per_m", "N/m"),
         ("_rad_s", "rad/s"),
         ("_kgm2", "kg m²"),
+        ("_kgm", "kg m"),
         ("_rad", "rad"),
         ("_nm", "N m"),
         ("_kg", "kg"),
@@ -214,14 +215,20 @@ pub fn sentence(
             with("delta_com_y_m"),
             with("delta_com_z_m")
         ),
-        "link_inertia" => format!(
-            "Link {place} is another body than its URDF says, by {} and first moments of ({}, {}, {}), and no one name fits that: \
-             what is left depends on the motion of all joints that carry it, as its weight and inertia would.",
-            with("delta_mass_kg"),
-            with("delta_first_moment_x_kgm"),
-            with("delta_first_moment_y_kgm"),
-            with("delta_first_moment_z_kgm")
-        ),
+        "link_inertia" => {
+            let value = |parameter: &str| parameters.get(parameter).and_then(Value::as_f64);
+            let moment = ["x", "y", "z"].map(|axis| {
+                let value = value(&format!("delta_first_moment_{axis}_kgm"));
+                number(value.unwrap_or(f64::NAN))
+            });
+            format!(
+                "Link {place} is another body than its URDF says, and no one name fits that: its mass is off by {}, its first moment \
+                 (mass times centre) by ({}) kg m, and so is its inertia; \
+                 what is left depends on the motion of all joints that carry it.",
+                with("delta_mass_kg"),
+                moment.join(", ")
+            )
+        }
         "base_tilt" => format!(
             "The base is tilted: roll {}, pitch {}.",
             with("roll_rad"),

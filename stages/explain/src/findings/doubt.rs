@@ -16,6 +16,8 @@ use super::Named;
 
 /// What is doubted is as likely as not.
 const DOUBTED: f64 = 0.5;
+/// What explains less than this share of what the largest finding does may patch it.
+const PATCH: f64 = 0.02;
 /// Pushes whose times differ by less than this from recording to recording come at the same time \[s\].
 const SAME_TIME_S: f64 = 0.3;
 /// In at least so many recordings.
@@ -31,6 +33,16 @@ pub fn doubt(named: &mut Named, problem: &Problem, actives: &[Active]) {
     }
     let pushed = doubt_pushes(&mut named.findings, problem.tracks.len());
     named.notes.extend(pushed);
+}
+
+/// Doubts what explains next to nothing beside the largest finding, where what was found does not carry over: it may only patch what
+/// is wrong elsewhere.
+pub fn doubt_patches(findings: &mut [Finding]) {
+    let largest = findings.iter().map(|f| f.explains).fold(0.0, f64::max);
+    let small = |finding: &&mut Finding| finding.explains < PATCH * largest;
+    for finding in findings.iter_mut().filter(small) {
+        finding.confidence = DOUBTED;
+    }
 }
 
 /// Whether a body, or how gravity acts on it, is named beside a curve that a joint which carries it has without a name: what weighs
@@ -165,6 +177,17 @@ mod tests {
             equivalent_to: Vec::new(),
             sentence: String::new(),
         }
+    }
+
+    #[test]
+    fn what_explains_next_to_nothing_is_doubted_where_the_whole_does_not_carry_over() {
+        let mut found = [push("a", 2.0), push("b", 5.0), push("c", 7.0)];
+        for (finding, explains) in found.iter_mut().zip([0.9, 0.03, 0.01]) {
+            finding.explains = explains;
+        }
+        doubt_patches(&mut found);
+        let confidence = found.map(|finding| finding.confidence);
+        assert!(confidence[0] > 0.9 && confidence[1] > 0.9 && confidence[2] <= DOUBTED);
     }
 
     #[test]

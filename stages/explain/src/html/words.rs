@@ -13,7 +13,7 @@ pub(super) fn sentence_case(name: &str) -> String {
 }
 
 /// Endings of canonical names and the units they stand for, longer ones before those they end in.
-const UNITS: [(&str, &str); 20] = [
+const UNITS: [(&str, &str); 21] = [
     ("_nms2_per_rad2", "N m s²/rad²"),
     ("_nms_per_rad", "N m s/rad"),
     ("_nm_per_rad", "N m/rad"),
@@ -26,6 +26,7 @@ const UNITS: [(&str, &str); 20] = [
     ("_rad_s2", "rad/s²"),
     ("_rad_s", "rad/s"),
     ("_kgm2", "kg m²"),
+    ("_kgm", "kg m"),
     ("_nm", "N m"),
     ("_hz", "Hz"),
     ("_kg", "kg"),
