@@ -43,6 +43,7 @@ def options():
     a.add_argument("--seconds", default="8.5,10", help="range of a recording's length")
     a.add_argument("--several", type=float, default=0., help="probability that an effect of a combination comes on a second joint too")
     a.add_argument("--no-constants", type=float, default=0., help="share of the cases in A that do not give torque constants")
+    a.add_argument("--twin-topic", action="store_true", help="the twin is a topic in the recordings: the nominal arm from the encoder's derivatives")
     a.add_argument("--prefix", default="c")
     return a.parse_args()
 
@@ -218,10 +219,10 @@ def attempt(o, ident, kind, names, robot, rng, folder, rejected):
         v = np.round((at(m.v) + fine * SPEED_NOISE * rng.normal(size=measured.shape)) / (fine * speed_step)) * fine * speed_step
         ns = epoch * 10**9 + np.round((start + t) * 1e9).astype(np.int64)
         pick = lambda x: x[rows][:, order]
+        practical = robot.nominal.rnea(*truth.estimated(t, q))
         files.append((r, ns[rows], pick(q), pick(v) if has_speed else None, pick(measured / constant),
-                      pick(at(command)) if has_command else None))
+                      pick(at(command)) if has_command else None, pick(practical / constant) if o.twin_topic else None))
         if r in held:
-            practical = robot.nominal.rnea(*truth.estimated(t, q))
             cut = int(len(t) / (t[-1] - t[0]) * truth.CUT)
             within = slice(cut, -cut)
             figures[r] = {k: (x / constant)[within] for k, x in {
@@ -237,11 +238,14 @@ def attempt(o, ident, kind, names, robot, rng, folder, rejected):
     path = os.path.join(folder, "cases", ident)
     os.makedirs(path, exist_ok=True)
     names_out = [robot.names[k] for k in order]
-    for r, ns, q, v, tau, command in files:
-        record.write(os.path.join(path, r + ".mcap"), names_out, ns, q, v, tau, command)
+    for r, *columns in files:
+        record.write(os.path.join(path, r + ".mcap"), names_out, *columns)
     topics = {"state": "/joint_states"} | ({"command": "/joint_commands"} if has_command else {})
     text = {"case": ident, "robot": f"../../robots/{robot.name}.urdf", "effort_unit": unit, "joint_names": robot.names, "rate_hz": rate,
             "topics": topics, "has_velocity": bool(has_speed), "fit": [r + ".mcap" for r in fit], "holdout": [r + ".mcap" for r in held]}
+    if o.twin_topic:
+        del text["robot"]
+        text["twin"] = {"topic": "/twin/joint_states"}
     if unit == "A" and not hidden:
         text["torque_constants_nm_per_a"] = dict(zip(robot.names, constant.tolist()))
     with open(os.path.join(path, "case.yaml"), "w") as file:

@@ -43,17 +43,20 @@ def encode(ns, names, arrays):
     return b"\0\1\0\0" + bytes(body)
 
 
-def write(path, names, stamps_ns, position, velocity, effort, command=None):
-    """One recording: /joint_states, and /joint_commands (positions) if `command` is given.  Rows are samples."""
+def write(path, names, stamps_ns, position, velocity, effort, command=None, twin=None):
+    """One recording: /joint_states, and if given `command`, /joint_commands (positions), and `twin`, /twin/joint_states (efforts).  Rows are samples."""
     with open(path, "wb") as file:
         writer = Writer(file, chunk_size=4 << 20, compression=CompressionType.ZSTD)
         writer.start(profile="ros2", library="concealed-arm")
         schema = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", DEFINITION.encode())
         states = writer.register_channel("/joint_states", "cdr", schema)
         commands = None if command is None else writer.register_channel("/joint_commands", "cdr", schema)
+        twins = None if twin is None else writer.register_channel("/twin/joint_states", "cdr", schema)
         for i, ns in enumerate(int(x) for x in stamps_ns):
             row = (position[i], None if velocity is None else velocity[i], effort[i])
             writer.add_message(states, ns, encode(ns, names, row), ns, i)
+            if twins is not None:
+                writer.add_message(twins, ns, encode(ns, names, (None, None, twin[i])), ns, i)
             if commands is not None:
                 writer.add_message(commands, ns, encode(ns, names, (command[i], None, None)), ns, i)
         writer.finish()
