@@ -105,6 +105,37 @@ fn touches_of_a_standing_franka_stand_out() {
 }
 
 #[test]
+fn a_standing_ur10e_was_pushed_four_times() {
+    let Some(shared) = shared("a_standing_ur10e_was_pushed_four_times") else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let mut explain = tauscope();
+    explain
+        .args(["explain", "--effort-unit", "A", "--robot"])
+        .arg(shared.join("robots/ur10e.urdf"))
+        .arg("--fit")
+        .arg(shared.join("recordings/ur10e/push_pose_1.mcap"))
+        .arg("--out")
+        .arg(folder.path());
+    let out = Out::of(explain);
+    assert_eq!(out.code, 0, "{}", out.stderr);
+    let report = std::fs::read_to_string(folder.path().join("report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let findings = report["findings"].as_array().unwrap();
+    assert!(findings.iter().all(|f| f["effect"] == "external_push"));
+    let mut starts: Vec<f64> = findings
+        .iter()
+        .map(|f| f["t_start"].as_f64().unwrap())
+        .collect();
+    starts.sort_by(f64::total_cmp);
+    assert_eq!(starts.len(), 4, "{starts:?}");
+    for (start, about) in starts.iter().zip([2.0, 4.7, 8.4, 12.0]) {
+        assert!((start - about).abs() < 0.5, "{starts:?}");
+    }
+}
+
+#[test]
 fn a_sqlite3_bag_is_replayed_whole() {
     let Some(shared) = shared("a_sqlite3_bag_is_replayed_whole") else {
         return;

@@ -1,7 +1,5 @@
 //! The search where no joint moves: what comes and goes can be told, what lasts cannot.
 
-use std::collections::BTreeSet;
-
 use tauscope_dynamics::terms::TermError;
 
 use crate::active::Hypothesis;
@@ -12,7 +10,7 @@ use crate::fit::Fit;
 use crate::problem::Problem;
 use crate::propose::Base;
 use crate::recording::Recording;
-use crate::search::{Explanation, Search, plausible};
+use crate::search::{Explanation, Search, bearing, plausible};
 use crate::track::Track;
 use crate::windows::{TimeKind, time_kind};
 use crate::words;
@@ -91,12 +89,21 @@ fn stands_out(problem: &Problem, fit: &Fit, deviations: &[f64]) -> Vec<(f64, f64
         })
         .collect();
     let noise = deviations.iter().map(|d| d * d).sum::<f64>().sqrt();
+    // The most since it last was back where it began: what friction holds of a push is no other push, however long it does.
+    let held = norm.iter().scan(0.0_f64, |most, x| {
+        *most = if *x > STANDS_OUT * noise {
+            most.max(*x)
+        } else {
+            0.0
+        };
+        Some(*most)
+    });
+    let held: Vec<f64> = held.collect();
     let stands_out = |k: usize| {
         let first = times.partition_point(|t| *t < times[k] - NEAR_S);
         let last = times.partition_point(|t| *t <= times[k] + NEAR_S);
-        let peak = norm[first..last]
-            .iter()
-            .fold(0.0_f64, |most, x| most.max(*x));
+        let near = norm[first..last].iter();
+        let peak = near.fold(held[k], |most, x| most.max(*x));
         norm[k] > (STANDS_OUT * noise).max(SHARE_OF_PEAK * peak)
     };
     let mut found: Vec<(f64, f64)> = Vec::new();
@@ -139,13 +146,7 @@ fn last_to_feel(
 /// How many joints there are from the base to one.
 fn order(problem: &Problem, joint: usize) -> usize {
     let model = &problem.model;
-    let mut link = Some(model.joints()[joint].child_link);
-    let mut joints = BTreeSet::new();
-    while let Some(index) = link {
-        joints.extend(model.links()[index].joint);
-        link = model.links()[index].parent;
-    }
-    joints.len()
+    bearing(model, model.joints()[joint].child_link).len()
 }
 
 /// A push for each time that something stands out, at the link where a constant force explains most of it: one that is next to
