@@ -197,6 +197,11 @@ mod tests {
         )
     }
 
+    /// The step of all parameters of one body.
+    fn whole_step(actives: &[Active], asked: (&DMatrix<f64>, &DVector<f64>)) -> DVector<f64> {
+        body_step(&model(), actives, &free(), asked, &[true; BODY], 0.0).unwrap()
+    }
+
     fn after(actives: &[Active], step: &DVector<f64>) -> Vec<Active> {
         let mut there = actives.to_vec();
         for (value, step) in there[0].coordinates.iter_mut().zip(step) {
@@ -215,15 +220,7 @@ mod tests {
         );
         let actives = carried(here);
         let (normal, right) = asking(&here, &wanted, [1e-6; BODY]);
-        let step = body_step(
-            &model(),
-            &actives,
-            &free(),
-            (&normal, &right),
-            &[true; BODY],
-            0.0,
-        )
-        .unwrap();
+        let step = whole_step(&actives, (&normal, &right));
         let there = after(&actives, &step);
         for (value, wanted) in there[0].coordinates.iter().zip(wanted.parameters()) {
             assert!((value - wanted).abs() < 1e-5, "{value} instead of {wanted}");
@@ -241,15 +238,7 @@ mod tests {
         deviations[..4].fill(1e-5);
         deviations[9] = 1e-5;
         let (normal, right) = asking(&here, &wanted, deviations);
-        let step = body_step(
-            &model(),
-            &actives,
-            &free(),
-            (&normal, &right),
-            &[true; BODY],
-            0.0,
-        )
-        .unwrap();
+        let step = whole_step(&actives, (&normal, &right));
         let there = after(&actives, &step);
         assert!(log_density(&model(), &there).is_finite());
         for c in [0, 1, 2, 3, 9] {
