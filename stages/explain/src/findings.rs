@@ -15,7 +15,7 @@ use crate::active::{Active, Hypothesis};
 use crate::drive::is_drive;
 use crate::explain::Input;
 use crate::fit::Fit;
-use crate::interval::{HALF_WIDTH_95, covariance, parameter_deviations};
+use crate::interval::{covariance, half_width_95, parameter_deviations};
 use crate::next_motion;
 use crate::report::{Finding, NextMotion, Rejected, Rival, Verdict};
 use crate::search::{Explanation, Search};
@@ -139,7 +139,7 @@ pub fn of(
             // A change between two recordings has no sharper time than that.
             let vague = parameter.name.contains("time") && *deviation > VAGUE_S;
             if deviation.is_finite() && !vague {
-                let half = HALF_WIDTH_95 * deviation;
+                let half = half_width_95(search.problem) * deviation;
                 let least = search.problem.least(active.hypothesis, parameter.minimum);
                 let low = (value - half).max(least);
                 intervals.insert(parameter.name.to_owned(), [low, value + half]);

@@ -19,6 +19,15 @@ const NEAR_GAP_PERIODS: f64 = 0.5;
 /// Half width of a 95 % interval of a normal variable, in standard deviations.
 pub const HALF_WIDTH_95: f64 = 1.96;
 
+/// Half width of a 95 % interval of a number with a deviation by [`covariance`], in these: that is itself an estimate, from as many rows
+/// as there are, and too small on average by what its lags are of them. Of Bartlett's weights at 97.5 % (Kiefer and Vogelsang, "A New
+/// Asymptotic Theory for Heteroskedasticity-Autocorrelation Robust Tests", 2005, table 1).
+pub fn half_width_95(problem: &Problem) -> f64 {
+    let lags = (LAGS + 1) as f64 / f64::max(problem.rows as f64, 1.0);
+    let b = lags.min(1.0);
+    HALF_WIDTH_95 + b * (2.9694 + b * (0.4160 - b * 0.5324))
+}
+
 /// Covariance of all free coordinates of a fit, in the order of [`Fit::parameters`].
 ///
 /// The sandwich `A⁻¹ B A⁻¹` with A the normal matrix and B the covariance of the scores, autocorrelation within
