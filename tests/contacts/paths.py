@@ -1,9 +1,9 @@
 """Draws a scenario of hands on random paths for `tauscope simulate`, as examples/scenarios/paths.yaml: an arm with about as much unknown
 physics as an explained twin leaves, pushed anywhere along and around four links.
 
-    paths.py ROBOT.urdf SEED TRAIN VALIDATION TEST > scenario.yaml
+    paths.py ROBOT.urdf SEED TRAIN VALIDATION TEST [FREE] > scenario.yaml
 
-The robot is xArm7-like: links link1 to link7, joints joint1 to joint7.
+FREE more test recordings, in which nothing touches the arm, count false alarms. The robot is xArm7-like: links link1 to link7, joints joint1 to joint7.
 """
 import json
 import sys
@@ -47,6 +47,7 @@ def friction(rng, joint, larger):
 
 def main():
     robot, seed, *counts = sys.argv[1], *map(int, sys.argv[2:6])
+    free = int(sys.argv[6]) if len(sys.argv) > 6 else 0
     rng, urdf = np.random.default_rng(seed), ET.parse(robot).getroot()
     centres = {link.get("name"): xyz(link.find("inertial/origin")) for link in urdf.findall("link") if link.find("inertial") is not None}
     ends = {joint.find("parent").get("link"): xyz(joint.find("origin")) for joint in urdf.findall("joint")}
@@ -57,6 +58,9 @@ def main():
         duration_s = float(rng.uniform(22, 34))
         contacts = pushes(rng, ends, centres, duration_s) if role == "test" else []
         recordings.append({"name": f"rec_{i:03d}", "role": role, "duration_s": duration_s, "motion": MOTION, "contacts": contacts})
+    rng = np.random.default_rng(seed + 10**6)
+    recordings += [{"name": f"rec_{len(roles) + i:03d}", "role": "test", "duration_s": float(rng.uniform(22, 34)), "motion": MOTION, "contacts": []}
+                   for i in range(free)]
     scenario = {"version": 1, "name": "paths", "robot": robot, "seed": seed, "rate_hz": 100, "physics": physics,
                 "sensors": {"position_step_rad": 3e-5, "velocity_noise_rad_s": 0.001, "effort_noise_nm": 0.15}, "recordings": recordings}
     json.dump(scenario, sys.stdout, indent=1)  # which YAML is a superset of

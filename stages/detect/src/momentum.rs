@@ -60,19 +60,15 @@ impl MomentumObserver {
         gain_per_s: f64,
         detector: &'static str,
     ) -> Result<Self, ConfigError> {
-        let Some(model) = &setup.model else {
+        let Some(inertia) = Inertia::of(setup) else {
             return Err(ConfigError::NoModel { detector });
         };
         if !setup.joints.iter().any(JointSetup::tells_torque) {
             return Err(ConfigError::NoTorque { detector });
         }
-        let new = || Inertia::new(model.clone());
         Ok(Self {
             gain_per_s,
-            inertia: match &setup.shared {
-                Some(shared) => shared.inertia(new),
-                None => Tap::own(new()),
-            },
+            inertia,
             nm_per_effort: (setup.joints.iter())
                 .map(|joint| {
                     if joint.tells_torque() {
@@ -182,9 +178,19 @@ impl Inertia {
         }
     }
 
+    /// That of the robot of `setup`, shared where others of its detectors ask, too; nothing without a model.
+    pub fn of(setup: &Setup) -> Option<Tap<Self>> {
+        let model = setup.model.as_ref()?;
+        let new = || Self::new(model.clone());
+        Some(match &setup.shared {
+            Some(shared) => shared.inertia(new),
+            None => Tap::own(new()),
+        })
+    }
+
     /// Mean over the step to the next sample of M times (the velocity's change a second - q̈), by joint
     /// \[N m\]; 0 at the first. A repeated stamp changes nothing.
-    fn update(&mut self, sample: &TwinState) -> JointArray {
+    pub fn update(&mut self, sample: &TwinState) -> JointArray {
         let stamp_ns = sample.header.stamp_ns;
         let n = self.model.dof();
         let before_ns = self.before_ns.filter(|_| !sample.header.has(flags::RESET));

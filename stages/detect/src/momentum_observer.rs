@@ -34,8 +34,8 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             gain_per_s: DEFAULT_GAIN_PER_S,
-            // The twin's on efforts; the paper does not give its own.
-            cutoff_hz: 4.0,
+            // With the observer's own 10 ms as late as the twin's low-pass of 4 Hz on efforts (√2 / ω); the paper does not give its own.
+            cutoff_hz: 5.0,
         }
     }
 }

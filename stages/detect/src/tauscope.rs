@@ -3,7 +3,8 @@
 //! The noise of a residual is not the same in every joint, at every speed and over every length of time:
 //! friction is least certain where a joint turns round, joints err together, and what is small beside
 //! one sample is large beside the mean of thirty. All of that is learnt from contact-free recordings
-//! ([`Learnt`]). Friction that the twin leaves out, and how late the twin is, are learnt first, and taken away ([`LearntUsual`]). The score is the largest, over windows of 10 ms to 0.2 s, of the Mahalanobis length of the mean residual, in
+//! ([`Learnt`]). Friction that the twin leaves out, and how late the twin is, are learnt first, and taken away ([`LearntUsual`]).
+//! What the change of velocity explains at once, and the twin's low-passed acceleration later, is no contact. The score is the largest, over windows of 10 ms to 0.2 s, of the Mahalanobis length of the mean residual, in
 //! units of what that window's length reaches at most in one of a thousand contact-free samples. Slow drift (warming up)
 //! is followed while nothing touches the robot.
 //!
@@ -20,6 +21,7 @@
 
 mod alarm;
 mod kinds;
+mod late;
 mod learnt;
 mod means;
 mod noise;
@@ -46,6 +48,7 @@ use crate::rate::Rate;
 use crate::stage::Setup;
 use alarm::Watch;
 pub use kinds::Kinds;
+use late::{Late, LateIn};
 use learnt::ENOUGH_S;
 pub use learnt::{Learnt, LearntJoint, LearntWindow};
 use means::Follow;
@@ -134,8 +137,9 @@ pub fn learn(
     setup: &Setup,
     lessons: &Lessons<'_>,
 ) -> Result<Settings, LearnError> {
-    let mut learnt = Learnt::new(lessons, &setup.joint_names, settings.follow())?;
-    learnt.smallest = smallest::smallest(&learnt, lessons, setup, settings.follow());
+    let late = LateIn::of(lessons, setup);
+    let mut learnt = Learnt::new(lessons, &late, &setup.joint_names, settings.follow())?;
+    learnt.smallest = smallest::smallest(&learnt, lessons, &late, setup, settings.follow());
     learnt.kinds = kinds::learn(&learnt, settings, setup, lessons);
     Ok(Settings {
         learnt: Some(learnt),
@@ -178,6 +182,7 @@ impl Settings {
 
 struct Tauscope {
     rate: Rate,
+    late: Late,
     windows: Windows,
     /// How the joints have moved \[rad/s\].
     moved: Ring<MOVED>,
@@ -212,7 +217,8 @@ impl Detector for Tauscope {
         let free = self.watch.contact_ns().is_none();
         // Whatever raises no alarm and is not far from usual may be drift.
         let drifts = free.then_some(self.watch.threshold().min(DRIFT));
-        let score = self.windows.score(sample, drifts);
+        let late = self.late.next(sample);
+        let score = self.windows.score(sample, &late, drifts);
         self.moved.push(sample.header.stamp_ns, &sample.velocity);
         let ready = self.windows.ready() && sample.header.has(flags::READY);
         if !ready {
@@ -254,6 +260,7 @@ impl Tauscope {
         windows.heed_rest(threshold, per_hour);
         Self {
             rate: Rate::new(learnt.rate_hz),
+            late: Late::new(setup),
             windows,
             moved: Ring::new(),
             place: Place::new(setup),

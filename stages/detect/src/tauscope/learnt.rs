@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use tauscope_bus::{TwinState, flags};
 
 use super::kinds::Kinds;
+use super::late::LateIn;
 use super::means::{Follow, WINDOWS_S};
 use super::noise;
 use super::pieces::{FOLDS, Piece, free, free_s, marked, pieces, quantile};
@@ -110,10 +111,11 @@ impl Learnt {
     /// If they hold too little.
     pub(crate) fn new(
         lessons: &Lessons<'_>,
+        late: &LateIn,
         joint_names: &[String],
         follow: Follow,
     ) -> Result<Self, LearnError> {
-        let all = pieces(lessons, follow);
+        let all = pieces(lessons, late, follow);
         let count: usize = all.iter().map(|piece| free(piece).count()).sum();
         let rate_hz = rate::of(&[lessons.train, lessons.validation]);
         let Some(rate_hz) = rate_hz.filter(|_| count >= LEAST_SAMPLES) else {
@@ -261,11 +263,11 @@ impl Learnt {
     ) {
         for piece in all {
             let mut windows = Windows::new(self, follow);
-            for (sample, is_free) in marked(piece) {
+            for (sample, late, is_free) in marked(piece) {
                 if sample.header.has(flags::RESET) {
                     windows.reset();
                 }
-                let score = windows.score(sample, is_free.then_some(drifts));
+                let score = windows.score(sample, late, is_free.then_some(drifts));
                 if is_free && windows.ready() {
                     visit(sample, &windows, score);
                 }

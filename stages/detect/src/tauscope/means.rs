@@ -39,6 +39,11 @@ pub(super) fn borne_out(
     borne_out
 }
 
+/// Whichever is closer to 0; the first where the second is not known.
+fn smaller(a: f64, b: f64) -> f64 {
+    if b.abs() < a.abs() { b } else { a }
+}
+
 /// How the slow part of a residual is had.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Follow {
@@ -54,6 +59,11 @@ pub(crate) struct Means {
     sums: Sums,
     /// The residual that is usual just now, by joint.
     usual: Vec<Usual>,
+    /// What is left of the residual over each step when its change of velocity tells what the twin misses; and at the end of the newest step.
+    known: Sums,
+    newest: JointArray,
+    /// By window and joint, the mean of whichever of both is closer to 0.
+    nearer: [JointArray; WINDOWS_S.len()],
     /// What is left of the residual where the arm has come to rest behind a contact.
     settled: JointArray,
     settings: Follow,
@@ -76,6 +86,9 @@ impl Means {
         Self {
             sums: Sums::new(windows),
             usual: joints.iter().map(usual).collect(),
+            known: Sums::new(windows),
+            newest: [0.0; MAX_JOINTS],
+            nearer: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
             settled: [0.0; MAX_JOINTS],
             settings,
             step: (Step::of(0.0), 0.0),
@@ -87,6 +100,7 @@ impl Means {
 
     pub fn reset(&mut self) {
         self.sums.reset();
+        self.known.reset();
         self.usual.iter_mut().for_each(Usual::reset);
         self.settled = [0.0; MAX_JOINTS];
     }
@@ -98,8 +112,8 @@ impl Means {
         (newest - self.start_ns) as f64 * 1e-9 >= longest.max(self.settings.offset_from_first_s)
     }
 
-    /// Takes a sample; slow drift is followed if `follow`.
-    pub fn push(&mut self, sample: &TwinState, follow: bool) {
+    /// Takes a sample with what the twin misses of it; slow drift is followed if `follow`.
+    pub fn push(&mut self, sample: &TwinState, late: &JointArray, follow: bool) {
         let n = self.usual.len();
         let now = sample.header.stamp_ns;
         let is_first = self.sums.is_empty();
@@ -120,7 +134,7 @@ impl Means {
         }
         let (step, drift) = &self.step;
         let recovery = dt_s / SLOW_MEMORY_S;
-        let mut row = [0.0; MAX_JOINTS];
+        let (mut row, mut step_end) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
         for (j, (value, usual)) in row.iter_mut().zip(&mut self.usual).enumerate() {
             let efforts = [sample.effort[j], sample.expected_effort[j]];
             let left = efforts[0] - efforts[1] - usual.next(step, sample.velocity[j], efforts);
@@ -133,32 +147,60 @@ impl Means {
                 0.0
             };
             *value = left - followed - self.settled[j];
+            step_end[j] = *value + usual.late();
             let recovered = self.slow[j] + recovery * self.fast[j];
             self.slow[j] = recovered.min(sample.velocity[j].abs());
         }
+        if is_first {
+            self.newest = step_end;
+        }
+        let mut known = [0.0; MAX_JOINTS];
+        for (j, known) in known.iter_mut().enumerate().take(n) {
+            *known = 0.5 * (step_end[j] + self.newest[j]) - late[j];
+        }
+        self.newest = step_end;
         self.sums.push(now, &row, n);
+        self.known.push(now, &known, n);
+        self.explain();
+    }
+
+    /// How late the twin is can be told from the expected effort or from the change of velocity: either errs, and what one of them explains is no contact.
+    fn explain(&mut self) {
+        self.nearer = self.sums.means;
+        for (means, known) in self.nearer.iter_mut().zip(&self.known.means) {
+            for (mean, known) in means.iter_mut().zip(known) {
+                *mean = smaller(*mean, *known);
+            }
+        }
     }
 
     /// The arm has come to rest with the residual as it is.
     pub fn settle(&mut self) {
-        let left = self.sums.means[MIDDLE];
+        let left = self.nearer[MIDDLE];
         for (settled, left) in self.settled.iter_mut().zip(&left) {
             *settled += left;
         }
         self.sums.shift(&left, self.usual.len());
+        self.known.shift(&left, self.usual.len());
+        self.explain();
     }
 
     /// Where the arm has come to rest creeps, or is forgotten if it `moves`.
     pub fn creep(&mut self, moves: bool) {
         let dt_s = self.step.0.dt_s();
         let share = dt_s / (SETTLES_S + dt_s);
-        for (settled, left) in self.settled.iter_mut().zip(&self.sums.means[MIDDLE]) {
+        for (settled, left) in self.settled.iter_mut().zip(&self.nearer[MIDDLE]) {
             *settled += share * if moves { -*settled } else { *left };
         }
     }
 
     /// Mean residual of a joint over a window \[effort unit\].
     pub fn mean(&self, window: usize, joint: usize) -> f64 {
+        self.nearer[window][joint]
+    }
+
+    /// The same, whatever the change of velocity tells.
+    pub fn whole(&self, window: usize, joint: usize) -> f64 {
         self.sums.means[window][joint]
     }
 
@@ -179,7 +221,7 @@ impl Means {
 
     /// By window.
     pub fn all(&self) -> &[JointArray; WINDOWS_S.len()] {
-        &self.sums.means
+        &self.nearer
     }
 
     /// Stamp of the newest sample.
@@ -191,6 +233,11 @@ impl Means {
     pub fn earlier(&self, to_ns: i64) -> JointArray {
         // The window is open where it begins.
         let from_ns = to_ns - (WINDOWS_S[SHORTEST] * 1e9) as i64 + 1;
-        self.sums.rows.mean(from_ns, to_ns)
+        let mut mean = self.sums.rows.mean(from_ns, to_ns);
+        let known = self.known.rows.mean(from_ns, to_ns);
+        for (mean, known) in mean.iter_mut().zip(&known) {
+            *mean = smaller(*mean, *known);
+        }
+        mean
     }
 }

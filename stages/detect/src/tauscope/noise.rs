@@ -91,9 +91,9 @@ pub(super) fn learn(
     let mut seen = vec![vec![[Seen::default(); BINS]; joints.len()]; WINDOWS_S.len()];
     for piece in all {
         let mut means = Means::new(joints, follow, WINDOWS_S.len());
-        for (sample, is_free) in marked(piece) {
+        for (sample, late, is_free) in marked(piece) {
             restart(&mut means, sample);
-            means.push(sample, is_free);
+            means.push(sample, late, is_free);
             if !(is_free && means.ready()) {
                 continue;
             }

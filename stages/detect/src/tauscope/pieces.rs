@@ -1,7 +1,8 @@
 //! What is learnt from: stretches of recordings, and what in them nothing touched.
 
-use tauscope_bus::{TwinState, flags};
+use tauscope_bus::{JointArray, TwinState, flags};
 
+use super::late::LateIn;
 use super::means::Follow;
 use crate::lesson::{Lesson, Lessons};
 
@@ -17,13 +18,19 @@ pub(super) const FOLDS: usize = 4;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Piece<'a> {
     pub samples: &'a [TwinState],
+    /// What the twin misses of each because its acceleration comes late, by joint \[effort unit\].
+    late: &'a [JointArray],
     /// The part of the data that it is held out with: pieces of one recording together, where there are enough recordings.
     pub fold: usize,
     lesson: &'a Lesson,
 }
 
 /// All recordings; few ones in equal pieces, so that there are some for each fold, unless each must begin where it does.
-pub(super) fn pieces<'a>(lessons: &Lessons<'a>, follow: Follow) -> Vec<Piece<'a>> {
+pub(super) fn pieces<'a>(
+    lessons: &Lessons<'a>,
+    late: &'a LateIn,
+    follow: Follow,
+) -> Vec<Piece<'a>> {
     let all = || lessons.train.iter().chain(lessons.validation);
     let each = if follow.offset_from_first_s > 0.0 {
         1
@@ -32,11 +39,12 @@ pub(super) fn pieces<'a>(lessons: &Lessons<'a>, follow: Follow) -> Vec<Piece<'a>
     };
     let recordings_do = all().count() >= FOLDS;
     all()
+        .zip(late.recordings())
         .enumerate()
-        .flat_map(|(number, lesson)| {
+        .flat_map(|(number, (lesson, late))| {
             let length = lesson.samples.len().div_ceil(each).max(1);
-            let parts = lesson.samples.chunks(length).enumerate();
-            parts.map(move |(part, samples)| {
+            let parts = lesson.samples.chunks(length).zip(late.chunks(length));
+            parts.enumerate().map(move |(part, (samples, late))| {
                 let of_all = if recordings_do {
                     number
                 } else {
@@ -45,6 +53,7 @@ pub(super) fn pieces<'a>(lessons: &Lessons<'a>, follow: Follow) -> Vec<Piece<'a>
                 let fold = of_all % FOLDS;
                 Piece {
                     samples,
+                    late,
                     fold,
                     lesson,
                 }
@@ -53,23 +62,29 @@ pub(super) fn pieces<'a>(lessons: &Lessons<'a>, follow: Follow) -> Vec<Piece<'a>
         .collect()
 }
 
-/// Settled samples of a piece, and whether nothing touched the robot then.
-pub(super) fn marked<'a>(piece: &Piece<'a>) -> impl Iterator<Item = (&'a TwinState, bool)> {
+/// Settled samples of a piece, what the twin misses of each, and whether nothing touched the robot then.
+pub(super) fn marked<'a>(
+    piece: &Piece<'a>,
+) -> impl Iterator<Item = (&'a TwinState, &'a JointArray, bool)> {
     let Piece {
-        samples, lesson, ..
+        samples,
+        late,
+        lesson,
+        ..
     } = *piece;
-    let settled = samples.iter().filter(|s| s.header.has(flags::READY));
-    settled.map(move |sample| {
+    let all = samples.iter().zip(late);
+    let settled = all.filter(|(sample, _)| sample.header.has(flags::READY));
+    settled.map(move |(sample, late)| {
         let stamp = sample.header.stamp_ns;
         let touched = lesson.contacts.iter().flatten().any(|contact| {
             stamp >= contact.on_ns - BEFORE_NS && stamp <= contact.off_ns + AFTER_NS
         });
-        (sample, !touched)
+        (sample, late, !touched)
     })
 }
 
 pub(super) fn free<'a>(piece: &Piece<'a>) -> impl Iterator<Item = &'a TwinState> {
-    marked(piece).filter_map(|(sample, is_free)| is_free.then_some(sample))
+    marked(piece).filter_map(|(sample, _, is_free)| is_free.then_some(sample))
 }
 
 /// How long nothing touched the robot \[s\].

@@ -170,7 +170,7 @@ fn each(all: &[Piece<'_>], joints: usize, mut visit: impl FnMut(i64, bool, &Chan
     for piece in all {
         let mut base = Base::new();
         let mut is_first = true;
-        for (sample, is_free) in marked(piece) {
+        for (sample, _, is_free) in marked(piece) {
             // What was before a contact is not what is behind it.
             if sample.header.has(flags::RESET) || !is_free {
                 base.reset();

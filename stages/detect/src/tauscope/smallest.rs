@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tauscope_bus::MAX_JOINTS;
 
+use super::late::LateIn;
 use super::learnt::Learnt;
 use super::means::Follow;
 use super::pieces::pieces;
@@ -34,6 +35,7 @@ pub struct Smallest {
 pub(crate) fn smallest(
     learnt: &Learnt,
     lessons: &Lessons<'_>,
+    late: &LateIn,
     setup: &Setup,
     follow: Follow,
 ) -> Vec<Smallest> {
@@ -48,7 +50,7 @@ pub(crate) fn smallest(
     let mut scores: Vec<(usize, Vec<f64>)> = Vec::new();
     let mut count = 0;
     learnt.each(
-        &pieces(lessons, follow),
+        &pieces(lessons, late, follow),
         follow,
         f64::INFINITY,
         |sample, windows, _| {

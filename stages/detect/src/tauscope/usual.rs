@@ -72,7 +72,7 @@ fn shown(
         usual.lively = lively;
         let mut of_piece = Products::zeros();
         let mut before_ns = None;
-        for (sample, is_free) in marked(piece) {
+        for (sample, _, is_free) in marked(piece) {
             let now_ns = sample.header.stamp_ns;
             let dt_s = (now_ns - before_ns.replace(now_ns).unwrap_or(now_ns)) as f64 * 1e-9;
             let dt_s = dt_s.clamp(0.0, MOST_STEP_S);
@@ -292,6 +292,11 @@ impl Usual {
     pub fn offset(&mut self, left: f64, share: f64) -> f64 {
         self.weights[0] += share * left;
         share * left
+    }
+
+    /// What of it is there because the twin is late.
+    pub fn late(&self) -> f64 {
+        self.weights[FEATURES - 1] * self.newest[FEATURES - 1]
     }
 
     /// How far what is usual may be wrong \[effort unit\].

@@ -96,10 +96,10 @@ impl Windows {
         self.means.ready()
     }
 
-    /// The score of the next sample: the most unusual window's, or that of a standing arm; below `usual`, drift is followed.
-    pub fn score(&mut self, sample: &TwinState, usual: Option<f64>) -> f64 {
+    /// The score of the next sample, of which the twin misses `late`: the most unusual window's, or that of a standing arm; below `usual`, drift is followed.
+    pub fn score(&mut self, sample: &TwinState, late: &JointArray, usual: Option<f64>) -> f64 {
         let follow = usual.is_some_and(|usual| self.score < usual);
-        self.means.push(sample, follow);
+        self.means.push(sample, late, follow);
         for (j, joint) in self.learnt.joints.iter().enumerate() {
             let bin = bin(joint, self.means.slow[j]);
             let (unrest, strange) = (self.means.unrest(j), self.means.strange(j));
@@ -212,7 +212,7 @@ impl Windows {
 
     /// The same less what it was before the contact began, alone or on top of another.
     pub fn excess(&self, window: usize, joint: usize) -> f64 {
-        self.mean(window, joint) - self.base[joint]
+        self.means.whole(window, joint) - self.base[joint]
     }
 
     /// Takes the residual for what it is without a contact.
