@@ -272,17 +272,33 @@ impl Search<'_> {
         proposals: &[Proposal],
         rival: f64,
     ) -> Option<Explanation> {
-        let worth = &self.problem.worth;
         let worthy = proposals.iter().filter(|p| {
             let (evidence, size) = needs(p.active.hypothesis, &now.fit);
             let possible =
                 is_timely(self.problem, &p.active) && plausible(&p.active, &self.problem.model);
             p.evidence() > evidence && p.size > size && possible
         });
+        let mut worthy: Vec<&Proposal> = worthy.collect();
+        // Where those with the most promise do not keep it, as beside a piece that is stuck at its joint, those elsewhere may.
+        while !worthy.is_empty() {
+            let tried = worthy.iter().take(REFINED).copied().collect::<Vec<_>>();
+            let found = self.able(now, &tried, rival);
+            if found.is_some() {
+                return found;
+            }
+            let joints = |p: &Proposal| Fit::joints_of(&p.active.hypothesis, self.problem.joints);
+            let spent: Vec<Vec<usize>> = tried.iter().map(|p| joints(p)).collect();
+            worthy.retain(|p| !spent.contains(&joints(p)));
+        }
+        None
+    }
+
+    /// The best explanation with one of these proposals, as they are once they are refined.
+    fn able(&self, now: &Explanation, worthy: &[&Proposal], rival: f64) -> Option<Explanation> {
+        let worth = &self.problem.worth;
         let mut able: Vec<(Explanation, &Proposal)> = Vec::new();
-        let worthy: Vec<&Proposal> = worthy.take(REFINED).collect();
-        let joined = parallel::map(&worthy, |proposal| self.joined(now, proposal, rival));
-        for (next, proposal) in joined.into_iter().zip(worthy) {
+        let joined = parallel::map(worthy, |proposal| self.joined(now, proposal, rival));
+        for (next, &proposal) in joined.into_iter().zip(worthy) {
             let (evidence, _) = needs(proposal.active.hypothesis, &now.fit);
             let evident = next.ahead_of(now, worth) >= evidence || overwhelming(&next, now);
             let once = time_kind(proposal.active.hypothesis) == TimeKind::Once;

@@ -187,6 +187,8 @@ const STRONGEST_N: f64 = 1000.0;
 
 /// A rotor on the spring of its gear resonates at least this fast against a link that stands still.
 const SOFTEST_RAD_S: f64 = 3.0 * std::f64::consts::TAU;
+/// A joint breaks away within this: bristles that give more are a spring \[rad or m\].
+const MOST_PRESLIDING_RAD: f64 = 0.1;
 /// Nearer than this to the end of its range, as a share of it, a shape is there.
 const AT_BOUND: f64 = 1e-3;
 
@@ -207,7 +209,7 @@ pub fn at_bound(active: &Active) -> bool {
 }
 
 /// Whether the numbers are ones that a robot may have: a link's mass stays above nothing and within twice what its URDF says,
-/// its centre within the link, a push is not beyond all strength, a wall is neither soft nor out of reach, a spring hangs loose somewhere, a gear is no soft spring, and friction is neither of one direction
+/// its centre within the link, a push is not beyond all strength, a wall is neither soft nor out of reach, a spring hangs loose somewhere, a gear is no soft spring nor are its bristles, and friction is neither of one direction
 /// alone nor falls to nothing with speed or warmth.
 pub fn plausible(active: &Active, model: &Model) -> bool {
     let x = &active.coordinates;
@@ -230,6 +232,7 @@ pub fn plausible(active: &Active, model: &Model) -> bool {
             hangs_loose_near(&joint.limits, active.parameters()[1])
         }
         "joint_elasticity" => (x[1] / x[0].max(1e-12)).sqrt() >= SOFTEST_RAD_S,
+        "presliding_hysteresis" => x[2] >= 1.0 / MOST_PRESLIDING_RAD,
         "temperature_viscous" => x[0] >= LEAST_LEFT * (x[0] + x[1]),
         "stribeck_friction" => x[0] >= LEAST_SLIDING * (x[0] + x[1]),
         "asymmetric_coulomb" => x[0].min(x[1]) >= LEAST_SYMMETRY * x[0].max(x[1]),
