@@ -7,6 +7,7 @@ mod bodies;
 mod curves;
 mod evidence;
 mod exchange;
+mod parted;
 mod simpler;
 
 use std::collections::BTreeSet;
@@ -97,7 +98,7 @@ impl Search<'_> {
         }
         // What it was compared with until now is no measure of how precise its numbers are to be.
         best.fit = best.fit.refined(self.problem);
-        self.upheld(best)
+        self.parted(self.upheld(best))
     }
 
     fn begun(&self, start: Vec<Active>, penalties: Vec<f64>) -> Explanation {
@@ -281,10 +282,9 @@ impl Search<'_> {
         let mut worthy: Vec<&Proposal> = worthy.collect();
         // Where those with the most promise do not keep it, as beside a piece that is stuck at its joint, those elsewhere may.
         while !worthy.is_empty() {
-            let tried = worthy.iter().take(REFINED).copied().collect::<Vec<_>>();
-            let found = self.able(now, &tried, rival);
-            if found.is_some() {
-                return found;
+            let tried: Vec<&Proposal> = worthy.iter().take(REFINED).copied().collect();
+            if let Some(found) = self.able(now, &tried, rival) {
+                return Some(found);
             }
             let joints = |p: &Proposal| Fit::joints_of(&p.active.hypothesis, self.problem.joints);
             let spent: Vec<Vec<usize>> = tried.iter().map(|p| joints(p)).collect();
