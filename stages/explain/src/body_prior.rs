@@ -226,7 +226,7 @@ pub mod tests {
 
     /// A link that is so much heavier, its centre and its inertia as far off.
     fn altered(share: f64) -> Vec<Active> {
-        let of = library::unnamed_bodies(&model())[2];
+        let of = library::unnamed_bodies(&model(), &BTreeSet::new())[2];
         let link = model().links()[of.place.link].inertia;
         let mut change = link.parameters().map(|parameter| share * parameter);
         change[2] += 0.02 * share;

@@ -26,7 +26,7 @@ impl Setup<'_> {
         }
         let hypotheses = self.hypotheses();
         let unnamed_bodies = if input.bodies {
-            library::unnamed_bodies(&input.model)
+            library::unnamed_bodies(&input.model, &input.without)
         } else {
             Vec::new()
         };

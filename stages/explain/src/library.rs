@@ -9,8 +9,8 @@ use crate::active::{Hypothesis, UNNAMED_BODY, Whereabouts};
 
 /// The links whose bodies may be described where no name fits: those that move and have a body in the URDF, but for that at
 /// the end, where any body is a payload.
-pub fn unnamed_bodies(model: &Model) -> Vec<Hypothesis> {
-    let Some(effect) = effect(UNNAMED_BODY) else {
+pub fn unnamed_bodies(model: &Model, without: &BTreeSet<String>) -> Vec<Hypothesis> {
+    let Some(effect) = effect(UNNAMED_BODY).filter(|effect| !without.contains(effect.name)) else {
         return Vec::new();
     };
     let tool = model.links()[model.tool_link()].joint;
