@@ -153,7 +153,7 @@ fn a_contact_is_not_taken_for_a_change() {
 }
 
 /// A good twin or a rigid one, and how often the motion becomes another \[s\].
-const ONE_PROGRAM: [(bool, f64); 2] = [(true, f64::INFINITY), (false, f64::INFINITY)];
+const ONE_PROGRAM: [(bool, f64); 1] = [(true, f64::INFINITY)];
 const NEW_PROGRAMS: [(bool, f64); 2] = [(false, 12.0), (false, 300.0)];
 
 /// Words over hours of an arm that warms up.
@@ -181,7 +181,7 @@ fn twenty_clean_minutes_raise_nothing() {
     assert_eq!(clean(1, 1.0 / 3.0, &NEW_PROGRAMS), "");
 }
 
-/// Of eight arms, each with a good and a rigid twin.
+/// Of eight arms with a good twin.
 #[test]
 #[ignore = "takes minutes"]
 fn eight_clean_hours_of_one_program_raise_nothing() {
