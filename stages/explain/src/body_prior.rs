@@ -27,7 +27,7 @@ pub struct Body {
 /// With the mass m, the covariance S of a body's density about its centre and the usual one s² in each direction,
 /// `ln det(S / s²) - tr(S) / s²`: the log-determinant divergence from a usual body (Lee, Wensing and Park, "Geometric Robot
 /// Dynamic Identification: A Convex Programming Approach", 2020) as the exponent of a density. A link is expected to be as its
-/// URDF has it: with the pseudo-inertias P and P₀, `ln det(P P₀⁻¹) - tr(P P₀⁻¹)` (ibid., equation 22).
+/// URDF has it: with the pseudo-inertias P and P₀, `ln det(P P₀⁻¹) - tr(P P₀⁻¹)`, the same divergence.
 pub fn log_density(model: &Model, actives: &[Active]) -> f64 {
     let all = bodies(model, actives);
     all.map(|(_, body)| density_of(&body)).sum()

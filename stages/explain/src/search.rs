@@ -86,7 +86,11 @@ impl Search<'_> {
             (self.say)(&format!("? {}", describe(&described)));
             best = self.named(self.pruned(described));
         }
-        while let Some(described) = self.embodied(&best) {
+        // A body that the names take back might be described again for ever.
+        for _ in self.unnamed_bodies {
+            let Some(described) = self.embodied(&best) else {
+                break;
+            };
             (self.say)(&format!("? {}", describe(&described)));
             best = self.named(described);
         }
