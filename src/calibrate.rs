@@ -6,10 +6,12 @@ use std::path::{Path, PathBuf};
 use tauscope_bus::{SampleRef, Sink, StageError, TwinState, flags};
 use tauscope_detect::Detector;
 use tauscope_ingest::{FileConfig, RecordedSource, Topics};
-use tauscope_twin::{Calibration, Filters, JointCorrection, Robot, ScoreStatistics, TwinFile};
+use tauscope_twin::{
+    Calibration, Expected, Filters, JointCorrection, Robot, ScoreStatistics, TwinFile,
+};
 
 use crate::build;
-use crate::pipeline::Cell;
+use crate::pipeline::{Cell, EffortUnit};
 use crate::provenance;
 use crate::replay::{Graph, ReplayError};
 
@@ -94,7 +96,11 @@ impl Job<'_> {
     ) -> Result<Calibrated, CalibrateError> {
         let joint_count = self.cell.facts.joint_names.len();
         let mut lost = 0;
-        let mut calibration = Calibration::new(joint_count);
+        let facts = &self.cell.facts;
+        let alike = self.twin.expected == Expected::Topic
+            || facts.effort_unit == EffortUnit::Nm
+            || facts.torque_constants_nm_per_a.is_some();
+        let mut calibration = Calibration::new(joint_count, alike);
         for (index, recording) in self.fit.iter().enumerate() {
             let step = &mut |fraction| progress(index, fraction);
             lost += self.each(recording, None, step, &mut |sample| {

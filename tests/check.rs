@@ -278,7 +278,7 @@ stages:
 fn a_twin_made_for_another_robot_or_other_filters_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let model = std::fs::read_to_string(bundled().join("demo.twin.yaml")).unwrap();
-    assert!(model.contains("name: demo_arm\n") && model.contains("effort_cutoff_hz: 4.0\n"));
+    assert!(model.contains("name: demo_arm\n") && model.contains("effort_cutoff_hz: 4.5\n"));
     let model = model.replace("name: demo_arm\n", "name: other_arm\n");
     write(&folder.path().join("twin.yaml"), &model);
     let pipeline = stages(
@@ -300,13 +300,13 @@ error: this twin was made for the robot `other_arm`, not for `demo_arm`
   |
   = help: calibrate one for this robot: `tauscope calibrate`
 
-error: `effort_cutoff_hz` is 5, but the twin's model was made with 4
+error: `effort_cutoff_hz` is 5, but the twin's model was made with 4.5
  --> pipeline.yaml:5:74
   |
 5 | - {name: twin, input: ingest, twin: {model: twin.yaml, effort_cutoff_hz: 5}}
   |                                                                          ^
   |
-  = help: give `effort_cutoff_hz: 4`, or calibrate anew: its thresholds hold for no other
+  = help: give `effort_cutoff_hz: 4.5`, or calibrate anew: its thresholds hold for no other
 
 2 errors; nothing was started
 "

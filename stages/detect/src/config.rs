@@ -18,8 +18,14 @@ use crate::{
     virtual_collision_sensor, virtual_collision_sensor_basic, window_autoencoder, window_ocsvm,
 };
 
-/// The papers' k, where the file names no threshold.
-const DEFAULT_SIGMAS: f64 = 4.0;
+/// Standard deviations from the mean score of contact-free data to the alarm of `detector`, where the
+/// file names no threshold: equation 7 of Tajiri and Iwamoto.
+fn default_sigmas(detector: &str) -> f64 {
+    match detector {
+        momentum_observer::NAME => momentum_observer::SIGMAS,
+        _ => 4.0,
+    }
+}
 
 /// A detector: exactly one of the detectors' keys, and what all of them share.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -279,7 +285,7 @@ impl Config {
 #[serde(deny_unknown_fields, default)]
 pub struct Threshold {
     /// This many standard deviations above the mean of the score on contact-free data, which
-    /// `twin.yaml` holds. By default 4.
+    /// `twin.yaml` holds. By default 4, of `momentum_observer` 3.
     #[schemars(range(min = 0.0, max = 1000.0))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigmas: Option<f64>,
@@ -299,7 +305,7 @@ impl Threshold {
             (Some(_), Some(_)) => Err(ConfigError::TwoThresholds),
             (None, Some(score)) => Ok(score),
             (sigmas, None) => {
-                let sigmas = sigmas.unwrap_or(DEFAULT_SIGMAS);
+                let sigmas = sigmas.unwrap_or_else(|| default_sigmas(detector));
                 match setup.statistics(detector) {
                     Some(score) => Ok(score.mean + sigmas * score.standard_deviation),
                     None => Err(ConfigError::NoStatistics { detector, sigmas }),

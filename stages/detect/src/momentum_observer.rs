@@ -18,6 +18,10 @@ use crate::stage::Setup;
 /// Canonical name.
 pub(crate) const NAME: &str = "momentum_observer";
 
+/// Where its alarm is raised if the file does not say: the paper's best threshold for it is mean + σ,
+/// that of its own method mean + 4 σ.
+pub(crate) const SIGMAS: f64 = 3.0;
+
 /// Settings of `momentum_observer`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -34,8 +38,8 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             gain_per_s: DEFAULT_GAIN_PER_S,
-            // With the observer's own 10 ms as late as the twin's low-pass of 4 Hz on efforts (√2 / ω); the paper does not give its own.
-            cutoff_hz: 5.0,
+            // With the observer's own 10 ms as late as the twin's low-pass of 4.5 Hz on efforts (√2 / ω); the paper does not give its own.
+            cutoff_hz: 5.6,
         }
     }
 }

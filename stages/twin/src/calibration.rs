@@ -6,6 +6,11 @@
 
 use tauscope_bus::{TwinState, flags};
 
+/// A joint faster than this moves: no encoder's noise is as much \[rad/s, m/s\].
+const MOVES: f64 = 0.03;
+/// The arm must move in so large a share of the samples if they are to tell a gain.
+const LEAST_MOVING: f64 = 0.01;
+
 /// One joint's fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointFit {
@@ -35,15 +40,21 @@ struct Moments {
 #[derive(Debug, Clone)]
 pub struct Calibration {
     joints: Vec<Moments>,
+    /// Whether efforts and model are in one unit, so that a gain nobody tells is about 1.
+    alike: bool,
     samples: u64,
+    moving: u64,
 }
 
 impl Calibration {
-    /// An empty regression for this many joints.
-    pub fn new(joint_count: usize) -> Self {
+    /// An empty regression for this many joints; `alike` if efforts and model are in one unit, so that a gain that the recordings do not tell
+    /// is better taken for 1.
+    pub fn new(joint_count: usize, alike: bool) -> Self {
         Self {
             joints: vec![Moments::default(); joint_count],
+            alike,
             samples: 0,
+            moving: 0,
         }
     }
 
@@ -59,6 +70,8 @@ impl Calibration {
         }
         self.samples += 1;
         let n = self.samples as f64;
+        let velocities = &sample.velocity[..self.joints.len()];
+        self.moving += u64::from(velocities.iter().any(|velocity| velocity.abs() > MOVES));
         for (j, m) in self.joints.iter_mut().enumerate() {
             let (x, y) = (
                 sample.filtered_expected_effort[j],
@@ -75,17 +88,20 @@ impl Calibration {
 
     /// The fit per joint, or nothing from fewer than two samples.
     ///
-    /// A joint whose model effort does not vary keeps gain 1 and is only offset: no motion, no gain.
+    /// A joint whose model effort does not vary keeps gain 1 and is only offset: no motion, no gain. So do all joints of an arm that stands, if
+    /// efforts and model are in one unit: what static friction holds differs from pose to pose by more than what a gain could be told by.
     pub fn fit(&self) -> Option<Vec<JointFit>> {
         if self.samples < 2 {
             return None;
         }
         let n = self.samples as f64;
+        let stands = (self.moving as f64) < LEAST_MOVING * n;
         Some(
             self.joints
                 .iter()
                 .map(|m| {
-                    let varies = m.xx > 1e-12 * n * (1.0 + m.mean_x * m.mean_x);
+                    let varies =
+                        m.xx > 1e-12 * n * (1.0 + m.mean_x * m.mean_x) && !(stands && self.alike);
                     let gain = if varies { m.xy / m.xx } else { 1.0 };
                     let left = (m.yy - 2.0 * gain * m.xy + gain * gain * m.xx).max(0.0);
                     JointFit {
@@ -122,13 +138,14 @@ mod tests {
         };
         sample.filtered_expected_effort[0] = model;
         sample.filtered_effort[0] = measured;
+        sample.velocity[0] = 0.5;
         sample
     }
 
     proptest! {
         #[test]
         fn a_line_is_recovered(gain in -50.0..50.0f64, offset in -50.0..50.0f64, far in -1e3..1e3f64) {
-            let mut calibration = Calibration::new(1);
+            let mut calibration = Calibration::new(1, true);
             for i in 0..200 {
                 let model = far + (f64::from(i) * 0.1).sin() * 3.0;
                 calibration.add(&sample(model, gain * model + offset));
@@ -142,7 +159,7 @@ mod tests {
 
     #[test]
     fn a_joint_whose_model_effort_never_varies_keeps_its_gain() {
-        let mut calibration = Calibration::new(1);
+        let mut calibration = Calibration::new(1, true);
         for i in 0..100 {
             calibration.add(&sample(2.0, 5.0 + f64::from(i % 2)));
         }
@@ -154,8 +171,25 @@ mod tests {
     }
 
     #[test]
+    fn an_arm_that_stands_tells_no_gain_unless_its_unit_is_another() {
+        for alike in [true, false] {
+            let mut calibration = Calibration::new(1, alike);
+            for pose in [1.0, 2.0] {
+                for _ in 0..100 {
+                    let mut standing = sample(pose, 9.0 - 3.0 * pose);
+                    standing.velocity[0] = 0.001;
+                    calibration.add(&standing);
+                }
+            }
+            let fit = calibration.fit().unwrap()[0];
+            let (gain, offset) = if alike { (1.0, 3.0) } else { (-3.0, 9.0) };
+            assert!((fit.gain - gain).abs() < 1e-9 && (fit.offset - offset).abs() < 1e-9);
+        }
+    }
+
+    #[test]
     fn samples_before_the_filters_have_settled_are_passed_over() {
-        let mut calibration = Calibration::new(1);
+        let mut calibration = Calibration::new(1, true);
         calibration.add(&TwinState::default());
         assert_eq!(calibration.samples(), 0);
         assert!(calibration.fit().is_none());

@@ -34,7 +34,7 @@ impl Default for Config {
             motion: Motion::Measured,
             expected: Expected::Model,
             velocity_cutoff_hz: 12.0,
-            effort_cutoff_hz: 4.0,
+            effort_cutoff_hz: 4.5,
             max_gap_s: 0.25,
         }
     }
