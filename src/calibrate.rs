@@ -97,10 +97,10 @@ impl Job<'_> {
         let joint_count = self.cell.facts.joint_names.len();
         let mut lost = 0;
         let facts = &self.cell.facts;
-        let alike = self.twin.expected == Expected::Topic
-            || facts.effort_unit == EffortUnit::Nm
-            || facts.torque_constants_nm_per_a.is_some();
-        let mut calibration = Calibration::new(joint_count, alike);
+        let in_nm =
+            facts.effort_unit == EffortUnit::Nm || facts.torque_constants_nm_per_a.is_some();
+        let from_topic = self.twin.expected == Expected::Topic;
+        let mut calibration = Calibration::new(joint_count, in_nm || from_topic);
         for (index, recording) in self.fit.iter().enumerate() {
             let step = &mut |fraction| progress(index, fraction);
             lost += self.each(recording, None, step, &mut |sample| {
@@ -116,7 +116,9 @@ impl Job<'_> {
         for (name, fit) in self.cell.facts.joint_names.iter().zip(&fits) {
             let joint = JointCorrection {
                 gain: fit.gain,
-                gain_deviation: None,
+                // Somebody else's twin in A knows its drives, its gain does not tell them.
+                gain_deviation: (from_topic && !in_nm)
+                    .then_some(fit.gain.abs().max(f64::MIN_POSITIVE)),
                 offset: fit.offset,
                 noise: None,
                 explained: Some(fit.explained),

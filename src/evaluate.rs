@@ -1,5 +1,6 @@
 //! `tauscope evaluate`: trains, thresholds and scores detectors on a labelled set.
 
+mod bad_readings;
 mod files;
 mod heard;
 mod html;
@@ -197,7 +198,15 @@ impl Evaluation {
                 .play(recording, &mut |_| progress(FITTED, &what))
                 .map_err(|source| failed(recording, source))?;
             heard.add(recording, &played)?;
-            lessons.push(session::lesson(recording, played.samples));
+            let mut lesson = session::lesson(recording, played.samples);
+            let facts = &request.cell.facts;
+            let bad = bad_readings::leave_out(
+                &mut lesson,
+                &facts.joint_names,
+                facts.effort_unit.as_str(),
+            );
+            heard.notes.extend(bad);
+            lessons.push(lesson);
         }
         let measured: &[Lesson] = if validation.is_empty() {
             &train

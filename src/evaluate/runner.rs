@@ -34,13 +34,14 @@ pub struct Output {
     pub took_s: f64,
 }
 
-/// A detector that has learnt, on its way through the session.
+/// A detector that has learnt, on its way through the session: started anew with each recording, as a pipeline starts it, and told what it
+/// kept of its life before.
 pub struct Runner {
     /// Which it is.
     pub entry: &'static Entry,
     /// Its seed.
     pub seed: u64,
-    /// Its part of a pipeline file.
+    /// Its part of a pipeline file, with all that the training and validation recordings taught it.
     pub config: Config,
     /// The curves behind what it has learnt.
     pub sweeps: Option<Sweeps>,
@@ -54,7 +55,9 @@ pub struct Runner {
     pub threshold: f64,
     /// What it has said so far.
     pub outputs: Vec<Output>,
-    stage: Detect,
+    /// The same, with what it has learnt since.
+    now: Config,
+    setup: Setup,
     lowest: f64,
 }
 
@@ -89,10 +92,11 @@ impl Runner {
                 detector: entry.name,
             })?;
         setup.scores.insert(entry.name.to_owned(), statistics);
-        let stage = Detect::new(&config, setup).map_err(|error| failed(error.into()))?;
+        Detect::new(&config, setup.clone()).map_err(|error| failed(error.into()))?;
         Ok(Self {
             entry,
             seed: task.seed,
+            now: config.clone(),
             config,
             sweeps,
             training_s,
@@ -100,7 +104,7 @@ impl Runner {
             counted,
             threshold: f64::NAN,
             outputs: Vec::new(),
-            stage,
+            setup,
             lowest,
         })
     }
@@ -122,15 +126,22 @@ impl Runner {
             Role::Test => self.lowest,
             Role::Train | Role::Validation => self.statistics.mean,
         };
+        let mut stage = Detect::new(&self.now, self.setup.clone()).map_err(StageError::failed)?;
         let began = Instant::now();
         for sample in samples {
-            self.stage.accept(sample, &mut last)?;
+            stage.accept(sample, &mut last)?;
             let said = &last.0;
             let judged = said.header.has(flags::READY) && said.score.is_finite();
             scores.push(if judged { said.score } else { not_ready });
             tally.add(said);
         }
         let took_s = began.elapsed().as_secs_f64();
+        if let Some(learnt) = stage.learnt() {
+            self.now.resume(learnt);
+        }
+        if recording.role != Role::Test {
+            self.config.clone_from(&self.now);
+        }
         if !samples.is_empty() {
             self.threshold = last.0.threshold;
         }

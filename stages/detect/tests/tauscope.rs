@@ -122,6 +122,25 @@ fn slow_drift_is_no_contact() {
 }
 
 #[test]
+fn one_bad_reading_is_forgotten_as_soon_as_it_has_passed() {
+    let mut detector = detector(learnt(&tauscope::Settings::default()));
+    let mut samples = quiet(3, 3000);
+    samples[1000].effort[1] = 5000.0;
+    for sample in &mut samples[2000..2050] {
+        sample.effort[1] -= 1.5;
+    }
+    let detections = run(&mut detector, &samples);
+    let found = onsets(&detections);
+    assert!(
+        found
+            .iter()
+            .all(|k| (1000..1040).contains(k) || (2000..2050).contains(k))
+    );
+    assert!(found.iter().any(|k| *k >= 2000));
+    assert!(detections[1060].score < 0.5 * detections[1060].threshold);
+}
+
+#[test]
 fn labelled_contacts_teach_nothing() {
     let mut touched = quiet(1, 6000);
     for sample in &mut touched[2000..2100] {

@@ -317,6 +317,34 @@ fn learning_at_the_start_is_asked_for_once_in_a_sensors_life() {
 }
 
 #[test]
+fn a_collision_teaches_nothing_not_even_the_way_up_to_its_alarm() {
+    let learnt_beside = |collision: Option<(f64, f64, f64)>| {
+        let mut sensor = detect(&adaptive_with(adaptive::Settings {
+            learnt: Some(learnt_on(JOINTS)),
+            ..settings()
+        }));
+        let mut found = 0;
+        for time in 0..8 {
+            let start_s = 8.0 * f64::from(time);
+            let collision = collision.map(|(from, length, hard)| (start_s + from, length, hard));
+            let world = World {
+                collision,
+                ..World::default()
+            };
+            found += alarms(&run(&mut sensor, &arm(start_s, 8.0, world))).len();
+        }
+        (found, sensor.learnt().unwrap())
+    };
+    let (none, clean) = learnt_beside(None);
+    let (found, touched) = learnt_beside(Some((5.5, 0.4, 4.0)));
+    assert_eq!((none, found), (0, 8));
+    for joint in JOINTS {
+        let (clean, touched) = (&clean.joints[joint], &touched.joints[joint]);
+        assert!(touched.ident <= clean.ident && touched.start <= clean.start);
+    }
+}
+
+#[test]
 fn what_was_learnt_goes_on_in_the_next_life_as_if_there_had_been_one() {
     let learning = adaptive::Settings {
         learn: Learn::AtStart,

@@ -62,6 +62,8 @@ pub(crate) struct Means {
     /// What is left of the residual over each step when its change of velocity tells what the twin misses; and at the end of the newest step.
     known: Sums,
     newest: JointArray,
+    /// What the newest sample left of the residual beside what is usual, to be followed; nothing where its offset is being learnt.
+    left: Option<JointArray>,
     /// By window and joint, the mean of whichever of both is closer to 0.
     nearer: [JointArray; WINDOWS_S.len()],
     /// What is left of the residual where the arm has come to rest behind a contact.
@@ -88,6 +90,7 @@ impl Means {
             usual: joints.iter().map(usual).collect(),
             known: Sums::new(windows),
             newest: [0.0; MAX_JOINTS],
+            left: None,
             nearer: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
             settled: [0.0; MAX_JOINTS],
             settings,
@@ -112,8 +115,8 @@ impl Means {
         (newest - self.start_ns) as f64 * 1e-9 >= longest.max(self.settings.offset_from_first_s)
     }
 
-    /// Takes a sample with what the twin misses of it; slow drift is followed if `follow`.
-    pub fn push(&mut self, sample: &TwinState, late: &JointArray, follow: bool) {
+    /// Takes a sample with what the twin misses of it.
+    pub fn push(&mut self, sample: &TwinState, late: &JointArray) {
         let n = self.usual.len();
         let now = sample.header.stamp_ns;
         let is_first = self.sums.is_empty();
@@ -132,25 +135,26 @@ impl Means {
             let drift = 1.0 - (-dt_s / self.settings.drift_s).exp();
             self.step = (Step::of(dt_s), drift);
         }
-        let (step, drift) = &self.step;
+        let step = &self.step.0;
         let recovery = dt_s / SLOW_MEMORY_S;
         let (mut row, mut step_end) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
+        let mut beside = [0.0; MAX_JOINTS];
         for (j, (value, usual)) in row.iter_mut().zip(&mut self.usual).enumerate() {
             let efforts = [sample.effort[j], sample.expected_effort[j]];
             let left = efforts[0] - efforts[1] - usual.next(step, sample.velocity[j], efforts);
-            let followed = if first {
+            let offset = if first {
                 // The mean of the first seconds, as it grows.
                 usual.offset(left, dt_s / (since_s + dt_s).max(1e-9))
-            } else if follow {
-                usual.follow(left, *drift)
             } else {
                 0.0
             };
-            *value = left - followed - self.settled[j];
+            beside[j] = left;
+            *value = left - offset - self.settled[j];
             step_end[j] = *value + usual.late();
             let recovered = self.slow[j] + recovery * self.fast[j];
             self.slow[j] = recovered.min(sample.velocity[j].abs());
         }
+        self.left = (!first).then_some(beside);
         if is_first {
             self.newest = step_end;
         }
@@ -162,6 +166,16 @@ impl Means {
         self.sums.push(now, &row, n);
         self.known.push(now, &known, n);
         self.explain();
+    }
+
+    /// Takes what the newest sample left of the residual for slow drift, and follows it.
+    pub fn follow(&mut self) {
+        let Some(left) = self.left.take() else {
+            return;
+        };
+        for (usual, left) in self.usual.iter_mut().zip(left) {
+            usual.follow(left, self.step.1);
+        }
     }
 
     /// How late the twin is can be told from the expected effort or from the change of velocity: either errs, and what one of them explains is no contact.

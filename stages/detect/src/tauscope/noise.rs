@@ -93,7 +93,10 @@ pub(super) fn learn(
         let mut means = Means::new(joints, follow, WINDOWS_S.len());
         for (sample, late, is_free) in marked(piece) {
             restart(&mut means, sample);
-            means.push(sample, late, is_free);
+            means.push(sample, late);
+            if is_free {
+                means.follow();
+            }
             if !(is_free && means.ready()) {
                 continue;
             }

@@ -255,6 +255,7 @@ pub(super) struct Rest {
     joints: usize,
     /// What a score is multiplied by, so that it is exceeded by chance as often as that of a moving arm.
     scale: f64,
+    threshold: f64,
     base: Base,
     lasting: Lasting,
     /// The contact that goes on.
@@ -270,6 +271,7 @@ impl Rest {
             learnt: learnt.clone(),
             joints,
             scale: threshold / learnt.tail.threshold(per_hour),
+            threshold,
             base: Base::new(),
             lasting: Lasting::new(0),
             end: End::default(),
@@ -308,7 +310,8 @@ impl Rest {
             CREEPS * size * (-((now_ns - over_ns) as f64 * 1e-9) / FADES_S).exp()
         });
         let size = self.learnt.size(&changes) / (1.0 + creep);
-        self.base.follow(now_ns, free);
+        self.base
+            .follow(now_ns, free && self.scale * size.powi(2) < self.threshold);
         if free {
             self.end.forget();
         } else if self

@@ -276,16 +276,16 @@ impl Usual {
         self.weights.dot(&self.newest)
     }
 
-    /// Follows what was `left` of the residual by this share; by how much that changes what is usual.
-    pub fn follow(&mut self, left: f64, share: f64) -> f64 {
+    /// Follows what was `left` of the residual by this share.
+    pub fn follow(&mut self, left: f64, share: f64) {
         if self.pace.is_none() {
-            return self.offset(left, share);
+            self.offset(left, share);
+            return;
         }
         let own = self.turn.dot(&self.newest);
         // What is seen seldom is not to be followed at once.
         let share = share * (FEATURES as f64 / own).min(1.0);
         self.weights += self.turn * (share * left);
-        share * left * own
     }
 
     /// Takes what was `left` of the residual for a constant by this share; by how much that changes what is usual.

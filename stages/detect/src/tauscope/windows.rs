@@ -98,8 +98,7 @@ impl Windows {
 
     /// The score of the next sample, of which the twin misses `late`: the most unusual window's, or that of a standing arm; below `usual`, drift is followed.
     pub fn score(&mut self, sample: &TwinState, late: &JointArray, usual: Option<f64>) -> f64 {
-        let follow = usual.is_some_and(|usual| self.score < usual);
-        self.means.push(sample, late, follow);
+        self.means.push(sample, late);
         for (j, joint) in self.learnt.joints.iter().enumerate() {
             let bin = bin(joint, self.means.slow[j]);
             let (unrest, strange) = (self.means.unrest(j), self.means.strange(j));
@@ -121,6 +120,10 @@ impl Windows {
         self.score /= self.creep(sample.header.stamp_ns);
         let at_rest = (self.at_rest.as_mut()).and_then(|rest| rest.score(sample, usual.is_some()));
         self.score = at_rest.map_or(self.score, |score| score.max(self.score));
+        // A sample that stands out is no drift, however short it is: one bad reading would be remembered for minutes.
+        if usual.is_some_and(|usual| self.score < usual) {
+            self.means.follow();
+        }
         self.score
     }
 

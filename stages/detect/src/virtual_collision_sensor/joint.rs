@@ -134,11 +134,27 @@ pub(super) struct Joint {
     tuning: Tuning,
     /// Learning and adaptation.
     pub bias: Bias,
+    /// The bias when nothing spoke for a collision last.
+    trusted: Bias,
 }
 
 impl Joint {
     pub fn new(tuning: Tuning, bias: Bias) -> Self {
-        Self { tuning, bias }
+        Self {
+            tuning,
+            bias,
+            trusted: bias,
+        }
+    }
+
+    /// What has been learnt up to here was no collision's.
+    pub fn trust_bias(&mut self) {
+        self.trusted = self.bias;
+    }
+
+    /// Forgets what was learnt since then.
+    pub fn distrust_bias(&mut self) {
+        self.bias = self.trusted;
     }
 
     /// Holds what the currents do, `dt_s` seconds after the sample before, against the threshold.

@@ -254,9 +254,18 @@ impl Detector for Sensor {
         let alarm = self.alarm(stamp_ns, colliding, wrong, doubtful);
         if ratio < LOW_RATIO || self.newest_low_ns.is_none() {
             self.newest_low_ns = Some(stamp_ns);
+            for joint in &mut self.joints {
+                joint.trust_bias();
+            }
         }
         if alarm.is_some() {
             self.newest_alarm_ns = Some(stamp_ns);
+            // Nor is the way up to it: else every collision would make the next one harder to see.
+            if self.state == LearningState::Idle {
+                for joint in &mut self.joints {
+                    joint.distrust_bias();
+                }
+            }
         }
         let quiet = match self.state {
             LearningState::Init | LearningState::Learning(_) => LEARNING,
