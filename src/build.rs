@@ -11,7 +11,7 @@ use tauscope_ingest::{IngestError, Paced, Rate, SimulatedRobot};
 use tauscope_record::{CellInfo, RecordError, Recorder, StreamInfo};
 use tauscope_twin::{Correction, Twin, TwinFile};
 
-use crate::pipeline::{Cell, EffortUnit, Pipeline, Settings};
+use crate::pipeline::{Cell, EffortUnit, Pipeline, Settings, Stage};
 use crate::provenance;
 use crate::trained;
 
@@ -151,6 +151,25 @@ pub fn detect(
     setup.shared = shared;
     trained::read(config, &mut setup)?;
     Ok(Detect::new(config, setup)?)
+}
+
+/// Says what speaks against running the detectors of `pipeline` (on `host`, if one is given) as they are set, though they can.
+pub fn warn(pipeline: &Pipeline, host: Option<&str>) {
+    let here = |stage: &&Stage| host.is_none() || stage.host.as_deref() == host;
+    for stage in pipeline.stages.iter().filter(here) {
+        let Settings::Detect { config, model } = &stage.settings else {
+            continue;
+        };
+        let cell = stage
+            .cells
+            .first()
+            .and_then(|cell| pipeline.cells.get(cell));
+        // What is wrong with it has been said.
+        let setup = cell.and_then(|cell| detect_setup(model.as_ref(), cell).ok());
+        if let Some(warning) = setup.and_then(|setup| config.warning(&setup)) {
+            eprintln!("warning: {}: {warning}", stage.name);
+        }
+    }
 }
 
 /// What a detector behind a twin of `cell` with this `model` must know.

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use serde_json::json;
 
+use crate::build;
 use crate::exit::{Exit, Failure};
 use crate::files::FileKind;
 use crate::pipeline::Pipeline;
@@ -51,6 +52,7 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
         return Ok(Exit::Done);
     }
     let pipeline = Pipeline::load(&args.file, args.host.as_deref())?;
+    build::warn(&pipeline, args.host.as_deref());
     let links = plan::links(&pipeline);
     let format = if args.json { Format::Json } else { args.format };
     let text = match format {

@@ -11,6 +11,7 @@ use serde::Serialize;
 use tauscope_explain::watch::amount;
 
 use super::print;
+use crate::build;
 use crate::exit::{Exit, Failure};
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
@@ -51,6 +52,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<Exit, Failure> {
     let pipeline = Pipeline::load(&args.pipeline, None)?;
     check_names(args)?;
+    build::warn(&pipeline, None);
     let replay = Replay::new(&pipeline, args.source.as_deref(), args.twin)
         .map_err(|error| Failure::rejected(error.to_string()))?;
     for stage in replay.left_out() {

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 
+use crate::build;
 use crate::exit::{Exit, Failure};
 use crate::pipeline::{Pipeline, Settings};
 use crate::plan;
@@ -50,6 +51,7 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
         }
         (host, _) => host.as_deref(),
     };
+    build::warn(&pipeline, host);
     let links = plan::links(&pipeline);
     let summary = supervisor::run(&pipeline, &links, host)?;
     let text = if args.json {

@@ -121,10 +121,6 @@ impl Made {
                 let mut config = config.clone();
                 let path = learnt_state::resume(&mut config).map_err(SeatError::LearntState)?;
                 let detect = build::detect(&config, model.as_ref(), cell()?, None)?;
-                let setup = build::detect_setup(model.as_ref(), cell()?)?;
-                if let Some(warning) = config.warning(&setup) {
-                    eprintln!("warning: {warning}");
-                }
                 let detect = Kept::new(detect, path);
                 Self::Detect(Box::new(Announced::new(detect, &cell()?.facts)))
             }

@@ -189,11 +189,25 @@ impl Config {
 
     /// What speaks against running this detector in this cell, though it can.
     pub fn warning(&self, setup: &Setup) -> Option<String> {
-        let classifier = self.contact_classifier.as_ref();
+        let signals = [
+            (
+                contact_classifier::NAME,
+                self.contact_classifier.as_ref().map(|s| &s.signals),
+            ),
+            (
+                fisher_discriminant::NAME,
+                self.fisher_discriminant.as_ref().map(|s| &s.signals),
+            ),
+            (
+                frequency_classifier::NAME,
+                self.frequency_classifier.as_ref().map(|s| &s.signals),
+            ),
+        ];
+        let mut tuned = signals
+            .iter()
+            .filter_map(|(name, signals)| signals.and_then(|s| s.warning(name, setup)));
         let own = self.tauscope.as_ref();
-        classifier
-            .and_then(|settings| contact_classifier::warning(settings, setup))
-            .or_else(|| own.and_then(tauscope::warning))
+        tuned.next().or_else(|| own.and_then(tauscope::warning))
     }
 
     /// A line a detector.

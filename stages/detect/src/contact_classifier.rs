@@ -19,7 +19,7 @@ use crate::contact_signals::{SignalSettings, Signals};
 use crate::contact_tuning::{self, ClassSweep, Sweeps};
 use crate::detector::Detector;
 use crate::lesson::{ContactKind, LearnError, Lessons};
-use crate::stage::{Impedance, Setup};
+use crate::stage::Setup;
 
 /// Canonical name.
 pub(crate) const NAME: &str = "contact_classifier";
@@ -41,9 +41,6 @@ pub struct Settings {
     /// A tool slower than this stands still \[m/s\].
     #[schemars(range(min = 0.0))]
     pub standstill_m_per_s: f64,
-    /// The impedance that the thresholds were tuned at.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub tuned_impedance: Option<Impedance>,
 }
 
 impl Default for Settings {
@@ -53,7 +50,6 @@ impl Default for Settings {
             detection: MachineSettings::default(),
             gamma: PAPERS_GAMMA,
             standstill_m_per_s: 0.005,
-            tuned_impedance: None,
         }
     }
 }
@@ -132,7 +128,6 @@ pub fn learn(
     let (mut learnt, _, class) = tune(settings, setup, lessons)?;
     let [low, high] = contact_tuning::best(&class);
     learnt.gamma = high.min(low.max(PAPERS_GAMMA));
-    learnt.tuned_impedance = setup.impedance;
     Ok(learnt)
 }
 
@@ -160,7 +155,7 @@ type Tuned = (Settings, contact_tuning::Tracks, Vec<ClassSweep>);
 fn tune(settings: &Settings, setup: &Setup, lessons: &Lessons<'_>) -> Result<Tuned, LearnError> {
     let tracks = contact_tuning::tracks(&settings.signals, setup, lessons, NAME)?;
     let mut learnt = settings.clone();
-    learnt.signals.tuned_rate_hz = tracks.rate_hz;
+    learnt.signals = tracks.tuned(&settings.signals);
     learnt.detection.force_threshold_n = contact_tuning::force_threshold(&tracks, NAME)?;
     let window = settings.signals.window;
     let rule = &mut Conditions::of(settings);
@@ -172,20 +167,6 @@ fn tune(settings: &Settings, setup: &Setup, lessons: &Lessons<'_>) -> Result<Tun
         .collect();
     let class = contact_tuning::sweep_class(&ratios, PAPERS_GAMMA);
     Ok((learnt, tracks, class))
-}
-
-/// What to tell somebody who runs `settings` in a cell of another impedance than they were tuned at.
-pub fn warning(settings: &Settings, setup: &Setup) -> Option<String> {
-    let (tuned, now) = (settings.tuned_impedance?, setup.impedance?);
-    (tuned != now).then(|| {
-        format!(
-            "{NAME} was tuned at {} N/m and {} N m/rad, and the cell's impedance is {} N/m and {} N m/rad: forces rise otherwise there; tune it again",
-            tuned.translational_n_per_m,
-            tuned.rotational_nm_per_rad,
-            now.translational_n_per_m,
-            now.rotational_nm_per_rad
-        )
-    })
 }
 
 #[cfg(test)]
@@ -251,30 +232,5 @@ mod tests {
         let across = contact([0.0, 9.0, 0.0], [0.0, 0.002, -0.2], 1);
         assert!(misalignment(&across, 0.005).is_some());
         assert_eq!(kind(&across), ContactKind::Cooperation);
-    }
-
-    #[test]
-    fn another_impedance_than_the_tuned_one_is_told() {
-        let impedance = |translational_n_per_m| {
-            Some(Impedance {
-                translational_n_per_m,
-                rotational_nm_per_rad: 10.0,
-            })
-        };
-        let settings = Settings {
-            tuned_impedance: impedance(150.0),
-            ..Settings::default()
-        };
-        let at = |impedance| Setup {
-            impedance,
-            ..Setup::default()
-        };
-        assert_eq!(warning(&settings, &at(impedance(150.0))), None);
-        assert_eq!(warning(&settings, &at(None)), None);
-        let text = warning(&settings, &at(impedance(300.0))).unwrap();
-        assert!(
-            text.contains("tuned at 150 N/m") && text.contains("300 N/m"),
-            "{text}"
-        );
     }
 }

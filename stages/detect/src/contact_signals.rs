@@ -13,7 +13,7 @@ use crate::momentum::{DEFAULT_GAIN_PER_S, MomentumObserver};
 use crate::rate;
 use crate::shared::Tap;
 use crate::sliding_dft::{BandError, SlidingDft, bins};
-use crate::stage::Setup;
+use crate::stage::{Impedance, Setup};
 use crate::wrench::ToolPoint;
 
 /// How the external force is had and watched: what the detectors after Salt Ducaju et al. share.
@@ -36,6 +36,9 @@ pub struct SignalSettings {
     #[schemars(range(min = 0.01, max = 1_000_000.0))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tuned_rate_hz: Option<f64>,
+    /// The impedance of the cell that thresholds were tuned in.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tuned_impedance: Option<Impedance>,
 }
 
 impl Default for SignalSettings {
@@ -46,7 +49,24 @@ impl Default for SignalSettings {
             band_hz: [10.0, 100.0],
             velocity_cutoff_hz: 20.0,
             tuned_rate_hz: None,
+            tuned_impedance: None,
         }
+    }
+}
+
+impl SignalSettings {
+    /// What to tell somebody who runs `detector` in a cell of another impedance than it was tuned at: the paper's "must be varied".
+    pub(crate) fn warning(&self, detector: &str, setup: &Setup) -> Option<String> {
+        let (tuned, now) = (self.tuned_impedance?, setup.impedance?);
+        (tuned != now).then(|| {
+            format!(
+                "{detector} was tuned at {} N/m and {} N m/rad, and the cell's impedance is {} N/m and {} N m/rad: forces rise otherwise there; tune it again",
+                tuned.translational_n_per_m,
+                tuned.rotational_nm_per_rad,
+                now.translational_n_per_m,
+                now.rotational_nm_per_rad
+            )
+        })
     }
 }
 
@@ -229,5 +249,35 @@ impl Signals {
             }),
             _ => Ok(bins),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn another_impedance_than_the_tuned_one_is_told() {
+        let impedance = |translational_n_per_m| {
+            Some(Impedance {
+                translational_n_per_m,
+                rotational_nm_per_rad: 10.0,
+            })
+        };
+        let settings = SignalSettings {
+            tuned_impedance: impedance(150.0),
+            ..SignalSettings::default()
+        };
+        let at = |impedance| Setup {
+            impedance,
+            ..Setup::default()
+        };
+        assert_eq!(settings.warning("x", &at(impedance(150.0))), None);
+        assert_eq!(settings.warning("x", &at(None)), None);
+        let text = settings.warning("x", &at(impedance(300.0))).unwrap();
+        assert!(
+            text.contains("tuned at 150 N/m") && text.contains("300 N/m"),
+            "{text}"
+        );
     }
 }

@@ -8,7 +8,7 @@ use crate::contact_machine::{Machine, MachineSettings, NewContact, Rule};
 use crate::contact_signals::{Instant, SignalSettings, Signals};
 use crate::lesson::{ContactKind, LabelledContact, LearnError, Lesson, Lessons};
 use crate::rate;
-use crate::stage::Setup;
+use crate::stage::{Impedance, Setup};
 
 pub use class::ClassSweep;
 pub(crate) use class::{best, sweep_class};
@@ -38,7 +38,8 @@ pub(crate) struct Tracks {
     pub train: Vec<Track>,
     pub validation: Vec<Track>,
     /// Samples a second.
-    pub rate_hz: Option<f64>,
+    rate_hz: Option<f64>,
+    impedance: Option<Impedance>,
     /// How long a contact stays in the window \[ns\].
     window_ns: i64,
 }
@@ -46,6 +47,15 @@ pub(crate) struct Tracks {
 impl Tracks {
     fn all(&self) -> impl Iterator<Item = &Track> {
         self.train.iter().chain(&self.validation)
+    }
+
+    /// These settings, with what they were tuned at.
+    pub fn tuned(&self, settings: &SignalSettings) -> SignalSettings {
+        SignalSettings {
+            tuned_rate_hz: self.rate_hz,
+            tuned_impedance: self.impedance,
+            ..*settings
+        }
     }
 }
 
@@ -141,6 +151,7 @@ pub(crate) fn tracks(
         (steps > 0).then(|| (last.stamp_ns - first.stamp_ns) / steps)
     });
     Ok(Tracks {
+        impedance: setup.impedance,
         train,
         validation,
         rate_hz: rate::of(&[lessons.train, lessons.validation]),

@@ -100,7 +100,7 @@ pub fn learn(
 ) -> Result<Settings, LearnError> {
     let tracks = contact_tuning::tracks(&settings.signals, setup, lessons, NAME)?;
     let mut learnt = settings.clone();
-    learnt.signals.tuned_rate_hz = tracks.rate_hz;
+    learnt.signals = tracks.tuned(&settings.signals);
     learnt.detection.force_threshold_n = contact_tuning::force_threshold(&tracks, NAME)?;
     // Which contacts Algorithm 1 asks about depends on its answers: those that collide go on being asked about.
     let mut rule = Discriminant {

@@ -173,7 +173,7 @@ pub fn learn(
 ) -> Result<Settings, LearnError> {
     let tracks = contact_tuning::tracks(&settings.signals, setup, lessons, NAME)?;
     let mut learnt = settings.clone();
-    learnt.signals.tuned_rate_hz = tracks.rate_hz;
+    learnt.signals = tracks.tuned(&settings.signals);
     learnt.detection.force_threshold_n = contact_tuning::force_threshold(&tracks, NAME)?;
     let window = settings.signals.window;
     let found = contact_tuning::found(&tracks, &learnt.detection, window, &mut Undecided, NAME)?;

@@ -11,6 +11,9 @@ const MOVES: f64 = 0.03;
 /// The arm must move in so large a share of the samples if they are to tell a gain.
 const LEAST_MOVING: f64 = 0.01;
 
+/// A line that explains less of the measured effort's variance tells no gain: friction outweighs what the model knows.
+const LEAST_EXPLAINED: f64 = 0.05;
+
 /// One joint's fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointFit {
@@ -89,35 +92,37 @@ impl Calibration {
     /// The fit per joint, or nothing from fewer than two samples.
     ///
     /// A joint whose model effort does not vary keeps gain 1 and is only offset: no motion, no gain. So do all joints of an arm that stands, if
-    /// efforts and model are in one unit: what static friction holds differs from pose to pose by more than what a gain could be told by.
+    /// efforts and model are in one unit: what static friction holds differs from pose to pose by more than what a gain could be told by. And so
+    /// does a joint whose friction hides the model, in one unit, too.
     pub fn fit(&self) -> Option<Vec<JointFit>> {
         if self.samples < 2 {
             return None;
         }
         let n = self.samples as f64;
         let stands = (self.moving as f64) < LEAST_MOVING * n;
-        Some(
-            self.joints
-                .iter()
-                .map(|m| {
-                    let varies =
-                        m.xx > 1e-12 * n * (1.0 + m.mean_x * m.mean_x) && !(stands && self.alike);
-                    let gain = if varies { m.xy / m.xx } else { 1.0 };
-                    let left = (m.yy - 2.0 * gain * m.xy + gain * gain * m.xx).max(0.0);
-                    JointFit {
-                        gain,
-                        offset: m.mean_y - gain * m.mean_x,
-                        noise: (left / n).sqrt(),
-                        explained: if varies && m.yy > 0.0 {
-                            1.0 - left / m.yy
-                        } else {
-                            0.0
-                        },
-                        excitation: (m.xx / n).sqrt(),
-                    }
-                })
-                .collect(),
-        )
+        let fit = |m: &Moments| {
+            let varies = m.xx > 1e-12 * n * (1.0 + m.mean_x * m.mean_x);
+            let left = |gain: f64| (m.yy - 2.0 * gain * m.xy + gain * gain * m.xx).max(0.0);
+            let explained = |gain| {
+                let share = if m.yy > 0.0 {
+                    1.0 - left(gain) / m.yy
+                } else {
+                    0.0
+                };
+                share.max(0.0)
+            };
+            let line = m.xy / m.xx;
+            let told = varies && !(self.alike && (stands || explained(line) < LEAST_EXPLAINED));
+            let gain = if told { line } else { 1.0 };
+            JointFit {
+                gain,
+                offset: m.mean_y - gain * m.mean_x,
+                noise: (left(gain) / n).sqrt(),
+                explained: if varies { explained(gain) } else { 0.0 },
+                excitation: (m.xx / n).sqrt(),
+            }
+        };
+        Some(self.joints.iter().map(fit).collect())
     }
 }
 
@@ -168,6 +173,21 @@ mod tests {
         assert!((fit.offset - 3.5).abs() < 1e-9);
         assert!((fit.noise - 0.5).abs() < 1e-9);
         assert!(fit.explained.abs() < f64::EPSILON);
+    }
+
+    #[test]
+    fn friction_that_hides_the_model_tells_no_gain_unless_the_unit_is_another() {
+        for alike in [true, false] {
+            let mut calibration = Calibration::new(1, alike);
+            for i in 0..1000 {
+                let friction = if i % 100 < 50 { 2.0 } else { -2.0 };
+                let model = 0.1 * (0.3 * f64::from(i)).sin();
+                calibration.add(&sample(model, 1.0 - 0.5 * model + friction));
+            }
+            let fit = calibration.fit().unwrap()[0];
+            assert_eq!(alike, (fit.gain - 1.0).abs() < f64::EPSILON);
+            assert!((fit.offset - 1.0).abs() < 0.01 && fit.explained < 0.01);
+        }
     }
 
     #[test]
