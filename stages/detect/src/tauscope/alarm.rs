@@ -7,14 +7,19 @@ const RELEASE: f64 = 0.35;
 /// For so long \[s\].
 const HOLD_S: f64 = 0.1;
 /// Another contact on top of one: the residual changes by this many times the threshold against what it has been, which is
-/// followed with this time constant, and grows (else it is a release); not sooner than this after the last alarm \[s\].
+/// followed with this time constant, and is no release; not sooner than this after the last alarm \[s\].
 const CHANGE: f64 = 2.0;
 /// One contact may swell and still be one: the change must be this share of what it has been as well.
 const SWELL: f64 = 0.5;
 /// Where kinds are told apart, it is another one, too, if the change points elsewhere: no more than this share of it along the contact (the cosine).
 const ELSEWHERE: f64 = 0.92;
+/// A contact that only falls is released: its change points against it by more than this (the cosine).
+const FALLS: f64 = 0.7;
 const FOLLOW_S: f64 = 0.15;
 const AGAIN_S: f64 = 0.25;
+/// Sooner, after this \[s\], one that is as large as that and points elsewhere: no more than this share of it along the contact (the cosine).
+const SOON_S: f64 = 0.1;
+const TURNS: f64 = 0.5;
 /// Where kinds are told, the alarm waits so long for the force to show where it points \[s\].
 const DECIDE_S: f64 = 0.012;
 /// A score from this share of the threshold on may already belong to a contact.
@@ -132,15 +137,17 @@ impl Watch {
             self.end();
             return None;
         }
-        let rested = now_ns - alarm.raised_ns > ns(AGAIN_S);
+        let since_ns = now_ns - alarm.raised_ns;
         let change = windows.change();
         let waits =
             self.waits_since_ns.is_some() && change.size > RELEASE * CHANGE * self.threshold;
         let along = change.along / (change.size * change.held).sqrt().max(f64::MIN_POSITIVE);
-        let is_other = change.size > SWELL * change.held || self.tells_kinds && along < ELSEWHERE;
+        let is_large = change.size > SWELL * change.held;
+        let rested = since_ns > ns(AGAIN_S) || since_ns > ns(SOON_S) && is_large && along < TURNS;
+        let is_other = is_large || self.tells_kinds && along < ELSEWHERE;
         let again = rested
             && score >= self.threshold
-            && windows.grows()
+            && (windows.grows() || is_large && along > -FALLS)
             && change.size > CHANGE * self.threshold
             && is_other;
         if !(again || waits) {
