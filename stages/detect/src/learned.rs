@@ -46,7 +46,7 @@ impl Default for SignalSettings {
     fn default() -> Self {
         Self {
             observer_gain_per_s: crate::momentum::DEFAULT_GAIN_PER_S,
-            // The twin's low-pass on efforts.
+            // About that of the twin on efforts; the paper does not give its own.
             cutoff_hz: 4.0,
         }
     }
