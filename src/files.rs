@@ -14,7 +14,7 @@ use crate::report::Report;
 use crate::yaml;
 
 pub use case::CaseFile;
-pub use set::SetFile;
+pub use set::{Impedance, SetFile};
 
 /// A kind of file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]

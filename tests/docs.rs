@@ -61,6 +61,12 @@ fn the_scenario_is_simulated_and_its_twin_calibrated_as_documented() {
         .arg(folder.path());
     let out = Out::of(simulate);
     assert_eq!(out.code, 0, "{}", out.stderr);
+    let set = std::fs::read_to_string(folder.path().join("set.yaml")).unwrap();
+    passes("set", &set);
+    assert!(
+        set.contains("robot: demo_arm.urdf") && set.contains("- touched.mcap"),
+        "{set}"
+    );
     let mut calibrate = tauscope();
     calibrate
         .arg("calibrate")

@@ -1,6 +1,7 @@
 //! `tauscope simulate`.
 
 mod case;
+mod set;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -19,8 +20,9 @@ use crate::provenance;
 pub struct Args {
     /// The scenario file.
     scenario: PathBuf,
-    /// The folder the recordings go to, with `labels.json`; for a scenario that conceals also the URDF,
-    /// `case.yaml` to explain, and the answer in `concealed.json`.
+    /// The folder the recordings go to, with `labels.json`; for a scenario with test recordings also the URDF and
+    /// `set.yaml` to evaluate; for one that conceals the URDF, `case.yaml` to explain, and the answer in
+    /// `concealed.json`.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Machine-readable.
@@ -70,6 +72,7 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
         Some(_) => Some(case::write(&facts, &args.out)?),
         None => None,
     };
+    let set = set::write(&facts, &made.labels_path, &args.out)?;
     let text = if args.json {
         let recordings: Vec<_> = made
             .recordings
@@ -79,13 +82,14 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
         let value = serde_json::json!({
             "recordings": recordings,
             "labels": made.labels_path,
+            "set": set,
             "case": case,
             "concealed": made.concealed_path,
         });
         serde_json::to_string_pretty(&value).context("cannot encode the result")?
     } else {
         let mut lines: Vec<String> = made.recordings.iter().map(line).collect();
-        let others = [Some(made.labels_path), made.concealed_path, case];
+        let others = [Some(made.labels_path), set, made.concealed_path, case];
         let others = others.into_iter().flatten();
         lines.extend(others.map(|path| path.display().to_string()));
         lines.join("\n")

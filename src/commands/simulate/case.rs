@@ -37,14 +37,12 @@ struct Topics {
 /// If a file cannot be written.
 pub fn write(facts: &ScenarioFacts, out: &Path) -> anyhow::Result<PathBuf> {
     let scenario = &facts.scenario;
-    let robot = scenario.robot.file_name().unwrap_or("robot.urdf".as_ref());
-    put(&out.join(robot), &facts.urdf)?;
     let files = scenario.recordings.iter();
     let mut fit: Vec<_> = files.map(|each| format!("{}.mcap", each.name)).collect();
     let holdout = fit.split_off(fit_count(fit.len()).min(fit.len()));
     let case = Case {
         case: &scenario.name,
-        robot: robot.into(),
+        robot: put_robot(facts, out)?,
         effort_unit: scenario.effort_unit,
         torque_constants_nm_per_a: &scenario.torque_constants_nm_per_a,
         topics: Topics {
@@ -62,8 +60,22 @@ pub fn write(facts: &ScenarioFacts, out: &Path) -> anyhow::Result<PathBuf> {
     Ok(path)
 }
 
+/// Writes the URDF to the folder of the recordings, and gives its name there.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn put_robot(facts: &ScenarioFacts, out: &Path) -> anyhow::Result<PathBuf> {
+    let robot = facts.scenario.robot.file_name();
+    let robot = robot.unwrap_or("robot.urdf".as_ref());
+    put(&out.join(robot), &facts.urdf)?;
+    Ok(robot.into())
+}
+
 /// Writes a file whole or not at all.
-fn put(path: &Path, text: &str) -> anyhow::Result<()> {
+///
+/// # Errors
+/// If it cannot be written.
+pub fn put(path: &Path, text: &str) -> anyhow::Result<()> {
     let mut part = path.as_os_str().to_owned();
     part.push(".part");
     let written = std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, path));

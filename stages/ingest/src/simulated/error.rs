@@ -21,6 +21,18 @@ pub enum ScenarioError {
         /// The robot's links.
         known: String,
     },
+    /// A push on a link that is fixed to the ground.
+    #[error(
+        "recording `{recording}`: {what} is on link `{link}`, which no joint moves: no joint would feel it; name a link that moves"
+    )]
+    FixedLink {
+        /// The recording.
+        recording: String,
+        /// What is to act there.
+        what: &'static str,
+        /// The link in the file.
+        link: String,
+    },
     /// A joint that the robot has not.
     #[error("{what} names joint `{joint}`, which the robot does not have; its joints: {known}")]
     UnknownJoint {

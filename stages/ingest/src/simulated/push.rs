@@ -85,7 +85,7 @@ pub(super) fn pushes(
                 ),
             });
         }
-        let link = find_link(model, "a contact", &contact.link)?;
+        let link = moving_link(spec, model, "a contact", &contact.link)?;
         pushes.push(Push {
             link,
             point_m: contact
@@ -133,7 +133,7 @@ fn draw(
             .map(|joint| joint.child_link)
             .collect()
     } else {
-        let find = |name: &String| find_link(model, "a hand", name);
+        let find = |name: &String| moving_link(spec, model, "a hand", name);
         hands
             .links
             .iter()
@@ -162,6 +162,24 @@ fn draw(
         }
     });
     Ok(pushes.collect())
+}
+
+/// The place of a link that a joint moves: of a push on another nothing could be felt.
+fn moving_link(
+    spec: &RecordingSpec,
+    model: &Model,
+    what: &'static str,
+    name: &str,
+) -> Result<usize, ScenarioError> {
+    let link = find_link(model, what, name)?;
+    match model.links()[link].joint {
+        Some(_) => Ok(link),
+        None => Err(ScenarioError::FixedLink {
+            recording: spec.name.clone(),
+            what,
+            link: name.to_owned(),
+        }),
+    }
 }
 
 /// The place of a link in the model.
