@@ -64,21 +64,47 @@ impl SignalSettings {
 }
 
 /// How a net is trained: Adam on the mean squared error.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TrainingSettings {
     /// How often all training data is gone through.
-    #[schemars(range(min = 1))]
     pub epochs: usize,
     /// Samples or windows in one step.
-    #[schemars(range(min = 1))]
     pub batch: usize,
     /// Share of each middle layer's units that is left out at a step.
-    #[schemars(range(min = 0.0, max = 0.9))]
     pub dropout: f64,
     /// Adam's step size.
-    #[schemars(range(min = 1e-9, max = 1.0))]
     pub learning_rate: f64,
+}
+
+/// The same as files have it: what is left out is the detector's own.
+#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(rename = "TrainingSettings")]
+pub(crate) struct GivenTraining {
+    /// How often all training data is gone through.
+    #[schemars(range(min = 1))]
+    epochs: Option<usize>,
+    /// Samples or windows in one step.
+    #[schemars(range(min = 1))]
+    batch: Option<usize>,
+    /// Share of each middle layer's units that is left out at a step.
+    #[schemars(range(min = 0.0, max = 0.9))]
+    dropout: Option<f64>,
+    /// Adam's step size.
+    #[schemars(range(min = 1e-9, max = 1.0))]
+    learning_rate: Option<f64>,
+}
+
+impl GivenTraining {
+    /// What is given, and `own` in the place of what is not.
+    pub fn or(self, own: TrainingSettings) -> TrainingSettings {
+        TrainingSettings {
+            epochs: self.epochs.unwrap_or(own.epochs),
+            batch: self.batch.unwrap_or(own.batch),
+            dropout: self.dropout.unwrap_or(own.dropout),
+            learning_rate: self.learning_rate.unwrap_or(own.learning_rate),
+        }
+    }
 }
 
 impl TrainingSettings {

@@ -10,12 +10,13 @@ use std::path::PathBuf;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::config::ConfigError;
 use crate::detector::Detector;
 use crate::learned::{
-    self, Course, Lstm, LstmScorer, Scorer, SignalSettings, Trained, TrainedError, TrainingSettings,
+    self, Course, GivenTraining, Lstm, LstmScorer, Scorer, SignalSettings, Trained, TrainedError,
+    TrainingSettings,
 };
 use crate::lesson::{LearnError, Lessons};
 use crate::stage::Setup;
@@ -39,7 +40,13 @@ pub struct Settings {
     #[schemars(range(min = 1, max = 10_000))]
     pub hidden: usize,
     /// How it is trained. `batch` counts samples: 1000 are ten sequences of 100.
+    #[serde(deserialize_with = "training")]
+    #[schemars(with = "GivenTraining")]
     pub training: TrainingSettings,
+}
+
+fn training<'de, D: Deserializer<'de>>(file: D) -> Result<TrainingSettings, D::Error> {
+    Ok(GivenTraining::deserialize(file)?.or(Settings::default().training))
 }
 
 impl Default for Settings {

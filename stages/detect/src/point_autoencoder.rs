@@ -9,13 +9,13 @@ use std::path::PathBuf;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::config::ConfigError;
 use crate::detector::Detector;
 use crate::learned::{
-    self, Autoencoder, Course, Scorer, SignalSettings, Trained, TrainedError, TrainingSettings,
-    VectorScorer, Vectors,
+    self, Autoencoder, Course, GivenTraining, Scorer, SignalSettings, Trained, TrainedError,
+    TrainingSettings, VectorScorer, Vectors,
 };
 use crate::lesson::{LearnError, Lessons};
 use crate::stage::Setup;
@@ -38,7 +38,13 @@ pub struct Settings {
     /// Units of the middle layers.
     pub layers: Vec<usize>,
     /// How it is trained.
+    #[serde(deserialize_with = "training")]
+    #[schemars(with = "GivenTraining")]
     pub training: TrainingSettings,
+}
+
+fn training<'de, D: Deserializer<'de>>(file: D) -> Result<TrainingSettings, D::Error> {
+    Ok(GivenTraining::deserialize(file)?.or(Settings::default().training))
 }
 
 impl Default for Settings {

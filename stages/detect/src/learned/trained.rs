@@ -175,6 +175,11 @@ impl Trained {
         &mut self.facts.provenance
     }
 
+    /// What its score stays below whatever is seen, where there is such a bound: a one-class machine's is ρ.
+    pub fn largest_score(&self) -> Option<f64> {
+        Some(self.get_f64("svm.rho", &[1]).ok()?[0])
+    }
+
     /// What its score does on contact-free data; its threshold rests on it.
     pub fn score(&self) -> ScoreStatistics {
         let score = self.get_f64(SCORE, &[2]).unwrap_or(vec![f64::NAN; 2]);
