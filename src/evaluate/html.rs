@@ -13,6 +13,7 @@ use tauscope_explain::html::{POLICY, STYLE};
 use super::Evaluation;
 use super::input::Role;
 use super::judged::Judged;
+use super::metrics::statistics::mean_sd;
 use super::tables::Table;
 use crate::provenance;
 
@@ -21,6 +22,9 @@ const OWN_STYLE: &str = include_str!("html/style.css");
 
 /// Colours of the style sheet; further detectors take them again with a dashed line.
 const COLOURS: usize = 7;
+
+/// Of detectors that lead together, so many are named.
+const MOST_NAMED: usize = 3;
 
 /// The page.
 ///
@@ -120,9 +124,12 @@ fn header(evaluation: &Evaluation, judged: &[Judged<'_>]) -> Markup {
     }
 }
 
-/// Who leads, in a sentence.
+/// Who leads in what, in a sentence.
 fn verdict(judged: &[Judged<'_>]) -> String {
-    let auc = |judged: &&Judged<'_>| judged.first().samples.auc;
+    let auc = |judged: &Judged<'_>| {
+        let seeds: Vec<f64> = judged.numbers.iter().map(|n| n.samples.auc).collect();
+        mean_sd(&seeds).0
+    };
     let best = (judged.iter())
         .filter(|judged| auc(judged).is_finite())
         .max_by(|a, b| auc(a).total_cmp(&auc(b)));
@@ -132,27 +139,35 @@ fn verdict(judged: &[Judged<'_>]) -> String {
             judged.len()
         );
     };
-    let found = (judged.iter())
-        .max_by_key(|judged| {
-            (
-                judged.first().found,
-                std::cmp::Reverse(judged.first().false_alarms),
-            )
-        })
-        .unwrap_or(best);
-    let numbers = found.first();
+    let (most, of) = (judged.iter())
+        .map(|judged| (judged.first().found, judged.first().events))
+        .max()
+        .unwrap_or_default();
+    if judged.len() == 1 {
+        return format!(
+            "{} finds {most} of {of} contacts with {} false alarms; its AUC is {:.3}",
+            best.label,
+            best.first().false_alarms,
+            auc(best)
+        );
+    }
+    let mut finders: Vec<&Judged<'_>> = (judged.iter())
+        .filter(|judged| judged.first().found == most)
+        .collect();
+    finders.sort_by_key(|judged| judged.first().false_alarms);
+    let named = finders.iter().take(MOST_NAMED).map(|judged| {
+        let false_alarms = judged.first().false_alarms;
+        format!("{} with {false_alarms} false alarms", judged.label)
+    });
+    let mut named: Vec<String> = named.collect();
+    if finders.len() > MOST_NAMED {
+        named.push(format!("{} more", finders.len() - MOST_NAMED));
+    }
+    let said = named.join(" and ");
     format!(
-        "{} tells contact from free motion best (AUC {:.3}){} finds most: {} of {} contacts with {} false alarms",
-        best.label,
-        best.first().samples.auc,
-        if std::ptr::eq(best, found) {
-            " and".to_owned()
-        } else {
-            format!("; {}", found.label)
-        },
-        numbers.found,
-        numbers.events,
-        numbers.false_alarms
+        "The largest AUC is {:.3}, of {}; the most contacts, {most} of {of}, are found by {said}",
+        auc(best),
+        best.label
     )
 }
 
