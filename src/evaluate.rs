@@ -249,6 +249,10 @@ impl Evaluation {
             let share = LEARNT + (1.0 - LEARNT) * (at + 1) as f64 / count;
             progress(share, &format!("{name}: {}", recording.name));
         }
+        heard.close(request);
+        notes.extend(twin.doubts());
+        notes.extend(heard.unjudged(&runners));
+        notes.extend(heard::silent(&runners));
         self.lost += heard.lost;
         for note in notes.into_iter().chain(heard.notes) {
             if !self.notes.contains(&note) {
@@ -327,6 +331,8 @@ fn learn(
             lessons,
             free_first_s: request.set.free_first_s,
             seed,
+            twin_fit_s: twin.fit_s,
+            given: &request.set.detectors,
             weights: out.join("models").join(file),
         };
         let runner = Runner::new(entry, &task);

@@ -18,7 +18,7 @@ use crate::report::Problem;
 
 pub use input::{Arguments, Request, from_arguments, from_case, without};
 pub use output::{json, prepare, write};
-pub use read::{Kept, read};
+pub use read::{Kept, first_joint_names, read};
 pub use words::text;
 
 /// What went in, by name and hash.

@@ -1,6 +1,7 @@
 //! The pipeline file: read, checked, and everything it names looked up.
 
 mod cells;
+mod constants;
 mod file;
 mod files;
 mod role;
@@ -15,6 +16,7 @@ use tauscope_bus::Keep;
 use tauscope_twin::TwinFile;
 
 pub use cells::{Cell, CellFacts};
+pub use constants::{ConstantSpot, torque_constants};
 pub use file::{EffortUnit, HostEntry, KeepEntry, OutsideEntry, PipelineFile, ToolEntry};
 pub use role::{Role, words_for};
 pub use scenario::ScenarioFacts;

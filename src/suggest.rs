@@ -35,6 +35,16 @@ pub fn list<'a>(words: impl IntoIterator<Item = &'a str>) -> String {
     quoted.join(", ")
 }
 
+/// The first few of many words.
+pub fn some(words: &[&str]) -> String {
+    const MOST_NAMED: usize = 8;
+    let first = words[..words.len().min(MOST_NAMED)].join(", ");
+    match words.len().saturating_sub(MOST_NAMED) {
+        0 => first,
+        more => format!("{first} and {more} more"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -10,7 +10,7 @@ use tauscope_twin::{Expected, Motion, TwinFile};
 use super::print;
 use crate::calibrate::{Calibrated, Job};
 use crate::exit::{Exit, Failure};
-use crate::pipeline::{Cell, EffortUnit};
+use crate::pipeline::{Cell, ConstantSpot, EffortUnit};
 use crate::progress::Progress;
 use crate::provenance;
 use crate::report::Problem;
@@ -85,7 +85,8 @@ fn motion(text: &str) -> Result<Motion, String> {
 /// Calibrates and writes the twin.
 pub fn run(args: &Args) -> Result<Exit, Failure> {
     let constants = args.torque_constant.iter().cloned().collect();
-    let cell = Cell::from_urdf(&args.robot, args.effort_unit, &constants)?;
+    let problem = |_: ConstantSpot<'_>, title| Problem::new(title);
+    let cell = Cell::from_urdf(&args.robot, args.effort_unit, &constants, &problem)?;
     let topics = Topics {
         state: args.state_topic.clone(),
         command: args.command_topic.clone(),

@@ -1,5 +1,9 @@
 //! What is to be evaluated: the set file and the arguments, everything named looked up.
 
+mod arm;
+mod labelled;
+mod twins;
+
 use std::path::{Path, PathBuf};
 
 use tauscope_archive::Recording;
@@ -10,7 +14,7 @@ use tauscope_twin::TwinFile;
 use super::labels::{self, LabelsFile, Truth};
 use super::registry::{self, Entry, Facts};
 use crate::files::SetFile;
-use crate::pipeline::{Cell, ToolEntry};
+use crate::pipeline::Cell;
 use crate::replay::stem;
 use crate::report::{Problem, Report};
 use crate::suggest;
@@ -156,31 +160,18 @@ pub fn load(path: &Path, options: &Options) -> Result<Request, Report> {
     let root = Place::root();
     let mut report = Report::default();
     let mut notes = Vec::new();
-    let constants = set.torque_constants_nm_per_a.clone().unwrap_or_default();
-    let mut cell = Cell::from_urdf(&file.resolve(&set.robot), set.effort_unit, &constants)?;
-    if let Some(link) = &set.tool_link
-        && (cell.model.as_ref()).is_some_and(|model| model.link_index(link).is_none())
-    {
-        let title = format!("the robot has no link `{link}`");
-        report.push(file.at(&root.key("tool_link"), title));
-    }
-    cell.facts.tool = set.tool_link.clone().map(|link| ToolEntry {
-        link,
-        // What it weighs is in the URDF.
-        mass_kg: 0.0,
-        com_m: [0.0; 3],
-        inertia_kgm2: [0.0; 6],
-        contact_point_m: set.contact_point_on_tool_m,
-    });
-    let labels = find_labels(&file, &mut notes, &mut report);
+    let cell = arm::cell(&file, &mut notes, &mut report)?;
+    let labels = labelled::find(&file, &mut notes, &mut report);
     let recordings = recordings(&file, labels.as_ref(), &mut report);
+    notes.extend(labelled::doubts(labels.as_ref(), &recordings, &cell));
     if set.test.is_empty() && set.validation.is_empty() {
         let problem = file.at_key(&root, "neither `test` nor `validation` recordings");
         report.push(problem.help("name the recordings that are to be scored under `test`"));
     }
+    learnt_here(&file, &mut report);
     let facts = Facts::of(&set, &recordings);
     let detectors = detectors(&options.detectors, facts, &mut report);
-    let twins = twins(&set, &cell, &options.twins, &mut report);
+    let twins = twins::choices(&file, &cell, &options.twins, &mut report);
     report.into_result(Request {
         set,
         path: path.to_owned(),
@@ -193,42 +184,6 @@ pub fn load(path: &Path, options: &Options) -> Result<Request, Report> {
         jobs: options.jobs.max(1),
         notes,
     })
-}
-
-/// `labels:` in the file, else `labels.json`, else `labels_train.json` beside it.
-fn find_labels(
-    file: &Located<SetFile>,
-    notes: &mut Vec<String>,
-    report: &mut Report,
-) -> Option<LabelsFile> {
-    const TRAIN: &str = "labels_train.json";
-    let named = file.value.labels.as_ref().map(|path| file.resolve(path));
-    let beside = |name: &str| Some(file.resolve(Path::new(name))).filter(|path| path.is_file());
-    let place = Place::root().key("labels");
-    let path = match named {
-        Some(path) if path.is_file() => path,
-        Some(path) => {
-            let Some(train) = beside(TRAIN) else {
-                let title = format!("there is no file {}", path.display());
-                report.push(file.at(&place, title));
-                return None;
-            };
-            notes.push(format!(
-                "{} is not there; the labels are those of {}",
-                path.display(),
-                train.display()
-            ));
-            train
-        }
-        None => beside("labels.json").or_else(|| beside(TRAIN))?,
-    };
-    match labels::read(&path) {
-        Ok(labels) => Some(labels),
-        Err(wrong) => {
-            report.push(Problem::of_file(&path, wrong));
-            None
-        }
-    }
 }
 
 /// The set's recordings with what touched the robot in them.
@@ -291,6 +246,33 @@ fn open(path: &Path, state: &str, contact: Option<&str>) -> Result<(i64, Option<
     Ok((start_ns, truth))
 }
 
+/// Refuses what an evaluation finds itself among the detectors' settings.
+fn learnt_here(file: &Located<SetFile>, report: &mut Report) {
+    let mut given = file.value.detectors.clone();
+    let mut found: Vec<(&str, &str)> = (given.trained_files_mut())
+        .map(|(detector, _)| (detector, "model"))
+        .collect();
+    if given.state_mut().is_some() {
+        found.push(("virtual_collision_sensor", "state"));
+    }
+    let sensor = given.virtual_collision_sensor.as_ref();
+    if sensor.is_some_and(|settings| settings.learnt.is_some()) {
+        found.push(("virtual_collision_sensor", "learnt"));
+    }
+    let own = given.tauscope.as_ref();
+    if own.is_some_and(|settings| settings.learnt.is_some()) {
+        found.push(("tauscope", "learnt"));
+    }
+    for (detector, key) in found {
+        let place = Place::root().key("detectors").key(detector).key(key);
+        let title = format!("`{key}` of {detector}: an evaluation lets every detector learn anew");
+        report.push(
+            file.at_key(&place, title)
+                .help(format!("leave `{key}` out")),
+        );
+    }
+}
+
 fn detectors(names: &[String], facts: Facts, report: &mut Report) -> Vec<&'static Entry> {
     if names.is_empty() {
         let usual = registry::ENTRIES
@@ -315,80 +297,4 @@ fn detectors(names: &[String], facts: Facts, report: &mut Report) -> Vec<&'stati
         }
     }
     found
-}
-
-fn twins(set: &SetFile, cell: &Cell, names: &[String], report: &mut Report) -> Vec<TwinChoice> {
-    let usual = if set.topics.twin.is_some() {
-        "topic"
-    } else {
-        "regression"
-    };
-    let usual = [usual.to_owned()];
-    let names = if names.is_empty() { &usual } else { names };
-    let mut all: Vec<TwinChoice> = Vec::new();
-    for name in names {
-        let source = match name.as_str() {
-            "rigid" => TwinSource::Rigid,
-            "regression" => TwinSource::Regression,
-            "topic" if set.topics.twin.is_some() => TwinSource::Topic,
-            "topic" => {
-                let problem = Problem::new("--twin topic: the set names no `topics.twin`");
-                report.push(problem.help("use --twin rigid or --twin regression"));
-                continue;
-            }
-            path => match twin_file(Path::new(path), cell) {
-                Ok(file) => TwinSource::File(Box::new(file)),
-                Err(problems) => {
-                    report.append(problems);
-                    continue;
-                }
-            },
-        };
-        let path = Path::new(name);
-        // `explain` calls all of them twin.yaml: then the folder tells them apart.
-        let mut short = match &source {
-            TwinSource::File(_) if stem(path) == "twin" => {
-                path.parent().and_then(Path::file_name).map_or_else(
-                    || "twin".to_owned(),
-                    |name| name.to_string_lossy().into_owned(),
-                )
-            }
-            TwinSource::File(_) => stem(path),
-            _ => name.clone(),
-        };
-        let alike = all.iter().filter(|other| other.name == short).count();
-        if alike > 0 {
-            short = format!("{short}_{}", all.len() + 1);
-        }
-        let from_file = matches!(source, TwinSource::File(_));
-        all.push(TwinChoice {
-            name: short,
-            path: from_file.then(|| path.to_owned()),
-            source,
-        });
-    }
-    all
-}
-
-fn twin_file(path: &Path, cell: &Cell) -> Result<TwinFile, Report> {
-    if !path.is_file() {
-        let known = ["rigid", "regression", "topic"];
-        let title = format!("--twin: there is no file {}", path.display());
-        let help = "give rigid, regression, topic, or the path of a twin.yaml".to_owned();
-        let near = suggest::nearest(&path.to_string_lossy(), known);
-        let help = near.map_or(help, |near| format!("did you mean `{near}`?"));
-        return Err(Problem::new(title).help(help).into());
-    }
-    let file: Located<TwinFile> = yaml::load(path)?;
-    let facts = &cell.facts;
-    if let Some(robot) = &cell.model
-        && let Some(title) = file.value.made_for_other(robot.name())
-    {
-        let help = "calibrate one for this robot: `tauscope calibrate`, or --twin regression";
-        return Err(Problem::of_file(path, title).help(help).into());
-    }
-    (file.value)
-        .resolve(&facts.joint_names, facts.effort_unit.as_str())
-        .map_err(|error| Problem::of_file(path, error.to_string()))?;
-    Ok(file.value)
 }

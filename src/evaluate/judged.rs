@@ -78,7 +78,7 @@ fn test<'a>(evaluation: &'a Evaluation, runner: &'a Runner) -> Vec<Scored<'a>> {
         .outputs
         .iter()
         .filter(|output| output.role == Role::Test);
-    let window = runner.entry.window;
+    let window = runner.window();
     outputs
         .filter_map(|output| Scored::of(&evaluation.request, output, window))
         .collect()

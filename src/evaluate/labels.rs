@@ -7,6 +7,8 @@ use serde::Deserialize;
 use tauscope_archive::{ArchiveError, Recording, ros};
 use tauscope_detect::{ContactKind, LabelledContact};
 
+use crate::suggest;
+
 /// `labels.json`. What is in it beyond this is passed over.
 #[derive(Debug, Clone, Deserialize)]
 pub struct LabelsFile {
@@ -64,6 +66,9 @@ pub struct TrueEvent {
     pub zone: Option<String>,
 }
 
+/// Of contacts, as the labels have them.
+pub const KINDS: [&str; 3] = ["contact", "collision", "cooperation"];
+
 fn contact() -> String {
     "contact".to_owned()
 }
@@ -88,10 +93,27 @@ impl TrueEvent {
 impl Truth {
     /// What is wrong with it.
     pub fn check(&self) -> Result<(), String> {
-        for event in &self.events {
+        if let Some(duration) = self.duration
+            && !(duration.is_finite() && duration >= 0.0)
+        {
+            return Err(format!("a `duration` of {duration} s"));
+        }
+        for (index, event) in self.events.iter().enumerate() {
             let (on, off) = (event.t_on, event.t_off);
             if !(on.is_finite() && off.is_finite() && on <= off) {
                 return Err(format!("an event from {on} s to {off} s"));
+            }
+            let kinds = [Some(&event.kind), event.during.as_ref()];
+            for kind in kinds.into_iter().flatten() {
+                if !KINDS.contains(&kind.as_str()) {
+                    let help = suggest::nearest(kind, KINDS)
+                        .map_or_else(String::new, |near| format!("; did you mean `{near}`?"));
+                    return Err(format!(
+                        "event {}, at {on} s: there is no kind `{kind}`; the kinds are {}{help}",
+                        index + 1,
+                        suggest::list(KINDS)
+                    ));
+                }
             }
         }
         Ok(())

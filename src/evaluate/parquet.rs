@@ -72,7 +72,7 @@ pub fn write_results(path: &Path, evaluation: &Evaluation) -> Result<(), TableEr
         for runner in &run.seeds {
             let mut all = Vec::new();
             for output in &runner.outputs {
-                let scored = Scored::of(&evaluation.request, output, runner.entry.window);
+                let scored = Scored::of(&evaluation.request, output, runner.window());
                 head(&mut rows, evaluation, twin, runner, Some(output));
                 let one: Vec<&Scored<'_>> = scored.iter().collect();
                 numbers(&mut rows, &Numbers::of(&evaluation.request, runner, &one));

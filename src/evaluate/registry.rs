@@ -5,9 +5,8 @@ use std::path::PathBuf;
 use tauscope_detect::contact_tuning::Sweeps;
 use tauscope_detect::{
     Config, LearnError, Lessons, Setup, contact_classifier, fisher_discriminant,
-    frequency_classifier, lstm_momentum_observer, momentum_observer, naive_difference,
-    point_autoencoder, point_ocsvm, tauscope, twin_regression, virtual_collision_sensor,
-    virtual_collision_sensor_basic, window_autoencoder, window_ocsvm,
+    frequency_classifier, lstm_momentum_observer, point_autoencoder, point_ocsvm, tauscope,
+    virtual_collision_sensor, virtual_collision_sensor_basic, window_autoencoder, window_ocsvm,
 };
 
 use super::input::{Named, Role};
@@ -21,14 +20,25 @@ pub struct Entry {
     pub name: &'static str,
     /// Whether chance has a part in its training: then it is trained with [`SEEDS`] seeds.
     pub random: bool,
-    /// How many samples it judges at once, for one that judges windows.
-    pub window: Option<usize>,
+    /// What its training is.
+    pub training: Training,
     /// Whether it runs on a set where nobody names detectors.
     pub usual: fn(Facts) -> bool,
     /// Trains or tunes it: what its part of a pipeline file would be.
     pub learn: fn(&Task<'_>) -> Result<Config, LearnError>,
     /// The curves behind what it has learnt, where it was tuned by some.
     pub sweeps: Option<Sweep>,
+}
+
+/// What the training of a detector is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Training {
+    /// It has none.
+    None,
+    /// The fit of the twin's gains and offsets.
+    Twin,
+    /// Its own.
+    Own,
 }
 
 /// The curves behind learnt settings.
@@ -48,8 +58,23 @@ pub struct Task<'a> {
     pub free_first_s: f64,
     /// For what is drawn by chance.
     pub seed: u64,
+    /// How long the fit of the twin took, if it was fitted \[s\].
+    pub twin_fit_s: Option<f64>,
+    /// What the set says of the detectors' settings.
+    pub given: &'a Config,
     /// Where trained weights go; the ending is the detector's.
     pub weights: PathBuf,
+}
+
+impl Task<'_> {
+    /// What all detectors share.
+    fn shared(&self) -> Config {
+        Config {
+            threshold: self.given.threshold,
+            hold_s: self.given.hold_s,
+            ..Config::default()
+        }
+    }
 }
 
 /// What kind of set it is.
@@ -95,7 +120,7 @@ const fn entry(name: &'static str, learn: fn(&Task<'_>) -> Result<Config, LearnE
     Entry {
         name,
         random: false,
-        window: None,
+        training: Training::Own,
         usual: always,
         learn,
         sweeps: None,
@@ -106,32 +131,35 @@ const fn entry(name: &'static str, learn: fn(&Task<'_>) -> Result<Config, LearnE
 /// settings, `trained` weights that go to a file.
 macro_rules! detector {
     (given $name:ident) => {
-        entry(stringify!($name), |_| {
-            Ok(Config {
-                $name: Some($name::Settings::default()),
-                ..Config::default()
+        Entry {
+            training: Training::None,
+            ..entry(stringify!($name), |task| {
+                Ok(Config {
+                    $name: Some(task.given.$name.clone().unwrap_or_default()),
+                    ..task.shared()
+                })
             })
-        })
+        }
     };
     (tuned $name:ident) => {
         entry(stringify!($name), |task| {
-            let settings = $name::Settings::default();
+            let settings = task.given.$name.clone().unwrap_or_default();
             let settings = $name::learn(&settings, task.setup, &task.lessons)?;
             Ok(Config {
                 $name: Some(settings),
-                ..Config::default()
+                ..task.shared()
             })
         })
     };
     (trained $name:ident) => {
         entry(stringify!($name), |task| {
-            let mut settings = $name::Settings::default();
+            let mut settings = task.given.$name.clone().unwrap_or_default();
             let (lessons, seed) = (&task.lessons, task.seed);
             let trained = $name::train(&settings, task.setup, lessons, seed, &mut |_| ())?;
             settings.model = Some(trained::write(&task.weights, lessons, trained)?);
             Ok(Config {
                 $name: Some(settings),
-                ..Config::default()
+                ..task.shared()
             })
         })
     };
@@ -141,7 +169,10 @@ macro_rules! detector {
 pub static ENTRIES: &[Entry] = &[
     detector!(given naive_difference),
     detector!(given momentum_observer),
-    detector!(given twin_regression),
+    Entry {
+        training: Training::Twin,
+        ..detector!(given twin_regression)
+    },
     Entry {
         usual: is_plain,
         ..detector!(trained point_ocsvm)
@@ -157,13 +188,11 @@ pub static ENTRIES: &[Entry] = &[
         ..detector!(trained lstm_momentum_observer)
     },
     Entry {
-        window: Some(16),
         usual: is_plain,
         ..detector!(trained window_ocsvm)
     },
     Entry {
         random: true,
-        window: Some(16),
         usual: is_plain,
         ..detector!(trained window_autoencoder)
     },
@@ -194,14 +223,14 @@ pub static ENTRIES: &[Entry] = &[
         ..detector!(tuned frequency_classifier)
     },
     entry("tauscope", |task| {
-        let settings = tauscope::Settings {
-            offset_from_first_s: task.free_first_s,
-            ..tauscope::Settings::default()
-        };
+        let mut settings = task.given.tauscope.clone().unwrap_or_default();
+        if settings.offset_from_first_s <= 0.0 {
+            settings.offset_from_first_s = task.free_first_s;
+        }
         let settings = tauscope::learn(&settings, task.setup, &task.lessons)?;
         Ok(Config {
             tauscope: Some(settings),
-            ..Config::default()
+            ..task.shared()
         })
     }),
 ];

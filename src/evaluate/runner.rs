@@ -9,7 +9,7 @@ use tauscope_detect::{Config, Detect, Lesson, ScoreStatistics, Setup};
 
 use super::EvaluateError;
 use super::input::{Named, Role};
-use super::registry::{Entry, Task};
+use super::registry::{Entry, Task, Training};
 use super::twin::is_free_of;
 use crate::build::BuildError;
 use crate::replay::{DetectionTally, Event};
@@ -30,6 +30,8 @@ pub struct Output {
     pub scores: Vec<f64>,
     /// What it found.
     pub events: Vec<Event>,
+    /// Samples that the detector was not ready for.
+    pub not_judged: usize,
     /// How long it took \[s\].
     pub took_s: f64,
 }
@@ -45,7 +47,7 @@ pub struct Runner {
     pub config: Config,
     /// The curves behind what it has learnt.
     pub sweeps: Option<Sweeps>,
-    /// How long it learnt \[s\], without the curves.
+    /// How long it learnt \[s\], without the curves; NaN if it learns nothing.
     pub training_s: f64,
     /// What its score does on the validation recordings while nothing touches the robot.
     pub statistics: ScoreStatistics,
@@ -53,6 +55,8 @@ pub struct Runner {
     pub counted: u64,
     /// Its score from which on it raises an alarm.
     pub threshold: f64,
+    /// What its score cannot exceed, where there is such a bound.
+    pub largest_score: Option<f64>,
     /// What it has said so far.
     pub outputs: Vec<Output>,
     /// The same, with what it has learnt since.
@@ -75,7 +79,11 @@ impl Runner {
         };
         let began = Instant::now();
         let config = (entry.learn)(task).map_err(failed)?;
-        let training_s = began.elapsed().as_secs_f64();
+        let training_s = match entry.training {
+            Training::None => f64::NAN,
+            Training::Twin => task.twin_fit_s.unwrap_or(f64::NAN),
+            Training::Own => began.elapsed().as_secs_f64(),
+        };
         let sweeps = match entry.sweeps {
             Some(sweeps) => sweeps(&config, task).map_err(failed)?,
             None => None,
@@ -91,6 +99,8 @@ impl Runner {
             .ok_or(EvaluateError::NeverReady {
                 detector: entry.name,
             })?;
+        let trained = setup.trained.get(entry.name);
+        let largest_score = trained.and_then(|trained| trained.largest_score());
         setup.scores.insert(entry.name.to_owned(), statistics);
         Detect::new(&config, setup.clone()).map_err(|error| failed(error.into()))?;
         Ok(Self {
@@ -103,10 +113,19 @@ impl Runner {
             statistics,
             counted,
             threshold: f64::NAN,
+            largest_score,
             outputs: Vec::new(),
             setup,
             lowest,
         })
+    }
+
+    /// How many samples it judges at once, if it judges windows.
+    pub fn window(&self) -> Option<usize> {
+        let config = &self.config;
+        let one_class = config.window_ocsvm.as_ref().map(|settings| settings.window);
+        let autoencoder = config.window_autoencoder.as_ref();
+        one_class.or_else(|| autoencoder.map(|settings| settings.window))
     }
 
     /// Lets the next recording of the session pass through.
@@ -127,11 +146,13 @@ impl Runner {
             Role::Train | Role::Validation => self.statistics.mean,
         };
         let mut stage = Detect::new(&self.now, self.setup.clone()).map_err(StageError::failed)?;
+        let mut not_judged = 0;
         let began = Instant::now();
         for sample in samples {
             stage.accept(sample, &mut last)?;
             let said = &last.0;
             let judged = said.header.has(flags::READY) && said.score.is_finite();
+            not_judged += usize::from(!judged);
             scores.push(if judged { said.score } else { not_ready });
             tally.add(said);
         }
@@ -153,6 +174,7 @@ impl Runner {
             t: samples.iter().map(seconds).collect(),
             scores,
             events: tally.events,
+            not_judged,
             took_s,
         });
         Ok(())

@@ -51,7 +51,7 @@ pub fn all(evaluation: &Evaluation, judged: &[Judged<'_>]) -> Vec<Table> {
         tables.extend(contacts::tables(judged));
         tables.extend(cycles::tables(&evaluation.request, judged));
     } else {
-        tables.push(overall::unscored(evaluation));
+        tables.push(overall::unscored(evaluation, judged));
     }
     tables.extend(overall::smallest(judged));
     tables

@@ -18,6 +18,9 @@ const BEFORE_NS: i64 = 100_000_000;
 /// Nor is one this close behind its end: the arm swings, and the filters remember \[ns\].
 const AFTER_NS: i64 = 500_000_000;
 
+/// No drive reports more than this many times the effort that the model expects.
+const LARGEST_GAIN: f64 = 5.0;
+
 /// A twin, ready.
 #[derive(Debug)]
 pub struct Prepared {
@@ -140,6 +143,22 @@ impl Prepared {
         Ok(())
     }
 
+    /// Fitted gains that no drive has.
+    pub fn doubts(&self) -> Option<String> {
+        self.fit_s?;
+        let said: Vec<String> = (self.file.joints.iter())
+            .filter(|(_, joint)| !(0.0..=LARGEST_GAIN).contains(&joint.gain))
+            .map(|(name, joint)| format!("{:.2} at {name}", joint.gain))
+            .collect();
+        (!said.is_empty()).then(|| {
+            format!(
+                "{}: the fitted gain is {}: friction, or what else the model leaves out, outweighs there what it knows",
+                self.name,
+                said.join(", ")
+            )
+        })
+    }
+
     /// What a detector behind it must know.
     ///
     /// # Errors
@@ -166,7 +185,7 @@ fn train(request: &Request) -> Vec<PathBuf> {
 }
 
 /// Whether, as far as anybody has said, nothing touches the robot at this instant, nor has just done so.
-fn is_free(recording: &Named, stamp_ns: i64) -> bool {
+pub fn is_free(recording: &Named, stamp_ns: i64) -> bool {
     let events = recording.truth.iter().flat_map(|truth| &truth.events);
     let mut spans = events.map(|event| event.labelled(recording.start_ns));
     !spans.any(|contact| touches(contact.on_ns, contact.off_ns, stamp_ns))

@@ -141,10 +141,7 @@ pub fn from_case(path: &Path, without: BTreeSet<String>) -> Result<Request, Repo
         problem: &|spot, title| match spot {
             Spot::Robot => file.at(&root.key("robot"), title),
             Spot::Twin => file.at(&root.key("twin").key("model"), title),
-            Spot::Constants => file.at_key(&root.key("torque_constants_nm_per_a"), title),
-            Spot::Constant(joint) => {
-                file.at_key(&root.key("torque_constants_nm_per_a").key(joint), title)
-            }
+            Spot::Constants(spot) => spot.problem(&file, &root, title),
             Spot::Fit(index) => file.at(&root.key("fit").index(index), title),
             Spot::Holdout(index) => file.at(&root.key("holdout").index(index), title),
         },

@@ -15,14 +15,16 @@ use crate::pipeline::EffortUnit;
 pub struct SetFile {
     /// Name of the set.
     pub set: String,
-    /// The robot's URDF.
-    pub robot: PathBuf,
+    /// The robot's URDF; may be left out where the twin is a topic.
+    #[serde(default)]
+    pub robot: Option<PathBuf>,
     /// The labels; without them `labels.json` or `labels_train.json` beside the file, or the contact
     /// topic.
     #[serde(default)]
     pub labels: Option<PathBuf>,
-    /// Nominal rate of the recordings \[Hz\].
+    /// Nominal rate of the recordings \[Hz\], for information: time is in the stamps.
     #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub rate_hz: Option<f64>,
     /// Unit of the measured effort.
     #[serde(default)]
@@ -44,13 +46,19 @@ pub struct SetFile {
     pub impedance: Option<Impedance>,
     /// Length of one cycle of a cyclic motion \[s\].
     #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub cycle_s: Option<f64>,
-    /// Cycles at the beginning of the session that a detector may learn from.
+    /// How many cycles the train recordings hold, for information: detectors learn from all of these recordings.
     #[serde(default)]
+    #[schemars(range(min = 1))]
     pub learning_cycles: Option<u32>,
     /// For so long nothing touches the robot at the beginning of each recording \[s\]: there `tauscope` takes its offset from.
     #[serde(default)]
+    #[schemars(range(min = 0.0))]
     pub free_first_s: f64,
+    /// Settings of detectors by name, as a pipeline's `detect` has them. `threshold` and `hold_s` beside them are for all.
+    #[serde(default)]
+    pub detectors: tauscope_detect::Config,
     /// Contact-free recordings that detectors are trained on.
     #[serde(default)]
     pub train: Vec<PathBuf>,
@@ -92,10 +100,12 @@ impl Default for SetTopics {
 #[serde(deny_unknown_fields)]
 pub struct Impedance {
     /// Translational stiffness \[N/m\].
+    #[schemars(range(min = 0.0))]
     pub translational_n_per_m: f64,
     /// Rotational stiffness \[N m/rad\].
+    #[schemars(range(min = 0.0))]
     pub rotational_nm_per_rad: f64,
     /// The damping's rule in words, e.g. `2 sqrt(K)`.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub damping: Option<String>,
 }

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use tauscope_bus::MAX_JOINTS;
 use tauscope_dynamics::Model;
 
+use super::constants::{self, ConstantSpot};
 use super::file::{CellEntry, EffortUnit, PipelineFile, ToolEntry};
 use crate::report::{Problem, Report};
 use crate::suggest;
@@ -50,8 +51,8 @@ impl Cell {
         Ok(Self { facts, model })
     }
 
-    /// A cell of the robot at `path`, without a pipeline file; `constants` by joint \[N m/A\], for all
-    /// joints or for none.
+    /// A cell of the robot at `path`, without a pipeline file; `constants` by joint \[N m/A\], none where they are not
+    /// known. `problem` says where they stand.
     ///
     /// # Errors
     /// If the URDF cannot be read or used, or the constants are not those of its joints.
@@ -59,43 +60,55 @@ impl Cell {
         path: &Path,
         effort_unit: EffortUnit,
         constants: &BTreeMap<String, f64>,
+        problem: &dyn Fn(ConstantSpot<'_>, String) -> Problem,
     ) -> Result<Self, Report> {
         let urdf = std::fs::read_to_string(path)
             .map_err(|error| Problem::of_file(path, format!("cannot read the URDF: {error}")))?;
         let model = Model::from_urdf(&urdf)
             .map_err(|error| Problem::of_file(path, format!("cannot use the URDF: {error}")))?;
-        let joint_names: Vec<String> = model.joint_names().map(str::to_owned).collect();
-        let mut report = Report::default();
-        for joint in constants
-            .keys()
-            .filter(|joint| !joint_names.contains(joint))
-        {
-            let names = joint_names.iter().map(String::as_str);
-            let problem = Problem::new(format!("the robot has no joint `{joint}`"));
-            report.push(problem.maybe_help(suggest::help(joint, "its joints are", names)));
+        let joint_names = model.joint_names().map(str::to_owned).collect();
+        let name = model.name().to_owned();
+        let mut cell = Self::from_joints(name, joint_names, effort_unit, constants, problem)?;
+        cell.facts.urdf = Some(urdf);
+        cell.model = Some(model);
+        Ok(cell)
+    }
+
+    /// A cell of which no more than the joints is known; else as [`Cell::from_urdf`].
+    ///
+    /// # Errors
+    /// If there are too many joints, or the constants are not theirs.
+    pub fn from_joints(
+        name: String,
+        joint_names: Vec<String>,
+        effort_unit: EffortUnit,
+        constants: &BTreeMap<String, f64>,
+        problem: &dyn Fn(ConstantSpot<'_>, String) -> Problem,
+    ) -> Result<Self, Report> {
+        if joint_names.len() > MAX_JOINTS {
+            return Err(Problem::new(too_many(joint_names.len())).into());
         }
-        let by_joint: Option<Vec<f64>> = joint_names
-            .iter()
-            .map(|joint| constants.get(joint).copied())
-            .collect();
-        if by_joint.is_none() && !constants.is_empty() {
-            report.push(Problem::new(
-                "torque constants are wanted for all joints or for none",
-            ));
+        let mut report = Report::default();
+        let mut by_joint = None;
+        if !constants.is_empty() {
+            by_joint = constants::torque_constants(
+                constants,
+                &joint_names,
+                effort_unit,
+                problem,
+                &mut report,
+            );
         }
         let facts = CellFacts {
-            name: model.name().to_owned(),
-            urdf: Some(urdf),
+            name,
+            urdf: None,
             joint_names,
             effort_unit,
             torque_constants_nm_per_a: by_joint,
             tool: None,
             impedance: None,
         };
-        report.into_result(Self {
-            facts,
-            model: Some(model),
-        })
+        report.into_result(Self { facts, model: None })
     }
 
     /// The link the tool is attached to.
@@ -109,6 +122,10 @@ impl Cell {
     pub fn contact_point_on_tool_m(&self) -> Option<[f64; 3]> {
         self.facts.tool.as_ref()?.contact_point_m
     }
+}
+
+fn too_many(joints: usize) -> String {
+    format!("{joints} joints, at most {MAX_JOINTS} are supported")
 }
 
 /// Looks up every cell; those in which something is wrong are left out and reported.
@@ -210,48 +227,16 @@ impl Resolver<'_> {
         };
         if names.len() > MAX_JOINTS {
             let key = if model.is_some() { "robot" } else { "joints" };
-            let title = format!("{} joints, at most {MAX_JOINTS} are supported", names.len());
-            report.push(self.file.at(&self.place.key(key), title));
+            report.push(self.file.at(&self.place.key(key), too_many(names.len())));
         }
         names
     }
 
     fn torque_constants(&self, joints: &[String], report: &mut Report) -> Option<Vec<f64>> {
         let constants = self.entry.torque_constants_nm_per_a.as_ref()?;
-        let place = self.place.key("torque_constants_nm_per_a");
-        if self.entry.effort_unit == EffortUnit::Nm {
-            let problem = self
-                .file
-                .at_key(&place, "torque constants, but the effort is in Nm");
-            report.push(problem.help("give `effort_unit: A`, or leave them out"));
-        }
-        for (joint, constant) in constants {
-            let place = place.key(joint);
-            if !joints.contains(joint) && !joints.is_empty() {
-                let names = joints.iter().map(String::as_str);
-                let help = suggest::help(joint, "the joints are", names);
-                let title = format!("the robot has no joint `{joint}`");
-                report.push(self.file.at_key(&place, title).maybe_help(help));
-            }
-            if *constant <= 0.0 {
-                let title = format!("a torque constant is more than 0, found {constant}");
-                report.push(self.file.at(&place, title));
-            }
-        }
-        let missing: Vec<&str> = joints
-            .iter()
-            .filter(|joint| !constants.contains_key(*joint))
-            .map(String::as_str)
-            .collect();
-        if !missing.is_empty() {
-            let title = format!("no torque constant for {}", suggest::list(missing));
-            let problem = self.file.at_key(&place, title);
-            report.push(problem.help("name all joints, or leave `torque_constants_nm_per_a` out"));
-        }
-        joints
-            .iter()
-            .map(|joint| constants.get(joint).copied())
-            .collect()
+        let problem = |spot: ConstantSpot<'_>, title| spot.problem(self.file, &self.place, title);
+        let unit = self.entry.effort_unit;
+        constants::torque_constants(constants, joints, unit, &problem, report)
     }
 
     fn check_tool(&self, model: Option<&Model>, report: &mut Report) {

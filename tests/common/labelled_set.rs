@@ -19,6 +19,8 @@ pub struct Set {
     pub train: Vec<PathBuf>,
     pub validation: Vec<PathBuf>,
     pub test: PathBuf,
+    /// Further lines of the file.
+    pub more: &'static str,
 }
 
 impl Default for Set {
@@ -30,6 +32,7 @@ impl Default for Set {
             labels: Some(bundled().join("labels.json")),
             validation: vec![bundled().join("demo_validation.mcap")],
             test: bundled().join("demo.mcap"),
+            more: "",
         }
     }
 }
@@ -45,7 +48,8 @@ impl Set {
         };
         let text = format!(
             "set: hands\nrobot: {robot}\n{labels}topics: {{state: /joint_states, contact: /contact}}\n\
-             train: [{train}]\nvalidation: [{validation}]\ntest: [{test}]\n",
+             train: [{train}]\nvalidation: [{validation}]\ntest: [{test}]\n{more}\n",
+            more = self.more,
             robot = self.robot.display(),
             train = list(&self.train),
             validation = list(&self.validation),

@@ -9,6 +9,8 @@ pub const TOLERANCE_S: f64 = 0.02;
 pub const AFTER_S: f64 = 0.15;
 /// A false alarm within this time of the last counted one counts no more \[s\].
 pub const MERGE_S: f64 = 0.25;
+/// A labelled length may exceed the last stamp by so much: a period, or a rounding \[s\].
+pub const LAST_S: f64 = 0.5;
 /// Grid on which the time in alarm is counted \[s\].
 const GRID_S: f64 = 0.01;
 
@@ -94,10 +96,30 @@ pub fn in_alarm(truth: &Truth, duration_s: f64, detections: &[Event]) -> (f64, f
     (alarm as f64 * GRID_S, free as f64 * GRID_S)
 }
 
-/// Contact-free time of a recording \[s\]: its length less that of its events.
+/// Length of a recording \[s\]: as the labels have it, unless its samples end before.
+pub fn duration_s(truth: &Truth, last_s: f64) -> f64 {
+    let labelled = truth
+        .duration
+        .filter(|duration| *duration <= last_s + LAST_S);
+    labelled.unwrap_or(last_s)
+}
+
+/// Contact-free time of a recording \[s\]: its length less the part of it in which something is labelled. What came on
+/// top of another contact (`during`) is taken off on its own.
 pub fn free_s(truth: &Truth, duration_s: f64) -> f64 {
-    let busy: f64 = truth.events.iter().map(|e| e.t_off - e.t_on).sum();
-    duration_s - busy
+    let within = |event: &TrueEvent| (event.t_on.max(0.0), event.t_off.min(duration_s));
+    let (on_top, plain): (Vec<&TrueEvent>, Vec<&TrueEvent>) =
+        (truth.events.iter()).partition(|event| event.during.is_some());
+    let mut spans: Vec<(f64, f64)> = plain.into_iter().map(within).collect();
+    spans.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (mut busy, mut until) = (0.0, 0.0_f64);
+    for (on, off) in spans {
+        busy += (off - on.max(until)).max(0.0);
+        until = until.max(off);
+    }
+    let each = on_top.into_iter().map(within);
+    busy += each.map(|(on, off)| (off - on).max(0.0)).sum::<f64>();
+    (duration_s - busy).max(0.0)
 }
 
 #[cfg(test)]
@@ -185,5 +207,38 @@ mod tests {
         assert!((alarm - 0.19).abs() < 1e-9, "{alarm}");
         assert!((free - (2.0 - 0.68)).abs() < 0.011, "{free}");
         assert!((free_s(&truth, 2.0) - 1.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn contacts_count_once_and_only_within_the_recording() {
+        let free = |events| free_s(&truth(events), 20.0);
+        let is = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} is not {b}");
+        is(
+            free(vec![event(1.0, 4.0, false), event(2.0, 5.0, false)]),
+            16.0,
+        );
+        is(
+            free(vec![event(-3.0, 1.0, false), event(18.0, 900.0, false)]),
+            17.0,
+        );
+        is(
+            free(vec![event(0.0, 900.0, false), event(0.0, 900.0, false)]),
+            0.0,
+        );
+        let on_top = TrueEvent {
+            during: Some("collision".to_owned()),
+            ..event(2.0, 3.0, false)
+        };
+        is(free(vec![event(1.0, 4.0, false), on_top]), 16.0);
+    }
+
+    #[test]
+    fn a_labelled_length_counts_unless_the_samples_end_before() {
+        let labelled = |duration| Truth {
+            duration: Some(duration),
+            events: Vec::new(),
+        };
+        assert_eq!(duration_s(&labelled(20.01), 20.0), 20.01);
+        assert_eq!(duration_s(&labelled(900.0), 20.0), 20.0);
     }
 }

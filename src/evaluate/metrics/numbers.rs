@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::events::{Matched, Matching, free_s, in_alarm};
+use super::events::{Matched, Matching, duration_s, free_s, in_alarm};
 use super::samples::{Labelled, flags};
 use super::statistics::Distribution;
 use crate::evaluate::input::Request;
@@ -44,7 +44,7 @@ impl<'a> Scored<'a> {
             windows
         });
         let last = output.t.last().copied().unwrap_or(0.0);
-        let duration_s = truth.duration.unwrap_or(last);
+        let duration_s = duration_s(truth, last);
         Some(Self {
             output,
             matching: Matching::of(truth, &output.events, request.rest_s()),
@@ -102,6 +102,8 @@ pub struct Numbers {
     pub events: usize,
     /// Those that were found.
     pub found: usize,
+    /// Alarms in all: also those that came again while an event lasted, or in the rest after one.
+    pub alarms: usize,
     /// Detections of nothing.
     pub false_alarms: usize,
     /// The same per hour of contact-free time.
@@ -135,8 +137,7 @@ impl Numbers {
         };
         let samples = together(&|one| Some(one.samples.clone()));
         let windows = runner
-            .entry
-            .window
+            .window()
             .map(|_| together(&|one| one.windows.clone()));
         let matched: Vec<Matched<'_>> = (scored.iter())
             .flat_map(|one| one.matching.events.clone())
@@ -164,6 +165,7 @@ impl Numbers {
             samples: SampleNumbers::of(&samples, runner),
             windows: windows.map(|windows| SampleNumbers::of(&windows, runner)),
             events: matched.len(),
+            alarms: scored.iter().map(|one| one.output.events.len()).sum(),
             found: matched.iter().filter(|m| m.detection.is_some()).count(),
             false_alarms,
             false_alarms_per_hour: false_alarms as f64 / free_hours,

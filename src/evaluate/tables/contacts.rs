@@ -1,10 +1,13 @@
 //! Collision or cooperation: Salt Ducaju et al., tables I and II.
 
+use std::collections::BTreeMap;
+
 use super::{Table, mean_sd_ms, number, part, percent};
 use crate::evaluate::judged::Judged;
 use crate::evaluate::metrics::Matched;
 use crate::evaluate::metrics::statistics::{Distribution, mean_sd};
 
+const CONTACT: &str = "contact";
 const COLLISION: &str = "collision";
 const COOPERATION: &str = "cooperation";
 
@@ -96,11 +99,13 @@ fn confusion(judged: &[&Judged<'_>]) -> Table {
 
 fn operators(judged: &Judged<'_>) -> Option<Table> {
     let all = counted(judged);
-    let mut names: Vec<(&str, bool)> = (all.iter())
-        .filter_map(|m| Some((m.event.operator.as_deref()?, m.event.experienced?)))
-        .collect();
-    names.sort_unstable();
-    names.dedup();
+    let mut names: BTreeMap<&str, Option<bool>> = BTreeMap::new();
+    for event in all.iter().map(|matched| matched.event) {
+        if let Some(name) = event.operator.as_deref() {
+            let known = names.entry(name).or_default();
+            *known = known.or(event.experienced);
+        }
+    }
     if names.is_empty() {
         return None;
     }
@@ -118,7 +123,14 @@ fn operators(judged: &Judged<'_>) -> Option<Table> {
         let hits = told(&own, COOPERATION, COOPERATION);
         right.push((experienced, 100.0 * hits as f64 / own.len() as f64));
         table.row([
-            format!("{name}{}", if experienced { " (experienced)" } else { "" }),
+            format!(
+                "{name}{}",
+                if experienced == Some(true) {
+                    " (experienced)"
+                } else {
+                    ""
+                }
+            ),
             part(told(&own, COOPERATION, COLLISION), own.len()),
             part(hits, own.len()),
             missed(&own, COOPERATION).to_string(),
@@ -130,9 +142,12 @@ fn operators(judged: &Judged<'_>) -> Option<Table> {
         ("of the others", Some(false)),
     ] {
         let shares: Vec<f64> = (right.iter())
-            .filter(|(experienced, _)| of.is_none_or(|of| of == *experienced))
+            .filter(|(experienced, _)| of.is_none() || of == *experienced)
             .map(|(_, share)| *share)
             .collect();
+        if shares.is_empty() {
+            continue;
+        }
         let (mean, sd) = mean_sd(&shares);
         let said = format!("{} ± {} %", number(mean, 1), number(sd, 1));
         table.row([name.to_owned(), String::new(), said, String::new()]);
@@ -143,7 +158,7 @@ fn operators(judged: &Judged<'_>) -> Option<Table> {
 fn delays(judged: &[&Judged<'_>]) -> Table {
     let mut table = Table::new(
         "Detection times by kind and context",
-        "Context: what the contact came on top of.",
+        "Context: what the contact came on top of. \"all\" leaves out collisions on top of a cooperation, as table I does.",
         &[
             "detector",
             "kind",
@@ -156,26 +171,40 @@ fn delays(judged: &[&Judged<'_>]) -> Table {
     );
     for judged in judged {
         for kind in [COLLISION, COOPERATION] {
-            for context in [None, Some(COLLISION), Some(COOPERATION)] {
-                let own: Vec<Matched<'_>> = (judged.matched())
+            let all = counted(judged).into_iter();
+            let all = all.filter(|m| m.event.kind == kind).collect();
+            table.rows.extend(delay(judged, kind, "all", all));
+            for context in [None, Some(CONTACT), Some(COLLISION), Some(COOPERATION)] {
+                let own = (judged.matched())
                     .filter(|m| m.event.kind == kind && m.event.during.as_deref() == context)
                     .collect();
-                if own.is_empty() {
-                    continue;
-                }
-                let found = own.len() - missed(&own, kind);
-                let delay = Distribution::of(own.iter().filter_map(Matched::delay_s));
-                table.row([
-                    judged.label.clone(),
-                    kind.to_owned(),
-                    context.unwrap_or("free").to_owned(),
-                    part(found, own.len()),
-                    part(told(&own, kind, kind), own.len()),
-                    mean_sd_ms(&delay),
-                    super::ms(delay.p95),
-                ]);
+                let row = delay(judged, kind, context.unwrap_or("free"), own);
+                table.rows.extend(row);
             }
         }
     }
     table
+}
+
+/// A row, if there are such contacts.
+fn delay(
+    judged: &Judged<'_>,
+    kind: &str,
+    context: &str,
+    own: Vec<Matched<'_>>,
+) -> Option<Vec<String>> {
+    if own.is_empty() {
+        return None;
+    }
+    let found = own.len() - missed(&own, kind);
+    let delay = Distribution::of(own.iter().filter_map(Matched::delay_s));
+    Some(vec![
+        judged.label.clone(),
+        kind.to_owned(),
+        context.to_owned(),
+        part(found, own.len()),
+        part(told(&own, kind, kind), own.len()),
+        mean_sd_ms(&delay),
+        super::ms(delay.p95),
+    ])
 }

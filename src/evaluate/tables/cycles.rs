@@ -13,23 +13,28 @@ const ADAPTIVE: &str = "virtual_collision_sensor";
 /// Which events a row is of.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 enum Group {
-    Place(String, String),
+    Place(Option<String>, Option<String>),
     Material(String),
 }
 
 impl Group {
     fn name(&self) -> String {
         match self {
-            Self::Place(motion, zone) => format!("{motion} {zone}"),
+            Self::Place(motion, zone) => {
+                let parts: Vec<&str> = [motion, zone]
+                    .into_iter()
+                    .flatten()
+                    .map(String::as_str)
+                    .collect();
+                parts.join(" ")
+            }
             Self::Material(material) => material.clone(),
         }
     }
 
     fn holds(&self, event: &TrueEvent) -> bool {
         match self {
-            Self::Place(motion, zone) => {
-                event.motion.as_ref() == Some(motion) && event.zone.as_ref() == Some(zone)
-            }
+            Self::Place(motion, zone) => event.motion == *motion && event.zone == *zone,
             Self::Material(material) => event.material.as_ref() == Some(material),
         }
     }
@@ -40,8 +45,8 @@ pub fn tables(request: &Request, judged: &[Judged<'_>]) -> Vec<Table> {
     let mut groups: Vec<Group> = Vec::new();
     for matched in judged.iter().flat_map(Judged::matched) {
         let event = matched.event;
-        if let (Some(motion), Some(zone)) = (&event.motion, &event.zone) {
-            groups.push(Group::Place(motion.clone(), zone.clone()));
+        if event.motion.is_some() || event.zone.is_some() {
+            groups.push(Group::Place(event.motion.clone(), event.zone.clone()));
         }
         groups.extend(event.material.clone().map(Group::Material));
     }

@@ -6,6 +6,7 @@ use crate::evaluate::input::Role;
 use crate::evaluate::judged::Judged;
 use crate::evaluate::metrics::Numbers;
 use crate::evaluate::metrics::numbers::SampleNumbers;
+use crate::evaluate::registry::Training;
 
 /// The twins, joint by joint: Tajiri and Iwamoto's equations 9 and 10.
 pub fn twins(evaluation: &Evaluation) -> Table {
@@ -64,6 +65,16 @@ pub fn samples(judged: &[Judged<'_>]) -> Table {
         "{:.1} % of the samples are in a contact. Best F1 is over mean + i sigma of the validation scores.",
         100.0 * share
     );
+    let regressed = |judged: &Judged<'_>| {
+        let runner = judged.run.first();
+        runner.entry.training == Training::Twin && runner.training_s.is_finite()
+    };
+    let regression = if judged.iter().any(regressed) {
+        " The training of twin_regression is the regression, with reading."
+    } else {
+        ""
+    };
+    let note = format!("{note}{regression}");
     let mut table = Table::new(
         "Sample by sample (Tajiri and Iwamoto, table II)",
         note,
@@ -139,11 +150,12 @@ pub fn events(judged: &[Judged<'_>]) -> Table {
     let mut table = Table::new(
         "Event by event",
         format!(
-            "{minutes:.1} contact-free minutes; delays from the labelled beginning to the alarm."
+            "{minutes:.1} contact-free minutes; delays from the labelled beginning to the alarm. Alarms: in all, with those that came again while a contact lasted."
         ),
         &[
             "detector",
             "found",
+            "alarms",
             "false alarms",
             "per hour",
             "free time in alarm",
@@ -161,6 +173,7 @@ pub fn events(judged: &[Judged<'_>]) -> Table {
         table.row([
             judged.label.clone(),
             part(first.found, first.events),
+            first.alarms.to_string(),
             first.false_alarms.to_string(),
             over_seeds(&rates, 1),
             format!("{} %", number(100.0 * first.free_share_in_alarm, 2)),
@@ -207,23 +220,25 @@ pub fn places(judged: &[Judged<'_>]) -> Table {
 }
 
 /// What there is to tell without labels.
-pub fn unscored(evaluation: &Evaluation) -> Table {
-    let mut table = Table::new(
-        "Detections",
-        "The test recordings have no labels: nothing was scored.",
-        &["detector", "threshold", "detections", "time in alarm [s]"],
-    );
-    for run in &evaluation.runs {
-        let runner = run.first();
-        let test = runner
-            .outputs
-            .iter()
-            .filter(|output| output.role == Role::Test);
+pub fn unscored(evaluation: &Evaluation, judged: &[Judged<'_>]) -> Table {
+    let mut tests = evaluation.request.recordings.iter();
+    let note = if tests.any(|recording| recording.role == Role::Test) {
+        "The test recordings have no labels: nothing was scored."
+    } else {
+        "There are no test recordings: nothing was scored."
+    };
+    let head = ["detector", "threshold", "detections", "time in alarm [s]"];
+    let mut table = Table::new("Detections", note, &head);
+    for judged in judged {
+        let runner = judged.run.first();
+        let test = (runner.outputs.iter()).filter(|output| output.role == Role::Test);
         let events: Vec<_> = test.flat_map(|output| &output.events).collect();
-        let alarm: f64 = events.iter().map(|event| event.t_off - event.t).sum();
-        let twin = &evaluation.twins[run.twin].name;
+        // The sum of nothing would be -0.
+        let alarm = events
+            .iter()
+            .fold(0.0, |sum, event| sum + (event.t_off - event.t));
         table.row([
-            format!("{} ({twin})", runner.entry.name),
+            judged.label.clone(),
             format!("{:.4}", runner.threshold),
             events.len().to_string(),
             number(alarm, 1),
@@ -237,20 +252,26 @@ pub fn smallest(judged: &[Judged<'_>]) -> Vec<Table> {
     let tables = judged.iter().filter_map(|one| {
         let settings = one.run.first().config.tauscope.as_ref()?;
         let wish = settings.false_alarms_per_hour;
-        let wishes = [wish, 1.0, 1.0 / (7.0 * 24.0)];
-        let forces = wishes.map(|per_hour| settings.smallest_forces(per_hour));
+        let usual = [(1.0, "one an hour"), (1.0 / (7.0 * 24.0), "one a week")];
+        let mut wishes = vec![(wish, format!("{wish} an hour"))];
+        let others = usual.into_iter().filter(|(other, _)| (other - wish).abs() > 1e-9);
+        wishes.extend(others.map(|(other, said)| (other, said.to_owned())));
         let mut table = Table::new(
             format!("Smallest force found, {}", one.label),
             "Once it has lasted 0.2 s, in half and in nine of ten of the postures and directions of the contact-free recordings [N]; by the false alarms that are put up with.",
             &["link"],
         );
-        for said in [format!("{wish} an hour"), "one an hour".to_owned(), "one a week".to_owned()] {
+        for (_, said) in &wishes {
             table.head.extend([format!("{said}: half"), "nine of ten".to_owned()]);
         }
+        let forces: Vec<_> = (wishes.iter())
+            .map(|(per_hour, _)| settings.smallest_forces(*per_hour))
+            .collect();
         for (i, of_link) in forces[0].iter().enumerate() {
             let mut row = vec![of_link.link.clone()];
             for forces in &forces {
-                row.extend([forces[i].half_n, forces[i].most_n].map(|force| number(force.unwrap_or(f64::NAN), 1)));
+                let both = [forces[i].half_n, forces[i].most_n];
+                row.extend(both.map(|force| number(force.unwrap_or(f64::NAN), 1)));
             }
             table.row(row);
         }

@@ -8,9 +8,8 @@ use tauscope_twin::TwinFile;
 
 use super::{Named, Request, StartFile};
 use crate::explain::read;
-use crate::pipeline::{Cell, CellFacts, EffortUnit};
+use crate::pipeline::{self, Cell, CellFacts, ConstantSpot, EffortUnit};
 use crate::report::{Problem, Report};
-use crate::suggest;
 use crate::yaml;
 
 /// Where in the input something stands that may be wrong.
@@ -20,9 +19,7 @@ pub enum Spot<'a> {
     /// The path of the twin to start from.
     Twin,
     /// The torque constants.
-    Constants,
-    /// That of a joint.
-    Constant(&'a str),
+    Constants(ConstantSpot<'a>),
     /// A recording to fit.
     Fit(usize),
     /// A recording to hold out.
@@ -197,39 +194,8 @@ impl Assembly<'_> {
 
     fn torque_constants(&self, joints: &[String], report: &mut Report) -> Option<Vec<f64>> {
         let constants = self.constants.as_ref()?;
-        let problem = self.problem;
-        if self.effort_unit == EffortUnit::Nm {
-            let title = "torque constants, but the effort is in Nm".to_owned();
-            let help = "say that the effort unit is A, or leave them out";
-            report.push(problem(Spot::Constants, title).help(help));
-        }
-        for (joint, constant) in constants {
-            if !joints.contains(joint) {
-                let help =
-                    suggest::help(joint, "the joints are", joints.iter().map(String::as_str));
-                let title = format!("the robot has no joint `{joint}`");
-                report.push(problem(Spot::Constant(joint), title).maybe_help(help));
-            }
-            if !(constant.is_finite() && *constant > 0.0) {
-                let title = format!("a torque constant is more than 0, found {constant}");
-                report.push(problem(Spot::Constant(joint), title));
-            }
-        }
-        let is_missing = |joint: &&String| !constants.contains_key(*joint);
-        let missing: Vec<&str> = joints
-            .iter()
-            .filter(is_missing)
-            .map(String::as_str)
-            .collect();
-        if !missing.is_empty() {
-            let title = format!("no torque constant for {}", suggest::list(missing));
-            let help = "torque constants are wanted for all joints or for none";
-            report.push(problem(Spot::Constants, title).help(help));
-        }
-        joints
-            .iter()
-            .map(|joint| constants.get(joint).copied())
-            .collect()
+        let problem = |spot: ConstantSpot<'_>, title| (self.problem)(Spot::Constants(spot), title);
+        pipeline::torque_constants(constants, joints, self.effort_unit, &problem, report)
     }
 
     /// A twin to start from must be one of this robot, in this unit.
