@@ -23,7 +23,8 @@ pub struct Args {
     #[arg(long, value_name = "DETECTORS", value_delimiter = ',')]
     detectors: Vec<String>,
     /// Behind which twin: `rigid`, `regression`, `topic`, or the path of a twin.yaml; may be given several
-    /// times. Without it `topic` where the set names one, else `regression`.
+    /// times. Without it `topic` where the set names one, `rigid` where it gives an
+    /// impedance and efforts are in N m, else `regression`.
     #[arg(long, value_name = "TWIN")]
     twin: Vec<String>,
     /// Low-pass on the velocity before it is differentiated, in Hz; without it the twin's own.

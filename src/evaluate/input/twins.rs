@@ -6,7 +6,7 @@ use tauscope_twin::TwinFile;
 
 use super::{TwinChoice, TwinSource};
 use crate::files::SetFile;
-use crate::pipeline::Cell;
+use crate::pipeline::{Cell, EffortUnit};
 use crate::replay::stem;
 use crate::report::{Problem, Report};
 use crate::suggest;
@@ -30,6 +30,9 @@ pub fn choices(
     }
     let usual = if set.topics.twin.is_some() {
         "topic"
+    } else if set.impedance.is_some() && cell.facts.effort_unit == EffortUnit::Nm {
+        // An arm under impedance control feels torque behind its gears: friction would be all that a gain takes up.
+        "rigid"
     } else {
         "regression"
     };
