@@ -199,12 +199,7 @@ impl Evaluation {
                 .map_err(|source| failed(recording, source))?;
             heard.add(recording, &played)?;
             let mut lesson = session::lesson(recording, played.samples);
-            let facts = &request.cell.facts;
-            let bad = bad_readings::leave_out(
-                &mut lesson,
-                &facts.joint_names,
-                facts.effort_unit.as_str(),
-            );
+            let bad = bad_readings::leave_out(&mut lesson, &request.cell.facts);
             heard.notes.extend(bad);
             lessons.push(lesson);
         }

@@ -8,6 +8,7 @@ use tauscope_detect::{ContactKind, LabelledContact, Lesson};
 
 use super::metrics::statistics::quantile;
 use super::twin::is_free_of;
+use crate::pipeline::CellFacts;
 
 /// A bad reading stands out by so many times what all but one in a hundred samples differ at most from the middle of their neighbours.
 const STANDS_OUT: f64 = 20.0;
@@ -53,14 +54,14 @@ fn find(lesson: &Lesson, joints: usize) -> Vec<BadReading> {
             // Most samples repeat the one before: nothing tells what is usual.
             continue;
         }
-        for at in 1..residual.len() - 2 {
+        for (at, sample) in samples.iter().enumerate().skip(1).take(samples.len() - 3) {
             let stands_out = [at, at + 1]
                 .into_iter()
                 .any(|to| departure(&residual, at, to) > bound);
             let known = found
                 .last()
                 .is_some_and(|last| last.joint == joint && at - last.index < 2);
-            if stands_out && !known && is_free_of(lesson, samples[at].header.stamp_ns) {
+            if stands_out && !known && is_free_of(lesson, sample.header.stamp_ns) {
                 found.push(BadReading { index: at, joint });
             }
         }
@@ -69,18 +70,19 @@ fn find(lesson: &Lesson, joints: usize) -> Vec<BadReading> {
 }
 
 /// Leaves bad readings, and what the filters make of them, out of what `lesson` teaches; says so, with the first of them.
-pub fn leave_out(lesson: &mut Lesson, joint_names: &[String], unit: &str) -> Option<String> {
-    let found = find(lesson, joint_names.len());
+pub fn leave_out(lesson: &mut Lesson, facts: &CellFacts) -> Option<String> {
+    let found = find(lesson, facts.joint_names.len());
     let first = found.first()?;
     let sample = &lesson.samples[first.index];
     let begin_ns = lesson.samples[0].header.stamp_ns;
     let at_s = (sample.header.stamp_ns - begin_ns) as f64 * 1e-9;
     let note = format!(
-        "{}: {} reading(s) jump away and back as no arm does, the first at {} ({:.3} {unit} at {at_s:.3} s): left out of what is learnt and of thresholds",
+        "{}: {} reading(s) jump away and back as no arm does, the first at {} ({:.3} {} at {at_s:.3} s): left out of what is learnt and of thresholds",
         lesson.name,
         found.len(),
-        joint_names[first.joint],
+        facts.joint_names[first.joint],
         sample.effort[first.joint],
+        facts.effort_unit.as_str(),
     );
     let contacts = lesson.contacts.get_or_insert_default();
     // Learners pass over what somebody labelled and told them to ignore, and over what follows it.
@@ -99,6 +101,7 @@ pub fn leave_out(lesson: &mut Lesson, joint_names: &[String], unit: &str) -> Opt
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pipeline::EffortUnit;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -119,8 +122,20 @@ mod tests {
         }
     }
 
+    fn facts() -> CellFacts {
+        CellFacts {
+            name: "cell".to_owned(),
+            urdf: None,
+            joint_names: vec!["joint1".to_owned()],
+            effort_unit: EffortUnit::Nm,
+            torque_constants_nm_per_a: None,
+            tool: None,
+            impedance: None,
+        }
+    }
+
     fn left_out(lesson: &mut Lesson) -> Vec<i64> {
-        leave_out(lesson, &["joint1".to_owned()], "Nm");
+        leave_out(lesson, &facts());
         let contacts = lesson.contacts.iter().flatten();
         contacts.map(|contact| contact.on_ns / 10_000_000).collect()
     }
@@ -129,7 +144,7 @@ mod tests {
     fn one_or_two_samples_that_jump_away_and_back_are_left_out_and_told() {
         for last in [500, 501] {
             let mut lesson = lesson(|k| if (500..=last).contains(&k) { 9.0 } else { 0.0 });
-            let note = leave_out(&mut lesson, &["joint1".to_owned()], "Nm");
+            let note = leave_out(&mut lesson, &facts());
             assert!(note.is_some_and(|note| note.contains("at joint1 (") && note.contains("at 5.000 s")));
             let contacts = lesson.contacts.as_deref().unwrap_or_default();
             assert_eq!(contacts.len(), 1);
