@@ -117,6 +117,7 @@ recordings:
         train: vec![recording("learn.mcap")],
         validation: Vec::new(),
         test: recording("touched.mcap"),
+        more: "",
     };
     let detectors =
         "momentum_observer,contact_classifier,fisher_discriminant,frequency_classifier,tauscope";

@@ -14,7 +14,8 @@ use crate::pipeline::ScenarioFacts;
 /// As [`crate::files::SetFile`] reads it.
 #[derive(Debug, Serialize)]
 struct Set<'a> {
-    set: &'a str,
+    #[serde(rename = "set")]
+    name: &'a str,
     robot: PathBuf,
     labels: PathBuf,
     rate_hz: f64,
@@ -61,7 +62,7 @@ pub fn write(facts: &ScenarioFacts, labels: &Path, out: &Path) -> anyhow::Result
     }
     let impedance = scenario.controller.impedance.as_ref();
     let set = Set {
-        set: &scenario.name,
+        name: &scenario.name,
         robot: case::put_robot(facts, out)?,
         labels: labels.file_name().unwrap_or(labels.as_os_str()).into(),
         rate_hz: scenario.rate_hz,

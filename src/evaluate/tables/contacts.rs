@@ -172,13 +172,13 @@ fn delays(judged: &[&Judged<'_>]) -> Table {
     for judged in judged {
         for kind in [COLLISION, COOPERATION] {
             let all = counted(judged).into_iter();
-            let all = all.filter(|m| m.event.kind == kind).collect();
-            table.rows.extend(delay(judged, kind, "all", all));
+            let all: Vec<_> = all.filter(|m| m.event.kind == kind).collect();
+            table.rows.extend(delay(judged, kind, "all", &all));
             for context in [None, Some(CONTACT), Some(COLLISION), Some(COOPERATION)] {
-                let own = (judged.matched())
+                let own: Vec<_> = (judged.matched())
                     .filter(|m| m.event.kind == kind && m.event.during.as_deref() == context)
                     .collect();
-                let row = delay(judged, kind, context.unwrap_or("free"), own);
+                let row = delay(judged, kind, context.unwrap_or("free"), &own);
                 table.rows.extend(row);
             }
         }
@@ -191,19 +191,19 @@ fn delay(
     judged: &Judged<'_>,
     kind: &str,
     context: &str,
-    own: Vec<Matched<'_>>,
+    own: &[Matched<'_>],
 ) -> Option<Vec<String>> {
     if own.is_empty() {
         return None;
     }
-    let found = own.len() - missed(&own, kind);
+    let found = own.len() - missed(own, kind);
     let delay = Distribution::of(own.iter().filter_map(Matched::delay_s));
     Some(vec![
         judged.label.clone(),
         kind.to_owned(),
         context.to_owned(),
         part(found, own.len()),
-        part(told(&own, kind, kind), own.len()),
+        part(told(own, kind, kind), own.len()),
         mean_sd_ms(&delay),
         super::ms(delay.p95),
     ])
