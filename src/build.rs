@@ -137,7 +137,10 @@ pub fn twin(
         torque_constants_nm_per_a: cell.facts.torque_constants_nm_per_a.clone(),
         tool_link: cell.tool_link(),
     };
-    Ok(Twin::new(config, setup, correction(model, cell)?)?)
+    let config = config
+        .clone()
+        .with(config.filters(model.map(|model| model.filters)));
+    Ok(Twin::new(&config, setup, correction(model, cell)?)?)
 }
 
 /// A detector behind a twin of `cell` with this `model`, and what it shares with others.

@@ -6,9 +6,7 @@ use std::path::{Path, PathBuf};
 use tauscope_bus::{SampleRef, Sink, StageError, TwinState, flags};
 use tauscope_detect::Detector;
 use tauscope_ingest::{FileConfig, RecordedSource, Topics};
-use tauscope_twin::{
-    Calibration, Expected, Filters, JointCorrection, Robot, ScoreStatistics, TwinFile,
-};
+use tauscope_twin::{Calibration, Expected, JointCorrection, Robot, ScoreStatistics, TwinFile};
 
 use crate::build;
 use crate::pipeline::{Cell, EffortUnit};
@@ -247,10 +245,7 @@ impl Job<'_> {
                     .map_or_else(String::new, |urdf| provenance::sha256(urdf.as_bytes())),
             },
             effort_unit: facts.effort_unit.as_str().to_owned(),
-            filters: Filters {
-                velocity_cutoff_hz: self.twin.velocity_cutoff_hz,
-                effort_cutoff_hz: self.twin.effort_cutoff_hz,
-            },
+            filters: self.twin.filters(None),
             joints: std::collections::BTreeMap::new(),
             terms: Vec::new(),
             scores: std::collections::BTreeMap::new(),

@@ -306,7 +306,7 @@ error: `effort_cutoff_hz` is 5, but the twin's model was made with 4.5
 5 | - {name: twin, input: ingest, twin: {model: twin.yaml, effort_cutoff_hz: 5}}
   |                                                                          ^
   |
-  = help: give `effort_cutoff_hz: 4.5`, or calibrate anew: its thresholds hold for no other
+  = help: leave it out or give `effort_cutoff_hz: 4.5`, or calibrate anew: its thresholds hold for no other
 
 2 errors; nothing was started
 "

@@ -55,10 +55,10 @@ pub struct Args {
     #[arg(long, default_value = "measured", value_parser = motion)]
     motion: Motion,
     /// Low-pass on the velocity before it is differentiated, in Hz.
-    #[arg(long, default_value_t = tauscope_twin::Config::default().velocity_cutoff_hz)]
+    #[arg(long, default_value_t = tauscope_twin::Filters::default().velocity_cutoff_hz)]
     velocity_cutoff_hz: f64,
     /// Low-pass on measured and expected effort, in Hz.
-    #[arg(long, default_value_t = tauscope_twin::Config::default().effort_cutoff_hz)]
+    #[arg(long, default_value_t = tauscope_twin::Filters::default().effort_cutoff_hz)]
     effort_cutoff_hz: f64,
     /// Machine-readable.
     #[arg(long)]
@@ -107,8 +107,8 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
         } else {
             Expected::Model
         },
-        velocity_cutoff_hz: args.velocity_cutoff_hz,
-        effort_cutoff_hz: args.effort_cutoff_hz,
+        velocity_cutoff_hz: Some(args.velocity_cutoff_hz),
+        effort_cutoff_hz: Some(args.effort_cutoff_hz),
         ..tauscope_twin::Config::default()
     };
     let job = Job {

@@ -50,8 +50,6 @@ impl Prepared {
             TwinSource::Topic => true,
             // A corrected topic has no robot.
             TwinSource::File(file) => {
-                config.velocity_cutoff_hz = file.filters.velocity_cutoff_hz;
-                config.effort_cutoff_hz = file.filters.effort_cutoff_hz;
                 file.robot.name.is_empty() && request.set.topics.twin.is_some()
             }
             TwinSource::Rigid | TwinSource::Regression => false,
@@ -59,9 +57,7 @@ impl Prepared {
         if reference {
             config.expected = Expected::Topic;
         }
-        let [velocity, effort] = request.cutoffs_hz;
-        config.velocity_cutoff_hz = velocity.unwrap_or(config.velocity_cutoff_hz);
-        config.effort_cutoff_hz = effort.unwrap_or(config.effort_cutoff_hz);
+        [config.velocity_cutoff_hz, config.effort_cutoff_hz] = request.cutoffs_hz;
 
         let fit = train(request);
         let topics = request.topics(reference);

@@ -329,7 +329,9 @@ impl<'a> Resolver<'a> {
             // The twin's model is wrong, which has been said.
             return None;
         }
-        let effort_cutoff_hz = twin_config.effort_cutoff_hz;
+        let effort_cutoff_hz = twin_config
+            .filters(model.map(|model| model.filters))
+            .effort_cutoff_hz;
         if let Some(cell) = self.cell(index)
             && let Err(error) = build::watch(config, model, effort_cutoff_hz, cell)
         {

@@ -20,9 +20,10 @@ pub fn twins(evaluation: &Evaluation) -> Table {
             of(&format!("offset [{unit}]")),
             of(&format!("noise [{unit}]")),
         ]);
+        let filters = twin.config.filters(Some(twin.file.filters));
         let mut said = format!(
             "{}: low-pass {} Hz on efforts, {} Hz on velocity",
-            twin.name, twin.config.effort_cutoff_hz, twin.config.velocity_cutoff_hz
+            twin.name, filters.effort_cutoff_hz, filters.velocity_cutoff_hz
         );
         if !twin.file.terms.is_empty() {
             said.push_str(&format!(

@@ -40,13 +40,15 @@ impl Resolver<'_> {
                 clippy::float_cmp,
                 reason = "both were written by people, not computed"
             )]
-            let same = here == there;
-            if !model.scores.is_empty() && !same {
+            let other = here.filter(|here| *here != there);
+            if let Some(here) = other
+                && !model.scores.is_empty()
+            {
                 let title =
                     format!("`{key}` is {here}, but the twin's model was made with {there}");
                 let problem = self.file.at(&place.key(key), title);
                 let help = format!(
-                    "give `{key}: {there}`, or calibrate anew: its thresholds hold for no other"
+                    "leave it out or give `{key}: {there}`, or calibrate anew: its thresholds hold for no other"
                 );
                 self.report.push(problem.help(help));
             }

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::twin_file::Filters;
+
 /// A twin: what the effort should have been.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -16,12 +18,14 @@ pub struct Config {
     pub motion: Motion,
     /// Where the expected effort comes from.
     pub expected: Expected,
-    /// Low-pass on the velocity before it is differentiated to the acceleration \[Hz\].
+    /// Low-pass on the velocity before it is differentiated to the acceleration \[Hz\]; without it that of the `model`, else 12.
     #[schemars(range(min = 0.01, max = 10_000.0))]
-    pub velocity_cutoff_hz: f64,
-    /// The same low-pass on measured and expected effort \[Hz\]; the residual is their difference.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub velocity_cutoff_hz: Option<f64>,
+    /// The same low-pass on measured and expected effort \[Hz\], whose difference is the residual; without it that of the `model`, else 4.5.
     #[schemars(range(min = 0.01, max = 10_000.0))]
-    pub effort_cutoff_hz: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub effort_cutoff_hz: Option<f64>,
     /// A gap between two samples longer than this starts the filters anew \[s\].
     #[schemars(range(min = 0.001, max = 3600.0))]
     pub max_gap_s: f64,
@@ -33,9 +37,30 @@ impl Default for Config {
             model: None,
             motion: Motion::Measured,
             expected: Expected::Model,
-            velocity_cutoff_hz: 12.0,
-            effort_cutoff_hz: 4.5,
+            velocity_cutoff_hz: None,
+            effort_cutoff_hz: None,
             max_gap_s: 0.25,
+        }
+    }
+}
+
+impl Config {
+    /// The low-passes: what is given, and what is not as the `model` has it.
+    pub fn filters(&self, model: Option<Filters>) -> Filters {
+        let made_with = model.unwrap_or_default();
+        Filters {
+            velocity_cutoff_hz: (self.velocity_cutoff_hz).unwrap_or(made_with.velocity_cutoff_hz),
+            effort_cutoff_hz: self.effort_cutoff_hz.unwrap_or(made_with.effort_cutoff_hz),
+        }
+    }
+
+    /// The same, with these low-passes given.
+    #[must_use]
+    pub fn with(self, filters: Filters) -> Self {
+        Self {
+            velocity_cutoff_hz: Some(filters.velocity_cutoff_hz),
+            effort_cutoff_hz: Some(filters.effort_cutoff_hz),
+            ..self
         }
     }
 }
@@ -63,4 +88,27 @@ pub enum Expected {
     Model,
     /// From somebody else's twin, whose effort the source reads from a topic.
     Topic,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_low_pass_that_nobody_gives_is_the_models() {
+        let model = Filters {
+            velocity_cutoff_hz: 20.0,
+            effort_cutoff_hz: 4.0,
+        };
+        let given = Config {
+            velocity_cutoff_hz: Some(15.0),
+            ..Config::default()
+        };
+        let filters = given.filters(Some(model));
+        assert_eq!(
+            [filters.velocity_cutoff_hz, filters.effort_cutoff_hz],
+            [15.0, 4.0]
+        );
+        assert_eq!(Config::default().filters(None), Filters::default());
+    }
 }

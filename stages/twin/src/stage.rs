@@ -85,8 +85,9 @@ impl Twin {
         if config.expected == Expected::Model && setup.model.is_none() {
             return Err(TwinError::NoModel);
         }
-        let motion = MotionTracker::new(config.motion, joint_count, config.velocity_cutoff_hz);
-        let effort_filter = Butterworth2::new(config.effort_cutoff_hz);
+        let filters = config.filters(None);
+        let motion = MotionTracker::new(config.motion, joint_count, filters.velocity_cutoff_hz);
+        let effort_filter = Butterworth2::new(filters.effort_cutoff_hz);
         let nm_per_unit = setup
             .torque_constants_nm_per_a
             .unwrap_or_else(|| vec![1.0; joint_count]);

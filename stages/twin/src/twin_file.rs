@@ -58,6 +58,15 @@ pub struct Filters {
     pub effort_cutoff_hz: f64,
 }
 
+impl Default for Filters {
+    fn default() -> Self {
+        Self {
+            velocity_cutoff_hz: 12.0,
+            effort_cutoff_hz: 4.5,
+        }
+    }
+}
+
 /// How one joint's measured effort follows from the model's:
 /// `measured = gain * model + offset` (Tajiri and Iwamoto, equation 4).
 ///
