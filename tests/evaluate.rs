@@ -103,6 +103,21 @@ fn further_twins_stand_beside_the_first_and_cannot_be_mistaken_for_it() {
 }
 
 #[test]
+fn the_usual_twin_is_a_regression_and_of_an_arm_under_impedance_control_the_rigid_one() {
+    let impedance = "impedance: {translational_n_per_m: 150, rotational_nm_per_rad: 10}";
+    for (more, wanted) in [("", "regression"), (impedance, "rigid")] {
+        let folder = tempfile::tempdir().unwrap();
+        let set = Set {
+            more,
+            ..Set::default()
+        };
+        let set = set.write(folder.path());
+        let summary = summary(&set, &folder.path().join("out"), &LIGHT);
+        assert_eq!(summary["detectors"][0]["twin"], wanted);
+    }
+}
+
+#[test]
 fn without_labels_there_are_detections_and_it_is_said_that_nothing_was_scored() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
