@@ -60,20 +60,24 @@ fn finds_in_a_pipeline_what_was_found(
     }
 }
 
-/// A session of one test recording, so that nothing is carried over from a validation recording.
+/// What a validation recording has taught stands in `learnt.yaml`, and nothing else is carried over from it.
 #[test]
 fn a_pipeline_of_what_was_learnt_finds_what_evaluate_found() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("out");
-    let set = Set {
+    let detectors = "naive_difference,twin_regression,momentum_observer,virtual_collision_sensor_basic,\
+                     virtual_collision_sensor,tauscope";
+    let validated = Set::default();
+    let trained = Set {
         validation: Vec::new(),
         ..Set::default()
     };
-    let detectors = "naive_difference,twin_regression,momentum_observer,virtual_collision_sensor_basic,\
-                     virtual_collision_sensor,window_ocsvm,tauscope";
-    let run = evaluate(&set.write(folder.path()), &out, &["--detectors", detectors]);
-    assert_eq!(run.code, 0, "{}", run.stderr);
-    finds_in_a_pipeline_what_was_found(folder.path(), &set, &out, ("demo", 7));
+    let with_machine = format!("{detectors},window_ocsvm");
+    for (set, detectors, count) in [(validated, detectors, 6), (trained, &with_machine, 7)] {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("out");
+        let run = evaluate(&set.write(folder.path()), &out, &["--detectors", detectors]);
+        assert_eq!(run.code, 0, "{}", run.stderr);
+        finds_in_a_pipeline_what_was_found(folder.path(), &set, &out, ("demo", count));
+    }
 }
 
 /// The same of those that need collisions, cooperations and a high rate.
