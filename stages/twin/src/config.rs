@@ -104,11 +104,11 @@ mod tests {
             velocity_cutoff_hz: Some(15.0),
             ..Config::default()
         };
-        let filters = given.filters(Some(model));
-        assert_eq!(
-            [filters.velocity_cutoff_hz, filters.effort_cutoff_hz],
-            [15.0, 4.0]
-        );
+        let wanted = Filters {
+            velocity_cutoff_hz: 15.0,
+            effort_cutoff_hz: 4.0,
+        };
+        assert_eq!(given.filters(Some(model)), wanted);
         assert_eq!(Config::default().filters(None), Filters::default());
     }
 }
