@@ -9,15 +9,15 @@ const HOLD_S: f64 = 0.1;
 /// Another contact on top of one: the residual changes by this many times the threshold against what it has been, which is
 /// followed with this time constant, and is no release; not sooner than this after the last alarm \[s\].
 const CHANGE: f64 = 2.0;
+const FOLLOW_S: f64 = 0.15;
+const AGAIN_S: f64 = 0.25;
 /// One contact may swell and still be one: the change must be this share of what it has been as well.
 const SWELL: f64 = 0.5;
 /// Where kinds are told apart, it is another one, too, if the change points elsewhere: no more than this share of it along the contact (the cosine).
 const ELSEWHERE: f64 = 0.92;
 /// A contact that only falls is released: its change points against it by more than this (the cosine).
 const FALLS: f64 = 0.7;
-const FOLLOW_S: f64 = 0.15;
-const AGAIN_S: f64 = 0.25;
-/// Sooner, after this \[s\], one that is as large as that and points elsewhere: no more than this share of it along the contact (the cosine).
+/// Sooner, after this \[s\], one that is as large as a swell would have to be, and points elsewhere: no more than this share of it along the contact (the cosine).
 const SOON_S: f64 = 0.1;
 const TURNS: f64 = 0.5;
 /// Where kinds are told, the alarm waits so long for the force to show where it points \[s\].
