@@ -19,6 +19,7 @@ mod recording;
 mod repair;
 pub mod ros;
 mod sqlite_file;
+pub mod whole_file;
 
 pub use csv_file::{Column, Columns, CsvError, CsvMapping, CsvProblem, limits as csv_limits};
 pub use damage::{Damage, DamageKind};

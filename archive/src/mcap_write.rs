@@ -15,6 +15,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::ros;
+use crate::whole_file::{self, Existing, part_of};
 pub use error::WriteError;
 use error::yaml;
 pub(crate) use error::{io, mcap};
@@ -56,10 +57,13 @@ pub struct McapWriter {
     path: PathBuf,
     part: PathBuf,
     set_aside: Option<PathBuf>,
+    existing: Existing,
     topics: Vec<WrittenTopic>,
     /// Log time of the first message in the open chunk.
     chunk_start_ns: Option<i64>,
     chunk_bytes: usize,
+    /// Bytes in the file when the last chunk was closed.
+    bytes: u64,
     log_times_ns: Option<(i64, i64)>,
     body: Vec<u8>,
 }
@@ -117,7 +121,7 @@ impl McapWriter {
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(io(folder))?;
         }
-        let set_aside = set_aside(&path, &part)?;
+        let set_aside = whole_file::set_part_aside(&path).map_err(io(&part))?;
         let file = OpenOptions::new()
             .read(true)
             .write(true)
@@ -134,14 +138,29 @@ impl McapWriter {
             path,
             part,
             set_aside,
+            existing: Existing::Keep,
             topics: Vec::new(),
             chunk_start_ns: None,
             chunk_bytes: 0,
+            bytes: 0,
             log_times_ns: None,
             body: Vec::new(),
         };
         this.write_metadata(PROVENANCE, provenance)?;
         Ok(this)
+    }
+
+    /// What becomes of a file that has the name when this one is complete. Unless told otherwise it is
+    /// kept, and this one gets the first name that is free: `a.1.mcap` for `a.mcap`.
+    #[must_use]
+    pub fn existing(mut self, existing: Existing) -> Self {
+        self.existing = existing;
+        self
+    }
+
+    /// Length of the file when its last chunk was closed \[bytes\].
+    pub fn bytes(&self) -> u64 {
+        self.bytes
     }
 
     /// Where a `.part` of a writer before was moved to.
@@ -242,14 +261,19 @@ impl McapWriter {
             return Ok(());
         }
         self.chunk_bytes = 0;
-        self.writer.flush().map_err(mcap(&self.part))
+        self.writer.flush().map_err(mcap(&self.part))?;
+        self.bytes = fs::metadata(&self.part).map_err(io(&self.part))?.len();
+        Ok(())
     }
 
-    /// Completes the file and gives it its proper name, in place of an older one.
+    /// Completes the file and gives it its proper name, which [`Written::path`] tells.
     ///
     /// # Errors
     /// If it cannot be written; the `.part` stays.
     pub fn finish(mut self) -> Result<Written, WriteError> {
+        if self.existing == Existing::Keep {
+            self.path = whole_file::unused_name(&self.path).map_err(io(&self.path))?;
+        }
         let bag = rosbag2::serialized_metadata(&self.path, &self.topics, self.log_times_ns)
             .map_err(yaml(&self.part))?;
         self.write_metadata(
@@ -260,10 +284,11 @@ impl McapWriter {
             writer,
             path,
             part,
+            existing,
             topics,
             ..
         } = self;
-        let bytes = complete(writer, &part, &path)?;
+        let bytes = complete(writer, &part, &path, existing)?;
         Ok(Written {
             messages: topics.iter().map(|topic| topic.count).sum(),
             path,
@@ -286,18 +311,12 @@ impl McapWriter {
     }
 }
 
-/// What a file is called until it is whole.
-pub(crate) fn part_of(path: &Path) -> PathBuf {
-    let mut part = path.to_owned().into_os_string();
-    part.push(".part");
-    part.into()
-}
-
 /// Completes the file that `writer` has written as `part` and renames it; gives its length.
 pub(crate) fn complete(
     mut writer: mcap::Writer<BufWriter<File>>,
     part: &Path,
     path: &Path,
+    existing: Existing,
 ) -> Result<u64, WriteError> {
     writer.finish().map_err(mcap(part))?;
     let file = writer
@@ -307,7 +326,7 @@ pub(crate) fn complete(
     summary_order::sort(&file).map_err(io(part))?;
     file.sync_all().map_err(io(part))?;
     let bytes = file.metadata().map_err(io(part))?.len();
-    fs::rename(part, path).map_err(io(path))?;
+    whole_file::put_in_place(part, path, existing).map_err(io(path))?;
     Ok(bytes)
 }
 
@@ -325,22 +344,4 @@ pub(crate) fn options(compression: Compression) -> mcap::WriteOptions {
         .chunk_size(None)
         // A chunk comes into the file whole: a torn one is never patched.
         .disable_seeking(true)
-}
-
-/// Moves an old `.part` to `<stem>.<n>.mcap.part`, with the first `n` that is free.
-fn set_aside(path: &Path, part: &Path) -> Result<Option<PathBuf>, WriteError> {
-    if !part.try_exists().map_err(io(part))? {
-        return Ok(None);
-    }
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let extension = path.extension().unwrap_or_default().to_string_lossy();
-    let mut n = 1_u32;
-    loop {
-        let aside = path.with_file_name(format!("{stem}.{n}.{extension}.part"));
-        if !aside.try_exists().map_err(io(&aside))? {
-            fs::rename(part, &aside).map_err(io(part))?;
-            return Ok(Some(aside));
-        }
-        n += 1;
-    }
 }

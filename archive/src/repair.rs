@@ -12,6 +12,7 @@ use crate::damage::{Damage, DamageKind};
 use crate::mcap_file::{Layout, McapCursor, Order, attachment_header};
 use crate::mcap_write::{self, Compression, WriteError, Written};
 use crate::recording::Cursor;
+use crate::whole_file::{self, Existing};
 use crate::{ArchiveError, Recording, RecordingKind};
 
 /// Name of the metadata record that says what was repaired.
@@ -74,7 +75,7 @@ pub fn repair(from: &Path, to: &Path) -> Result<Repaired, RepairError> {
         }));
     }
     let layout = Arc::new(Layout::read(from)?);
-    let part = mcap_write::part_of(to);
+    let part = whole_file::part_of(to);
     let file = OpenOptions::new()
         .read(true)
         .write(true)
@@ -98,7 +99,7 @@ pub fn repair(from: &Path, to: &Path) -> Result<Repaired, RepairError> {
     copy.messages()?;
     copy.attachments()?;
     copy.metadata()?;
-    let bytes = mcap_write::complete(copy.writer, &copy.part, to)?;
+    let bytes = mcap_write::complete(copy.writer, &copy.part, to, Existing::Keep)?;
     Ok(Repaired {
         written: Written {
             path: to.to_owned(),

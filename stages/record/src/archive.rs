@@ -6,9 +6,10 @@ mod detections;
 mod joints;
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use tauscope_archive::ros::{self, DiagnosticArray};
+use tauscope_archive::whole_file::Existing;
 use tauscope_archive::{Compression, McapWriter, TopicWriter, WriteError};
 use tauscope_bus::{Header, Health, SampleKind, SampleRef, TwinState, flags};
 
@@ -82,10 +83,11 @@ impl Archive {
     pub fn create(
         path: &Path,
         compression: Compression,
+        existing: Existing,
         provenance: &BTreeMap<String, String>,
         streams: &Streams,
     ) -> Result<Self, RecordError> {
-        let writer = McapWriter::create(path, compression, provenance)?;
+        let writer = McapWriter::create(path, compression, provenance)?.existing(existing);
         if let Some(aside) = writer.set_aside() {
             let aside = aside.display();
             tracing::warn!("an unfinished archive of a run before was kept as {aside}");
@@ -200,10 +202,14 @@ impl Archive {
         Ok(self.file.writer.flush()?)
     }
 
-    /// Completes the file and gives it its name.
-    pub fn finish(self) -> Result<(), RecordError> {
-        self.file.writer.finish()?;
-        Ok(())
+    /// Length of the file when its last chunk was closed \[bytes\].
+    pub fn bytes(&self) -> u64 {
+        self.file.writer.bytes()
+    }
+
+    /// Completes the file and gives it its name, which is told.
+    pub fn finish(self) -> Result<PathBuf, RecordError> {
+        Ok(self.file.writer.finish()?.path)
     }
 }
 

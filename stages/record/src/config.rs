@@ -5,27 +5,50 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tauscope_archive::Compression;
+use tauscope_archive::whole_file::Existing;
 
 /// A recorder: what is kept of the streams it listens to. At least one of `mcap` and `rerun`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
-    /// The archive to write (`.mcap`), complete and readable by any ROS 2 tool. Written beside it
-    /// with `.part` at the end of its name until it is whole; a file of that name is replaced.
+    /// The archive to write (`.mcap`), complete and readable by any ROS 2 tool. Its name has `.part`
+    /// at the end until it is whole. It may hold `{cell}`, `{date}` and `{time}` (UTC, of the first
+    /// sample in it) and `{n}` (the first number that makes the name new).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mcap: Option<PathBuf>,
     /// How the archive's chunks are compressed.
     pub compression: Compression,
+    /// When files are closed and new ones begun; their names must hold `{n}` or `{time}` then.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub split: Option<Split>,
+    /// What becomes of a file that already has the name: it is kept, and a run that would replace it
+    /// does not start, or it is replaced once the new one is whole.
+    pub existing: Existing,
     /// The picture for the Rerun viewer.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rerun: Option<RerunConfig>,
+}
+
+/// When a recorder closes its files and begins new ones. Each file stands for itself: what holds at
+/// its beginning (command, tool, threshold, alarm) is told again.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Split {
+    /// After this time, by the samples' own clock \[s\].
+    #[schemars(range(min = 1.0))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub after_s: Option<f64>,
+    /// Once the archive has this size \[MB, 10⁶ bytes\].
+    #[schemars(range(min = 1.0))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub after_mb: Option<f64>,
 }
 
 /// Where the picture goes: to a file, to a viewer, or to both.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RerunConfig {
-    /// The file to write (`.rrd`), with `.part` at the end of its name until it is whole. Sure to
+    /// The file to write (`.rrd`), named and split as the archive is. Sure to
     /// open in the viewer of this version and the next; the archive is what lasts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use tauscope_bus::SampleKind;
 
+use crate::file_name::FileNameError;
+
 /// Why a recorder cannot be made, or cannot go on.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
@@ -12,6 +14,26 @@ pub enum RecordError {
         "a recorder must write something: give `mcap`, `rerun: {{file: …}}` or `rerun: {{connect: …}}`"
     )]
     NothingToWrite,
+    /// A file's name cannot be filled in.
+    #[error(transparent)]
+    FileName(#[from] FileNameError),
+    /// Files are to be split, and all would have one name.
+    #[error(
+        "files are to be split, but `{name}` names only one: put `{{n}}` or `{{time}}` into it", name = name.display()
+    )]
+    OneName {
+        /// The name.
+        name: PathBuf,
+    },
+    /// The file of one cell is asked for where several are recorded.
+    #[error("`{{cell}}` in a file's name stands for one cell, but the recorder listens to {cells}")]
+    SeveralCells {
+        /// How many.
+        cells: usize,
+    },
+    /// A folder cannot be looked into.
+    #[error("cannot look for a new file name: {0}")]
+    Folder(std::io::Error),
     /// Two cells of one name.
     #[error("two cells are named `{cell}`")]
     DuplicateCell {

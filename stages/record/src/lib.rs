@@ -4,19 +4,23 @@
 mod archive;
 mod config;
 mod error;
+mod file_name;
+mod files;
 mod recorder;
 mod rerun;
 mod streams;
 mod words;
 
-pub use config::{Config, RerunConfig};
+pub use config::{Config, RerunConfig, Split};
 pub use error::RecordError;
+pub use file_name::{FileName, FileNameError};
 pub use recorder::Recorder;
 pub use rerun::explanation::{
     ExplainedEvent, ExplainedJoint, ExplainedRecording, Explanation, write_explanation,
 };
 pub use streams::{CellInfo, StreamInfo};
 pub use tauscope_archive::Compression;
+pub use tauscope_archive::whole_file::Existing;
 
 /// Version of Rerun that the pictures are made for; a viewer of this version opens them.
 pub fn rerun_version() -> String {

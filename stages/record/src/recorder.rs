@@ -1,13 +1,14 @@
 //! The recorder as a stage.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use tauscope_bus::{SampleRef, Sink, StageError};
 
-use crate::archive::Archive;
 use crate::config::Config;
 use crate::error::RecordError;
-use crate::rerun::Picture;
+use crate::files::Files;
+use crate::rerun::LivePicture;
 use crate::streams::{CellInfo, StreamInfo, Streams};
 
 /// Keeps what it listens to: all of it in an archive, a view of it for the Rerun viewer.
@@ -17,8 +18,8 @@ use crate::streams::{CellInfo, StreamInfo, Streams};
 /// hour together.
 pub struct Recorder {
     streams: Streams,
-    archive: Option<Archive>,
-    picture: Option<Picture>,
+    files: Files,
+    live: Option<LivePicture>,
 }
 
 impl Recorder {
@@ -26,8 +27,8 @@ impl Recorder {
     /// what made it (versions, hashes of the files that went in) and stands in the archive.
     ///
     /// # Errors
-    /// If nothing is to be written, cells and streams do not fit together, a file cannot be made or
-    /// the viewer's address is none. That no viewer is there is no error.
+    /// If nothing is to be written, cells, streams and file names do not fit together, a file cannot
+    /// be made or the viewer's address is none. That no viewer is there is no error.
     pub fn new(
         config: &Config,
         cells: &[CellInfo],
@@ -35,46 +36,50 @@ impl Recorder {
         provenance: &BTreeMap<String, String>,
     ) -> Result<Self, RecordError> {
         let picture = config.rerun.as_ref();
-        let picture = picture.filter(|rerun| rerun.file.is_some() || rerun.connect.is_some());
-        if config.mcap.is_none() && picture.is_none() {
+        let viewer = picture.and_then(|rerun| rerun.connect.as_ref());
+        let file = picture.and_then(|rerun| rerun.file.as_ref());
+        if config.mcap.is_none() && viewer.is_none() && file.is_none() {
             return Err(RecordError::NothingToWrite);
         }
         let streams = Streams::new(cells, streams)?;
-        let archive = match &config.mcap {
-            Some(path) => Some(Archive::create(
-                path,
-                config.compression,
-                provenance,
-                &streams,
-            )?),
-            None => None,
-        };
-        let picture = match picture {
-            Some(rerun) => Some(Picture::open(rerun, &streams)?),
-            None => None,
-        };
+        let files = Files::new(config, provenance, &streams)?;
+        let live = viewer.map(|url| LivePicture::start(url, &streams));
+        let live = live.transpose()?;
         Ok(Self {
             streams,
-            archive,
-            picture,
+            files,
+            live,
         })
     }
 
     /// Messages of the live picture that the viewer was too slow for, or not there for. No data is
     /// lost by it: the files hold everything.
     pub fn live_dropped(&self) -> u64 {
-        self.picture.as_ref().map_or(0, Picture::live_dropped)
+        self.live.as_ref().map_or(0, LivePicture::dropped)
+    }
+
+    /// The files that were completed last, and how many were in all.
+    pub fn completed(&self) -> (&[PathBuf], u64) {
+        self.files.completed()
     }
 
     fn keep(&mut self, from: &str, sample: SampleRef<'_>) -> Result<(), RecordError> {
         let index = self.streams.find(from, &sample)?;
-        if let Some(archive) = &mut self.archive {
-            archive.accept(&self.streams, index, sample)?;
-        }
-        if let Some(picture) = &mut self.picture {
-            picture.accept(&self.streams, index, sample)?;
+        self.files.accept(&self.streams, index, sample)?;
+        if let Some(live) = &mut self.live {
+            live.accept(&self.streams, index, sample)?;
         }
         Ok(())
+    }
+
+    fn show_and_flush(&mut self) -> Result<(), RecordError> {
+        self.files.flush()?;
+        self.live.as_mut().map_or(Ok(()), LivePicture::idle)
+    }
+
+    fn complete(&mut self) -> Result<(), RecordError> {
+        self.files.finish(&self.streams)?;
+        self.live.as_mut().map_or(Ok(()), LivePicture::finish)
     }
 }
 
@@ -84,23 +89,10 @@ impl Sink for Recorder {
     }
 
     fn idle(&mut self) -> Result<(), StageError> {
-        if let Some(archive) = &mut self.archive {
-            archive.flush().map_err(StageError::failed)?;
-        }
-        if let Some(picture) = &mut self.picture {
-            picture.idle().map_err(StageError::failed)?;
-        }
-        Ok(())
+        self.show_and_flush().map_err(StageError::failed)
     }
 
     fn finish(&mut self) -> Result<(), StageError> {
-        // The archive first: it is what lasts, whatever becomes of the picture.
-        if let Some(archive) = self.archive.take() {
-            archive.finish().map_err(StageError::failed)?;
-        }
-        if let Some(picture) = &mut self.picture {
-            picture.finish(&self.streams).map_err(StageError::failed)?;
-        }
-        Ok(())
+        self.complete().map_err(StageError::failed)
     }
 }

@@ -18,64 +18,34 @@ mod robot;
 mod store;
 mod tracks;
 
+use std::path::{Path, PathBuf};
+
 use rerun::log::LogMsg;
+use tauscope_archive::whole_file::Existing;
 use tauscope_bus::SampleRef;
 
 use self::blueprint::Purpose;
 use self::file::PictureFile;
 use self::live::Live;
 use self::painter::{Pace, Painter};
-use crate::config::RerunConfig;
 use crate::error::RecordError;
 use crate::streams::Streams;
 
-/// The picture in all its outputs.
-pub(crate) struct Picture {
-    file: Option<FilePicture>,
-    live: Option<LivePicture>,
-}
-
-struct FilePicture {
+/// The picture in a file.
+pub(crate) struct FilePicture {
     painter: Painter,
     file: PictureFile,
 }
 
-struct LivePicture {
-    painter: Painter,
-    live: Live,
-}
-
-impl Picture {
-    /// Opens what is configured: makes the file, begins to connect.
-    pub fn open(config: &RerunConfig, streams: &Streams) -> Result<Self, RecordError> {
-        let file = match &config.file {
-            Some(path) => {
-                let mut file = PictureFile::create(path)?;
-                let painter = Painter::new(streams, Pace::FILE, &mut |m| file.write(&m))?;
-                for message in blueprint::messages(streams, &painter, Purpose::File)? {
-                    file.write(&message)?;
-                }
-                Some(FilePicture { painter, file })
-            }
-            None => None,
-        };
-        let live = match &config.connect {
-            Some(url) => {
-                let mut preamble = Vec::new();
-                let mut gather = |message: LogMsg| {
-                    preamble.push(message);
-                    Ok(())
-                };
-                let painter = Painter::new(streams, Pace::LIVE, &mut gather)?;
-                preamble.extend(blueprint::messages(streams, &painter, Purpose::Live)?);
-                Some(LivePicture {
-                    painter,
-                    live: Live::start(url, preamble)?,
-                })
-            }
-            None => None,
-        };
-        Ok(Self { file, live })
+impl FilePicture {
+    /// Makes the file.
+    pub fn create(path: &Path, existing: Existing, streams: &Streams) -> Result<Self, RecordError> {
+        let mut file = PictureFile::create(path, existing)?;
+        let painter = Painter::new(streams, Pace::FILE, &mut |m| file.write(&m))?;
+        for message in blueprint::messages(streams, &painter, Purpose::File)? {
+            file.write(&message)?;
+        }
+        Ok(Self { painter, file })
     }
 
     /// Takes a sample of the stream number `index`.
@@ -85,45 +55,72 @@ impl Picture {
         index: usize,
         sample: SampleRef<'_>,
     ) -> Result<(), RecordError> {
-        if let Some(FilePicture { painter, file }) = &mut self.file {
-            painter.accept(streams, index, sample, &mut |message| file.write(&message))?;
-        }
-        if let Some(LivePicture { painter, live }) = &mut self.live {
-            painter.accept(streams, index, sample, &mut push_to(live))?;
-        }
-        Ok(())
+        let Self { painter, file } = self;
+        painter.accept(streams, index, sample, &mut |message| file.write(&message))
     }
 
-    /// Shows a live viewer what was gathered.
+    /// Completes the file; gives its name.
+    pub fn finish(self, streams: &Streams) -> Result<PathBuf, RecordError> {
+        let Self {
+            mut painter,
+            mut file,
+        } = self;
+        painter.flush(&mut |message| file.write(&message))?;
+        // Once more: only now is known where the robot went, and so from where to look at it.
+        for message in blueprint::messages(streams, &painter, Purpose::File)? {
+            file.write(&message)?;
+        }
+        file.finish()
+    }
+}
+
+/// The picture as it streams to a viewer.
+pub(crate) struct LivePicture {
+    painter: Painter,
+    live: Live,
+}
+
+impl LivePicture {
+    /// Begins to connect.
+    pub fn start(url: &str, streams: &Streams) -> Result<Self, RecordError> {
+        let mut preamble = Vec::new();
+        let mut gather = |message: LogMsg| {
+            preamble.push(message);
+            Ok(())
+        };
+        let painter = Painter::new(streams, Pace::LIVE, &mut gather)?;
+        preamble.extend(blueprint::messages(streams, &painter, Purpose::Live)?);
+        let live = Live::start(url, preamble)?;
+        Ok(Self { painter, live })
+    }
+
+    /// Takes a sample of the stream number `index`.
+    pub fn accept(
+        &mut self,
+        streams: &Streams,
+        index: usize,
+        sample: SampleRef<'_>,
+    ) -> Result<(), RecordError> {
+        let Self { painter, live } = self;
+        painter.accept(streams, index, sample, &mut push_to(live))
+    }
+
+    /// Shows the viewer what was gathered.
     pub fn idle(&mut self) -> Result<(), RecordError> {
-        if let Some(LivePicture { painter, live }) = &mut self.live {
-            painter.flush(&mut push_to(live))?;
-        }
-        Ok(())
+        let Self { painter, live } = self;
+        painter.flush(&mut push_to(live))
     }
 
-    /// Completes the file and lets the viewer go.
-    pub fn finish(&mut self, streams: &Streams) -> Result<(), RecordError> {
-        if let Some(FilePicture { painter, file }) = &mut self.file {
-            painter.flush(&mut |message| file.write(&message))?;
-            // Once more: only now is known where the robot went, and so from where to look at it.
-            for message in blueprint::messages(streams, painter, Purpose::File)? {
-                file.write(&message)?;
-            }
-            file.finish()?;
-        }
-        if let Some(LivePicture { painter, live }) = &mut self.live {
-            painter.flush(&mut push_to(live))?;
-            live.finish();
-        }
+    /// Lets the viewer go.
+    pub fn finish(&mut self) -> Result<(), RecordError> {
+        self.idle()?;
+        self.live.finish();
         Ok(())
     }
 
     /// Messages for the viewer that gave way to newer ones.
-    pub fn live_dropped(&self) -> u64 {
-        self.live
-            .as_ref()
-            .map_or(0, |picture| picture.live.counts().dropped)
+    pub fn dropped(&self) -> u64 {
+        self.live.counts().dropped
     }
 }
 

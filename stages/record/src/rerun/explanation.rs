@@ -18,6 +18,8 @@ use rerun::{
 };
 
 use super::blueprint::explanation::messages;
+use tauscope_archive::whole_file::Existing;
+
 use super::file::PictureFile;
 use super::palette::{CORRECTED, EVENT, EXPECTED, MEASURED, QUIET};
 use super::store::{Store, entity, unserializable};
@@ -91,7 +93,8 @@ pub struct ExplainedEvent {
 ///
 /// If the file cannot be written or Rerun does not take the data.
 pub fn write_explanation(path: &Path, explanation: &Explanation) -> Result<(), RecordError> {
-    let mut file = PictureFile::create(path)?;
+    // Whoever asks for it has made sure that nothing is lost.
+    let mut file = PictureFile::create(path, Existing::Replace)?;
     // The viewer keeps one layout per application: another case, another layout.
     let application =
         ApplicationId::new_or_unknown(format!("tauscope explain {}", explanation.case));
@@ -113,7 +116,7 @@ pub fn write_explanation(path: &Path, explanation: &Explanation) -> Result<(), R
             event.write(number, recording, &store, &mut file)?;
         }
     }
-    file.finish()
+    file.finish().map(drop)
 }
 
 /// Where the text is.

@@ -8,21 +8,23 @@ use rerun::external::re_build_info::CrateVersion;
 use rerun::external::re_log_encoding::{Encoder, EncodingOptions};
 use rerun::log::LogMsg;
 
+use tauscope_archive::whole_file::{self, Existing, part_of};
+
 use crate::error::RecordError;
 
 /// An `.rrd` file, with `.part` at the end of its name until it is whole.
 pub(super) struct PictureFile {
     path: PathBuf,
     part: PathBuf,
+    existing: Existing,
     encoder: Encoder<BufWriter<File>>,
 }
 
 impl PictureFile {
-    /// Makes the file, and its folder where there is none.
-    pub fn create(path: &Path) -> Result<Self, RecordError> {
-        let mut part = path.as_os_str().to_owned();
-        part.push(".part");
-        let part = PathBuf::from(part);
+    /// Makes the file, and its folder where there is none. `existing` says what becomes of a file that
+    /// has the name when this one is complete.
+    pub fn create(path: &Path, existing: Existing) -> Result<Self, RecordError> {
+        let part = part_of(path);
         let failed = |error: &dyn std::fmt::Display| RecordError::RerunFile {
             path: part.clone(),
             reason: error.to_string(),
@@ -30,7 +32,8 @@ impl PictureFile {
         if let Some(folder) = path.parent() {
             std::fs::create_dir_all(folder).map_err(|error| failed(&error))?;
         }
-        let file = File::create(&part).map_err(|error| failed(&error))?;
+        whole_file::set_part_aside(path).map_err(|error| failed(&error))?;
+        let file = File::create_new(&part).map_err(|error| failed(&error))?;
         let encoder = Encoder::new_eager(
             CrateVersion::LOCAL,
             EncodingOptions::PROTOBUF_COMPRESSED,
@@ -40,6 +43,7 @@ impl PictureFile {
         Ok(Self {
             path: path.to_owned(),
             part,
+            existing,
             encoder,
         })
     }
@@ -51,13 +55,21 @@ impl PictureFile {
         }
     }
 
-    /// Completes it and gives it its name.
-    pub fn finish(&mut self) -> Result<(), RecordError> {
+    /// Completes it and gives it its name, which is told: the first that is free where a file that is
+    /// to be kept has it.
+    pub fn finish(mut self) -> Result<PathBuf, RecordError> {
         self.encoder.finish().map_err(|error| self.failed(&error))?;
         self.encoder
             .flush_blocking()
             .map_err(|error| self.failed(&error))?;
-        std::fs::rename(&self.part, &self.path).map_err(|error| self.failed(&error))
+        let path = match self.existing {
+            Existing::Replace => Ok(self.path.clone()),
+            Existing::Keep => whole_file::unused_name(&self.path),
+        };
+        let path = path.map_err(|error| self.failed(&error))?;
+        whole_file::put_in_place(&self.part, &path, self.existing)
+            .map_err(|error| self.failed(&error))?;
+        Ok(path)
     }
 
     fn failed(&self, error: &dyn std::fmt::Display) -> RecordError {

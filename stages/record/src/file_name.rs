@@ -1,0 +1,190 @@
+//! Names of the files that a recorder writes.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use jiff::Timestamp;
+use tauscope_archive::whole_file::part_of;
+
+/// A file's name with fields that are filled in when the file is begun: `{cell}`, `{date}` and
+/// `{time}` (UTC, of the first sample in it, as `2026-11-22` and `14-03-05`) and `{n}` (the first
+/// number, from 001 on, that makes the name new).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FileName {
+    parts: Vec<Part>,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Part {
+    Text(String),
+    Cell,
+    Date,
+    Time,
+    Number,
+}
+
+/// Why a name cannot be filled in.
+#[derive(Debug, thiserror::Error, PartialEq, Eq)]
+pub enum FileNameError {
+    /// A field that there is none of.
+    #[error("`{{{field}}}` is no field of a file name; there are `{{cell}}`, `{{date}}`, `{{time}}` and `{{n}}`")]
+    UnknownField {
+        /// What stands between the braces.
+        field: String,
+    },
+    /// A brace without its other half.
+    #[error("a `{{` or `}}` stands alone in the file name `{name}`")]
+    LoneBrace {
+        /// The name.
+        name: String,
+    },
+    /// A name that is not text.
+    #[error("the file name `{name}` is not valid UTF-8")]
+    NotText {
+        /// The name, as far as it can be shown.
+        name: String,
+    },
+}
+
+impl FileName {
+    /// Takes a name apart.
+    ///
+    /// # Errors
+    /// If it holds a field that there is none of, or a brace alone.
+    pub fn parse(path: &Path) -> Result<Self, FileNameError> {
+        let name = path.to_str().ok_or_else(|| FileNameError::NotText {
+            name: path.display().to_string(),
+        })?;
+        let lone = || FileNameError::LoneBrace {
+            name: name.to_owned(),
+        };
+        let mut parts = Vec::new();
+        let mut rest = name;
+        while !rest.is_empty() {
+            let (text, from_brace) = rest.split_at(rest.find(['{', '}']).unwrap_or(rest.len()));
+            if !text.is_empty() {
+                parts.push(Part::Text(text.to_owned()));
+            }
+            if from_brace.is_empty() {
+                break;
+            }
+            let inside = from_brace.strip_prefix('{').ok_or_else(lone)?;
+            let (field, behind) = inside.split_once('}').ok_or_else(lone)?;
+            parts.push(match field {
+                "cell" => Part::Cell,
+                "date" => Part::Date,
+                "time" => Part::Time,
+                "n" => Part::Number,
+                _ => {
+                    return Err(FileNameError::UnknownField {
+                        field: field.to_owned(),
+                    });
+                }
+            });
+            rest = behind;
+        }
+        Ok(Self { parts })
+    }
+
+    /// Whether the name is known before the first sample is.
+    pub fn is_known_at_start(&self) -> bool {
+        !(self.parts.iter()).any(|part| matches!(part, Part::Date | Part::Time))
+    }
+
+    /// Whether one name can become several files.
+    pub fn can_differ(&self) -> bool {
+        !(self.parts.iter()).all(|part| matches!(part, Part::Text(_) | Part::Cell))
+    }
+
+    /// Whether it stands for the file of one cell.
+    pub(crate) fn is_of_one_cell(&self) -> bool {
+        self.parts.contains(&Part::Cell)
+    }
+
+    fn has_number(&self) -> bool {
+        self.parts.contains(&Part::Number)
+    }
+
+    fn fill(&self, cell: &str, start: Timestamp, n: u32) -> PathBuf {
+        let fill = |part: &Part| match part {
+            Part::Text(text) => text.clone(),
+            Part::Cell => cell.to_owned(),
+            Part::Date => start.strftime("%Y-%m-%d").to_string(),
+            Part::Time => start.strftime("%H-%M-%S").to_string(),
+            Part::Number => format!("{n:03}"),
+        };
+        self.parts.iter().map(fill).collect::<String>().into()
+    }
+}
+
+/// Fills in the names of files that belong together, so that all get the same number.
+///
+/// # Errors
+/// If a folder cannot be read.
+pub fn fill_in(names: &[&FileName], cell: &str, start_ns: i64) -> io::Result<Vec<PathBuf>> {
+    let start = Timestamp::from_nanosecond(i128::from(start_ns)).unwrap_or_default();
+    let mut n = 1;
+    loop {
+        let paths = names.iter().map(|name| name.fill(cell, start, n));
+        let paths: Vec<PathBuf> = paths.collect();
+        let mut taken = false;
+        for (path, _) in paths.iter().zip(names).filter(|(_, name)| name.has_number()) {
+            taken |= path.try_exists()? || part_of(path).try_exists()?;
+        }
+        if !taken {
+            return Ok(paths);
+        }
+        n += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn name(text: &str) -> FileName {
+        FileName::parse(Path::new(text)).unwrap()
+    }
+
+    /// 22 November 2026, 14:03:05.7 UTC.
+    const START_NS: i64 = 1_795_356_185_700_000_000;
+
+    #[test]
+    fn fields_are_filled_in_with_cell_and_first_sample() {
+        let filled = fill_in(&[&name("{cell}/{date}/{time}.mcap")], "press-3", START_NS);
+        let expected = Path::new("press-3/2026-11-22/14-03-05.mcap");
+        assert_eq!(filled.unwrap(), [expected]);
+    }
+
+    #[test]
+    fn files_that_belong_together_get_one_number_that_none_of_them_had() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |file: &str| folder.path().join(file);
+        std::fs::write(at("a-001.rrd"), "").unwrap();
+        std::fs::write(at("a-002.mcap.part"), "").unwrap();
+        let names = ["a-{n}.mcap", "a-{n}.rrd"].map(|file| FileName::parse(&at(file)).unwrap());
+        let filled = fill_in(&names.each_ref(), "cell", START_NS).unwrap();
+        assert_eq!(filled, [at("a-003.mcap"), at("a-003.rrd")]);
+    }
+
+    #[test]
+    fn what_is_no_field_is_named() {
+        let message = |text: &str| FileName::parse(Path::new(text)).unwrap_err().to_string();
+        assert!(message("a-{day}.mcap").starts_with("`{day}` is no field of a file name"));
+        assert!(message("a-{n.mcap").contains("stands alone"));
+        assert!(message("a-n}.mcap").contains("stands alone"));
+    }
+
+    #[test]
+    fn only_a_date_or_a_time_waits_for_the_first_sample() {
+        for (text, at_start, can_differ) in [
+            ("a.mcap", true, false),
+            ("{cell}.mcap", true, false),
+            ("a-{n}.mcap", true, true),
+            ("{date}/a.mcap", false, true),
+        ] {
+            assert_eq!(name(text).is_known_at_start(), at_start, "{text}");
+            assert_eq!(name(text).can_differ(), can_differ, "{text}");
+        }
+    }
+}
