@@ -27,7 +27,9 @@ enum Part {
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 pub enum FileNameError {
     /// A field that there is none of.
-    #[error("`{{{field}}}` is no field of a file name; there are `{{cell}}`, `{{date}}`, `{{time}}` and `{{n}}`")]
+    #[error(
+        "`{{{field}}}` is no field of a file name; there are `{{cell}}`, `{{date}}`, `{{time}}` and `{{n}}`"
+    )]
     UnknownField {
         /// What stands between the braces.
         field: String,
@@ -128,7 +130,11 @@ pub fn fill_in(names: &[&FileName], cell: &str, start_ns: i64) -> io::Result<Vec
         let paths = names.iter().map(|name| name.fill(cell, start, n));
         let paths: Vec<PathBuf> = paths.collect();
         let mut taken = false;
-        for (path, _) in paths.iter().zip(names).filter(|(_, name)| name.has_number()) {
+        for (path, _) in paths
+            .iter()
+            .zip(names)
+            .filter(|(_, name)| name.has_number())
+        {
             taken |= path.try_exists()? || part_of(path).try_exists()?;
         }
         if !taken {

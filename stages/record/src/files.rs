@@ -82,7 +82,11 @@ impl Files {
             return Ok(());
         }
         let now_ns = sample.header().received_ns;
-        if self.open.as_ref().is_some_and(|open| self.is_full(open, now_ns)) {
+        if self
+            .open
+            .as_ref()
+            .is_some_and(|open| self.is_full(open, now_ns))
+        {
             self.finish(streams)?;
         }
         let mut open = match self.open.take() {
@@ -99,9 +103,9 @@ impl Files {
         let Some(split) = self.config.split else {
             return false;
         };
-        let age_s = open
-            .start_ns
-            .map_or(0.0, |start_ns| now_ns.saturating_sub(start_ns) as f64 * 1e-9);
+        let age_s = open.start_ns.map_or(0.0, |start_ns| {
+            now_ns.saturating_sub(start_ns) as f64 * 1e-9
+        });
         let size_mb = open
             .archive
             .as_ref()

@@ -1,0 +1,160 @@
+//! Files are named, split and kept as the recorder was told, and each stands for itself.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+mod synthetic;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use synthetic::{arm, cell, motion, streams};
+use tauscope_archive::Recording;
+use tauscope_archive::ros::{Float64, JointState, Message};
+use tauscope_bus::Sink;
+use tauscope_record::{Config, Existing, RecordError, Recorder, RerunConfig, Split};
+
+fn recorder(config: &Config) -> Result<Recorder, RecordError> {
+    let cells = [cell("demo", Some(arm(false)))];
+    Recorder::new(config, &cells, &streams("demo", ""), &BTreeMap::new())
+}
+
+fn record(config: &Config, seconds: f64) -> Recorder {
+    let mut recorder = recorder(config).unwrap();
+    for instant in &motion(seconds) {
+        instant.feed(&mut recorder, "");
+    }
+    recorder.finish().unwrap();
+    recorder
+}
+
+fn count<M: Message>(path: &Path, topic: &str) -> usize {
+    let recording = Recording::open(path).unwrap();
+    assert!(recording.damage().is_empty(), "{}", path.display());
+    recording.topic_of::<M>(topic).unwrap();
+    let mut messages = recording.messages(&[topic]).unwrap();
+    let mut count = 0;
+    while let Some(message) = messages.next_message() {
+        message.unwrap();
+        count += 1;
+    }
+    count
+}
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut files: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn files_are_split_by_time_and_lose_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = Config {
+        mcap: Some(folder.path().join("{cell}-{date}-{time}.mcap")),
+        split: Some(Split {
+            after_s: Some(2.0),
+            after_mb: None,
+        }),
+        ..Config::default()
+    };
+    let recorder = record(&config, 5.0);
+    let names: Vec<_> = files(folder.path());
+    let expected = ["08-53-20", "08-53-22", "08-53-24"]
+        .map(|time| folder.path().join(format!("demo-2025-10-09-{time}.mcap")));
+    assert_eq!(names, expected);
+    let states = names
+        .iter()
+        .map(|file| count::<JointState>(file, "/joint_states"));
+    assert_eq!(states.sum::<usize>(), motion(5.0).len());
+    // The threshold never changes; still each file tells it.
+    for file in &names {
+        let threshold = "/detections/twin_regression/threshold";
+        assert_eq!(count::<Float64>(file, threshold), 1, "{}", file.display());
+    }
+    assert_eq!(recorder.completed(), (&expected[2..], 3));
+}
+
+#[test]
+fn files_are_split_by_size_and_numbered_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = Config {
+        mcap: Some(folder.path().join("a-{n}.mcap")),
+        rerun: Some(RerunConfig {
+            file: Some(folder.path().join("a-{n}.rrd")),
+            connect: None,
+        }),
+        split: Some(Split {
+            after_s: None,
+            after_mb: Some(0.2),
+        }),
+        ..Config::default()
+    };
+    record(&config, 5.0);
+    let names = files(folder.path());
+    assert!(names.len() >= 4, "{names:?}");
+    for (n, pair) in names.chunks(2).enumerate() {
+        let of = |kind: &str| folder.path().join(format!("a-{:03}.{kind}", n + 1));
+        assert_eq!(pair, [of("mcap"), of("rrd")]);
+        let megabytes = pair[0].metadata().unwrap().len() as f64 * 1e-6;
+        assert!(megabytes < 0.3, "{megabytes} MB");
+    }
+}
+
+#[test]
+fn a_file_that_is_there_is_kept_and_the_new_one_gets_another_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    std::fs::write(&path, "somebody's only copy").unwrap();
+    let config = Config {
+        mcap: Some(path.clone()),
+        ..Config::default()
+    };
+    let recorder = record(&config, 1.0);
+    assert_eq!(std::fs::read(&path).unwrap(), b"somebody's only copy");
+    let other = folder.path().join("a.1.mcap");
+    assert_eq!(recorder.completed().0, [other.as_path()]);
+    assert_eq!(count::<JointState>(&other, "/joint_states"), 250);
+
+    let replacing = Config {
+        existing: Existing::Replace,
+        ..config
+    };
+    record(&replacing, 1.0);
+    assert_eq!(count::<JointState>(&path, "/joint_states"), 250);
+}
+
+#[test]
+fn nothing_is_begun_for_a_name_that_waits_for_a_sample_that_never_comes() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = Config {
+        mcap: Some(folder.path().join("{time}.mcap")),
+        ..Config::default()
+    };
+    record(&config, 0.0);
+    assert!(files(folder.path()).is_empty());
+}
+
+#[test]
+fn names_that_cannot_be_are_refused() {
+    let refused = |name: &str, split: Option<Split>| {
+        let config = Config {
+            mcap: Some(name.into()),
+            split,
+            ..Config::default()
+        };
+        recorder(&config).err().unwrap().to_string()
+    };
+    assert!(refused("{day}.mcap", None).contains("`{day}` is no field of a file name"));
+    assert!(refused("a.mcap", Some(Split::default())).contains("put `{n}` or `{time}` into it"));
+    let cells = [cell("x", None), cell("y", None)];
+    let config = Config {
+        mcap: Some("{cell}.mcap".into()),
+        ..Config::default()
+    };
+    let several = Recorder::new(&config, &cells, &[], &BTreeMap::new());
+    assert!(matches!(
+        several.err(),
+        Some(RecordError::SeveralCells { cells: 2 })
+    ));
+}
