@@ -12,7 +12,7 @@ def inertia(mass, size):
 
 def urdf(name, rng):
     """URDF text of an arm: a vertical axis, two horizontal ones, and mostly a fourth; a massless frame `tool` at its end."""
-    joints = int(rng.integers(3, 5))
+    joints = 3 + int(rng.random() < 0.3)
     length = rng.uniform(0.22, 0.42, joints) * 0.85**np.arange(joints)
     length[0] = rng.uniform(0.1, 0.2)
     mass = rng.uniform(4., 8.) * rng.uniform(0.45, 0.7)**np.arange(joints)
