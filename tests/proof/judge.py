@@ -66,3 +66,13 @@ def judge(findings, effects, robot):
         return None if off and body else "wrong"
 
     return [one(f) for f in findings]
+
+
+def counts(findings, effects, robot):
+    """Effects that were named, those that were missed, and wrong findings; bodies that are off are not asked for."""
+    hit = missed = 0
+    for effect in effects:
+        if effect["effect"] != "bodies_off":
+            own = [f for f, v in zip(findings, judge(findings, [effect], robot)) if v == "right"]
+            hit, missed = hit + bool(own), missed + (not own)
+    return hit, missed, judge(findings, effects, robot).count("wrong")
