@@ -62,7 +62,8 @@ def judge(findings, effects, robot):
             return "right"
         if any(own[0] in PARTS.get(e, ()) and own[1] == p for (e, p), _ in truths):
             return None
-        body = own[0] in BODIES and finding.get("link") or own == ("rotor_inertia", 0)
+        # So is what the report itself cannot tell from a body: the spring of a joint may be the weight of its link.
+        body = own == ("rotor_inertia", 0) or any(x["effect"] in BODIES and x.get("link") for x in (finding, *finding["equivalent_to"][:3]))
         return None if off and body else "wrong"
 
     return [one(f) for f in findings]
