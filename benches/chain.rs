@@ -95,7 +95,7 @@ fn main() {
         let config = tauscope_twin::Config::default();
         let mut twin = tauscope_twin::Twin::new(&config, setup, correction).expect("a twin");
         let config = tauscope_detect::Config {
-            twin_regression: Some(tauscope_detect::twin_regression::Settings::default()),
+            twin_regression: Some(tauscope_detect::tajiri::twin_regression::Settings::default()),
             threshold: tauscope_detect::Threshold {
                 score: Some(40.0),
                 sigmas: None,

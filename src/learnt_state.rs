@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use tauscope_bus::{Detection, Emit, Stage, StageError, TwinState};
-use tauscope_detect::virtual_collision_sensor::Learnt;
+use tauscope_detect::indri::virtual_collision_sensor::Learnt;
 use tauscope_detect::{Config, Detect};
 
 use crate::report::Report;
@@ -95,7 +95,7 @@ mod tests {
     use std::path::Path;
 
     use tauscope_bus::{Header, LinkError, flags};
-    use tauscope_detect::virtual_collision_sensor::{FirstBias, Settings};
+    use tauscope_detect::indri::virtual_collision_sensor::{FirstBias, Settings};
     use tauscope_detect::{JointSetup, Setup};
 
     use super::*;

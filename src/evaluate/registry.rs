@@ -2,12 +2,13 @@
 
 use std::path::PathBuf;
 
-use tauscope_detect::contact_tuning::Sweeps;
-use tauscope_detect::{
-    Config, LearnError, Lessons, Setup, contact_classifier, fisher_discriminant,
-    frequency_classifier, lstm_momentum_observer, point_autoencoder, point_ocsvm, tauscope,
-    virtual_collision_sensor, virtual_collision_sensor_basic, window_autoencoder, window_ocsvm,
+use tauscope_detect::indri::{virtual_collision_sensor, virtual_collision_sensor_basic};
+use tauscope_detect::salt_ducaju::contact_tuning::Sweeps;
+use tauscope_detect::salt_ducaju::{contact_classifier, fisher_discriminant, frequency_classifier};
+use tauscope_detect::tajiri::{
+    lstm_momentum_observer, point_autoencoder, point_ocsvm, window_autoencoder, window_ocsvm,
 };
+use tauscope_detect::{Config, LearnError, Lessons, Setup, tauscope};
 
 use super::input::{Named, Role};
 use crate::files::SetFile;

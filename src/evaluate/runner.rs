@@ -4,7 +4,7 @@
 use std::time::Instant;
 
 use tauscope_bus::{Detection, Emit, LinkError, Stage as _, StageError, TwinState, flags};
-use tauscope_detect::contact_tuning::Sweeps;
+use tauscope_detect::salt_ducaju::contact_tuning::Sweeps;
 use tauscope_detect::{Config, Detect, Lesson, ScoreStatistics, Setup};
 
 use super::EvaluateError;

@@ -2,8 +2,10 @@
 //! (Salt Ducaju et al., section V).
 
 use maud::{Markup, html};
-use tauscope_detect::contact_classifier::Settings;
-use tauscope_detect::contact_tuning::{ClassSweep, FoundSweep, Sweeps, ThresholdSweep};
+use tauscope_detect::salt_ducaju::contact_classifier::Settings;
+use tauscope_detect::salt_ducaju::contact_tuning::{
+    ClassSweep, FoundSweep, Sweeps, ThresholdSweep,
+};
 use tauscope_explain::html::chart::{Axis, Panel, r};
 
 use crate::evaluate::judged::Judged;

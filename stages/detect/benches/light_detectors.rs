@@ -15,11 +15,12 @@ use hdrhistogram::Histogram;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tauscope_bus::{Detection, Emit, LinkError, Stage, TwinState, flags};
-use tauscope_detect::fisher_discriminant::Discriminant;
+use tauscope_detect::indri::{virtual_collision_sensor, virtual_collision_sensor_basic};
+use tauscope_detect::salt_ducaju::fisher_discriminant::Discriminant;
+use tauscope_detect::salt_ducaju::{contact_classifier, fisher_discriminant, frequency_classifier};
+use tauscope_detect::tajiri::{momentum_observer, naive_difference, twin_regression};
 use tauscope_detect::{
-    Config, Detect, JointSetup, Lesson, Lessons, Setup, Shared, Threshold, contact_classifier,
-    fisher_discriminant, frequency_classifier, momentum_observer, naive_difference, tauscope,
-    twin_regression, virtual_collision_sensor, virtual_collision_sensor_basic,
+    Config, Detect, JointSetup, Lesson, Lessons, Setup, Shared, Threshold, tauscope,
 };
 use tauscope_dynamics::{Data, Model, rnea};
 

@@ -9,14 +9,16 @@ use serde::{Deserialize, Serialize};
 
 pub use error::ConfigError;
 
-use crate::detector::Detector;
-use crate::stage::{JointSetup, Setup};
-use crate::virtual_collision_sensor::Learnt;
-use crate::{
-    contact_classifier, fisher_discriminant, frequency_classifier, lstm_momentum_observer,
-    momentum_observer, naive_difference, point_autoencoder, point_ocsvm, tauscope, twin_regression,
-    virtual_collision_sensor, virtual_collision_sensor_basic, window_autoencoder, window_ocsvm,
+use crate::frame::detector::Detector;
+use crate::frame::stage::{JointSetup, Setup};
+use crate::indri::virtual_collision_sensor::Learnt;
+use crate::indri::{virtual_collision_sensor, virtual_collision_sensor_basic};
+use crate::salt_ducaju::{contact_classifier, fisher_discriminant, frequency_classifier};
+use crate::tajiri::{
+    lstm_momentum_observer, momentum_observer, naive_difference, point_autoencoder, point_ocsvm,
+    twin_regression, window_autoencoder, window_ocsvm,
 };
+use crate::tauscope;
 
 /// Standard deviations from the mean score of contact-free data to the alarm of `detector`, where the
 /// file names no threshold: equation 7 of Tajiri and Iwamoto.

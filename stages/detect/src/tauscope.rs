@@ -42,10 +42,10 @@ use serde::{Deserialize, Serialize};
 use tauscope_bus::{TwinState, flags};
 
 use crate::config::ConfigError;
-use crate::detector::{Detector, Judgement, Seen, Verdict};
-use crate::lesson::{LearnError, Lessons};
-use crate::rate::Rate;
-use crate::stage::Setup;
+use crate::frame::detector::{Detector, Judgement, Seen, Verdict};
+use crate::frame::lesson::{LearnError, Lessons};
+use crate::frame::rate::Rate;
+use crate::frame::stage::Setup;
 use alarm::Watch;
 pub use kinds::Kinds;
 use late::{Late, LateIn};

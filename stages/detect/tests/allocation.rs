@@ -6,11 +6,10 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use tauscope_bus::{Detection, Emit, Header, LinkError, Stage, TwinState, flags};
-use tauscope_detect::{
-    Config, Detect, JointSetup, Lesson, Lessons, Setup, Threshold, contact_classifier,
-    frequency_classifier, momentum_observer, naive_difference, tauscope, twin_regression,
-    virtual_collision_sensor, virtual_collision_sensor_basic,
-};
+use tauscope_detect::indri::{virtual_collision_sensor, virtual_collision_sensor_basic};
+use tauscope_detect::salt_ducaju::{contact_classifier, frequency_classifier};
+use tauscope_detect::tajiri::{momentum_observer, naive_difference, twin_regression};
+use tauscope_detect::{Config, Detect, JointSetup, Lesson, Lessons, Setup, Threshold, tauscope};
 use tauscope_dynamics::Model;
 
 /// The system's allocator, counting per thread.

@@ -8,10 +8,11 @@ use std::sync::LazyLock;
 
 use common::Out;
 use tauscope_bus::{Detection, EventKind, Header, Stage, TwinState, flags};
-use tauscope_detect::contact_signals::SignalSettings;
+use tauscope_detect::salt_ducaju::contact_signals::SignalSettings;
+use tauscope_detect::salt_ducaju::{contact_classifier, fisher_discriminant, frequency_classifier};
 use tauscope_detect::{
     Config, ConfigError, ContactKind, Detect, JointSetup, LabelledContact, LearnError, Lesson,
-    Lessons, Setup, contact_classifier, fisher_discriminant, frequency_classifier,
+    Lessons, Setup,
 };
 use tauscope_dynamics::{Data, Model, forward_kinematics, link_jacobian};
 

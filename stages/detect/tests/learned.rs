@@ -6,11 +6,13 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
 use tauscope_bus::{Header, TwinState, flags};
-use tauscope_detect::learned::TrainingSettings;
+use tauscope_detect::tajiri::learned::TrainingSettings;
+use tauscope_detect::tajiri::{
+    lstm_momentum_observer, point_autoencoder, point_ocsvm, window_autoencoder, window_ocsvm,
+};
 use tauscope_detect::{
     Config, ConfigError, ContactKind, Detect, Detector, JointSetup, LabelledContact, LearnError,
-    Lesson, Lessons, Setup, Trained, TrainedError, lstm_momentum_observer, point_autoencoder,
-    point_ocsvm, window_autoencoder, window_ocsvm,
+    Lesson, Lessons, Setup, Trained, TrainedError,
 };
 use tauscope_dynamics::Model;
 

@@ -3,7 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use tauscope_bus::{Header, TwinState, flags};
-use tauscope_detect::{Config, ConfigError, JointSetup, Setup, momentum_observer};
+use tauscope_detect::tajiri::momentum_observer;
+use tauscope_detect::{Config, ConfigError, JointSetup, Setup};
 use tauscope_dynamics::Model;
 
 const ARM: &str = r#"<robot name="arm"><link name="base"/>

@@ -6,12 +6,11 @@ mod common;
 
 use common::Out;
 use tauscope_bus::{Detection, Stage, TwinState, flags};
-use tauscope_detect::fisher_discriminant::Discriminant;
-use tauscope_detect::{
-    Config, Detect, JointSetup, Setup, Shared, Threshold, contact_classifier, fisher_discriminant,
-    frequency_classifier, momentum_observer, virtual_collision_sensor,
-    virtual_collision_sensor_basic,
-};
+use tauscope_detect::indri::{virtual_collision_sensor, virtual_collision_sensor_basic};
+use tauscope_detect::salt_ducaju::fisher_discriminant::Discriminant;
+use tauscope_detect::salt_ducaju::{contact_classifier, fisher_discriminant, frequency_classifier};
+use tauscope_detect::tajiri::momentum_observer;
+use tauscope_detect::{Config, Detect, JointSetup, Setup, Shared, Threshold};
 use tauscope_dynamics::Model;
 
 const ARM: &str = r#"<robot name="arm">

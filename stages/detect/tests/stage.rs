@@ -8,10 +8,8 @@ use std::collections::BTreeMap;
 
 use common::Out;
 use tauscope_bus::{Detection, EventKind, Header, Stage, TwinState, flags};
-use tauscope_detect::{
-    Config, ConfigError, Detect, JointSetup, ScoreStatistics, Setup, Threshold, naive_difference,
-    twin_regression,
-};
+use tauscope_detect::tajiri::{naive_difference, twin_regression};
+use tauscope_detect::{Config, ConfigError, Detect, JointSetup, ScoreStatistics, Setup, Threshold};
 use tauscope_dynamics::{Data, Model, forward_kinematics, link_jacobian};
 
 /// Three joints in a row, axes z, y, y, half a metre apart.

@@ -7,10 +7,13 @@ mod common;
 
 use common::Out;
 use tauscope_bus::{Detection, EventKind, Header, Stage, TwinState, flags};
-use tauscope_detect::virtual_collision_sensor::{FirstBias, Learn, Learnt};
+use tauscope_detect::indri::virtual_collision_sensor::{FirstBias, Learn, Learnt};
+use tauscope_detect::indri::{
+    virtual_collision_sensor as adaptive, virtual_collision_sensor_basic as basic,
+};
 use tauscope_detect::{
     Config, ConfigError, ContactKind, Detect, JointSetup, LabelledContact, LearnError, Lesson,
-    Lessons, Setup, virtual_collision_sensor as adaptive, virtual_collision_sensor_basic as basic,
+    Lessons, Setup,
 };
 
 /// Samples a second.

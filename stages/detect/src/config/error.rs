@@ -1,6 +1,6 @@
 //! What can be wrong with the detector's part of the pipeline file.
 
-use crate::learned::TrainedError;
+use crate::tajiri::learned::TrainedError;
 
 /// What is wrong with a detector's configuration.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -6,10 +6,10 @@
 
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 
-use crate::lesson::{Lesson, Lessons};
-use crate::momentum::Inertia;
-use crate::shared::Tap;
-use crate::stage::Setup;
+use crate::frame::lesson::{Lesson, Lessons};
+use crate::frame::momentum::Inertia;
+use crate::frame::shared::Tap;
+use crate::frame::stage::Setup;
 
 /// What the twin misses, by joint; NaN where that is not known. No allocation per sample.
 #[derive(Debug)]

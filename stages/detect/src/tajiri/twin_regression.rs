@@ -1,0 +1,44 @@
+//! `twin_regression`: Tajiri and Iwamoto, "Collision Detection for Robot Arm Assisted with Digital
+//! Twin System", equations 5 to 7.
+//!
+//! The score is the squared length of the residual vector: measured effort less the twin's effort
+//! after the regression of equations 3 and 4, both through the same low-pass (the twin stage does
+//! that). The alarm is raised where it reaches mean + 4 standard deviations of the score on
+//! contact-free data.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tauscope_bus::{TwinState, flags};
+
+use crate::frame::detector::{Detector, Judgement};
+
+/// Canonical name.
+pub(crate) const NAME: &str = "twin_regression";
+
+/// Settings of `twin_regression`: none, its filters are the twin's.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Settings {}
+
+/// The detector.
+pub(crate) fn build(_: &Settings) -> Box<dyn Detector> {
+    Box::new(TwinRegression)
+}
+
+struct TwinRegression;
+
+impl Detector for TwinRegression {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn judge(&mut self, sample: &TwinState) -> Judgement {
+        let joint_count = sample.header.joint_count as usize;
+        Judgement {
+            // Equation 5.
+            score: sample.residual[..joint_count].iter().map(|r| r * r).sum(),
+            ready: sample.header.has(flags::READY),
+            verdict: None,
+        }
+    }
+}
