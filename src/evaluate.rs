@@ -20,11 +20,11 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use tauscope_bus::StageError;
-use tauscope_detect::{LearnError, Lesson, Lessons};
+use tauscope_detect::{Entry, LearnError, Lesson, Lessons};
 
 use self::heard::Heard;
 use self::input::{Named, Role};
-use self::registry::{Entry, SEEDS, Task};
+use self::registry::{SEEDS, Task};
 use self::runner::Runner;
 use self::twin::Prepared;
 use crate::build::BuildError;

@@ -41,11 +41,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tauscope_bus::{TwinState, flags};
 
-use crate::config::ConfigError;
-use crate::frame::detector::{Detector, Judgement, Seen, Verdict};
-use crate::frame::lesson::{LearnError, Lessons};
 use crate::frame::rate::Rate;
-use crate::frame::stage::Setup;
+use crate::frame::{
+    ConfigError, Detector, DetectorSettings, Judgement, LearnError, Lessons, Seen, Setup, Task,
+    Trained, Training, Verdict,
+};
 use alarm::Watch;
 pub use kinds::Kinds;
 use late::{Late, LateIn};
@@ -105,27 +105,45 @@ impl Default for Settings {
     }
 }
 
-/// The detector.
-///
-/// # Errors
-/// If nothing has been learnt, or for a robot with other joints.
-pub(crate) fn build(settings: &Settings, setup: &Setup) -> Result<Box<dyn Detector>, ConfigError> {
-    let Some(learnt) = &settings.learnt else {
-        return Err(ConfigError::NotLearnt { detector: NAME });
-    };
-    if let Some(reason) = learnt.fault(&setup.joint_names) {
-        return Err(ConfigError::LearntState {
-            detector: NAME,
-            reason,
-        });
+impl DetectorSettings for Settings {
+    const NAME: &'static str = NAME;
+    const ABOUT: &'static str = "The residual held against what it usually is: our own.";
+    const TRAINING: Training = Training::Own;
+
+    fn build(&self, setup: &Setup, _hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {
+        let Some(learnt) = &self.learnt else {
+            return Err(ConfigError::NotLearnt { detector: NAME });
+        };
+        if let Some(reason) = learnt.fault(&setup.joint_names) {
+            return Err(ConfigError::LearntState {
+                detector: NAME,
+                reason,
+            });
+        }
+        let tells_kinds = learnt.kinds.is_some();
+        Ok(Box::new(Tauscope::new(learnt, self, setup, tells_kinds)))
     }
-    let tells_kinds = learnt.kinds.is_some();
-    Ok(Box::new(Tauscope::new(
-        learnt,
-        settings,
-        setup,
-        tells_kinds,
-    )))
+
+    fn learn(&self, task: &Task<'_>) -> Result<(Self, Option<Trained>), LearnError> {
+        let mut settings = self.clone();
+        if settings.offset_from_first_s <= 0.0 {
+            settings.offset_from_first_s = task.free_first_s;
+        }
+        Ok((learn(&settings, task.setup, &task.lessons)?, None))
+    }
+
+    fn warning(&self, _: &Setup) -> Option<String> {
+        let free_s = self.learnt.as_ref()?.free_s?;
+        (free_s < ENOUGH_S).then(|| {
+            format!(
+                "{NAME} has learnt what is usual from {free_s:.1} s in which nothing touched the arm, and that is too little: its threshold is a guess, how often it is exceeded by chance is not known, and all joints are taken for more alike than they are; let it learn from at least {ENOUGH_S} s, better some minutes"
+            )
+        })
+    }
+
+    fn found_by_evaluation(&self) -> Vec<&'static str> {
+        self.learnt.iter().map(|_| "learnt").collect()
+    }
 }
 
 /// Learns from contact-free stretches of all recordings, and what parts the kinds from the training recordings' contacts.
@@ -144,16 +162,6 @@ pub fn learn(
     Ok(Settings {
         learnt: Some(learnt),
         ..settings.clone()
-    })
-}
-
-/// What speaks against running it with these settings, though it can.
-pub(crate) fn warning(settings: &Settings) -> Option<String> {
-    let free_s = settings.learnt.as_ref()?.free_s?;
-    (free_s < ENOUGH_S).then(|| {
-        format!(
-            "{NAME} has learnt what is usual from {free_s:.1} s in which nothing touched the arm, and that is too little: its threshold is a guess, how often it is exceeded by chance is not known, and all joints are taken for more alike than they are; let it learn from at least {ENOUGH_S} s, better some minutes"
-        )
     })
 }
 

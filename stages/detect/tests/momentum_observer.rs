@@ -27,10 +27,7 @@ fn setup(gain: f64, offset: f64) -> Setup {
 }
 
 fn config() -> Config {
-    Config {
-        momentum_observer: Some(momentum_observer::Settings::default()),
-        ..Config::default()
-    }
+    Config::of(momentum_observer::Settings::default())
 }
 
 /// A resting arm, `i` hundredths of a second in: the model says 3, the motor 5.

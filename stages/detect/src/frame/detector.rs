@@ -2,7 +2,7 @@
 
 use tauscope_bus::TwinState;
 
-use crate::indri::virtual_collision_sensor::Learnt;
+use super::isolation::Contact;
 
 /// What a detector makes of one sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,7 +36,7 @@ pub struct Seen {
     pub joints: Option<u32>,
     /// The touched link, an index into the model's links, and the force on the robot in the world
     /// frame \[N\] with the point where it is taken to act \[m\]; `None` leaves it to the residual's pattern.
-    pub place: Option<crate::Contact>,
+    pub place: Option<Contact>,
 }
 
 /// What a detector saw on the way to its newest judgement. World frame.
@@ -48,6 +48,9 @@ pub struct Details {
     /// velocity at its beginning; zeros for one without length.
     pub directions: Option<[[f64; 3]; 2]>,
 }
+
+/// What a detector has learnt while running: whatever its own file makes of it.
+pub type State = serde_json::Value;
 
 /// Scores every sample of a twin. Pure: time is in the samples; nothing is allocated per sample.
 pub trait Detector: Send {
@@ -69,7 +72,7 @@ pub trait Detector: Send {
     }
 
     /// What it has learnt while running, to be kept for its next life; `None` if it learns nothing.
-    fn learnt(&self) -> Option<Learnt> {
+    fn learnt(&self) -> Option<State> {
         None
     }
 

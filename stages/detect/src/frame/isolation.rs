@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 use tauscope_bus::{JointArray, TwinState};
 use tauscope_dynamics::{Data, Model, forward_kinematics, link_jacobian, link_pose};
 
-use crate::frame::stage::Setup;
+use super::setup::Setup;
 
 /// A joint counts as loaded from this many standard deviations of its contact-free residual on.
 const LOADED_SIGMAS: f64 = 4.0;

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use tauscope_bus::{TwinState, flags};
 
+use super::setup::Setup;
+
 /// The recordings that a detector learns from.
 #[derive(Debug, Clone, Copy)]
 pub struct Lessons<'a> {
@@ -11,6 +13,19 @@ pub struct Lessons<'a> {
     pub train: &'a [Lesson],
     /// Those that thresholds are chosen on, and training is stopped by.
     pub validation: &'a [Lesson],
+}
+
+/// What there is to learn from, and in which cell.
+#[derive(Debug, Clone, Copy)]
+pub struct Task<'a> {
+    /// The cell and its twin.
+    pub setup: &'a Setup,
+    /// Recordings behind the twin.
+    pub lessons: Lessons<'a>,
+    /// For so long nothing touches the robot at the beginning of each recording \[s\].
+    pub free_first_s: f64,
+    /// For what is drawn by chance.
+    pub seed: u64,
 }
 
 /// One recording behind the twin.
@@ -115,5 +130,5 @@ pub enum LearnError {
     },
     /// The settings do not fit.
     #[error(transparent)]
-    Config(#[from] crate::ConfigError),
+    Config(#[from] super::error::ConfigError),
 }

@@ -23,9 +23,9 @@
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState, flags};
 use tauscope_dynamics::{Data, InertialEffort, Model};
 
-use crate::config::ConfigError;
-use crate::frame::shared::Tap;
-use crate::frame::stage::{JointSetup, Setup};
+use super::error::ConfigError;
+use super::setup::{JointSetup, Setup};
+use super::shared::Tap;
 
 /// The papers' gain \[1/s\].
 pub const DEFAULT_GAIN_PER_S: f64 = 100.0;
@@ -183,7 +183,7 @@ impl Inertia {
         let model = setup.model.as_ref()?;
         let new = || Self::new(model.clone());
         Some(match &setup.shared {
-            Some(shared) => shared.inertia(new),
+            Some(shared) => shared.tap((), new),
             None => Tap::own(new()),
         })
     }

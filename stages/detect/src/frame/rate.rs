@@ -2,7 +2,7 @@
 
 use tauscope_bus::{TwinState, flags};
 
-use crate::frame::lesson::Lesson;
+use super::lesson::Lesson;
 
 /// Steps whose median is a stream's period.
 const COUNT: usize = 101;

@@ -1,59 +1,35 @@
 //! What detectors of one stream derive alike, derived once.
 
+use std::any::Any;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::frame::momentum::Inertia;
-use crate::indri::virtual_collision_sensor::{BlockSettings, Blocks};
-use crate::salt_ducaju::contact_signals::{SignalSettings, Signals};
-
-/// Handed to detectors by [`Setup::shared`](crate::Setup::shared), it lets them take from one another what they derive alike: the
-/// arm's inertia in motion, and where the settings are the same the signals after Salt Ducaju et al. and what the currents do after Indri et al.
+/// Handed to detectors by [`Setup::shared`](crate::Setup::shared), it lets them take from one another what
+/// they derive alike under the same settings, such as the arm's inertia in motion.
 ///
 /// Only detectors that are given the very same samples one after the other may share, such as the
 /// detectors behind one twin in a replay: whoever sees a sample first derives, the others find it done.
 #[derive(Debug, Clone, Default)]
-pub struct Shared(Arc<Mutex<Derived>>);
+pub struct Shared(Arc<Mutex<Vec<Box<dyn Any + Send>>>>);
 
-#[derive(Debug, Default)]
-struct Derived {
-    inertia: Option<Arc<Mutex<Inertia>>>,
-    signals: Vec<(SignalSettings, Arc<Mutex<Signals>>)>,
-    blocks: Vec<(BlockSettings, Arc<Mutex<Blocks>>)>,
-}
+/// A value and the settings that it is derived under.
+struct Under<S, T>(S, Arc<Mutex<T>>);
 
 impl Shared {
-    /// The inertia that is shared; `new` where nobody has asked yet.
-    pub(crate) fn inertia(&self, new: impl FnOnce() -> Inertia) -> Tap<Inertia> {
-        let mut derived = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let inertia = derived.inertia.get_or_insert_with(|| shared(new()));
-        Tap::Shared(Arc::clone(inertia))
+    /// The value of this type that is shared under these settings; `new` where nobody has asked yet.
+    pub(crate) fn tap<S, T>(&self, settings: S, new: impl FnOnce() -> T) -> Tap<T>
+    where
+        S: PartialEq + Send + 'static,
+        T: Send + 'static,
+    {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut alike = (all.iter()).filter_map(|any| any.downcast_ref::<Under<S, T>>());
+        if let Some(Under(_, value)) = alike.find(|Under(of, _)| *of == settings) {
+            return Tap::Shared(Arc::clone(value));
+        }
+        let value = Arc::new(Mutex::new(new()));
+        all.push(Box::new(Under(settings, Arc::clone(&value))));
+        Tap::Shared(value)
     }
-
-    /// The signals that are shared under these settings; `own` where nobody has asked yet.
-    pub(crate) fn signals(&self, settings: &SignalSettings, own: Signals) -> Tap<Signals> {
-        let mut derived = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        under(&mut derived.signals, *settings, own)
-    }
-
-    /// What the joints' currents do under these settings; `own` where nobody has asked yet.
-    pub(crate) fn blocks(&self, settings: BlockSettings, own: Blocks) -> Tap<Blocks> {
-        let mut derived = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        under(&mut derived.blocks, settings, own)
-    }
-}
-
-/// What `all` has under these settings, or else `own` from now on.
-fn under<S: PartialEq, T>(all: &mut Vec<(S, Arc<Mutex<T>>)>, settings: S, own: T) -> Tap<T> {
-    if let Some((_, value)) = all.iter().find(|(of, _)| *of == settings) {
-        return Tap::Shared(Arc::clone(value));
-    }
-    let own = shared(own);
-    all.push((settings, Arc::clone(&own)));
-    Tap::Shared(own)
-}
-
-fn shared<T>(value: T) -> Arc<Mutex<T>> {
-    Arc::new(Mutex::new(value))
 }
 
 /// Something of one's own, or shared.

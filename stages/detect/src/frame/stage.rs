@@ -1,91 +1,17 @@
 //! The detector as a stage: twin states in, a verdict for each out.
 
-use std::collections::BTreeMap;
-use std::sync::Arc;
-
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use tauscope_bus::{Detection, Emit, Name, Stage, StageError, TwinState, flags};
-use tauscope_dynamics::Model;
 
-use crate::config::{Config, ConfigError, Threshold};
-use crate::frame::detector::Detector;
-use crate::frame::events::{Alarm, OwnEvents, Step};
-use crate::frame::isolation::Isolation;
-use crate::frame::shared::Shared;
-use crate::indri::virtual_collision_sensor::Learnt;
-use crate::tajiri::learned::Trained;
+use super::detector::{Detector, State};
+use super::error::ConfigError;
+use super::events::{Alarm, OwnEvents, Step};
+use super::isolation::Isolation;
+use super::setup::Setup;
+use super::threshold::Threshold;
 
-/// What a detector must know of its cell and its twin.
-#[derive(Debug, Clone, Default)]
-pub struct Setup {
-    /// By joint in URDF order.
-    pub joints: Vec<JointSetup>,
-    /// Their names: what was learnt by joint belongs to them.
-    pub joint_names: Vec<String>,
-    /// The robot, where there is one: for the touched link and the force.
-    pub model: Option<Model>,
-    /// By detector, what its score did on contact-free data.
-    pub scores: BTreeMap<String, ScoreStatistics>,
-    /// The link that holds the tool, an index into the model's links; else the model says which.
-    pub tool_link: Option<usize>,
-    /// The point of the tool that touches things, in that link's frame \[m\]; else its origin.
-    pub contact_point_on_tool_m: Option<[f64; 3]>,
-    /// The impedance that a Cartesian controller holds the tool with, where it is known.
-    pub impedance: Option<Impedance>,
-    /// By detector, those that were trained.
-    pub trained: BTreeMap<String, Arc<Trained>>,
-    /// What it shares with other detectors that are given the same samples; `None` shares nothing.
-    pub shared: Option<Shared>,
-}
-
-impl Setup {
-    /// What the score of `detector` does on contact-free data, as the twin says or else its training.
-    pub fn statistics(&self, detector: &str) -> Option<ScoreStatistics> {
-        let trained = || self.trained.get(detector).map(|trained| trained.score());
-        self.scores.get(detector).copied().or_else(trained)
-    }
-}
-
-/// What a Cartesian impedance controller holds the tool with (Salt Ducaju et al., equation 1).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Impedance {
-    /// Translational stiffness \[N/m\].
-    pub translational_n_per_m: f64,
-    /// Rotational stiffness \[N m/rad\].
-    pub rotational_nm_per_rad: f64,
-}
-
-/// What a detector must know of a joint.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct JointSetup {
-    /// Gain that the twin applied \[effort unit per model unit\].
-    pub gain: f64,
-    /// Offset that the twin applied \[effort unit\].
-    pub offset: f64,
-    /// Standard deviation of the contact-free residual \[effort unit\], where known.
-    pub noise: Option<f64>,
-    /// How much the measured effort changes by 1 N m at the joint \[effort unit per N m\]; NaN where
-    /// that is not known, and the joint tells nothing of a force.
-    pub effort_per_nm: f64,
-}
-
-impl JointSetup {
-    /// Whether its effort tells a torque.
-    pub fn tells_torque(&self) -> bool {
-        self.effort_per_nm.is_finite() && self.effort_per_nm != 0.0
-    }
-}
-
-/// A detector's score on contact-free data.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ScoreStatistics {
-    /// Mean.
-    pub mean: f64,
-    /// Standard deviation.
-    pub standard_deviation: f64,
-}
+/// Share of the threshold from which a score may belong to a contact, where nobody has measured what it
+/// does on contact-free data.
+const BEGIN: f64 = 0.5;
 
 /// Who says when an alarm is raised.
 enum Rule {
@@ -113,14 +39,20 @@ pub struct Detect {
 }
 
 impl Detect {
-    /// The detector that `config` names, for a cell.
+    /// `detector` in a cell. Its alarm is raised at `threshold`, by default so many standard deviations above
+    /// the mean of its score, and lasts until the score has stayed below it for `hold_s` \[s\]; a detector
+    /// with rules of its own takes no threshold.
     ///
     /// # Errors
-    /// If the configuration names no or several detectors, or no threshold can be had.
-    pub fn new(config: &Config, setup: Setup) -> Result<Self, ConfigError> {
-        let detector = config.detector(&setup)?;
+    /// If no threshold can be had, or one is given to a detector with rules of its own.
+    pub fn new(
+        detector: Box<dyn Detector>,
+        (wanted, sigmas): (&Threshold, f64),
+        hold_s: f64,
+        setup: Setup,
+    ) -> Result<Self, ConfigError> {
         let rule = match detector.threshold() {
-            Some(_) if config.threshold != Threshold::default() => {
+            Some(_) if *wanted != Threshold::default() => {
                 let detector = detector.name();
                 return Err(ConfigError::OwnThreshold { detector });
             }
@@ -129,14 +61,13 @@ impl Detect {
                 events: OwnEvents::default(),
             },
             None => {
-                let threshold = config.threshold.resolve(detector.name(), &setup)?;
+                let threshold = wanted.resolve(detector.name(), sigmas, &setup)?;
                 // The usual range of the score: one standard deviation above its mean.
-                let low = setup
-                    .statistics(detector.name())
-                    .map_or(0.5 * threshold, |score| {
-                        score.mean + score.standard_deviation
-                    });
-                Rule::Threshold(Alarm::new(threshold, low, config.hold_s))
+                let low = setup.statistics(detector.name());
+                let low = low.map_or(BEGIN * threshold, |score| {
+                    score.mean + score.standard_deviation
+                });
+                Rule::Threshold(Alarm::new(threshold, low, hold_s))
             }
         };
         Ok(Self {
@@ -149,7 +80,7 @@ impl Detect {
 
     /// What the detector has learnt while running, to be given to its next life; `None` if it learns
     /// nothing.
-    pub fn learnt(&self) -> Option<Learnt> {
+    pub fn learnt(&self) -> Option<State> {
         self.detector.learnt()
     }
 }

@@ -31,19 +31,20 @@ mod validity;
 
 use std::path::PathBuf;
 
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 
-use crate::config::ConfigError;
-use crate::frame::lesson::{LearnError, Lessons};
-use crate::frame::stage::Setup;
+use crate::frame::{
+    ConfigError, Detector, DetectorSettings, LearnError, Lessons, Setup, State, Suits, Task,
+    Trained, Training,
+};
 pub use bias::LearningState;
-pub(crate) use blocks::Blocks;
 pub use first_bias::FirstBias;
 pub(crate) use joint::{BlockSettings, Tuning};
 pub use learnt::{Learnt, LearntJoint};
 pub use phase::Phase;
 use sensor::Learning;
+
 pub(crate) use sensor::Sensor;
 
 /// Canonical name.
@@ -103,6 +104,53 @@ impl Default for Settings {
     }
 }
 
+impl DetectorSettings for Settings {
+    const NAME: &'static str = NAME;
+    const ABOUT: &'static str = "The same with a bias that is learnt and adapts.";
+    const TRAINING: Training = Training::Own;
+    const SUITS: Suits = Suits::Cycles;
+
+    fn build(&self, setup: &Setup, hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {
+        let bias = first_bias(NAME, self.bias.as_ref(), setup)?;
+        let learnt = self.learnt.as_ref();
+        if let Some(reason) = learnt.and_then(|learnt| learnt.fault(&setup.joint_names)) {
+            return Err(ConfigError::LearntState {
+                detector: NAME,
+                reason,
+            });
+        }
+        let learning = Learning {
+            duration_s: self.learning_s,
+            at_start: self.learn == Learn::AtStart,
+        };
+        let mut sensor = Sensor::new(NAME, self.tuning(), &bias, hold_s, setup.shared.as_ref());
+        sensor.let_learn(learning, &setup.joint_names, learnt);
+        Ok(Box::new(sensor))
+    }
+
+    fn learn(&self, task: &Task<'_>) -> Result<(Self, Option<Trained>), LearnError> {
+        Ok((learn(self, task.setup, &task.lessons)?, None))
+    }
+
+    fn found_by_evaluation(&self) -> Vec<&'static str> {
+        let state = self.state.iter().map(|_| "state");
+        state.chain(self.learnt.iter().map(|_| "learnt")).collect()
+    }
+
+    fn state_file(&mut self) -> Option<&mut Option<PathBuf>> {
+        Some(&mut self.state)
+    }
+
+    fn state_schema(generator: &mut SchemaGenerator) -> Option<Schema> {
+        Some(generator.subschema_for::<Learnt>())
+    }
+
+    fn resume(&mut self, state: State) -> Result<(), serde_json::Error> {
+        self.learnt = Some(serde_json::from_value(state)?);
+        Ok(())
+    }
+}
+
 /// When the sensor is asked to learn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -126,38 +174,6 @@ impl Settings {
             time_constant_s: self.adaptation_s,
         }
     }
-}
-
-/// The detector; an alarm ends once nothing was detected for `hold_s`.
-///
-/// # Errors
-/// If there is no bias, or bias or learnt state do not fit the joints.
-pub(crate) fn build(
-    settings: &Settings,
-    setup: &Setup,
-    hold_s: f64,
-) -> Result<Sensor, ConfigError> {
-    let bias = first_bias(NAME, settings.bias.as_ref(), setup)?;
-    let learnt = settings.learnt.as_ref();
-    if let Some(reason) = learnt.and_then(|learnt| learnt.fault(&setup.joint_names)) {
-        return Err(ConfigError::LearntState {
-            detector: NAME,
-            reason,
-        });
-    }
-    let learning = Learning {
-        duration_s: settings.learning_s,
-        at_start: settings.learn == Learn::AtStart,
-    };
-    let mut sensor = Sensor::new(
-        NAME,
-        settings.tuning(),
-        &bias,
-        hold_s,
-        setup.shared.as_ref(),
-    );
-    sensor.let_learn(learning, &setup.joint_names, learnt);
-    Ok(sensor)
 }
 
 /// The first bias by joint in URDF order, checked.

@@ -6,9 +6,10 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::config::ConfigError;
-use crate::frame::lesson::{LearnError, Lessons};
-use crate::frame::stage::Setup;
+use crate::frame::{
+    ConfigError, Detector, DetectorSettings, LearnError, Lessons, Setup, Suits, Task, Trained,
+    Training,
+};
 use crate::indri::virtual_collision_sensor::{
     BlockSettings, FirstBias, Sensor, Tuning, first_bias, learn_first_bias,
 };
@@ -46,6 +47,25 @@ impl Default for Settings {
     }
 }
 
+impl DetectorSettings for Settings {
+    const NAME: &'static str = NAME;
+    const ABOUT: &'static str =
+        "Collisions from both efforts alone, with a constant bias (Indri, Trapani and Lazzero).";
+    const TRAINING: Training = Training::Own;
+    const SUITS: Suits = Suits::Cycles;
+
+    fn build(&self, setup: &Setup, hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {
+        let bias = first_bias(NAME, self.bias.as_ref(), setup)?;
+        let shared = setup.shared.as_ref();
+        let sensor = Sensor::new(NAME, self.tuning(), &bias, hold_s, shared);
+        Ok(Box::new(sensor))
+    }
+
+    fn learn(&self, task: &Task<'_>) -> Result<(Self, Option<Trained>), LearnError> {
+        Ok((learn(self, task.setup, &task.lessons)?, None))
+    }
+}
+
 impl Settings {
     fn tuning(&self) -> Tuning {
         Tuning {
@@ -59,25 +79,6 @@ impl Settings {
             time_constant_s: 1.0,
         }
     }
-}
-
-/// The detector; an alarm ends once nothing was detected for `hold_s`.
-///
-/// # Errors
-/// If there is no bias, or it does not fit the joints.
-pub(crate) fn build(
-    settings: &Settings,
-    setup: &Setup,
-    hold_s: f64,
-) -> Result<Sensor, ConfigError> {
-    let bias = first_bias(NAME, settings.bias.as_ref(), setup)?;
-    Ok(Sensor::new(
-        NAME,
-        settings.tuning(),
-        &bias,
-        hold_s,
-        setup.shared.as_ref(),
-    ))
 }
 
 /// Learns the bias from the recordings `lessons` is trained on: per joint twice the smallest bias that

@@ -13,13 +13,13 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::config::ConfigError;
-use crate::frame::detector::Detector;
-use crate::frame::lesson::{ContactKind, LearnError, Lessons};
-use crate::frame::stage::Setup;
+use crate::frame::{
+    ClassSweep, ConfigError, ContactKind, Detector, DetectorSettings, LearnError, Lessons, Setup,
+    Suits, Sweeps, Task, Trained, Training,
+};
 use crate::salt_ducaju::contact_machine::{ContactDetector, MachineSettings, NewContact, Rule};
 use crate::salt_ducaju::contact_signals::{SignalSettings, Signals};
-use crate::salt_ducaju::contact_tuning::{self, ClassSweep, Sweeps};
+use crate::salt_ducaju::contact_tuning;
 
 /// Canonical name.
 pub(crate) const NAME: &str = "contact_classifier";
@@ -54,15 +54,30 @@ impl Default for Settings {
     }
 }
 
-/// The detector.
-///
-/// # Errors
-/// If `setup` has no model.
-pub(crate) fn build(settings: &Settings, setup: &Setup) -> Result<Box<dyn Detector>, ConfigError> {
-    let signals = Signals::tap(&settings.signals, setup, NAME)?;
-    let rule = Conditions::of(settings);
-    let shared = (&settings.signals, &settings.detection);
-    Ok(Box::new(ContactDetector::new(NAME, signals, shared, rule)))
+impl DetectorSettings for Settings {
+    const NAME: &'static str = NAME;
+    const ABOUT: &'static str = "Collision or cooperation, by the force's frequency content and direction (Salt Ducaju et al.).";
+    const TRAINING: Training = Training::Own;
+    const SUITS: Suits = Suits::Kinds;
+
+    fn build(&self, setup: &Setup, _hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {
+        let signals = Signals::tap(&self.signals, setup, NAME)?;
+        let rule = Conditions::of(self);
+        let shared = (&self.signals, &self.detection);
+        Ok(Box::new(ContactDetector::new(NAME, signals, shared, rule)))
+    }
+
+    fn learn(&self, task: &Task<'_>) -> Result<(Self, Option<Trained>), LearnError> {
+        Ok((learn(self, task.setup, &task.lessons)?, None))
+    }
+
+    fn warning(&self, setup: &Setup) -> Option<String> {
+        self.signals.warning(NAME, setup)
+    }
+
+    fn sweeps(&self, task: &Task<'_>) -> Result<Option<Sweeps>, LearnError> {
+        sweeps(self, task.setup, &task.lessons).map(Some)
+    }
 }
 
 /// Algorithm 2.
@@ -147,6 +162,8 @@ pub fn sweeps(
     Ok(Sweeps {
         detection: contact_tuning::sweep_threshold(&tracks, &settings.detection, window, rule),
         class,
+        force_threshold_n: settings.detection.force_threshold_n,
+        bound: settings.gamma,
     })
 }
 

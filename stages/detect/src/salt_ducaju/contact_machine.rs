@@ -16,10 +16,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tauscope_bus::TwinState;
 
-use crate::frame::detector::{Details, Detector, Judgement, Seen, Verdict};
-use crate::frame::isolation::Contact;
-use crate::frame::lesson::ContactKind;
-use crate::frame::shared::Tap;
+use crate::frame::{Contact, ContactKind, Details, Detector, Judgement, Seen, Tap, Verdict};
 use crate::salt_ducaju::contact_signals::{Instant, SignalSettings, Signals};
 use crate::salt_ducaju::sliding_dft::BandError;
 

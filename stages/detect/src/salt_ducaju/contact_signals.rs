@@ -8,11 +8,8 @@ use serde::{Deserialize, Serialize};
 use tauscope_bus::{TwinState, flags};
 use tauscope_dynamics::lowpass::Butterworth2;
 
-use crate::config::ConfigError;
 use crate::frame::momentum::{DEFAULT_GAIN_PER_S, MomentumObserver};
-use crate::frame::rate;
-use crate::frame::shared::Tap;
-use crate::frame::stage::{Impedance, Setup};
+use crate::frame::{ConfigError, Impedance, Setup, Tap, rate};
 use crate::salt_ducaju::sliding_dft::{BandError, SlidingDft, bins};
 use crate::salt_ducaju::wrench::ToolPoint;
 
@@ -152,7 +149,7 @@ impl Signals {
     ) -> Result<Tap<Self>, ConfigError> {
         let own = Self::new(settings, setup, detector)?;
         Ok(match &setup.shared {
-            Some(shared) => shared.signals(settings, own),
+            Some(shared) => shared.tap(*settings, || own),
             None => Tap::own(own),
         })
     }

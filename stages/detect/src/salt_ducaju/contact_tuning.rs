@@ -4,13 +4,13 @@ mod class;
 
 use tauscope_bus::TwinState;
 
-use crate::frame::lesson::{ContactKind, LabelledContact, LearnError, Lesson, Lessons};
-use crate::frame::rate;
-use crate::frame::stage::{Impedance, Setup};
+use crate::frame::{
+    ContactKind, FoundSweep, Impedance, LabelledContact, LearnError, Lesson, Lessons, Setup,
+    ThresholdSweep, rate,
+};
 use crate::salt_ducaju::contact_machine::{Machine, MachineSettings, NewContact, Rule};
 use crate::salt_ducaju::contact_signals::{Instant, SignalSettings, Signals};
 
-pub use class::ClassSweep;
 pub(crate) use class::{best, sweep_class};
 
 /// A detection belongs to the contact that began last of those that began at most this long after it
@@ -57,39 +57,6 @@ impl Tracks {
             ..*settings
         }
     }
-}
-
-/// Both curves of the paper's discussion.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Sweeps {
-    /// Over `F_th`, ascending.
-    pub detection: Vec<ThresholdSweep>,
-    /// Over γ (or what else parts the kinds), ascending.
-    pub class: Vec<ClassSweep>,
-}
-
-/// What a force threshold finds on the tuning recordings.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ThresholdSweep {
-    /// `F_th` \[N\].
-    pub force_threshold_n: f64,
-    /// Collisions and cooperations (contacts of unknown kind count as collisions).
-    pub collisions: FoundSweep,
-    /// The same of cooperations.
-    pub cooperations: FoundSweep,
-    /// Detections where nothing touched the robot.
-    pub false_alarms: usize,
-}
-
-/// What was found of one kind.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct FoundSweep {
-    /// How many were found.
-    pub found: usize,
-    /// And how many not.
-    pub missed: usize,
-    /// Mean time from the beginning to the detection \[s\]; NaN if none was found.
-    pub mean_delay_s: f64,
 }
 
 /// Runs the recordings through the signals.

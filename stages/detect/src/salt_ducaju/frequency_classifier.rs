@@ -11,11 +11,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tauscope_bus::TwinState;
 
-use crate::config::ConfigError;
-use crate::frame::detector::{Details, Detector, Judgement};
-use crate::frame::lesson::{ContactKind, LearnError, Lessons};
-use crate::frame::shared::Tap;
-use crate::frame::stage::Setup;
+use crate::frame::{
+    ConfigError, ContactKind, Details, Detector, DetectorSettings, Judgement, LearnError, Lessons,
+    Setup, Suits, Tap, Task, Trained, Training,
+};
 use crate::salt_ducaju::contact_machine::{
     Machine, MachineSettings, NewContact, Ongoing, Rule, judgement,
 };
@@ -54,18 +53,29 @@ impl Default for Settings {
     }
 }
 
-/// The detector.
-///
-/// # Errors
-/// If `setup` has no model.
-pub(crate) fn build(settings: &Settings, setup: &Setup) -> Result<Box<dyn Detector>, ConfigError> {
-    let mut signals = Signals::tap(&settings.signals, setup, NAME)?;
-    Ok(Box::new(FrequencyClassifier {
-        tool_link: signals.with(|signals| signals.tool_link()),
-        signals,
-        fault: None,
-        by_content: ByContent::new(settings),
-    }))
+impl DetectorSettings for Settings {
+    const NAME: &'static str = NAME;
+    const ABOUT: &'static str = "The same detection, told apart by the frequency content alone.";
+    const TRAINING: Training = Training::Own;
+    const SUITS: Suits = Suits::Kinds;
+
+    fn build(&self, setup: &Setup, _hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {
+        let mut signals = Signals::tap(&self.signals, setup, NAME)?;
+        Ok(Box::new(FrequencyClassifier {
+            tool_link: signals.with(|signals| signals.tool_link()),
+            signals,
+            fault: None,
+            by_content: ByContent::new(self),
+        }))
+    }
+
+    fn learn(&self, task: &Task<'_>) -> Result<(Self, Option<Trained>), LearnError> {
+        Ok((learn(self, task.setup, &task.lessons)?, None))
+    }
+
+    fn warning(&self, setup: &Setup) -> Option<String> {
+        self.signals.warning(NAME, setup)
+    }
 }
 
 struct FrequencyClassifier {

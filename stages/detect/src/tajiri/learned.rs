@@ -1,6 +1,6 @@
 //! What the five learned methods of Tajiri and Iwamoto (section IV-B, 3 to 7) share: the signals they
 //! see, equation 8's scaling, the support vector machine, the nets and how they are trained, and the
-//! file that a trained detector is kept in ([`Trained`]).
+//! file that a trained detector is kept in ([`Trained`](crate::Trained)).
 //!
 //! Training uses libsvm-rs and candle. A trained net is run by hand-written loops over its weights: for
 //! nets this small a framework's bookkeeping costs many times the arithmetic. Tests hold the two against
@@ -12,56 +12,18 @@ mod one_class;
 mod runner;
 mod scaling;
 mod signals;
-mod trained;
 mod training;
 mod vectors;
 
+use crate::frame::LearnError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-use crate::frame::lesson::LearnError;
-
-pub use trained::{Facts, Trained, TrainedError};
 
 pub(crate) use autoencoder::Autoencoder;
 pub(crate) use lstm::{Lstm, LstmScorer};
 pub(crate) use one_class::OneClass;
 pub(crate) use runner::{Course, Scorer, build};
 pub(crate) use vectors::{VectorScorer, Vectors};
-
-/// The signals that a learned detector sees. They belong to its training: a trained detector brings
-/// those that it was trained with.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct SignalSettings {
-    /// Gain of the momentum observer \[1/s\].
-    #[schemars(range(min = 0.1, max = 10_000.0))]
-    pub observer_gain_per_s: f64,
-    /// Low-pass on external torques, positions and velocities \[Hz\].
-    #[schemars(range(min = 0.01, max = 10_000.0))]
-    pub cutoff_hz: f64,
-}
-
-impl Default for SignalSettings {
-    fn default() -> Self {
-        Self {
-            observer_gain_per_s: crate::frame::momentum::DEFAULT_GAIN_PER_S,
-            // About that of the twin on efforts; the paper does not give its own.
-            cutoff_hz: 4.0,
-        }
-    }
-}
-
-impl SignalSettings {
-    /// What is wrong with them, if anything.
-    fn fault(&self) -> Option<&'static str> {
-        let positive = |value: f64| value > 0.0 && value.is_finite();
-        if !positive(self.observer_gain_per_s) {
-            return Some("`observer_gain_per_s` must be above 0");
-        }
-        (!positive(self.cutoff_hz)).then_some("`cutoff_hz` must be above 0")
-    }
-}
 
 /// How a net is trained: Adam on the mean squared error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

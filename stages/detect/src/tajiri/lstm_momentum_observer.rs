@@ -12,17 +12,16 @@ use rand_chacha::ChaCha8Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::config::ConfigError;
-use crate::frame::detector::Detector;
-use crate::frame::lesson::{LearnError, Lessons};
-use crate::frame::stage::Setup;
+use crate::frame::{
+    ConfigError, Detector, DetectorSettings, LearnError, Lessons, Setup, SignalSettings, Suits,
+    Task, Trained, TrainedError, Training,
+};
 use crate::tajiri::learned::{
-    self, Course, GivenTraining, Lstm, LstmScorer, Scorer, SignalSettings, Trained, TrainedError,
-    TrainingSettings,
+    self, Course, GivenTraining, Lstm, LstmScorer, Scorer, TrainingSettings,
 };
 
 /// Canonical name.
-pub const NAME: &str = "lstm_momentum_observer";
+pub(crate) const NAME: &str = "lstm_momentum_observer";
 
 /// Settings of `lstm_momentum_observer`. All but `model` are those of its training.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -66,12 +65,30 @@ impl Default for Settings {
     }
 }
 
-/// The detector that was trained.
-///
-/// # Errors
-/// If `setup` holds none, or one that does not fit the robot.
-pub(crate) fn build(setup: &Setup) -> Result<Box<dyn Detector>, ConfigError> {
-    learned::build(NAME, setup, load)
+impl DetectorSettings for Settings {
+    const NAME: &'static str = NAME;
+    const ABOUT: &'static str =
+        "Momentum observer less what an LSTM expects of it (Tajiri and Iwamoto, after Lim et al.).";
+    const TRAINING: Training = Training::Own;
+    const RANDOM: bool = true;
+    const SUITS: Suits = Suits::NewPaths;
+
+    fn build(&self, setup: &Setup, _hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {
+        learned::build(NAME, setup, load)
+    }
+
+    fn learn(&self, task: &Task<'_>) -> Result<(Self, Option<Trained>), LearnError> {
+        let trained = train(self, task.setup, &task.lessons, task.seed)?;
+        Ok((self.clone(), Some(trained)))
+    }
+
+    fn found_by_evaluation(&self) -> Vec<&'static str> {
+        self.model.iter().map(|_| "model").collect()
+    }
+
+    fn trained_file(&mut self) -> Option<&mut Option<PathBuf>> {
+        Some(&mut self.model)
+    }
 }
 
 fn load(trained: &Trained) -> Result<Box<dyn Scorer>, TrainedError> {
@@ -87,7 +104,6 @@ pub fn train(
     setup: &Setup,
     lessons: &Lessons<'_>,
     seed: u64,
-    progress: &mut dyn FnMut(f64),
 ) -> Result<Trained, LearnError> {
     learned::demand(NAME, settings.hidden > 0, "`hidden` must be at least 1")?;
     settings.training.check(NAME)?;
@@ -95,14 +111,7 @@ pub fn train(
     let course = Course::new(NAME, &settings.signals, length, setup, lessons, seed)?;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let training = &settings.training;
-    let net = Lstm::fit(
-        &course,
-        settings.hidden,
-        length,
-        training,
-        &mut rng,
-        progress,
-    )
-    .map_err(|error| course.failed(error))?;
+    let net = Lstm::fit(&course, settings.hidden, length, training, &mut rng)
+        .map_err(|error| course.failed(error))?;
     course.end(|trained| net.save(trained), load)
 }

@@ -10,10 +10,8 @@ use serde::{Deserialize, Serialize};
 use tauscope_bus::{MAX_JOINTS, TwinState, flags};
 use tauscope_dynamics::lowpass::Butterworth2;
 
-use crate::config::ConfigError;
-use crate::frame::detector::{Detector, Judgement};
 use crate::frame::momentum::{DEFAULT_GAIN_PER_S, MomentumObserver};
-use crate::frame::stage::Setup;
+use crate::frame::{ConfigError, Detector, DetectorSettings, JointSetup, Judgement, Setup};
 
 /// Canonical name.
 pub(crate) const NAME: &str = "momentum_observer";
@@ -44,19 +42,29 @@ impl Default for Settings {
     }
 }
 
-/// The detector behind a twin with the gains and offsets of `setup`.
-pub(crate) fn build(settings: &Settings, setup: &Setup) -> Result<Box<dyn Detector>, ConfigError> {
-    let filter = Butterworth2::new(settings.cutoff_hz);
-    Ok(Box::new(Naive {
-        observer: MomentumObserver::new(setup, settings.gain_per_s, NAME)?,
-        regression: (setup.joints.iter())
-            .map(|joint| (joint.gain, joint.offset))
-            .collect(),
-        settling_ns: (filter.settling_time_s() * 1e9) as i64,
-        filters: vec![filter; setup.joints.len()],
-        previous_ns: None,
-        started_ns: 0,
-    }))
+impl DetectorSettings for Settings {
+    const NAME: &'static str = NAME;
+    const ABOUT: &'static str =
+        "Squared length of the external torque that a momentum observer of the rigid body sees.";
+    const SIGMAS: f64 = SIGMAS;
+
+    fn build(&self, setup: &Setup, _hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {
+        let filter = Butterworth2::new(self.cutoff_hz);
+        Ok(Box::new(Naive {
+            observer: MomentumObserver::new(setup, self.gain_per_s, NAME)?,
+            regression: (setup.joints.iter())
+                .map(|joint| (joint.gain, joint.offset))
+                .collect(),
+            settling_ns: (filter.settling_time_s() * 1e9) as i64,
+            filters: vec![filter; setup.joints.len()],
+            previous_ns: None,
+            started_ns: 0,
+        }))
+    }
+
+    fn is_calibrated(setup: &Setup) -> bool {
+        setup.model.is_some() && setup.joints.iter().any(JointSetup::tells_torque)
+    }
 }
 
 struct Naive {

@@ -4,12 +4,10 @@
 //! The twin's low-pass is linear with gain 1 at rest, so the regression can be undone behind it; one
 //! twin stage serves both detectors.
 
+use crate::frame::{ConfigError, Detector, DetectorSettings, Judgement, Setup};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tauscope_bus::{MAX_JOINTS, TwinState, flags};
-
-use crate::frame::detector::{Detector, Judgement};
-use crate::frame::stage::Setup;
 
 /// Canonical name.
 pub(crate) const NAME: &str = "naive_difference";
@@ -19,13 +17,21 @@ pub(crate) const NAME: &str = "naive_difference";
 #[serde(deny_unknown_fields)]
 pub struct Settings {}
 
-/// The detector behind a twin with the gains and offsets of `setup`.
-pub(crate) fn build(_: &Settings, setup: &Setup) -> Box<dyn Detector> {
-    let mut regression = [(1.0, 0.0); MAX_JOINTS];
-    for (own, joint) in regression.iter_mut().zip(&setup.joints) {
-        *own = (joint.gain, joint.offset);
+impl DetectorSettings for Settings {
+    const NAME: &'static str = NAME;
+    const ABOUT: &'static str = "The same without the regression: gain 1, offset 0.";
+
+    fn build(&self, setup: &Setup, _hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {
+        let mut regression = [(1.0, 0.0); MAX_JOINTS];
+        for (own, joint) in regression.iter_mut().zip(&setup.joints) {
+            *own = (joint.gain, joint.offset);
+        }
+        Ok(Box::new(NaiveDifference { regression }))
     }
-    Box::new(NaiveDifference { regression })
+
+    fn is_calibrated(_: &Setup) -> bool {
+        true
+    }
 }
 
 struct NaiveDifference {

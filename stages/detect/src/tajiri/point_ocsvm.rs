@@ -10,16 +10,14 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::config::ConfigError;
-use crate::frame::detector::Detector;
-use crate::frame::lesson::{LearnError, Lessons};
-use crate::frame::stage::Setup;
-use crate::tajiri::learned::{
-    self, Course, OneClass, Scorer, SignalSettings, Trained, TrainedError, VectorScorer, Vectors,
+use crate::frame::{
+    ConfigError, Detector, DetectorSettings, LearnError, Lessons, Setup, SignalSettings, Suits,
+    Task, Trained, TrainedError, Training,
 };
+use crate::tajiri::learned::{self, Course, OneClass, Scorer, VectorScorer, Vectors};
 
 /// Canonical name.
-pub const NAME: &str = "point_ocsvm";
+pub(crate) const NAME: &str = "point_ocsvm";
 
 /// Samples that a score rests on.
 const WINDOW: usize = 1;
@@ -52,12 +50,32 @@ impl Default for Settings {
     }
 }
 
-/// The detector that was trained.
-///
-/// # Errors
-/// If `setup` holds none, or one that does not fit the robot.
-pub(crate) fn build(setup: &Setup) -> Result<Box<dyn Detector>, ConfigError> {
-    learned::build(NAME, setup, load)
+impl DetectorSettings for Settings {
+    const NAME: &'static str = NAME;
+    const ABOUT: &'static str = "One-class support vector machine over the external torques of one sample (Tajiri and Iwamoto).";
+    const TRAINING: Training = Training::Own;
+    const SUITS: Suits = Suits::NewPaths;
+
+    fn build(&self, setup: &Setup, _hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {
+        learned::build(NAME, setup, load)
+    }
+
+    fn learn(&self, task: &Task<'_>) -> Result<(Self, Option<Trained>), LearnError> {
+        let trained = train(self, task.setup, &task.lessons, task.seed)?;
+        Ok((self.clone(), Some(trained)))
+    }
+
+    fn largest_score(trained: &Trained) -> Option<f64> {
+        OneClass::largest_score(trained)
+    }
+
+    fn found_by_evaluation(&self) -> Vec<&'static str> {
+        self.model.iter().map(|_| "model").collect()
+    }
+
+    fn trained_file(&mut self) -> Option<&mut Option<PathBuf>> {
+        Some(&mut self.model)
+    }
 }
 
 fn load(trained: &Trained) -> Result<Box<dyn Scorer>, TrainedError> {
@@ -74,15 +92,12 @@ pub fn train(
     setup: &Setup,
     lessons: &Lessons<'_>,
     seed: u64,
-    progress: &mut dyn FnMut(f64),
 ) -> Result<Trained, LearnError> {
     let share = settings.nu > 0.0 && settings.nu <= 1.0;
     learned::demand(NAME, share, "`nu` must be above 0 and at most 1")?;
     learned::demand(NAME, settings.stride > 0, "`stride` must be at least 1")?;
     let course = Course::new(NAME, &settings.signals, WINDOW, setup, lessons, seed)?;
     let vectors = Vectors::new(&course, WINDOW, settings.stride);
-    progress(0.0);
     let machine = OneClass::fit(vectors.rows(), vectors.dimensions(), settings.nu);
-    progress(1.0);
     course.end(|trained| vectors.save(&machine, trained), load)
 }

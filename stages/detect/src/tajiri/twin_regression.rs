@@ -6,11 +6,10 @@
 //! that). The alarm is raised where it reaches mean + 4 standard deviations of the score on
 //! contact-free data.
 
+use crate::frame::{ConfigError, Detector, DetectorSettings, Judgement, Setup, Training};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tauscope_bus::{TwinState, flags};
-
-use crate::frame::detector::{Detector, Judgement};
 
 /// Canonical name.
 pub(crate) const NAME: &str = "twin_regression";
@@ -20,9 +19,19 @@ pub(crate) const NAME: &str = "twin_regression";
 #[serde(deny_unknown_fields)]
 pub struct Settings {}
 
-/// The detector.
-pub(crate) fn build(_: &Settings) -> Box<dyn Detector> {
-    Box::new(TwinRegression)
+impl DetectorSettings for Settings {
+    const NAME: &'static str = NAME;
+    const ABOUT: &'static str =
+        "Squared length of the residual after the twin's regression (Tajiri and Iwamoto).";
+    const TRAINING: Training = Training::Twin;
+
+    fn build(&self, _setup: &Setup, _hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {
+        Ok(Box::new(TwinRegression))
+    }
+
+    fn is_calibrated(_: &Setup) -> bool {
+        true
+    }
 }
 
 struct TwinRegression;

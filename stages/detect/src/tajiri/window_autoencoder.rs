@@ -12,17 +12,16 @@ use rand_chacha::ChaCha8Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::config::ConfigError;
-use crate::frame::detector::Detector;
-use crate::frame::lesson::{LearnError, Lessons};
-use crate::frame::stage::Setup;
+use crate::frame::{
+    ConfigError, Detector, DetectorSettings, LearnError, Lessons, Setup, SignalSettings, Suits,
+    Task, Trained, TrainedError, Training,
+};
 use crate::tajiri::learned::{
-    self, Autoencoder, Course, GivenTraining, Scorer, SignalSettings, Trained, TrainedError,
-    TrainingSettings, VectorScorer, Vectors,
+    self, Autoencoder, Course, GivenTraining, Scorer, TrainingSettings, VectorScorer, Vectors,
 };
 
 /// Canonical name.
-pub const NAME: &str = "window_autoencoder";
+pub(crate) const NAME: &str = "window_autoencoder";
 
 /// Settings of `window_autoencoder`. All but `model` are those of its training.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -70,12 +69,33 @@ impl Default for Settings {
     }
 }
 
-/// The detector that was trained.
-///
-/// # Errors
-/// If `setup` holds none, or one that does not fit the robot.
-pub(crate) fn build(setup: &Setup) -> Result<Box<dyn Detector>, ConfigError> {
-    learned::build(NAME, setup, load)
+impl DetectorSettings for Settings {
+    const NAME: &'static str = NAME;
+    const ABOUT: &'static str = "`point_autoencoder` over windows (after Park et al.).";
+    const TRAINING: Training = Training::Own;
+    const RANDOM: bool = true;
+    const SUITS: Suits = Suits::NewPaths;
+
+    fn build(&self, setup: &Setup, _hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {
+        learned::build(NAME, setup, load)
+    }
+
+    fn learn(&self, task: &Task<'_>) -> Result<(Self, Option<Trained>), LearnError> {
+        let trained = train(self, task.setup, &task.lessons, task.seed)?;
+        Ok((self.clone(), Some(trained)))
+    }
+
+    fn window(&self) -> Option<usize> {
+        Some(self.window)
+    }
+
+    fn found_by_evaluation(&self) -> Vec<&'static str> {
+        self.model.iter().map(|_| "model").collect()
+    }
+
+    fn trained_file(&mut self) -> Option<&mut Option<PathBuf>> {
+        Some(&mut self.model)
+    }
 }
 
 fn load(trained: &Trained) -> Result<Box<dyn Scorer>, TrainedError> {
@@ -91,7 +111,6 @@ pub fn train(
     setup: &Setup,
     lessons: &Lessons<'_>,
     seed: u64,
-    progress: &mut dyn FnMut(f64),
 ) -> Result<Trained, LearnError> {
     learned::demand(NAME, settings.stride > 0, "`stride` must be at least 1")?;
     let units = !settings.layers.contains(&0);
@@ -107,13 +126,7 @@ pub fn train(
     )?;
     let vectors = Vectors::new(&course, settings.window, settings.stride);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let net = Autoencoder::fit(
-        &vectors,
-        &settings.layers,
-        &settings.training,
-        &mut rng,
-        progress,
-    )
-    .map_err(|error| course.failed(error))?;
+    let net = Autoencoder::fit(&vectors, &settings.layers, &settings.training, &mut rng)
+        .map_err(|error| course.failed(error))?;
     course.end(|trained| vectors.save(&net, trained), load)
 }

@@ -11,16 +11,14 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::config::ConfigError;
-use crate::frame::detector::Detector;
-use crate::frame::lesson::{LearnError, Lessons};
-use crate::frame::stage::Setup;
-use crate::tajiri::learned::{
-    self, Course, OneClass, Scorer, SignalSettings, Trained, TrainedError, VectorScorer, Vectors,
+use crate::frame::{
+    ConfigError, Detector, DetectorSettings, LearnError, Lessons, Setup, SignalSettings, Suits,
+    Task, Trained, TrainedError, Training,
 };
+use crate::tajiri::learned::{self, Course, OneClass, Scorer, VectorScorer, Vectors};
 
 /// Canonical name.
-pub const NAME: &str = "window_ocsvm";
+pub(crate) const NAME: &str = "window_ocsvm";
 
 /// Settings of `window_ocsvm`. All but `model` are those of its training.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -55,12 +53,36 @@ impl Default for Settings {
     }
 }
 
-/// The detector that was trained.
-///
-/// # Errors
-/// If `setup` holds none, or one that does not fit the robot.
-pub(crate) fn build(setup: &Setup) -> Result<Box<dyn Detector>, ConfigError> {
-    learned::build(NAME, setup, load)
+impl DetectorSettings for Settings {
+    const NAME: &'static str = NAME;
+    const ABOUT: &'static str = "`point_ocsvm` over windows (after Park et al.).";
+    const TRAINING: Training = Training::Own;
+    const SUITS: Suits = Suits::NewPaths;
+
+    fn build(&self, setup: &Setup, _hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {
+        learned::build(NAME, setup, load)
+    }
+
+    fn learn(&self, task: &Task<'_>) -> Result<(Self, Option<Trained>), LearnError> {
+        let trained = train(self, task.setup, &task.lessons, task.seed)?;
+        Ok((self.clone(), Some(trained)))
+    }
+
+    fn window(&self) -> Option<usize> {
+        Some(self.window)
+    }
+
+    fn largest_score(trained: &Trained) -> Option<f64> {
+        OneClass::largest_score(trained)
+    }
+
+    fn found_by_evaluation(&self) -> Vec<&'static str> {
+        self.model.iter().map(|_| "model").collect()
+    }
+
+    fn trained_file(&mut self) -> Option<&mut Option<PathBuf>> {
+        Some(&mut self.model)
+    }
 }
 
 fn load(trained: &Trained) -> Result<Box<dyn Scorer>, TrainedError> {
@@ -77,7 +99,6 @@ pub fn train(
     setup: &Setup,
     lessons: &Lessons<'_>,
     seed: u64,
-    progress: &mut dyn FnMut(f64),
 ) -> Result<Trained, LearnError> {
     let share = settings.nu > 0.0 && settings.nu <= 1.0;
     learned::demand(NAME, share, "`nu` must be above 0 and at most 1")?;
@@ -91,8 +112,6 @@ pub fn train(
         seed,
     )?;
     let vectors = Vectors::new(&course, settings.window, settings.stride);
-    progress(0.0);
     let machine = OneClass::fit(vectors.rows(), vectors.dimensions(), settings.nu);
-    progress(1.0);
     course.end(|trained| vectors.save(&machine, trained), load)
 }

@@ -9,12 +9,9 @@ use nalgebra::{Matrix3, Matrix6, Vector6};
 use super::Tauscope;
 use super::learnt::Learnt;
 use super::place::ToolTouch;
-use crate::frame::detector::Detector;
-use crate::frame::lesson::{ContactKind, Lessons};
-use crate::frame::stage::Setup;
-use crate::salt_ducaju::fisher_discriminant::{Discriminant, Moments};
+use crate::frame::{ContactKind, Detector, Discriminant, Lessons, Moments, Setup};
 
-pub use crate::salt_ducaju::fisher_discriminant::Discriminant as Kinds;
+pub use crate::frame::Discriminant as Kinds;
 
 /// A tool slower than this has no direction of motion \[m/s\].
 const STANDSTILL_M_PER_S: f64 = 0.005;

@@ -16,9 +16,7 @@ use super::tail::{Peaks, Tail};
 use super::usual::LearntUsual;
 use super::windows::Windows;
 use super::{DRIFT, NAME};
-use crate::frame::joints;
-use crate::frame::lesson::{LearnError, Lessons};
-use crate::frame::rate;
+use crate::frame::{LearnError, Lessons, joints, rate};
 
 /// Where speeds are divided, as shares of a joint's usual highest speed.
 const EDGES: [f64; BINS - 1] = [0.02, 0.05, 0.12, 0.3];

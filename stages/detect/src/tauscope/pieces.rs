@@ -4,7 +4,7 @@ use tauscope_bus::{JointArray, TwinState, flags};
 
 use super::late::LateIn;
 use super::means::Follow;
-use crate::frame::lesson::{Lesson, Lessons};
+use crate::frame::{Lesson, Lessons};
 
 /// So much around a labelled contact is left out \[ns\].
 const BEFORE_NS: i64 = 50_000_000;

@@ -12,8 +12,7 @@ use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 use super::means::SHORTEST;
 use super::points::{POINTS, Points};
 use super::windows::Windows;
-use crate::frame::isolation::Contact;
-use crate::frame::stage::Setup;
+use crate::frame::{Contact, Setup};
 
 /// A joint counts as loaded from this many times its usual residual on.
 const LOADED: f64 = 4.0;

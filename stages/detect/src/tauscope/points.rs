@@ -2,11 +2,10 @@
 
 use std::f64::consts::TAU;
 
+use crate::frame::Setup;
 use nalgebra::{Vector3, Vector6};
 use tauscope_bus::{MAX_JOINTS, TwinState};
 use tauscope_dynamics::{Data, Model, forward_kinematics, link_jacobian, link_pose};
-
-use crate::frame::stage::Setup;
 
 /// Where along a link points are asked about, as shares of the way from its joint to the next; and about its centre of mass.
 const ALONG: [f64; 4] = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0];

@@ -10,8 +10,7 @@ use super::learnt::Learnt;
 use super::means::Follow;
 use super::pieces::pieces;
 use super::place::Place;
-use crate::frame::lesson::Lessons;
-use crate::frame::stage::Setup;
+use crate::frame::{Lessons, Setup};
 
 /// Of the contact-free samples every so many is a posture that is asked about.
 const EVERY: usize = 50;

@@ -2,11 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use crate::frame::{ConfigError, joints};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-use crate::config::ConfigError;
-use crate::frame::joints;
 
 /// By joint the smallest effort that is a collision until something is learnt \[effort unit\].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -2,10 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use crate::frame::joints;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-use crate::frame::joints;
 
 /// What the adaptive sensor has learnt of a robot and its cycle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -5,7 +5,7 @@ use tauscope_bus::flags;
 use super::bias::Bias;
 use super::blocks::Blocks;
 use super::joint::{Joint, Tuning};
-use crate::frame::lesson::{LearnError, Lesson};
+use crate::frame::{LearnError, Lesson};
 use tauscope_dynamics::lowpass::Butterworth2;
 
 /// The first bias of a joint is this many times what contact-free data needed, for a motion that was

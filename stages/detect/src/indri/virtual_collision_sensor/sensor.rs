@@ -9,8 +9,7 @@ use super::blocks::Blocks;
 use super::joint::{Joint, Reading, Tuning};
 use super::learnt::Learnt;
 use super::validity::Validity;
-use crate::frame::detector::{Detector, Judgement, Seen, Verdict};
-use crate::frame::shared::{Shared, Tap};
+use crate::frame::{Detector, Judgement, Seen, Shared, State, Tap, Verdict};
 
 /// A ratio from here on may already belong to a collision: where the search for its beginning stops.
 const LOW_RATIO: f64 = 0.5;
@@ -81,7 +80,7 @@ impl Sensor {
             name,
             joint_names: Vec::new(),
             blocks: match shared {
-                Some(shared) => shared.blocks(tuning.block, blocks),
+                Some(shared) => shared.tap(tuning.block, || blocks),
                 None => Tap::own(blocks),
             },
             joints: (joints
@@ -189,13 +188,12 @@ impl Detector for Sensor {
         Some(1.0)
     }
 
-    fn learnt(&self) -> Option<Learnt> {
+    fn learnt(&self) -> Option<State> {
         self.learning?;
         let joints = self.joints.iter().map(|joint| joint.bias.learnt());
         let joints = self.joint_names.iter().cloned().zip(joints);
-        Some(Learnt {
-            joints: joints.collect(),
-        })
+        let joints = joints.collect();
+        serde_json::to_value(Learnt { joints }).ok()
     }
 
     fn judge(&mut self, sample: &TwinState) -> Judgement {

@@ -1,20 +1,9 @@
 //! The bound between collision and cooperation.
 
-use crate::frame::lesson::ContactKind;
+use crate::frame::{ClassSweep, ContactKind};
 
 /// How far above the largest ratio the last bound of a sweep lies, as a share of it.
 const ABOVE: f64 = 0.1;
-
-/// What a bound between the kinds does to the contacts that were found.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ClassSweep {
-    /// The bound: below it a contact is a collision.
-    pub bound: f64,
-    /// Share of cooperations that are told as such.
-    pub sensitivity: f64,
-    /// Share of collisions that are told as such.
-    pub specificity: f64,
-}
 
 /// Sensitivity and specificity of every bound that parts the `ratios` of collisions (below) and
 /// cooperations otherwise than the one before; the last is above all that are finite, and at least

@@ -5,9 +5,9 @@ use candle_core::{Device, Tensor, Var};
 use rand_chacha::ChaCha8Rng;
 
 use super::TrainingSettings;
-use super::trained::{Trained, TrainedError};
 use super::training::{drop_out, fit, numbers, start};
 use super::vectors::{VectorModel, Vectors};
+use crate::frame::{Trained, TrainedError};
 
 /// A trained autoencoder.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,7 +36,6 @@ impl Autoencoder {
         middle: &[usize],
         settings: &TrainingSettings,
         rng: &mut ChaCha8Rng,
-        progress: &mut dyn FnMut(f64),
     ) -> candle_core::Result<Self> {
         let dimensions = vectors.dimensions();
         let sizes = sizes(dimensions, middle);
@@ -57,7 +56,7 @@ impl Autoencoder {
             (output - input)?.sqr()?.mean_all()
         };
         let examples = |_: &mut ChaCha8Rng| (0..count).collect();
-        fit(settings, weights.clone(), rng, progress, &examples, &loss)?;
+        fit(settings, weights.clone(), rng, &examples, &loss)?;
         let layers = (weights.chunks_exact(2).zip(&sizes))
             .map(|(pair, &inputs)| {
                 Ok(Dense {
@@ -183,7 +182,7 @@ mod tests {
     fn trained(seed: u64) -> Autoencoder {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let vectors = Vectors::unscaled(3, curve());
-        Autoencoder::fit(&vectors, &[8, 1, 8], &SETTINGS, &mut rng, &mut |_| ()).unwrap()
+        Autoencoder::fit(&vectors, &[8, 1, 8], &SETTINGS, &mut rng).unwrap()
     }
 
     #[test]

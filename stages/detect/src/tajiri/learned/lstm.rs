@@ -10,8 +10,8 @@ use super::TrainingSettings;
 use super::runner::{Course, Scorer};
 use super::scaling::Scaling;
 use super::signals::Signal;
-use super::trained::{Trained, TrainedError};
 use super::training::{drop_out, fit, numbers, start};
+use crate::frame::{Trained, TrainedError};
 
 /// Input numbers a joint: q(t), q̇(t), q̇(t-1).
 const INPUTS: usize = 3;
@@ -53,7 +53,6 @@ impl Lstm {
         length: usize,
         settings: &TrainingSettings,
         rng: &mut ChaCha8Rng,
-        progress: &mut dyn FnMut(f64),
     ) -> candle_core::Result<Self> {
         let joints = course.joint_count();
         let (inputs, outputs): (Vec<_>, Vec<_>) = (course.stretches().iter().flatten())
@@ -101,7 +100,7 @@ impl Lstm {
             batch: (settings.batch / length).max(1),
             ..*settings
         };
-        fit(&settings, weights.clone(), rng, progress, &examples, &loss)?;
+        fit(&settings, weights.clone(), rng, &examples, &loss)?;
         let [
             weight_input,
             weight_hidden,

@@ -4,8 +4,8 @@
 use libsvm_rs::train::svm_train;
 use libsvm_rs::{KernelType, SvmNode, SvmParameter, SvmProblem, SvmType};
 
-use super::trained::{Trained, TrainedError};
 use super::vectors::VectorModel;
+use crate::frame::{Trained, TrainedError};
 
 /// Memory for kernel values while training \[MB\].
 const CACHE_MB: f64 = 400.0;
@@ -81,6 +81,13 @@ impl OneClass {
             alpha: from.get_f64("svm.alpha", &[count])?,
             vectors: from.get_f64("svm.vectors", &[count, dimensions])?,
         })
+    }
+}
+
+impl OneClass {
+    /// ρ, which no score exceeds.
+    pub fn largest_score(trained: &Trained) -> Option<f64> {
+        Some(trained.get_f64("svm.rho", &[1]).ok()?[0])
     }
 }
 

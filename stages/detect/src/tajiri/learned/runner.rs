@@ -4,14 +4,13 @@ use std::sync::Arc;
 
 use tauscope_bus::{TwinState, flags};
 
+use super::demand;
 use super::signals::{Signal, Signals};
-use super::trained::{Facts, Trained, TrainedError};
-use super::{SignalSettings, demand};
-use crate::config::ConfigError;
-use crate::frame::detector::{Detector, Judgement};
-use crate::frame::lesson::{LearnError, Lessons};
 use crate::frame::rate::Rate;
-use crate::frame::stage::{ScoreStatistics, Setup};
+use crate::frame::{
+    ConfigError, Detector, Facts, Judgement, LearnError, Lessons, ScoreStatistics, Setup,
+    SignalSettings, Trained, TrainedError,
+};
 
 /// What a detector makes of the signals, sample by sample.
 pub(crate) trait Scorer: Send {

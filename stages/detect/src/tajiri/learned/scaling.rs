@@ -1,6 +1,6 @@
 //! Equation 8 of Tajiri and Iwamoto: every dimension of the input to 0..1 over the training data.
 
-use super::trained::{Trained, TrainedError};
+use crate::frame::{Trained, TrainedError};
 
 /// x ↦ (x - min) / (max - min), by dimension. A dimension that never changed in training becomes 0.
 #[derive(Debug, Clone, PartialEq)]

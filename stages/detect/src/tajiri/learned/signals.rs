@@ -4,11 +4,8 @@
 use tauscope_bus::{JointArray, TwinState, flags};
 use tauscope_dynamics::lowpass::Butterworth2;
 
-use super::SignalSettings;
-use crate::config::ConfigError;
-use crate::frame::lesson::Lesson;
 use crate::frame::momentum::MomentumObserver;
-use crate::frame::stage::Setup;
+use crate::frame::{ConfigError, Lesson, Setup, SignalSettings};
 
 /// The arm at one instant, low-passed; entries beyond the joints are zero.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -17,7 +17,6 @@ pub(crate) fn fit<E>(
     settings: &TrainingSettings,
     weights: Vec<Var>,
     rng: &mut ChaCha8Rng,
-    progress: &mut dyn FnMut(f64),
     examples: &dyn Fn(&mut ChaCha8Rng) -> Vec<E>,
     loss: &dyn Fn(&[E], &mut ChaCha8Rng) -> candle_core::Result<Tensor>,
 ) -> candle_core::Result<()> {
@@ -28,15 +27,13 @@ pub(crate) fn fit<E>(
         ..ParamsAdamW::default()
     };
     let mut adam = AdamW::new(weights, parameters)?;
-    for epoch in 0..settings.epochs {
-        progress(epoch as f64 / settings.epochs as f64);
+    for _ in 0..settings.epochs {
         let mut examples = examples(rng);
         examples.shuffle(rng);
         for batch in examples.chunks(settings.batch) {
             adam.backward_step(&loss(batch, rng)?)?;
         }
     }
-    progress(1.0);
     Ok(())
 }
 

@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use super::runner::{Course, Scorer};
 use super::scaling::Scaling;
 use super::signals::Signal;
-use super::trained::{Trained, TrainedError};
+use crate::frame::{Trained, TrainedError};
 
 /// Tells how unlike its training data a scaled vector is.
 pub(crate) trait VectorModel: Send {

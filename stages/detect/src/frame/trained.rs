@@ -5,10 +5,8 @@ use std::collections::{BTreeMap, HashMap};
 
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-use super::SignalSettings;
-use crate::frame::stage::ScoreStatistics;
 
 /// The only version of the format so far.
 const VERSION: u32 = 1;
@@ -46,6 +44,49 @@ pub struct Facts {
     pub window: usize,
     /// What made this file: program version, recordings and their hashes.
     pub provenance: BTreeMap<String, String>,
+}
+
+/// The signals that a learned detector sees. They belong to its training: a trained detector brings
+/// those that it was trained with.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct SignalSettings {
+    /// Gain of the momentum observer \[1/s\].
+    #[schemars(range(min = 0.1, max = 10_000.0))]
+    pub observer_gain_per_s: f64,
+    /// Low-pass on external torques, positions and velocities \[Hz\].
+    #[schemars(range(min = 0.01, max = 10_000.0))]
+    pub cutoff_hz: f64,
+}
+
+impl Default for SignalSettings {
+    fn default() -> Self {
+        Self {
+            observer_gain_per_s: crate::frame::momentum::DEFAULT_GAIN_PER_S,
+            // About that of the twin on efforts; the paper does not give its own.
+            cutoff_hz: 4.0,
+        }
+    }
+}
+
+impl SignalSettings {
+    /// What is wrong with them, if anything.
+    pub(crate) fn fault(&self) -> Option<&'static str> {
+        let positive = |value: f64| value > 0.0 && value.is_finite();
+        if !positive(self.observer_gain_per_s) {
+            return Some("`observer_gain_per_s` must be above 0");
+        }
+        (!positive(self.cutoff_hz)).then_some("`cutoff_hz` must be above 0")
+    }
+}
+
+/// A detector's score on contact-free data.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScoreStatistics {
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation.
+    pub standard_deviation: f64,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -173,11 +214,6 @@ impl Trained {
     /// What made it, to be filled in by the program.
     pub fn provenance_mut(&mut self) -> &mut BTreeMap<String, String> {
         &mut self.facts.provenance
-    }
-
-    /// What its score stays below whatever is seen, where there is such a bound: a one-class machine's is ρ.
-    pub fn largest_score(&self) -> Option<f64> {
-        Some(self.get_f64("svm.rho", &[1]).ok()?[0])
     }
 
     /// What its score does on contact-free data; its threshold rests on it.

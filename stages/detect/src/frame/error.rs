@@ -1,6 +1,6 @@
 //! What can be wrong with the detector's part of the pipeline file.
 
-use crate::tajiri::learned::TrainedError;
+use super::trained::TrainedError;
 
 /// What is wrong with a detector's configuration.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
