@@ -28,9 +28,11 @@ use super::setup::{JointSetup, Setup};
 use super::shared::Tap;
 
 /// The papers' gain \[1/s\].
+/// Tuned: by Tajiri and Iwamoto (section IV-B), on their robot.
 pub const DEFAULT_GAIN_PER_S: f64 = 100.0;
 
 /// The observer counts as settled after so many of its time constants: 1 % of a step is missing still.
+/// Statistical: ln 100.
 const SETTLED: f64 = 4.605_170_185_988_092;
 
 /// The observer of one robot. No allocation per sample.

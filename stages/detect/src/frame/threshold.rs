@@ -23,6 +23,7 @@ pub struct Threshold {
 impl Threshold {
     /// Standard deviations above the mean where neither the file nor the detector says how many (equation 7 of
     /// Tajiri and Iwamoto).
+    /// Tuned: by Tajiri and Iwamoto (section V), on their robot.
     pub const SIGMAS: f64 = 4.0;
 
     /// The score from which on `detector` raises the alarm (equation 7 of Tajiri and Iwamoto: mean +

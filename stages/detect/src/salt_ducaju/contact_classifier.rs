@@ -25,6 +25,7 @@ use crate::salt_ducaju::contact_tuning;
 pub(crate) const NAME: &str = "contact_classifier";
 
 /// The paper's γ.
+/// Tuned: by Salt Ducaju et al. (section V), on their robot.
 const PAPERS_GAMMA: f64 = 6.2;
 
 /// Settings of `contact_classifier`; the defaults are the paper's.

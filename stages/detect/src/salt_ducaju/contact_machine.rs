@@ -21,8 +21,10 @@ use crate::salt_ducaju::contact_signals::{Instant, SignalSettings, Signals};
 use crate::salt_ducaju::sliding_dft::BandError;
 
 /// A fall of the force by this share of the threshold parts one rise from another.
+/// Tuned: on the training recordings of the practice set of assembly (docs/papers.md); not swept.
 const SWING: f64 = 0.5;
 /// A contact has begun at this share of its rise.
+/// Tuned: on the training recordings of the practice set of assembly (docs/papers.md); not swept.
 const BEGUN: f64 = 0.15;
 
 /// When a contact begins and ends: what the detectors after Salt Ducaju et al. share.

@@ -13,16 +13,23 @@ use crate::salt_ducaju::contact_signals::{Instant, SignalSettings, Signals};
 
 pub(crate) use class::{best, sweep_class};
 
-/// A detection belongs to the contact that began last of those that began at most this long after it
-/// and ended at most that long before it \[ns\].
+/// A detection belongs to the contact that began last of those that began at most this long after it \[ns\].
+/// Tuned: on the training recordings of the practice set of assembly (docs/papers.md); not swept.
 const BEFORE_NS: i64 = 20_000_000;
+/// And that ended at most this long before it \[ns\].
+/// Tuned: on the training recordings of the practice set of assembly (docs/papers.md); not swept.
 const AFTER_NS: i64 = 150_000_000;
 /// An arm that was let go swings for this long \[ns\].
+/// Tuned: on the training recordings of the practice set of assembly (docs/papers.md); not swept.
 const SWINGS_NS: i64 = 300_000_000;
 /// How far the threshold stays above what contact-free motion was seen to reach.
+/// Tuned: on the training recordings of the practice set of assembly (docs/papers.md); not swept.
 const MARGIN: f64 = 1.1;
-/// Thresholds of a sweep: this many in equal ratios, from the first to the last share of the tuned one.
+/// Thresholds of a sweep, in equal ratios.
+/// Tuned: for the picture alone.
 const STEPS: usize = 41;
+/// From this share of the tuned one to that.
+/// Tuned: for the picture alone.
 const SHARES: [f64; 2] = [0.25, 4.0];
 
 /// A labelled recording as the detectors see it.

@@ -11,6 +11,7 @@ use crate::frame::momentum::MomentumObserver;
 /// Damping λ of the inverse, (J Jᵀ + λ² 1)⁻¹ J (Nakamura and Hanafusa, "Inverse Kinematic Solutions with
 /// Singularity Robustness", 1986), in m for forces and rad for moments. Half of a direction that the
 /// joints feel with a lever of 1 cm is left; with a lever of 20 cm, all but 1/400.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const DAMPING: f64 = 0.01;
 
 /// A point of the tool: where it is, how it moves, and which wrench there explains joint torques. No

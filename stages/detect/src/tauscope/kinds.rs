@@ -14,13 +14,19 @@ use crate::frame::{ContactKind, Detector, Discriminant, Lessons, Moments, Setup}
 pub use crate::frame::Discriminant as Kinds;
 
 /// A tool slower than this has no direction of motion \[m/s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const STANDSTILL_M_PER_S: f64 = 0.005;
 /// No force is told smaller than this \[N\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const LEAST_FORCE_N: f64 = 0.3;
-/// An alarm belongs to the contact that began last, from so much before its beginning to so much behind its end \[ns\].
+/// An alarm belongs to the contact that began last, from so much before its beginning \[ns\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const BEFORE_NS: i64 = 20_000_000;
+/// To so much behind its end \[ns\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const AFTER_NS: i64 = 150_000_000;
 /// So many contacts of either kind are needed.
+/// Statistical: three measurements need as many contacts of a kind to span them.
 const LEAST: usize = 3;
 
 /// What the kinds are told by: how far the residual rises as by a force on the tool against its motion (from -1 to 1), and the

@@ -10,10 +10,13 @@ use tauscope_dynamics::lowpass::Butterworth2;
 
 /// The first bias of a joint is this many times what contact-free data needed, for a motion that was
 /// not seen may be worse than all that were.
+/// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const SAFETY: f64 = 2.0;
 /// Nothing is learnt for so long after a contact \[ns\]: the arm swings out.
+/// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const AFTER_CONTACT_NS: i64 = 1_000_000_000;
 /// The shortest time that tells anything of a motion \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_S: f64 = 5.0;
 
 /// What a joint's bias would have had to be.

@@ -4,8 +4,10 @@
 use super::trend::{Band, NoiseBounds, Trend};
 
 /// The expected current is steady once both derivatives are below this share of their noise …
+/// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const STEADY_BELOW: f64 = 0.5;
 /// … and no longer steady above this one.
+/// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const STEADY_UNTIL: f64 = 1.0;
 
 /// What the currents of a joint are doing.

@@ -12,9 +12,11 @@ use super::validity::Validity;
 use crate::frame::{Detector, Judgement, Seen, Shared, State, Tap, Verdict};
 
 /// A ratio from here on may already belong to a collision: where the search for its beginning stops.
+/// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const LOW_RATIO: f64 = 0.5;
 
 /// For so long after an alarm nothing is learnt: the model error still remembers it \[ns\].
+/// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const AFTER_ALARM_NS: i64 = 2_000_000_000;
 
 /// What the sensor says while nothing is the matter.

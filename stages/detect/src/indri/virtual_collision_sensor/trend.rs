@@ -4,12 +4,16 @@
 use tauscope_dynamics::lowpass::Butterworth2;
 
 /// Half width of the noise bounds, in standard deviations of the derivatives' error.
+/// Statistical: Gaussian noise goes beyond three standard deviations once in 370 samples.
 const BOUND_SIGMAS: f64 = 3.0;
 /// Half width of the "further much higher bound", in the same.
+/// Tuned: twice the bound, by hand; not swept.
 const IMPULSE_SIGMAS: f64 = 6.0;
 /// Memory of the noise statistics \[s\].
+/// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const NOISE_MEMORY_S: f64 = 2.0;
 /// Until then every error counts in full, for there are no bounds yet to hold it against \[s\].
+/// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const NOISE_SETTLING_S: f64 = 0.2;
 
 /// A current through the low-pass, and how it changes.

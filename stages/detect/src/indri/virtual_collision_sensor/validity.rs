@@ -5,13 +5,19 @@
 //! declared wrongly, or a work-piece that stayed in the gripper.
 
 /// Far beyond: this many times the smallest collision effort.
+/// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const FAR: f64 = 2.0;
-/// The share of the time from which on a model is wrong, and down to which it stays so.
+/// The share of the time from which on a model is wrong.
+/// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const WRONG_FROM: f64 = 0.5;
+/// And down to which it stays so.
+/// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const WRONG_UNTIL: f64 = 0.25;
 /// Memory of the share \[s\].
+/// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const MEMORY_S: f64 = 10.0;
 /// What it takes at least to say so where there is no other alarm \[s\].
+/// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
 const CERTAIN_S: f64 = 3.0;
 
 /// The share of the time that a joint's residue has been far beyond the smallest collision effort.

@@ -3,6 +3,7 @@
 use crate::frame::{ClassSweep, ContactKind};
 
 /// How far above the largest ratio the last bound of a sweep lies, as a share of it.
+/// Tuned: for the picture alone.
 const ABOVE: f64 = 0.1;
 
 /// Sensitivity and specificity of every bound that parts the `ratios` of collisions (below) and

@@ -8,8 +8,10 @@ use super::vectors::VectorModel;
 use crate::frame::{Trained, TrainedError};
 
 /// Memory for kernel values while training \[MB\].
+/// Tuned: for what it costs in time; not swept.
 const CACHE_MB: f64 = 400.0;
 /// LIBSVM's and scikit-learn's tolerance of the optimum.
+/// Tuned: by the authors of LIBSVM.
 const TOLERANCE: f64 = 1e-3;
 
 /// A trained one-class machine.
