@@ -52,7 +52,7 @@ use crate::frame::{
     Trained, Training, Verdict,
 };
 use alarm::Watch;
-pub use kinds::Kinds;
+pub use kinds::{KindContacts, Kinds};
 use late::{Late, LateIn};
 use learnt::ENOUGH_S;
 pub use learnt::{Learnt, LearntJoint, LearntWindow};
@@ -150,6 +150,10 @@ impl DetectorSettings for Settings {
         })
     }
 
+    fn note(&self) -> Option<String> {
+        self.learnt.as_ref()?.kind_contacts.as_ref()?.note()
+    }
+
     fn found_by_evaluation(&self) -> Vec<&'static str> {
         self.learnt.iter().map(|_| "learnt").collect()
     }
@@ -167,7 +171,7 @@ pub fn learn(
     let late = LateIn::of(lessons, setup);
     let mut learnt = Learnt::new(lessons, &late, &setup.joint_names, settings.follow())?;
     learnt.smallest = smallest::smallest(&learnt, lessons, &late, setup, settings.follow());
-    learnt.kinds = kinds::learn(&learnt, settings, setup, lessons);
+    (learnt.kinds, learnt.kind_contacts) = kinds::learn(&learnt, settings, setup, lessons).unzip();
     Ok(Settings {
         learnt: Some(learnt),
         ..settings.clone()

@@ -78,6 +78,11 @@ pub trait DetectorSettings:
         None
     }
 
+    /// What whoever let it learn should know of what it has learnt.
+    fn note(&self) -> Option<String> {
+        None
+    }
+
     /// Samples that it judges at once, if it judges windows.
     fn window(&self) -> Option<usize> {
         None
@@ -163,6 +168,8 @@ pub trait AnySettings: Any + Debug + Send + Sync + erased_serde::Serialize {
     fn sweeps(&self, task: &Task<'_>) -> Result<Option<Sweeps>, LearnError>;
     /// [`DetectorSettings::warning`].
     fn warning(&self, setup: &Setup) -> Option<String>;
+    /// [`DetectorSettings::note`].
+    fn note(&self) -> Option<String>;
     /// [`DetectorSettings::window`].
     fn window(&self) -> Option<usize>;
     /// [`DetectorSettings::found_by_evaluation`].
@@ -205,6 +212,10 @@ impl<S: DetectorSettings> AnySettings for S {
 
     fn warning(&self, setup: &Setup) -> Option<String> {
         DetectorSettings::warning(self, setup)
+    }
+
+    fn note(&self) -> Option<String> {
+        DetectorSettings::note(self)
     }
 
     fn window(&self) -> Option<usize> {

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tauscope_bus::{TwinState, flags};
 
-use super::kinds::Kinds;
+use super::kinds::{KindContacts, Kinds};
 use super::late::LateIn;
 use super::means::{Follow, WINDOWS_S};
 use super::noise;
@@ -76,6 +76,9 @@ pub struct Learnt {
     /// What parts collisions from cooperations, where the labels told them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kinds: Option<Kinds>,
+    /// The contacts that `kinds` was learnt from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kind_contacts: Option<KindContacts>,
 }
 
 /// A joint's speeds.
@@ -156,6 +159,7 @@ impl Learnt {
             free_s: Some(free_s(pieces)),
             smallest: Vec::new(),
             kinds: None,
+            kind_contacts: None,
         };
         learnt.tell_usual(pieces);
         let free_s = learnt.free_s.unwrap_or(0.0);
