@@ -153,7 +153,7 @@ pub fn detect(
     let mut setup = detect_setup(model, cell)?;
     setup.shared = shared;
     trained::read(config, &mut setup)?;
-    Ok(Detect::new(config, setup)?)
+    Ok(config.stage(setup)?)
 }
 
 /// Says what speaks against running the detectors of `pipeline` (on `host`, if one is given) as they are set, though they can.
