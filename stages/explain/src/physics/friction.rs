@@ -3,7 +3,9 @@
 use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::{Against, Layer, PlaceKind, TermSpec};
 
-use crate::report::sentences;
+use crate::data::problem::Problem;
+use crate::physics::active::Hypothesis;
+use crate::physics::parameter_units::is_of_effort;
 
 /// A plain friction, and which effects hold it.
 struct Plain {
@@ -90,7 +92,7 @@ pub fn in_recorded_units(term: &TermSpec, model: &Model, units_nm: &[f64]) -> Te
         return term;
     };
     for (name, value) in &mut term.parameters {
-        if sentences::is_of_effort(name) {
+        if is_of_effort(name) {
             *value /= units_nm[joint];
         }
     }
@@ -112,4 +114,11 @@ pub fn in_recorded_units(term: &TermSpec, model: &Model, units_nm: &[f64]) -> Te
         }
     }
     term
+}
+
+/// The least that a factor of a hypothesis may be: a friction that the twin has already may be less.
+pub fn least(problem: &Problem, hypothesis: Hypothesis, minimum: f64) -> f64 {
+    plain(hypothesis.effect.name).map_or(minimum, |which| {
+        minimum - problem.known_friction[hypothesis.place.joint][which]
+    })
 }

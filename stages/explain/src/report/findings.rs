@@ -11,17 +11,15 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 use tauscope_dynamics::terms::PlaceKind;
 
-use crate::explain::Input;
 use crate::fit::fitted::Fit;
 use crate::fit::interval::{covariance, half_width_95, parameter_deviations};
-use crate::physics::active::{Active, Hypothesis};
-use crate::physics::torque_scale::is_drive;
-use crate::report::next_motion;
-use crate::report::sentences;
-use crate::report::{Finding, NextMotion, Rejected, Rival, Verdict};
-use crate::select::evidence::Explanation;
+use crate::physics::active::{Active, Hypothesis, TimeKind};
+use crate::physics::friction::least;
+use crate::read::input::Input;
+use crate::report::schema::{Finding, NextMotion, Rejected, Rival, Verdict};
+use crate::report::{next_motion, sentences};
+use crate::select::explanation::Explanation;
 use crate::select::search::Search;
-use crate::select::windows::{TimeKind, time_kind};
 
 use contest::contest;
 pub use doubt::doubt_patches;
@@ -58,19 +56,6 @@ impl Named {
         self.trajectories.extend(other.trajectories);
         self.notes.extend(other.notes);
     }
-}
-
-/// Whether an effect is part of the arm, not something that came and went.
-pub fn lasts(hypothesis: Hypothesis) -> bool {
-    matches!(time_kind(hypothesis), TimeKind::Always | TimeKind::Step)
-        && hypothesis.effect.name != "contact_wall"
-}
-
-/// The physics in the order in which it acts within its layer: drives last.
-pub fn in_order(actives: &[Active]) -> Vec<&Active> {
-    let mut all: Vec<&Active> = actives.iter().collect();
-    all.sort_by_key(|active| is_drive(&active.hypothesis));
-    all
 }
 
 fn place_of(
@@ -123,7 +108,7 @@ pub fn of(
         ..Named::default()
     };
     for (index, active) in fit.actives.iter().enumerate() {
-        if is_drive(&active.hypothesis) {
+        if active.hypothesis.is_torque_scale() {
             continue;
         }
         let deviations = parameter_deviations(search.problem, fit, &spread, index);
@@ -141,7 +126,7 @@ pub fn of(
             let vague = parameter.name.contains("time") && *deviation > VAGUE_S;
             if deviation.is_finite() && !vague {
                 let half = half_width_95(search.problem) * deviation;
-                let least = search.problem.least(active.hypothesis, parameter.minimum);
+                let least = least(search.problem, active.hypothesis, parameter.minimum);
                 let low = (value - half).max(least);
                 intervals.insert(parameter.name.to_owned(), [low, value + half]);
             }
@@ -293,7 +278,7 @@ fn when(
     };
     let known = parameters.clone();
     let get = |name: &str| known.get(name).and_then(Value::as_f64);
-    match time_kind(active.hypothesis) {
+    match active.hypothesis.time_kind() {
         TimeKind::Always => none,
         TimeKind::Step => {
             none.start = get("change_time_session_s");

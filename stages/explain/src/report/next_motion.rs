@@ -6,9 +6,9 @@ use std::fmt::Write as _;
 use tauscope_dynamics::terms::PlaceKind;
 use tauscope_dynamics::{JointKind, Model};
 
-use crate::explain::Input;
 use crate::physics::active::Hypothesis;
-use crate::report::{NextMotion, Rival};
+use crate::read::input::Input;
+use crate::report::schema::{NextMotion, Rival};
 
 /// Share of a joint's range and of its speed limit that a trajectory keeps within.
 const RANGE: f64 = 0.8;

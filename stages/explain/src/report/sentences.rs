@@ -7,6 +7,7 @@ use tauscope_dynamics::terms::Against;
 
 use crate::physics::active::Active;
 use crate::physics::friction;
+use crate::physics::parameter_units::unit;
 
 /// `value` with three significant digits and no trailing zeros, e.g. `4.1`, `0.0235`, `21`.
 pub fn number(value: f64) -> String {
@@ -31,43 +32,6 @@ pub fn odds(nats: f64) -> String {
         return format!("{odds:.0}");
     }
     format!("10^{:.0}", nats / std::f64::consts::LN_10)
-}
-
-/// Unit of a parameter, from its canonical name.
-pub fn unit(parameter: &str) -> &'static str {
-    for (ending, unit) in [
-        ("_nms2_per_rad2", "N m s²/rad²"),
-        ("_nms_per_rad", "N m s/rad"),
-        ("_nm_per_rad", "N m/rad"),
-        ("_n_per_m", "N/m"),
-        ("_rad_s", "rad/s"),
-        ("_kgm2", "kg m²"),
-        ("_kgm", "kg m"),
-        ("_rad", "rad"),
-        ("_nm", "N m"),
-        ("_kg", "kg"),
-        ("_hz", "Hz"),
-        ("_s", "s"),
-        ("_m", "m"),
-        ("_n", "N"),
-    ] {
-        if parameter.ends_with(ending) {
-            return unit;
-        }
-    }
-    ""
-}
-
-/// Whether a parameter is so much effort, or so much of it by something.
-pub fn is_of_effort(parameter: &str) -> bool {
-    let unit = unit(parameter);
-    unit.starts_with("N m") || unit == "kg m²"
-}
-
-/// Whether a parameter of a body or a force grows with the effort that it is read from.
-pub fn grows_with_effort(parameter: &str) -> bool {
-    let whole = ["mass_kg", "stiffness_n_per_m"].contains(&parameter);
-    whole || parameter.starts_with("force_") || parameter.starts_with("delta_")
 }
 
 /// A sentence on an effort whose numbers are in A.
@@ -362,20 +326,5 @@ mod tests {
         assert_eq!(odds(0.0), "1");
         assert_eq!(odds(3.0), "20");
         assert_eq!(odds(100.0), "10^43");
-    }
-
-    #[test]
-    fn units_come_from_names() {
-        for (name, expected) in [
-            ("coulomb_nm", "N m"),
-            ("viscous_nms_per_rad", "N m s/rad"),
-            ("delay_s", "s"),
-            ("gain", ""),
-            ("delta_com_x_m", "m"),
-            ("stribeck_velocity_rad_s", "rad/s"),
-            ("force_x_n", "N"),
-        ] {
-            assert_eq!(unit(name), expected, "{name}");
-        }
     }
 }

@@ -2,9 +2,10 @@
 
 use tauscope_dynamics::terms::{Against, MotionSample, Table, effect};
 
+use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::data::track::FitTrack;
-use crate::physics::active::{Active, Column, Hypothesis, Whereabouts, held_knots};
+use crate::physics::active::{Active, Hypothesis, Whereabouts, held_knots};
 use crate::select::propose::Base;
 
 /// Knots of a curve.

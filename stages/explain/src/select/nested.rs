@@ -4,10 +4,12 @@ use tauscope_dynamics::terms::effect;
 
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis};
+use crate::select::evidence::{LEAST_EVIDENCE, overwhelming, tie};
+use crate::select::explanation::{Explanation, describe};
+use crate::select::explanation::{pieces, place_of};
+use crate::select::plausible::at_bound;
 use crate::select::propose::penalty;
 
-use crate::select::evidence::{Explanation, LEAST_EVIDENCE, at_bound, describe, overwhelming, tie};
-use crate::select::exchange;
 use crate::select::search::Search;
 
 /// Effects that contain a simpler one, whose only number is their first.
@@ -20,15 +22,13 @@ const SIMPLER: [(&str, &str); 7] = [
     ("joint_elasticity", "rotor_inertia"),
     ("backlash", "rotor_inertia"),
 ];
-/// What contains a simpler effect must be ahead of it by this \[nats\], odds of twenty to one.
-pub const MORE_THAN_SIMPLE: f64 = 3.0;
 
 impl Search<'_> {
     /// Puts the simpler effect that a piece contains in its place, where it is not ahead by `enough` for the evidence for it
     /// \[nats\]; more is asked of a shape that ends its range.
     pub fn plainer(&self, mut best: Explanation, enough: impl Fn(f64) -> f64) -> Explanation {
-        for piece in exchange::pieces(&best) {
-            let Some(index) = exchange::place_of(&best, piece) else {
+        for piece in pieces(&best) {
+            let Some(index) = place_of(&best, piece) else {
                 continue;
             };
             let less = self.less(&best, index);

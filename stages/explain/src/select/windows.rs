@@ -6,8 +6,9 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::CoordinateKind;
 
-use crate::physics::active::{Column, Hypothesis};
-use crate::physics::columns::columns;
+use crate::data::column::Column;
+use crate::physics::active::Hypothesis;
+use crate::physics::active::TimeKind;
 use crate::select::propose::{Base, Proposal, best_of};
 
 /// Shortest interval that is looked for \[s\].
@@ -21,40 +22,10 @@ const STEPS: usize = 100;
 /// Factors beyond these are left out of the scan: inertias hardly show in it.
 const SCANNED_FACTORS: usize = 4;
 
-/// What kind of time an effect has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TimeKind {
-    /// None.
-    Always,
-    /// It changes once in a session.
-    Step,
-    /// It lasts for an interval of every recording.
-    EveryRecording,
-    /// It lasts for an interval of the session.
-    Once,
-}
-
-/// The kind of time of a hypothesis.
-pub fn time_kind(hypothesis: Hypothesis) -> TimeKind {
-    let count = |kind: CoordinateKind| {
-        let all = hypothesis.effect.coordinates.iter();
-        all.filter(|c| c.kind == kind).count()
-    };
-    match (
-        count(CoordinateKind::RecordingTime),
-        count(CoordinateKind::SessionTime),
-    ) {
-        (0, 0) => TimeKind::Always,
-        (0, 1) => TimeKind::Step,
-        (_, 0) => TimeKind::EveryRecording,
-        _ => TimeKind::Once,
-    }
-}
-
 impl Base<'_> {
     /// The best of a hypothesis whose effect has a time.
     pub fn propose_in_time(&self, hypothesis: Hypothesis) -> Option<Proposal> {
-        match time_kind(hypothesis) {
+        match hypothesis.time_kind() {
             TimeKind::Always if hypothesis.effect.name == "contact_wall" => {
                 self.propose_wall(hypothesis)
             }
@@ -73,7 +44,7 @@ impl Base<'_> {
         let mut shape = vec![0.0; hypothesis.effect.coordinates.len()];
         let time = time_index(hypothesis)?;
         shape[time] = f64::NEG_INFINITY;
-        let all = columns(problem, self.fit, hypothesis, &shape);
+        let all = self.fit.columns(problem, hypothesis, &shape);
         // With the change before everything, the second factor's column is the whole effect.
         let whole = all.factors.last()?;
         let joint = hypothesis.only_joint()?;
@@ -125,7 +96,7 @@ impl Base<'_> {
         let [start, end] = times[..] else { return None };
         let mut shape = vec![0.0; hypothesis.effect.coordinates.len()];
         (shape[start], shape[end]) = (f64::NEG_INFINITY, f64::INFINITY);
-        let all = columns(problem, self.fit, hypothesis, &shape);
+        let all = self.fit.columns(problem, hypothesis, &shape);
         let all = &all.factors;
         let scanned = &all[..all.len().min(SCANNED_FACTORS)];
         let intervals = self.scan(scanned, only);
@@ -148,7 +119,7 @@ impl Base<'_> {
         let [start, end] = times[..] else { return None };
         let mut shape = vec![0.0; hypothesis.effect.coordinates.len()];
         (shape[start], shape[end]) = (f64::NEG_INFINITY, f64::INFINITY);
-        let all = columns(self.problem, self.fit, hypothesis, &shape);
+        let all = self.fit.columns(self.problem, hypothesis, &shape);
         let masked = self.all_within(&all.factors, (from_s, to_s), only);
         let session_s = only.map_or(0.0, |track| self.problem.tracks[track].track.session_s);
         (shape[start], shape[end]) = (session_s + from_s, session_s + to_s);

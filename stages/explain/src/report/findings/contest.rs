@@ -2,7 +2,8 @@
 
 use crate::physics::active::{Active, Hypothesis};
 use crate::report::sentences;
-use crate::select::evidence::{Explanation, tie};
+use crate::select::evidence::tie;
+use crate::select::explanation::Explanation;
 use crate::select::search::Search;
 
 /// How many rivals of a finding are refined, and how many are told.

@@ -7,12 +7,13 @@ use serde_json::Value;
 use tauscope_dynamics::terms::Layer;
 
 use crate::data::problem::Problem;
-use crate::explain::Input;
 use crate::fit::fitted::Fit;
 use crate::fit::interval::{HALF_WIDTH_95, parameter_deviations};
+use crate::fit::urdf_uncertainty::off_with_the_links;
 use crate::physics::active::Hypothesis;
-use crate::physics::start::KNOWN;
-use crate::physics::torque_scale::{is_drive, off_with_the_links};
+use crate::physics::parameter_units::{grows_with_effort, is_of_effort};
+use crate::read::input::Input;
+use crate::read::start::KNOWN;
 use crate::report::sentences;
 
 /// The scale of one drive \[A per N m\].
@@ -37,7 +38,7 @@ impl Scales {
     /// As a fit has them; how far they are known counts that the URDF's masses are not exact.
     pub fn of(problem: &Problem, fit: &Fit, spread: &DMatrix<f64>) -> Self {
         let drives: Vec<usize> = (0..fit.actives.len())
-            .filter(|&index| is_drive(&fit.actives[index].hypothesis))
+            .filter(|&index| fit.actives[index].hypothesis.is_torque_scale())
             .collect();
         if drives.is_empty() {
             return Self(Vec::new());
@@ -79,7 +80,7 @@ impl Scales {
         }
         let share = scale.deviation / scale.gain;
         for (name, value) in parameters {
-            let Some(number) = value.as_f64().filter(|_| sentences::is_of_effort(name)) else {
+            let Some(number) = value.as_f64().filter(|_| is_of_effort(name)) else {
                 continue;
             };
             let known = number / scale.gain;
@@ -146,7 +147,7 @@ impl StartScales {
             return;
         }
         for (name, interval) in intervals {
-            let scaled = sentences::is_of_effort(name) || sentences::grows_with_effort(name);
+            let scaled = is_of_effort(name) || grows_with_effort(name);
             if let Some(number) = parameters.get(name).and_then(Value::as_f64)
                 && scaled
             {

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use tauscope_dynamics::terms::{Layer, PlaceKind};
 
+use crate::data::column::Column;
 use crate::fit::fitted::Fit;
-use crate::physics::active::Column;
-use crate::physics::columns::columns;
-use crate::report::Undetectable;
-use crate::select::evidence::{Explanation, LEAST_EVIDENCE, LEAST_SIZE};
+use crate::report::schema::Undetectable;
+use crate::select::evidence::{LEAST_EVIDENCE, LEAST_SIZE};
+use crate::select::explanation::Explanation;
 use crate::select::propose::{Base, shapes};
 use crate::select::search::Search;
 
@@ -37,7 +37,7 @@ pub fn undetectable(
         let Some(shape) = shapes(search.problem, *hypothesis).into_iter().next() else {
             continue;
         };
-        let columns = columns(search.problem, &found.fit, *hypothesis, &shape);
+        let columns = found.fit.columns(search.problem, *hypothesis, &shape);
         let Some(column) = columns.factors.first() else {
             continue;
         };

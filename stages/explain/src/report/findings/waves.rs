@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::report::Finding;
+use crate::report::schema::Finding;
 
 /// Two waves of ripple at one joint are told as one finding, the larger first.
 pub fn merge_waves(findings: &mut Vec<Finding>) {

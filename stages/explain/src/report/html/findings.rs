@@ -6,8 +6,8 @@ use super::chart::{Axis, r};
 use super::effects::{effect_at, effect_meaning, effect_title, place};
 use super::number_format::{almost_all, number_text, parameter, percent, value, with_digits_of};
 use super::proof;
+use crate::report::schema::{Finding, Report, Verdict};
 use crate::report::sentences::in_amperes;
-use crate::report::{Finding, Report, Verdict};
 
 /// A card a finding, or that there is none.
 pub(super) fn cards(report: &Report) -> Option<Markup> {
