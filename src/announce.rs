@@ -2,8 +2,7 @@
 
 use tauscope_bus::{Detection, Emit, EventKind, LinkError, Stage, StageError, TwinState, flags};
 use tauscope_explain::watch;
-
-use crate::pipeline::CellFacts;
+use tauscope_pipeline::cell::CellFacts;
 
 /// A detect or explain stage whose events are told on standard error. Its stream is untouched.
 pub struct Announced<S> {
