@@ -37,6 +37,7 @@ pub struct JointRms {
 }
 
 impl TwinTally {
+    /// Nothing summed yet, for the twin `stage` of an arm with so many joints.
     pub fn new(stage: &str, joint_count: usize) -> Self {
         Self {
             stage: stage.to_owned(),
@@ -46,6 +47,7 @@ impl TwinTally {
         }
     }
 
+    /// Adds a sample, if it holds a measured effort.
     pub fn add(&mut self, sample: &TwinState) {
         if !sample.header.has(flags::EFFORT_MEASURED) {
             return;
@@ -119,6 +121,7 @@ pub struct DetectionTally {
 }
 
 impl DetectionTally {
+    /// Nothing found yet by the detector `stage` of an arm with these joints.
     pub fn new(stage: &str, joint_names: &[String]) -> Self {
         Self {
             stage: stage.to_owned(),
@@ -139,6 +142,7 @@ impl DetectionTally {
         self
     }
 
+    /// Adds a sample: an event begins, goes on or ends.
     pub fn add(&mut self, sample: &Detection) {
         let start_ns = *self.start_ns.get_or_insert(sample.header.stamp_ns);
         let seconds = |ns: i64| (ns - start_ns) as f64 * 1e-9;

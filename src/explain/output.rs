@@ -78,7 +78,7 @@ pub fn write(
             joint.joint.clone_from(name);
         }
     }
-    let provenance = provenance_of(request)?;
+    let provenance = provenance_of(request).context("what went in")?;
     let mut made = Made::default();
     let mut predictions = Vec::new();
     for (recording, rows) in &outcome.predictions {

@@ -1,9 +1,7 @@
 //! Recordings into what the engine takes.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
-use tauscope_archive::Recording as Archive;
 use tauscope_dynamics::Model;
 use tauscope_explain::{Input, Recording, RecordingTopics, Start};
 use tauscope_pipeline::report::{Problem, Report};
