@@ -4,14 +4,14 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use tauscope_bus::StageError;
-use tauscope_detect::{Lesson, Lessons};
+use tauscope_detect::{Entry, Lesson, Lessons};
 use tauscope_pipeline::parallel;
 
 use crate::error::EvaluateError;
 use crate::heard::{self, Heard};
 use crate::input::Request;
 use crate::recording::{Named, Role};
-use crate::registry::{Entry, SEEDS, Task};
+use crate::registry::{SEEDS, Task};
 use crate::runner::Runner;
 use crate::twin::Prepared;
 use crate::{bad_readings, session};
@@ -247,6 +247,7 @@ fn learn(
                 // What its random siblings say, too, is said once.
                 let warning = runner.config.warning(&setup);
                 notes.extend(warning.filter(|warning| !notes.contains(warning)));
+                notes.extend(runner.config.all().filter_map(|settings| settings.note()));
                 runners.push(runner);
             }
             Err(EvaluateError::Learn { detector, source }) if !request.explicit => {

@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
-use tauscope_explain::watch::amount;
 use tauscope_pipeline::parallel;
 use tauscope_pipeline::pipeline::Pipeline;
 use tauscope_pipeline::replay::{Outcome, Replay, ReplayError, TwinChoice, stem};
 use tauscope_pipeline::report::{Problem, Report};
 use tauscope_pipeline::tables::{write_events, write_summary};
 use tauscope_pipeline::tally::{Event, JointRms};
+use tauscope_watch::amount;
 
 use crate::exit::{Exit, Failure};
 use crate::output::Output;

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use tauscope_explain::watch;
 use tauscope_record::{RecordError, Recorder};
+use tauscope_watch as watch;
 
 use super::{Pipeline, Stage};
 use crate::build::{self, StreamFacts};
