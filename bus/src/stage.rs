@@ -3,6 +3,8 @@
 //! Three roles, so that a wrong wiring does not compile: a [`Source`] makes a stream, a [`Stage`]
 //! turns one into another, a [`Sink`] takes many and gives none.
 
+use std::path::PathBuf;
+
 use crate::link::LinkError;
 use crate::sample::{Sample, SampleRef};
 
@@ -67,6 +69,20 @@ pub trait Source<T: Sample>: Send {
     }
 }
 
+impl<T: Sample, S: Source<T> + ?Sized> Source<T> for Box<S> {
+    fn step(&mut self, out: &mut dyn Emit<T>) -> Result<Progress, StageError> {
+        (**self).step(out)
+    }
+
+    fn dropped(&self) -> u64 {
+        (**self).dropped()
+    }
+
+    fn fraction_done(&self) -> Option<f64> {
+        (**self).fraction_done()
+    }
+}
+
 /// Turns a stream into another: a pure state machine, without I/O and without a clock of its own.
 pub trait Stage<I: Sample, O: Sample>: Send {
     /// Takes one sample and emits what follows from it.
@@ -110,6 +126,11 @@ pub trait Sink: Send {
     /// # Errors
     /// If it cannot be completed.
     fn finish(&mut self) -> Result<(), StageError>;
+
+    /// The files that it completed last, and how many in all.
+    fn completed_files(&self) -> (&[PathBuf], u64) {
+        (&[], 0)
+    }
 
     /// Samples this sink had to drop so far.
     fn dropped(&self) -> u64 {

@@ -3,13 +3,15 @@
 use std::path::PathBuf;
 
 use anyhow::Context;
+use tauscope_pipeline::pipeline::{Pipeline, Stage};
+use tauscope_pipeline::report::{Problem, Report};
+use tauscope_pipeline::settings::Settings;
+use tauscope_pipeline::suggest;
+use tauscope_record::Existing;
 
-use crate::build;
 use crate::exit::{Exit, Failure};
-use crate::pipeline::{Pipeline, Settings};
+use crate::output::Output;
 use crate::plan;
-use crate::report::Problem;
-use crate::suggest;
 use crate::supervisor::{self, Summary};
 
 /// Run a pipeline: check the file, start this host's stages, look after them until the source ends
@@ -22,6 +24,9 @@ pub struct Args {
     /// Which of the file's hosts this is, where it names several.
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
+    /// Let recorders replace files that have the names of theirs.
+    #[arg(long)]
+    force: bool,
     /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
@@ -34,14 +39,15 @@ impl Default for Args {
         Self {
             pipeline: DEFAULT.into(),
             host: None,
+            force: false,
             json: false,
         }
     }
 }
 
 /// Runs it.
-pub fn run(args: &Args) -> Result<Exit, Failure> {
-    let pipeline = Pipeline::load(&args.pipeline, args.host.as_deref())?;
+pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
+    let mut pipeline = Pipeline::load(&args.pipeline, args.host.as_deref())?;
     let names = || pipeline.hosts.keys().map(String::as_str);
     let host = match (&args.host, pipeline.hosts.len()) {
         (None, 2..) => {
@@ -51,7 +57,14 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
         }
         (host, _) => host.as_deref(),
     };
-    build::warn(&pipeline, host);
+    for warning in pipeline.warnings(host) {
+        out.say(&format!("warning: {warning}"));
+    }
+    if args.force {
+        replace_files(&mut pipeline);
+    } else {
+        keep_files(&pipeline, host)?;
+    }
     let links = plan::links(&pipeline);
     let summary = supervisor::run(&pipeline, &links, host)?;
     let text = if args.json {
@@ -59,31 +72,61 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
     } else {
         summary.table()
     };
-    super::print(&text)?;
+    out.print(&text)?;
     if !args.json {
-        super::print(&written(&pipeline, &summary))?;
+        out.print(&written(&summary))?;
     }
     Ok(summary.exit())
 }
 
-/// What this host's recorders have completed, and how to open it.
-fn written(pipeline: &Pipeline, summary: &Summary) -> String {
-    let mut lines = Vec::new();
-    for stage in summary.stages.iter().filter(|stage| !stage.failed) {
-        let stage = pipeline
-            .stages
-            .iter()
-            .find(|known| known.name == stage.stage);
-        let Some(Settings::Record(config)) = stage.map(|stage| &stage.settings) else {
+/// Lets all recorders replace files.
+fn replace_files(pipeline: &mut Pipeline) {
+    for stage in &mut pipeline.stages {
+        if let Settings::Record(config) = &mut stage.settings {
+            config.existing = Existing::Replace;
+        }
+    }
+}
+
+/// Refuses to start where a recorder on `host` would have to replace a file.
+fn keep_files(pipeline: &Pipeline, host: Option<&str>) -> Result<(), Failure> {
+    let mut report = Report::default();
+    let here = |stage: &&Stage| host.is_none() || stage.host.as_deref() == host;
+    for stage in pipeline.stages.iter().filter(here) {
+        let Settings::Record(config) = &stage.settings else {
             continue;
         };
-        let picture = config.rerun.as_ref().and_then(|rerun| rerun.file.as_ref());
-        let files = config.mcap.iter().chain(picture);
-        for (path, file) in files.filter_map(|path| Some((path, path.metadata().ok()?))) {
+        if config.existing == Existing::Replace {
+            continue;
+        }
+        let cell = stage.cells.first().map_or("", String::as_str);
+        for file in config.in_the_way(cell) {
+            let title = format!("`{}` would replace {}", stage.name, file.display());
+            report.push(Problem::new(title).help(
+                "put `{date}`, `{time}` or `{n}` into the name, or replace the file with --force",
+            ));
+        }
+    }
+    Ok(report.into_result(())?)
+}
+
+/// What this host's recorders have completed, and how to open it.
+fn written(summary: &Summary) -> String {
+    let mut lines = Vec::new();
+    for stage in summary.stages.iter().filter(|stage| !stage.failed) {
+        for path in &stage.files {
+            let Ok(file) = path.metadata() else { continue };
             let megabytes = file.len() as f64 * 1e-6;
             lines.push(format!("wrote {} ({megabytes:.1} MB)", path.display()));
         }
-        if let Some(path) = picture {
+        let before = stage
+            .files_completed
+            .saturating_sub(stage.files.len() as u64);
+        if before > 0 {
+            lines.push(format!("and {before} files before"));
+        }
+        let is_picture = |path: &&PathBuf| path.extension().is_some_and(|kind| kind == "rrd");
+        if let Some(path) = stage.files.iter().find(is_picture) {
             let version = tauscope_record::rerun_version();
             let path = path.display();
             lines.push(format!(

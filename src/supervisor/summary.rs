@@ -1,12 +1,14 @@
 //! What came of a run: a line for each stage and each link.
 
+use std::path::PathBuf;
+
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
 use tauscope_bus::SampleKind;
+use tauscope_pipeline::pipeline::Pipeline;
 
 use super::local::Local;
 use crate::exit::Exit;
-use crate::pipeline::Pipeline;
 use crate::plan::{Link, Over};
 
 /// What came of a run on this host.
@@ -36,6 +38,10 @@ pub struct StageSummary {
     pub restarts: u64,
     /// Whether it was given up.
     pub failed: bool,
+    /// The files that a recorder completed last.
+    pub files: Vec<PathBuf>,
+    /// How many files a recorder completed.
+    pub files_completed: u64,
 }
 
 /// One link.
@@ -207,6 +213,8 @@ impl StageSummary {
             dropped: lost + sums.refused,
             restarts: stage.seat.restarts,
             failed: stage.is_lost(),
+            files: stage.tally.newest().files.clone(),
+            files_completed: sums.files_completed,
         }
     }
 }

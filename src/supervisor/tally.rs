@@ -23,6 +23,8 @@ pub struct Sums {
     pub refused: u64,
     /// Samples that those who keep all did not get.
     pub undelivered: u64,
+    /// Files that a recorder has completed.
+    pub files_completed: u64,
     /// Each input, in the order of the seat.
     pub inputs: Vec<ReceiverCounts>,
 }
@@ -56,6 +58,7 @@ impl Tally {
         sums.emitted += self.newest.emitted;
         sums.refused += self.newest.refused;
         sums.undelivered += self.newest.undelivered;
+        sums.files_completed += self.newest.files_completed;
         let inputs = &self.newest.inputs;
         sums.inputs.resize(
             sums.inputs.len().max(inputs.len()),

@@ -1,5 +1,6 @@
 //! How a stage fares.
 
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -29,6 +30,12 @@ pub struct Report {
     pub stamp_ns: i64,
     /// How far a source of known length is, from 0 to 1.
     pub fraction_done: Option<f64>,
+    /// The files that a sink completed last.
+    #[serde(default)]
+    pub files: Vec<PathBuf>,
+    /// How many files a sink has completed.
+    #[serde(default)]
+    pub files_completed: u64,
     /// Each input.
     pub inputs: Vec<InputReport>,
     /// How it ended; `None` while it runs.

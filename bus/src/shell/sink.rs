@@ -155,6 +155,11 @@ impl SinkShell<'_> {
     fn count(&mut self) {
         self.report.count_inputs();
         self.report.refused = self.sink.dropped();
+        let (files, completed) = self.sink.completed_files();
+        if self.report.files_completed != completed {
+            self.report.files = files.to_vec();
+            self.report.files_completed = completed;
+        }
         self.report.stamp_ns = self.health.stamp_ns();
     }
 }

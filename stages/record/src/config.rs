@@ -7,6 +7,9 @@ use serde::{Deserialize, Serialize};
 use tauscope_archive::Compression;
 use tauscope_archive::whole_file::Existing;
 
+use crate::error::RecordError;
+use crate::file_name::FileName;
+
 /// A recorder: what is kept of the streams it listens to. At least one of `mcap` and `rerun`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -27,6 +30,37 @@ pub struct Config {
     /// The picture for the Rerun viewer.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rerun: Option<RerunConfig>,
+}
+
+impl Config {
+    /// The names of the files in this configuration: archive, then picture.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &PathBuf> {
+        let picture = self.rerun.as_ref().and_then(|rerun| rerun.file.as_ref());
+        self.mcap.iter().chain(picture)
+    }
+
+    /// Checks the files' names.
+    ///
+    /// # Errors
+    /// If a name holds a field that there is none of, or files are to be split that have one name.
+    pub fn check_names(&self) -> Result<(), RecordError> {
+        for path in self.names() {
+            let name = FileName::parse(path)?;
+            if self.split.is_some() && !name.can_differ() {
+                return Err(RecordError::OneName { name: path.clone() });
+            }
+        }
+        Ok(())
+    }
+
+    /// Files that are there and that a recorder of `cell` would have to replace.
+    pub fn in_the_way(&self, cell: &str) -> Vec<PathBuf> {
+        let fixed = |path: &PathBuf| FileName::parse(path).ok()?.fixed(cell);
+        self.names()
+            .filter_map(fixed)
+            .filter(|path| path.exists())
+            .collect()
+    }
 }
 
 /// When a recorder closes its files and begins new ones. Each file stands for itself: what holds at

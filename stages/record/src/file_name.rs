@@ -8,7 +8,7 @@ use tauscope_archive::whole_file::part_of;
 
 /// A file's name with fields that are filled in when the file is begun: `{cell}`, `{date}` and
 /// `{time}` (UTC, of the first sample in it, as `2026-11-22` and `14-03-05`) and `{n}` (the first
-/// number, from 001 on, that makes the name new).
+/// number, from 001 on, that makes the name new). `{{` and `}}` are braces that stay.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileName {
     parts: Vec<Part>,
@@ -70,6 +70,14 @@ impl FileName {
             if from_brace.is_empty() {
                 break;
             }
+            if let Some(brace) = ["{", "}"]
+                .into_iter()
+                .find(|b| from_brace.starts_with(&b.repeat(2)))
+            {
+                parts.push(Part::Text(brace.to_owned()));
+                rest = &from_brace[2..];
+                continue;
+            }
             let inside = from_brace.strip_prefix('{').ok_or_else(lone)?;
             let (field, behind) = inside.split_once('}').ok_or_else(lone)?;
             parts.push(match field {
@@ -86,6 +94,20 @@ impl FileName {
             rest = behind;
         }
         Ok(Self { parts })
+    }
+
+    /// A path as a file's name in which no brace means anything.
+    pub fn literal(path: &Path) -> PathBuf {
+        match path.to_str() {
+            Some(text) => text.replace('{', "{{").replace('}', "}}").into(),
+            // Not text, so without fields.
+            None => path.to_owned(),
+        }
+    }
+
+    /// The file, where it does not hang on when it is begun.
+    pub fn fixed(&self, cell: &str) -> Option<PathBuf> {
+        (!self.can_differ()).then(|| self.fill(cell, Timestamp::default(), 0))
     }
 
     /// Whether the name is known before the first sample is.
@@ -171,6 +193,13 @@ mod tests {
         let names = ["a-{n}.mcap", "a-{n}.rrd"].map(|file| FileName::parse(&at(file)).unwrap());
         let filled = fill_in(&names.each_ref(), "cell", START_NS).unwrap();
         assert_eq!(filled, [at("a-003.mcap"), at("a-003.rrd")]);
+    }
+
+    #[test]
+    fn doubled_braces_are_braces() {
+        let path = Path::new("a{1}.mcap");
+        let literal = FileName::parse(&FileName::literal(path)).unwrap();
+        assert_eq!(literal.fixed("cell").unwrap(), path);
     }
 
     #[test]

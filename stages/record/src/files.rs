@@ -39,6 +39,7 @@ impl Files {
         provenance: &BTreeMap<String, String>,
         streams: &Streams,
     ) -> Result<Self, RecordError> {
+        config.check_names()?;
         let rerun = config.rerun.as_ref().and_then(|rerun| rerun.file.as_ref());
         let parse = |path: Option<&PathBuf>| path.map(|path| FileName::parse(path)).transpose();
         let mut files = Self {
@@ -53,13 +54,6 @@ impl Files {
         let cells = streams.cells.len();
         if cells > 1 && files.names().any(FileName::is_of_one_cell) {
             return Err(RecordError::SeveralCells { cells });
-        }
-        if config.split.is_some() {
-            for (name, path) in files.names().zip(config.mcap.iter().chain(rerun)) {
-                if !name.can_differ() {
-                    return Err(RecordError::OneName { name: path.clone() });
-                }
-            }
         }
         if files.names().all(FileName::is_known_at_start) {
             files.open = Some(files.begin(streams, 0)?);

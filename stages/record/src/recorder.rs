@@ -58,11 +58,6 @@ impl Recorder {
         self.live.as_ref().map_or(0, LivePicture::dropped)
     }
 
-    /// The files that were completed last, and how many were in all.
-    pub fn completed(&self) -> (&[PathBuf], u64) {
-        self.files.completed()
-    }
-
     fn keep(&mut self, from: &str, sample: SampleRef<'_>) -> Result<(), RecordError> {
         let index = self.streams.find(from, &sample)?;
         self.files.accept(&self.streams, index, sample)?;
@@ -94,5 +89,9 @@ impl Sink for Recorder {
 
     fn finish(&mut self) -> Result<(), StageError> {
         self.complete().map_err(StageError::failed)
+    }
+
+    fn completed_files(&self) -> (&[PathBuf], u64) {
+        self.files.completed()
     }
 }

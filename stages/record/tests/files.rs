@@ -72,7 +72,7 @@ fn files_are_split_by_time_and_lose_nothing() {
         let threshold = "/detections/twin_regression/threshold";
         assert_eq!(count::<Float64>(file, threshold), 1, "{}", file.display());
     }
-    assert_eq!(recorder.completed(), (&expected[2..], 3));
+    assert_eq!(recorder.completed_files(), (&expected[2..], 3));
 }
 
 #[test]
@@ -113,7 +113,7 @@ fn a_file_that_is_there_is_kept_and_the_new_one_gets_another_name() {
     let recorder = record(&config, 1.0);
     assert_eq!(std::fs::read(&path).unwrap(), b"somebody's only copy");
     let other = folder.path().join("a.1.mcap");
-    assert_eq!(recorder.completed().0, [other.as_path()]);
+    assert_eq!(recorder.completed_files().0, [other.as_path()]);
     assert_eq!(count::<JointState>(&other, "/joint_states"), 250);
 
     let replacing = Config {
