@@ -10,6 +10,7 @@ mod asymmetric_coulomb;
 mod backlash;
 mod base_tilt;
 mod cable_spring;
+mod concealed;
 mod contact_wall;
 mod coulomb_friction;
 mod counterbalance_spring;
@@ -31,6 +32,7 @@ mod presliding_hysteresis;
 mod quadratic_drag;
 mod rotor_inertia;
 mod spec;
+mod split_joint;
 mod stribeck_friction;
 mod table;
 mod temperature_viscous;
@@ -45,16 +47,22 @@ mod torque_saturation;
 mod transmission_coupling;
 mod two_masses;
 mod viscous_friction;
+pub mod words;
 
 use std::sync::Arc;
 
 use crate::{Inertia, Model};
 
-pub use effect::{Coordinate, CoordinateKind, Effect, Layer, Parameter, PlaceKind, Scale};
+pub use concealed::{Chance, Draw, Drawn, Parameters};
+pub use effect::{
+    Compliance, Coordinate, CoordinateKind, Effect, Excitation, Family, Layer, Parameter,
+    PlaceKind, Scale, Simpler, Simulated, Time, Traits,
+};
 pub use expansion::Expansion;
 pub use physics::Physics;
 pub use spec::{TermError, TermSpec};
-pub use table::{Against, Table, TableSpec, table};
+pub use table::{Against, EFFECT as UNKNOWN, Table, TableSpec, table};
+pub use words::Words;
 
 /// Every effect there is.
 pub static EFFECTS: &[&Effect] = &[

@@ -3,17 +3,37 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Effect, Layer, MotionSample, PlaceKind, Site, Term, TermError, sign};
+use super::{
+    Effect, Excitation, Family, Layer, MotionSample, PlaceKind, Simulated, Site, Term, TermError,
+    Traits, Words, sign,
+};
 use crate::Model;
 
-pub(super) static EFFECT: Effect = Effect {
+/// What has no name: a [`Table`] is all there is to it.
+pub static EFFECT: Effect = Effect {
     name: "unknown",
+    words: Words::new(
+        "Unknown",
+        "something that no name fits",
+        "Something that no name of the library fits; the correction only describes it.",
+        "Something in joint {place} has no name.",
+    ),
+    family: Family::Unnamed,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
     parameters: &[],
     coordinates: &[],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
+    simpler: None,
+    limit: None,
+    excitation: Excitation::Speeds,
+    simulated: Simulated::Joint,
+    concealed: None,
+    traits: Traits {
+        describes_only: true,
+        ..Traits::NONE
+    },
     // Without a table there is nothing to describe.
     build: |site, _| {
         Box::new(Curve {

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::DVector;
 use tauscope_dynamics::terms::{
-    Coordinate, Effect, Layer, MotionSample, Parameter, PlaceKind, Term, effect,
+    Coordinate, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind, Simulated,
+    Term, Traits, Words, effect,
 };
 
 use crate::active::{Active, Column, Hypothesis, Whereabouts};
@@ -21,12 +22,25 @@ const CENTRE_OFF: f64 = 0.2;
 /// [`Layer::Body`] terms.
 pub static DRIVE_GAIN: Effect = Effect {
     name: "drive_gain",
+    words: Words::new(
+        "Torque scale",
+        "torque scale",
+        "What a recorded effort of 1 is in N m.",
+        "The effort of joint {place} is recorded {gain} times the model's.",
+    ),
+    family: Family::Recording,
     place: PlaceKind::Joint,
     layer: Layer::Body,
-    parameters: &[Parameter::any("gain")],
+    parameters: &[Parameter::ratio("gain", f64::NEG_INFINITY)],
     coordinates: &[Coordinate::factor("gain_minus_one")],
     to_parameters: |c| vec![1.0 + c[0]],
     to_coordinates: |p| vec![p[0] - 1.0],
+    simpler: None,
+    limit: None,
+    excitation: Excitation::Poses,
+    simulated: Simulated::Record,
+    concealed: None,
+    traits: Traits::NONE,
     build: |site, values| {
         Box::new(DriveGain {
             joint: site.joint,
