@@ -6,10 +6,10 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use tauscope_bus::{Emit, JointState, LinkError, Progress, SampleKind, Source, StageError};
 use tauscope_detect::Detect;
-use tauscope_explain::watch::{self, Watch};
 use tauscope_ingest::{IngestError, Paced, Rate, SimulatedRobot};
 use tauscope_record::{CellInfo, RecordError, Recorder, StreamInfo};
 use tauscope_twin::{Correction, Twin, TwinFile};
+use tauscope_watch::{self as watch, Watch};
 
 use crate::pipeline::{Cell, EffortUnit, Pipeline, Settings, Stage};
 use crate::provenance;

@@ -319,7 +319,7 @@ impl<'a> Resolver<'a> {
         &mut self,
         index: usize,
         place: &Place,
-        config: &tauscope_explain::watch::Config,
+        config: &tauscope_watch::Config,
     ) -> Option<Settings> {
         let twin = self.above(index, |role| role == Role::Twin);
         let model = twin.and_then(|twin| self.models.get(&twin));

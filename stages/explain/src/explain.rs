@@ -5,22 +5,23 @@ use std::collections::{BTreeMap, BTreeSet};
 use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::{Layer, Site, TermError, TermSpec};
 
-use crate::active::{Active, Hypothesis};
-use crate::at_rest;
-use crate::audit;
-use crate::drive;
-use crate::findings::{self, Named};
-use crate::fit::Fit;
-use crate::friction;
-use crate::library;
-use crate::locate;
-use crate::problem::Problem;
-use crate::recording::Recording;
+use crate::physics::active::{Active, Hypothesis};
+mod at_rest;
+mod in_motion;
+use crate::data::problem::Problem;
+use crate::data::track::Track;
+use crate::fit::fitted::Fit;
+use crate::physics::friction;
+use crate::physics::library;
+use crate::physics::start::{Start, scales};
+use crate::physics::torque_scale;
+use crate::read::audit;
+use crate::read::recording::Recording;
+use crate::report::findings::{self, Named};
+use crate::report::locate;
+use crate::report::verdict;
 use crate::report::{RecordingPicture, Report, Undetectable, Verdict};
-use crate::start::{Start, scales};
-use crate::track::Track;
-use crate::verdict;
-use crate::windows::{TimeKind, time_kind};
+use crate::select::windows::{TimeKind, time_kind};
 
 /// What is to be explained.
 #[derive(Debug)]
@@ -331,7 +332,7 @@ impl Setup<'_> {
         let mut gain = start.map_or_else(|| vec![1.0; n], |start| start.gain.clone());
         let mut deviation =
             start.map_or_else(|| vec![0.0; n], |start| start.gain_deviation.clone());
-        let of_fit = drive::gains(&found.actives, n);
+        let of_fit = torque_scale::gains(&found.actives, n);
         for &(joint, of_gain) in fitted {
             (gain[joint], deviation[joint]) = (of_fit[joint], of_gain);
         }
@@ -356,7 +357,7 @@ impl Setup<'_> {
         let of_bodies = |active: &&Active| {
             let hypothesis = active.hypothesis;
             let lasts = !matches!(time_kind(hypothesis), TimeKind::Once);
-            hypothesis.effect.layer == Layer::Body && !drive::is_drive(&hypothesis) && lasts
+            hypothesis.effect.layer == Layer::Body && !torque_scale::is_drive(&hypothesis) && lasts
         };
         let bodies = found.actives.iter().filter(of_bodies);
         bodies.map(|active| self.spec(active)).collect()
@@ -370,7 +371,7 @@ impl Setup<'_> {
             .as_ref()
             .map_or_else(Vec::new, |start| start.terms.clone());
         for active in &found.actives {
-            if drive::is_drive(&active.hypothesis) || !findings::lasts(active.hypothesis) {
+            if torque_scale::is_drive(&active.hypothesis) || !findings::lasts(active.hypothesis) {
                 continue;
             }
             let term = self.spec(active);

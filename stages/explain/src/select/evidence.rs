@@ -1,0 +1,339 @@
+//! What counts as evidence for a piece of physics, and how much of it is asked for.
+
+use nalgebra::{DMatrix, DVector};
+use tauscope_dynamics::terms::{CoordinateKind, Scale};
+use tauscope_dynamics::{Limits, Model};
+
+use crate::data::problem::Problem;
+use crate::fit::fitted::Fit;
+use crate::fit::least_squares::Products;
+use crate::physics::active::{Active, Column, Hypothesis};
+use crate::select::windows::{TimeKind, time_kind};
+
+use crate::select::curves::is_plain_friction;
+
+/// Evidence that a piece of physics needs \[nats\].
+pub const LEAST_EVIDENCE: f64 = 8.0;
+/// Least share of what is then left at some joint that a piece of physics must explain: less is in reach of what
+/// differentiation and filters leave.
+pub const LEAST_SIZE: f64 = 0.12;
+/// The same for what lasts only for an interval, which must have this much more evidence.
+const LEAST_SIZE_OF_INTERVAL: f64 = 0.03;
+const INTERVAL_EVIDENCE: f64 = 40.0;
+/// Least share beside a curve without a name in the same joint, or of an interval beside any: the name may only patch the curve.
+const LEAST_SIZE_BESIDE_CURVE: f64 = 3.0;
+/// Evidence that needs no account of correlation, if rows counted in full \[nats\].
+const OVERWHELMING: f64 = 40.0;
+/// And what is left over what is then left: of what lasts, which may follow slow noise all the time; of what comes and goes; and of a
+/// curve, which bends to any slow noise and must do much more.
+const FAIR_SHARE: f64 = 1.8;
+const FAIR_SHARE_FOR_A_WHILE: f64 = 1.3;
+const FAIR_SHARE_OF_CURVE: f64 = 3.0;
+/// Nearer than this \[nats\], or than this share of the evidence for either, two rivals cannot be told apart.
+pub const TIE: f64 = 5.0;
+const TIE_SHARE: f64 = 0.01;
+/// How many proposals of a round are refined before one is taken.
+pub const REFINED: usize = 3;
+/// An exchange must gain this \[nats\].
+pub const LEAST_GAIN: f64 = 0.5;
+/// What began or ended so much beside a recording began or ended with it \[s\].
+const BESIDE_S: f64 = 0.5;
+/// A change of friction smaller than this share of it is what friction does from day to day.
+const LEAST_STEP: f64 = 0.3;
+
+/// A fit and the evidence for it, all penalties counted.
+#[derive(Debug, Clone)]
+pub struct Explanation {
+    /// The fit.
+    pub fit: Fit,
+    /// Penalty by active.
+    pub penalties: Vec<f64>,
+}
+
+impl Explanation {
+    /// Evidence for this rather than another \[nats\], rows weighted by their `worth`.
+    pub fn ahead_of(&self, other: &Self, worth: &[f64]) -> f64 {
+        let penalty = |e: &Self| e.penalties.iter().sum::<f64>();
+        self.fit.gain_over(&other.fit, worth) - penalty(self) + penalty(other)
+    }
+}
+
+/// By how much a rival may be behind \[nats\] and still not be told from what has so much evidence.
+pub fn tie(evidence: f64) -> f64 {
+    TIE.max(TIE_SHARE * evidence)
+}
+
+/// Whether an explanation takes away a fair share of what another leaves at some joint, with much evidence if rows counted
+/// in full: however correlated the rest is, that much is no chance.
+pub fn overwhelming(explanation: &Explanation, other: &Explanation) -> bool {
+    let white = vec![1.0; other.fit.variance.len()];
+    let more = |is: &dyn Fn(&Active) -> bool| {
+        let count = |e: &Explanation| e.fit.actives.iter().filter(|a| is(a)).count();
+        count(explanation) > count(other)
+    };
+    let share = if more(&|a| a.curve.is_some()) {
+        FAIR_SHARE_OF_CURVE
+    } else if more(&|a| time_kind(a.hypothesis) == TimeKind::Once) {
+        FAIR_SHARE_FOR_A_WHILE
+    } else {
+        FAIR_SHARE
+    };
+    let less = |(with, without): (&f64, &f64)| *without > share * with;
+    explanation.ahead_of(other, &white) > OVERWHELMING
+        && explanation
+            .fit
+            .variance
+            .iter()
+            .zip(&other.fit.variance)
+            .any(less)
+}
+
+/// By piece, the square of its factors in units of their covariance, as if what is left were white.
+pub fn wald(problem: &Problem, fit: &Fit) -> Vec<f64> {
+    let jacobian = fit.jacobian(problem);
+    let columns: Vec<&Column> = jacobian.iter().map(AsRef::as_ref).collect();
+    let products = Products::new(problem, &columns, &fit.residual, None);
+    let (normal, _) = products.normal(&fit.variance, &vec![0.0; columns.len()]);
+    let p = columns.len();
+    let scale: Vec<f64> = (0..p).map(|a| normal[(a, a)].max(1e-300).sqrt()).collect();
+    let mut scaled = DMatrix::from_fn(p, p, |a, b| normal[(a, b)] / (scale[a] * scale[b]));
+    for a in 0..p {
+        scaled[(a, a)] += 1e-9;
+    }
+    let Some(inverse) = scaled.try_inverse() else {
+        return vec![0.0; fit.actives.len()];
+    };
+    let mut first = 0;
+    fit.actives
+        .iter()
+        .map(|active| {
+            let index: Vec<usize> = (0..active.coordinates.len())
+                .filter(|&c| matches!(active.kind(c), CoordinateKind::Factor { .. }))
+                .map(|c| first + c)
+                .collect();
+            let theta = DVector::from_iterator(
+                index.len(),
+                index
+                    .iter()
+                    .map(|&a| active.coordinates[a - first] * scale[a]),
+            );
+            first += active.coordinates.len();
+            let own = DMatrix::from_fn(index.len(), index.len(), |a, b| {
+                inverse[(index[a], index[b])]
+            });
+            own.try_inverse()
+                .map_or(0.0, |own| (own * &theta).dot(&theta))
+        })
+        .collect()
+}
+
+/// Friction that changes, once or as the joint warms up, leaves at least this share of what it was: none comes from nothing or
+/// goes for good.
+const LEAST_LEFT: f64 = 0.1;
+/// What lasts for an interval of one recording lasts at most for this share of it; what lasts longer is not told from an offset.
+const LONGEST_SHARE: f64 = 0.75;
+
+/// Whether the times of a piece of physics are ones that tell something: friction that changes once changes by more than friction
+/// does from day to day and does not vanish, and what comes and goes does both within a recording.
+pub fn is_timely(problem: &Problem, active: &Active) -> bool {
+    let x = &active.coordinates;
+    match time_kind(active.hypothesis) {
+        TimeKind::Step => {
+            let (less, more) = (x[0].min(x[1]), x[0].max(x[1]));
+            more - less > LEAST_STEP * more && less >= LEAST_LEFT * more
+        }
+        TimeKind::Once => {
+            let [.., start_s, end_s] = x[..] else {
+                return true;
+            };
+            problem.tracks.iter().map(|t| &t.track).any(|track| {
+                let first_s = track.session_s;
+                let length_s = track.time_s.last().copied().unwrap_or(0.0);
+                let within = start_s > first_s - BESIDE_S && end_s < first_s + length_s + BESIDE_S;
+                within && end_s - start_s <= LONGEST_SHARE * length_s
+            })
+        }
+        TimeKind::Always | TimeKind::EveryRecording => true,
+    }
+}
+
+/// Friction of one direction is at least this share of the other's; what looks more lopsided is friction and an offset.
+const LEAST_SYMMETRY: f64 = 0.2;
+/// Friction that falls with speed keeps at least this share of what it is when a joint breaks away: none falls to nothing.
+const LEAST_SLIDING: f64 = 0.2;
+/// A link's centre of mass is not off by more than this many times its radius of gyration, or by this \[m\] if that is more.
+const MOST_GYRATIONS: f64 = 1.0;
+const FAR_OFF_M: f64 = 0.1;
+
+/// What is behind a gear comes back after a revolution: slower waves are whole numbers of cycles in it, within what is known of them.
+const MOST_WHOLE_CYCLES: f64 = 30.0;
+const NEARLY_WHOLE: f64 = 0.15;
+
+/// Whether a wave over a joint's position does not close after a revolution.
+pub fn is_open_wave(active: &Active) -> bool {
+    let [_, _, cycles] = active.coordinates[..] else {
+        return false;
+    };
+    active.hypothesis.effect.name == "torque_ripple"
+        && cycles < MOST_WHOLE_CYCLES
+        && (cycles - cycles.round()).abs() > NEARLY_WHOLE
+}
+
+/// A wall gives way by no more than this, and is within reach: what is softer or farther is a force that is always there.
+const SOFTEST_WALL_N_PER_M: f64 = 5.0;
+const FARTHEST_WALL_M: f64 = 1.49;
+
+/// A spring hangs loose within the range of its joint or this many times its width beside it: farther off it is a constant effort. Where the
+/// URDF knows no range it is taken to be a turn either way.
+const LOOSE_BESIDE: f64 = 1.0;
+
+fn hangs_loose_near(limits: &Limits, rest: f64) -> bool {
+    let turn = std::f64::consts::TAU;
+    let (lower, upper) = (limits.lower.unwrap_or(-turn), limits.upper.unwrap_or(turn));
+    let beside = LOOSE_BESIDE * (upper - lower);
+    (lower - beside..=upper + beside).contains(&rest)
+}
+
+/// A stronger force is none that pushes a robot \[N\]: it hardly acts on the joints that would feel a weaker one elsewhere.
+const STRONGEST_N: f64 = 1000.0;
+
+/// A rotor on the spring of its gear resonates at least this fast against a link that stands still.
+const SOFTEST_RAD_S: f64 = 3.0 * std::f64::consts::TAU;
+/// A joint breaks away within this: bristles that give more are a spring \[rad or m\].
+const MOST_PRESLIDING_RAD: f64 = 0.1;
+/// Nearer than this to the end of its range, as a share of it, a shape is there.
+const AT_BOUND: f64 = 1e-3;
+
+/// Whether one of the shapes is where its range ends: then the effect may only be a way to say something else.
+pub fn at_bound(active: &Active) -> bool {
+    (0..active.coordinates.len()).any(|c| match active.kind(c) {
+        CoordinateKind::Shape {
+            lower,
+            upper,
+            scale: Scale::Log,
+            ..
+        } => {
+            let share = (active.coordinates[c] / lower).ln() / (upper / lower).ln();
+            !(AT_BOUND..=1.0 - AT_BOUND).contains(&share)
+        }
+        _ => false,
+    })
+}
+
+/// Whether the numbers are ones that a robot may have: a link's mass stays above nothing and within twice what its URDF says,
+/// its centre within the link, a push is not beyond all strength, a wall is neither soft nor out of reach, a spring hangs loose somewhere, a gear is no soft spring nor are its bristles, and friction is neither of one direction
+/// alone nor falls to nothing with speed or warmth.
+pub fn plausible(active: &Active, model: &Model) -> bool {
+    let x = &active.coordinates;
+    let link = &model.links()[active.hypothesis.place.link];
+    match active.hypothesis.effect.name {
+        "link_mass" => x[0].abs() < link.mass_kg(),
+        "link_com" => {
+            let shift_m = active
+                .parameters()
+                .iter()
+                .map(|d| d * d)
+                .sum::<f64>()
+                .sqrt();
+            shift_m < FAR_OFF_M.max(MOST_GYRATIONS * link.gyration_radius_m())
+        }
+        "contact_wall" => x[0] >= SOFTEST_WALL_N_PER_M && x[3].abs() < FARTHEST_WALL_M,
+        "external_push" => x[..3].iter().map(|f| f * f).sum::<f64>().sqrt() < STRONGEST_N,
+        "cable_spring" => {
+            let joint = &model.joints()[active.hypothesis.place.joint];
+            hangs_loose_near(&joint.limits, active.parameters()[1])
+        }
+        "joint_elasticity" => (x[1] / x[0].max(1e-12)).sqrt() >= SOFTEST_RAD_S,
+        "presliding_hysteresis" => x[2] >= 1.0 / MOST_PRESLIDING_RAD,
+        "temperature_viscous" => x[0] >= LEAST_LEFT * (x[0] + x[1]),
+        "stribeck_friction" => x[0] >= LEAST_SLIDING * (x[0] + x[1]),
+        "asymmetric_coulomb" => x[0].min(x[1]) >= LEAST_SYMMETRY * x[0].max(x[1]),
+        _ => true,
+    }
+}
+
+pub const ROTOR: &str = "rotor_inertia";
+
+/// Whether an effect splits a joint in rotor and link: those are costly to try.
+pub fn has_rotor(hypothesis: &Hypothesis) -> bool {
+    matches!(hypothesis.effect.name, "joint_elasticity" | "backlash")
+}
+
+/// Whether an effect is a function of its joint's position alone.
+pub fn is_of_position(hypothesis: Hypothesis) -> bool {
+    matches!(
+        hypothesis.effect.name,
+        "cable_spring" | "counterbalance_spring" | "torque_ripple"
+    )
+}
+
+/// Evidence and size that a piece of physics needs beside what `fit` holds.
+pub fn needs(hypothesis: Hypothesis, fit: &Fit) -> (f64, f64) {
+    let joint = hypothesis.only_joint();
+    let once = time_kind(hypothesis) == TimeKind::Once;
+    let goes_with = |a: &Active| is_plain_friction(hypothesis) && a.is_friction_curve();
+    let curve = |a: &Active| {
+        a.curve.is_some() && (once || a.hypothesis.only_joint() == joint) && !goes_with(a)
+    };
+    let beside_curve = (once || joint.is_some()) && fit.actives.iter().any(curve);
+    let (evidence, size) = if once {
+        (INTERVAL_EVIDENCE, LEAST_SIZE_OF_INTERVAL)
+    } else {
+        (LEAST_EVIDENCE, LEAST_SIZE)
+    };
+    if beside_curve {
+        return (evidence, LEAST_SIZE_BESIDE_CURVE);
+    }
+    (evidence, size)
+}
+
+/// The joint variances that are this many times the white noise are noise alone, or something that nobody has named.
+const QUIET_RATIO: f64 = 1.5;
+const LOUD_RATIO: f64 = 4.0;
+
+/// Whether at some joint the `with` fit leaves less than `without` by a share of what it still leaves: `least`, and up to
+/// `loud` where that is far above the white noise. What cannot be named there could do what a small piece seems to do.
+pub fn matters(problem: &Problem, with: &Fit, without: &Fit, least: f64, loud: f64) -> bool {
+    (0..problem.joints).any(|j| {
+        let ratio = with.variance[j] / (problem.white_noise[j] * problem.white_noise[j]).max(1e-16);
+        let share = ((ratio - QUIET_RATIO) / (LOUD_RATIO - QUIET_RATIO)).clamp(0.0, 1.0);
+        let needed = least.max(least + share * (loud - least));
+        without.variance[j] - with.variance[j] >= needed * with.variance[j]
+    })
+}
+
+/// The joints at which `fit` leaves clearly more than `better`.
+pub fn worse_joints(fit: &Fit, better: &Fit) -> Vec<usize> {
+    let worse = |&j: &usize| fit.variance[j] > (1.0 + LEAST_SIZE) * better.variance[j];
+    (0..fit.variance.len()).filter(worse).collect()
+}
+
+/// How many of one effect there may be at one place.
+pub fn most_at_one_place(hypothesis: Hypothesis) -> usize {
+    match hypothesis.effect.name {
+        "external_push" => 8,
+        "torque_ripple" => 2,
+        _ => 1,
+    }
+}
+
+pub fn describe(explanation: &Explanation) -> String {
+    let one = |active: &Active| {
+        let place = active.hypothesis.place;
+        let values: Vec<String> = active
+            .coordinates
+            .iter()
+            .map(|v| format!("{v:.4}"))
+            .collect();
+        format!(
+            "{}@{}/{}/{} [{}]",
+            active.hypothesis.effect.name,
+            place.joint,
+            place.source,
+            place.link,
+            values.join(", ")
+        )
+    };
+    let all: Vec<String> = explanation.fit.actives.iter().map(one).collect();
+    all.join("; ")
+}
