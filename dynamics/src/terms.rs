@@ -54,14 +54,19 @@ use std::sync::Arc;
 use crate::{Inertia, Model};
 
 pub use concealed::{Chance, Draw, Drawn, Parameters};
+pub use coulomb_friction::EFFECT as COULOMB_FRICTION;
 pub use effect::{
     Compliance, Coordinate, CoordinateKind, Effect, Excitation, Family, Layer, Parameter,
     PlaceKind, Scale, Simpler, Simulated, Time, Traits,
 };
 pub use expansion::Expansion;
+pub use payload::EFFECT as PAYLOAD;
 pub use physics::Physics;
 pub use spec::{TermError, TermSpec};
 pub use table::{Against, EFFECT as UNKNOWN, Table, TableSpec, table};
+pub use torque_bias::EFFECT as TORQUE_BIAS;
+pub use torque_gain::EFFECT as TORQUE_GAIN;
+pub use viscous_friction::EFFECT as VISCOUS_FRICTION;
 pub use words::Words;
 
 /// Every effect there is.

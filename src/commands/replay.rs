@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use anyhow::Context as _;
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
+use tauscope_dynamics::terms::UNKNOWN;
 use tauscope_watch::amount;
 
 use super::print;
@@ -299,7 +300,7 @@ fn rms_table(outcome: &Outcome, rms: &[JointRms]) -> Table {
 
 fn event_line(event: &Event, effort_unit: &str) -> String {
     let mut line = format!("{:8.3} s to {:8.3} s  {}", event.t, event.t_off, event.kind);
-    if let Some(size) = event.size.filter(|_| event.kind != "unknown") {
+    if let Some(size) = event.size.filter(|_| event.kind != UNKNOWN.name) {
         let _ = write!(line, " {}", amount(&event.kind, size, effort_unit));
     }
     if let Some(link) = &event.link {

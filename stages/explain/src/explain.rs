@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use tauscope_dynamics::Model;
-use tauscope_dynamics::terms::{Layer, Site, TermError, TermSpec};
+use tauscope_dynamics::terms::{Layer, Site, TermError, TermSpec, Time};
 
 use crate::physics::active::{Active, Hypothesis};
 mod at_rest;
@@ -21,7 +21,6 @@ use crate::report::findings::{self, Named};
 use crate::report::locate;
 use crate::report::verdict;
 use crate::report::{RecordingPicture, Report, Undetectable, Verdict};
-use crate::select::windows::{TimeKind, time_kind};
 
 /// What is to be explained.
 #[derive(Debug)]
@@ -248,7 +247,7 @@ impl Setup<'_> {
         let mut all = library::hypotheses(&input.model, input.bodies, &input.without);
         // The scale of such a joint is free as it is.
         let unscaled = |joint: usize| self.unscaled.iter().any(|(other, _)| *other == joint);
-        all.retain(|h| h.effect.name != "torque_gain" || !unscaled(h.place.joint));
+        all.retain(|h| !h.effect.traits.is_scale || !unscaled(h.place.joint));
         all
     }
 
@@ -307,7 +306,7 @@ impl Setup<'_> {
             problem.known_friction = start.friction(&self.input.model);
             if self.input.torque_constants_nm_per_a.is_none() {
                 for (known, unit) in problem.known_friction.iter_mut().zip(self.unit_nm) {
-                    *known = known.map(|value| value * unit);
+                    known.values_mut().for_each(|value| *value *= unit);
                 }
             }
         }
@@ -342,13 +341,7 @@ impl Setup<'_> {
     /// A piece of physics as files hold it.
     fn spec(&self, active: &Active) -> TermSpec {
         let model = &self.input.model;
-        let place = active.hypothesis.place;
-        let site = Site {
-            model,
-            joint: place.joint,
-            source: place.source,
-            link: place.link,
-        };
+        let site = active.hypothesis.place.site(model);
         TermSpec::of(&*active.term_for(model), &site)
     }
 
@@ -356,7 +349,7 @@ impl Setup<'_> {
     fn bodies(&self, found: &Fit) -> Vec<TermSpec> {
         let of_bodies = |active: &&Active| {
             let hypothesis = active.hypothesis;
-            let lasts = !matches!(time_kind(hypothesis), TimeKind::Once);
+            let lasts = !matches!(hypothesis.effect.time(), Time::Once);
             hypothesis.effect.layer == Layer::Body && !torque_scale::is_drive(&hypothesis) && lasts
         };
         let bodies = found.actives.iter().filter(of_bodies);
@@ -371,7 +364,7 @@ impl Setup<'_> {
             .as_ref()
             .map_or_else(Vec::new, |start| start.terms.clone());
         for active in &found.actives {
-            if torque_scale::is_drive(&active.hypothesis) || !findings::lasts(active.hypothesis) {
+            if torque_scale::is_drive(&active.hypothesis) || !active.hypothesis.effect.lasts() {
                 continue;
             }
             let term = self.spec(active);

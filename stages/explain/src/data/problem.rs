@@ -1,5 +1,6 @@
 //! The data of a fit: smoothed motion, rigid-body effort and filtered measured effort of the recordings.
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
 use tauscope_dynamics::terms::Expansion;
@@ -54,7 +55,7 @@ pub struct Problem {
     /// Independent samples that a row of noise is worth, by joint.
     pub worth: Vec<f64>,
     /// Coulomb and viscous friction by joint that the twin has already: by so much they may be less.
-    pub known_friction: Vec<[f64; 2]>,
+    pub known_friction: Vec<BTreeMap<&'static str, f64>>,
     /// Columns that were computed before.
     pub cache: Arc<ColumnCache>,
     /// What unit bodies cost.
@@ -99,7 +100,7 @@ impl Problem {
             largest_effort: vec![0.0; n],
             cutoff_hz,
             worth: Vec::new(),
-            known_friction: vec![[0.0; 2]; n],
+            known_friction: vec![BTreeMap::new(); n],
             cache: Arc::default(),
             units: Arc::default(),
             bare: OnceLock::new(),
@@ -172,9 +173,8 @@ impl Problem {
 
     /// The least that a factor of a hypothesis may be: a friction that the twin has already may be less.
     pub fn least(&self, hypothesis: Hypothesis, minimum: f64) -> f64 {
-        friction::plain(hypothesis.effect.name).map_or(minimum, |which| {
-            minimum - self.known_friction[hypothesis.place.joint][which]
-        })
+        let known = &self.known_friction[hypothesis.place.joint];
+        minimum - known.get(hypothesis.effect.name).copied().unwrap_or(0.0)
     }
 
     /// The same where one recording does not count.

@@ -1,6 +1,7 @@
 //! The search where no joint moves: what comes and goes can be told, what lasts cannot.
 
-use tauscope_dynamics::terms::TermError;
+use tauscope_dynamics::terms::words::number;
+use tauscope_dynamics::terms::{TermError, Time};
 
 use crate::data::problem::Problem;
 use crate::data::track::Track;
@@ -14,7 +15,6 @@ use crate::report::sentences;
 use crate::select::evidence::{Explanation, plausible};
 use crate::select::propose::Base;
 use crate::select::search::{Search, bearing};
-use crate::select::windows::{TimeKind, time_kind};
 
 /// What the arm bears at the beginning of a recording is what it bears without anything that comes and goes \[s\].
 const BEGINNING_S: f64 = 1.0;
@@ -199,7 +199,7 @@ impl Setup<'_> {
         let joints: Vec<String> = input.model.joint_names().map(str::to_owned).collect();
         let rests_count = vec![true; joints.len()];
         let mut hypotheses = self.hypotheses();
-        let passes = |h: &Hypothesis| time_kind(*h) == TimeKind::Once;
+        let passes = |h: &Hypothesis| h.effect.time() == Time::Once;
         hypotheses.retain(passes);
         let say = |text: &str| progress(0.1, text);
         let (mut actives, mut undetectable) = (Vec::new(), Vec::new());
@@ -235,9 +235,8 @@ impl Setup<'_> {
              each recording is taken for what it always bears there."
         ));
         if !self.unscaled.is_empty() {
-            let of = |&(j, _): &(usize, f64)| {
-                format!("{} {} N m/A", joints[j], sentences::number(self.unit_nm[j]))
-            };
+            let of =
+                |&(j, _): &(usize, f64)| format!("{} {} N m/A", joints[j], number(self.unit_nm[j]));
             let taken: Vec<String> = self.unscaled.iter().map(of).collect();
             named.notes.push(format!(
                 "Nobody knows the scales of these drives, and forces hang on what they were taken for: {}.",

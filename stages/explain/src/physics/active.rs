@@ -1,8 +1,8 @@
 //! A piece of physics that is part of an explanation: what, where, and its numbers.
 
 use tauscope_dynamics::terms::{
-    Against, Coordinate, CoordinateKind, Effect, Layer, MotionSample, PlaceKind, Site, Table, Term,
-    table,
+    Against, Coordinate, CoordinateKind, Effect, Family, Layer, MotionSample, PlaceKind, Site,
+    Table, Term, table,
 };
 
 use tauscope_dynamics::{Inertia, Model};
@@ -21,11 +21,25 @@ pub struct Whereabouts {
     pub link: usize,
 }
 
+impl Whereabouts {
+    /// The same in a robot.
+    pub fn site(self, model: &Model) -> Site<'_> {
+        let Self {
+            joint,
+            source,
+            link,
+        } = self;
+        Site {
+            model,
+            joint,
+            source,
+            link,
+        }
+    }
+}
+
 /// Inertial parameters of a body.
 pub const BODY: usize = 10;
-
-/// What describes a link's body: a change of all its inertial parameters.
-pub const UNNAMED_BODY: &str = "link_inertia";
 
 /// Slow, but fast enough for a sign.
 const SLOW_RAD_S: f64 = 0.02;
@@ -41,7 +55,7 @@ pub struct Hypothesis {
 
 impl PartialEq for Hypothesis {
     fn eq(&self, other: &Self) -> bool {
-        self.effect.name == other.effect.name && self.place == other.place
+        self.effect == other.effect && self.place == other.place
     }
 }
 
@@ -67,13 +81,7 @@ impl Hypothesis {
         let Some(joint) = self.only_joint() else {
             return false;
         };
-        let Whereabouts { source, link, .. } = self.place;
-        let site = Site {
-            model,
-            joint,
-            source,
-            link,
-        };
+        let site = self.place.site(model);
         let middle = |c: &Coordinate| match c.kind {
             CoordinateKind::Factor { .. } => 1.0,
             CoordinateKind::Shape { lower, upper, .. } => (lower * upper).abs().sqrt(),
@@ -105,7 +113,7 @@ impl Hypothesis {
 
     /// Whether it depends on what the gear transmits.
     pub fn needs_load(&self) -> bool {
-        self.effect.name == "load_dependent_friction"
+        self.effect.traits.needs_load
     }
 
     /// Whether its first ten coordinates are those of a body, see [`Inertia::parameters`].
@@ -113,18 +121,9 @@ impl Hypothesis {
         self.effect.place == PlaceKind::Tool && self.effect.coordinates.len() >= BODY
     }
 
-    /// What it is called in reports: what only describes is `unknown`.
-    pub fn said(&self) -> &'static str {
-        if self.is_unnamed_body() {
-            "unknown"
-        } else {
-            self.effect.name
-        }
-    }
-
     /// Whether it describes a link's body without a name for what is wrong with it.
     pub fn is_unnamed_body(&self) -> bool {
-        self.effect.name == UNNAMED_BODY
+        self.effect.traits.describes_only && self.effect.family == Family::Body
     }
 
     /// Whether all its coordinates are factors.
@@ -162,17 +161,7 @@ impl Active {
 
     /// The term for a robot.
     pub fn term_for(&self, model: &Model) -> Box<dyn Term> {
-        let Whereabouts {
-            joint,
-            source,
-            link,
-        } = self.hypothesis.place;
-        let site = Site {
-            model,
-            joint,
-            source,
-            link,
-        };
+        let site = self.hypothesis.place.site(model);
         let curve = self.curve.as_ref().and_then(|curve| {
             let values = self.values_at_knots(curve);
             table(
@@ -201,7 +190,7 @@ impl Active {
     /// Whether it is a curve over its joint's own velocity: friction, whatever bends it.
     pub fn is_friction_curve(&self) -> bool {
         let curve = self.curve.as_ref();
-        curve.is_some_and(|curve| is_of_friction(curve, self.hypothesis.place.joint))
+        curve.is_some_and(|curve| curve.is_friction_of(self.hypothesis.place.joint))
     }
 
     /// Whether its effort jumps where its joint reverses.
@@ -266,14 +255,10 @@ impl Active {
     }
 }
 
-fn is_of_friction(curve: &Table, joint: usize) -> bool {
-    curve.against == Against::Velocity && curve.of_joint == joint
-}
-
 /// The knots of a curve in a joint that are held at zero. A curve over the joint's own velocity is what Coulomb and viscous
 /// friction leave: these are the straight line between its slowest and its fastest knot in each direction.
 pub fn held_knots(curve: &Table, joint: usize) -> Vec<usize> {
-    if !is_of_friction(curve, joint) {
+    if !curve.is_friction_of(joint) {
         return Vec::new();
     }
     let middle = curve.knots.partition_point(|knot| *knot < 0.0);

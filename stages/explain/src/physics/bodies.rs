@@ -11,7 +11,6 @@ use crate::data::track::FitTrack;
 use crate::physics::active::Active;
 use crate::physics::columns::CACHED_ROWS;
 use crate::physics::efforts::{act_over, silent};
-use crate::select::evidence::has_rotor;
 
 /// An effort by track, row-major, one number per joint and sample \[N m or N\].
 pub type TrackEfforts = Vec<Vec<f64>>;
@@ -42,7 +41,7 @@ pub fn add(problem: &Problem, active: &Active, rigid: &[Vec<f64>], into: &mut [V
     if let Some((unit, factors)) = in_units(problem, &*term) {
         add_units(&units(problem, unit), &factors, into);
     } else {
-        if problem.rows <= CACHED_ROWS && has_rotor(&hypothesis) {
+        if problem.rows <= CACHED_ROWS && hypothesis.effect.splits_joint() {
             term.expand(problem.expansion(hypothesis.place.joint));
         }
         let added = act_over(problem, &mut *term, &silent(rigid), rigid);

@@ -11,7 +11,6 @@ use crate::physics::active::{Active, Column, Hypothesis, Whereabouts};
 use crate::physics::bodies::{self, TrackEfforts};
 use crate::physics::efforts::{Efforts, change, column, recorded_on_top, scale, silent, subtract};
 use crate::physics::parts::feeds;
-use crate::select::evidence::has_rotor;
 
 /// The columns of a hypothesis at some shape.
 #[derive(Debug)]
@@ -201,7 +200,7 @@ fn computed(
     };
     let alone = at(&coordinates);
     let mut factors = Vec::with_capacity(steps.len());
-    if has_rotor(&hypothesis) && others.is_empty() {
+    if hypothesis.effect.splits_joint() && others.is_empty() {
         let own = hypothesis.place.joint;
         let mut values = vec![0.0; alone.values.len()];
         let rotor = &mut values[problem.joint_rows(own)];
@@ -255,7 +254,7 @@ fn bodies_of(problem: &Problem, hypothesis: Hypothesis, shape: &[f64]) -> Arc<Bo
         }
         let alone = at(&coordinates);
         let mut factors = Vec::new();
-        if has_rotor(&hypothesis) {
+        if hypothesis.effect.splits_joint() {
             factors.push(bodies::rotor(problem, hypothesis.place.joint));
         }
         for (i, step) in steps(hypothesis).into_iter().skip(factors.len()) {

@@ -1,6 +1,8 @@
 //! A corrected twin to start from: what is new is told beside what it knows already.
 
-use tauscope_dynamics::terms::{Against, Layer, Physics, TermError, TermSpec};
+use std::collections::BTreeMap;
+
+use tauscope_dynamics::terms::{Against, Effect, Layer, Physics, TermError, TermSpec};
 use tauscope_dynamics::{Data, Model, gravity_effort};
 
 use crate::data::track::Track;
@@ -60,7 +62,8 @@ impl Start {
     pub fn needs_load(&self) -> bool {
         let needs = |term: &TermSpec| {
             let against = term.table.as_ref().map(|table| table.against);
-            term.effect == "load_dependent_friction" || against == Some(Against::Load)
+            let needs = |effect: &Effect| effect.traits.needs_load;
+            term.effect().is_ok_and(needs) || against == Some(Against::Load)
         };
         self.terms.iter().any(needs)
     }
@@ -85,15 +88,13 @@ impl Start {
         dry
     }
 
-    /// Coulomb and viscous friction by joint, in units of its terms: by so much they may have fallen since.
-    pub fn friction(&self, model: &Model) -> Vec<[f64; 2]> {
-        let mut all = vec![[0.0; 2]; model.dof()];
+    /// Coulomb and viscous friction by joint and name, in units of its terms: by so much they may have fallen since.
+    pub fn friction(&self, model: &Model) -> Vec<BTreeMap<&'static str, f64>> {
+        let mut all = vec![BTreeMap::new(); model.dof()];
         for spec in &self.terms {
             let joint = (spec.joint.as_ref()).and_then(|name| model.joint_index(name));
-            if let Some(joint) = joint {
-                for (sum, own) in all[joint].iter_mut().zip(friction::of(spec)) {
-                    *sum += own;
-                }
+            if let (Some(joint), Some((name, own))) = (joint, friction::of(spec)) {
+                *all[joint].entry(name).or_insert(0.0) += own;
             }
         }
         all

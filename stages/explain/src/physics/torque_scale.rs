@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::DVector;
 use tauscope_dynamics::terms::{
-    Coordinate, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind, Simulated,
-    Term, Traits, Words, effect,
+    Coordinate, EFFECTS, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind,
+    Simulated, Term, Traits, Words,
 };
 
 use crate::data::problem::Problem;
@@ -13,10 +13,6 @@ use crate::fit::fitted::Fit;
 use crate::fit::least_squares::{Products, solved};
 use crate::physics::active::{Active, Column, Hypothesis, Whereabouts};
 use crate::physics::columns::columns;
-
-/// How far a link's mass, as a share of it, and its centre of mass, in radii of gyration, may be off in a URDF.
-const MASS_OFF: f64 = 0.1;
-const CENTRE_OFF: f64 = 0.2;
 
 /// Effort of the bodies times 1 + x: not a finding, but a number that every fit needs. Acts after all other
 /// [`Layer::Body`] terms.
@@ -71,7 +67,7 @@ impl Term for DriveGain {
 
 /// Whether a piece of physics is the scale of a drive.
 pub fn is_drive(hypothesis: &Hypothesis) -> bool {
-    hypothesis.effect.name == DRIVE_GAIN.name
+    *hypothesis.effect == DRIVE_GAIN
 }
 
 /// The scales of joints that nobody knows, as they are at first.
@@ -113,13 +109,9 @@ pub fn off_with_the_links(problem: &Problem, fit: &Fit) -> Vec<f64> {
                 ..Whereabouts::default()
             },
         );
-        let sizes = [
-            ("link_mass", MASS_OFF * link.mass_kg()),
-            ("link_com", CENTRE_OFF * link.gyration_radius_m()),
-        ];
-        for (effect, off) in sizes
-            .into_iter()
-            .filter_map(|(n, off)| Some((effect(n)?, off)))
+        for (effect, off) in EFFECTS
+            .iter()
+            .filter_map(|effect| Some((*effect, effect.traits.off_in_urdf?(link))))
         {
             let shape = vec![0.0; effect.coordinates.len()];
             let all = columns(problem, fit, Hypothesis { effect, place }, &shape);

@@ -9,7 +9,7 @@ mod waves;
 use std::collections::BTreeMap;
 
 use serde_json::Value;
-use tauscope_dynamics::terms::PlaceKind;
+use tauscope_dynamics::terms::{PlaceKind, Time};
 
 use crate::explain::Input;
 use crate::fit::fitted::Fit;
@@ -21,7 +21,6 @@ use crate::report::sentences;
 use crate::report::{Finding, NextMotion, Rejected, Rival, Verdict};
 use crate::select::evidence::Explanation;
 use crate::select::search::Search;
-use crate::select::windows::{TimeKind, time_kind};
 
 use contest::contest;
 pub use doubt::doubt_patches;
@@ -60,12 +59,6 @@ impl Named {
     }
 }
 
-/// Whether an effect is part of the arm, not something that came and went.
-pub fn lasts(hypothesis: Hypothesis) -> bool {
-    matches!(time_kind(hypothesis), TimeKind::Always | TimeKind::Step)
-        && hypothesis.effect.name != "contact_wall"
-}
-
 /// The physics in the order in which it acts within its layer: drives last.
 pub fn in_order(actives: &[Active]) -> Vec<&Active> {
     let mut all: Vec<&Active> = actives.iter().collect();
@@ -97,7 +90,7 @@ fn place_of(
 fn rival(input: &Input, joints: &[String], hypothesis: &Hypothesis) -> Rival {
     let (joint, link) = place_of(input, joints, hypothesis);
     Rival {
-        effect: hypothesis.said().to_owned(),
+        effect: hypothesis.effect.said().to_owned(),
         joint,
         link,
     }
@@ -188,7 +181,7 @@ pub fn of(
             named.next_motions.push(next);
         }
         named.findings.push(Finding {
-            effect: active.hypothesis.said().to_owned(),
+            effect: active.hypothesis.effect.said().to_owned(),
             joint,
             link,
             parameters,
@@ -293,17 +286,17 @@ fn when(
     };
     let known = parameters.clone();
     let get = |name: &str| known.get(name).and_then(Value::as_f64);
-    match time_kind(active.hypothesis) {
-        TimeKind::Always => none,
-        TimeKind::Step => {
+    match active.hypothesis.effect.time() {
+        Time::Always => none,
+        Time::Step => {
             none.start = get("change_time_session_s");
             none
         }
-        TimeKind::EveryRecording => {
+        Time::EveryRecording => {
             (none.start, none.end) = (get("t_start_s"), get("t_end_s"));
             none
         }
-        TimeKind::Once => {
+        Time::Once => {
             let (Some(start), Some(end)) = (get("t_start_s"), get("t_end_s")) else {
                 return none;
             };

@@ -1,6 +1,6 @@
 //! What no name fits: a curve beside the names of a joint, or in their place.
 
-use tauscope_dynamics::terms::Against;
+use tauscope_dynamics::terms::{Against, Time};
 
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis};
@@ -8,11 +8,8 @@ use crate::physics::torque_scale::is_drive;
 use crate::select::cross_validation::{carries_over, left_elsewhere};
 use crate::select::curve_shapes;
 use crate::select::propose::Base;
-use crate::select::windows::{TimeKind, time_kind};
 
-use crate::select::evidence::{
-    Explanation, is_of_position, is_open_wave, overwhelming, worse_joints,
-};
+use crate::select::evidence::{Explanation, overwhelming, worse_joints};
 use crate::select::search::{Search, bearing};
 
 /// Evidence that a curve without a name needs \[nats\].
@@ -32,35 +29,20 @@ const LOUD: f64 = 4.0;
 
 /// Whether a curve in the joint says already what a hypothesis would: friction that is not plain, or a function of position. Beside the curve it could take any size that the curve takes back.
 pub fn is_drawn_already(fit: &Fit, hypothesis: Hypothesis) -> bool {
-    let bends = matches!(
-        hypothesis.effect.name,
-        "asymmetric_coulomb"
-            | "friction_step"
-            | "stribeck_friction"
-            | "presliding_hysteresis"
-            | "quadratic_drag"
-    );
+    let drawn_over = hypothesis.effect.traits.drawn_over;
     let joint = hypothesis.only_joint();
     let draws = |active: &Active| {
         active.curve.as_ref().is_some_and(|curve| {
             let own = Some(curve.of_joint) == joint && active.hypothesis.only_joint() == joint;
             let of_position = curve.against == Against::Position && !curve.by_direction;
             own && if of_position {
-                is_of_position(hypothesis)
+                drawn_over == Some(Against::Position)
             } else {
-                bends && active.is_friction_curve()
+                drawn_over == Some(Against::Velocity) && active.is_friction_curve()
             }
         })
     };
     fit.actives.iter().any(draws)
-}
-
-/// Friction that a curve of friction goes with.
-pub fn is_plain_friction(hypothesis: Hypothesis) -> bool {
-    matches!(
-        hypothesis.effect.name,
-        "coulomb_friction" | "viscous_friction"
-    )
 }
 
 impl Search<'_> {
@@ -86,7 +68,10 @@ impl Search<'_> {
             let bare = self.stripped(best, &own, joint);
             let mut instead = self.with_curve(&bare, joint);
             // Friction it is, whatever bends its curve.
-            let shaped = |i: &usize| !is_plain_friction(best.fit.actives[*i].hypothesis);
+            let shaped = |i: &usize| {
+                let hypothesis = best.fit.actives[*i].hypothesis;
+                !hypothesis.effect.is_plain_friction()
+            };
             let shaped: Vec<usize> = own.iter().copied().filter(shaped).collect();
             let plain = self.with_plain_friction(&self.stripped(best, &shaped, joint), joint);
             let bent = self.with_curve(&plain, joint);
@@ -120,7 +105,7 @@ impl Search<'_> {
     /// The explanation with a curve in one joint in the place of all that lasted for an interval, if that does better: what comes
     /// back at a place, or time and again, looks like many pushes. They are evident, so that it need only beat them.
     pub fn described_for_intervals(&self, best: &Explanation) -> Option<Explanation> {
-        let once = |&i: &usize| time_kind(best.fit.actives[i].hypothesis) == TimeKind::Once;
+        let once = |&i: &usize| best.fit.actives[i].hypothesis.effect.time() == Time::Once;
         let intervals: Vec<usize> = (0..best.fit.actives.len()).filter(once).collect();
         if intervals.len() < 2 {
             return None;
@@ -176,7 +161,7 @@ impl Search<'_> {
     fn with_plain_friction(&self, from: &Explanation, joint: usize) -> Explanation {
         let plain = self.hypotheses.iter().filter(|h| {
             let missing = from.fit.actives.iter().all(|a| a.hypothesis != **h);
-            h.place.joint == joint && is_plain_friction(**h) && missing
+            h.place.joint == joint && h.effect.is_plain_friction() && missing
         });
         let add = |from: Explanation, hypothesis: &Hypothesis| {
             let base = Base::new(self.problem, &from.fit, self.hypotheses.len());
@@ -215,14 +200,19 @@ impl Search<'_> {
             };
             let names: Vec<usize> = (0..best.fit.actives.len()).filter(local).collect();
             let of = |i: usize| best.fit.actives[i].hypothesis;
-            let lasting = names.iter().all(|&i| time_kind(of(i)) == TimeKind::Always);
+            let lasting = names.iter().all(|&i| of(i).effect.time() == Time::Always);
             let shaped = names.iter().any(|&i| !of(i).is_linear());
             if !lasting || !shaped {
                 continue;
             }
             let bare = self.stripped(&best, &names, joint);
-            let of_position = names.iter().filter(|&&i| is_of_position(of(i))).count();
-            let open = names.iter().any(|&i| is_open_wave(&best.fit.actives[i]));
+            let is_of_position =
+                |i: &&usize| of(**i).effect.traits.drawn_over == Some(Against::Position);
+            let of_position = names.iter().filter(is_of_position).count();
+            let open = names.iter().any(|&i| {
+                let made = of(i).effect.traits.is_made_by_gears;
+                !made(&best.fit.actives[i].coordinates)
+            });
             if (of_position > MOST_OF_POSITION || open)
                 && let Some(curve) = self.with_curve(&bare, joint)
             {

@@ -1,16 +1,13 @@
 //! What counts as evidence for a piece of physics, and how much of it is asked for.
 
 use nalgebra::{DMatrix, DVector};
-use tauscope_dynamics::terms::{CoordinateKind, Scale};
+use tauscope_dynamics::terms::{CoordinateKind, Scale, Time};
 use tauscope_dynamics::{Limits, Model};
 
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::fit::least_squares::Products;
 use crate::physics::active::{Active, Column, Hypothesis};
-use crate::select::windows::{TimeKind, time_kind};
-
-use crate::select::curves::is_plain_friction;
 
 /// Evidence that a piece of physics needs \[nats\].
 pub const LEAST_EVIDENCE: f64 = 8.0;
@@ -38,8 +35,6 @@ pub const REFINED: usize = 3;
 pub const LEAST_GAIN: f64 = 0.5;
 /// What began or ended so much beside a recording began or ended with it \[s\].
 const BESIDE_S: f64 = 0.5;
-/// A change of friction smaller than this share of it is what friction does from day to day.
-const LEAST_STEP: f64 = 0.3;
 
 /// A fit and the evidence for it, all penalties counted.
 #[derive(Debug, Clone)]
@@ -73,7 +68,7 @@ pub fn overwhelming(explanation: &Explanation, other: &Explanation) -> bool {
     };
     let share = if more(&|a| a.curve.is_some()) {
         FAIR_SHARE_OF_CURVE
-    } else if more(&|a| time_kind(a.hypothesis) == TimeKind::Once) {
+    } else if more(&|a| a.hypothesis.effect.time() == Time::Once) {
         FAIR_SHARE_FOR_A_WHILE
     } else {
         FAIR_SHARE
@@ -127,22 +122,14 @@ pub fn wald(problem: &Problem, fit: &Fit) -> Vec<f64> {
         .collect()
 }
 
-/// Friction that changes, once or as the joint warms up, leaves at least this share of what it was: none comes from nothing or
-/// goes for good.
-const LEAST_LEFT: f64 = 0.1;
 /// What lasts for an interval of one recording lasts at most for this share of it; what lasts longer is not told from an offset.
 const LONGEST_SHARE: f64 = 0.75;
 
-/// Whether the times of a piece of physics are ones that tell something: friction that changes once changes by more than friction
-/// does from day to day and does not vanish, and what comes and goes does both within a recording.
+/// Whether the times of a piece of physics are ones that tell something: what comes and goes does both within a recording.
 pub fn is_timely(problem: &Problem, active: &Active) -> bool {
     let x = &active.coordinates;
-    match time_kind(active.hypothesis) {
-        TimeKind::Step => {
-            let (less, more) = (x[0].min(x[1]), x[0].max(x[1]));
-            more - less > LEAST_STEP * more && less >= LEAST_LEFT * more
-        }
-        TimeKind::Once => {
+    match active.hypothesis.effect.time() {
+        Time::Once => {
             let [.., start_s, end_s] = x[..] else {
                 return true;
             };
@@ -153,54 +140,10 @@ pub fn is_timely(problem: &Problem, active: &Active) -> bool {
                 within && end_s - start_s <= LONGEST_SHARE * length_s
             })
         }
-        TimeKind::Always | TimeKind::EveryRecording => true,
+        Time::Always | Time::Step | Time::EveryRecording => true,
     }
 }
 
-/// Friction of one direction is at least this share of the other's; what looks more lopsided is friction and an offset.
-const LEAST_SYMMETRY: f64 = 0.2;
-/// Friction that falls with speed keeps at least this share of what it is when a joint breaks away: none falls to nothing.
-const LEAST_SLIDING: f64 = 0.2;
-/// A link's centre of mass is not off by more than this many times its radius of gyration, or by this \[m\] if that is more.
-const MOST_GYRATIONS: f64 = 1.0;
-const FAR_OFF_M: f64 = 0.1;
-
-/// What is behind a gear comes back after a revolution: slower waves are whole numbers of cycles in it, within what is known of them.
-const MOST_WHOLE_CYCLES: f64 = 30.0;
-const NEARLY_WHOLE: f64 = 0.15;
-
-/// Whether a wave over a joint's position does not close after a revolution.
-pub fn is_open_wave(active: &Active) -> bool {
-    let [_, _, cycles] = active.coordinates[..] else {
-        return false;
-    };
-    active.hypothesis.effect.name == "torque_ripple"
-        && cycles < MOST_WHOLE_CYCLES
-        && (cycles - cycles.round()).abs() > NEARLY_WHOLE
-}
-
-/// A wall gives way by no more than this, and is within reach: what is softer or farther is a force that is always there.
-const SOFTEST_WALL_N_PER_M: f64 = 5.0;
-const FARTHEST_WALL_M: f64 = 1.49;
-
-/// A spring hangs loose within the range of its joint or this many times its width beside it: farther off it is a constant effort. Where the
-/// URDF knows no range it is taken to be a turn either way.
-const LOOSE_BESIDE: f64 = 1.0;
-
-fn hangs_loose_near(limits: &Limits, rest: f64) -> bool {
-    let turn = std::f64::consts::TAU;
-    let (lower, upper) = (limits.lower.unwrap_or(-turn), limits.upper.unwrap_or(turn));
-    let beside = LOOSE_BESIDE * (upper - lower);
-    (lower - beside..=upper + beside).contains(&rest)
-}
-
-/// A stronger force is none that pushes a robot \[N\]: it hardly acts on the joints that would feel a weaker one elsewhere.
-const STRONGEST_N: f64 = 1000.0;
-
-/// A rotor on the spring of its gear resonates at least this fast against a link that stands still.
-const SOFTEST_RAD_S: f64 = 3.0 * std::f64::consts::TAU;
-/// A joint breaks away within this: bristles that give more are a spring \[rad or m\].
-const MOST_PRESLIDING_RAD: f64 = 0.1;
 /// Nearer than this to the end of its range, as a share of it, a shape is there.
 const AT_BOUND: f64 = 1e-3;
 
@@ -220,58 +163,18 @@ pub fn at_bound(active: &Active) -> bool {
     })
 }
 
-/// Whether the numbers are ones that a robot may have: a link's mass stays above nothing and within twice what its URDF says,
-/// its centre within the link, a push is not beyond all strength, a wall is neither soft nor out of reach, a spring hangs loose somewhere, a gear is no soft spring nor are its bristles, and friction is neither of one direction
-/// alone nor falls to nothing with speed or warmth.
+/// Whether the numbers are ones that a robot may have.
 pub fn plausible(active: &Active, model: &Model) -> bool {
-    let x = &active.coordinates;
-    let link = &model.links()[active.hypothesis.place.link];
-    match active.hypothesis.effect.name {
-        "link_mass" => x[0].abs() < link.mass_kg(),
-        "link_com" => {
-            let shift_m = active
-                .parameters()
-                .iter()
-                .map(|d| d * d)
-                .sum::<f64>()
-                .sqrt();
-            shift_m < FAR_OFF_M.max(MOST_GYRATIONS * link.gyration_radius_m())
-        }
-        "contact_wall" => x[0] >= SOFTEST_WALL_N_PER_M && x[3].abs() < FARTHEST_WALL_M,
-        "external_push" => x[..3].iter().map(|f| f * f).sum::<f64>().sqrt() < STRONGEST_N,
-        "cable_spring" => {
-            let joint = &model.joints()[active.hypothesis.place.joint];
-            hangs_loose_near(&joint.limits, active.parameters()[1])
-        }
-        "joint_elasticity" => (x[1] / x[0].max(1e-12)).sqrt() >= SOFTEST_RAD_S,
-        "presliding_hysteresis" => x[2] >= 1.0 / MOST_PRESLIDING_RAD,
-        "temperature_viscous" => x[0] >= LEAST_LEFT * (x[0] + x[1]),
-        "stribeck_friction" => x[0] >= LEAST_SLIDING * (x[0] + x[1]),
-        "asymmetric_coulomb" => x[0].min(x[1]) >= LEAST_SYMMETRY * x[0].max(x[1]),
-        _ => true,
-    }
-}
-
-pub const ROTOR: &str = "rotor_inertia";
-
-/// Whether an effect splits a joint in rotor and link: those are costly to try.
-pub fn has_rotor(hypothesis: &Hypothesis) -> bool {
-    matches!(hypothesis.effect.name, "joint_elasticity" | "backlash")
-}
-
-/// Whether an effect is a function of its joint's position alone.
-pub fn is_of_position(hypothesis: Hypothesis) -> bool {
-    matches!(
-        hypothesis.effect.name,
-        "cable_spring" | "counterbalance_spring" | "torque_ripple"
-    )
+    let hypothesis = active.hypothesis;
+    let site = hypothesis.place.site(model);
+    hypothesis.effect.is_plausible(&site, &active.coordinates)
 }
 
 /// Evidence and size that a piece of physics needs beside what `fit` holds.
 pub fn needs(hypothesis: Hypothesis, fit: &Fit) -> (f64, f64) {
     let joint = hypothesis.only_joint();
-    let once = time_kind(hypothesis) == TimeKind::Once;
-    let goes_with = |a: &Active| is_plain_friction(hypothesis) && a.is_friction_curve();
+    let once = hypothesis.effect.time() == Time::Once;
+    let goes_with = |a: &Active| hypothesis.effect.is_plain_friction() && a.is_friction_curve();
     let curve = |a: &Active| {
         a.curve.is_some() && (once || a.hypothesis.only_joint() == joint) && !goes_with(a)
     };
@@ -306,15 +209,6 @@ pub fn matters(problem: &Problem, with: &Fit, without: &Fit, least: f64, loud: f
 pub fn worse_joints(fit: &Fit, better: &Fit) -> Vec<usize> {
     let worse = |&j: &usize| fit.variance[j] > (1.0 + LEAST_SIZE) * better.variance[j];
     (0..fit.variance.len()).filter(worse).collect()
-}
-
-/// How many of one effect there may be at one place.
-pub fn most_at_one_place(hypothesis: Hypothesis) -> usize {
-    match hypothesis.effect.name {
-        "external_push" => 8,
-        "torque_ripple" => 2,
-        _ => 1,
-    }
 }
 
 pub fn describe(explanation: &Explanation) -> String {

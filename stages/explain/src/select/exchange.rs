@@ -5,7 +5,7 @@ use crate::physics::torque_scale::is_drive;
 use crate::select::evidence::{Explanation, LEAST_GAIN, describe};
 use crate::select::propose::{Base, Proposal};
 use crate::select::search::Search;
-use crate::select::windows::{TimeKind, time_kind};
+use tauscope_dynamics::terms::Time;
 
 /// A rival may gain this much less to first order than what it is to replace.
 const COULD_DO_BETTER: f64 = 0.85;
@@ -44,7 +44,7 @@ impl Search<'_> {
             }
         }
         // Several pushes may be one wall.
-        let once = |&i: &usize| time_kind(best.fit.actives[i].hypothesis) == TimeKind::Once;
+        let once = |&i: &usize| best.fit.actives[i].hypothesis.effect.time() == Time::Once;
         let pushes: Vec<usize> = (0..best.fit.actives.len()).filter(once).collect();
         if pushes.len() > 1 {
             let less = |from: Explanation, index: &usize| self.less(&from, *index);
@@ -82,7 +82,7 @@ impl Search<'_> {
     /// The better explanation that a wall makes in the place of all pushes, if it does: where it is, only a search tells, so that what
     /// it gains at first is no measure.
     fn walled(&self, best: &Explanation, without: &Explanation) -> Option<Explanation> {
-        let wall = |h: &&Hypothesis| h.effect.name == "contact_wall";
+        let wall = |h: &&Hypothesis| h.effect.is_surface();
         let hypothesis = self.hypotheses.iter().find(wall)?;
         let base = Base::new(self.problem, &without.fit, self.hypotheses.len());
         let proposal = base.propose_in_time(*hypothesis)?;

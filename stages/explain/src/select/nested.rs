@@ -1,7 +1,5 @@
 //! Effects that contain a simpler one, which is said unless the other is much likelier.
 
-use tauscope_dynamics::terms::effect;
-
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis};
 use crate::select::propose::penalty;
@@ -10,16 +8,6 @@ use crate::select::evidence::{Explanation, LEAST_EVIDENCE, at_bound, describe, o
 use crate::select::exchange;
 use crate::select::search::Search;
 
-/// Effects that contain a simpler one, whose only number is their first.
-const SIMPLER: [(&str, &str); 7] = [
-    ("friction_step", "coulomb_friction"),
-    ("stribeck_friction", "coulomb_friction"),
-    ("asymmetric_coulomb", "coulomb_friction"),
-    ("presliding_hysteresis", "coulomb_friction"),
-    ("temperature_viscous", "viscous_friction"),
-    ("joint_elasticity", "rotor_inertia"),
-    ("backlash", "rotor_inertia"),
-];
 /// What contains a simpler effect must be ahead of it by this \[nats\], odds of twenty to one.
 pub const MORE_THAN_SIMPLE: f64 = 3.0;
 
@@ -62,11 +50,8 @@ impl Search<'_> {
             coordinates,
             ..
         } = &best.fit.actives[index];
-        let (_, name) = SIMPLER
-            .iter()
-            .find(|(of, _)| *of == hypothesis.effect.name)?;
         let simple = Hypothesis {
-            effect: effect(name)?,
+            effect: hypothesis.effect.simpler?.effect,
             place: hypothesis.place,
         };
         let there = |a: &Active| a.hypothesis == simple;

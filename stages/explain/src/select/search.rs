@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 
 use tauscope_dynamics::Model;
-use tauscope_dynamics::terms::Layer;
+use tauscope_dynamics::terms::{Layer, Time};
 
 use crate::data::effective_samples;
 use crate::data::problem::Problem;
@@ -16,12 +16,11 @@ use crate::physics::torque_scale::is_drive;
 use crate::select::cross_validation::carries_over;
 use crate::select::parallel;
 use crate::select::propose::{Base, Proposal};
-use crate::select::windows::{TimeKind, time_kind};
 
 use crate::select::curves::{CURVE_EVIDENCE, CURVE_SIZE, is_drawn_already};
 use crate::select::evidence::{
-    Explanation, LEAST_EVIDENCE, LEAST_GAIN, LEAST_SIZE, REFINED, ROTOR, describe, has_rotor,
-    is_timely, matters, most_at_one_place, needs, overwhelming, plausible, tie, wald, worse_joints,
+    Explanation, LEAST_EVIDENCE, LEAST_GAIN, LEAST_SIZE, REFINED, describe, is_timely, matters,
+    needs, overwhelming, plausible, tie, wald, worse_joints,
 };
 use crate::select::nested::MORE_THAN_SIMPLE;
 
@@ -113,7 +112,7 @@ impl Search<'_> {
             let names: Vec<usize> = (0..best.fit.actives.len())
                 .filter(|&i| {
                     let active = &best.fit.actives[i];
-                    let once = time_kind(active.hypothesis) == TimeKind::Once;
+                    let once = active.hypothesis.effect.time() == Time::Once;
                     !active.is_unnamed() && !once && !is_drive(&active.hypothesis)
                 })
                 .collect();
@@ -150,7 +149,7 @@ impl Search<'_> {
         let worse = worse_joints(without, best);
         let own = active.hypothesis.only_joint();
         let friction = active.is_set_valued(&self.problem.model)
-            || active.hypothesis.effect.name == "viscous_friction";
+            || active.hypothesis.effect.is_plain_friction();
         self.proposals_for(without, |h| match h.only_joint() {
             Some(joint) => worse.contains(&joint),
             None => !(friction && own.is_some()),
@@ -165,16 +164,20 @@ impl Search<'_> {
             .filter(|h| touches(h) && self.is_worth_a_try(fit, **h))
             .copied()
             .collect();
-        // An elastic joint or one with play has a rotor: where a rotor's inertia is no help, they are not tried.
-        let rotor = |joint: usize| {
-            let is = |h: &&Hypothesis| h.effect.name == ROTOR && h.place.joint == joint;
+        // A joint split in rotor and link is costly to try: where the rotor alone is no help, it is not.
+        let simpler_helps = |split: &Hypothesis| {
+            let Some(simpler) = split.effect.simpler else {
+                return true;
+            };
+            let is =
+                |h: &&Hypothesis| h.effect == simpler.effect && h.place.joint == split.place.joint;
             let hypothesis = self.hypotheses.iter().find(is);
             hypothesis.is_none_or(|h| base.propose(*h).is_some_and(|p| p.gain > LEAST_EVIDENCE))
                 || fit.actives.iter().any(|a| is(&&a.hypothesis))
         };
         let wanted: Vec<Hypothesis> = wanted
             .into_iter()
-            .filter(|h| !has_rotor(h) || rotor(h.place.joint))
+            .filter(|h| !h.effect.splits_joint() || simpler_helps(h))
             .collect();
         let mut all: Vec<Proposal> = parallel::map(&wanted, |h| base.propose_in_time(*h))
             .into_iter()
@@ -195,7 +198,7 @@ impl Search<'_> {
             .iter()
             .filter(|active| active.hypothesis == hypothesis)
             .count();
-        if same >= most_at_one_place(hypothesis) || is_drawn_already(fit, hypothesis) {
+        if same >= hypothesis.effect.traits.most_at_one_place || is_drawn_already(fit, hypothesis) {
             return false;
         }
         let excess = |j: usize| {
@@ -233,7 +236,7 @@ impl Search<'_> {
             (self.say)(&format!("+ {}", describe(&next)));
             let new = next.fit.actives.last().map(|active| active.hypothesis);
             let next = self.pruned(next);
-            let once = new.is_some_and(|new| time_kind(new) == TimeKind::Once);
+            let once = new.is_some_and(|new| new.effect.time() == Time::Once);
             // What lasts for a while makes noise look correlated as long as it is not explained.
             let worth = if once {
                 effective_samples::at_least(self.problem, &next.fit)
@@ -286,7 +289,7 @@ impl Search<'_> {
         for (next, &proposal) in joined.into_iter().zip(worthy) {
             let (evidence, _) = needs(proposal.active.hypothesis, &now.fit);
             let evident = next.ahead_of(now, worth) >= evidence || overwhelming(&next, now);
-            let once = time_kind(proposal.active.hypothesis) == TimeKind::Once;
+            let once = proposal.active.hypothesis.effect.time() == Time::Once;
             if evident && (once || matters(self.problem, &next.fit, &now.fit, 0.0, LOUD_SIZE)) {
                 able.push((next, proposal));
             }

@@ -2,7 +2,6 @@
 
 use crate::fit::fitted::Fit;
 use crate::physics::active::Active;
-use crate::select::windows::{TimeKind, time_kind};
 
 use crate::select::evidence::{Explanation, TIE, describe};
 use crate::select::search::Search;
@@ -41,7 +40,7 @@ impl Search<'_> {
 
 /// The two pushes that a long one makes with one on the same link that undoes it for a while within.
 fn two(long: &Active, pause: &Active) -> Option<(Active, Active)> {
-    let once = time_kind(long.hypothesis) == TimeKind::Once;
+    let once = long.hypothesis.effect.time() == Time::Once;
     let ([x, y, z, start, end], [u, v, w, from, to]) = (
         long.coordinates[..].try_into().ok()?,
         pause.coordinates[..].try_into().ok()?,
@@ -63,7 +62,7 @@ fn two(long: &Active, pause: &Active) -> Option<(Active, Active)> {
 
 #[cfg(test)]
 mod tests {
-    use tauscope_dynamics::terms::effect;
+    use tauscope_dynamics::terms::{Time, effect};
 
     use super::*;
     use crate::physics::active::{Hypothesis, Whereabouts};

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use tauscope_dynamics::terms::CoordinateKind;
+use tauscope_dynamics::terms::{CoordinateKind, Time};
 
 use crate::physics::active::{Column, Hypothesis};
 use crate::physics::columns::columns;
@@ -21,47 +21,15 @@ const STEPS: usize = 100;
 /// Factors beyond these are left out of the scan: inertias hardly show in it.
 const SCANNED_FACTORS: usize = 4;
 
-/// What kind of time an effect has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TimeKind {
-    /// None.
-    Always,
-    /// It changes once in a session.
-    Step,
-    /// It lasts for an interval of every recording.
-    EveryRecording,
-    /// It lasts for an interval of the session.
-    Once,
-}
-
-/// The kind of time of a hypothesis.
-pub fn time_kind(hypothesis: Hypothesis) -> TimeKind {
-    let count = |kind: CoordinateKind| {
-        let all = hypothesis.effect.coordinates.iter();
-        all.filter(|c| c.kind == kind).count()
-    };
-    match (
-        count(CoordinateKind::RecordingTime),
-        count(CoordinateKind::SessionTime),
-    ) {
-        (0, 0) => TimeKind::Always,
-        (0, 1) => TimeKind::Step,
-        (_, 0) => TimeKind::EveryRecording,
-        _ => TimeKind::Once,
-    }
-}
-
 impl Base<'_> {
     /// The best of a hypothesis whose effect has a time.
     pub fn propose_in_time(&self, hypothesis: Hypothesis) -> Option<Proposal> {
-        match time_kind(hypothesis) {
-            TimeKind::Always if hypothesis.effect.name == "contact_wall" => {
-                self.propose_wall(hypothesis)
-            }
-            TimeKind::Always => self.propose(hypothesis),
-            TimeKind::Step => self.propose_step(hypothesis),
-            TimeKind::EveryRecording => self.propose_interval(hypothesis, None),
-            TimeKind::Once => (0..self.problem.tracks.len())
+        match hypothesis.effect.time() {
+            Time::Always if hypothesis.effect.is_surface() => self.propose_wall(hypothesis),
+            Time::Always => self.propose(hypothesis),
+            Time::Step => self.propose_step(hypothesis),
+            Time::EveryRecording => self.propose_interval(hypothesis, None),
+            Time::Once => (0..self.problem.tracks.len())
                 .filter_map(|track| self.propose_interval(hypothesis, Some(track)))
                 .max_by(|a, b| a.evidence().total_cmp(&b.evidence())),
         }

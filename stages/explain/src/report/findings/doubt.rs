@@ -3,14 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use tauscope_dynamics::Model;
-use tauscope_dynamics::terms::{Against, PlaceKind};
+use tauscope_dynamics::terms::{Against, PlaceKind, Time};
 
 use crate::data::problem::Problem;
 use crate::physics::active::{Active, Hypothesis};
 use crate::physics::torque_scale::is_drive;
 use crate::report::Finding;
 use crate::select::search::bearing;
-use crate::select::windows::{TimeKind, time_kind};
 
 use super::Named;
 
@@ -48,8 +47,8 @@ pub fn doubt_patches(findings: &mut [Finding]) {
 /// Whether a body, or how gravity acts on it, is named beside a curve that a joint which carries it has without a name: what weighs
 /// there weighs here too, and the name could be part of it.
 fn is_shadowed(model: &Model, actives: &[Active], hypothesis: Hypothesis) -> bool {
-    let lasts =
-        time_kind(hypothesis) == TimeKind::Always && hypothesis.effect.name != "contact_wall";
+    let effect = hypothesis.effect;
+    let lasts = effect.time() == Time::Always && effect.lasts();
     let carriers = match hypothesis.effect.place {
         PlaceKind::Link | PlaceKind::Tool if lasts => bearing(model, hypothesis.place.link),
         PlaceKind::Base => (0..model.dof()).collect(),
