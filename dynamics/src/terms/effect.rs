@@ -219,6 +219,8 @@ pub struct Traits {
     pub is_fast: bool,
     /// A term of [`Layer::Record`] that only adds.
     pub only_adds: bool,
+    /// It cuts the effort off at a limit, of a sensor or of a drive: a finding says of which.
+    pub cuts_off: bool,
     /// It multiplies all effort of a joint: where nobody knows the joint's scale, it says nothing.
     pub is_scale: bool,
     /// It describes what has no name.
@@ -240,6 +242,7 @@ impl Traits {
         needs_load: false,
         is_fast: false,
         only_adds: false,
+        cuts_off: false,
         is_scale: false,
         describes_only: false,
         is_made_by_gears: |_| true,

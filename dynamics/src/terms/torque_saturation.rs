@@ -32,7 +32,10 @@ pub(super) static EFFECT: Effect = Effect {
             vec![("limit_nm", largest * (1.0 - cut))]
         })
     }),
-    traits: Traits::NONE,
+    traits: Traits {
+        cuts_off: true,
+        ..Traits::NONE
+    },
     build: |site, values| {
         Box::new(TorqueSaturation {
             joint: site.joint,

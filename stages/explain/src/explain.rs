@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use tauscope_dynamics::Model;
-use tauscope_dynamics::terms::{Layer, Site, TermError, TermSpec, Time};
+use tauscope_dynamics::terms::{Layer, TermError, TermSpec, Time};
 
 use crate::physics::active::{Active, Hypothesis};
 mod at_rest;

@@ -13,7 +13,6 @@ use crate::physics::active::Hypothesis;
 use crate::physics::bodies::UnitCosts;
 use crate::physics::columns::ColumnCache;
 use crate::physics::efforts::Efforts;
-use crate::physics::friction;
 use crate::read::recording::Recording;
 
 /// What is compared lies below this frequency, unless the recordings are too slow for it \[Hz\].

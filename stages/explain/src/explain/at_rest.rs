@@ -11,7 +11,6 @@ use crate::physics::active::Hypothesis;
 use crate::read::audit;
 use crate::read::recording::Recording;
 use crate::report::findings;
-use crate::report::sentences;
 use crate::select::evidence::{Explanation, plausible};
 use crate::select::propose::Base;
 use crate::select::search::{Search, bearing};

@@ -1,8 +1,8 @@
 //! What counts as evidence for a piece of physics, and how much of it is asked for.
 
 use nalgebra::{DMatrix, DVector};
+use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::{CoordinateKind, Scale, Time};
-use tauscope_dynamics::{Limits, Model};
 
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;

@@ -1,5 +1,7 @@
 //! A push that pauses is two.
 
+use tauscope_dynamics::terms::Time;
+
 use crate::fit::fitted::Fit;
 use crate::physics::active::Active;
 
@@ -62,7 +64,7 @@ fn two(long: &Active, pause: &Active) -> Option<(Active, Active)> {
 
 #[cfg(test)]
 mod tests {
-    use tauscope_dynamics::terms::{Time, effect};
+    use tauscope_dynamics::terms::effect;
 
     use super::*;
     use crate::physics::active::{Hypothesis, Whereabouts};
