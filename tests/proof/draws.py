@@ -3,6 +3,7 @@ import dataclasses
 
 import numpy as np
 
+import off_list
 import truth
 from effects import active
 
@@ -184,6 +185,8 @@ def shape(name, c, rng, j):
 
 def unknown_shape(kind, c, rng, j):
     """The same for something off the list."""
+    if kind in off_list.KINDS:
+        return off_list.shape(kind, c, rng, j)
     u = lambda a, b: float(rng.uniform(a, b))
     q, joint = np.concatenate([m.q[:, j] for m in c.fit_motions]), {"joint": c.robot.names[j]}
     low, wide = float(q.min()), float(np.ptp(q))
@@ -263,8 +266,18 @@ def whole_arm(n, rng):
     return out + together(more, int(rng.integers(0, 3)), rng)
 
 
+def bodies_off(c, rng):
+    """All bodies a little off what the URDF says, as those of real arms are: masses by 5 %, centres by 5 mm, inertias by 10 %."""
+    heavy = [link.name for link in c.robot.links.values() if link.body >= 0 and link.inertial is not None and link.inertial.mass > 0]
+    by = lambda: {"mass": float(np.exp(rng.normal(0., 0.05))), "com_m": rng.normal(0., 0.005, 3).tolist(),
+                  "inertia": float(np.exp(rng.normal(0., 0.1)))}
+    return {"effect": "bodies_off", "link": heavy[0], "parameters": {link: by() for link in heavy}}
+
+
 def draw(name, c, rng, target, taken=()):
     """One effect of this name, or None where the robot's motion cannot show it. On a joint of its own it asks nobody: `name@joint`."""
+    if name == "bodies_off":
+        return bodies_off(c, rng)
     name, _, at = name.partition("@")
     kind = name.split(":")[1] if name.startswith("unknown:") else None
     target = max(target * (1. if kind else SHARE.get(name, 1.)), 1.5)

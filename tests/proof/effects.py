@@ -5,6 +5,8 @@ The joint torques below take `math` or `numpy` as `m`, so that the plant and its
 """
 import numpy as np
 
+import off_list
+
 SMOOTHING = 0.002  # rad/s (m/s): half width of the sign function
 
 
@@ -58,6 +60,7 @@ FRICTION = {
     "unknown:square_root_friction": lambda p, m, q, v, **_: -p["root_nm"] * m.sqrt(abs(v)) * sgn(m, v),
     # The other joint's load on a common bearing: friction here grows with the speed there.
     "unknown:cross_joint_friction": lambda p, m, q, v, other, **_: -p["coefficient_nms_per_rad"] * abs(other) * sgn(m, v),
+    **off_list.FRICTION,
 }
 # Torques of position or time alone.
 FIELD = {
@@ -67,8 +70,9 @@ FIELD = {
     "unknown:torque_bump": _bump,
     "unknown:periodic_disturbance": lambda p, m, q, v, session, **_: p["amplitude_nm"] * m.sin(
         2 * np.pi * p["frequency_hz"] * session + p["phase_rad"]),
+    **off_list.FIELD,
 }
-BODY = ("payload", "payload_pickup", "link_mass", "link_com", "base_tilt")
+BODY = ("payload", "payload_pickup", "link_mass", "link_com", "base_tilt", "bodies_off")
 TWO_MASS = ("joint_elasticity", "backlash")
 WRENCH = ("external_push", "contact_wall")
 # In the order in which they act on the record.
@@ -107,6 +111,9 @@ def changes(robot, effect):
         own = robot.links[effect["link"]].inertial
         com = own.com + np.array([p.get(f"delta_com_{a}_m", 0.) for a in "xyz"])
         return {"changed": {effect["link"]: Inertial(own.mass + p.get("delta_mass_kg", 0.), com, own.about_com)}}
+    if name == "bodies_off":
+        off = lambda own, by: Inertial(own.mass * by["mass"], own.com + np.array(by["com_m"]), own.about_com * by["inertia"])
+        return {"changed": {link: off(robot.links[link].inertial, by) for link, by in p.items()}}
     if name == "base_tilt":
         return {"tilt": (p["roll_rad"], p["pitch_rad"])}
     if name == "rotor_inertia":

@@ -4,5 +4,7 @@ pub mod body_prior;
 pub mod body_step;
 pub mod fitted;
 pub mod interval;
+pub mod jacobian;
 pub mod least_squares;
 pub mod refine;
+pub mod urdf_uncertainty;

@@ -4,7 +4,6 @@ use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::{MotionSample, sign};
 
 use crate::data::problem::Problem;
-use crate::fit::fitted::Fit;
 
 /// Rows of a stretch whose correlation is told by itself.
 const STRETCH_ROWS: usize = 20;
@@ -31,13 +30,13 @@ pub fn worth(problem: &Problem) -> Vec<f64> {
         .collect()
 }
 
-/// The same, or what a fit leaves if that is whiter: the noise is no more correlated than that.
-pub fn at_least(problem: &Problem, fit: &Fit) -> Vec<f64> {
+/// The same, or what `residual` a fit leaves if that is whiter: the noise is no more correlated than that.
+pub fn at_least(problem: &Problem, residual: &[f64]) -> Vec<f64> {
     let of_joint = |(joint, known): (usize, &f64)| {
         known.max(of_left(
             problem,
             joint,
-            &fit.residual[problem.joint_rows(joint)],
+            &residual[problem.joint_rows(joint)],
         ))
     };
     problem.worth.iter().enumerate().map(of_joint).collect()

@@ -5,7 +5,7 @@
 
 use nalgebra::Vector3;
 
-use crate::data::problem::white_variance;
+use crate::data::noise::white_variance;
 use crate::data::smoother::MotionSmoother;
 
 /// A joint stands while it creeps slower than this \[rad/s\].

@@ -17,6 +17,9 @@ const REVERSAL_PERIODS: f64 = 0.4;
 /// A joint that moves in less than this share of the time is judged at rest, too.
 const LEAST_MOVING_SHARE: f64 = 0.2;
 
+/// What the arm bears at the beginning of a recording is what it bears without anything that comes and goes \[s\].
+pub const BEGINNING_S: f64 = 1.0;
+
 /// One recording as a fit sees it. Matrices are row-major: one number per joint and sample.
 #[derive(Debug, Clone)]
 pub struct Track {
@@ -109,6 +112,26 @@ impl Track {
             standstill::resmooth(&recording.time_s, &measured, &mut states);
             for (velocity, state) in self.velocity.iter_mut().skip(j).step_by(n).zip(&states) {
                 *velocity = state.y;
+            }
+        }
+    }
+
+    /// Shifts what the twin says of an arm at rest so that it begins with what is measured: load, friction and offset cannot be told
+    /// apart there.
+    pub fn start_at_measured(&mut self, recording: &Recording, unit_nm: &[f64]) {
+        let n = unit_nm.len();
+        let samples = self.time_s.partition_point(|t| *t < BEGINNING_S);
+        if recording.effort.is_empty() || samples == 0 {
+            return;
+        }
+        for (j, unit) in unit_nm.iter().enumerate() {
+            let off = |k: usize| {
+                let at = k * n + j;
+                (recording.effort[at] - self.beside[at]) * unit - self.rigid[at]
+            };
+            let mean = (0..samples).map(off).sum::<f64>() / samples as f64;
+            for value in self.rigid.iter_mut().skip(j).step_by(n) {
+                *value += mean;
             }
         }
     }

@@ -1,42 +1,21 @@
 //! The search where no joint moves: what comes and goes can be told, what lasts cannot.
 
-use tauscope_dynamics::terms::words::number;
-use tauscope_dynamics::terms::{TermError, Time};
+use tauscope_dynamics::terms::TermError;
 
+use crate::context::Context;
 use crate::data::problem::Problem;
-use crate::data::track::Track;
-use crate::explain::{Judged, Setup};
+use crate::data::track::BEGINNING_S;
+use crate::explain::judged::Judged;
 use crate::fit::fitted::Fit;
-use crate::physics::active::Hypothesis;
+use crate::physics::active::{Hypothesis, TimeKind};
+use crate::physics::kinematic_tree::bearing;
 use crate::read::audit;
 use crate::read::recording::Recording;
-use crate::report::findings;
-use crate::select::evidence::{Explanation, plausible};
+use crate::report::{findings, sentences};
+use crate::select::explanation::Explanation;
+use crate::select::plausible::plausible;
 use crate::select::propose::Base;
-use crate::select::search::{Search, bearing};
-
-/// What the arm bears at the beginning of a recording is what it bears without anything that comes and goes \[s\].
-const BEGINNING_S: f64 = 1.0;
-
-/// Shifts what the twin says of an arm at rest so that it begins with what is measured: load, friction and offset cannot be told
-/// apart there.
-pub fn start_at_measured(track: &mut Track, recording: &Recording, unit_nm: &[f64]) {
-    let n = unit_nm.len();
-    let samples = track.time_s.partition_point(|t| *t < BEGINNING_S);
-    if recording.effort.is_empty() || samples == 0 {
-        return;
-    }
-    for (j, unit) in unit_nm.iter().enumerate() {
-        let off = |k: usize| {
-            let at = k * n + j;
-            (recording.effort[at] - track.beside[at]) * unit - track.rigid[at]
-        };
-        let mean = (0..samples).map(off).sum::<f64>() / samples as f64;
-        for value in track.rigid.iter_mut().skip(j).step_by(n) {
-            *value += mean;
-        }
-    }
-}
+use crate::select::search::Search;
 
 /// What is left stands out where it is so many times its deviation in the beginning, over all joints,
 const STANDS_OUT: f64 = 8.0;
@@ -188,7 +167,7 @@ fn pushes(search: &Search<'_>) -> Explanation {
     best
 }
 
-impl Setup<'_> {
+impl Context<'_> {
     /// Searches each recording by itself for what comes and goes in it; the reason why nothing can be said, if there is one.
     pub fn at_rest(
         &self,
@@ -198,7 +177,7 @@ impl Setup<'_> {
         let joints: Vec<String> = input.model.joint_names().map(str::to_owned).collect();
         let rests_count = vec![true; joints.len()];
         let mut hypotheses = self.hypotheses();
-        let passes = |h: &Hypothesis| h.effect.time() == Time::Once;
+        let passes = |h: &Hypothesis| h.time_kind() == TimeKind::Once;
         hypotheses.retain(passes);
         let say = |text: &str| progress(0.1, text);
         let (mut actives, mut undetectable) = (Vec::new(), Vec::new());
@@ -234,8 +213,9 @@ impl Setup<'_> {
              each recording is taken for what it always bears there."
         ));
         if !self.unscaled.is_empty() {
-            let of =
-                |&(j, _): &(usize, f64)| format!("{} {} N m/A", joints[j], number(self.unit_nm[j]));
+            let of = |&(j, _): &(usize, f64)| {
+                format!("{} {} N m/A", joints[j], sentences::number(self.unit_nm[j]))
+            };
             let taken: Vec<String> = self.unscaled.iter().map(of).collect();
             named.notes.push(format!(
                 "Nobody knows the scales of these drives, and forces hang on what they were taken for: {}.",

@@ -2,16 +2,16 @@
 
 use tauscope_dynamics::terms::TermError;
 
-use crate::explain::{Judged, Setup};
+use crate::context::Context;
+use crate::data::same_robot;
+use crate::explain::judged::Judged;
 use crate::fit::fitted::Fit;
 use crate::physics::active::Active;
-use crate::physics::library;
-use crate::physics::torque_scale;
-use crate::read::audit;
+use crate::physics::{library, torque_scale};
 use crate::report::findings;
 use crate::select::search::Search;
 
-impl Setup<'_> {
+impl Context<'_> {
     /// Searches, first in motion alone, then with the standstills of the joints that have no dry friction; the reason why
     /// nothing can be said, if there is one.
     pub fn in_motion(
@@ -21,7 +21,7 @@ impl Setup<'_> {
         let input = self.input;
         let joints: Vec<String> = input.model.joint_names().map(str::to_owned).collect();
         let problem = self.problem(&input.fit, &vec![false; joints.len()])?;
-        if let Some(reason) = audit::of_problem(input, &problem) {
+        if let Some(reason) = same_robot::reason_against(input, &problem) {
             return Ok(Err(reason));
         }
         let hypotheses = self.hypotheses();

@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::data::column::Column;
 use crate::data::problem::Problem;
-use crate::physics::active::Column;
 
 /// Sums are formed in this many parts, which a processor adds at once.
 const LANES: usize = 8;

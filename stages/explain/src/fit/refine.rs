@@ -4,12 +4,14 @@
 use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::{CoordinateKind, Scale};
 
+use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::fit::body_prior;
 use crate::fit::body_step::body_step;
 use crate::fit::fitted::Fit;
 use crate::fit::least_squares::Products;
-use crate::physics::active::{Active, Column};
+use crate::physics::active::Active;
+use crate::physics::friction::least;
 
 const MAX_ITERATIONS: usize = 20;
 /// So often the damping is raised for one step.
@@ -191,7 +193,7 @@ impl Fit {
 fn bounds(problem: &Problem, active: &Active, c: usize) -> (f64, f64) {
     match active.kind(c) {
         CoordinateKind::Factor { minimum, .. } => {
-            (problem.least(active.hypothesis, minimum), f64::INFINITY)
+            (least(problem, active.hypothesis, minimum), f64::INFINITY)
         }
         CoordinateKind::Shape {
             lower,

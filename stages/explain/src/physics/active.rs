@@ -1,14 +1,11 @@
 //! A piece of physics that is part of an explanation: what, where, and its numbers.
 
 use tauscope_dynamics::terms::{
-    Against, Coordinate, CoordinateKind, Effect, Family, Layer, MotionSample, PlaceKind, Site,
-    Table, Term, table,
+    Against, Coordinate, CoordinateKind, Effect, Layer, MotionSample, PlaceKind, Site, Table, Term,
+    table,
 };
 
 use tauscope_dynamics::{Inertia, Model};
-
-use crate::data::problem::Problem;
-use crate::physics::torque_scale::is_drive;
 
 /// Where an effect is: indices into the model's joints and links; what its kind of place does not ask for is 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
@@ -21,28 +18,30 @@ pub struct Whereabouts {
     pub link: usize,
 }
 
-impl Whereabouts {
-    /// The same in a robot.
-    pub fn site(self, model: &Model) -> Site<'_> {
-        let Self {
-            joint,
-            source,
-            link,
-        } = self;
-        Site {
-            model,
-            joint,
-            source,
-            link,
-        }
-    }
-}
-
 /// Inertial parameters of a body.
 pub const BODY: usize = 10;
 
+/// What describes a link's body: a change of all its inertial parameters.
+pub const UNNAMED_BODY: &str = "link_inertia";
+
+/// The scale between a joint's torque and its recorded effort, see `torque_scale.rs`.
+pub const TORQUE_SCALE: &str = "torque_scale";
+
 /// Slow, but fast enough for a sign.
 const SLOW_RAD_S: f64 = 0.02;
+
+/// What kind of time an effect has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TimeKind {
+    /// None.
+    Always,
+    /// It changes once in a session.
+    Step,
+    /// It lasts for an interval of every recording.
+    EveryRecording,
+    /// It lasts for an interval of the session.
+    Once,
+}
 
 /// An effect at a place, without its numbers.
 #[derive(Debug, Clone, Copy)]
@@ -55,7 +54,7 @@ pub struct Hypothesis {
 
 impl PartialEq for Hypothesis {
     fn eq(&self, other: &Self) -> bool {
-        self.effect == other.effect && self.place == other.place
+        self.effect.name == other.effect.name && self.place == other.place
     }
 }
 
@@ -72,7 +71,7 @@ impl Hypothesis {
     /// The one joint whose effort it changes, if there is only one.
     pub fn only_joint(&self) -> Option<usize> {
         let at_joint = matches!(self.effect.place, PlaceKind::Joint | PlaceKind::TwoJoints);
-        (at_joint && (self.effect.layer != Layer::Body || is_drive(self)))
+        (at_joint && (self.effect.layer != Layer::Body || self.is_torque_scale()))
             .then_some(self.place.joint)
     }
 
@@ -81,7 +80,13 @@ impl Hypothesis {
         let Some(joint) = self.only_joint() else {
             return false;
         };
-        let site = self.place.site(model);
+        let Whereabouts { source, link, .. } = self.place;
+        let site = Site {
+            model,
+            joint,
+            source,
+            link,
+        };
         let middle = |c: &Coordinate| match c.kind {
             CoordinateKind::Factor { .. } => 1.0,
             CoordinateKind::Shape { lower, upper, .. } => (lower * upper).abs().sqrt(),
@@ -113,7 +118,7 @@ impl Hypothesis {
 
     /// Whether it depends on what the gear transmits.
     pub fn needs_load(&self) -> bool {
-        self.effect.traits.needs_load
+        self.effect.name == "load_dependent_friction"
     }
 
     /// Whether its first ten coordinates are those of a body, see [`Inertia::parameters`].
@@ -121,9 +126,64 @@ impl Hypothesis {
         self.effect.place == PlaceKind::Tool && self.effect.coordinates.len() >= BODY
     }
 
+    /// Whether it is the scale between a joint's torque and its recorded effort.
+    pub fn is_torque_scale(&self) -> bool {
+        self.effect.name == TORQUE_SCALE
+    }
+
+    /// Whether it splits a joint in rotor and link: such effects are costly to try.
+    pub fn has_rotor(&self) -> bool {
+        matches!(self.effect.name, "joint_elasticity" | "backlash")
+    }
+
+    /// Whether it is Coulomb or viscous friction, which a curve of friction goes with.
+    pub fn is_plain_friction(&self) -> bool {
+        matches!(self.effect.name, "coulomb_friction" | "viscous_friction")
+    }
+
+    /// Whether it is a function of its joint's position alone.
+    pub fn is_of_position(&self) -> bool {
+        matches!(
+            self.effect.name,
+            "cable_spring" | "counterbalance_spring" | "torque_ripple"
+        )
+    }
+
+    /// How it depends on time.
+    pub fn time_kind(&self) -> TimeKind {
+        let count = |kind: CoordinateKind| {
+            let all = self.effect.coordinates.iter();
+            all.filter(|c| c.kind == kind).count()
+        };
+        match (
+            count(CoordinateKind::RecordingTime),
+            count(CoordinateKind::SessionTime),
+        ) {
+            (0, 0) => TimeKind::Always,
+            (0, 1) => TimeKind::Step,
+            (_, 0) => TimeKind::EveryRecording,
+            _ => TimeKind::Once,
+        }
+    }
+
+    /// Whether it is part of the arm, not something that came and went.
+    pub fn lasts(&self) -> bool {
+        matches!(self.time_kind(), TimeKind::Always | TimeKind::Step)
+            && self.effect.name != "contact_wall"
+    }
+
+    /// What it is called in reports: what only describes is `unknown`.
+    pub fn said(&self) -> &'static str {
+        if self.is_unnamed_body() {
+            "unknown"
+        } else {
+            self.effect.name
+        }
+    }
+
     /// Whether it describes a link's body without a name for what is wrong with it.
     pub fn is_unnamed_body(&self) -> bool {
-        self.effect.traits.describes_only && self.effect.family == Family::Body
+        self.effect.name == UNNAMED_BODY
     }
 
     /// Whether all its coordinates are factors.
@@ -154,14 +214,19 @@ pub struct Active {
 }
 
 impl Active {
-    /// The term for a problem's robot.
-    pub fn term(&self, problem: &Problem) -> Box<dyn Term> {
-        self.term_for(&problem.model)
-    }
-
     /// The term for a robot.
-    pub fn term_for(&self, model: &Model) -> Box<dyn Term> {
-        let site = self.hypothesis.place.site(model);
+    pub fn term(&self, model: &Model) -> Box<dyn Term> {
+        let Whereabouts {
+            joint,
+            source,
+            link,
+        } = self.hypothesis.place;
+        let site = Site {
+            model,
+            joint,
+            source,
+            link,
+        };
         let curve = self.curve.as_ref().and_then(|curve| {
             let values = self.values_at_knots(curve);
             table(
@@ -190,7 +255,7 @@ impl Active {
     /// Whether it is a curve over its joint's own velocity: friction, whatever bends it.
     pub fn is_friction_curve(&self) -> bool {
         let curve = self.curve.as_ref();
-        curve.is_some_and(|curve| curve.is_friction_of(self.hypothesis.place.joint))
+        curve.is_some_and(|curve| is_of_friction(curve, self.hypothesis.place.joint))
     }
 
     /// Whether its effort jumps where its joint reverses.
@@ -255,10 +320,29 @@ impl Active {
     }
 }
 
+/// Whether another joint's recording feels a joint's.
+pub fn feeds(actives: &[Active], joint: usize) -> bool {
+    let couplings = actives.iter().filter(|active| active.is_coupling());
+    couplings
+        .map(|active| active.hypothesis.place.source)
+        .any(|source| source == joint)
+}
+
+/// Effects in the order in which they act within their layer: torque scales last.
+pub fn in_order(actives: &[Active]) -> Vec<&Active> {
+    let mut all: Vec<&Active> = actives.iter().collect();
+    all.sort_by_key(|active| active.hypothesis.is_torque_scale());
+    all
+}
+
+fn is_of_friction(curve: &Table, joint: usize) -> bool {
+    curve.against == Against::Velocity && curve.of_joint == joint
+}
+
 /// The knots of a curve in a joint that are held at zero. A curve over the joint's own velocity is what Coulomb and viscous
 /// friction leave: these are the straight line between its slowest and its fastest knot in each direction.
 pub fn held_knots(curve: &Table, joint: usize) -> Vec<usize> {
-    if !curve.is_friction_of(joint) {
+    if !is_of_friction(curve, joint) {
         return Vec::new();
     }
     let middle = curve.knots.partition_point(|knot| *knot < 0.0);
@@ -268,25 +352,6 @@ pub fn held_knots(curve: &Table, joint: usize) -> Vec<usize> {
         .filter(|knots| knots.len() >= 2)
         .flat_map(|knots| [knots.start, knots.end - 1])
         .collect()
-}
-
-/// A signal that is zero but for one joint, or not.
-#[derive(Debug, Clone)]
-pub struct Column {
-    /// The joint that `values` belong to; `None` if they are of all joints.
-    pub joint: Option<usize>,
-    /// Rows of the joint, or of all joints one after the other.
-    pub values: Vec<f64>,
-}
-
-impl Column {
-    /// The rows of a joint, `None` if they are zero.
-    pub fn of_joint(&self, joint: usize, rows: usize) -> Option<&[f64]> {
-        match self.joint {
-            Some(own) => (own == joint).then_some(&self.values[..]),
-            None => Some(&self.values[joint * rows..(joint + 1) * rows]),
-        }
-    }
 }
 
 #[cfg(test)]

@@ -1,57 +1,35 @@
 //! What bodies cost over the recordings of a problem, from that of unit inertias and unit gravity: computed once.
 
-use std::collections::HashMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use tauscope_dynamics::terms::Term;
 use tauscope_dynamics::{Data, Inertia, Model, gravity_effort, rnea};
 
+use crate::data::efforts::{TrackEfforts, zeros};
+use crate::data::memo::{MOST_ROWS, Unit};
 use crate::data::problem::Problem;
 use crate::data::track::FitTrack;
+use crate::physics::act::act_over;
 use crate::physics::active::Active;
-use crate::physics::columns::CACHED_ROWS;
-use crate::physics::efforts::{act_over, silent};
-
-/// An effort by track, row-major, one number per joint and sample \[N m or N\].
-pub type TrackEfforts = Vec<Vec<f64>>;
-
-/// What each unit of something costs; effort is linear in them.
-type Units = Arc<Vec<TrackEfforts>>;
-
-/// Where a unit is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-enum Unit {
-    /// The ten inertial parameters at a link's frame, see [`Inertia::parameters`].
-    Inertia(usize),
-    /// Gravity along the base's axes \[m/s²\].
-    Gravity,
-}
-
-/// Costs of units that were computed before: at most one set for each link.
-#[derive(Debug, Default)]
-pub struct UnitCosts {
-    efforts: Mutex<HashMap<Unit, Units>>,
-    signals: Mutex<HashMap<Unit, Arc<Vec<Vec<f64>>>>>,
-}
 
 /// Adds what a piece of physics of bodies costs to efforts over all tracks; `rigid` is what the twin says of the motion.
 pub fn add(problem: &Problem, active: &Active, rigid: &[Vec<f64>], into: &mut [Vec<f64>]) {
     let hypothesis = active.hypothesis;
-    let mut term = active.term(problem);
+    let mut term = active.term(&problem.model);
     if let Some((unit, factors)) = in_units(problem, &*term) {
         add_units(&units(problem, unit), &factors, into);
     } else {
-        if problem.rows <= CACHED_ROWS && hypothesis.effect.splits_joint() {
+        if problem.rows <= MOST_ROWS && hypothesis.has_rotor() {
             term.expand(problem.expansion(hypothesis.place.joint));
         }
-        let added = act_over(problem, &mut *term, &silent(rigid), rigid);
+        let added = act_over(problem, &mut *term, &zeros(rigid), rigid);
         add_units(&[added], &[1.0], into);
     }
 }
 
 /// What a unit of rotor inertia costs at a joint with rotor and link: the first factor of what has both.
 pub fn rotor(problem: &Problem, joint: usize) -> TrackEfforts {
-    let mut effort = silent(&problem.bare().body);
+    let mut effort = zeros(&problem.bare().body);
     for (track, effort) in problem.tracks.iter().zip(&mut effort) {
         let of_joint = effort.iter_mut().zip(&track.track.acceleration);
         let of_joint = of_joint.skip(joint).step_by(problem.joints);
@@ -62,25 +40,10 @@ pub fn rotor(problem: &Problem, joint: usize) -> TrackEfforts {
 
 /// What a piece of physics of bodies costs as a signal, if it is so many times some units.
 pub fn signal(problem: &Problem, active: &Active) -> Option<Vec<f64>> {
-    let (unit, factors) = in_units(problem, &*active.term(problem))?;
-    let lock = || {
-        problem
-            .units
-            .signals
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-    };
-    let known = lock().get(&unit).map(Arc::clone);
-    let signals = known.unwrap_or_else(|| {
+    let (unit, factors) = in_units(problem, &*active.term(&problem.model))?;
+    let signals = problem.units.signals.get_or(unit, || {
         let units = units(problem, unit);
-        let new = Arc::new(
-            units
-                .iter()
-                .map(|unit| problem.signal(unit))
-                .collect::<Vec<_>>(),
-        );
-        lock().insert(unit, Arc::clone(&new));
-        new
+        units.iter().map(|unit| problem.signal(unit)).collect()
     });
     let mut sum = vec![0.0; problem.joints * problem.rows];
     for (signal, factor) in signals.iter().zip(&factors).filter(|(_, f)| **f != 0.0) {
@@ -93,7 +56,7 @@ pub fn signal(problem: &Problem, active: &Active) -> Option<Vec<f64>> {
 
 /// How many times which units a term costs, if its effort is linear in some, and these may be kept.
 fn in_units(problem: &Problem, term: &dyn Term) -> Option<(Unit, Vec<f64>)> {
-    if problem.rows > CACHED_ROWS {
+    if problem.rows > MOST_ROWS {
         return None;
     }
     if let Some((link, inertia)) = term.inertia() {
@@ -120,17 +83,7 @@ fn add_units(units: &[TrackEfforts], factors: &[f64], into: &mut [Vec<f64>]) {
     }
 }
 
-fn units(problem: &Problem, unit: Unit) -> Units {
-    let lock = || {
-        problem
-            .units
-            .efforts
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-    };
-    if let Some(known) = lock().get(&unit) {
-        return Arc::clone(known);
-    }
+fn units(problem: &Problem, unit: Unit) -> Arc<Vec<TrackEfforts>> {
     let one = |k: usize| match unit {
         Unit::Inertia(link) => {
             let mut parameters = [0.0; 10];
@@ -152,8 +105,10 @@ fn units(problem: &Problem, unit: Unit) -> Units {
         Unit::Inertia(_) => 10,
         Unit::Gravity => 3,
     };
-    let new = Arc::new((0..count).map(one).collect::<Vec<_>>());
-    Arc::clone(lock().entry(unit).or_insert(new))
+    problem
+        .units
+        .efforts
+        .get_or(unit, || (0..count).map(one).collect())
 }
 
 /// What a model costs over the motion of all tracks, or what holds it still there.

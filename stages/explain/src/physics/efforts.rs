@@ -2,33 +2,23 @@
 
 use std::sync::Arc;
 
-use tauscope_dynamics::terms::{Layer, MotionSample, Physics, Term};
+use tauscope_dynamics::terms::{Layer, Term};
 
+use crate::data::efforts::{Efforts, TrackEfforts, scale, subtract, zeros};
 use crate::data::problem::Problem;
-use crate::physics::active::{Active, Column};
-use crate::physics::bodies::{self, TrackEfforts};
-use crate::physics::columns::add_shaped;
-use crate::physics::torque_scale::{gains, is_drive};
-
-/// Efforts of all tracks under some physics.
-#[derive(Debug, Clone)]
-pub struct Efforts {
-    /// Rigid body and [`Layer::Body`] terms: what the gears transmit.
-    pub body: Arc<TrackEfforts>,
-    /// With the [`Layer::Joint`] terms.
-    pub mechanical: Arc<TrackEfforts>,
-    /// With the [`Layer::Record`] terms: what is recorded.
-    pub recorded: Arc<TrackEfforts>,
-    /// Scale of each joint's drive.
-    pub gains: Vec<f64>,
-}
+use crate::physics::act::{act_over, run};
+use crate::physics::active::Active;
+use crate::physics::bodies;
+use crate::physics::shaped_bodies::add_shaped;
+use crate::physics::torque_scale::gains;
 
 fn terms_of(problem: &Problem, actives: &[Active], layer: Layer) -> Vec<Box<dyn Term>> {
     // The scale of a drive is that of all bodies, and is put to them when they are summed.
-    let of_layer =
-        |active: &&Active| active.hypothesis.effect.layer == layer && !is_drive(&active.hypothesis);
+    let of_layer = |active: &&Active| {
+        active.hypothesis.effect.layer == layer && !active.hypothesis.is_torque_scale()
+    };
     let of_layer = actives.iter().filter(of_layer);
-    of_layer.map(|active| active.term(problem)).collect()
+    of_layer.map(|active| active.term(&problem.model)).collect()
 }
 
 /// What the gears transmit under the physics of `actives`.
@@ -36,7 +26,7 @@ pub fn transmitted(problem: &Problem, actives: &[Active]) -> TrackEfforts {
     let rigid = &problem.bare().body;
     let mut body = TrackEfforts::clone(rigid);
     let of_bodies =
-        |a: &&Active| a.hypothesis.effect.layer == Layer::Body && !is_drive(&a.hypothesis);
+        |a: &&Active| a.hypothesis.effect.layer == Layer::Body && !a.hypothesis.is_torque_scale();
     for active in actives.iter().filter(of_bodies) {
         if !add_shaped(problem, active, &mut body) {
             bodies::add(problem, active, rigid, &mut body);
@@ -46,40 +36,15 @@ pub fn transmitted(problem: &Problem, actives: &[Active]) -> TrackEfforts {
     body
 }
 
-impl Efforts {
-    /// Under the physics of `actives`, of which the gears transmit `body`.
-    pub fn new(problem: &Problem, actives: &[Active], body: Arc<TrackEfforts>) -> Self {
-        let mechanical = run(problem, terms_of(problem, actives, Layer::Joint), &body);
-        let recorded = record(problem, actives, &mechanical);
-        Self {
-            body,
-            mechanical: Arc::new(mechanical),
-            recorded: Arc::new(recorded),
-            gains: gains(actives, problem.joints),
-        }
+/// Under the physics of `actives`, of which the gears transmit `body`.
+pub fn evaluated(problem: &Problem, actives: &[Active], body: Arc<TrackEfforts>) -> Efforts {
+    let mechanical = run(problem, terms_of(problem, actives, Layer::Joint), &body);
+    let recorded = record(problem, actives, &mechanical);
+    Efforts {
+        body,
+        mechanical: Arc::new(mechanical),
+        recorded: Arc::new(recorded),
     }
-
-    /// Under no physics but bodies, of which the gears transmit `body`.
-    pub fn of_bodies(body: Arc<TrackEfforts>, joints: usize) -> Self {
-        Self {
-            mechanical: Arc::clone(&body),
-            recorded: Arc::clone(&body),
-            body,
-            gains: vec![1.0; joints],
-        }
-    }
-}
-
-/// Efforts with terms of one layer added.
-fn run(problem: &Problem, terms: Vec<Box<dyn Term>>, start: &[Vec<f64>]) -> TrackEfforts {
-    if terms.is_empty() {
-        return start.to_vec();
-    }
-    let mut physics = Physics::new(terms, problem.joints);
-    let tracks = problem.tracks.iter().zip(start);
-    tracks
-        .map(|(track, start)| track.track.run(&mut physics, start))
-        .collect()
 }
 
 /// What is recorded of mechanical efforts.
@@ -105,22 +70,22 @@ pub fn change(
     let through = others.iter().any(Active::is_of_record);
     match active.hypothesis.effect.layer {
         Layer::Record => {
-            let mut term = active.term(problem);
+            let mut term = active.term(&problem.model);
             let changed = act_over(problem, &mut *term, &efforts.recorded, &efforts.body);
             return subtract(changed, &efforts.recorded);
         }
         Layer::Joint if through => {
-            let mut term = active.term(problem);
+            let mut term = active.term(&problem.model);
             let changed = act_over(problem, &mut *term, &efforts.mechanical, &efforts.body);
             return subtract(record(problem, others, &changed), &efforts.recorded);
         }
         Layer::Joint => {
-            let mut term = active.term(problem);
-            return act_over(problem, &mut *term, &silent(&efforts.body), &efforts.body);
+            let mut term = active.term(&problem.model);
+            return act_over(problem, &mut *term, &zeros(&efforts.body), &efforts.body);
         }
         Layer::Body => {}
     }
-    let mut added = silent(&efforts.body);
+    let mut added = zeros(&efforts.body);
     bodies::add(problem, active, &efforts.body, &mut added);
     scale(&mut added, gains);
     if !through {
@@ -144,67 +109,4 @@ pub fn recorded_on_top(
         }
     }
     subtract(record(problem, others, &changed), &efforts.recorded)
-}
-
-/// What a term adds to `start` over all tracks, `transmitted` by the gears.
-pub fn act_over(
-    problem: &Problem,
-    term: &mut dyn Term,
-    start: &[Vec<f64>],
-    transmitted: &[Vec<f64>],
-) -> TrackEfforts {
-    let n = problem.joints;
-    let mut out = start.to_vec();
-    for ((track, effort), transmitted) in problem.tracks.iter().zip(&mut out).zip(transmitted) {
-        term.reset();
-        track.track.each(|k, at| {
-            let row = k * n..(k + 1) * n;
-            let at = MotionSample {
-                transmitted: &transmitted[row.clone()],
-                ..*at
-            };
-            term.act(&at, &mut effort[row]);
-        });
-    }
-    out
-}
-
-/// An effort as a signal: of one joint, or of all.
-pub fn column(problem: &Problem, effort: &[Vec<f64>], joint: Option<usize>) -> Column {
-    let values = match joint {
-        Some(joint) => {
-            let mut values = vec![0.0; problem.rows];
-            problem.joint_signal(effort, joint, &mut values);
-            values
-        }
-        None => problem.signal(effort),
-    };
-    Column { joint, values }
-}
-
-/// No effort, as many numbers as `like` has.
-pub fn silent(like: &[Vec<f64>]) -> TrackEfforts {
-    like.iter().map(|like| vec![0.0; like.len()]).collect()
-}
-
-/// Scales what bodies cost by the drives.
-pub fn scale(bodies: &mut [Vec<f64>], gains: &[f64]) {
-    if gains.iter().all(|gain| (gain - 1.0).abs() <= 0.0) {
-        return;
-    }
-    for body in bodies {
-        for (k, value) in body.iter_mut().enumerate() {
-            *value *= gains[k % gains.len()];
-        }
-    }
-}
-
-/// The difference of two efforts.
-pub fn subtract(mut from: TrackEfforts, what: &[Vec<f64>]) -> TrackEfforts {
-    for (from, what) in from.iter_mut().zip(what) {
-        for (a, b) in from.iter_mut().zip(what) {
-            *a -= b;
-        }
-    }
-    from
 }

@@ -1,16 +1,19 @@
 //! An explanation's effort as a sum of what its pieces add, each filtered once: most pieces only add to what is recorded,
 //! and a change of one leaves the others as they are. What transforms a joint's recording is evaluated as a whole.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use tauscope_dynamics::terms::{Coordinate, CoordinateKind, Layer, PlaceKind};
 
+use crate::data::column::Column;
+use crate::data::efforts::{Efforts, TrackEfforts};
+use crate::data::memo::MOST_ROWS;
 use crate::data::problem::Problem;
-use crate::physics::active::{Active, Column, Hypothesis};
-use crate::physics::bodies::{self, TrackEfforts};
-use crate::physics::columns::{CACHED_ROWS, units};
-use crate::physics::efforts::{Efforts, change, column, transmitted};
-use crate::physics::torque_scale::{gains, is_drive};
+use crate::physics::active::{Active, Hypothesis, feeds};
+use crate::physics::bodies;
+use crate::physics::efforts::{change, evaluated, transmitted};
+use crate::physics::torque_scale::gains;
+use crate::physics::unit_columns::units;
 
 /// What the pieces of an explanation add.
 #[derive(Debug, Clone)]
@@ -25,6 +28,8 @@ pub struct Parts {
     load: Option<Arc<TrackEfforts>>,
     /// Joints whose recording another joint's feels.
     feeds: Vec<bool>,
+    /// What is recorded of the whole, unfiltered; where it was asked for.
+    efforts: OnceLock<Arc<Efforts>>,
 }
 
 impl Parts {
@@ -38,6 +43,7 @@ impl Parts {
             feeds: (0..problem.joints)
                 .map(|joint| feeds(actives, joint))
                 .collect(),
+            efforts: OnceLock::new(),
         };
         if actives.iter().any(Active::needs_load) {
             let known = before.filter(|(others, _)| same_bodies(actives, others));
@@ -63,7 +69,7 @@ impl Parts {
     /// Whether a piece only adds, as far as this is of interest: to a joint that nothing transforms.
     fn adds(&self, active: &Active) -> bool {
         let hypothesis = &active.hypothesis;
-        if is_drive(hypothesis) {
+        if hypothesis.is_torque_scale() {
             return false;
         }
         match hypothesis.only_joint() {
@@ -74,9 +80,9 @@ impl Parts {
 
     /// Whether a piece would only add, to joints that nothing transforms and no other joint feels.
     pub fn is_plain(&self, hypothesis: &Hypothesis) -> bool {
-        let of_record = hypothesis.effect.layer == Layer::Record && !only_adds(hypothesis);
+        let of_record = hypothesis.effect.layer == Layer::Record && !is_bias(hypothesis);
         !of_record
-            && !is_drive(hypothesis)
+            && !hypothesis.is_torque_scale()
             && match hypothesis.only_joint() {
                 Some(joint) => !self.transformed[joint] && !self.feeds[joint],
                 None => !self.transformed.contains(&true),
@@ -88,9 +94,23 @@ impl Parts {
         self.feeds[joint]
     }
 
-    /// What the gears transmit, if a part depends on it.
-    pub fn load(&self) -> Option<&Arc<TrackEfforts>> {
-        self.load.as_ref()
+    /// What the effects of the parts say of the recordings, unfiltered.
+    pub fn efforts(&self, problem: &Problem, actives: &[Active]) -> &Efforts {
+        self.efforts.get_or_init(|| {
+            let body = match &self.load {
+                Some(load) => Arc::clone(load),
+                None => Arc::new(transmitted(problem, actives)),
+            };
+            Arc::new(evaluated(problem, actives, body))
+        })
+    }
+
+    /// What the gears transmit under the effects of the parts, unfiltered.
+    pub fn load(&self, problem: &Problem, actives: &[Active]) -> Arc<TrackEfforts> {
+        match &self.load {
+            Some(load) => Arc::clone(load),
+            None => Arc::clone(&self.efforts(problem, actives).body),
+        }
     }
 
     /// What an active adds by itself, before the drives.
@@ -100,13 +120,9 @@ impl Parts {
         if active.needs_load()
             && let Some(load) = &self.load
         {
-            let efforts = Efforts::of_bodies(Arc::clone(load), problem.joints);
+            let efforts = Efforts::of_bodies(Arc::clone(load));
             let ones = vec![1.0; problem.joints];
-            return column(
-                problem,
-                &change(problem, &[], &efforts, active, &ones),
-                joint,
-            );
+            return problem.column(&change(problem, &[], &efforts, active, &ones), joint);
         }
         if hypothesis.effect.layer == Layer::Body
             && let Some(values) = bodies::signal(problem, active)
@@ -133,7 +149,7 @@ impl Parts {
         }
         let ones = vec![1.0; problem.joints];
         let added = change(problem, &[], problem.bare(), active, &ones);
-        column(problem, &added, joint)
+        problem.column(&added, joint)
     }
 
     /// What an active adds, before the drives, if it does.
@@ -183,7 +199,7 @@ pub fn is_kept(problem: &Problem, active: &Active) -> bool {
     };
     active.curve.is_none()
         && active.hypothesis.effect.coordinates.iter().all(timeless)
-        && problem.rows <= CACHED_ROWS
+        && problem.rows <= MOST_ROWS
 }
 
 fn add(into: &mut [f64], what: &[f64]) {
@@ -192,16 +208,8 @@ fn add(into: &mut [f64], what: &[f64]) {
     }
 }
 
-fn only_adds(hypothesis: &Hypothesis) -> bool {
-    hypothesis.effect.traits.only_adds
-}
-
-/// Whether another joint's recording feels a joint's.
-pub fn feeds(actives: &[Active], joint: usize) -> bool {
-    let couplings = actives.iter().filter(|active| active.is_coupling());
-    couplings
-        .map(|active| active.hypothesis.place.source)
-        .any(|source| source == joint)
+fn is_bias(hypothesis: &Hypothesis) -> bool {
+    hypothesis.effect.name == "torque_bias"
 }
 
 /// The joints whose recording something transforms; an offset alone does not.
@@ -209,7 +217,7 @@ fn transformed(actives: &[Active], joints: usize) -> Vec<bool> {
     let mut transformed = vec![false; joints];
     for active in actives
         .iter()
-        .filter(|a| a.is_of_record() && !only_adds(&a.hypothesis))
+        .filter(|a| a.is_of_record() && !is_bias(&a.hypothesis))
     {
         if active.hypothesis.effect.place == PlaceKind::All {
             return vec![true; joints];

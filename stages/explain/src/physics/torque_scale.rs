@@ -1,23 +1,16 @@
 //! The scale between N m and a recorded current, where nobody knows the torque constants.
 
-use std::sync::Arc;
-
-use nalgebra::DVector;
 use tauscope_dynamics::terms::{
-    Coordinate, EFFECTS, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind,
-    Simulated, Term, Traits, Words,
+    Coordinate, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind, Simulated,
+    Term, Traits, Words,
 };
 
-use crate::data::problem::Problem;
-use crate::fit::fitted::Fit;
-use crate::fit::least_squares::{Products, solved};
-use crate::physics::active::{Active, Column, Hypothesis, Whereabouts};
-use crate::physics::columns::columns;
+use crate::physics::active::{Active, Hypothesis, TORQUE_SCALE, Whereabouts};
 
 /// Effort of the bodies times 1 + x: not a finding, but a number that every fit needs. Acts after all other
 /// [`Layer::Body`] terms.
-pub static DRIVE_GAIN: Effect = Effect {
-    name: "drive_gain",
+pub static EFFECT: Effect = Effect {
+    name: TORQUE_SCALE,
     words: Words::new(
         "Torque scale",
         "torque scale",
@@ -38,7 +31,7 @@ pub static DRIVE_GAIN: Effect = Effect {
     concealed: None,
     traits: Traits::NONE,
     build: |site, values| {
-        Box::new(DriveGain {
+        Box::new(TorqueScale {
             joint: site.joint,
             values: [values[0]],
         })
@@ -46,14 +39,14 @@ pub static DRIVE_GAIN: Effect = Effect {
 };
 
 #[derive(Debug)]
-struct DriveGain {
+struct TorqueScale {
     joint: usize,
     values: [f64; 1],
 }
 
-impl Term for DriveGain {
+impl Term for TorqueScale {
     fn effect(&self) -> &'static Effect {
-        &DRIVE_GAIN
+        &EFFECT
     }
 
     fn coordinates(&self) -> &[f64] {
@@ -65,11 +58,6 @@ impl Term for DriveGain {
     }
 }
 
-/// Whether a piece of physics is the scale of a drive.
-pub fn is_drive(hypothesis: &Hypothesis) -> bool {
-    *hypothesis.effect == DRIVE_GAIN
-}
-
 /// The scales of joints that nobody knows, as they are at first.
 pub fn unknown_gains(first: &[(usize, f64)]) -> Vec<Active> {
     let one = |&(joint, gain): &(usize, f64)| {
@@ -78,7 +66,7 @@ pub fn unknown_gains(first: &[(usize, f64)]) -> Vec<Active> {
             ..Whereabouts::default()
         };
         Hypothesis {
-            effect: &DRIVE_GAIN,
+            effect: &EFFECT,
             place,
         }
         .with(vec![gain - 1.0])
@@ -89,50 +77,11 @@ pub fn unknown_gains(first: &[(usize, f64)]) -> Vec<Active> {
 /// The scale of each joint in an explanation; 1 where it is out of the question.
 pub fn gains(actives: &[Active], joints: usize) -> Vec<f64> {
     let mut gains = vec![1.0; joints];
-    for active in actives.iter().filter(|active| is_drive(&active.hypothesis)) {
+    for active in actives
+        .iter()
+        .filter(|active| active.hypothesis.is_torque_scale())
+    {
         gains[active.hypothesis.place.joint] = 1.0 + active.coordinates[0];
     }
     gains
-}
-
-/// By coordinate of a fit, how far it is off if the URDF's masses and centres of mass are: the root of the sum of squares over all
-/// links. A drive whose joint carries next to nothing has no scale of its own, however small its interval.
-pub fn off_with_the_links(problem: &Problem, fit: &Fit) -> Vec<f64> {
-    let model = &problem.model;
-    let mut nuisance: Vec<Arc<Column>> = Vec::new();
-    let mut size: Vec<f64> = Vec::new();
-    for joint in model.joints() {
-        let (link, place) = (
-            &model.links()[joint.child_link],
-            Whereabouts {
-                link: joint.child_link,
-                ..Whereabouts::default()
-            },
-        );
-        for (effect, off) in EFFECTS
-            .iter()
-            .filter_map(|effect| Some((*effect, effect.traits.off_in_urdf?(link))))
-        {
-            let shape = vec![0.0; effect.coordinates.len()];
-            let all = columns(problem, fit, Hypothesis { effect, place }, &shape);
-            size.extend(all.factors.iter().map(|_| off));
-            nuisance.extend(all.factors.iter().cloned());
-        }
-    }
-    let own = fit.jacobian(problem);
-    let p = own.len();
-    let all: Vec<&Column> = own.iter().chain(&nuisance).map(AsRef::as_ref).collect();
-    let products = Products::new(problem, &all, &fit.residual, None);
-    let (normal, _) = products.normal(&fit.variance, &vec![0.0; all.len()]);
-    let mine = normal.view((0, 0), (p, p)).into_owned();
-    let mut squares = vec![0.0; p];
-    for (k, size) in size.iter().enumerate() {
-        let right = DVector::from_iterator(p, (0..p).map(|a| normal[(a, p + k)] * size));
-        if let Some(off) = solved(&mine, &right, &vec![true; p], 0.0) {
-            for (sum, off) in squares.iter_mut().zip(off.iter()) {
-                *sum += off * off;
-            }
-        }
-    }
-    squares.into_iter().map(f64::sqrt).collect()
 }

@@ -9,17 +9,16 @@ mod waves;
 use std::collections::BTreeMap;
 
 use serde_json::Value;
-use tauscope_dynamics::terms::{PlaceKind, Time};
+use tauscope_dynamics::terms::PlaceKind;
 
-use crate::explain::Input;
 use crate::fit::fitted::Fit;
 use crate::fit::interval::{covariance, half_width_95, parameter_deviations};
-use crate::physics::active::{Active, Hypothesis};
-use crate::physics::torque_scale::is_drive;
-use crate::report::next_motion;
-use crate::report::sentences;
-use crate::report::{Finding, NextMotion, Rejected, Rival, Verdict};
-use crate::select::evidence::Explanation;
+use crate::physics::active::{Active, Hypothesis, TimeKind};
+use crate::physics::friction::least;
+use crate::read::input::Input;
+use crate::report::schema::{Finding, NextMotion, Rejected, Rival, Verdict};
+use crate::report::{next_motion, sentences};
+use crate::select::explanation::Explanation;
 use crate::select::search::Search;
 
 use contest::contest;
@@ -59,13 +58,6 @@ impl Named {
     }
 }
 
-/// The physics in the order in which it acts within its layer: drives last.
-pub fn in_order(actives: &[Active]) -> Vec<&Active> {
-    let mut all: Vec<&Active> = actives.iter().collect();
-    all.sort_by_key(|active| is_drive(&active.hypothesis));
-    all
-}
-
 fn place_of(
     input: &Input,
     joints: &[String],
@@ -90,7 +82,7 @@ fn place_of(
 fn rival(input: &Input, joints: &[String], hypothesis: &Hypothesis) -> Rival {
     let (joint, link) = place_of(input, joints, hypothesis);
     Rival {
-        effect: hypothesis.effect.said().to_owned(),
+        effect: hypothesis.said().to_owned(),
         joint,
         link,
     }
@@ -116,7 +108,7 @@ pub fn of(
         ..Named::default()
     };
     for (index, active) in fit.actives.iter().enumerate() {
-        if is_drive(&active.hypothesis) {
+        if active.hypothesis.is_torque_scale() {
             continue;
         }
         let deviations = parameter_deviations(search.problem, fit, &spread, index);
@@ -134,7 +126,7 @@ pub fn of(
             let vague = parameter.name.contains("time") && *deviation > VAGUE_S;
             if deviation.is_finite() && !vague {
                 let half = half_width_95(search.problem) * deviation;
-                let least = search.problem.least(active.hypothesis, parameter.minimum);
+                let least = least(search.problem, active.hypothesis, parameter.minimum);
                 let low = (value - half).max(least);
                 intervals.insert(parameter.name.to_owned(), [low, value + half]);
             }
@@ -143,7 +135,7 @@ pub fn of(
             let source = joints[active.hypothesis.place.source].clone();
             parameters.insert("source_joint".to_owned(), Value::from(source));
         }
-        if effect.traits.cuts_off {
+        if effect.name == "torque_saturation" {
             parameters.insert("mode".to_owned(), Value::from("sensor"));
         }
         describe_curve(active, &mut parameters);
@@ -181,7 +173,7 @@ pub fn of(
             named.next_motions.push(next);
         }
         named.findings.push(Finding {
-            effect: active.hypothesis.effect.said().to_owned(),
+            effect: active.hypothesis.said().to_owned(),
             joint,
             link,
             parameters,
@@ -286,17 +278,17 @@ fn when(
     };
     let known = parameters.clone();
     let get = |name: &str| known.get(name).and_then(Value::as_f64);
-    match active.hypothesis.effect.time() {
-        Time::Always => none,
-        Time::Step => {
+    match active.hypothesis.time_kind() {
+        TimeKind::Always => none,
+        TimeKind::Step => {
             none.start = get("change_time_session_s");
             none
         }
-        Time::EveryRecording => {
+        TimeKind::EveryRecording => {
             (none.start, none.end) = (get("t_start_s"), get("t_end_s"));
             none
         }
-        Time::Once => {
+        TimeKind::Once => {
             let (Some(start), Some(end)) = (get("t_start_s"), get("t_end_s")) else {
                 return none;
             };

@@ -4,13 +4,13 @@ use std::ops::RangeInclusive;
 
 use tauscope_dynamics::terms::{Physics, TermError};
 
+use crate::context::Context;
 use crate::data::problem::Problem;
 use crate::data::track::Track;
-use crate::explain::Setup;
 use crate::fit::fitted::Fit;
+use crate::physics::active::in_order;
 use crate::read::recording::Recording;
-use crate::report::findings;
-use crate::report::{JointPicture, RecordingPicture};
+use crate::report::schema::{JointPicture, RecordingPicture};
 
 /// Motion of a prediction is smoothed with the best of these, as shares of the fit's cutoff.
 const PREDICTION_CUTOFFS: [f64; 5] = [0.75, 1.0, 1.4, 2.0, 3.0];
@@ -53,12 +53,12 @@ enum Velocity {
     Recorded,
 }
 
-impl Setup<'_> {
+impl Context<'_> {
     /// The corrected twin's effort over a track, in the recording's unit.
     fn predict(&self, problem: &Problem, fit: &Fit, track: &Track) -> Vec<f64> {
-        let terms = findings::in_order(&fit.actives)
+        let terms = in_order(&fit.actives)
             .into_iter()
-            .map(|active| active.term(problem))
+            .map(|active| active.term(&problem.model))
             .collect();
         let mut physics = Physics::new(terms, self.unit_nm.len());
         let mut effort = track.run(&mut physics, &track.rigid);

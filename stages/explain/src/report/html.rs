@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use crate::report::{RecordingPicture, Report, Verdict};
+use crate::report::schema::{RecordingPicture, Report, Verdict};
 
 use self::number_format::{almost_all, effort_unit};
 

@@ -2,7 +2,7 @@
 
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
-use crate::report::Located;
+use crate::report::schema::Located;
 
 /// A joint's mismatch is told from this many times its noise (RMS).
 const LEAST_OVER_NOISE: f64 = 1.5;

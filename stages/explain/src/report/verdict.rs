@@ -3,7 +3,7 @@
 use crate::fit::fitted::Fit;
 use crate::physics::active::Active;
 use crate::report::holdout::Proof;
-use crate::report::{Finding, Verdict};
+use crate::report::schema::{Finding, Verdict};
 
 /// An explanation does not carry over where it leaves so many times the error that it leaves where it was fitted, and so many
 /// times the measurement's white noise.

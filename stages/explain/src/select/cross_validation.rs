@@ -1,10 +1,10 @@
 //! Whether a piece of physics carries over from some recordings to the others.
 
+use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::fit::least_squares::Products;
 use crate::fit::refine::Anchor;
-use crate::physics::active::Column;
 use crate::select::parallel;
 
 /// Least share of what a piece of physics gains where it is fitted that it must gain where it is not.

@@ -1,10 +1,11 @@
 //! What no name fits: how it depends on the motion or on time, as a curve, so that the fit improves all the same.
 
-use tauscope_dynamics::terms::{Against, MotionSample, Table, UNKNOWN};
+use tauscope_dynamics::terms::{Against, MotionSample, Table, effect};
 
+use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::data::track::FitTrack;
-use crate::physics::active::{Active, Column, Hypothesis, Whereabouts, held_knots};
+use crate::physics::active::{Active, Hypothesis, Whereabouts, held_knots};
 use crate::select::propose::Base;
 
 /// Knots of a curve.
@@ -65,7 +66,7 @@ impl Base<'_> {
 
     fn try_curve(&self, joint: usize, curve: &Table) -> Option<CurveProposal> {
         let hypothesis = Hypothesis {
-            effect: &UNKNOWN,
+            effect: effect("unknown")?,
             place: Whereabouts {
                 joint,
                 ..Whereabouts::default()

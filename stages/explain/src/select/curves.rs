@@ -1,23 +1,19 @@
 //! What no name fits: a curve beside the names of a joint, or in their place.
 
-use tauscope_dynamics::terms::{Against, Time};
-
 use crate::fit::fitted::Fit;
-use crate::physics::active::{Active, Hypothesis};
-use crate::physics::torque_scale::is_drive;
+use crate::physics::active::{Active, Hypothesis, TimeKind};
+use crate::physics::kinematic_tree::bearing;
 use crate::select::cross_validation::{carries_over, left_elsewhere};
 use crate::select::curve_shapes;
+use crate::select::evidence::{CURVE_EVIDENCE, CURVE_SIZE, is_drawn_already};
+use crate::select::evidence::{overwhelming, worse_joints};
+use crate::select::explanation::Explanation;
+use crate::select::plausible::is_open_wave;
 use crate::select::propose::Base;
+use crate::select::search::Search;
 
-use crate::select::evidence::{Explanation, overwhelming, worse_joints};
-use crate::select::search::{Search, bearing};
-
-/// Evidence that a curve without a name needs \[nats\].
-pub const CURVE_EVIDENCE: f64 = 25.0;
 /// A curve is not looked for at a joint whose variance is below this many times its white noise.
 const CURVE_EXCESS: f64 = 1.6;
-/// A curve must divide the variance that is left at its joint by this.
-pub const CURVE_SIZE: f64 = 1.35;
 /// Names that leave less of the variance than this on recordings that they were not fitted on carry over, and so do those that
 /// leave at most so many times the share that they leave where they were.
 const MOST_LEFT: f64 = 0.1;
@@ -26,24 +22,6 @@ const MOST_WORSE: f64 = 10.0;
 const MOST_OF_POSITION: usize = 3;
 /// That is asked where the variance without them is this many times the white noise.
 const LOUD: f64 = 4.0;
-
-/// Whether a curve in the joint says already what a hypothesis would: friction that is not plain, or a function of position. Beside the curve it could take any size that the curve takes back.
-pub fn is_drawn_already(fit: &Fit, hypothesis: Hypothesis) -> bool {
-    let drawn_over = hypothesis.effect.traits.drawn_over;
-    let joint = hypothesis.only_joint();
-    let draws = |active: &Active| {
-        active.curve.as_ref().is_some_and(|curve| {
-            let own = Some(curve.of_joint) == joint && active.hypothesis.only_joint() == joint;
-            let of_position = curve.against == Against::Position && !curve.by_direction;
-            own && if of_position {
-                drawn_over == Some(Against::Position)
-            } else {
-                drawn_over == Some(Against::Velocity) && active.is_friction_curve()
-            }
-        })
-    };
-    fit.actives.iter().any(draws)
-}
 
 impl Search<'_> {
     /// The explanation with a curve in a joint, where names do not do: beside the names, if much is left, or in place
@@ -56,7 +34,7 @@ impl Search<'_> {
         let own: Vec<usize> = (0..best.fit.actives.len())
             .filter(|&i| {
                 let hypothesis = &best.fit.actives[i].hypothesis;
-                hypothesis.only_joint() == Some(joint) && !is_drive(hypothesis)
+                hypothesis.only_joint() == Some(joint) && !hypothesis.is_torque_scale()
             })
             .collect();
         if own.iter().any(|&i| best.fit.actives[i].curve.is_some()) {
@@ -68,10 +46,7 @@ impl Search<'_> {
             let bare = self.stripped(best, &own, joint);
             let mut instead = self.with_curve(&bare, joint);
             // Friction it is, whatever bends its curve.
-            let shaped = |i: &usize| {
-                let hypothesis = best.fit.actives[*i].hypothesis;
-                !hypothesis.effect.is_plain_friction()
-            };
+            let shaped = |i: &usize| !best.fit.actives[*i].hypothesis.is_plain_friction();
             let shaped: Vec<usize> = own.iter().copied().filter(shaped).collect();
             let plain = self.with_plain_friction(&self.stripped(best, &shaped, joint), joint);
             let bent = self.with_curve(&plain, joint);
@@ -105,7 +80,7 @@ impl Search<'_> {
     /// The explanation with a curve in one joint in the place of all that lasted for an interval, if that does better: what comes
     /// back at a place, or time and again, looks like many pushes. They are evident, so that it need only beat them.
     pub fn described_for_intervals(&self, best: &Explanation) -> Option<Explanation> {
-        let once = |&i: &usize| best.fit.actives[i].hypothesis.effect.time() == Time::Once;
+        let once = |&i: &usize| best.fit.actives[i].hypothesis.time_kind() == TimeKind::Once;
         let intervals: Vec<usize> = (0..best.fit.actives.len()).filter(once).collect();
         if intervals.len() < 2 {
             return None;
@@ -161,7 +136,7 @@ impl Search<'_> {
     fn with_plain_friction(&self, from: &Explanation, joint: usize) -> Explanation {
         let plain = self.hypotheses.iter().filter(|h| {
             let missing = from.fit.actives.iter().all(|a| a.hypothesis != **h);
-            h.place.joint == joint && h.effect.is_plain_friction() && missing
+            h.place.joint == joint && h.is_plain_friction() && missing
         });
         let add = |from: Explanation, hypothesis: &Hypothesis| {
             let base = Base::new(self.problem, &from.fit, self.hypotheses.len());
@@ -196,23 +171,18 @@ impl Search<'_> {
                 let active = &best.fit.actives[i];
                 active.hypothesis.only_joint() == Some(joint)
                     && active.curve.is_none()
-                    && !is_drive(&active.hypothesis)
+                    && !active.hypothesis.is_torque_scale()
             };
             let names: Vec<usize> = (0..best.fit.actives.len()).filter(local).collect();
             let of = |i: usize| best.fit.actives[i].hypothesis;
-            let lasting = names.iter().all(|&i| of(i).effect.time() == Time::Always);
+            let lasting = names.iter().all(|&i| of(i).time_kind() == TimeKind::Always);
             let shaped = names.iter().any(|&i| !of(i).is_linear());
             if !lasting || !shaped {
                 continue;
             }
             let bare = self.stripped(&best, &names, joint);
-            let is_of_position =
-                |i: &&usize| of(**i).effect.traits.drawn_over == Some(Against::Position);
-            let of_position = names.iter().filter(is_of_position).count();
-            let open = names.iter().any(|&i| {
-                let made = of(i).effect.traits.is_made_by_gears;
-                !made(&best.fit.actives[i].coordinates)
-            });
+            let of_position = names.iter().filter(|&&i| of(i).is_of_position()).count();
+            let open = names.iter().any(|&i| is_open_wave(&best.fit.actives[i]));
             if (of_position > MOST_OF_POSITION || open)
                 && let Some(curve) = self.with_curve(&bare, joint)
             {

@@ -1,13 +1,14 @@
 //! What counts as evidence for a piece of physics, and how much of it is asked for.
 
 use nalgebra::{DMatrix, DVector};
-use tauscope_dynamics::Model;
-use tauscope_dynamics::terms::{CoordinateKind, Scale, Time};
+use tauscope_dynamics::terms::{Against, CoordinateKind};
 
+use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::fit::least_squares::Products;
-use crate::physics::active::{Active, Column, Hypothesis};
+use crate::physics::active::{Active, Hypothesis, TimeKind};
+use crate::select::explanation::Explanation;
 
 /// Evidence that a piece of physics needs \[nats\].
 pub const LEAST_EVIDENCE: f64 = 8.0;
@@ -33,25 +34,13 @@ const TIE_SHARE: f64 = 0.01;
 pub const REFINED: usize = 3;
 /// An exchange must gain this \[nats\].
 pub const LEAST_GAIN: f64 = 0.5;
-/// What began or ended so much beside a recording began or ended with it \[s\].
-const BESIDE_S: f64 = 0.5;
 
-/// A fit and the evidence for it, all penalties counted.
-#[derive(Debug, Clone)]
-pub struct Explanation {
-    /// The fit.
-    pub fit: Fit,
-    /// Penalty by active.
-    pub penalties: Vec<f64>,
-}
-
-impl Explanation {
-    /// Evidence for this rather than another \[nats\], rows weighted by their `worth`.
-    pub fn ahead_of(&self, other: &Self, worth: &[f64]) -> f64 {
-        let penalty = |e: &Self| e.penalties.iter().sum::<f64>();
-        self.fit.gain_over(&other.fit, worth) - penalty(self) + penalty(other)
-    }
-}
+/// Evidence that a curve without a name needs \[nats\].
+pub const CURVE_EVIDENCE: f64 = 25.0;
+/// A curve must divide the variance that is left at its joint by this.
+pub const CURVE_SIZE: f64 = 1.35;
+/// What contains a simpler effect must be ahead of it by this \[nats\], odds of twenty to one.
+pub const MORE_THAN_SIMPLE: f64 = 3.0;
 
 /// By how much a rival may be behind \[nats\] and still not be told from what has so much evidence.
 pub fn tie(evidence: f64) -> f64 {
@@ -68,7 +57,7 @@ pub fn overwhelming(explanation: &Explanation, other: &Explanation) -> bool {
     };
     let share = if more(&|a| a.curve.is_some()) {
         FAIR_SHARE_OF_CURVE
-    } else if more(&|a| a.hypothesis.effect.time() == Time::Once) {
+    } else if more(&|a| a.hypothesis.time_kind() == TimeKind::Once) {
         FAIR_SHARE_FOR_A_WHILE
     } else {
         FAIR_SHARE
@@ -122,59 +111,13 @@ pub fn wald(problem: &Problem, fit: &Fit) -> Vec<f64> {
         .collect()
 }
 
-/// What lasts for an interval of one recording lasts at most for this share of it; what lasts longer is not told from an offset.
-const LONGEST_SHARE: f64 = 0.75;
-
-/// Whether the times of a piece of physics are ones that tell something: what comes and goes does both within a recording.
-pub fn is_timely(problem: &Problem, active: &Active) -> bool {
-    let x = &active.coordinates;
-    match active.hypothesis.effect.time() {
-        Time::Once => {
-            let [.., start_s, end_s] = x[..] else {
-                return true;
-            };
-            problem.tracks.iter().map(|t| &t.track).any(|track| {
-                let first_s = track.session_s;
-                let length_s = track.time_s.last().copied().unwrap_or(0.0);
-                let within = start_s > first_s - BESIDE_S && end_s < first_s + length_s + BESIDE_S;
-                within && end_s - start_s <= LONGEST_SHARE * length_s
-            })
-        }
-        Time::Always | Time::Step | Time::EveryRecording => true,
-    }
-}
-
-/// Nearer than this to the end of its range, as a share of it, a shape is there.
-const AT_BOUND: f64 = 1e-3;
-
-/// Whether one of the shapes is where its range ends: then the effect may only be a way to say something else.
-pub fn at_bound(active: &Active) -> bool {
-    (0..active.coordinates.len()).any(|c| match active.kind(c) {
-        CoordinateKind::Shape {
-            lower,
-            upper,
-            scale: Scale::Log,
-            ..
-        } => {
-            let share = (active.coordinates[c] / lower).ln() / (upper / lower).ln();
-            !(AT_BOUND..=1.0 - AT_BOUND).contains(&share)
-        }
-        _ => false,
-    })
-}
-
-/// Whether the numbers are ones that a robot may have.
-pub fn plausible(active: &Active, model: &Model) -> bool {
-    let hypothesis = active.hypothesis;
-    let site = hypothesis.place.site(model);
-    hypothesis.effect.is_plausible(&site, &active.coordinates)
-}
+pub const ROTOR: &str = "rotor_inertia";
 
 /// Evidence and size that a piece of physics needs beside what `fit` holds.
 pub fn needs(hypothesis: Hypothesis, fit: &Fit) -> (f64, f64) {
     let joint = hypothesis.only_joint();
-    let once = hypothesis.effect.time() == Time::Once;
-    let goes_with = |a: &Active| hypothesis.effect.is_plain_friction() && a.is_friction_curve();
+    let once = hypothesis.time_kind() == TimeKind::Once;
+    let goes_with = |a: &Active| hypothesis.is_plain_friction() && a.is_friction_curve();
     let curve = |a: &Active| {
         a.curve.is_some() && (once || a.hypothesis.only_joint() == joint) && !goes_with(a)
     };
@@ -211,23 +154,36 @@ pub fn worse_joints(fit: &Fit, better: &Fit) -> Vec<usize> {
     (0..fit.variance.len()).filter(worse).collect()
 }
 
-pub fn describe(explanation: &Explanation) -> String {
-    let one = |active: &Active| {
-        let place = active.hypothesis.place;
-        let values: Vec<String> = active
-            .coordinates
-            .iter()
-            .map(|v| format!("{v:.4}"))
-            .collect();
-        format!(
-            "{}@{}/{}/{} [{}]",
-            active.hypothesis.effect.name,
-            place.joint,
-            place.source,
-            place.link,
-            values.join(", ")
-        )
+/// How many of one effect there may be at one place.
+pub fn most_at_one_place(hypothesis: Hypothesis) -> usize {
+    match hypothesis.effect.name {
+        "external_push" => 8,
+        "torque_ripple" => 2,
+        _ => 1,
+    }
+}
+
+/// Whether a curve in the joint says already what a hypothesis would: friction that is not plain, or a function of position. Beside the curve it could take any size that the curve takes back.
+pub fn is_drawn_already(fit: &Fit, hypothesis: Hypothesis) -> bool {
+    let bends = matches!(
+        hypothesis.effect.name,
+        "asymmetric_coulomb"
+            | "friction_step"
+            | "stribeck_friction"
+            | "presliding_hysteresis"
+            | "quadratic_drag"
+    );
+    let joint = hypothesis.only_joint();
+    let draws = |active: &Active| {
+        active.curve.as_ref().is_some_and(|curve| {
+            let own = Some(curve.of_joint) == joint && active.hypothesis.only_joint() == joint;
+            let of_position = curve.against == Against::Position && !curve.by_direction;
+            own && if of_position {
+                hypothesis.is_of_position()
+            } else {
+                bends && active.is_friction_curve()
+            }
+        })
     };
-    let all: Vec<String> = explanation.fit.actives.iter().map(one).collect();
-    all.join("; ")
+    fit.actives.iter().any(draws)
 }

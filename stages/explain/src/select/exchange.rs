@@ -1,11 +1,11 @@
 //! Each piece of physics is taken out in turn, and every rival tried in its place.
 
-use crate::physics::active::Hypothesis;
-use crate::physics::torque_scale::is_drive;
-use crate::select::evidence::{Explanation, LEAST_GAIN, describe};
+use crate::physics::active::{Hypothesis, TimeKind};
+use crate::select::evidence::LEAST_GAIN;
+use crate::select::explanation::{Explanation, describe};
+use crate::select::explanation::{Piece, pieces, place_of};
 use crate::select::propose::{Base, Proposal};
 use crate::select::search::Search;
-use tauscope_dynamics::terms::Time;
 
 /// A rival may gain this much less to first order than what it is to replace.
 const COULD_DO_BETTER: f64 = 0.85;
@@ -44,7 +44,7 @@ impl Search<'_> {
             }
         }
         // Several pushes may be one wall.
-        let once = |&i: &usize| best.fit.actives[i].hypothesis.effect.time() == Time::Once;
+        let once = |&i: &usize| best.fit.actives[i].hypothesis.time_kind() == TimeKind::Once;
         let pushes: Vec<usize> = (0..best.fit.actives.len()).filter(once).collect();
         if pushes.len() > 1 {
             let less = |from: Explanation, index: &usize| self.less(&from, *index);
@@ -82,7 +82,7 @@ impl Search<'_> {
     /// The better explanation that a wall makes in the place of all pushes, if it does: where it is, only a search tells, so that what
     /// it gains at first is no measure.
     fn walled(&self, best: &Explanation, without: &Explanation) -> Option<Explanation> {
-        let wall = |h: &&Hypothesis| h.effect.is_surface();
+        let wall = |h: &&Hypothesis| h.effect.name == "contact_wall";
         let hypothesis = self.hypotheses.iter().find(wall)?;
         let base = Base::new(self.problem, &without.fit, self.hypotheses.len());
         let proposal = base.propose_in_time(*hypothesis)?;
@@ -116,26 +116,4 @@ impl Search<'_> {
         let other = self.pruned(other);
         (other.ahead_of(best, worth) > LEAST_GAIN).then_some(other)
     }
-}
-
-/// A piece of physics: a hypothesis, and the how-manieth of its kind it is.
-pub type Piece = (Hypothesis, usize);
-
-pub fn pieces(explanation: &Explanation) -> Vec<Piece> {
-    let all: Vec<Hypothesis> = explanation
-        .fit
-        .actives
-        .iter()
-        .map(|a| a.hypothesis)
-        .collect();
-    let alike_before = |i: usize| all[..i].iter().filter(|h| **h == all[i]).count();
-    let numbered = (0..all.len()).map(|i| (all[i], alike_before(i)));
-    numbered.filter(|(h, _)| !is_drive(h)).collect()
-}
-
-/// Where a piece is in an explanation, if it still is.
-pub fn place_of(explanation: &Explanation, (hypothesis, alike_before): Piece) -> Option<usize> {
-    let actives = explanation.fit.actives.iter().enumerate();
-    let mut alike = actives.filter(|(_, a)| a.hypothesis == hypothesis);
-    alike.nth(alike_before).map(|(index, _)| index)
 }

@@ -2,11 +2,11 @@
 
 use crate::physics::active::Active;
 use crate::select::cross_validation::carries_over;
+use crate::select::evidence::{CURVE_EVIDENCE, REFINED, overwhelming};
+use crate::select::explanation::Explanation;
 use crate::select::parallel;
 use crate::select::propose::{Base, Proposal};
 
-use crate::select::curves::CURVE_EVIDENCE;
-use crate::select::evidence::{Explanation, REFINED, overwhelming};
 use crate::select::search::Search;
 
 impl Search<'_> {

@@ -1,22 +1,34 @@
 //! Effects that contain a simpler one, which is said unless the other is much likelier.
 
+use tauscope_dynamics::terms::effect;
+
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis};
+use crate::select::evidence::{LEAST_EVIDENCE, overwhelming, tie};
+use crate::select::explanation::{Explanation, describe};
+use crate::select::explanation::{pieces, place_of};
+use crate::select::plausible::at_bound;
 use crate::select::propose::penalty;
 
-use crate::select::evidence::{Explanation, LEAST_EVIDENCE, at_bound, describe, overwhelming, tie};
-use crate::select::exchange;
 use crate::select::search::Search;
 
-/// What contains a simpler effect must be ahead of it by this \[nats\], odds of twenty to one.
-pub const MORE_THAN_SIMPLE: f64 = 3.0;
+/// Effects that contain a simpler one, whose only number is their first.
+const SIMPLER: [(&str, &str); 7] = [
+    ("friction_step", "coulomb_friction"),
+    ("stribeck_friction", "coulomb_friction"),
+    ("asymmetric_coulomb", "coulomb_friction"),
+    ("presliding_hysteresis", "coulomb_friction"),
+    ("temperature_viscous", "viscous_friction"),
+    ("joint_elasticity", "rotor_inertia"),
+    ("backlash", "rotor_inertia"),
+];
 
 impl Search<'_> {
     /// Puts the simpler effect that a piece contains in its place, where it is not ahead by `enough` for the evidence for it
     /// \[nats\]; more is asked of a shape that ends its range.
     pub fn plainer(&self, mut best: Explanation, enough: impl Fn(f64) -> f64) -> Explanation {
-        for piece in exchange::pieces(&best) {
-            let Some(index) = exchange::place_of(&best, piece) else {
+        for piece in pieces(&best) {
+            let Some(index) = place_of(&best, piece) else {
                 continue;
             };
             let less = self.less(&best, index);
@@ -50,8 +62,11 @@ impl Search<'_> {
             coordinates,
             ..
         } = &best.fit.actives[index];
+        let (_, name) = SIMPLER
+            .iter()
+            .find(|(of, _)| *of == hypothesis.effect.name)?;
         let simple = Hypothesis {
-            effect: hypothesis.effect.simpler?.effect,
+            effect: effect(name)?,
             place: hypothesis.place,
         };
         let there = |a: &Active| a.hypothesis == simple;

@@ -6,11 +6,12 @@ use std::sync::Arc;
 use nalgebra::DVector;
 use tauscope_dynamics::terms::{CoordinateKind, PlaceKind, Scale};
 
+use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::fit::fitted::{Fit, likelihood, variances};
 use crate::fit::least_squares::Products;
-use crate::physics::active::{Active, Column, Hypothesis};
-use crate::physics::columns::columns;
+use crate::physics::active::{Active, Hypothesis};
+use crate::physics::friction::least;
 use crate::select::trial::{Factored, Trial};
 
 /// Steps of a shape of all joints.
@@ -124,7 +125,7 @@ impl<'a> Base<'a> {
 
     /// The same at one shape.
     pub fn glance_at(&self, hypothesis: Hypothesis, shape: &[f64]) -> Option<f64> {
-        let columns = columns(self.problem, self.fit, hypothesis, shape);
+        let columns = self.fit.columns(self.problem, hypothesis, shape);
         self.glance(hypothesis, columns.alone.as_ref(), &columns.factors)
     }
 
@@ -221,7 +222,7 @@ impl<'a> Base<'a> {
 
     /// The best factors of a hypothesis at one shape.
     pub fn propose_at(&self, hypothesis: Hypothesis, shape: &[f64]) -> Option<Proposal> {
-        let columns = columns(self.problem, self.fit, hypothesis, shape);
+        let columns = self.fit.columns(self.problem, hypothesis, shape);
         self.propose_columns(hypothesis, shape, columns.alone.as_ref(), &columns.factors)
     }
 
@@ -265,7 +266,7 @@ fn minimum(problem: &Problem, hypothesis: Hypothesis) -> Vec<f64> {
     let of = factors
         .iter()
         .map(|&i| match hypothesis.effect.coordinates[i].kind {
-            CoordinateKind::Factor { minimum, .. } => problem.least(hypothesis, minimum),
+            CoordinateKind::Factor { minimum, .. } => least(problem, hypothesis, minimum),
             _ => f64::NEG_INFINITY,
         });
     of.collect()

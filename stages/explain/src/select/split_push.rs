@@ -1,11 +1,10 @@
 //! A push that pauses is two.
 
-use tauscope_dynamics::terms::Time;
-
 use crate::fit::fitted::Fit;
-use crate::physics::active::Active;
+use crate::physics::active::{Active, TimeKind};
+use crate::select::evidence::TIE;
+use crate::select::explanation::{Explanation, describe};
 
-use crate::select::evidence::{Explanation, TIE, describe};
 use crate::select::search::Search;
 
 /// Forces that differ by less than this share of the larger, but for their sign, cancel.
@@ -42,7 +41,7 @@ impl Search<'_> {
 
 /// The two pushes that a long one makes with one on the same link that undoes it for a while within.
 fn two(long: &Active, pause: &Active) -> Option<(Active, Active)> {
-    let once = long.hypothesis.effect.time() == Time::Once;
+    let once = long.hypothesis.time_kind() == TimeKind::Once;
     let ([x, y, z, start, end], [u, v, w, from, to]) = (
         long.coordinates[..].try_into().ok()?,
         pause.coordinates[..].try_into().ok()?,

@@ -4,10 +4,10 @@ use std::borrow::Borrow;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::fit::fitted::{Fit, likelihood, variances};
 use crate::fit::least_squares::{Products, weighted_dot};
-use crate::physics::active::Column;
 
 /// Normal equations of a fit's own columns, factored once.
 #[derive(Debug)]

@@ -4,10 +4,11 @@
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use tauscope_dynamics::terms::{CoordinateKind, Time};
+use tauscope_dynamics::terms::CoordinateKind;
 
-use crate::physics::active::{Column, Hypothesis};
-use crate::physics::columns::columns;
+use crate::data::column::Column;
+use crate::physics::active::Hypothesis;
+use crate::physics::active::TimeKind;
 use crate::select::propose::{Base, Proposal, best_of};
 
 /// Shortest interval that is looked for \[s\].
@@ -24,12 +25,14 @@ const SCANNED_FACTORS: usize = 4;
 impl Base<'_> {
     /// The best of a hypothesis whose effect has a time.
     pub fn propose_in_time(&self, hypothesis: Hypothesis) -> Option<Proposal> {
-        match hypothesis.effect.time() {
-            Time::Always if hypothesis.effect.is_surface() => self.propose_wall(hypothesis),
-            Time::Always => self.propose(hypothesis),
-            Time::Step => self.propose_step(hypothesis),
-            Time::EveryRecording => self.propose_interval(hypothesis, None),
-            Time::Once => (0..self.problem.tracks.len())
+        match hypothesis.time_kind() {
+            TimeKind::Always if hypothesis.effect.name == "contact_wall" => {
+                self.propose_wall(hypothesis)
+            }
+            TimeKind::Always => self.propose(hypothesis),
+            TimeKind::Step => self.propose_step(hypothesis),
+            TimeKind::EveryRecording => self.propose_interval(hypothesis, None),
+            TimeKind::Once => (0..self.problem.tracks.len())
                 .filter_map(|track| self.propose_interval(hypothesis, Some(track)))
                 .max_by(|a, b| a.evidence().total_cmp(&b.evidence())),
         }
@@ -41,7 +44,7 @@ impl Base<'_> {
         let mut shape = vec![0.0; hypothesis.effect.coordinates.len()];
         let time = time_index(hypothesis)?;
         shape[time] = f64::NEG_INFINITY;
-        let all = columns(problem, self.fit, hypothesis, &shape);
+        let all = self.fit.columns(problem, hypothesis, &shape);
         // With the change before everything, the second factor's column is the whole effect.
         let whole = all.factors.last()?;
         let joint = hypothesis.only_joint()?;
@@ -93,7 +96,7 @@ impl Base<'_> {
         let [start, end] = times[..] else { return None };
         let mut shape = vec![0.0; hypothesis.effect.coordinates.len()];
         (shape[start], shape[end]) = (f64::NEG_INFINITY, f64::INFINITY);
-        let all = columns(problem, self.fit, hypothesis, &shape);
+        let all = self.fit.columns(problem, hypothesis, &shape);
         let all = &all.factors;
         let scanned = &all[..all.len().min(SCANNED_FACTORS)];
         let intervals = self.scan(scanned, only);
@@ -116,7 +119,7 @@ impl Base<'_> {
         let [start, end] = times[..] else { return None };
         let mut shape = vec![0.0; hypothesis.effect.coordinates.len()];
         (shape[start], shape[end]) = (f64::NEG_INFINITY, f64::INFINITY);
-        let all = columns(self.problem, self.fit, hypothesis, &shape);
+        let all = self.fit.columns(self.problem, hypothesis, &shape);
         let masked = self.all_within(&all.factors, (from_s, to_s), only);
         let session_s = only.map_or(0.0, |track| self.problem.tracks[track].track.session_s);
         (shape[start], shape[end]) = (session_s + from_s, session_s + to_s);

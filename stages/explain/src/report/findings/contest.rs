@@ -2,7 +2,8 @@
 
 use crate::physics::active::{Active, Hypothesis};
 use crate::report::sentences;
-use crate::select::evidence::{Explanation, tie};
+use crate::select::evidence::tie;
+use crate::select::explanation::Explanation;
 use crate::select::search::Search;
 
 /// How many rivals of a finding are refined, and how many are told.
@@ -53,7 +54,7 @@ pub fn contest(
         .clamp(0.0, 1.0);
         let reason = format!(
             "in the place of {} it takes away {:.0} % of the mismatch that this takes away; the recordings are {} times less likely with it",
-            active.hypothesis.effect.words.noun,
+            sentences::name(active.hypothesis.effect.name),
             100.0 * share,
             sentences::odds(behind)
         );

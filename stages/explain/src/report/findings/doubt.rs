@@ -3,13 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use tauscope_dynamics::Model;
-use tauscope_dynamics::terms::{Against, PlaceKind, Time};
+use tauscope_dynamics::terms::{Against, PlaceKind};
 
 use crate::data::problem::Problem;
-use crate::physics::active::{Active, Hypothesis};
-use crate::physics::torque_scale::is_drive;
-use crate::report::Finding;
-use crate::select::search::bearing;
+use crate::physics::active::{Active, Hypothesis, TimeKind};
+use crate::physics::kinematic_tree::bearing;
+use crate::report::schema::Finding;
 
 use super::Named;
 
@@ -24,7 +23,7 @@ const TOO_OFTEN: usize = 3;
 
 /// Doubts what is said of the physics that was found, and says why.
 pub fn doubt(named: &mut Named, problem: &Problem, actives: &[Active]) {
-    let said = actives.iter().filter(|a| !is_drive(&a.hypothesis));
+    let said = actives.iter().filter(|a| !a.hypothesis.is_torque_scale());
     for (finding, active) in named.findings.iter_mut().zip(said) {
         if is_shadowed(&problem.model, actives, active.hypothesis) {
             finding.confidence = DOUBTED;
@@ -47,8 +46,8 @@ pub fn doubt_patches(findings: &mut [Finding]) {
 /// Whether a body, or how gravity acts on it, is named beside a curve that a joint which carries it has without a name: what weighs
 /// there weighs here too, and the name could be part of it.
 fn is_shadowed(model: &Model, actives: &[Active], hypothesis: Hypothesis) -> bool {
-    let effect = hypothesis.effect;
-    let lasts = effect.time() == Time::Always && effect.lasts();
+    let lasts =
+        hypothesis.time_kind() == TimeKind::Always && hypothesis.effect.name != "contact_wall";
     let carriers = match hypothesis.effect.place {
         PlaceKind::Link | PlaceKind::Tool if lasts => bearing(model, hypothesis.place.link),
         PlaceKind::Base => (0..model.dof()).collect(),

@@ -5,15 +5,15 @@ use std::collections::BTreeMap;
 use nalgebra::DMatrix;
 use serde_json::Value;
 use tauscope_dynamics::terms::Layer;
-use tauscope_dynamics::terms::words::number;
 
 use crate::data::problem::Problem;
-use crate::explain::Input;
 use crate::fit::fitted::Fit;
 use crate::fit::interval::{HALF_WIDTH_95, parameter_deviations};
+use crate::fit::urdf_uncertainty::off_with_the_links;
 use crate::physics::active::Hypothesis;
-use crate::physics::start::KNOWN;
-use crate::physics::torque_scale::{is_drive, off_with_the_links};
+use crate::physics::parameter_units::{grows_with_effort, is_of_effort};
+use crate::read::input::Input;
+use crate::read::start::KNOWN;
 use crate::report::sentences;
 
 /// The scale of one drive \[A per N m\].
@@ -38,7 +38,7 @@ impl Scales {
     /// As a fit has them; how far they are known counts that the URDF's masses are not exact.
     pub fn of(problem: &Problem, fit: &Fit, spread: &DMatrix<f64>) -> Self {
         let drives: Vec<usize> = (0..fit.actives.len())
-            .filter(|&index| is_drive(&fit.actives[index].hypothesis))
+            .filter(|&index| fit.actives[index].hypothesis.is_torque_scale())
             .collect();
         if drives.is_empty() {
             return Self(Vec::new());
@@ -80,7 +80,7 @@ impl Scales {
         }
         let share = scale.deviation / scale.gain;
         for (name, value) in parameters {
-            let Some(number) = value.as_f64().filter(|_| sentences::is_of_effort(name)) else {
+            let Some(number) = value.as_f64().filter(|_| is_of_effort(name)) else {
                 continue;
             };
             let known = number / scale.gain;
@@ -147,7 +147,7 @@ impl StartScales {
             return;
         }
         for (name, interval) in intervals {
-            let scaled = sentences::is_of_effort(name) || sentences::grows_with_effort(name);
+            let scaled = is_of_effort(name) || grows_with_effort(name);
             if let Some(number) = parameters.get(name).and_then(Value::as_f64)
                 && scaled
             {
@@ -169,15 +169,15 @@ fn note(scale: &Scale, joints: &[String]) -> String {
         return format!(
             "The gain of joint {joint} is not identifiable: hardly any gravity or inertia acts on it in these recordings, and what \
              does hangs on how exact the URDF's masses are ({} A per N m, 95 % interval {} to {}). The numbers of its effects are in A.",
-            number(gain),
-            number(gain - half),
-            number(gain + half)
+            sentences::number(gain),
+            sentences::number(gain - half),
+            sentences::number(gain + half)
         );
     }
     format!(
         "The drive of joint {joint} has {} N m/A (95 % interval {} to {}).",
-        number(1.0 / gain),
-        number(1.0 / (gain + half)),
-        number(1.0 / (gain - half))
+        sentences::number(1.0 / gain),
+        sentences::number(1.0 / (gain + half)),
+        sentences::number(1.0 / (gain - half))
     )
 }

@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use tauscope_dynamics::terms::PlaceKind;
+use tauscope_dynamics::terms::{Layer, PlaceKind};
 
+use crate::data::column::Column;
 use crate::fit::fitted::Fit;
-use crate::physics::active::Column;
-use crate::physics::columns::columns;
-use crate::report::Undetectable;
-use crate::select::evidence::{Explanation, LEAST_EVIDENCE, LEAST_SIZE};
+use crate::report::schema::Undetectable;
+use crate::select::evidence::{LEAST_EVIDENCE, LEAST_SIZE};
+use crate::select::explanation::Explanation;
 use crate::select::propose::{Base, shapes};
 use crate::select::search::Search;
 
@@ -21,21 +21,23 @@ pub fn undetectable(
     let base = Base::new(search.problem, &found.fit, search.hypotheses.len());
     let mut all = Vec::new();
     for hypothesis in search.hypotheses {
-        let Some(told_as) = hypothesis.effect.traits.smallest_told_as else {
-            continue;
-        };
+        let factors = hypothesis.factors();
+        let simple = factors.len() == hypothesis.effect.coordinates.len()
+            && (factors.len() == 1 || hypothesis.effect.name == "payload")
+            && hypothesis.effect.place != PlaceKind::TwoJoints
+            && (hypothesis.effect.layer != Layer::Body || hypothesis.effect.name != "drive_gain");
         let there = found
             .fit
             .actives
             .iter()
             .any(|a| a.hypothesis == *hypothesis);
-        if there {
+        if !simple || there || hypothesis.effect.name == "link_mass" {
             continue;
         }
         let Some(shape) = shapes(search.problem, *hypothesis).into_iter().next() else {
             continue;
         };
-        let columns = columns(search.problem, &found.fit, *hypothesis, &shape);
+        let columns = found.fit.columns(search.problem, *hypothesis, &shape);
         let Some(column) = columns.factors.first() else {
             continue;
         };
@@ -55,11 +57,18 @@ pub fn undetectable(
                     .name
                     .clone()
             });
+        let parameter = hypothesis.effect.parameters[0].name.to_owned();
+        // A gain of 1 does nothing: what counts is how far from it.
+        let name = if parameter == "gain" {
+            "gain_minus_one".to_owned()
+        } else {
+            parameter
+        };
         all.push(Undetectable {
             effect: hypothesis.effect.name.to_owned(),
             joint,
             link,
-            smallest_findable: BTreeMap::from([(told_as.to_owned(), smallest)]),
+            smallest_findable: BTreeMap::from([(name, smallest)]),
         });
     }
     all

@@ -1,14 +1,13 @@
 //! The findings, a card each.
 
 use maud::{Markup, html};
-use tauscope_dynamics::terms::UNKNOWN;
 
 use super::chart::{Axis, r};
 use super::effects::{effect_at, effect_meaning, effect_title, place};
 use super::number_format::{almost_all, number_text, parameter, percent, value, with_digits_of};
 use super::proof;
+use crate::report::schema::{Finding, Report, Verdict};
 use crate::report::sentences::in_amperes;
-use crate::report::{Finding, Report, Verdict};
 
 /// A card a finding, or that there is none.
 pub(super) fn cards(report: &Report) -> Option<Markup> {
@@ -32,7 +31,7 @@ pub(super) fn cards(report: &Report) -> Option<Markup> {
 }
 
 fn card(number: usize, finding: &Finding) -> Markup {
-    let kind = if finding.effect == UNKNOWN.name {
+    let kind = if finding.effect == "unknown" {
         "card unknown"
     } else {
         "card"

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::chart::r;
 use super::number_format::{effort_unit, fixed, number_text, percent};
-use crate::report::{Located, Report, Verdict};
+use crate::report::schema::{Located, Report, Verdict};
 
 /// How many rows of a table are shown at once.
 const ROWS: usize = 10;

@@ -8,7 +8,7 @@ use super::effects::{effect_at, effect_title, place};
 use super::findings::list;
 use super::number_format::{number_text, parameter};
 use super::proof;
-use crate::report::{NextMotion, Rejected, Report, Undetectable, Verdict};
+use crate::report::schema::{NextMotion, Rejected, Report, Undetectable, Verdict};
 
 /// How many rejected rivals are shown at once.
 const ROWS: usize = 12;

@@ -1,7 +1,9 @@
 use serde_json::json;
 
 use super::*;
-use crate::report::{Finding, JointPicture, Located, NextMotion, Rejected, Rival, Undetectable};
+use crate::report::schema::{
+    Finding, JointPicture, Located, NextMotion, Rejected, Rival, Undetectable,
+};
 
 fn empty(verdict: Verdict) -> Report {
     Report {

@@ -6,7 +6,7 @@ use super::chart::{Axis, Panel, bulk, r};
 use super::effects::effect_title;
 use super::number_format::effort_unit;
 use super::proof::{Row, rows};
-use crate::report::{Finding, JointPicture, RecordingPicture, Report};
+use crate::report::schema::{Finding, JointPicture, RecordingPicture, Report};
 
 /// How many joints are shown without a click.
 const OPEN: usize = 5;
