@@ -95,12 +95,13 @@ fn main() {
         let config = tauscope_twin::Config::default();
         let mut twin = tauscope_twin::Twin::new(&config, setup, correction).expect("a twin");
         let config = tauscope_detect::Config {
-            twin_regression: Some(tauscope_detect::twin_regression::Settings::default()),
             threshold: tauscope_detect::Threshold {
                 score: Some(40.0),
                 sigmas: None,
             },
-            ..tauscope_detect::Config::default()
+            ..tauscope_detect::Config::of(
+                tauscope_detect::tajiri::twin_regression::Settings::default(),
+            )
         };
         let joint = tauscope_detect::JointSetup {
             gain: 1.0,
@@ -113,7 +114,7 @@ fn main() {
             model: Some(model.clone()),
             ..tauscope_detect::Setup::default()
         };
-        let mut detect = tauscope_detect::Detect::new(&config, setup).expect("a detector");
+        let mut detect = config.stage(setup).expect("a detector");
         let (mut twin_state, mut detection) =
             (Slot(TwinState::default()), Slot(Detection::default()));
         for sample in &kept.0 {

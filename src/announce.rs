@@ -1,7 +1,7 @@
 //! Says on the terminal what a detector or a watch finds, as it finds it.
 
 use tauscope_bus::{Detection, Emit, EventKind, LinkError, Stage, StageError, TwinState, flags};
-use tauscope_explain::watch;
+use tauscope_watch as watch;
 
 use crate::pipeline::CellFacts;
 

@@ -6,10 +6,10 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use tauscope_bus::{Emit, JointState, LinkError, Progress, SampleKind, Source, StageError};
 use tauscope_detect::Detect;
-use tauscope_explain::watch::{self, Watch};
 use tauscope_ingest::{IngestError, Paced, Rate, SimulatedRobot};
 use tauscope_record::{CellInfo, RecordError, Recorder, StreamInfo};
 use tauscope_twin::{Correction, Twin, TwinFile};
+use tauscope_watch::{self as watch, Watch};
 
 use crate::pipeline::{Cell, EffortUnit, Pipeline, Settings, Stage};
 use crate::provenance;
@@ -153,7 +153,7 @@ pub fn detect(
     let mut setup = detect_setup(model, cell)?;
     setup.shared = shared;
     trained::read(config, &mut setup)?;
-    Ok(Detect::new(config, setup)?)
+    Ok(config.stage(setup)?)
 }
 
 /// Says what speaks against running the detectors of `pipeline` (on `host`, if one is given) as they are set, though they can.

@@ -256,7 +256,7 @@ impl Job<'_> {
     /// Every detector behind this twin, its score not yet measured.
     fn detectors(&self, file: &TwinFile) -> Result<Vec<Scored>, ReplayError> {
         let setup = build::detect_setup(Some(file), self.cell)?;
-        let all = tauscope_detect::Config::every(&setup).map_err(build::BuildError::from)?;
+        let all = tauscope_detect::Config::calibrated(&setup).map_err(build::BuildError::from)?;
         Ok(all
             .into_iter()
             .map(|detector| (detector, Spread::default()))

@@ -20,11 +20,11 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use tauscope_bus::StageError;
-use tauscope_detect::{LearnError, Lesson, Lessons};
+use tauscope_detect::{Entry, LearnError, Lesson, Lessons};
 
 use self::heard::Heard;
 use self::input::{Named, Role};
-use self::registry::{Entry, SEEDS, Task};
+use self::registry::{SEEDS, Task};
 use self::runner::Runner;
 use self::twin::Prepared;
 use crate::build::BuildError;
@@ -341,6 +341,7 @@ fn learn(
                 // What its random siblings say, too, is said once.
                 let warning = runner.config.warning(&setup);
                 notes.extend(warning.filter(|warning| !notes.contains(warning)));
+                notes.extend(runner.config.all().filter_map(|settings| settings.note()));
                 runners.push(runner);
             }
             Err(EvaluateError::Learn { detector, source }) if !request.explicit => {

@@ -3,11 +3,10 @@
 use std::path::PathBuf;
 
 use tauscope_bus::{Detection, Emit, Stage, StageError, TwinState};
-use tauscope_detect::virtual_collision_sensor::Learnt;
-use tauscope_detect::{Config, Detect};
+use tauscope_detect::{Config, Detect, StateFile};
 
 use crate::report::Report;
-use crate::yaml;
+use crate::yaml::{self, Place};
 
 /// Time between two writes, in time of the stream \[ns\]. What was learnt since is lost if the process
 /// dies.
@@ -21,7 +20,9 @@ const WRITE_EVERY_NS: i64 = 60_000_000_000;
 pub fn resume(config: &mut Config) -> Result<Option<PathBuf>, Report> {
     let path = config.state_mut().cloned();
     if let Some(path) = path.as_ref().filter(|path| path.exists()) {
-        config.resume(yaml::load::<Learnt>(path)?.value);
+        let state = yaml::load::<StateFile>(path)?;
+        let resumed = config.resume(&state.value.0);
+        resumed.map_err(|error| state.at(&Place::root(), error.to_string()))?;
     }
     Ok(path)
 }
@@ -95,7 +96,7 @@ mod tests {
     use std::path::Path;
 
     use tauscope_bus::{Header, LinkError, flags};
-    use tauscope_detect::virtual_collision_sensor::{FirstBias, Settings};
+    use tauscope_detect::indri::virtual_collision_sensor::{FirstBias, Settings};
     use tauscope_detect::{JointSetup, Setup};
 
     use super::*;
@@ -110,14 +111,11 @@ mod tests {
     }
 
     fn kept(path: &Path) -> Kept {
-        let mut config = Config {
-            virtual_collision_sensor: Some(Settings {
-                bias: Some(FirstBias::InOrder(vec![1.0])),
-                state: Some(path.to_owned()),
-                ..Settings::default()
-            }),
-            ..Config::default()
-        };
+        let mut config = Config::of(Settings {
+            bias: Some(FirstBias::InOrder(vec![1.0])),
+            state: Some(path.to_owned()),
+            ..Settings::default()
+        });
         assert_eq!(resume(&mut config).unwrap().as_deref(), Some(path));
         let joint = JointSetup {
             gain: 1.0,
@@ -130,7 +128,7 @@ mod tests {
             joint_names: vec!["elbow".to_owned()],
             ..Setup::default()
         };
-        Kept::new(Detect::new(&config, setup).unwrap(), Some(path.to_owned()))
+        Kept::new(config.stage(setup).unwrap(), Some(path.to_owned()))
     }
 
     #[test]
@@ -154,7 +152,7 @@ mod tests {
         assert!(!path.exists());
         first.finish(&mut Nowhere).unwrap();
         let learnt = first.stage.learnt().unwrap();
-        assert!(learnt.joints["elbow"].ident > 0.0);
+        assert!(learnt["joints"]["elbow"]["ident"].as_f64() > Some(0.0));
         assert_eq!(kept(&path).stage.learnt().unwrap(), learnt);
     }
 
@@ -163,13 +161,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("learnt.yaml");
         std::fs::write(&path, "joints: {elbow: {ident: much}}\n").unwrap();
-        let mut config = Config {
-            virtual_collision_sensor: Some(Settings {
-                state: Some(path),
-                ..Settings::default()
-            }),
-            ..Config::default()
-        };
+        let mut config = Config::of(Settings {
+            state: Some(path),
+            ..Settings::default()
+        });
         assert!(resume(&mut config).is_err());
     }
 }

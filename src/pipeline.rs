@@ -94,7 +94,7 @@ pub enum Settings {
     /// A watch over a twin.
     Explain {
         /// From the pipeline file.
-        config: tauscope_explain::watch::Config,
+        config: tauscope_watch::Config,
         /// The model of the twin it listens to.
         model: Option<TwinFile>,
         /// That twin's low-pass on efforts \[Hz\].

@@ -331,8 +331,7 @@ fn members(pipeline: &Pipeline, source: &Stage) -> Vec<usize> {
 
 /// The pipeline's topics, for a recording of its robot.
 fn file_config(config: &tauscope_ingest::Config, recording: &Path) -> tauscope_ingest::FileConfig {
-    let topics = (config.file.as_ref().map(|file| &file.topics))
-        .or_else(|| config.zenoh.as_ref().map(|zenoh| &zenoh.topics));
+    let topics = config.source().ok().and_then(|(_, source)| source.topics());
     // What a simulated cell was asked for is in its archive, too.
     let simulated = || tauscope_ingest::Topics {
         learn: Some("/learn".to_owned()),

@@ -67,6 +67,20 @@ pub trait Source<T: Sample>: Send {
     }
 }
 
+impl<T: Sample, S: Source<T> + ?Sized> Source<T> for Box<S> {
+    fn step(&mut self, out: &mut dyn Emit<T>) -> Result<Progress, StageError> {
+        (**self).step(out)
+    }
+
+    fn dropped(&self) -> u64 {
+        (**self).dropped()
+    }
+
+    fn fraction_done(&self) -> Option<f64> {
+        (**self).fraction_done()
+    }
+}
+
 /// Turns a stream into another: a pure state machine, without I/O and without a clock of its own.
 pub trait Stage<I: Sample, O: Sample>: Send {
     /// Takes one sample and emits what follows from it.

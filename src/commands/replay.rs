@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use anyhow::Context as _;
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
-use tauscope_explain::watch::amount;
+use tauscope_watch::amount;
 
 use super::print;
 use crate::build;

@@ -87,7 +87,7 @@ enum Made {
     Source(Box<dyn tauscope_bus::Source<tauscope_bus::JointState>>),
     Twin(Box<tauscope_twin::Twin>),
     Detect(Box<Announced<Kept>>),
-    Watch(Box<Announced<tauscope_explain::watch::Watch>>),
+    Watch(Box<Announced<tauscope_watch::Watch>>),
     Record(Box<tauscope_record::Recorder>),
 }
 

@@ -7,12 +7,13 @@ mod twins;
 use std::path::{Path, PathBuf};
 
 use tauscope_archive::Recording;
+use tauscope_detect::{DETECTORS, Entry};
 use tauscope_dynamics::Model;
 use tauscope_ingest::Topics;
 use tauscope_twin::TwinFile;
 
 use super::labels::{self, LabelsFile, Truth};
-use super::registry::{self, Entry, Facts};
+use super::registry::Facts;
 use crate::files::SetFile;
 use crate::pipeline::Cell;
 use crate::replay::stem;
@@ -248,21 +249,10 @@ fn open(path: &Path, state: &str, contact: Option<&str>) -> Result<(i64, Option<
 
 /// Refuses what an evaluation finds itself among the detectors' settings.
 fn learnt_here(file: &Located<SetFile>, report: &mut Report) {
-    let mut given = file.value.detectors.clone();
-    let mut found: Vec<(&str, &str)> = (given.trained_files_mut())
-        .map(|(detector, _)| (detector, "model"))
-        .collect();
-    if given.state_mut().is_some() {
-        found.push(("virtual_collision_sensor", "state"));
-    }
-    let sensor = given.virtual_collision_sensor.as_ref();
-    if sensor.is_some_and(|settings| settings.learnt.is_some()) {
-        found.push(("virtual_collision_sensor", "learnt"));
-    }
-    let own = given.tauscope.as_ref();
-    if own.is_some_and(|settings| settings.learnt.is_some()) {
-        found.push(("tauscope", "learnt"));
-    }
+    let found = file.value.detectors.all().flat_map(|settings| {
+        let keys = settings.found_by_evaluation().into_iter();
+        keys.map(|key| (settings.name(), key))
+    });
     for (detector, key) in found {
         let place = Place::root().key("detectors").key(detector).key(key);
         let title = format!("`{key}` of {detector}: an evaluation lets every detector learn anew");
@@ -275,21 +265,19 @@ fn learnt_here(file: &Located<SetFile>, report: &mut Report) {
 
 fn detectors(names: &[String], facts: Facts, report: &mut Report) -> Vec<&'static Entry> {
     if names.is_empty() {
-        let usual = registry::ENTRIES
-            .iter()
-            .filter(|entry| (entry.usual)(facts));
+        let usual = DETECTORS.iter().filter(|entry| facts.suit(entry));
         return usual.collect();
     }
     if names == ["all"] {
-        return registry::ENTRIES.iter().collect();
+        return DETECTORS.iter().collect();
     }
     let mut found: Vec<&'static Entry> = Vec::new();
     for name in names {
-        match registry::ENTRIES.iter().find(|entry| entry.name == name) {
+        match DETECTORS.iter().find(|entry| entry.name == name) {
             Some(entry) if found.iter().any(|other| other.name == entry.name) => {}
             Some(entry) => found.push(entry),
             None => {
-                let known = registry::ENTRIES.iter().map(|entry| entry.name);
+                let known = DETECTORS.iter().map(|entry| entry.name);
                 let help = suggest::help(name, "the detectors are", known);
                 let title = format!("--detectors: there is no detector `{name}`");
                 report.push(Problem::new(title).maybe_help(help));

@@ -1,50 +1,15 @@
-//! Which detectors there are, and how each comes to its settings: a line a detector.
+//! Which detectors run on a set, and how each comes to its settings. What there is, the detectors' own table
+//! says ([`DETECTORS`](tauscope_detect::DETECTORS)).
 
 use std::path::PathBuf;
 
-use tauscope_detect::contact_tuning::Sweeps;
-use tauscope_detect::{
-    Config, LearnError, Lessons, Setup, contact_classifier, fisher_discriminant,
-    frequency_classifier, lstm_momentum_observer, point_autoencoder, point_ocsvm, tauscope,
-    virtual_collision_sensor, virtual_collision_sensor_basic, window_autoencoder, window_ocsvm,
-};
+use tauscope_detect::{Config, Entry, LearnError, Lessons, Setup, Suits, Sweeps};
 
 use super::input::{Named, Role};
 use crate::files::SetFile;
 use crate::trained;
 
-/// A detector that can be evaluated.
-#[derive(Debug)]
-pub struct Entry {
-    /// Its canonical name.
-    pub name: &'static str,
-    /// Whether chance has a part in its training: then it is trained with [`SEEDS`] seeds.
-    pub random: bool,
-    /// What its training is.
-    pub training: Training,
-    /// Whether it runs on a set where nobody names detectors.
-    pub usual: fn(Facts) -> bool,
-    /// Trains or tunes it: what its part of a pipeline file would be.
-    pub learn: fn(&Task<'_>) -> Result<Config, LearnError>,
-    /// The curves behind what it has learnt, where it was tuned by some.
-    pub sweeps: Option<Sweep>,
-}
-
-/// What the training of a detector is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Training {
-    /// It has none.
-    None,
-    /// The fit of the twin's gains and offsets.
-    Twin,
-    /// Its own.
-    Own,
-}
-
-/// The curves behind learnt settings.
-pub type Sweep = fn(&Config, &Task<'_>) -> Result<Option<Sweeps>, LearnError>;
-
-/// How many seeds a random detector is trained with.
+/// How many seeds a detector is trained with in whose training chance has a part.
 pub const SEEDS: u64 = 5;
 
 /// What there is to learn from.
@@ -67,12 +32,43 @@ pub struct Task<'a> {
 }
 
 impl Task<'_> {
-    /// What all detectors share.
-    fn shared(&self) -> Config {
-        Config {
+    /// Trains or tunes a detector: what its part of a pipeline file would be.
+    ///
+    /// # Errors
+    /// If it cannot learn from these recordings, or its weights cannot be written.
+    pub fn learn(&self, entry: &Entry) -> Result<Config, LearnError> {
+        let usual = (entry.settings)();
+        let given = self.given.given(entry).unwrap_or(&*usual);
+        let (mut settings, trained) = given.learn(&self.of_detector())?;
+        if let (Some(trained), Some(file)) = (trained, settings.trained_file()) {
+            *file = Some(trained::write(&self.weights, &self.lessons, trained)?);
+        }
+        let shared = Config {
             threshold: self.given.threshold,
             hold_s: self.given.hold_s,
             ..Config::default()
+        };
+        Ok(shared.with_any(settings))
+    }
+
+    /// The curves behind what was learnt, where a detector was tuned by some.
+    ///
+    /// # Errors
+    /// As [`learn`](Self::learn).
+    pub fn sweeps(&self, learnt: &Config) -> Result<Option<Sweeps>, LearnError> {
+        let mut all = learnt.all();
+        let sweeps = all
+            .next()
+            .map(|settings| settings.sweeps(&self.of_detector()));
+        Ok(sweeps.transpose()?.flatten())
+    }
+
+    fn of_detector(&self) -> tauscope_detect::Task<'_> {
+        tauscope_detect::Task {
+            setup: self.setup,
+            lessons: self.lessons,
+            free_first_s: self.free_first_s,
+            seed: self.seed,
         }
     }
 }
@@ -100,137 +96,14 @@ impl Facts {
             cyclic: set.cycle_s.is_some(),
         }
     }
-}
 
-fn always(_: Facts) -> bool {
-    true
-}
-
-/// Neither kinds nor a cycle: a robot on ever new paths.
-fn is_plain(facts: Facts) -> bool {
-    !facts.kinds && !facts.cyclic
-}
-
-fn tells_kinds(facts: Facts) -> bool {
-    facts.kinds
-}
-
-/// A detector without chance that judges sample by sample and runs on every set.
-const fn entry(name: &'static str, learn: fn(&Task<'_>) -> Result<Config, LearnError>) -> Entry {
-    Entry {
-        name,
-        random: false,
-        training: Training::Own,
-        usual: always,
-        learn,
-        sweeps: None,
+    /// Whether `entry` runs on such a set where nobody names detectors.
+    pub fn suit(self, entry: &Entry) -> bool {
+        match entry.suits {
+            Suits::All => true,
+            Suits::Cycles => self.cyclic,
+            Suits::Kinds => self.kinds,
+            Suits::NewPaths => !self.kinds && !self.cyclic,
+        }
     }
 }
-
-/// A detector by the name of its module, which is its own: `given` has nothing to learn, `tuned` learns its
-/// settings, `trained` weights that go to a file.
-macro_rules! detector {
-    (given $name:ident) => {
-        Entry {
-            training: Training::None,
-            ..entry(stringify!($name), |task| {
-                Ok(Config {
-                    $name: Some(task.given.$name.clone().unwrap_or_default()),
-                    ..task.shared()
-                })
-            })
-        }
-    };
-    (tuned $name:ident) => {
-        entry(stringify!($name), |task| {
-            let settings = task.given.$name.clone().unwrap_or_default();
-            let settings = $name::learn(&settings, task.setup, &task.lessons)?;
-            Ok(Config {
-                $name: Some(settings),
-                ..task.shared()
-            })
-        })
-    };
-    (trained $name:ident) => {
-        entry(stringify!($name), |task| {
-            let mut settings = task.given.$name.clone().unwrap_or_default();
-            let (lessons, seed) = (&task.lessons, task.seed);
-            let trained = $name::train(&settings, task.setup, lessons, seed, &mut |_| ())?;
-            settings.model = Some(trained::write(&task.weights, lessons, trained)?);
-            Ok(Config {
-                $name: Some(settings),
-                ..task.shared()
-            })
-        })
-    };
-}
-
-/// All of them, in the order of the tables.
-pub static ENTRIES: &[Entry] = &[
-    detector!(given naive_difference),
-    detector!(given momentum_observer),
-    Entry {
-        training: Training::Twin,
-        ..detector!(given twin_regression)
-    },
-    Entry {
-        usual: is_plain,
-        ..detector!(trained point_ocsvm)
-    },
-    Entry {
-        random: true,
-        usual: is_plain,
-        ..detector!(trained point_autoencoder)
-    },
-    Entry {
-        random: true,
-        usual: is_plain,
-        ..detector!(trained lstm_momentum_observer)
-    },
-    Entry {
-        usual: is_plain,
-        ..detector!(trained window_ocsvm)
-    },
-    Entry {
-        random: true,
-        usual: is_plain,
-        ..detector!(trained window_autoencoder)
-    },
-    Entry {
-        usual: |facts| facts.cyclic,
-        ..detector!(tuned virtual_collision_sensor_basic)
-    },
-    Entry {
-        usual: tells_kinds,
-        sweeps: Some(|config, task| {
-            let learnt = config.contact_classifier.as_ref();
-            learnt
-                .map(|learnt| contact_classifier::sweeps(learnt, task.setup, &task.lessons))
-                .transpose()
-        }),
-        ..detector!(tuned contact_classifier)
-    },
-    Entry {
-        usual: |facts| facts.cyclic,
-        ..detector!(tuned virtual_collision_sensor)
-    },
-    Entry {
-        usual: tells_kinds,
-        ..detector!(tuned fisher_discriminant)
-    },
-    Entry {
-        usual: tells_kinds,
-        ..detector!(tuned frequency_classifier)
-    },
-    entry("tauscope", |task| {
-        let mut settings = task.given.tauscope.clone().unwrap_or_default();
-        if settings.offset_from_first_s <= 0.0 {
-            settings.offset_from_first_s = task.free_first_s;
-        }
-        let settings = tauscope::learn(&settings, task.setup, &task.lessons)?;
-        Ok(Config {
-            tauscope: Some(settings),
-            ..task.shared()
-        })
-    }),
-];

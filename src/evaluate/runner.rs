@@ -4,12 +4,11 @@
 use std::time::Instant;
 
 use tauscope_bus::{Detection, Emit, LinkError, Stage as _, StageError, TwinState, flags};
-use tauscope_detect::contact_tuning::Sweeps;
-use tauscope_detect::{Config, Detect, Lesson, ScoreStatistics, Setup};
+use tauscope_detect::{Config, Entry, Lesson, ScoreStatistics, Setup, Sweeps, Training};
 
 use super::EvaluateError;
 use super::input::{Named, Role};
-use super::registry::{Entry, Task, Training};
+use super::registry::Task;
 use super::twin::is_free_of;
 use crate::build::BuildError;
 use crate::replay::{DetectionTally, Event};
@@ -78,16 +77,13 @@ impl Runner {
             source,
         };
         let began = Instant::now();
-        let config = (entry.learn)(task).map_err(failed)?;
+        let config = task.learn(entry).map_err(failed)?;
         let training_s = match entry.training {
             Training::None => f64::NAN,
             Training::Twin => task.twin_fit_s.unwrap_or(f64::NAN),
             Training::Own => began.elapsed().as_secs_f64(),
         };
-        let sweeps = match entry.sweeps {
-            Some(sweeps) => sweeps(&config, task).map_err(failed)?,
-            None => None,
-        };
+        let sweeps = task.sweeps(&config).map_err(failed)?;
         let measured = match task.lessons.validation {
             [] => task.lessons.train,
             some => some,
@@ -100,9 +96,11 @@ impl Runner {
                 detector: entry.name,
             })?;
         let trained = setup.trained.get(entry.name);
-        let largest_score = trained.and_then(|trained| trained.largest_score());
+        let largest_score = trained.and_then(|trained| (entry.largest_score)(trained));
         setup.scores.insert(entry.name.to_owned(), statistics);
-        Detect::new(&config, setup.clone()).map_err(|error| failed(error.into()))?;
+        config
+            .stage(setup.clone())
+            .map_err(|error| failed(error.into()))?;
         Ok(Self {
             entry,
             seed: task.seed,
@@ -122,10 +120,7 @@ impl Runner {
 
     /// How many samples it judges at once, if it judges windows.
     pub fn window(&self) -> Option<usize> {
-        let config = &self.config;
-        let one_class = config.window_ocsvm.as_ref().map(|settings| settings.window);
-        let autoencoder = config.window_autoencoder.as_ref();
-        one_class.or_else(|| autoencoder.map(|settings| settings.window))
+        self.config.all().find_map(|settings| settings.window())
     }
 
     /// Lets the next recording of the session pass through.
@@ -145,7 +140,7 @@ impl Runner {
             Role::Test => self.lowest,
             Role::Train | Role::Validation => self.statistics.mean,
         };
-        let mut stage = Detect::new(&self.now, self.setup.clone()).map_err(StageError::failed)?;
+        let mut stage = (self.now.stage(self.setup.clone())).map_err(StageError::failed)?;
         let mut not_judged = 0;
         let began = Instant::now();
         for sample in samples {
@@ -158,7 +153,7 @@ impl Runner {
         }
         let took_s = began.elapsed().as_secs_f64();
         if let Some(learnt) = stage.learnt() {
-            self.now.resume(learnt);
+            self.now.resume(&learnt).map_err(StageError::failed)?;
         }
         if recording.role != Role::Test {
             self.config.clone_from(&self.now);

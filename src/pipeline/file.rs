@@ -170,7 +170,7 @@ pub struct StageEntry {
     pub detect: Option<tauscope_detect::Config>,
     /// A watch over a twin: says when its residual changes character, and which physics changed.
     #[serde(default)]
-    pub explain: Option<tauscope_explain::watch::Config>,
+    pub explain: Option<tauscope_watch::Config>,
     /// A recorder: archive and picture.
     #[serde(default)]
     pub record: Option<tauscope_record::Config>,

@@ -7,7 +7,7 @@ mod outputs;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use tauscope_ingest::Input;
+use tauscope_ingest::SourceSettings;
 use tauscope_twin::{Expected, Motion, TwinFile};
 
 use super::cells::Cell;
@@ -16,6 +16,7 @@ use super::role::Role;
 use super::scenario::ScenarioFacts;
 use super::wiring::Wiring;
 use super::{Settings, stage_place};
+
 use crate::build;
 use crate::provenance;
 use crate::report::Report;
@@ -132,30 +133,25 @@ impl<'a> Resolver<'a> {
         place: &Place,
         config: &tauscope_ingest::Config,
     ) -> Option<Settings> {
-        let (path_place, what) = match config.input() {
-            Ok(Input::File(_)) => (place.key("file").key("path"), "recording"),
-            Ok(Input::Csv(_)) => (place.key("csv").key("path"), "table"),
-            Ok(Input::Simulate(_)) => (place.key("simulate").key("scenario"), "scenario"),
-            Ok(Input::Zenoh(zenoh)) => {
-                if zenoh.connect.is_empty() && zenoh.listen.is_empty() {
-                    let title = "nothing can reach this source: it neither connects nor listens";
-                    let problem = self.file.at_key(&place.key("zenoh"), title);
-                    self.report
-                        .push(problem.help("give `connect: [\"tcp/localhost:7447\"]`"));
-                }
-                (place.clone(), "")
-            }
+        let (key, source) = match config.source() {
+            Ok(source) => source,
             Err(error) => {
                 self.report.push(self.file.at_key(place, error.to_string()));
                 return None;
             }
         };
+        if let Some((title, help)) = source.fault() {
+            let problem = self.file.at_key(&place.key(key), title);
+            self.report.push(problem.help(help));
+        }
+        let file = source.file();
+        let path_place = file.map_or(place.clone(), |(path, _)| place.key(key).key(path));
         let mut config = config.clone();
-        for path in config.paths_mut() {
+        if let Some(path) = config.path_mut() {
             *path = self.file.resolve(path);
         }
-        let missing: Option<PathBuf> = config.paths_mut().find(|path| !path.exists()).cloned();
-        if let Some(path) = missing
+        let missing = config.path_mut().filter(|path| !path.exists()).cloned();
+        if let (Some(path), Some((_, what))) = (missing, file)
             && self.is_here(index)
         {
             let title = format!("there is no {what} {}", path.display());
@@ -190,7 +186,8 @@ impl<'a> Resolver<'a> {
         scenario: Option<&ScenarioFacts>,
     ) {
         let Some(cell) = self.cell(index) else { return };
-        if config.zenoh.is_some() || !self.is_here(index) {
+        let is_live = |(_, source): (_, &dyn SourceSettings)| source.file().is_none();
+        if config.source().is_ok_and(is_live) || !self.is_here(index) {
             return;
         }
         let opened = scenario
@@ -319,7 +316,7 @@ impl<'a> Resolver<'a> {
         &mut self,
         index: usize,
         place: &Place,
-        config: &tauscope_explain::watch::Config,
+        config: &tauscope_watch::Config,
     ) -> Option<Settings> {
         let twin = self.above(index, |role| role == Role::Twin);
         let model = twin.and_then(|twin| self.models.get(&twin));

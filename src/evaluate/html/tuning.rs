@@ -2,8 +2,7 @@
 //! (Salt Ducaju et al., section V).
 
 use maud::{Markup, html};
-use tauscope_detect::contact_classifier::Settings;
-use tauscope_detect::contact_tuning::{ClassSweep, FoundSweep, Sweeps, ThresholdSweep};
+use tauscope_detect::frame::{FoundSweep, Sweeps, ThresholdSweep};
 use tauscope_explain::html::chart::{Axis, Panel, r};
 
 use crate::evaluate::judged::Judged;
@@ -16,28 +15,24 @@ const TOP: f64 = 26.0;
 
 /// The curves of every detector that was tuned by some; none if there is none.
 pub(super) fn section(judged: &[Judged<'_>]) -> Option<Markup> {
-    let tuned: Vec<(&Judged<'_>, &Sweeps, &Settings)> = (judged.iter())
-        .filter_map(|judged| {
-            let runner = judged.run.first();
-            let settings = runner.config.contact_classifier.as_ref()?;
-            Some((judged, runner.sweeps.as_ref()?, settings))
-        })
+    let tuned: Vec<(&Judged<'_>, &Sweeps)> = (judged.iter())
+        .filter_map(|judged| Some((judged, judged.run.first().sweeps.as_ref()?)))
         .collect();
     (!tuned.is_empty()).then(|| {
         html! {
             p.lead { "What other thresholds would have done to the recordings that these were tuned on. Dashed: the tuned one." }
-            @for (judged, sweeps, settings) in &tuned {
+            @for (judged, sweeps) in &tuned {
                 div.card {
                     h3 { (judged.label) }
                     p.muted {
-                        "F" sub { "th" } " = " (format!("{:.2} N", settings.detection.force_threshold_n))
-                        ": above it the force's content of the band is a contact. γ = " (format!("{:.1}", settings.gamma))
+                        "F" sub { "th" } " = " (format!("{:.2} N", sweeps.force_threshold_n))
+                        ": above it the force's content of the band is a contact. γ = " (format!("{:.1}", sweeps.bound))
                         ": from it on a force points elsewhere than the motion, and is a cooperation."
                     }
                     div.scatters {
-                        @if let Some(picture) = delays(&sweeps.detection, settings) { (picture) }
-                        @if let Some(picture) = counts(&sweeps.detection, settings) { (picture) }
-                        @if let Some(picture) = kinds(&sweeps.class, settings.gamma) { (picture) }
+                        @if let Some(picture) = delays(sweeps) { (picture) }
+                        @if let Some(picture) = counts(sweeps) { (picture) }
+                        @if let Some(picture) = kinds(sweeps) { (picture) }
                     }
                 }
             }
@@ -51,18 +46,17 @@ fn thresholds(sweep: &[ThresholdSweep]) -> Vec<f64> {
 
 /// A picture over `F_th` with some lines: name, class and values.
 fn over_threshold(
-    sweep: &[ThresholdSweep],
-    settings: &Settings,
+    sweeps: &Sweeps,
     (title, y_name): (&str, &str),
     lines: &[(&str, &str, Vec<f64>)],
 ) -> Option<Markup> {
-    let xs = thresholds(sweep);
+    let xs = thresholds(&sweeps.detection);
     let values = lines.iter().flat_map(|(.., values)| values.iter().copied());
     let panel = Panel {
         x: Axis::over(xs.iter().copied(), LEFT, RIGHT)?,
         y: Axis::over(values.chain([0.0]), BOTTOM, TOP)?,
     };
-    let tuned = panel.x.px(settings.detection.force_threshold_n);
+    let tuned = panel.x.px(sweeps.force_threshold_n);
     Some(html! {
         figure {
             figcaption { b { (title) } }
@@ -76,7 +70,8 @@ fn over_threshold(
     })
 }
 
-fn delays(sweep: &[ThresholdSweep], settings: &Settings) -> Option<Markup> {
+fn delays(sweeps: &Sweeps) -> Option<Markup> {
+    let sweep = &sweeps.detection;
     let mean = |of: fn(&ThresholdSweep) -> &FoundSweep| -> Vec<f64> {
         sweep.iter().map(|at| 1e3 * of(at).mean_delay_s).collect()
     };
@@ -85,10 +80,11 @@ fn delays(sweep: &[ThresholdSweep], settings: &Settings) -> Option<Markup> {
         ("cooperations", "c0", mean(|at| &at.cooperations)),
     ];
     let names = ("Delay of what is found", "Mean delay [ms]");
-    over_threshold(sweep, settings, names, &lines)
+    over_threshold(sweeps, names, &lines)
 }
 
-fn counts(sweep: &[ThresholdSweep], settings: &Settings) -> Option<Markup> {
+fn counts(sweeps: &Sweeps) -> Option<Markup> {
+    let sweep = &sweeps.detection;
     let missed = |of: fn(&ThresholdSweep) -> &FoundSweep| -> Vec<f64> {
         sweep.iter().map(|at| of(at).missed as f64).collect()
     };
@@ -106,11 +102,12 @@ fn counts(sweep: &[ThresholdSweep], settings: &Settings) -> Option<Markup> {
         ("false alarms", "c6", false_alarms),
     ];
     let names = ("Missed and false", "Contacts, alarms");
-    over_threshold(sweep, settings, names, &lines)
+    over_threshold(sweeps, names, &lines)
 }
 
 /// Sensitivity against specificity over γ.
-fn kinds(sweep: &[ClassSweep], gamma: f64) -> Option<Markup> {
+fn kinds(sweeps: &Sweeps) -> Option<Markup> {
+    let (sweep, gamma) = (&sweeps.class, sweeps.bound);
     if sweep.is_empty() {
         return None;
     }

@@ -1,12 +1,13 @@
 //! Tables of all detectors beside each other.
 
+use tauscope_detect::Training;
+
 use super::{Table, mean_sd_ms, ms, number, over_seeds, part};
 use crate::evaluate::Evaluation;
 use crate::evaluate::input::Role;
 use crate::evaluate::judged::Judged;
 use crate::evaluate::metrics::Numbers;
 use crate::evaluate::metrics::numbers::SampleNumbers;
-use crate::evaluate::registry::Training;
 
 /// The twins, joint by joint: Tajiri and Iwamoto's equations 9 and 10.
 pub fn twins(evaluation: &Evaluation) -> Table {
@@ -251,7 +252,7 @@ pub fn unscored(evaluation: &Evaluation, judged: &[Judged<'_>]) -> Table {
 /// By link, the smallest force that `tauscope` finds, for its own wish and two others.
 pub fn smallest(judged: &[Judged<'_>]) -> Vec<Table> {
     let tables = judged.iter().filter_map(|one| {
-        let settings = one.run.first().config.tauscope.as_ref()?;
+        let settings = one.run.first().config.settings::<tauscope_detect::tauscope::Settings>()?;
         let wish = settings.false_alarms_per_hour;
         let usual = [(1.0, "one an hour"), (1.0 / (7.0 * 24.0), "one a week")];
         let mut wishes = vec![(wish, format!("{wish} an hour"))];

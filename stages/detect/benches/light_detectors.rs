@@ -15,11 +15,12 @@ use hdrhistogram::Histogram;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tauscope_bus::{Detection, Emit, LinkError, Stage, TwinState, flags};
-use tauscope_detect::fisher_discriminant::Discriminant;
+use tauscope_detect::frame::Discriminant;
+use tauscope_detect::indri::{virtual_collision_sensor, virtual_collision_sensor_basic};
+use tauscope_detect::salt_ducaju::{contact_classifier, fisher_discriminant, frequency_classifier};
+use tauscope_detect::tajiri::{momentum_observer, naive_difference, twin_regression};
 use tauscope_detect::{
-    Config, Detect, JointSetup, Lesson, Lessons, Setup, Shared, Threshold, contact_classifier,
-    fisher_discriminant, frequency_classifier, momentum_observer, naive_difference, tauscope,
-    twin_regression, virtual_collision_sensor, virtual_collision_sensor_basic,
+    Config, Detect, JointSetup, Lesson, Lessons, Setup, Shared, Threshold, tauscope,
 };
 use tauscope_dynamics::{Data, Model, rnea};
 
@@ -102,56 +103,29 @@ fn configs(joints: usize, setup: &Setup, free: &[TwinState]) -> Vec<Config> {
         ..Config::default()
     };
     vec![
-        Config {
-            twin_regression: Some(twin_regression::Settings::default()),
-            ..scored.clone()
-        },
-        Config {
-            naive_difference: Some(naive_difference::Settings::default()),
-            ..scored.clone()
-        },
-        Config {
-            momentum_observer: Some(momentum_observer::Settings::default()),
-            ..scored
-        },
-        Config {
-            virtual_collision_sensor_basic: Some(virtual_collision_sensor_basic::Settings {
-                bias: bias.clone(),
-                ..Default::default()
+        scored.clone().with(twin_regression::Settings::default()),
+        scored.clone().with(naive_difference::Settings::default()),
+        scored.with(momentum_observer::Settings::default()),
+        Config::of(virtual_collision_sensor_basic::Settings {
+            bias: bias.clone(),
+            ..Default::default()
+        }),
+        Config::of(virtual_collision_sensor::Settings {
+            bias,
+            learn: virtual_collision_sensor::Learn::AtStart,
+            learning_s: 1.0,
+            ..Default::default()
+        }),
+        Config::of(contact_classifier::Settings::default()),
+        Config::of(fisher_discriminant::Settings {
+            discriminant: Some(Discriminant {
+                weights: [-1.0; 6],
+                bound: 0.0,
             }),
-            ..Config::default()
-        },
-        Config {
-            virtual_collision_sensor: Some(virtual_collision_sensor::Settings {
-                bias,
-                learn: virtual_collision_sensor::Learn::AtStart,
-                learning_s: 1.0,
-                ..Default::default()
-            }),
-            ..Config::default()
-        },
-        Config {
-            contact_classifier: Some(contact_classifier::Settings::default()),
-            ..Config::default()
-        },
-        Config {
-            fisher_discriminant: Some(fisher_discriminant::Settings {
-                discriminant: Some(Discriminant {
-                    weights: [-1.0; 6],
-                    bound: 0.0,
-                }),
-                ..Default::default()
-            }),
-            ..Config::default()
-        },
-        Config {
-            frequency_classifier: Some(frequency_classifier::Settings::default()),
-            ..Config::default()
-        },
-        Config {
-            tauscope: Some(learnt.expect("20 s of contact-free samples")),
-            ..Config::default()
-        },
+            ..Default::default()
+        }),
+        Config::of(frequency_classifier::Settings::default()),
+        Config::of(learnt.expect("20 s of contact-free samples")),
     ]
 }
 
@@ -200,7 +174,7 @@ fn main() {
     };
     let (free, pushed) = (samples(&model, false), samples(&model, true));
     let configs = configs(n, &setup, &free);
-    let stage = |config: &Config| Detect::new(config, setup.clone()).expect("a detector");
+    let stage = |config: &Config| config.stage(setup.clone()).expect("a detector");
 
     let [mut clock, mut floor, mut apart, mut together] = [(); 4].map(|()| histogram());
     let mut alone: Vec<_> = (configs.iter())
@@ -237,7 +211,7 @@ fn main() {
                 shared,
                 ..setup.clone()
             };
-            let stage = |config: &Config| Detect::new(config, setup.clone()).expect("a detector");
+            let stage = |config: &Config| config.stage(setup.clone()).expect("a detector");
             let mut all: Vec<Detect> = configs.iter().map(stage).collect();
             for sample in &free {
                 let sample = warm(sample);

@@ -6,11 +6,10 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use tauscope_bus::{Detection, Emit, Header, LinkError, Stage, TwinState, flags};
-use tauscope_detect::{
-    Config, Detect, JointSetup, Lesson, Lessons, Setup, Threshold, contact_classifier,
-    frequency_classifier, momentum_observer, naive_difference, tauscope, twin_regression,
-    virtual_collision_sensor, virtual_collision_sensor_basic,
-};
+use tauscope_detect::indri::{virtual_collision_sensor, virtual_collision_sensor_basic};
+use tauscope_detect::salt_ducaju::{contact_classifier, frequency_classifier};
+use tauscope_detect::tajiri::{momentum_observer, naive_difference, twin_regression};
+use tauscope_detect::{Config, JointSetup, Lesson, Lessons, Setup, Threshold, tauscope};
 use tauscope_dynamics::Model;
 
 /// The system's allocator, counting per thread.
@@ -84,49 +83,25 @@ fn nothing_is_allocated_per_sample() {
         ..Config::default()
     };
     let configs = [
-        Config {
-            twin_regression: Some(twin_regression::Settings::default()),
-            ..scored.clone()
-        },
-        Config {
-            naive_difference: Some(naive_difference::Settings::default()),
-            ..scored.clone()
-        },
-        Config {
-            momentum_observer: Some(momentum_observer::Settings::default()),
-            ..scored
-        },
-        Config {
-            contact_classifier: Some(contact_classifier::Settings::default()),
-            ..Config::default()
-        },
-        Config {
-            frequency_classifier: Some(frequency_classifier::Settings::default()),
-            ..Config::default()
-        },
-        Config {
-            virtual_collision_sensor_basic: Some(virtual_collision_sensor_basic::Settings {
-                bias: bias.clone(),
-                ..Default::default()
-            }),
-            ..Config::default()
-        },
-        Config {
-            virtual_collision_sensor: Some(virtual_collision_sensor::Settings {
-                bias,
-                learn: virtual_collision_sensor::Learn::AtStart,
-                learning_s: 1.0,
-                ..Default::default()
-            }),
-            ..Config::default()
-        },
-        Config {
-            tauscope: Some(learnt(&setup)),
-            ..Config::default()
-        },
+        scored.clone().with(twin_regression::Settings::default()),
+        scored.clone().with(naive_difference::Settings::default()),
+        scored.with(momentum_observer::Settings::default()),
+        Config::of(contact_classifier::Settings::default()),
+        Config::of(frequency_classifier::Settings::default()),
+        Config::of(virtual_collision_sensor_basic::Settings {
+            bias: bias.clone(),
+            ..Default::default()
+        }),
+        Config::of(virtual_collision_sensor::Settings {
+            bias,
+            learn: virtual_collision_sensor::Learn::AtStart,
+            learning_s: 1.0,
+            ..Default::default()
+        }),
+        Config::of(learnt(&setup)),
     ];
     for config in configs {
-        let mut detect = Detect::new(&config, setup.clone()).unwrap();
+        let mut detect = config.stage(setup.clone()).unwrap();
         let mut before = 0;
         for i in 0..2000_i32 {
             if i == WARM {

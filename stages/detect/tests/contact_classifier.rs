@@ -8,10 +8,11 @@ use std::sync::LazyLock;
 
 use common::Out;
 use tauscope_bus::{Detection, EventKind, Header, Stage, TwinState, flags};
-use tauscope_detect::contact_signals::SignalSettings;
+use tauscope_detect::salt_ducaju::contact_signals::SignalSettings;
+use tauscope_detect::salt_ducaju::{contact_classifier, fisher_discriminant, frequency_classifier};
 use tauscope_detect::{
-    Config, ConfigError, ContactKind, Detect, JointSetup, LabelledContact, LearnError, Lesson,
-    Lessons, Setup, contact_classifier, fisher_discriminant, frequency_classifier,
+    Config, ConfigError, ContactKind, JointSetup, LabelledContact, LearnError, Lesson, Lessons,
+    Setup,
 };
 use tauscope_dynamics::{Data, Model, forward_kinematics, link_jacobian};
 
@@ -88,20 +89,17 @@ fn sample(ms: i64, qd: [f64; 3], force_n: [f64; 3]) -> TwinState {
 }
 
 fn classifier() -> Config {
-    Config {
-        contact_classifier: Some(contact_classifier::Settings {
-            signals: SignalSettings {
-                window: 200,
-                ..SignalSettings::default()
-            },
-            ..contact_classifier::Settings::default()
-        }),
-        ..Config::default()
-    }
+    Config::of(contact_classifier::Settings {
+        signals: SignalSettings {
+            window: 200,
+            ..SignalSettings::default()
+        },
+        ..contact_classifier::Settings::default()
+    })
 }
 
 fn run(config: &Config, samples: impl IntoIterator<Item = TwinState>) -> Vec<Detection> {
-    let mut detect = Detect::new(config, setup()).unwrap();
+    let mut detect = config.stage(setup()).unwrap();
     let mut out = Out::default();
     for sample in samples {
         detect.accept(&sample, &mut out).unwrap();
@@ -216,16 +214,15 @@ fn an_alarm_does_not_outlast_a_gap() {
 
 #[test]
 fn the_frequency_classifier_goes_by_the_second_threshold() {
-    let config = |collision_threshold_n| Config {
-        frequency_classifier: Some(frequency_classifier::Settings {
+    let config = |collision_threshold_n| {
+        Config::of(frequency_classifier::Settings {
             signals: SignalSettings {
                 window: 200,
                 ..SignalSettings::default()
             },
             collision_threshold_n,
             ..frequency_classifier::Settings::default()
-        }),
-        ..Config::default()
+        })
     };
     let samples = || (0..600).map(|ms| sample(ms, [0.0; 3], ramp(ms, 400, [0.0, 15.0, 40.0])));
     for (threshold, state) in [(1.0, "collision"), (1e3, "cooperation")] {
@@ -237,7 +234,7 @@ fn the_frequency_classifier_goes_by_the_second_threshold() {
 
 #[test]
 fn a_band_that_the_stream_does_not_hold_ends_the_stage_with_the_reason() {
-    let mut detect = Detect::new(&classifier(), setup()).unwrap();
+    let mut detect = classifier().stage(setup()).unwrap();
     let mut out = Out::default();
     let mut slow = (0..600).map(|i| sample(10 * i, [0.0; 3], [0.0; 3]));
     let error = slow.find_map(|sample| detect.accept(&sample, &mut out).err());
@@ -250,11 +247,8 @@ fn a_band_that_the_stream_does_not_hold_ends_the_stage_with_the_reason() {
 
 #[test]
 fn a_discriminant_that_has_learnt_nothing_does_not_run() {
-    let config = Config {
-        fisher_discriminant: Some(fisher_discriminant::Settings::default()),
-        ..Config::default()
-    };
-    let error = Detect::new(&config, setup()).err();
+    let config = Config::of(fisher_discriminant::Settings::default());
+    let error = config.stage(setup()).err();
     let detector = "fisher_discriminant";
     assert_eq!(error, Some(ConfigError::NotLearnt { detector }));
 }
@@ -286,7 +280,8 @@ fn tuning_finds_all_and_nothing_false_and_parts_the_kinds() {
         train: &train,
         validation: &[],
     };
-    let settings = classifier().contact_classifier.unwrap();
+    let config = classifier();
+    let settings = config.settings::<contact_classifier::Settings>().unwrap();
     let learnt = contact_classifier::learn(&settings, &setup(), &lessons).unwrap();
     let threshold = learnt.detection.force_threshold_n;
     assert!((0.005..0.2).contains(&threshold), "{threshold}");
@@ -318,7 +313,8 @@ fn tuning_finds_all_and_nothing_false_and_parts_the_kinds() {
 
 #[test]
 fn tuning_without_both_kinds_or_labels_says_so() {
-    let settings = classifier().contact_classifier.unwrap();
+    let config = classifier();
+    let settings = config.settings::<contact_classifier::Settings>().unwrap();
     let learn = |train: &[Lesson]| {
         let lessons = Lessons {
             train,

@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use tauscope_detect::ContactKind;
-use tauscope_detect::contact_machine::{Machine, MachineSettings, NewContact, Rule};
-use tauscope_detect::contact_signals::Instant;
+use tauscope_detect::salt_ducaju::contact_machine::{Machine, MachineSettings, NewContact, Rule};
+use tauscope_detect::salt_ducaju::contact_signals::Instant;
 
 const MS: i64 = 1_000_000;
 

@@ -6,11 +6,13 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
 use tauscope_bus::{Header, TwinState, flags};
-use tauscope_detect::learned::TrainingSettings;
+use tauscope_detect::tajiri::learned::TrainingSettings;
+use tauscope_detect::tajiri::{
+    lstm_momentum_observer, point_autoencoder, point_ocsvm, window_autoencoder, window_ocsvm,
+};
 use tauscope_detect::{
-    Config, ConfigError, ContactKind, Detect, Detector, JointSetup, LabelledContact, LearnError,
-    Lesson, Lessons, Setup, Trained, TrainedError, lstm_momentum_observer, point_autoencoder,
-    point_ocsvm, window_autoencoder, window_ocsvm,
+    Config, ConfigError, ContactKind, Detector, JointSetup, LabelledContact, LearnError, Lesson,
+    Lessons, Setup, Trained, TrainedError,
 };
 use tauscope_dynamics::Model;
 
@@ -103,34 +105,27 @@ fn quick(epochs: usize, batch: usize) -> TrainingSettings {
 /// Every detector: its name, how many samples a score rests on, a quick training, and its part of a
 /// pipeline file.
 fn detectors() -> [(&'static str, usize, Train, Config); 5] {
-    let none = Config::default;
     [
         (
-            point_ocsvm::NAME,
+            "point_ocsvm",
             1,
             |setup, lessons, seed| {
                 let settings = point_ocsvm::Settings::default();
-                point_ocsvm::train(&settings, setup, lessons, seed, &mut |_| ())
+                point_ocsvm::train(&settings, setup, lessons, seed)
             },
-            Config {
-                point_ocsvm: Some(point_ocsvm::Settings::default()),
-                ..none()
-            },
+            Config::of(point_ocsvm::Settings::default()),
         ),
         (
-            window_ocsvm::NAME,
+            "window_ocsvm",
             16,
             |setup, lessons, seed| {
                 let settings = window_ocsvm::Settings::default();
-                window_ocsvm::train(&settings, setup, lessons, seed, &mut |_| ())
+                window_ocsvm::train(&settings, setup, lessons, seed)
             },
-            Config {
-                window_ocsvm: Some(window_ocsvm::Settings::default()),
-                ..none()
-            },
+            Config::of(window_ocsvm::Settings::default()),
         ),
         (
-            point_autoencoder::NAME,
+            "point_autoencoder",
             1,
             |setup, lessons, seed| {
                 let settings = point_autoencoder::Settings {
@@ -138,15 +133,12 @@ fn detectors() -> [(&'static str, usize, Train, Config); 5] {
                     training: quick(20, 100),
                     ..point_autoencoder::Settings::default()
                 };
-                point_autoencoder::train(&settings, setup, lessons, seed, &mut |_| ())
+                point_autoencoder::train(&settings, setup, lessons, seed)
             },
-            Config {
-                point_autoencoder: Some(point_autoencoder::Settings::default()),
-                ..none()
-            },
+            Config::of(point_autoencoder::Settings::default()),
         ),
         (
-            window_autoencoder::NAME,
+            "window_autoencoder",
             16,
             |setup, lessons, seed| {
                 let settings = window_autoencoder::Settings {
@@ -154,15 +146,12 @@ fn detectors() -> [(&'static str, usize, Train, Config); 5] {
                     training: quick(20, 20),
                     ..window_autoencoder::Settings::default()
                 };
-                window_autoencoder::train(&settings, setup, lessons, seed, &mut |_| ())
+                window_autoencoder::train(&settings, setup, lessons, seed)
             },
-            Config {
-                window_autoencoder: Some(window_autoencoder::Settings::default()),
-                ..none()
-            },
+            Config::of(window_autoencoder::Settings::default()),
         ),
         (
-            lstm_momentum_observer::NAME,
+            "lstm_momentum_observer",
             20,
             |setup, lessons, seed| {
                 let settings = lstm_momentum_observer::Settings {
@@ -171,12 +160,9 @@ fn detectors() -> [(&'static str, usize, Train, Config); 5] {
                     training: quick(15, 200),
                     ..lstm_momentum_observer::Settings::default()
                 };
-                lstm_momentum_observer::train(&settings, setup, lessons, seed, &mut |_| ())
+                lstm_momentum_observer::train(&settings, setup, lessons, seed)
             },
-            Config {
-                lstm_momentum_observer: Some(lstm_momentum_observer::Settings::default()),
-                ..none()
-            },
+            Config::of(lstm_momentum_observer::Settings::default()),
         ),
     ]
 }
@@ -292,7 +278,7 @@ fn what_was_touched_is_not_learnt() {
             validation: &[],
         };
         let settings = window_ocsvm::Settings::default();
-        window_ocsvm::train(&settings, &setup(), &lessons, 1, &mut |_| ()).unwrap()
+        window_ocsvm::train(&settings, &setup(), &lessons, 1).unwrap()
     };
     assert!(pushed(4.0).facts().samples < 1160);
     assert_eq!(pushed(4.0).facts().samples, pushed(0.0).facts().samples);
@@ -308,7 +294,7 @@ fn another_robots_detector_is_refused_and_both_robots_joints_are_named() {
     let (name, _, learn, config) = detectors().into_iter().nth(1).unwrap();
     let other = setup_of(&ARM.replace("name=\"b\"", "name=\"elbow\""));
     let trained = learn(&other, &lessons, 1).unwrap();
-    let Err(error) = Detect::new(&config, with(name, trained)) else {
+    let Err(error) = config.stage(with(name, trained)) else {
         panic!("a detector for other joints was taken");
     };
     let text = error.to_string();
@@ -319,7 +305,7 @@ fn another_robots_detector_is_refused_and_both_robots_joints_are_named() {
 fn a_detector_without_its_training_says_so() {
     for (name, _, _, config) in detectors() {
         assert_eq!(
-            Detect::new(&config, setup()).err(),
+            config.stage(setup()).err(),
             Some(ConfigError::NotTrained { detector: name })
         );
     }
@@ -378,13 +364,12 @@ fn settings_out_of_range_are_refused_by_name() {
         stride: 0,
         ..window_ocsvm::Settings::default()
     };
-    let error = window_ocsvm::train(&settings, &setup(), &lessons, 1, &mut |_| ()).unwrap_err();
+    let error = window_ocsvm::train(&settings, &setup(), &lessons, 1).unwrap_err();
     assert!(error.to_string().contains("`stride`"), "{error}");
     let settings = point_autoencoder::Settings {
         layers: vec![5, 0, 5],
         ..point_autoencoder::Settings::default()
     };
-    let error =
-        point_autoencoder::train(&settings, &setup(), &lessons, 1, &mut |_| ()).unwrap_err();
+    let error = point_autoencoder::train(&settings, &setup(), &lessons, 1).unwrap_err();
     assert!(error.to_string().contains("`layers`"), "{error}");
 }

@@ -4,7 +4,7 @@
 #![allow(clippy::float_cmp, reason = "tests compare what must be the same bits")]
 
 use tauscope_bus::{Header, TwinState, flags};
-use tauscope_detect::momentum::MomentumObserver;
+use tauscope_detect::frame::momentum::MomentumObserver;
 use tauscope_detect::{ConfigError, JointSetup, Setup};
 use tauscope_dynamics::{Data, Model, forward_dynamics, rnea};
 

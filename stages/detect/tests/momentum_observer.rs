@@ -3,7 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use tauscope_bus::{Header, TwinState, flags};
-use tauscope_detect::{Config, ConfigError, JointSetup, Setup, momentum_observer};
+use tauscope_detect::tajiri::momentum_observer;
+use tauscope_detect::{Config, ConfigError, JointSetup, Setup};
 use tauscope_dynamics::Model;
 
 const ARM: &str = r#"<robot name="arm"><link name="base"/>
@@ -26,10 +27,7 @@ fn setup(gain: f64, offset: f64) -> Setup {
 }
 
 fn config() -> Config {
-    Config {
-        momentum_observer: Some(momentum_observer::Settings::default()),
-        ..Config::default()
-    }
+    Config::of(momentum_observer::Settings::default())
 }
 
 /// A resting arm, `i` hundredths of a second in: the model says 3, the motor 5.

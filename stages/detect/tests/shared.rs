@@ -6,12 +6,11 @@ mod common;
 
 use common::Out;
 use tauscope_bus::{Detection, Stage, TwinState, flags};
-use tauscope_detect::fisher_discriminant::Discriminant;
-use tauscope_detect::{
-    Config, Detect, JointSetup, Setup, Shared, Threshold, contact_classifier, fisher_discriminant,
-    frequency_classifier, momentum_observer, virtual_collision_sensor,
-    virtual_collision_sensor_basic,
-};
+use tauscope_detect::frame::Discriminant;
+use tauscope_detect::indri::{virtual_collision_sensor, virtual_collision_sensor_basic};
+use tauscope_detect::salt_ducaju::{contact_classifier, fisher_discriminant, frequency_classifier};
+use tauscope_detect::tajiri::momentum_observer;
+use tauscope_detect::{Config, Detect, JointSetup, Setup, Shared, Threshold};
 use tauscope_dynamics::Model;
 
 const ARM: &str = r#"<robot name="arm">
@@ -52,44 +51,28 @@ fn what_is_shared_changes_nothing() {
     let bias = || Some(virtual_collision_sensor::FirstBias::InOrder(vec![0.5; 2]));
     let configs = [
         Config {
-            momentum_observer: Some(momentum_observer::Settings::default()),
             threshold: Threshold {
                 score: Some(9.0),
                 sigmas: None,
             },
-            ..Config::default()
+            ..Config::of(momentum_observer::Settings::default())
         },
-        Config {
-            contact_classifier: Some(contact_classifier::Settings::default()),
-            ..Config::default()
-        },
-        Config {
-            fisher_discriminant: Some(fisher_discriminant::Settings {
-                discriminant,
-                ..Default::default()
-            }),
-            ..Config::default()
-        },
-        Config {
-            frequency_classifier: Some(frequency_classifier::Settings::default()),
-            ..Config::default()
-        },
-        Config {
-            virtual_collision_sensor_basic: Some(virtual_collision_sensor_basic::Settings {
-                bias: bias(),
-                ..Default::default()
-            }),
-            ..Config::default()
-        },
-        Config {
-            virtual_collision_sensor: Some(virtual_collision_sensor::Settings {
-                bias: bias(),
-                learn: virtual_collision_sensor::Learn::AtStart,
-                learning_s: 0.5,
-                ..Default::default()
-            }),
-            ..Config::default()
-        },
+        Config::of(contact_classifier::Settings::default()),
+        Config::of(fisher_discriminant::Settings {
+            discriminant,
+            ..Default::default()
+        }),
+        Config::of(frequency_classifier::Settings::default()),
+        Config::of(virtual_collision_sensor_basic::Settings {
+            bias: bias(),
+            ..Default::default()
+        }),
+        Config::of(virtual_collision_sensor::Settings {
+            bias: bias(),
+            learn: virtual_collision_sensor::Learn::AtStart,
+            learning_s: 0.5,
+            ..Default::default()
+        }),
     ];
     let run = |shared: Option<Shared>| {
         let joint = JointSetup {
@@ -105,7 +88,7 @@ fn what_is_shared_changes_nothing() {
             shared,
             ..Setup::default()
         };
-        let stage = |config| Detect::new(config, setup.clone()).unwrap();
+        let stage = |config: &Config| config.stage(setup.clone()).unwrap();
         let mut stages: Vec<Detect> = configs.iter().map(stage).collect();
         let mut out = Out::default();
         for sample in &samples() {

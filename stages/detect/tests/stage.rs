@@ -8,10 +8,8 @@ use std::collections::BTreeMap;
 
 use common::Out;
 use tauscope_bus::{Detection, EventKind, Header, Stage, TwinState, flags};
-use tauscope_detect::{
-    Config, ConfigError, Detect, JointSetup, ScoreStatistics, Setup, Threshold, naive_difference,
-    twin_regression,
-};
+use tauscope_detect::tajiri::{naive_difference, twin_regression};
+use tauscope_detect::{Config, ConfigError, Detect, JointSetup, ScoreStatistics, Setup, Threshold};
 use tauscope_dynamics::{Data, Model, forward_kinematics, link_jacobian};
 
 /// Three joints in a row, axes z, y, y, half a metre apart.
@@ -48,10 +46,7 @@ fn setup() -> Setup {
 }
 
 fn twin_regression() -> Config {
-    Config {
-        twin_regression: Some(twin_regression::Settings::default()),
-        ..Config::default()
-    }
+    Config::of(twin_regression::Settings::default())
 }
 
 /// A twin's sample at `i` hundredths of a second with this residual.
@@ -79,7 +74,7 @@ fn run(detect: &mut Detect, samples: impl IntoIterator<Item = TwinState>) -> Vec
 
 #[test]
 fn the_score_is_the_squared_residual_and_the_threshold_mean_plus_four_deviations() {
-    let mut detect = Detect::new(&twin_regression(), setup()).unwrap();
+    let mut detect = twin_regression().stage(setup()).unwrap();
     let verdict = run(&mut detect, [sample(0, [1.0, -2.0, 0.5])])[0];
     assert!((verdict.score - 5.25).abs() < 1e-12);
     assert!((verdict.threshold - 3.0).abs() < 1e-12);
@@ -97,13 +92,13 @@ fn a_score_at_the_threshold_is_a_contact() {
         },
         ..twin_regression()
     };
-    let mut detect = Detect::new(&config, setup()).unwrap();
+    let mut detect = config.stage(setup()).unwrap();
     assert!(run(&mut detect, [sample(0, [2.0, 0.0, 0.0])])[0].alarm());
 }
 
 #[test]
 fn an_alarm_has_one_beginning_and_one_end() {
-    let mut detect = Detect::new(&twin_regression(), setup()).unwrap();
+    let mut detect = twin_regression().stage(setup()).unwrap();
     let pushed = 20..40;
     let residual = |i: i64| {
         if pushed.contains(&i) {
@@ -130,7 +125,7 @@ fn an_alarm_has_one_beginning_and_one_end() {
 
 #[test]
 fn what_the_twin_does_not_vouch_for_raises_no_alarm() {
-    let mut detect = Detect::new(&twin_regression(), setup()).unwrap();
+    let mut detect = twin_regression().stage(setup()).unwrap();
     let mut unsettled = sample(0, [9.0; 3]);
     unsettled.header.flags = 0;
     let verdict = run(&mut detect, [unsettled])[0];
@@ -141,14 +136,13 @@ fn what_the_twin_does_not_vouch_for_raises_no_alarm() {
 #[test]
 fn naive_difference_undoes_gain_and_offset() {
     let config = Config {
-        naive_difference: Some(naive_difference::Settings::default()),
         threshold: Threshold {
             score: Some(1.0),
             sigmas: None,
         },
-        ..Config::default()
+        ..Config::of(naive_difference::Settings::default())
     };
-    let mut detect = Detect::new(&config, setup()).unwrap();
+    let mut detect = config.stage(setup()).unwrap();
     let mut at = sample(0, [0.0; 3]);
     for j in 0..3 {
         // The model said 5; the twin made 2 * 5 + 1 of it; measured were 11.
@@ -179,7 +173,7 @@ fn the_touched_link_and_the_force_are_found() {
             // The external torque is minus the residual.
             at.residual[j] = -row.dot(&force);
         }
-        let mut detect = Detect::new(&twin_regression(), setup()).unwrap();
+        let mut detect = twin_regression().stage(setup()).unwrap();
         let verdict = run(&mut detect, [at])[0];
         assert_eq!(verdict.link.as_str(), name);
         assert!(verdict.header.has(flags::FORCE));
@@ -195,21 +189,18 @@ fn the_touched_link_and_the_force_are_found() {
 
 #[test]
 fn a_configuration_that_says_too_much_or_too_little_is_refused() {
-    let none = Detect::new(&Config::default(), setup()).err().unwrap();
+    let none = Config::default().stage(setup()).err().unwrap();
     assert_eq!(none, ConfigError::OneDetector { found: 0 });
-    let two = Config {
-        naive_difference: Some(naive_difference::Settings::default()),
-        ..twin_regression()
-    };
+    let two = twin_regression().with(naive_difference::Settings::default());
     assert_eq!(
-        Detect::new(&two, setup()).err().unwrap(),
+        two.stage(setup()).err().unwrap(),
         ConfigError::OneDetector { found: 2 }
     );
     let unmeasured = Setup {
         scores: BTreeMap::new(),
         ..setup()
     };
-    let error = Detect::new(&twin_regression(), unmeasured).err().unwrap();
+    let error = twin_regression().stage(unmeasured).err().unwrap();
     assert!(error.to_string().contains("tauscope calibrate"), "{error}");
     let both = Config {
         threshold: Threshold {
@@ -219,7 +210,7 @@ fn a_configuration_that_says_too_much_or_too_little_is_refused() {
         ..twin_regression()
     };
     assert_eq!(
-        Detect::new(&both, setup()).err().unwrap(),
+        both.stage(setup()).err().unwrap(),
         ConfigError::TwoThresholds
     );
 }

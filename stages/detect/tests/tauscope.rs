@@ -58,11 +58,8 @@ fn learnt(settings: &tauscope::Settings) -> tauscope::Settings {
 }
 
 fn detector(settings: tauscope::Settings) -> Detect {
-    let config = Config {
-        tauscope: Some(settings),
-        ..Config::default()
-    };
-    Detect::new(&config, setup(JOINTS)).unwrap()
+    let config = Config::of(settings);
+    config.stage(setup(JOINTS)).unwrap()
 }
 
 fn run(detector: &mut Detect, samples: &[TwinState]) -> Vec<Detection> {
@@ -177,12 +174,9 @@ fn too_short_a_lesson_says_how_much_is_wanted() {
 
 #[test]
 fn nothing_learnt_and_another_robot_are_refused() {
-    let config = |settings| Config {
-        tauscope: Some(settings),
-        ..Config::default()
-    };
+    let config = |settings| Config::of(settings);
     let bare = config(tauscope::Settings::default());
-    let refused = |config: &Config, setup| Detect::new(config, setup).err().unwrap();
+    let refused = |config: &Config, setup| config.stage(setup).err().unwrap();
     assert!(matches!(
         refused(&bare, setup(JOINTS)),
         ConfigError::NotLearnt { .. }
@@ -365,11 +359,8 @@ fn taught_by(train: &[Lesson]) -> Detect {
         validation: &[],
     };
     let learnt = tauscope::learn(&tauscope::Settings::default(), &with_model(), &lessons).unwrap();
-    let config = Config {
-        tauscope: Some(learnt),
-        ..Config::default()
-    };
-    Detect::new(&config, with_model()).unwrap()
+    let config = Config::of(learnt);
+    config.stage(with_model()).unwrap()
 }
 
 #[test]
@@ -408,10 +399,7 @@ fn too_little_contact_free_time_is_said_and_the_threshold_stays_usable() {
             validation: &[],
         };
         let settings = tauscope::Settings::default();
-        Config {
-            tauscope: Some(tauscope::learn(&settings, &setup(JOINTS), &lessons).unwrap()),
-            ..Config::default()
-        }
+        Config::of(tauscope::learn(&settings, &setup(JOINTS), &lessons).unwrap())
     };
     let (little, much) = (learnt_from(600), learnt_from(6000));
     assert_eq!(much.warning(&setup(JOINTS)), None);
@@ -421,10 +409,7 @@ fn too_little_contact_free_time_is_said_and_the_threshold_stays_usable() {
     for sample in &mut samples[1000..1050] {
         sample.effort[1] -= 1.5;
     }
-    let onsets = onsets(&run(
-        &mut Detect::new(&little, setup(JOINTS)).unwrap(),
-        &samples,
-    ));
+    let onsets = onsets(&run(&mut little.stage(setup(JOINTS)).unwrap(), &samples));
     assert_eq!(onsets.len(), 1, "{onsets:?}");
     assert!((1000..1005).contains(&onsets[0]), "{onsets:?}");
 }

@@ -8,7 +8,7 @@ use common::Out;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tauscope_bus::{EventKind, Stage, TwinState, flags};
-use tauscope_detect::{Config, Detect, Lesson, Lessons, Setup, tauscope};
+use tauscope_detect::{Config, Lesson, Lessons, Setup, tauscope};
 use tauscope_dynamics::Model;
 
 /// One upright joint; its inertia is 0.6 kg m².
@@ -69,11 +69,8 @@ fn onsets(setup: &Setup, samples: &[TwinState]) -> usize {
         validation: &[],
     };
     let learnt = tauscope::learn(&tauscope::Settings::default(), setup, &lessons).unwrap();
-    let config = Config {
-        tauscope: Some(learnt),
-        ..Config::default()
-    };
-    let mut detector = Detect::new(&config, setup.clone()).unwrap();
+    let config = Config::of(learnt);
+    let mut detector = config.stage(setup.clone()).unwrap();
     let mut out = Out::default();
     for sample in samples {
         detector.accept(sample, &mut out).unwrap();

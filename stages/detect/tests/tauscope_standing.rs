@@ -70,11 +70,8 @@ fn taught_by(arm: impl Fn(u64) -> Vec<TwinState>) -> Detect {
     };
     let settings =
         tauscope::learn(&tauscope::Settings::default(), &setup(JOINTS), &lessons).unwrap();
-    let config = Config {
-        tauscope: Some(settings),
-        ..Config::default()
-    };
-    Detect::new(&config, setup(JOINTS)).unwrap()
+    let config = Config::of(settings);
+    config.stage(setup(JOINTS)).unwrap()
 }
 
 /// When alarms begin and end \[s\].

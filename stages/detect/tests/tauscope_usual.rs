@@ -8,7 +8,7 @@ use common::{Out, setup};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tauscope_bus::{Detection, EventKind, JointArray, Stage, TwinState, flags};
-use tauscope_detect::{Config, Detect, Lesson, Lessons, tauscope};
+use tauscope_detect::{Config, Lesson, Lessons, tauscope};
 
 const JOINTS: usize = 2;
 const STEP_NS: i64 = 10_000_000;
@@ -54,11 +54,8 @@ fn learnt(all: impl IntoIterator<Item = Vec<TwinState>>) -> tauscope::Settings {
 }
 
 fn run(settings: tauscope::Settings, samples: &[TwinState]) -> Vec<Detection> {
-    let config = Config {
-        tauscope: Some(settings),
-        ..Config::default()
-    };
-    let mut detector = Detect::new(&config, setup(JOINTS)).unwrap();
+    let config = Config::of(settings);
+    let mut detector = config.stage(setup(JOINTS)).unwrap();
     let mut out = Out::default();
     for sample in samples {
         detector.accept(sample, &mut out).unwrap();

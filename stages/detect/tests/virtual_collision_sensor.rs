@@ -7,10 +7,13 @@ mod common;
 
 use common::Out;
 use tauscope_bus::{Detection, EventKind, Header, Stage, TwinState, flags};
-use tauscope_detect::virtual_collision_sensor::{FirstBias, Learn, Learnt};
+use tauscope_detect::indri::virtual_collision_sensor::{FirstBias, Learn, Learnt};
+use tauscope_detect::indri::{
+    virtual_collision_sensor as adaptive, virtual_collision_sensor_basic as basic,
+};
 use tauscope_detect::{
     Config, ConfigError, ContactKind, Detect, JointSetup, LabelledContact, LearnError, Lesson,
-    Lessons, Setup, virtual_collision_sensor as adaptive, virtual_collision_sensor_basic as basic,
+    Lessons, Setup,
 };
 
 /// Samples a second.
@@ -100,6 +103,11 @@ fn setup() -> Setup {
     }
 }
 
+/// What a sensor has learnt while running.
+fn state(detect: &Detect) -> Learnt {
+    serde_json::from_value(detect.learnt().unwrap()).unwrap()
+}
+
 /// The first bias, learnt on these joints.
 fn learnt_on<const N: usize>(joints: [&str; N]) -> Learnt {
     let joint = adaptive::LearntJoint {
@@ -113,17 +121,11 @@ fn learnt_on<const N: usize>(joints: [&str; N]) -> Learnt {
 }
 
 fn basic_with(settings: basic::Settings) -> Config {
-    Config {
-        virtual_collision_sensor_basic: Some(settings),
-        ..Config::default()
-    }
+    Config::of(settings)
 }
 
 fn adaptive_with(settings: adaptive::Settings) -> Config {
-    Config {
-        virtual_collision_sensor: Some(settings),
-        ..Config::default()
-    }
+    Config::of(settings)
 }
 
 fn basic() -> Config {
@@ -142,7 +144,7 @@ fn settings() -> adaptive::Settings {
 }
 
 fn detect(config: &Config) -> Detect {
-    Detect::new(config, setup()).unwrap()
+    config.stage(setup()).unwrap()
 }
 
 fn run(detect: &mut Detect, samples: &[TwinState]) -> Vec<Detection> {
@@ -244,7 +246,7 @@ fn remark_2_at_the_start_it_is_not_ready_and_raises_nothing() {
 fn remark_3_without_a_request_the_first_bias_stays_for_ever() {
     let mut detect = detect(&adaptive_with(settings()));
     run(&mut detect, &arm(0.0, 60.0, World::default()));
-    for joint in detect.learnt().unwrap().joints.values() {
+    for joint in state(&detect).joints.values() {
         assert!((joint.start - BIAS).abs() < f64::EPSILON && joint.adapt_s.is_none());
         // The estimation runs all the same.
         assert!(joint.ident > 0.0 && joint.ident < BIAS);
@@ -306,7 +308,7 @@ fn learning_at_the_start_is_asked_for_once_in_a_sensors_life() {
     let verdicts = run(&mut first, &arm(0.0, 20.0, World::default()));
     assert_eq!(verdicts[500].state.as_str(), "learning");
     let again = adaptive::Settings {
-        learnt: first.learnt(),
+        learnt: Some(state(&first)),
         ..at_start
     };
     let verdicts = run(
@@ -333,7 +335,7 @@ fn a_collision_teaches_nothing_not_even_the_way_up_to_its_alarm() {
             };
             found += alarms(&run(&mut sensor, &arm(start_s, 8.0, world))).len();
         }
-        (found, sensor.learnt().unwrap())
+        (found, state(&sensor))
     };
     let (none, clean) = learnt_beside(None);
     let (found, touched) = learnt_beside(Some((5.5, 0.4, 4.0)));
@@ -357,7 +359,7 @@ fn what_was_learnt_goes_on_in_the_next_life_as_if_there_had_been_one() {
     let mut one_life = detect(&adaptive_with(learning.clone()));
     run(&mut one_life, &before);
     let next = adaptive::Settings {
-        learnt: one_life.learnt(),
+        learnt: Some(state(&one_life)),
         ..learning
     };
     let whole = run(&mut one_life, &after);
@@ -377,8 +379,8 @@ fn what_was_learnt_goes_to_the_joint_of_its_name_in_whatever_order_joints_come()
     });
     let mut turned = setup();
     turned.joint_names.reverse();
-    let stage = Detect::new(&config, turned).unwrap();
-    assert_eq!(stage.learnt(), Some(learnt));
+    let stage = config.stage(turned).unwrap();
+    assert_eq!(state(&stage), learnt);
     let mut hit = arm(0.0, 4.0, World::default());
     for sample in &mut hit[900..950] {
         // The elbow comes first now, and learnt that 0.25 A more are a collision.
@@ -459,7 +461,7 @@ fn the_bias_is_learnt_from_what_is_free_of_contact() {
 
 #[test]
 fn what_does_not_fit_is_refused_in_words() {
-    let refused = |config: &Config| Detect::new(config, setup()).err().unwrap();
+    let refused = |config: &Config| config.stage(setup()).err().unwrap();
     let error = refused(&basic_with(basic::Settings::default()));
     assert!(matches!(error, ConfigError::NoBias { .. }));
     let three = basic::Settings {

@@ -45,57 +45,6 @@ impl Default for Config {
     }
 }
 
-impl Config {
-    /// The one source that is configured.
-    ///
-    /// # Errors
-    /// If there is none, or more than one.
-    pub fn input(&self) -> Result<Input<'_>, ConfigError> {
-        let mut inputs = [
-            self.file.as_ref().map(Input::File),
-            self.csv.as_ref().map(Input::Csv),
-            self.zenoh.as_ref().map(Input::Zenoh),
-            self.simulate.as_ref().map(Input::Simulate),
-        ]
-        .into_iter()
-        .flatten();
-        let first = inputs.next();
-        let others = inputs.count();
-        match (first, others) {
-            (Some(input), 0) => Ok(input),
-            (first, others) => Err(ConfigError::OneSource {
-                found: others + usize::from(first.is_some()),
-            }),
-        }
-    }
-
-    /// Every path in it, so that the program can resolve them against the pipeline file.
-    pub fn paths_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
-        [
-            self.file.as_mut().map(|file| &mut file.path),
-            self.csv.as_mut().map(|csv| &mut csv.path),
-            self.simulate
-                .as_mut()
-                .map(|simulate| &mut simulate.scenario),
-        ]
-        .into_iter()
-        .flatten()
-    }
-}
-
-/// The source that a [`Config`] names.
-#[derive(Debug, Clone, Copy)]
-pub enum Input<'a> {
-    /// A recording.
-    File(&'a FileConfig),
-    /// A table.
-    Csv(&'a CsvConfig),
-    /// Live messages.
-    Zenoh(&'a ZenohConfig),
-    /// A simulated cell.
-    Simulate(&'a SimulateConfig),
-}
-
 /// A recording.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -336,9 +285,8 @@ mod tests {
         let config =
             parse("{file: {path: a.mcap, topics: {command: /joint_commands}}, rate: 2.5}").unwrap();
         assert_eq!(config.rate, Rate::Factor(2.5));
-        let Ok(Input::File(file)) = config.input() else {
-            panic!("{:?}", config.input())
-        };
+        assert_eq!(config.source().map(|(name, _)| name), Ok("file"));
+        let file = config.file.unwrap();
         assert_eq!(file.topics.state, "/joint_states");
         assert_eq!(file.topics.command.as_deref(), Some("/joint_commands"));
         assert_eq!(
@@ -351,12 +299,12 @@ mod tests {
     fn no_source_or_two_are_refused() {
         let none = parse("{rate: realtime}").unwrap();
         assert_eq!(
-            none.input().unwrap_err(),
+            none.source().map(|_| ()).unwrap_err(),
             ConfigError::OneSource { found: 0 }
         );
         let two = parse("{file: {path: a}, zenoh: {}}").unwrap();
         assert_eq!(
-            two.input().unwrap_err(),
+            two.source().map(|_| ()).unwrap_err(),
             ConfigError::OneSource { found: 2 }
         );
     }

@@ -8,23 +8,22 @@
 mod archived_twin;
 mod config;
 mod error;
-mod open;
 mod pacing;
 mod pack;
 mod recorded;
 mod setup;
 pub mod simulated;
+mod sources;
 mod zenoh;
 
 pub use archived_twin::{ArchivedTwin, ArchivedTwinTopics};
 pub use config::{
-    Config, ConfigError, CsvConfig, FileConfig, Input, Keys, Rate, SimulateConfig, Topics,
-    ZenohConfig,
+    Config, ConfigError, CsvConfig, FileConfig, Keys, Rate, SimulateConfig, Topics, ZenohConfig,
 };
 pub use error::IngestError;
-pub use open::{SimulatedRobot, open};
 pub use pacing::Paced;
 pub use pack::{PackCounts, PackError};
 pub use recorded::RecordedSource;
 pub use setup::{Setup, Tool};
+pub use sources::{Entry, Opening, SOURCES, SimulatedRobot, SourceSettings, open};
 pub use zenoh::{ZenohCounts, ZenohSource};

@@ -3,26 +3,41 @@
 use super::windows::Windows;
 
 /// An alarm ends where the score has stayed below this share of the threshold.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const RELEASE: f64 = 0.35;
 /// For so long \[s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const HOLD_S: f64 = 0.1;
-/// Another contact on top of one: the residual changes by this many times the threshold against what it has been, which is
-/// followed with this time constant, and is no release; not sooner than this after the last alarm \[s\].
+/// Another contact on top of one: the residual changes by this many times the threshold against what it has been, and that is no
+/// release.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const CHANGE: f64 = 2.0;
+/// What the residual has been is followed with this time constant \[s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const FOLLOW_S: f64 = 0.15;
+/// Another contact does not begin sooner than this after the last alarm \[s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const AGAIN_S: f64 = 0.25;
 /// One contact may swell and still be one: the change must be this share of what it has been as well.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const SWELL: f64 = 0.5;
 /// Where kinds are told apart, it is another one, too, if the change points elsewhere: no more than this share of it along the contact (the cosine).
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope), where kinds are told; not swept.
 const ELSEWHERE: f64 = 0.92;
 /// A contact that only falls is released: its change points against it by more than this (the cosine).
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const FALLS: f64 = 0.7;
-/// Sooner, after this \[s\], one that is as large as a swell would have to be, and points elsewhere: no more than this share of it along the contact (the cosine).
+/// After this \[s\] instead of [`AGAIN_S`], one that is as large as a swell would have to be and points elsewhere.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope), where kinds are told; not swept.
 const SOON_S: f64 = 0.1;
+/// It points elsewhere: no more than this share of it lies along the contact (the cosine).
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope), where kinds are told; not swept.
 const TURNS: f64 = 0.5;
 /// Where kinds are told, the alarm waits so long for the force to show where it points \[s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope), where kinds are told; not swept.
 const DECIDE_S: f64 = 0.012;
 /// A score from this share of the threshold on may already belong to a contact.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const LOW: f64 = 0.3;
 /// An alarm that lasts.
 #[derive(Debug)]

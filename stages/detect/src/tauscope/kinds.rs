@@ -4,26 +4,33 @@
 //! points against the tool's motion (Salt Ducaju et al., section II-C, assumption A1). A hand that means to lead may touch any link, from any
 //! side, and a tool at rest. And what is stiff pushes back at once, a hand takes its time. Fisher's linear discriminant weighs that.
 
-use nalgebra::{Matrix3, Matrix6, Vector6};
+use nalgebra::{Matrix6, Vector6};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-use super::Tauscope;
 use super::learnt::Learnt;
 use super::place::ToolTouch;
-use crate::detector::Detector;
-use crate::fisher_discriminant::{Discriminant, Moments};
-use crate::lesson::{ContactKind, Lessons};
-use crate::stage::Setup;
+use super::{NAME, Tauscope};
+use crate::frame::{ContactKind, Detector, Discriminant, Lessons, Moments, Setup};
 
-pub use crate::fisher_discriminant::Discriminant as Kinds;
+pub use crate::frame::Discriminant as Kinds;
 
+/// How many measurements tell the kinds.
+const MEASURED: usize = 3;
 /// A tool slower than this has no direction of motion \[m/s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const STANDSTILL_M_PER_S: f64 = 0.005;
 /// No force is told smaller than this \[N\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const LEAST_FORCE_N: f64 = 0.3;
-/// An alarm belongs to the contact that began last, from so much before its beginning to so much behind its end \[ns\].
+/// An alarm belongs to the contact that began last, from so much before its beginning \[ns\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const BEFORE_NS: i64 = 20_000_000;
+/// To so much behind its end \[ns\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const AFTER_NS: i64 = 150_000_000;
 /// So many contacts of either kind are needed.
+/// Statistical: three measurements need as many contacts of a kind to span them.
 const LEAST: usize = 3;
 
 /// What the kinds are told by: how far the residual rises as by a force on the tool against its motion (from -1 to 1), and the
@@ -62,7 +69,7 @@ pub(crate) fn learn(
     settings: &super::Settings,
     setup: &Setup,
     lessons: &Lessons<'_>,
-) -> Option<Kinds> {
+) -> Option<(Kinds, KindContacts)> {
     setup.model.as_ref()?;
     let labelled = |kind| {
         let contacts = lessons
@@ -103,26 +110,73 @@ pub(crate) fn learn(
             }
         }
     }
-    let count = |kind| found.iter().filter(|(of, _)| *of == kind).count();
-    let enough = count(ContactKind::Collision) >= LEAST && count(ContactKind::Cooperation) >= LEAST;
-    enough.then(|| Moments::of(&found).and(&usual()).discriminant())
+    let own = Moments::of(&found);
+    let enough = own.counts.iter().all(|count| *count >= LEAST as f64);
+    enough.then(|| (own.and(&prior()).discriminant(), KindContacts::of(&own)))
 }
 
-/// What is usual of the measurements, as so many contacts of either kind would tell it: a robot's own few contacts turn the
-/// discriminant towards what parts its kinds, and do not make it. From 892 contacts of simulated arms under impedance control.
-fn usual() -> Moments {
-    const WORTH: f64 = 40.0;
-    let three = |x: [f64; 3]| Vector6::new(x[0], x[1], x[2], 0.0, 0.0, 0.0);
+/// The contacts that the kinds were learnt from, without the prior. Measurements are those of [`measurements`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct KindContacts {
+    /// How many collisions and cooperations there were.
+    pub counts: [f64; 2],
+    /// Mean measurements of either.
+    pub means: [[f64; MEASURED]; 2],
+    /// Covariance of the measurements within a kind.
+    pub covariance: [[f64; MEASURED]; MEASURED],
+}
+
+impl KindContacts {
+    fn of(moments: &Moments) -> Self {
+        let all = moments.counts[0] + moments.counts[1];
+        Self {
+            counts: moments.counts,
+            means: moments.means.map(|mean| std::array::from_fn(|i| mean[i])),
+            covariance: std::array::from_fn(|i| {
+                std::array::from_fn(|j| moments.scatter[(i, j)] / all)
+            }),
+        }
+    }
+
+    /// What to know of what was learnt from so few, if the prior outweighs them.
+    pub(super) fn note(&self) -> Option<String> {
+        let [collisions, cooperations] = self.counts;
+        (collisions.min(cooperations) < PRIOR_CONTACTS).then(|| {
+            format!(
+                "{NAME} tells kinds by its prior more than by this robot's contacts: the prior weighs as {PRIOR_CONTACTS} contacts of a kind, and it found {collisions} collisions and {cooperations} cooperations to learn from"
+            )
+        })
+    }
+}
+
+/// The prior counts as so many contacts of either kind: a robot's own few contacts turn the discriminant towards what parts its
+/// kinds, and do not make it.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope), where kinds are told; not swept.
+const PRIOR_CONTACTS: f64 = 40.0;
+/// Mean measurements of collisions and cooperations.
+/// Statistical: over the contacts that `tests/contacts/kinds_prior.py` simulates and measures.
+const PRIOR_MEANS: [[f64; MEASURED]; 2] = [[0.83, -1.95, 2.18], [-0.04, -3.11, 0.35]];
+/// Covariance of the measurements within a kind.
+/// Statistical: over the same contacts.
+const PRIOR_COVARIANCE: [[f64; MEASURED]; MEASURED] = [
+    [0.177, 0.028, -0.016],
+    [0.028, 0.654, 0.079],
+    [-0.016, 0.079, 0.327],
+];
+
+/// What is usual of the measurements, as [`PRIOR_CONTACTS`] contacts of either kind would tell it.
+fn prior() -> Moments {
+    let six = |x: [f64; MEASURED]| Vector6::from_fn(|i, _| x.get(i).copied().unwrap_or(0.0));
     let mut scatter = Matrix6::zeros();
-    let covariance = Matrix3::new(
-        0.177, 0.028, -0.016, 0.028, 0.654, 0.079, -0.016, 0.079, 0.327,
-    );
-    scatter
-        .fixed_view_mut::<3, 3>(0, 0)
-        .copy_from(&(covariance * (2.0 * WORTH)));
+    for (i, row) in PRIOR_COVARIANCE.iter().enumerate() {
+        for (j, covariance) in row.iter().enumerate() {
+            scatter[(i, j)] = covariance * (2.0 * PRIOR_CONTACTS);
+        }
+    }
     Moments {
-        counts: [WORTH; 2],
-        means: [three([0.83, -1.95, 2.18]), three([-0.04, -3.11, 0.35])],
+        counts: [PRIOR_CONTACTS; 2],
+        means: PRIOR_MEANS.map(six),
         scatter,
     }
 }

@@ -6,10 +6,8 @@
 
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 
-use crate::lesson::{Lesson, Lessons};
-use crate::momentum::Inertia;
-use crate::shared::Tap;
-use crate::stage::Setup;
+use crate::frame::momentum::Inertia;
+use crate::frame::{Lesson, Lessons, Setup, Tap};
 
 /// What the twin misses, by joint; NaN where that is not known. No allocation per sample.
 #[derive(Debug)]

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tauscope_bus::{TwinState, flags};
 
-use super::kinds::Kinds;
+use super::kinds::{KindContacts, Kinds};
 use super::late::LateIn;
 use super::means::{Follow, WINDOWS_S};
 use super::noise;
@@ -16,32 +16,40 @@ use super::tail::{Peaks, Tail};
 use super::usual::LearntUsual;
 use super::windows::Windows;
 use super::{DRIFT, NAME};
-use crate::joints;
-use crate::lesson::{LearnError, Lessons};
-use crate::rate;
+use crate::frame::{LearnError, Lessons, joints, rate};
 
 /// Where speeds are divided, as shares of a joint's usual highest speed.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const EDGES: [f64; BINS - 1] = [0.02, 0.05, 0.12, 0.3];
 /// How many classes of speed there are.
 pub(super) const BINS: usize = 5;
 /// A joint's usual highest speed: this share of its samples is slower.
+/// Statistical: a quantile that one sample in twenty may exceed, so that no single fast move sets it.
 const FAST: f64 = 0.95;
 /// Speed below which a joint is not taken to move at all \[rad/s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const LEAST_FAST_RAD_S: f64 = 0.01;
 /// Correlations are believed to this share.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const BELIEVED: f64 = 0.95;
 /// The share of contact-free samples that stays below the unit of a window's score.
+/// Statistical: what one of a thousand contact-free samples exceeds is the unit of the score.
 const USUAL: f64 = 0.999;
 /// The least that can be learnt from \[samples\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const LEAST_SAMPLES: usize = 500;
 /// With less than this a tail cannot be told, nor how often a threshold is exceeded \[s\].
+/// Statistical: 20 blocks of a second, of which 15 % are three peaks; fewer have no mean worth the name.
 pub(super) const ENOUGH_S: f64 = 20.0;
 /// A joint's noise and the joints' correlations count half once they are from so much; until then noise is held to what is usual of
 /// all joints (the median), and correlations to none \[s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const HALF_S: f64 = 2.0;
 /// The last window is used where its noise is less than this share of that of the one before it.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const PAYS: f64 = 0.9;
 /// No joint's noise is believed below this share of what is usual of all joints.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const LEAST_NOISE: f64 = 0.02;
 
 /// What contact-free recordings taught.
@@ -68,6 +76,9 @@ pub struct Learnt {
     /// What parts collisions from cooperations, where the labels told them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kinds: Option<Kinds>,
+    /// The contacts that `kinds` was learnt from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kind_contacts: Option<KindContacts>,
 }
 
 /// A joint's speeds.
@@ -148,6 +159,7 @@ impl Learnt {
             free_s: Some(free_s(pieces)),
             smallest: Vec::new(),
             kinds: None,
+            kind_contacts: None,
         };
         learnt.tell_usual(pieces);
         let free_s = learnt.free_s.unwrap_or(0.0);
@@ -215,7 +227,11 @@ impl Learnt {
             return false;
         }
         let noise = |window: &LearntWindow| -> f64 {
-            let all = window.noise.iter().flatten();
+            let all = window
+                .noise
+                .iter()
+                .flatten()
+                .filter(|noise| **noise > noise::SILENT);
             all.clone().map(|noise| noise.ln()).sum::<f64>() / all.count().max(1) as f64
         };
         noise(last) - noise(before) < PAYS.ln()
@@ -246,7 +262,12 @@ impl Learnt {
 
     fn hold(&self, noise: &mut [f64]) {
         let believed = self.believed();
-        let usual = quantile(&mut noise.to_vec(), 0.5);
+        let heard = noise.iter().copied().filter(|noise| *noise > noise::SILENT);
+        let mut heard: Vec<f64> = heard.collect();
+        if heard.is_empty() {
+            return;
+        }
+        let usual = quantile(&mut heard, 0.5);
         for noise in noise {
             let least = noise.max(LEAST_NOISE * usual);
             *noise = least.powf(believed) * usual.powf(1.0 - believed);

@@ -7,6 +7,7 @@ use super::sums::Sums;
 use super::usual::{Step, Usual};
 
 /// Lengths of the windows \[s\]; the last one is used where it pays.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 pub(crate) const WINDOWS_S: [f64; 4] = [0.01, 0.03, 0.1, 0.2];
 /// The window that tells how a contact begins.
 pub(crate) const SHORTEST: usize = 0;
@@ -15,10 +16,13 @@ pub(crate) const MIDDLE: usize = 1;
 /// The window that tells what is usual just now.
 pub(super) const LONG: usize = 2;
 /// So much of the usual noise of the next shorter window's mean a longer one's may be away from it: what has gone is not told any longer.
+/// Statistical: two standard deviations hold 95 % of Gaussian noise.
 const BORNE_OUT: f64 = 2.0;
 /// How long a joint that was slow counts as slow \[s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const SLOW_MEMORY_S: f64 = 0.3;
 /// Time constant with which creep of a standing arm is followed behind a contact, and where it stood is forgotten once it moves \[s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const SETTLES_S: f64 = 0.3;
 
 /// Means over the windows as far as those over the next shorter ones bear them out, with these `noise`s by window and joint.

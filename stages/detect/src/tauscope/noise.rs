@@ -8,9 +8,15 @@ use super::means::{Follow, Means, WINDOWS_S};
 use super::pieces::{Piece, free, marked};
 
 /// The noise of a class of speed is taken for the joint's where it has not lasted longer than this \[s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const PRIOR_S: f64 = 2.0;
 /// No less than this share of a mean square is there without unrest.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const QUIET: f64 = 0.25;
+
+/// No less than this is taken for a joint's noise: of one whose residual is always 0, for its effort is not measured \[effort unit\].
+/// Physical: far below what any sensor of torque or current resolves.
+pub(super) const SILENT: f64 = 1e-9;
 
 /// Squares of means of a residual, of unrest, and of both with each other.
 #[derive(Debug, Clone, Copy, Default)]
@@ -67,7 +73,7 @@ impl LearntWindow {
             let overall = all.quiet(adds);
             let of = |seen: &Seen| {
                 let square = seen.quiet(adds) * seen.count + prior * overall;
-                (square / (seen.count + prior)).sqrt().max(1e-9)
+                (square / (seen.count + prior)).sqrt().max(SILENT)
             };
             noise.push(bins.iter().map(of).collect());
             unquiet.push(adds.sqrt());

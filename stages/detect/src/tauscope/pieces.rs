@@ -4,14 +4,19 @@ use tauscope_bus::{JointArray, TwinState, flags};
 
 use super::late::LateIn;
 use super::means::Follow;
-use crate::lesson::{Lesson, Lessons};
+use crate::frame::{Lesson, Lessons};
 
-/// So much around a labelled contact is left out \[ns\].
+/// So much before a labelled contact is left out \[ns\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const BEFORE_NS: i64 = 50_000_000;
+/// So much behind it is left out, too \[ns\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const AFTER_NS: i64 = 400_000_000;
 /// Data is cut in at least so many pieces, so that there are some for each part that is held out.
+/// Statistical: two for each of the [`FOLDS`].
 const LEAST_PIECES: usize = 8;
 /// In how many parts data is held out from what its noise is learnt from.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 pub(super) const FOLDS: usize = 4;
 
 /// A stretch of a recording.

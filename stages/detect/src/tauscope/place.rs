@@ -12,18 +12,22 @@ use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 use super::means::SHORTEST;
 use super::points::{POINTS, Points};
 use super::windows::Windows;
-use crate::isolation::Contact;
-use crate::stage::Setup;
+use crate::frame::{Contact, Setup};
 
 /// A joint counts as loaded from this many times its usual residual on.
+/// Statistical: Gaussian noise goes beyond four standard deviations once in 16 000 samples.
 const LOADED: f64 = 4.0;
 /// How hard robots are touched \[N\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const HAND_N: f64 = 10.0;
 /// The twin is believed to this share of the residual: a strong force is told no better than that.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const MODEL_ERROR: f64 = 0.05;
 /// What is wrong with a residual stays for so long: samples closer than that tell the same \[s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const CORRELATED_S: f64 = 0.1;
 /// So often it is asked anew where the contact is \[ns\].
+/// Tuned: for what it costs in time; not swept.
 const EVERY_NS: i64 = 8_000_000;
 /// The force on the tool that explains the residual best, and how the touched point moves. World frame.
 #[derive(Debug, Clone, Copy)]
@@ -71,9 +75,11 @@ impl Load {
         for j in 0..n {
             let mean = residual[j];
             let noise = windows.noise(window, j).hypot(MODEL_ERROR * mean);
-            z[j] = mean / noise;
-            // residual = -Jᵀ F.
-            scale[j] = -effort_per_nm[j] / noise;
+            // residual = -Jᵀ F; a joint that tells no torque says nothing of a force.
+            if effort_per_nm[j].is_finite() {
+                z[j] = mean / noise;
+                scale[j] = -effort_per_nm[j] / noise;
+            }
         }
         let mut load = Self {
             joints: n,
@@ -160,9 +166,8 @@ impl Place {
     pub fn new(setup: &Setup) -> Self {
         let joints = setup.joints.iter();
         let effort_per_nm: Vec<f64> = joints.map(|joint| joint.effort_per_nm).collect();
-        let known = effort_per_nm.iter().all(|per_nm| per_nm.is_finite());
         Self {
-            points: Points::new(setup).filter(|_| known),
+            points: Points::new(setup),
             effort_per_nm,
             evidence: [0.0; MAX_JOINTS],
             gathered: 0.0,
@@ -209,7 +214,7 @@ impl Place {
         let before_ns = self.newest.map_or(now_ns, |(at_ns, _)| at_ns);
         let share = ((now_ns - before_ns) as f64 * 1e-9 / CORRELATED_S).clamp(1e-3, 1.0);
         self.gathered += share;
-        let mut links = [0; MAX_JOINTS];
+        let mut links = [None; MAX_JOINTS];
         let mut means = [[Vector3::zeros(); 2]; MAX_JOINTS];
         points.each_link(sample, |joint, link| {
             let wrench = load.at(&link.columns);
@@ -225,15 +230,18 @@ impl Place {
             }
             let (mean, evidence) = weighted(&logs, &found);
             self.evidence[joint] += share * (evidence - weights.ln());
-            (links[joint], means[joint]) = (link.link, mean);
+            (links[joint], means[joint]) = (Some(link.link), mean);
         });
         // What was gathered in less than a correlation time counts as much as one sample does.
         let scale = self.gathered.recip().max(1.0);
-        let logs = self.evidence.map(|evidence| evidence * scale);
+        let logs: JointArray = std::array::from_fn(|joint| match links[joint] {
+            Some(_) => self.evidence[joint] * scale,
+            None => f64::NEG_INFINITY,
+        });
         let (best, _) = (logs[..n].iter().enumerate()).max_by(|(_, a), (_, b)| a.total_cmp(b))?;
         let ([force, _], _) = weighted(&logs[..n], &means[..n]);
         let contact = Contact {
-            link: links[best],
+            link: links[best]?,
             force_n: force.into(),
             point_m: means[best][1].into(),
         };
@@ -251,9 +259,10 @@ impl Place {
     ) -> Option<ToolTouch> {
         let points = self.points.as_mut()?;
         let load = Load::new(rise, windows, SHORTEST, &self.effort_per_nm);
+        let tool_joint = points.tool_joint();
         let mut touch = None;
         points.each_link(sample, |joint, link| {
-            if joint + 1 < load.joints {
+            if Some(joint) != tool_joint {
                 return;
             }
             let (information, pull) = load.at(&link.columns).force_at(&link.end_m);

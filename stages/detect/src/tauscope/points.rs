@@ -6,25 +6,62 @@ use nalgebra::{Vector3, Vector6};
 use tauscope_bus::{MAX_JOINTS, TwinState};
 use tauscope_dynamics::{Data, Model, forward_kinematics, link_jacobian, link_pose};
 
-use crate::stage::Setup;
+use crate::frame::{JointSetup, Setup};
 
 /// Where along a link points are asked about, as shares of the way from its joint to the next; and about its centre of mass.
+/// Tuned: few points for what they cost in time; not swept.
 const ALONG: [f64; 4] = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0];
 /// How many around it.
+/// Tuned: few points for what they cost in time; not swept.
 const AROUND: usize = 6;
 /// How far from its axis: between its axis and its surface \[m\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const RADIUS_M: f64 = 0.03;
 /// A link shorter than this has no axis of its own \[m\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const SHORT_M: f64 = 0.02;
 /// Points of a link.
 pub(crate) const POINTS: usize = (ALONG.len() + 1) * AROUND + 1;
 
-/// A robot's links. No allocation per call.
+/// A robot's links, by the kinematic tree. No allocation per call.
+///
+/// Asked about are the links whose own joint tells a torque: no residual parts another one, such as a gripper's finger, from the
+/// link that carries it.
 #[derive(Debug)]
 pub(crate) struct Points {
     robot: (Model, Data),
-    /// Where the tool is touched: its link and the point in its frame.
-    tool: Option<(usize, Vector3<f64>)>,
+    /// The joints whose links are asked about, with where these links end.
+    ends: Vec<(usize, End)>,
+    /// Of them, the one that carries the tool.
+    tool_joint: Option<usize>,
+}
+
+/// Where a link ends.
+#[derive(Debug, Clone, Copy)]
+enum End {
+    /// At the joint that carries this link.
+    NextLink(usize),
+    /// Where the tool is touched: its link, and the point in its frame.
+    Tool(usize, Vector3<f64>),
+    /// Nobody knows: the centre of mass stands for it.
+    CentreOfMass,
+}
+
+/// The movable joints above `joint`, the one next to it first.
+fn towards_base(model: &Model, joint: usize) -> impl Iterator<Item = usize> + '_ {
+    let above = |joint: usize| model.links()[model.joints()[joint].parent_link].joint;
+    std::iter::successors(above(joint), move |&joint| above(joint))
+}
+
+/// The joint on which most others hang, of those next to `joint` on the way from the base; none where there are none, or several alike.
+fn next_joint(model: &Model, joint: usize) -> Option<usize> {
+    let above = |other: usize, joint: usize| towards_base(model, other).any(|j| j == joint);
+    let carried = |by: usize| (0..model.dof()).filter(|&other| above(other, by)).count();
+    let is_next = |other: &usize| towards_base(model, *other).next() == Some(joint);
+    let next: Vec<usize> = (0..model.dof()).filter(is_next).collect();
+    let most = next.iter().map(|&next| carried(next)).max()?;
+    let mut longest = next.into_iter().filter(|&next| carried(next) == most);
+    longest.next().filter(|_| longest.next().is_none())
 }
 
 /// A link as it is at one sample, world frame.
@@ -87,35 +124,74 @@ impl Points {
     /// Of the cell's robot; nothing without a model.
     pub fn new(setup: &Setup) -> Option<Self> {
         let model = setup.model.clone()?;
+        let tells = |joint: usize| {
+            setup
+                .joints
+                .get(joint)
+                .is_some_and(JointSetup::tells_torque)
+        };
+        let carrier = |link: usize| {
+            let joint = model.links()[link].joint?;
+            std::iter::once(joint)
+                .chain(towards_base(&model, joint))
+                .find(|&joint| tells(joint))
+        };
+        let tool = setup.tool_link.unwrap_or_else(|| model.tool_link());
+        let tool_joint = carrier(tool);
+        let end = |joint: usize| {
+            let on_the_way =
+                |&next: &usize| towards_base(&model, next).any(|j| j == joint) && tells(next);
+            let towards_tool = tool_joint
+                .into_iter()
+                .flat_map(|tool| std::iter::once(tool).chain(towards_base(&model, tool)));
+            // The joint next to this one comes last on the way from the tool to the base.
+            if let Some(next) = towards_tool.filter(on_the_way).last() {
+                return End::NextLink(model.joints()[next].child_link);
+            }
+            if tool_joint == Some(joint) {
+                let point = setup.contact_point_on_tool_m.unwrap_or_default();
+                return match setup.tool_link {
+                    Some(link) => End::Tool(link, point.into()),
+                    None => End::CentreOfMass,
+                };
+            }
+            next_joint(&model, joint).map_or(End::CentreOfMass, |next| {
+                End::NextLink(model.joints()[next].child_link)
+            })
+        };
+        let asked = (0..model.dof().min(MAX_JOINTS)).filter(|&joint| tells(joint));
+        let ends = asked.map(|joint| (joint, end(joint))).collect();
         let data = Data::new(&model);
-        let tool = setup.tool_link.map(|link| {
-            let point = setup.contact_point_on_tool_m.unwrap_or_default();
-            (link, Vector3::from(point))
-        });
         Some(Self {
             robot: (model, data),
-            tool,
+            ends,
+            tool_joint,
         })
     }
 
-    /// Calls `visit` with each joint in order and the link that it carries.
+    /// The joint that carries the tool, of those that tell a torque.
+    pub fn tool_joint(&self) -> Option<usize> {
+        self.tool_joint
+    }
+
+    /// Calls `visit` with each joint that tells a torque and the link that it carries.
     pub fn each_link(&mut self, sample: &TwinState, mut visit: impl FnMut(usize, &LinkAt)) {
         let (model, data) = &mut self.robot;
         let n = model.dof().min(MAX_JOINTS);
         forward_kinematics(model, data, &sample.position[..n]);
-        for joint in 0..n {
+        for &(joint, end) in &self.ends {
             let link = model.joints()[joint].child_link;
             let pose = link_pose(model, data, link);
             let origin_m = pose.translation.vector;
             let com_m = pose.rotation * Vector3::from(model.links()[link].com_m());
-            let end = if joint + 1 < n {
-                let next = model.joints()[joint + 1].child_link;
-                link_pose(model, data, next).translation.vector
-            } else if let Some((tool, point)) = self.tool {
-                let tool = link_pose(model, data, tool);
-                tool.translation.vector + tool.rotation * point
-            } else {
-                origin_m + com_m
+            let has_tool = matches!(end, End::Tool(..));
+            let end = match end {
+                End::NextLink(next) => link_pose(model, data, next).translation.vector,
+                End::Tool(tool, point) => {
+                    let tool = link_pose(model, data, tool);
+                    tool.translation.vector + tool.rotation * point
+                }
+                End::CentreOfMass => origin_m + com_m,
             };
             let jacobian = link_jacobian(model, data, link);
             let mut columns = [Vector6::zeros(); MAX_JOINTS];
@@ -130,7 +206,7 @@ impl Points {
                     origin_m,
                     com_m,
                     end_m: end - origin_m,
-                    has_tool: joint + 1 == n && self.tool.is_some(),
+                    has_tool,
                     // A joint that slides has none; then any will do.
                     axis: turn.try_normalize(1e-9).unwrap_or_else(Vector3::z),
                     columns,

@@ -19,20 +19,31 @@ use super::sums::Sums;
 use super::tail::{Peaks, Tail};
 
 /// A standing arm is no faster than this: one that is about to move changes its effort, too \[rad/s, m/s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const SLOW: f64 = 0.03;
 /// A change counts once it has been there for so long to twice as long \[s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const LASTS_S: f64 = 0.075;
 /// Time constant with which the effort at rest is followed while nothing touches the arm \[s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const FOLLOW_S: f64 = 1.0;
-/// So much of a contact may creep behind it, and how fast that fades \[s\].
+/// So much of a contact may creep behind it.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const CREEPS: f64 = 0.5;
+/// How fast that fades \[s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const FADES_S: f64 = 1.5;
-/// What a standing arm does is learnt from at least so much of it \[s\], and from at most so many samples.
+/// What a standing arm does is learnt from at least so much of it \[s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const LEAST_S: f64 = 10.0;
+/// And from at most so many samples.
+/// Tuned: for what it costs in time; not swept.
 const MOST_SAMPLES: usize = 20_000;
 /// A joint's noise is what this share of its changes stays below: what an arm does that is about to move is not noise.
+/// Statistical: one standard deviation of Gaussian noise.
 const WITHIN_NOISE: f64 = 0.683;
 /// The share of contact-free samples whose change stays below the unit of the score.
+/// Statistical: what one of a hundred contact-free samples exceeds is the unit of the score at rest, where samples are few.
 const USUAL: f64 = 0.99;
 
 /// What has gone is gone, however the rest changes.

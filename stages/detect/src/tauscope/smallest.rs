@@ -10,10 +10,10 @@ use super::learnt::Learnt;
 use super::means::Follow;
 use super::pieces::pieces;
 use super::place::Place;
-use crate::lesson::Lessons;
-use crate::stage::Setup;
+use crate::frame::{Lessons, Setup};
 
 /// Of the contact-free samples every so many is a posture that is asked about.
+/// Tuned: for what it costs in time; not swept.
 const EVERY: usize = 50;
 
 /// The force on a link that reaches a score of 1 once it has lasted as long as the longest window; it grows with the root of the score.
@@ -69,7 +69,9 @@ pub(crate) fn smallest(
                 for (arm, _) in link.around() {
                     let mut information = Vector3::<f64>::zeros();
                     let mut rows = [Vector3::zeros(); MAX_JOINTS];
-                    for (a, row) in rows.iter_mut().enumerate().take(n) {
+                    let told = (rows.iter_mut().enumerate().take(n))
+                        .filter(|(a, _)| per_nm[*a].is_finite());
+                    for (a, row) in told {
                         *row = link.moved(a, &arm) * (per_nm[a] / windows.noise(w, a));
                     }
                     for a in 0..n {
@@ -101,4 +103,5 @@ pub(crate) fn smallest(
 }
 
 /// A direction in which even this does not reach a score of 1 is not felt \[N\].
+/// Physical: more than any arm of this kind withstands.
 const FELT_N: f64 = 1e4;

@@ -6,12 +6,20 @@
 
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 
-/// An arm stands once no joint has been further than this from where it was \[rad, m\], nor faster than `slow`, for so long \[s\].
+/// An arm stands once no joint has been further than this from where it was \[rad, m\], nor faster than `slow`.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const WITHIN: f64 = 0.01;
+/// For so long \[s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const STANDS_AFTER_S: f64 = 1.5;
-/// A contact is over where less than this share of it is left, and what is left changes by no more than this share of it, for so long \[s\].
+/// A contact is over where less than this share of it is left.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const LEFT: f64 = 0.35;
+/// And what is left changes by no more than this share of it.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const STEADY: f64 = 0.05;
+/// For so long \[s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const OVER_AFTER_S: f64 = 0.1;
 
 /// Tells whether the arm stands.

@@ -6,6 +6,7 @@ use super::means::WINDOWS_S;
 use super::ring::Ring;
 
 /// Most samples of a window.
+/// Physical: holds the longest window, 0.2 s, up to 5 kHz; arms are read at 1 kHz and less.
 const CAPACITY: usize = 1024;
 
 /// Running means of rows over the first windows.

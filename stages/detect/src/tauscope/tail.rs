@@ -4,19 +4,28 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Length of the blocks whose largest score counts \[s\].
+/// Statistical: twice the 0.5 s for which what is left of a residual stays, so that blocks are nearly independent.
 const BLOCK_S: f64 = 1.0;
 /// Share of the blocks above the level from which the tail is told.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const ABOVE: f64 = 0.15;
 /// Where too little was seen to tell a tail, its scale as a share of the largest score's root.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const FEW: f64 = 0.25;
-/// The shape of a tail that is usual, and how many peaks that is worth.
+/// The shape of a tail that is usual.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const USUAL_SHAPE: f64 = 0.1;
-const WORTH: f64 = 100.0;
+/// The usual shape counts as so many peaks.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
+const USUAL_PEAKS: f64 = 100.0;
 /// No shape is believed that is further from 0.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const FOUND: f64 = 0.5;
 /// A mean of peaks is below its lower limit once in ten times: so many standard deviations.
+/// Statistical: the 90 % quantile of the normal distribution.
 const LIMIT: f64 = 1.28;
 /// Bounds of the tail's shape: 0 is exponential, above 0 the tail is heavier.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const SHAPE: [f64; 2] = [0.0, 0.3];
 
 /// The tail of a score's distribution: the square roots of the largest scores of blocks of one second, above a level,
@@ -90,7 +99,7 @@ impl Tail {
         } else {
             FOUND
         };
-        let shape = (n * found + WORTH * USUAL_SHAPE) / (n + WORTH);
+        let shape = (n * found + USUAL_PEAKS * USUAL_SHAPE) / (n + USUAL_PEAKS);
         let shape = shape.clamp(SHAPE[0], SHAPE[1]);
         Self {
             level,

@@ -14,24 +14,35 @@ use super::pieces::{FOLDS, Piece, marked, quantile};
 /// The features: a constant, viscous friction, Coulomb friction that sets in over these shares of the usual highest speed, and how much the
 /// expected effort has changed.
 const FEATURES: usize = 5;
+/// Coulomb friction sets in over these shares of the usual highest speed.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const SETS_IN: [f64; 2] = [0.1, 0.02];
 /// The expected effort has changed since so long ago \[s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const LATE_S: f64 = 0.04;
 /// The weights are believed as if for so long all had been seen to be zero \[s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const PRIOR_S: f64 = 1.0;
 /// They are used where this share of the squared residual is left of recordings they were not learnt from.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const PAYS: f64 = 0.6;
 /// They are believed to be right to this share of what they say.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const RIGHT_TO: f64 = 0.1;
 /// The measured effort is smoothed over so long before its changes are told \[s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const SMOOTH_S: f64 = 0.005;
 /// For so long a joint is unquiet whose effort has changed \[s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const CALMS_S: f64 = 0.1;
 /// A joint's usual largest change of expected effort: this share of its samples changes less.
+/// Statistical: a quantile that one sample in twenty may exceed.
 const LIVELY: f64 = 0.95;
 /// What is left of a residual stays for so long: samples closer than that tell the same \[s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const CORRELATED_S: f64 = 0.5;
 /// A sample lasts no longer than this \[s\].
+/// Tuned: a guard against gaps, five periods of the slowest practice set (100 Hz); not swept.
 const MOST_STEP_S: f64 = 0.05;
 
 type Features = SVector<f64, FEATURES>;

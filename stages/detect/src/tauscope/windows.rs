@@ -8,9 +8,13 @@ use super::rest::Rest;
 use super::stand::{End, Stand};
 
 /// A standing arm that is pushed gives way no faster than this \[rad/s, m/s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const SLOW: f64 = 0.1;
-/// What is left behind a contact with a standing arm creeps for so long \[s\], by so much of the contact.
+/// What is left behind a contact with a standing arm creeps for so long \[s\].
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const CREEPS_S: f64 = 1.5;
+/// By so much of the contact.
+/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const CREEPS: f64 = 0.1;
 
 /// How the residual has changed against the contact that goes on: products in the metric of what is usual.

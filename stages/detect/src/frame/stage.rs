@@ -1,0 +1,167 @@
+//! The detector as a stage: twin states in, a verdict for each out.
+
+use tauscope_bus::{Detection, Emit, Name, Stage, StageError, TwinState, flags};
+
+use super::detector::{Detector, State};
+use super::error::ConfigError;
+use super::events::{Alarm, OwnEvents, Step};
+use super::isolation::Isolation;
+use super::setup::Setup;
+use super::threshold::Threshold;
+
+/// Share of the threshold from which a score may belong to a contact, where nobody has measured what it
+/// does on contact-free data.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const BEGIN: f64 = 0.5;
+
+/// Who says when an alarm is raised.
+enum Rule {
+    /// A threshold on the score.
+    Threshold(Alarm),
+    /// The detector, from this score on.
+    Own { threshold: f64, events: OwnEvents },
+}
+
+impl Rule {
+    fn threshold(&self) -> f64 {
+        match self {
+            Self::Threshold(alarm) => alarm.threshold(),
+            Self::Own { threshold, .. } => *threshold,
+        }
+    }
+}
+
+/// The detect stage: one detector and what all of them share.
+pub struct Detect {
+    detector: Box<dyn Detector>,
+    name: Name,
+    rule: Rule,
+    isolation: Isolation,
+}
+
+impl Detect {
+    /// `detector` in a cell. Its alarm is raised at `threshold`, by default so many standard deviations above
+    /// the mean of its score, and lasts until the score has stayed below it for `hold_s` \[s\]; a detector
+    /// with rules of its own takes no threshold.
+    ///
+    /// # Errors
+    /// If no threshold can be had, or one is given to a detector with rules of its own.
+    pub fn new(
+        detector: Box<dyn Detector>,
+        (wanted, sigmas): (&Threshold, f64),
+        hold_s: f64,
+        setup: Setup,
+    ) -> Result<Self, ConfigError> {
+        let rule = match detector.threshold() {
+            Some(_) if *wanted != Threshold::default() => {
+                let detector = detector.name();
+                return Err(ConfigError::OwnThreshold { detector });
+            }
+            Some(threshold) => Rule::Own {
+                threshold,
+                events: OwnEvents::default(),
+            },
+            None => {
+                let threshold = wanted.resolve(detector.name(), sigmas, &setup)?;
+                // The usual range of the score: one standard deviation above its mean.
+                let low = setup.statistics(detector.name());
+                let low = low.map_or(BEGIN * threshold, |score| {
+                    score.mean + score.standard_deviation
+                });
+                Rule::Threshold(Alarm::new(threshold, low, hold_s))
+            }
+        };
+        Ok(Self {
+            name: Name::new(detector.name()),
+            detector,
+            rule,
+            isolation: Isolation::new(setup),
+        })
+    }
+
+    /// What the detector has learnt while running, to be given to its next life; `None` if it learns
+    /// nothing.
+    pub fn learnt(&self) -> Option<State> {
+        self.detector.learnt()
+    }
+}
+
+impl Stage<TwinState, Detection> for Detect {
+    fn accept(
+        &mut self,
+        sample: &TwinState,
+        out: &mut dyn Emit<Detection>,
+    ) -> Result<(), StageError> {
+        let judgement = self.detector.judge(sample);
+        if let Some(fault) = self.detector.fault() {
+            let detector = self.detector.name();
+            return Err(StageError::Unfit(format!("{detector}: {fault}")));
+        }
+        let stamp_ns = sample.header.stamp_ns;
+        let score = judgement.ready.then_some(judgement.score);
+        let verdict = judgement.verdict.filter(|_| judgement.ready);
+        let seen = verdict.and_then(|verdict| verdict.contact);
+        let step = match &mut self.rule {
+            Rule::Threshold(alarm) => alarm.step(stamp_ns, score),
+            Rule::Own { events, .. } => events.step(
+                verdict.map(|verdict| verdict.state),
+                seen.map(|s| s.contact_ns),
+            ),
+        };
+        let (usual, event, contact_ns) = match step {
+            Step::Free => ("free", 0, None),
+            Step::Onset { contact_ns } => ("contact", Detection::ONSET, Some(contact_ns)),
+            Step::Contact { contact_ns } => ("contact", 0, Some(contact_ns)),
+            Step::Offset => ("free", Detection::OFFSET, None),
+        };
+        let state = match verdict {
+            Some(verdict) => verdict.state,
+            None if judgement.ready || contact_ns.is_some() || event != 0 => usual,
+            None => "not_ready",
+        };
+        let mut joints = 0;
+        let mut contact = None;
+        if contact_ns.is_some() {
+            joints = seen
+                .and_then(|seen| seen.joints)
+                .unwrap_or_else(|| self.isolation.loaded_joints(&sample.residual));
+            contact = seen
+                .and_then(|seen| seen.place)
+                .or_else(|| self.isolation.locate(sample));
+        }
+        let details = self.detector.details().filter(|_| judgement.ready);
+        out.emit(&mut |slot| {
+            slot.header = sample.header;
+            slot.header.flags = sample.header.flags & flags::RESET;
+            if judgement.ready {
+                slot.header.flags |= flags::READY;
+            }
+            slot.detector = self.name;
+            slot.state = Name::new(state);
+            slot.score = judgement.score;
+            slot.threshold = self.rule.threshold();
+            slot.joints = joints;
+            slot.event = event;
+            if let Some(contact_ns) = contact_ns {
+                slot.header.flags |= flags::ALARM;
+                slot.contact_ns = contact_ns;
+            }
+            if let Some(contact) = contact {
+                slot.header.flags |= flags::FORCE;
+                slot.link = Name::new(self.isolation.link_name(contact.link));
+                slot.force_n = contact.force_n;
+                slot.point_m = contact.point_m;
+            }
+            if let Some(details) = details {
+                slot.header.flags |= flags::CONTENT;
+                slot.content_n = details.content_n;
+                if let Some([rise, motion]) = details.directions {
+                    slot.header.flags |= flags::DIRECTIONS;
+                    slot.rise_direction = rise;
+                    slot.motion_direction = motion;
+                }
+            }
+        })?;
+        Ok(())
+    }
+}

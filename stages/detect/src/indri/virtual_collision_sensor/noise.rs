@@ -1,0 +1,151 @@
+//! How much of the residue is measurement noise, whatever the model knows: the threshold stays so far above the model
+//! error that noise alone does not reach it in weeks.
+
+use tauscope_dynamics::lowpass::Butterworth2;
+
+/// Standard deviations that noise may make of a residue. What is Gaussian, behind a low-pass of 15 Hz, reaches
+/// more on top of what was learnt once in some thousand cycles.
+/// Statistical: about one in 150 000 samples.
+const SIGMAS: f64 = 4.5;
+/// Memory of the estimate \[s\].
+/// Tuned: on the practice set of cyclic moves (docs/papers.md); not swept.
+const MEMORY_S: f64 = 10.0;
+/// A second difference counts as no more than this many of its standard deviations: a collision is no noise.
+/// Statistical: Gaussian noise goes beyond three standard deviations once in 370 samples.
+const CLIP: f64 = 3.0;
+/// Samples that are gathered before the estimate is brought up to date; the first of them count in full, for there is
+/// nothing yet to hold them against.
+/// Tuned: for what it costs in time; not swept.
+const BLOCK: u32 = 16;
+/// The variance of a second difference of white noise is this many times that of the noise.
+/// Statistical: 1² + 2² + 1².
+const SECOND_DIFFERENCE: f64 = 6.0;
+
+/// The noise of one joint's currents, from second differences of what the model leaves: what is smooth, be it a
+/// constant, a ramp or a model error, leaves none.
+#[derive(Debug, Clone)]
+pub(super) struct MeasurementNoise {
+    /// The low-pass's noise bandwidth \[Hz\].
+    bandwidth_hz: f64,
+    /// The two errors before, newest first.
+    before: [f64; 2],
+    /// Of the block that is being gathered: squares of second differences, time \[s\], samples.
+    sum: f64,
+    block_s: f64,
+    count: u32,
+    /// Time since the start \[s\].
+    elapsed_s: f64,
+    /// Mean square of second differences, and the largest that still counts in full.
+    square: f64,
+    most: f64,
+    /// [`SIGMAS`] standard deviations behind the low-pass \[effort unit\].
+    margin: f64,
+}
+
+impl MeasurementNoise {
+    /// Behind a low-pass of this cutoff.
+    pub fn new(cutoff_hz: f64) -> Self {
+        Self {
+            bandwidth_hz: Butterworth2::NOISE_BANDWIDTH * cutoff_hz,
+            before: [0.0; 2],
+            sum: 0.0,
+            block_s: 0.0,
+            count: 0,
+            elapsed_s: 0.0,
+            square: 0.0,
+            most: f64::INFINITY,
+            margin: 0.0,
+        }
+    }
+
+    /// Starts anew at this difference of measured and expected current.
+    pub fn reset(&mut self, error: f64) {
+        self.before = [error; 2];
+        (self.sum, self.block_s, self.count) = (0.0, 0.0, 0);
+        (self.elapsed_s, self.square, self.margin) = (0.0, 0.0, 0.0);
+        self.most = f64::INFINITY;
+    }
+
+    /// Takes the next difference of measured and expected current, `dt_s` after the one before, and gives what noise
+    /// may make of the residue \[effort unit\].
+    #[inline]
+    pub fn update(&mut self, dt_s: f64, error: f64) -> f64 {
+        if dt_s <= 0.0 {
+            return self.margin;
+        }
+        let [newest, oldest] = self.before;
+        self.before = [error, newest];
+        let difference = error - 2.0 * newest + oldest;
+        self.sum += (difference * difference).min(self.most);
+        self.block_s += dt_s;
+        self.count += 1;
+        if self.count == BLOCK {
+            self.take_block();
+        }
+        self.margin
+    }
+
+    fn take_block(&mut self) {
+        let count = f64::from(BLOCK);
+        self.elapsed_s += self.block_s;
+        let share = (self.block_s / self.elapsed_s.min(MEMORY_S)).min(1.0);
+        self.square += share * (self.sum / count - self.square);
+        self.most = CLIP * CLIP * self.square;
+        // Of white noise that much of the band up to half the rate passes.
+        let passes = (2.0 * self.bandwidth_hz * self.block_s / count).min(1.0);
+        self.margin = SIGMAS * (self.square / SECOND_DIFFERENCE * passes).sqrt();
+        (self.sum, self.block_s, self.count) = (0.0, 0.0, 0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CUTOFF_HZ: f64 = 15.0;
+
+    /// Even noise of standard deviation 1.
+    fn noise() -> impl FnMut() -> f64 {
+        let mut state = 5_u64;
+        move || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            let even = (state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5;
+            even * 12.0_f64.sqrt()
+        }
+    }
+
+    #[test]
+    fn it_is_what_the_lowpass_leaves_of_white_noise() {
+        let (mut estimate, mut lowpass) = (
+            MeasurementNoise::new(CUTOFF_HZ),
+            Butterworth2::new(CUTOFF_HZ),
+        );
+        let (mut noise, mut margin) = (noise(), 0.0);
+        let (mut squares, count) = (0.0, 100_000);
+        for k in 0..count {
+            let x = noise();
+            // A ramp, and a jump as of a collision, are no noise.
+            let jump = if k > 50_000 { 20.0 } else { 0.0 };
+            margin = estimate.update(0.002, x + 0.01 * f64::from(k) + jump);
+            squares += lowpass.update(0.002, x).powi(2);
+        }
+        let sigma = (squares / f64::from(count)).sqrt();
+        assert!(
+            (margin / (SIGMAS * sigma) - 1.0).abs() < 0.05,
+            "{margin} {sigma}"
+        );
+    }
+
+    #[test]
+    fn without_noise_there_is_none_and_repeated_stamps_change_nothing() {
+        let mut estimate = MeasurementNoise::new(CUTOFF_HZ);
+        estimate.reset(3.0);
+        for _ in 0..100 {
+            assert!(estimate.update(0.002, 3.0) < 1e-12);
+        }
+        let margin = estimate.update(0.0, 50.0);
+        assert!((estimate.update(0.002, 3.0) - margin).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,227 @@
+//! The autoencoder: dense layers that narrow and widen again, `ReLU` behind each middle layer, the
+//! output as it is. It learns to give back its input; what it cannot give back is unlike its training.
+
+use candle_core::{Device, Tensor, Var};
+use rand_chacha::ChaCha8Rng;
+
+use super::TrainingSettings;
+use super::training::{drop_out, fit, numbers, start};
+use super::vectors::{VectorModel, Vectors};
+use crate::frame::{Trained, TrainedError};
+
+/// A trained autoencoder.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Autoencoder {
+    layers: Vec<Dense>,
+    /// Units of the layer that is computed and of the one before.
+    units: [Vec<f32>; 2],
+}
+
+/// y = W x + b.
+#[derive(Debug, Clone, PartialEq)]
+struct Dense {
+    inputs: usize,
+    /// A row an output.
+    weight: Vec<f32>,
+    bias: Vec<f32>,
+}
+
+impl Autoencoder {
+    /// Trains with middle layers of `middle` units.
+    ///
+    /// # Errors
+    /// What candle says.
+    pub fn fit(
+        vectors: &Vectors,
+        middle: &[usize],
+        settings: &TrainingSettings,
+        rng: &mut ChaCha8Rng,
+    ) -> candle_core::Result<Self> {
+        let dimensions = vectors.dimensions();
+        let sizes = sizes(dimensions, middle);
+        let mut weights = Vec::new();
+        for pair in sizes.windows(2) {
+            weights.push(start(&[pair[1], pair[0]], pair[0], rng)?);
+            weights.push(start(&[pair[1]], pair[0], rng)?);
+        }
+        let rows: Vec<f32> = vectors.rows().iter().map(|&x| x as f32).collect();
+        let count = rows.len() / dimensions;
+        let loss = |batch: &[usize], rng: &mut ChaCha8Rng| {
+            let input: Vec<f32> = (batch.iter())
+                .flat_map(|&row| &rows[row * dimensions..][..dimensions])
+                .copied()
+                .collect();
+            let input = Tensor::from_vec(input, (batch.len(), dimensions), &Device::Cpu)?;
+            let output = forward(&weights, &input, settings.dropout, rng)?;
+            (output - input)?.sqr()?.mean_all()
+        };
+        let examples = |_: &mut ChaCha8Rng| (0..count).collect();
+        fit(settings, weights.clone(), rng, &examples, &loss)?;
+        let layers = (weights.chunks_exact(2).zip(&sizes))
+            .map(|(pair, &inputs)| {
+                Ok(Dense {
+                    inputs,
+                    weight: numbers(&pair[0])?,
+                    bias: numbers(&pair[1])?,
+                })
+            })
+            .collect::<candle_core::Result<_>>()?;
+        Ok(Self::new(layers))
+    }
+
+    fn new(layers: Vec<Dense>) -> Self {
+        Self {
+            layers,
+            units: [Vec::new(), Vec::new()],
+        }
+    }
+
+    /// What [`VectorModel::save`] kept.
+    ///
+    /// # Errors
+    /// If an array is not there or has another shape.
+    pub fn load(dimensions: usize, from: &Trained) -> Result<Self, TrainedError> {
+        let middle: Vec<usize> = (1..)
+            .map_while(|layer| {
+                let above = from.shape(&format!("net.{layer}.bias"));
+                (!above.is_empty()).then(|| from.shape(&format!("net.{}.bias", layer - 1)))
+            })
+            .filter_map(|shape| shape.first().copied())
+            .collect();
+        let layers = (sizes(dimensions, &middle).windows(2).enumerate())
+            .map(|(layer, pair)| {
+                Ok(Dense {
+                    inputs: pair[0],
+                    weight: from.get_f32(&format!("net.{layer}.weight"), &[pair[1], pair[0]])?,
+                    bias: from.get_f32(&format!("net.{layer}.bias"), &[pair[1]])?,
+                })
+            })
+            .collect::<Result<_, TrainedError>>()?;
+        Ok(Self::new(layers))
+    }
+}
+
+impl VectorModel for Autoencoder {
+    /// Mean square of what it does not give back.
+    fn score(&mut self, x: &[f64]) -> f64 {
+        let [now, before] = &mut self.units;
+        now.clear();
+        now.extend(x.iter().map(|&x| x as f32));
+        let last = self.layers.len() - 1;
+        for (index, layer) in self.layers.iter().enumerate() {
+            std::mem::swap(now, before);
+            now.clear();
+            let rows = layer.weight.chunks_exact(layer.inputs);
+            now.extend(rows.zip(&layer.bias).map(|(row, bias)| {
+                let sum: f32 = row.iter().zip(&*before).map(|(w, x)| w * x).sum();
+                let unit = sum + bias;
+                if index == last { unit } else { unit.max(0.0) }
+            }));
+        }
+        let squares = x.iter().zip(now).map(|(x, y)| (x - f64::from(*y)).powi(2));
+        squares.sum::<f64>() / x.len() as f64
+    }
+
+    fn save(&self, into: &mut Trained) {
+        for (index, layer) in self.layers.iter().enumerate() {
+            let shape = [layer.bias.len(), layer.inputs];
+            into.put_f32(&format!("net.{index}.weight"), &shape, &layer.weight);
+            into.put_f32(&format!("net.{index}.bias"), &shape[..1], &layer.bias);
+        }
+    }
+}
+
+/// The layers' sizes from input to output.
+fn sizes(dimensions: usize, middle: &[usize]) -> Vec<usize> {
+    let ends = std::iter::once(&dimensions);
+    ends.clone().chain(middle).chain(ends).copied().collect()
+}
+
+/// The output for a batch, `weights` being weight and bias by layer.
+fn forward(
+    weights: &[Var],
+    input: &Tensor,
+    dropout: f64,
+    rng: &mut ChaCha8Rng,
+) -> candle_core::Result<Tensor> {
+    let mut units = input.clone();
+    let last = weights.len() / 2 - 1;
+    for (index, pair) in weights.chunks_exact(2).enumerate() {
+        units = units.matmul(&pair[0].t()?)?.broadcast_add(&pair[1])?;
+        if index < last {
+            units = drop_out(units.relu()?, dropout, rng)?;
+        }
+    }
+    Ok(units)
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{Rng, SeedableRng};
+
+    use super::*;
+
+    const SETTINGS: TrainingSettings = TrainingSettings {
+        epochs: 150,
+        batch: 50,
+        dropout: 0.0,
+        learning_rate: 1e-2,
+    };
+
+    /// Points on a curve in three dimensions.
+    fn curve() -> Vec<f64> {
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        (0..400)
+            .flat_map(|_| {
+                let t: f64 = rng.random_range(0.0..1.0);
+                [t, t * t, 1.0 - t]
+            })
+            .collect()
+    }
+
+    fn trained(seed: u64) -> Autoencoder {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let vectors = Vectors::unscaled(3, curve());
+        Autoencoder::fit(&vectors, &[8, 1, 8], &SETTINGS, &mut rng).unwrap()
+    }
+
+    #[test]
+    fn it_gives_back_what_it_was_trained_on_and_nothing_beside_it() {
+        let mut net = trained(4);
+        let rows = curve();
+        let error = rows.chunks_exact(3).map(|row| net.score(row)).sum::<f64>() / 400.0;
+        assert!(error < 4e-3, "{error}");
+        assert!(net.score(&[0.5, 0.25, 0.5]) < 0.01);
+        assert!(net.score(&[0.9, 0.1, 0.9]) > 0.05);
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_weights_and_another_seed_others() {
+        let net = trained(4);
+        assert_eq!(net, trained(4));
+        assert_ne!(net, trained(5));
+    }
+
+    #[test]
+    fn its_own_loops_compute_what_candle_computes() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let mut net = trained(4);
+        let weights: Vec<Var> = (net.layers.iter())
+            .flat_map(|layer| {
+                let shape = (layer.bias.len(), layer.inputs);
+                [
+                    Var::from_vec(layer.weight.clone(), shape, &Device::Cpu).unwrap(),
+                    Var::from_vec(layer.bias.clone(), shape.0, &Device::Cpu).unwrap(),
+                ]
+            })
+            .collect();
+        for x in [[0.1f32, 0.9, 0.4], [2.0, -1.0, 0.0]] {
+            let input = Tensor::new(&[x], &Device::Cpu).unwrap();
+            let output = forward(&weights, &input, 0.0, &mut rng).unwrap();
+            let error = (output - input).unwrap().sqr().unwrap().mean_all().unwrap();
+            let error = f64::from(error.to_scalar::<f32>().unwrap());
+            let own = net.score(&x.map(f64::from));
+            assert!((own - error).abs() < 1e-5 * (1.0 + error), "{own} {error}");
+        }
+    }
+}

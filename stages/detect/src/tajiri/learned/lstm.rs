@@ -1,0 +1,363 @@
+//! The recurrent net of `lstm_momentum_observer`: one LSTM layer and a dense one behind it, which
+//! estimate the external torque of a contact-free arm from its motion.
+
+use candle_core::{D, DType, Device, Tensor, Var};
+use candle_nn::ops::sigmoid;
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+
+use super::TrainingSettings;
+use super::runner::{Course, Scorer};
+use super::scaling::Scaling;
+use super::signals::Signal;
+use super::training::{drop_out, fit, numbers, start};
+use crate::frame::{Trained, TrainedError};
+
+/// Input numbers a joint: q(t), q̇(t), q̇(t-1).
+const INPUTS: usize = 3;
+
+/// A trained net. Gates in the order input, forget, cell, output.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Lstm {
+    joints: usize,
+    hidden: usize,
+    input_scaling: Scaling,
+    output_scaling: Scaling,
+    /// `[inputs, 4 hidden]`
+    weight_input: Vec<f32>,
+    /// `[hidden, 4 hidden]`
+    weight_hidden: Vec<f32>,
+    /// `[4 hidden]`
+    bias: Vec<f32>,
+    /// `[joints, hidden]`
+    weight_output: Vec<f32>,
+    /// `[joints]`
+    bias_output: Vec<f32>,
+}
+
+/// One stretch of training data, scaled.
+struct Sequence {
+    inputs: Vec<f32>,
+    outputs: Vec<f32>,
+    len: usize,
+}
+
+impl Lstm {
+    /// Trains on sequences of `length` samples, with `hidden` units.
+    ///
+    /// # Errors
+    /// What candle says.
+    pub fn fit(
+        course: &Course<'_>,
+        hidden: usize,
+        length: usize,
+        settings: &TrainingSettings,
+        rng: &mut ChaCha8Rng,
+    ) -> candle_core::Result<Self> {
+        let joints = course.joint_count();
+        let (inputs, outputs): (Vec<_>, Vec<_>) = (course.stretches().iter().flatten())
+            .map(|signal| (input(signal, joints), signal.torque[..joints].to_vec()))
+            .unzip();
+        let input_scaling = Scaling::fit(INPUTS * joints, inputs.iter().map(Vec::as_slice));
+        let output_scaling = Scaling::fit(joints, outputs.iter().map(Vec::as_slice));
+        let sequences: Vec<Sequence> = (course.stretches().iter())
+            .map(|stretch| sequence(stretch, joints, &input_scaling, &output_scaling))
+            .collect();
+
+        let weights = vec![
+            start(&[INPUTS * joints, 4 * hidden], hidden, rng)?,
+            start(&[hidden, 4 * hidden], hidden, rng)?,
+            start(&[4 * hidden], hidden, rng)?,
+            start(&[joints, hidden], hidden, rng)?,
+            start(&[joints], hidden, rng)?,
+        ];
+        // Disjoint sequences, which begin elsewhere in every epoch.
+        let examples = |rng: &mut ChaCha8Rng| {
+            let mut all = Vec::new();
+            for (index, sequence) in sequences.iter().enumerate() {
+                let last = sequence.len - length;
+                let first = rng.random_range(0..length.min(last + 1));
+                all.extend((first..=last).step_by(length).map(|at| (index, at)));
+            }
+            all
+        };
+        let loss = |batch: &[(usize, usize)], rng: &mut ChaCha8Rng| {
+            let gather = |size: usize, of: fn(&Sequence) -> &[f32]| {
+                let values: Vec<f32> = (0..length)
+                    .flat_map(|k| batch.iter().map(move |&(index, at)| (index, at + k)))
+                    .flat_map(|(index, at)| &of(&sequences[index])[at * size..][..size])
+                    .copied()
+                    .collect();
+                Tensor::from_vec(values, (length, batch.len(), size), &Device::Cpu)
+            };
+            let input = gather(INPUTS * joints, |sequence| &sequence.inputs)?;
+            let wanted = gather(joints, |sequence| &sequence.outputs)?;
+            let output = forward(&weights, &input, settings.dropout, rng)?;
+            (output - wanted)?.sqr()?.mean_all()
+        };
+        let settings = TrainingSettings {
+            // A batch is counted in samples.
+            batch: (settings.batch / length).max(1),
+            ..*settings
+        };
+        fit(&settings, weights.clone(), rng, &examples, &loss)?;
+        let [
+            weight_input,
+            weight_hidden,
+            bias,
+            weight_output,
+            bias_output,
+        ] = [0, 1, 2, 3, 4].map(|index| numbers(&weights[index]));
+        Ok(Self {
+            joints,
+            hidden,
+            input_scaling,
+            output_scaling,
+            weight_input: weight_input?,
+            weight_hidden: weight_hidden?,
+            bias: bias?,
+            weight_output: weight_output?,
+            bias_output: bias_output?,
+        })
+    }
+
+    /// Keeps scaling and weights.
+    pub fn save(&self, into: &mut Trained) {
+        let (joints, hidden) = (self.joints, self.hidden);
+        self.input_scaling.save("input", into);
+        self.output_scaling.save("output", into);
+        into.put_f32(
+            "lstm.weight_input",
+            &[INPUTS * joints, 4 * hidden],
+            &self.weight_input,
+        );
+        into.put_f32(
+            "lstm.weight_hidden",
+            &[hidden, 4 * hidden],
+            &self.weight_hidden,
+        );
+        into.put_f32("lstm.bias", &[4 * hidden], &self.bias);
+        into.put_f32("output.weight", &[joints, hidden], &self.weight_output);
+        into.put_f32("output.bias", &[joints], &self.bias_output);
+    }
+
+    /// What [`Lstm::save`] kept.
+    ///
+    /// # Errors
+    /// If an array is not there or has another shape.
+    pub fn load(from: &Trained) -> Result<Self, TrainedError> {
+        let joints = from.facts().joints.len();
+        let hidden = from.shape("output.weight").get(1).copied().unwrap_or(0);
+        let gates = 4 * hidden;
+        Ok(Self {
+            joints,
+            hidden,
+            input_scaling: Scaling::load("input", INPUTS * joints, from)?,
+            output_scaling: Scaling::load("output", joints, from)?,
+            weight_input: from.get_f32("lstm.weight_input", &[INPUTS * joints, gates])?,
+            weight_hidden: from.get_f32("lstm.weight_hidden", &[hidden, gates])?,
+            bias: from.get_f32("lstm.bias", &[gates])?,
+            weight_output: from.get_f32("output.weight", &[joints, hidden])?,
+            bias_output: from.get_f32("output.bias", &[joints])?,
+        })
+    }
+
+    /// One sample: `hidden` and `cell` go on, `gates` is scratch.
+    fn step(&self, input: &[f64], hidden: &mut [f32], cell: &mut [f32], gates: &mut [f32]) {
+        gates.copy_from_slice(&self.bias);
+        let mut add = |value: f32, row: &[f32]| {
+            for (gate, weight) in gates.iter_mut().zip(row) {
+                *gate += value * weight;
+            }
+        };
+        for (&value, row) in (input.iter()).zip(self.weight_input.chunks_exact(4 * self.hidden)) {
+            add(value as f32, row);
+        }
+        for (&value, row) in (hidden.iter()).zip(self.weight_hidden.chunks_exact(4 * self.hidden)) {
+            add(value, row);
+        }
+        let logistic = |x: f32| 1.0 / (1.0 + (-x).exp());
+        let n = self.hidden;
+        for (k, (hidden, cell)) in hidden.iter_mut().zip(cell).enumerate() {
+            let [i, f, g, o] = [0, 1, 2, 3].map(|gate| gates[gate * n + k]);
+            *cell = logistic(f) * *cell + logistic(i) * g.tanh();
+            *hidden = logistic(o) * cell.tanh();
+        }
+    }
+
+    /// Scaled output of joint `joint`.
+    fn output(&self, joint: usize, hidden: &[f32]) -> f32 {
+        let row = &self.weight_output[joint * self.hidden..][..self.hidden];
+        let sum: f32 = row.iter().zip(hidden).map(|(w, h)| w * h).sum();
+        sum + self.bias_output[joint]
+    }
+}
+
+/// q(t), q̇(t), q̇(t-1) of all joints.
+fn input(signal: &Signal, joints: usize) -> Vec<f64> {
+    let parts = [
+        &signal.position,
+        &signal.velocity,
+        &signal.previous_velocity,
+    ];
+    parts
+        .iter()
+        .flat_map(|part| &part[..joints])
+        .copied()
+        .collect()
+}
+
+fn sequence(stretch: &[Signal], joints: usize, inputs: &Scaling, outputs: &Scaling) -> Sequence {
+    let mut sequence = Sequence {
+        inputs: Vec::with_capacity(stretch.len() * INPUTS * joints),
+        outputs: Vec::with_capacity(stretch.len() * joints),
+        len: stretch.len(),
+    };
+    for signal in stretch {
+        let mut row = input(signal, joints);
+        inputs.apply(&mut row);
+        sequence.inputs.extend(row.iter().map(|&x| x as f32));
+        let mut row = signal.torque[..joints].to_vec();
+        outputs.apply(&mut row);
+        sequence.outputs.extend(row.iter().map(|&x| x as f32));
+    }
+    sequence
+}
+
+/// Outputs at every sample of a batch of sequences, `[length, batch, ·]`, from a state of zeros.
+fn forward(
+    weights: &[Var],
+    input: &Tensor,
+    dropout: f64,
+    rng: &mut ChaCha8Rng,
+) -> candle_core::Result<Tensor> {
+    let (length, batch, _) = input.dims3()?;
+    let units = weights[1].dim(0)?;
+    let mut hidden = Tensor::zeros((batch, units), DType::F32, &Device::Cpu)?;
+    let mut cell = hidden.clone();
+    let mut all = Vec::with_capacity(length);
+    for k in 0..length {
+        let sum = (input.get(k)?.matmul(&weights[0])? + hidden.matmul(&weights[1])?)?;
+        let gates = sum.broadcast_add(&weights[2])?.chunk(4, D::Minus1)?;
+        let forgotten = (sigmoid(&gates[1])? * cell)?;
+        cell = (forgotten + (sigmoid(&gates[0])? * gates[2].tanh()?)?)?;
+        hidden = (sigmoid(&gates[3])? * cell.tanh()?)?;
+        all.push(hidden.clone());
+    }
+    let hidden = Tensor::stack(&all, 0)?.reshape((length * batch, units))?;
+    let hidden = drop_out(hidden, dropout, rng)?;
+    let output = hidden
+        .matmul(&weights[3].t()?)?
+        .broadcast_add(&weights[4])?;
+    output.reshape((length, batch, ()))
+}
+
+/// Holds the net's estimate against the observer's, with the net's state carried from sample to sample.
+pub(crate) struct LstmScorer {
+    net: Lstm,
+    /// Samples until the net has seen as many as in training.
+    window: usize,
+    seen: usize,
+    hidden: Vec<f32>,
+    cell: Vec<f32>,
+    gates: Vec<f32>,
+}
+
+impl LstmScorer {
+    /// What [`Lstm::save`] kept.
+    ///
+    /// # Errors
+    /// If an array is not there or has another shape.
+    pub fn load(from: &Trained) -> Result<Self, TrainedError> {
+        Ok(Self::new(Lstm::load(from)?, from.facts().window))
+    }
+
+    fn new(net: Lstm, window: usize) -> Self {
+        Self {
+            window,
+            seen: 0,
+            hidden: vec![0.0; net.hidden],
+            cell: vec![0.0; net.hidden],
+            gates: vec![0.0; 4 * net.hidden],
+            net,
+        }
+    }
+}
+
+impl Scorer for LstmScorer {
+    /// `|τ_ext - τ̂_ext|²` \[(N m)²\].
+    fn score(&mut self, signal: &Signal) -> Option<f64> {
+        let mut input = input(signal, self.net.joints);
+        self.net.input_scaling.apply(&mut input);
+        self.net
+            .step(&input, &mut self.hidden, &mut self.cell, &mut self.gates);
+        self.seen += 1;
+        if self.seen < self.window {
+            return None;
+        }
+        let errors = (0..self.net.joints).map(|joint| {
+            let estimate = f64::from(self.net.output(joint, &self.hidden));
+            signal.torque[joint] - self.net.output_scaling.undo(joint, estimate)
+        });
+        Some(errors.map(|error| error * error).sum())
+    }
+
+    fn reset(&mut self) {
+        self.seen = 0;
+        self.hidden.fill(0.0);
+        self.cell.fill(0.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+
+    use super::*;
+
+    #[test]
+    fn its_own_loops_compute_what_candle_computes() {
+        let (joints, hidden, length) = (2, 5, 7);
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let weights: Vec<Var> = [
+            vec![INPUTS * joints, 4 * hidden],
+            vec![hidden, 4 * hidden],
+            vec![4 * hidden],
+            vec![joints, hidden],
+            vec![joints],
+        ]
+        .iter()
+        .map(|shape| start(shape, 2, &mut rng).unwrap())
+        .collect();
+        let all: Vec<Vec<f32>> = weights.iter().map(|w| numbers(w).unwrap()).collect();
+        let unscaled = |n: usize| {
+            let rows = [vec![0.0; n], vec![1.0; n]];
+            Scaling::fit(n, rows.iter().map(Vec::as_slice))
+        };
+        let net = Lstm {
+            joints,
+            hidden,
+            input_scaling: unscaled(INPUTS * joints),
+            output_scaling: unscaled(joints),
+            weight_input: all[0].clone(),
+            weight_hidden: all[1].clone(),
+            bias: all[2].clone(),
+            weight_output: all[3].clone(),
+            bias_output: all[4].clone(),
+        };
+        let inputs: Vec<f64> = (0..length * INPUTS * joints)
+            .map(|k| (k as f64).sin())
+            .collect();
+        let floats = inputs.iter().map(|&x| x as f32).collect();
+        let batch = Tensor::from_vec(floats, (length, 1, INPUTS * joints), &Device::Cpu).unwrap();
+        let theirs = forward(&weights, &batch, 0.0, &mut rng).unwrap();
+        let theirs: Vec<Vec<f32>> = theirs.squeeze(1).unwrap().to_vec2().unwrap();
+        let (mut state, mut cell, mut gates) = ([0.0; 5], [0.0; 5], [0.0; 20]);
+        for (input, theirs) in inputs.chunks_exact(INPUTS * joints).zip(theirs) {
+            net.step(input, &mut state, &mut cell, &mut gates);
+            for (joint, theirs) in theirs.iter().enumerate() {
+                assert!((net.output(joint, &state) - theirs).abs() < 1e-6);
+            }
+        }
+    }
+}

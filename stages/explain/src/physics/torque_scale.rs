@@ -1,0 +1,73 @@
+//! The scale between N m and a recorded current, where nobody knows the torque constants.
+
+use tauscope_dynamics::terms::{
+    Coordinate, Effect, Layer, MotionSample, Parameter, PlaceKind, Term,
+};
+
+use crate::physics::active::{Active, Hypothesis, TORQUE_SCALE, Whereabouts};
+
+/// Effort of the bodies times 1 + x: not a finding, but a number that every fit needs. Acts after all other
+/// [`Layer::Body`] terms.
+pub static EFFECT: Effect = Effect {
+    name: TORQUE_SCALE,
+    place: PlaceKind::Joint,
+    layer: Layer::Body,
+    parameters: &[Parameter::any("gain")],
+    coordinates: &[Coordinate::factor("gain_minus_one")],
+    to_parameters: |c| vec![1.0 + c[0]],
+    to_coordinates: |p| vec![p[0] - 1.0],
+    build: |site, values| {
+        Box::new(TorqueScale {
+            joint: site.joint,
+            values: [values[0]],
+        })
+    },
+};
+
+#[derive(Debug)]
+struct TorqueScale {
+    joint: usize,
+    values: [f64; 1],
+}
+
+impl Term for TorqueScale {
+    fn effect(&self) -> &'static Effect {
+        &EFFECT
+    }
+
+    fn coordinates(&self) -> &[f64] {
+        &self.values
+    }
+
+    fn act(&mut self, _at: &MotionSample<'_>, effort: &mut [f64]) {
+        effort[self.joint] *= 1.0 + self.values[0];
+    }
+}
+
+/// The scales of joints that nobody knows, as they are at first.
+pub fn unknown_gains(first: &[(usize, f64)]) -> Vec<Active> {
+    let one = |&(joint, gain): &(usize, f64)| {
+        let place = Whereabouts {
+            joint,
+            ..Whereabouts::default()
+        };
+        Hypothesis {
+            effect: &EFFECT,
+            place,
+        }
+        .with(vec![gain - 1.0])
+    };
+    first.iter().map(one).collect()
+}
+
+/// The scale of each joint in an explanation; 1 where it is out of the question.
+pub fn gains(actives: &[Active], joints: usize) -> Vec<f64> {
+    let mut gains = vec![1.0; joints];
+    for active in actives
+        .iter()
+        .filter(|active| active.hypothesis.is_torque_scale())
+    {
+        gains[active.hypothesis.place.joint] = 1.0 + active.coordinates[0];
+    }
+    gains
+}

@@ -1,0 +1,108 @@
+//! The Markdown texts: lines that an editor shows whole, and links that lead somewhere.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::path::{Path, PathBuf};
+
+/// The longest line outside a table, in characters.
+const LONGEST: usize = 120;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Every Markdown file of the tree but those that a build or a run has made.
+fn texts() -> Vec<(PathBuf, String)> {
+    let mut found = Vec::new();
+    let mut folders = vec![root().to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            if path.is_dir() && !["target", "out", ".git"].contains(&name.as_str()) {
+                folders.push(path);
+            } else if name.ends_with(".md") {
+                let text = std::fs::read_to_string(&path).unwrap();
+                found.push((path, text));
+            }
+        }
+    }
+    assert!(found.len() > 15, "{} texts", found.len());
+    found
+}
+
+/// The anchors of a text's headings, as GitHub makes them.
+fn anchors(text: &str) -> Vec<String> {
+    headings(text)
+        .map(|heading| {
+            let kept = heading
+                .to_lowercase()
+                .replace(' ', "-")
+                .chars()
+                .filter(|c| c.is_alphanumeric() || *c == '-' || *c == '_')
+                .collect();
+            kept
+        })
+        .collect()
+}
+
+fn headings(text: &str) -> impl Iterator<Item = &str> {
+    outside_code(text)
+        .filter(|line| line.starts_with('#'))
+        .map(|line| line.trim_start_matches('#').trim())
+}
+
+/// The lines that stand in no fenced block.
+fn outside_code(text: &str) -> impl Iterator<Item = &str> {
+    let mut fenced = false;
+    text.lines().filter(move |line| {
+        let fence = line.trim_start().starts_with("```");
+        fenced ^= fence;
+        !fenced && !fence
+    })
+}
+
+#[test]
+fn no_line_outside_a_table_is_longer_than_an_editor_shows() {
+    let mut long = Vec::new();
+    for (path, text) in texts() {
+        for (number, line) in text.lines().enumerate() {
+            let length = line.chars().count();
+            if length > LONGEST && !line.starts_with('|') {
+                long.push(format!("{}:{}: {length}", path.display(), number + 1));
+            }
+        }
+    }
+    assert!(long.is_empty(), "{}", long.join("\n"));
+}
+
+#[test]
+fn every_link_to_a_file_or_a_heading_leads_there() {
+    let mut broken = Vec::new();
+    for (path, text) in texts() {
+        for target in text
+            .split("](")
+            .skip(1)
+            .map(|rest| &rest[..rest.find(')').unwrap_or(0)])
+        {
+            if target.is_empty() || target.contains("://") || target.contains(' ') {
+                continue;
+            }
+            let (file, anchor) = target.split_once('#').unwrap_or((target, ""));
+            let file = if file.is_empty() {
+                path.clone()
+            } else {
+                path.parent().unwrap().join(file)
+            };
+            let there = file.exists()
+                && (anchor.is_empty()
+                    || anchors(&std::fs::read_to_string(&file).unwrap())
+                        .iter()
+                        .any(|a| a == anchor));
+            if !there {
+                broken.push(format!("{}: {target}", path.display()));
+            }
+        }
+    }
+    assert!(broken.is_empty(), "{}", broken.join("\n"));
+}
