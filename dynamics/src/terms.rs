@@ -109,6 +109,7 @@ pub fn effect(name: &str) -> Option<&'static Effect> {
 }
 
 /// Over this speed the sign of a velocity is smoothed \[rad/s\].
+/// Tuned: an order below the slowest motion that is compared; not swept.
 pub const SIGN_SMOOTHING_RAD_S: f64 = 0.002;
 
 /// The sign of a velocity \[rad/s\], smooth through standstill so that it has a value at rest and a

@@ -7,6 +7,7 @@ use super::{
 };
 
 /// Friction of one direction is at least this share of the other's; what looks more lopsided is friction and an offset.
+/// Tuned: not swept.
 const LEAST_SYMMETRY: f64 = 0.2;
 
 /// Effort F+ max(sgn(qd), 0) + F- min(sgn(qd), 0).

@@ -8,10 +8,12 @@ use super::{
 use crate::Limits;
 
 /// Softer than this it is no spring \[N m/rad\].
+/// Physical: far below any spring; it only keeps the rest angle finite.
 const LEAST_STIFFNESS: f64 = 1e-9;
 
 /// A spring hangs loose within the range of its joint or this many times its width beside it: farther off it is a constant
 /// effort. Where the URDF knows no range it is taken to be a turn either way.
+/// Tuned: not swept.
 const LOOSE_BESIDE: f64 = 1.0;
 
 fn hangs_loose_near(limits: &Limits, rest: f64) -> bool {

@@ -5,8 +5,10 @@ use super::Site;
 use crate::{Data, mass_matrix};
 
 /// The share of the motor's effort that friction and springs may take.
+/// Tuned: so that motors of simulated arms can do the motion; not swept.
 const LARGEST_SHARE: f64 = 0.4;
 /// The smallest size tried, as a share of the largest.
+/// Tuned: far below what noise lets be seen; not swept.
 const SMALLEST: f64 = 1e-4;
 
 /// Parameters by name, as files hold them.

@@ -12,9 +12,12 @@ use super::{
 use crate::{Data, forward_kinematics, link_pose};
 
 /// A wall gives way by no more than this, and is within reach: what is softer or farther is a force that is always there.
+/// Tuned: not swept.
 const SOFTEST_N_PER_M: f64 = 5.0;
+/// The end of the range that is searched, less a little. Tuned: not swept.
 const FARTHEST_M: f64 = 1.49;
 /// A wall is drawn so that the arm is in it for a fifth of the time.
+/// Tuned: for simulated cells only; not swept.
 const IN_IT: usize = 5;
 
 /// How far away a wall is that the arm is in for that share of the time \[m\]; `None` if it begins in it.

@@ -11,6 +11,7 @@ use crate::kinematics::link_origin;
 use crate::{Data, Model, forward_kinematics, link_jacobian};
 
 /// A stronger force is none that pushes a robot \[N\]: it hardly acts on the joints that would feel a weaker one elsewhere.
+/// Physical: several times what collaborative robots may exert on a person (ISO/TS 15066, annex A).
 const STRONGEST_N: f64 = 1000.0;
 
 /// A constant force on the origin of a link, along the world's axes: effort -Jᵀ F while it lasts.

@@ -7,8 +7,10 @@ use super::{
 };
 
 /// A change of friction smaller than this share of it is what friction does from day to day.
+/// Tuned: not swept.
 const LEAST_STEP: f64 = 0.3;
 /// Friction that changes leaves at least this share of what it was: none comes from nothing or goes for good.
+/// Tuned: not swept.
 const LEAST_LEFT: f64 = 0.1;
 
 /// Effort F sgn(qd), F being one value before a time of the session and another from then on.

@@ -42,6 +42,7 @@ pub static EFFECT: Effect = Effect {
 };
 
 /// Radius of gyration of a body that is drawn \[m\].
+/// Tuned: for simulated cells only; not swept.
 const DRAWN_RADIUS_M: f64 = 0.04;
 
 /// A body at random; if it is there for a while, from and to shares of the shortest recording between these.

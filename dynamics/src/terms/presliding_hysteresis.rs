@@ -7,6 +7,7 @@ use super::{
 };
 
 /// A joint breaks away within this: bristles that give more are a spring \[rad or m\].
+/// Tuned: not swept.
 const MOST_PRESLIDING_RAD: f64 = 0.1;
 
 /// The `LuGre` model with a static friction that equals the kinetic one (Canudas de Wit, Olsson, Åström

@@ -7,6 +7,7 @@ use super::{
 };
 
 /// Friction that falls with speed keeps at least this share of what it is when a joint breaks away: none falls to nothing.
+/// Tuned: not swept.
 const LEAST_SLIDING: f64 = 0.2;
 
 /// Effort (Fc + (Fs - Fc) exp(-(qd/vs)²)) sgn(qd) (Armstrong-Hélouvry, Dupont and Canudas de Wit, "A

@@ -7,8 +7,10 @@ use super::{
 };
 
 /// Friction leaves at least this share of what it was when cold: none goes for good.
+/// Tuned: not swept.
 const LEAST_LEFT: f64 = 0.1;
 /// No joint warms up faster where one is drawn \[s\].
+/// Tuned: for simulated cells only, whose recordings are short; not swept.
 const FASTEST_DRAWN_S: f64 = 3.2;
 
 /// Effort (Fw + Fx exp(-t/T)) qd, t since the start of the recording: the joint is cold then. No gearbox warms up at

@@ -7,6 +7,7 @@ use super::{
 };
 
 /// How many samples are remembered: enough for a second at 1 kHz.
+/// Tuned: from the longest delay and the usual rates; not swept.
 const CAPACITY: usize = 1024;
 
 /// Recorded effort: the true one as it was a while ago, straight between samples, the same for all

@@ -10,7 +10,9 @@ use super::{
 
 /// What is behind a gear comes back after a revolution: slower waves are whole numbers of cycles in it, within what is
 /// known of them.
+/// Tuned: not swept.
 const MOST_WHOLE_CYCLES: f64 = 30.0;
+/// How far from a whole number that is. Tuned: not swept.
 const NEARLY_WHOLE: f64 = 0.15;
 
 /// Effort -A sin(n q + φ), searched as the factors of sin n q and cos n q. Of several waves each is a term.
