@@ -64,6 +64,49 @@ fn a_recording_goes_through_every_stage_and_nothing_is_lost() {
 }
 
 #[test]
+fn a_run_does_not_replace_a_file_unless_it_is_forced_to() {
+    let folder = tempfile::tempdir().unwrap();
+    pipeline(folder.path(), "fast");
+    let archive = folder.path().join("out.mcap");
+    write(&archive, "somebody's only copy");
+    let mut command = tauscope();
+    command.current_dir(folder.path()).arg("run");
+    let refused = Out::of(command);
+    assert_eq!(refused.code, 2, "{}", refused.stderr);
+    let expected = "`record` would replace ";
+    assert!(refused.stderr.contains(expected), "{}", refused.stderr);
+    assert!(refused.stderr.contains("--force"), "{}", refused.stderr);
+    let kept = std::fs::read_to_string(&archive).unwrap();
+    assert_eq!(kept, "somebody's only copy");
+
+    let (code, summary) = Live::start(folder.path(), &["--force"]).end();
+    assert_eq!(code, 0, "{summary}");
+    assert!(count(&info(&archive), "/joint_states") > 0);
+}
+
+#[test]
+fn a_name_with_a_number_is_new_with_every_run() {
+    let folder = tempfile::tempdir().unwrap();
+    pipeline(folder.path(), "fast");
+    let file = folder.path().join("pipeline.yaml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    write(
+        &file,
+        &text.replace("mcap: out.mcap", "mcap: \"out-{n}.mcap\""),
+    );
+    for n in 1..=2 {
+        let (code, summary) = Live::start(folder.path(), &[]).end();
+        assert_eq!(code, 0, "{summary}");
+        let archive = folder.path().join(format!("out-00{n}.mcap"));
+        assert_eq!(
+            stage(&summary, "record")["files"][0],
+            archive.to_str().unwrap()
+        );
+        assert!(count(&info(&archive), "/joint_states") > 0);
+    }
+}
+
+#[test]
 fn two_cells_and_several_detectors_run_side_by_side() {
     let folder = tempfile::tempdir().unwrap();
     let data = bundled();
