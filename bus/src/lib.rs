@@ -6,12 +6,14 @@
 //! sample in, samples out, all time taken from the samples. So the same stage runs live, in replay
 //! and in a test; what differs is the links around it.
 
+mod effort_unit;
 pub mod link;
 pub mod sample;
 pub mod seat;
 pub mod shell;
 pub mod stage;
 
+pub use effort_unit::EffortUnit;
 pub use link::{
     Audience, Domain, InProcess, Keep, LinkError, Position, Received, Receiver, ReceiverCounts,
     Sender, SenderCounts, SharedMemory, Transport, Zenoh, ZenohEndpoints, ZenohRouter,
@@ -20,5 +22,5 @@ pub use sample::{
     Detection, EventKind, Header, Health, JointArray, JointState, MAX_JOINTS, Name, Sample,
     SampleKind, SampleRef, TwinState, flags,
 };
-pub use seat::{EffortUnit, Seat};
+pub use seat::Seat;
 pub use stage::{Emit, Progress, Sink, Source, Stage, StageError};
