@@ -8,8 +8,8 @@ use tauscope_detect::{Entry, Lesson, Lessons};
 use tauscope_pipeline::parallel;
 
 use crate::error::EvaluateError;
-use crate::heard::{self, Heard};
 use crate::input::Request;
+use crate::notes::{self, Notes};
 use crate::recording::{Named, Role};
 use crate::registry::{SEEDS, Task};
 use crate::runner::Runner;
@@ -53,7 +53,7 @@ pub fn run(
 ) -> Result<Evaluation, EvaluateError> {
     let mut evaluation = Evaluation {
         notes: (request.notes.iter().cloned())
-            .chain(heard::unlabelled(&request))
+            .chain(notes::unlabelled(&request))
             .collect(),
         twins: Vec::new(),
         runs: Vec::new(),
@@ -92,7 +92,7 @@ impl Evaluation {
             source,
         };
         let (mut train, mut validation) = (Vec::new(), Vec::new());
-        let mut heard = Heard::default();
+        let mut odd = Notes::default();
         for recording in &request.recordings {
             let lessons = match recording.role {
                 Role::Train => &mut train,
@@ -103,10 +103,10 @@ impl Evaluation {
             let played = session
                 .play(recording, &mut |_| progress(FITTED, &what))
                 .map_err(|source| failed(recording, source))?;
-            heard.add(recording, &played)?;
+            odd.add(recording, &played)?;
             let mut lesson = session::lesson(recording, played.samples);
             let bad = bad_readings::leave_out(&mut lesson, &request.cell.facts);
-            heard.notes.extend(bad);
+            odd.all.extend(bad);
             lessons.push(lesson);
         }
         let measured: &[Lesson] = if validation.is_empty() {
@@ -137,7 +137,7 @@ impl Evaluation {
                     played = session
                         .play(recording, &mut |_| {})
                         .map_err(|source| failed(recording, source))?;
-                    heard.add(recording, &played)?;
+                    odd.add(recording, &played)?;
                     Some(&played.samples)
                 }
             };
@@ -150,12 +150,12 @@ impl Evaluation {
             let share = LEARNT + (1.0 - LEARNT) * (at + 1) as f64 / count;
             progress(share, &format!("{name}: {}", recording.name));
         }
-        heard.close(request);
+        odd.close(request);
         notes.extend(twin.doubts());
-        notes.extend(heard.unjudged(&runners));
-        notes.extend(heard::silent(&runners));
-        self.lost += heard.lost;
-        for note in notes.into_iter().chain(heard.notes) {
+        notes.extend(odd.unjudged(&runners));
+        notes.extend(notes::silent(&runners));
+        self.lost += odd.lost;
+        for note in notes.into_iter().chain(odd.all) {
             if !self.notes.contains(&note) {
                 self.notes.push(note);
             }
