@@ -1,10 +1,4 @@
-//! What a stage speaks: sample types, the stage traits, and links (in process, iceoryx2, Zenoh)
-//! behind one interface.
-//!
-//! A *stream* is the ordered sequence of samples that one stage puts out, all of one type. A *link*
-//! carries a stream from that stage to one that listens to it. A *stage* is a pure state machine: a
-//! sample in, samples out, all time taken from the samples. So the same stage runs live, in replay
-//! and in a test; what differs is the links around it.
+#![doc = include_str!("../README.md")]
 
 mod effort_unit;
 pub mod link;

@@ -1,4 +1,4 @@
-//! Detectors trained, thresholded and scored on labelled recordings.
+#![doc = include_str!("../README.md")]
 
 mod bad_readings;
 mod error;

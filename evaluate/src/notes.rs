@@ -67,7 +67,7 @@ impl Notes {
             ));
         } else if played.gaps > 0 {
             note(format!(
-                "{} gap(s) in time; {} of {count} samples passed over while the filters settled",
+                "{} gap(s) in time; {} of {count} samples were not judged while the filters settled",
                 played.gaps, played.unsettled
             ));
         }
@@ -133,7 +133,7 @@ fn beyond(recording: &Named, last_s: f64) -> Vec<String> {
         .filter(|labelled| *labelled > last_s + LAST_S)
     {
         notes.push(format!(
-            "the labels give it a length of {duration} s, and its samples end at {last_s:.2} s: these count"
+            "the labels give it a length of {duration} s, but its samples end at {last_s:.2} s: the samples count"
         ));
     }
     let reach = |t: f64| !(-TOLERANCE_S..=last_s + LAST_S).contains(&t);
@@ -158,7 +158,7 @@ pub fn silent(runners: &[Runner]) -> Vec<String> {
         let largest = runner.largest_score?;
         (runner.seed == 0 && runner.threshold >= largest).then(|| {
             format!(
-                "{} can never raise an alarm: its threshold is {:.4}, and its score stays below {largest:.4} whatever it sees; give a lower one in the set, `detectors: {{threshold: {{sigmas: ...}}}}`",
+                "{} can never raise an alarm: its threshold is {:.4}, and its score is always below {largest:.4}; give a lower one in the set, `detectors: {{threshold: {{sigmas: ...}}}}`",
                 runner.entry.name, runner.threshold
             )
         })
