@@ -1,7 +1,5 @@
 //! Effects that contain a simpler one, which is said unless the other is much likelier.
 
-use tauscope_dynamics::terms::effect;
-
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis};
 use crate::select::evidence::{LEAST_EVIDENCE, overwhelming, tie};
@@ -12,35 +10,24 @@ use crate::select::propose::penalty;
 
 use crate::select::search::Search;
 
-/// Effects that contain a simpler one, whose only number is their first.
-const SIMPLER: [(&str, &str); 7] = [
-    ("friction_step", "coulomb_friction"),
-    ("stribeck_friction", "coulomb_friction"),
-    ("asymmetric_coulomb", "coulomb_friction"),
-    ("presliding_hysteresis", "coulomb_friction"),
-    ("temperature_viscous", "viscous_friction"),
-    ("joint_elasticity", "rotor_inertia"),
-    ("backlash", "rotor_inertia"),
-];
-
 impl Search<'_> {
     /// Puts the simpler effect that a piece contains in its place, where it is not ahead by `enough` for the evidence for it
     /// \[nats\]; more is asked of a shape that ends its range.
-    pub fn plainer(&self, mut best: Explanation, enough: impl Fn(f64) -> f64) -> Explanation {
+    pub fn simplified(&self, mut best: Explanation, enough: impl Fn(f64) -> f64) -> Explanation {
         for piece in pieces(&best) {
             let Some(index) = place_of(&best, piece) else {
                 continue;
             };
-            let less = self.less(&best, index);
-            let worth = &self.problem.worth;
-            let evidence = best.ahead_of(&less, worth);
+            let less = self.without(&best, index);
+            let effective = &self.problem.effective_samples;
+            let evidence = best.ahead_of(&less, effective);
             let enough = if at_bound(&best.fit.actives[index]) {
                 tie(evidence)
             } else {
                 enough(evidence)
             };
             if let Some(simple) = self.simpler(&best, &less, index)
-                && best.ahead_of(&simple, worth) < enough
+                && best.ahead_of(&simple, effective) < enough
             {
                 (self.say)(&format!("~ {}", describe(&simple)));
                 best = simple;
@@ -62,11 +49,8 @@ impl Search<'_> {
             coordinates,
             ..
         } = &best.fit.actives[index];
-        let (_, name) = SIMPLER
-            .iter()
-            .find(|(of, _)| *of == hypothesis.effect.name)?;
         let simple = Hypothesis {
-            effect: effect(name)?,
+            effect: hypothesis.effect.simpler?.effect,
             place: hypothesis.place,
         };
         let there = |a: &Active| a.hypothesis == simple;
@@ -83,8 +67,8 @@ impl Search<'_> {
             fit: fit.refined_at(self.problem, Some(&joints), less.fit.likelihood()),
             penalties: [&less.penalties[..], &[penalty]].concat(),
         };
-        let worth = &self.problem.worth;
-        let evident = with.ahead_of(less, worth) >= LEAST_EVIDENCE || overwhelming(&with, less);
+        let effective = &self.problem.effective_samples;
+        let evident = with.ahead_of(less, effective) >= LEAST_EVIDENCE || overwhelming(&with, less);
         evident.then_some(with)
     }
 }

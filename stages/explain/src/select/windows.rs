@@ -26,9 +26,7 @@ impl Base<'_> {
     /// The best of a hypothesis whose effect has a time.
     pub fn propose_in_time(&self, hypothesis: Hypothesis) -> Option<Proposal> {
         match hypothesis.time_kind() {
-            TimeKind::Always if hypothesis.effect.name == "contact_wall" => {
-                self.propose_wall(hypothesis)
-            }
+            TimeKind::Always if hypothesis.effect.is_surface() => self.propose_wall(hypothesis),
             TimeKind::Always => self.propose(hypothesis),
             TimeKind::Step => self.propose_step(hypothesis),
             TimeKind::EveryRecording => self.propose_interval(hypothesis, None),
@@ -77,10 +75,10 @@ impl Base<'_> {
                 }
             }
         }
-        let glances = times
+        let scores = times
             .iter()
-            .map(|&(first, _)| self.glance(hypothesis, None, &split(first)));
-        let (best, _) = best_of(glances)?;
+            .map(|&(first, _)| self.first_order_score(hypothesis, None, &split(first)));
+        let (best, _) = best_of(scores)?;
         let (first, time_s) = times[best];
         shape[time] = time_s;
         let mut proposal = self.propose_columns(hypothesis, &shape, None, &split(first))?;
@@ -100,11 +98,11 @@ impl Base<'_> {
         let all = &all.factors;
         let scanned = &all[..all.len().min(SCANNED_FACTORS)];
         let intervals = self.scan(scanned, only);
-        let glances = intervals.iter().map(|&interval| {
+        let scores = intervals.iter().map(|&interval| {
             let masked = self.all_within(all, interval, only);
-            self.glance(hypothesis, None, &masked)
+            self.first_order_score(hypothesis, None, &masked)
         });
-        let (best, _) = best_of(glances)?;
+        let (best, _) = best_of(scores)?;
         self.propose_within(hypothesis, intervals[best], only)
     }
 

@@ -15,8 +15,6 @@ pub struct Contest {
     pub ties: Vec<Hypothesis>,
     /// Those that fit worse, and by how much.
     pub rejected: Vec<(Hypothesis, String)>,
-    /// Evidence for the winner over the best rival that is no tie \[nats\].
-    pub margin: f64,
 }
 
 /// Every rival in the place of one piece of physics.
@@ -29,32 +27,30 @@ pub fn contest(
     let mut result = Contest {
         ties: Vec::new(),
         rejected: Vec::new(),
-        margin: f64::INFINITY,
     };
     if active.is_unnamed() {
         return result;
     }
-    let efficiency = &search.problem.worth;
-    let evidence = found.ahead_of(less, efficiency);
+    let effective = &search.problem.effective_samples;
+    let evidence = found.ahead_of(less, effective);
     let proposals = search.rivals(&less.fit, &found.fit, active);
     let rivals = proposals
         .iter()
         .filter(|p| p.active.hypothesis != active.hypothesis && p.evidence() > 0.0);
     for proposal in rivals.take(RIVALS) {
         let other = search.joined(less, proposal, found.fit.likelihood());
-        let behind = found.ahead_of(&other, efficiency);
+        let behind = found.ahead_of(&other, effective);
         let hypothesis = proposal.active.hypothesis;
         if behind < tie(evidence) {
             result.ties.push(hypothesis);
             continue;
         }
-        result.margin = result.margin.min(behind);
         let share = ((other.fit.likelihood() - less.fit.likelihood())
             / (found.fit.likelihood() - less.fit.likelihood()).max(1e-9))
         .clamp(0.0, 1.0);
         let reason = format!(
             "in the place of {} it takes away {:.0} % of the mismatch that this takes away; the recordings are {} times less likely with it",
-            sentences::name(active.hypothesis.effect.name),
+            active.hypothesis.effect.words.noun,
             100.0 * share,
             sentences::odds(behind)
         );

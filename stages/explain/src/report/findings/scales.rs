@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::DMatrix;
 use serde_json::Value;
 use tauscope_dynamics::terms::Layer;
+use tauscope_dynamics::terms::words::number;
 
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
@@ -14,9 +15,8 @@ use crate::physics::active::Hypothesis;
 use crate::physics::parameter_units::{grows_with_effort, is_of_effort};
 use crate::read::input::Input;
 use crate::read::start::KNOWN;
-use crate::report::sentences;
 
-/// The scale of one drive \[A per N m\].
+/// The torque scale of one joint \[A per N m\].
 #[derive(Debug, Clone, Copy)]
 struct Scale {
     joint: usize,
@@ -30,17 +30,17 @@ impl Scale {
     }
 }
 
-/// The scales of all drives that were fitted.
+/// The torque scales that were fitted.
 #[derive(Debug)]
 pub struct Scales(Vec<Scale>);
 
 impl Scales {
     /// As a fit has them; how far they are known counts that the URDF's masses are not exact.
     pub fn of(problem: &Problem, fit: &Fit, spread: &DMatrix<f64>) -> Self {
-        let drives: Vec<usize> = (0..fit.actives.len())
+        let fitted: Vec<usize> = (0..fit.actives.len())
             .filter(|&index| fit.actives[index].hypothesis.is_torque_scale())
             .collect();
-        if drives.is_empty() {
+        if fitted.is_empty() {
             return Self(Vec::new());
         }
         let off = off_with_the_links(problem, fit);
@@ -54,7 +54,7 @@ impl Scales {
                 deviation: own.hypot(off[at]),
             }
         };
-        Self(drives.into_iter().map(of).collect())
+        Self(fitted.into_iter().map(of).collect())
     }
 
     /// What is known of each.
@@ -169,15 +169,15 @@ fn note(scale: &Scale, joints: &[String]) -> String {
         return format!(
             "The gain of joint {joint} is not identifiable: hardly any gravity or inertia acts on it in these recordings, and what \
              does hangs on how exact the URDF's masses are ({} A per N m, 95 % interval {} to {}). The numbers of its effects are in A.",
-            sentences::number(gain),
-            sentences::number(gain - half),
-            sentences::number(gain + half)
+            number(gain),
+            number(gain - half),
+            number(gain + half)
         );
     }
     format!(
         "The drive of joint {joint} has {} N m/A (95 % interval {} to {}).",
-        sentences::number(1.0 / gain),
-        sentences::number(1.0 / (gain + half)),
-        sentences::number(1.0 / (gain - half))
+        number(1.0 / gain),
+        number(1.0 / (gain + half)),
+        number(1.0 / (gain - half))
     )
 }
