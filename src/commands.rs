@@ -11,3 +11,12 @@ pub mod run;
 pub mod schema;
 pub mod simulate;
 pub mod stage;
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use tauscope_bus::EffortUnit;
+
+/// Reads a unit of effort.
+fn effort_unit() -> impl TypedValueParser<Value = EffortUnit> {
+    let names = EffortUnit::ALL.map(EffortUnit::as_str);
+    PossibleValuesParser::new(names).try_map(|text| text.parse::<EffortUnit>())
+}

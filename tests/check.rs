@@ -10,10 +10,11 @@ use common::{Out, bundled, tauscope, write};
 
 fn check(folder: &Path, text: &str, more: &[&str]) -> Out {
     std::fs::copy(bundled().join("demo_arm.urdf"), folder.join("arm.urdf")).unwrap();
-    write(&folder.join("pipeline.yaml"), text);
-    let mut command = tauscope();
-    command.current_dir(folder).arg("check").args(more);
-    Out::of(command)
+    let file = write(&folder.join("pipeline.yaml"), text);
+    let mut out = Out::answer(["check", file.to_str().unwrap()].iter().chain(more));
+    // Places are told with the path as it was given.
+    out.stderr = out.stderr.replace(&format!("{}/", folder.display()), "");
+    out
 }
 
 /// What is said of a file that is wrong.

@@ -17,9 +17,7 @@ fn block(document: &str, fence: &str) -> String {
 fn passes(kind: &str, text: &str) {
     let folder = tempfile::tempdir().unwrap();
     let file = write(&folder.path().join("file.yaml"), text);
-    let mut command = tauscope();
-    command.args(["check", "--kind", kind]).arg(file);
-    let out = Out::of(command);
+    let out = Out::answer(["check", "--kind", kind, file.to_str().unwrap()]);
     assert_eq!(out.code, 0, "{kind}: {}", out.stderr);
 }
 
@@ -37,9 +35,7 @@ fn the_check_of_a_kind_refuses_another_kind() {
         &folder.path().join("set.yaml"),
         &block("case-and-set.md", "yaml set"),
     );
-    let mut command = tauscope();
-    command.args(["check", "--kind", "case"]).arg(file);
-    let out = Out::of(command);
+    let out = Out::answer(["check", "--kind", "case", file.to_str().unwrap()]);
     assert_eq!(out.code, 2);
     assert!(out.stderr.contains("unknown key `set`"), "{}", out.stderr);
 }

@@ -62,16 +62,11 @@ fn read_ourselves(path: &Path) -> BTreeMap<String, Topic> {
     topics
 }
 
-#[test]
-fn the_reference_reader_finds_our_numbers() {
-    let python = match python() {
-        Ok(python) => python,
-        Err(why) => return skipped("the_reference_reader_finds_our_numbers", &why),
-    };
-    let folder = tempfile::tempdir().unwrap();
+/// Replays the bundled recording into `folder`; the archive.
+fn replayed(folder: &Path) -> PathBuf {
     let data = bundled();
     let pipeline = write(
-        &folder.path().join("pipeline.yaml"),
+        &folder.join("pipeline.yaml"),
         &format!(
             "version: 1\ncells: {{demo: {{robot: {}}}}}\nstages:\n\
              - {{name: ingest, ingest: {{file: {{path: {}}}}}}}\n\
@@ -89,11 +84,20 @@ fn the_reference_reader_finds_our_numbers() {
         .arg("--pipeline")
         .arg(pipeline)
         .arg(data.join("demo.mcap"));
-    replay.arg("--out").arg(folder.path());
+    replay.arg("--out").arg(folder);
     let replayed = Out::of(replay);
     assert_eq!(replayed.code, 0, "{}", replayed.stderr);
+    folder.join("demo.mcap")
+}
 
-    let archive = folder.path().join("demo.mcap");
+#[test]
+fn the_reference_reader_finds_our_numbers() {
+    let python = match python() {
+        Ok(python) => python,
+        Err(why) => return skipped("the_reference_reader_finds_our_numbers", &why),
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let archive = replayed(folder.path());
     let mut reader = Command::new(python);
     reader
         .arg(root().join("tests/python/read_archive.py"))

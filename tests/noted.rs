@@ -202,7 +202,7 @@ fn recordings_that_are_too_short_are_noted() {
     let notes = notes(&summary(&set, folder.path(), LIGHT[1]));
     for said in [
         "of its 41 samples were not judged",
-        "what is learnt from so little is a guess",
+        "what is learnt from so little is unreliable",
         "s of the validation recordings: how often they are exceeded",
     ] {
         assert!(notes.contains(said), "{said}: {notes}");

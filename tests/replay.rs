@@ -5,6 +5,7 @@
 
 mod common;
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use common::{Out, bundled, tauscope, write};
@@ -40,14 +41,15 @@ fn events(out: &Out, detector: &str) -> Vec<serde_json::Value> {
 }
 
 fn replay(pipeline: &Path, recording: &Path, out: &Path, more: &[&str]) -> Out {
-    let mut command = tauscope();
-    command
-        .arg("replay")
-        .arg("--json")
-        .arg("--pipeline")
-        .arg(pipeline);
-    command.arg(recording).arg("--out").arg(out).args(more);
-    Out::of(command)
+    let pipeline = [
+        "replay".as_ref(),
+        "--json".as_ref(),
+        "--pipeline".as_ref(),
+        pipeline.as_os_str(),
+    ];
+    let recording = [recording.as_os_str(), "--out".as_ref(), out.as_os_str()];
+    let arguments = pipeline.into_iter().chain(recording);
+    Out::answer(arguments.chain(more.iter().map(OsStr::new)))
 }
 
 #[test]

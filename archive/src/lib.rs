@@ -1,12 +1,4 @@
-//! Recordings at rest: MCAP files, rosbag2 bags and CSV tables to messages, and messages to MCAP.
-//!
-//! [`Recording::open`] finds out what lies at a path. Whatever it is, [`Recording::messages`] gives
-//! the messages of chosen topics in the order of their log times, as CDR bytes, with bounded memory:
-//! an archive larger than RAM can be read. [`ros`] decodes them. [`McapWriter`] writes what any
-//! ROS 2 or Foxglove tool opens.
-//!
-//! Nothing is lost in silence: what cannot be read is [`Damage`], known when the recording is opened
-//! (a torn tail) or told by the reader in its place (a broken chunk).
+#![doc = include_str!("../README.md")]
 
 mod bag_folder;
 mod csv_file;

@@ -5,9 +5,13 @@
 //! [`Header::joint_count`] on are zero. Angles are rad (or m for a prismatic joint), velocities
 //! rad/s, efforts N m (N) or A, as the cell declares.
 
+mod name;
+
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
+
+pub use name::Name;
 
 /// The most joints one cell may have. Fixed, because a sample's size is.
 pub const MAX_JOINTS: usize = 16;
@@ -114,7 +118,7 @@ pub struct TwinState {
     pub acceleration: JointArray,
     /// Measured effort as received.
     pub effort: JointArray,
-    /// Effort the same motion should have cost, in the measured effort's unit, corrected by the
+    /// Effort that the same motion requires, in the measured effort's unit, corrected by the
     /// calibration; not filtered.
     pub expected_effort: JointArray,
     /// Measured effort through the effort low-pass.
@@ -123,68 +127,6 @@ pub struct TwinState {
     pub filtered_expected_effort: JointArray,
     /// `filtered_effort - filtered_expected_effort`.
     pub residual: JointArray,
-}
-
-/// A short text of fixed size, UTF-8, zero-padded.
-#[repr(C)]
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Pod, Zeroable, ZeroCopySend)]
-pub struct Name {
-    bytes: [u8; Name::CAPACITY],
-}
-
-impl Name {
-    /// Longest text in bytes.
-    pub const CAPACITY: usize = 48;
-
-    /// `text`, cut at the last character that fits.
-    pub fn new(text: &str) -> Self {
-        let mut end = text.len().min(Self::CAPACITY);
-        while !text.is_char_boundary(end) {
-            end -= 1;
-        }
-        let mut bytes = [0; Self::CAPACITY];
-        bytes[..end].copy_from_slice(&text.as_bytes()[..end]);
-        Self { bytes }
-    }
-
-    /// The text; bytes from a foreign writer that are not UTF-8 end it.
-    pub fn as_str(&self) -> &str {
-        let end = self
-            .bytes
-            .iter()
-            .position(|&b| b == 0)
-            .unwrap_or(Self::CAPACITY);
-        match std::str::from_utf8(&self.bytes[..end]) {
-            Ok(text) => text,
-            Err(error) => std::str::from_utf8(&self.bytes[..error.valid_up_to()]).unwrap_or(""),
-        }
-    }
-}
-
-impl Default for Name {
-    fn default() -> Self {
-        Self {
-            bytes: [0; Self::CAPACITY],
-        }
-    }
-}
-
-impl From<&str> for Name {
-    fn from(text: &str) -> Self {
-        Self::new(text)
-    }
-}
-
-impl std::fmt::Debug for Name {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        self.as_str().fmt(f)
-    }
-}
-
-impl std::fmt::Display for Name {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        self.as_str().fmt(f)
-    }
 }
 
 /// What a detector said of one sample, beyond its score.
@@ -378,14 +320,6 @@ samples!(JointState, TwinState, Detection, Health);
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_name_is_cut_at_a_character() {
-        assert_eq!(Name::new("twin_regression").as_str(), "twin_regression");
-        let long = "ä".repeat(40);
-        assert_eq!(Name::new(&long).as_str(), "ä".repeat(24));
-        assert_eq!(Name::default().as_str(), "");
-    }
 
     #[test]
     fn the_kind_names_the_type_on_the_bus() {

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+use crate::effort_unit::EffortUnit;
 use crate::link::{Audience, Domain, Keep, PATIENCE, Position, ZenohEndpoints};
 use crate::sample::SampleKind;
 
@@ -98,15 +99,6 @@ pub struct Cell {
     pub joints: Vec<String>,
     /// What an effort means here.
     pub effort_unit: EffortUnit,
-}
-
-/// The unit of a cell's efforts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum EffortUnit {
-    /// Newton metres (newtons for a prismatic joint).
-    Nm,
-    /// Amperes of motor current.
-    A,
 }
 
 /// A transport between processes.

@@ -40,7 +40,7 @@ pub enum EvaluateError {
     },
     /// Every sample is in a contact, or before the filters have settled.
     #[error(
-        "the validation recordings (the train recordings, if there are none) hold no sample in which nothing touches the robot and the twin's filters have settled: no threshold can be set"
+        "no threshold can be set: the validation recordings (without them the train recordings) hold no contact-free sample for which the twin's filters have settled"
     )]
     NothingFree,
     /// A detector cannot learn from this set.

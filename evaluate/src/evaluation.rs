@@ -8,11 +8,12 @@ use tauscope_detect::{Entry, Lesson, Lessons};
 use tauscope_pipeline::parallel;
 
 use crate::error::EvaluateError;
-use crate::heard::{self, Heard};
 use crate::input::Request;
+use crate::notes::{self, Notes};
 use crate::recording::{Named, Role};
 use crate::registry::{SEEDS, Task};
 use crate::runner::Runner;
+use crate::session::{Played, Session};
 use crate::twin::Prepared;
 use crate::{bad_readings, session};
 
@@ -53,7 +54,7 @@ pub fn run(
 ) -> Result<Evaluation, EvaluateError> {
     let mut evaluation = Evaluation {
         notes: (request.notes.iter().cloned())
-            .chain(heard::unlabelled(&request))
+            .chain(notes::unlabelled(&request))
             .collect(),
         twins: Vec::new(),
         runs: Vec::new(),
@@ -87,28 +88,10 @@ impl Evaluation {
             progress(FITTED * (at as f64 + fraction) / count, &what);
         })?;
         let mut session = twin.session(request)?;
-        let failed = |recording: &Named, source| EvaluateError::Recording {
-            recording: recording.path.display().to_string(),
-            source,
-        };
-        let (mut train, mut validation) = (Vec::new(), Vec::new());
-        let mut heard = Heard::default();
-        for recording in &request.recordings {
-            let lessons = match recording.role {
-                Role::Train => &mut train,
-                Role::Validation => &mut validation,
-                Role::Test => continue,
-            };
-            let what = format!("{name}: reading {}", recording.name);
-            let played = session
-                .play(recording, &mut |_| progress(FITTED, &what))
-                .map_err(|source| failed(recording, source))?;
-            heard.add(recording, &played)?;
-            let mut lesson = session::lesson(recording, played.samples);
-            let bad = bad_readings::leave_out(&mut lesson, &request.cell.facts);
-            heard.notes.extend(bad);
-            lessons.push(lesson);
-        }
+        let mut odd = Notes::default();
+        let [train, validation] = lessons(request, &mut session, &mut odd, &|what| {
+            progress(FITTED, &format!("{name}: {what}"));
+        })?;
         let measured: &[Lesson] = if validation.is_empty() {
             &train
         } else {
@@ -134,10 +117,7 @@ impl Evaluation {
                     .find(|l| l.name == recording.name)
                     .map(|l| &l.samples),
                 Role::Test => {
-                    played = session
-                        .play(recording, &mut |_| {})
-                        .map_err(|source| failed(recording, source))?;
-                    heard.add(recording, &played)?;
+                    played = play(&mut session, recording, &mut odd, &mut |_| {})?;
                     Some(&played.samples)
                 }
             };
@@ -150,30 +130,75 @@ impl Evaluation {
             let share = LEARNT + (1.0 - LEARNT) * (at + 1) as f64 / count;
             progress(share, &format!("{name}: {}", recording.name));
         }
-        heard.close(request);
+        odd.close(request);
         notes.extend(twin.doubts());
-        notes.extend(heard.unjudged(&runners));
-        notes.extend(heard::silent(&runners));
-        self.lost += heard.lost;
-        for note in notes.into_iter().chain(heard.notes) {
+        notes.extend(odd.unjudged(&runners));
+        notes.extend(notes::silent(&runners));
+        self.lost += odd.lost;
+        for note in notes.into_iter().chain(odd.all) {
             if !self.notes.contains(&note) {
                 self.notes.push(note);
             }
         }
+        self.keep(index, runners);
+        self.twins.push(twin);
+        Ok(())
+    }
+
+    /// Keeps the detectors behind a twin, the seeds of each together.
+    fn keep(&mut self, twin: usize, runners: Vec<Runner>) {
         for runner in runners {
             match self.runs.last_mut() {
-                Some(run) if run.twin == index && run.seeds[0].entry.name == runner.entry.name => {
+                Some(run) if run.twin == twin && run.seeds[0].entry.name == runner.entry.name => {
                     run.seeds.push(runner);
                 }
                 _ => self.runs.push(Run {
-                    twin: index,
+                    twin,
                     seeds: vec![runner],
                 }),
             }
         }
-        self.twins.push(twin);
-        Ok(())
     }
+}
+
+/// Lets a recording go through the twin, and notes what is odd about it.
+fn play(
+    session: &mut Session<'_>,
+    recording: &Named,
+    odd: &mut Notes,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Played, EvaluateError> {
+    let played = session.play(recording, progress);
+    let played = played.map_err(|source| EvaluateError::Recording {
+        recording: recording.path.display().to_string(),
+        source,
+    })?;
+    odd.add(recording, &played)?;
+    Ok(played)
+}
+
+/// The train and the validation recordings behind the twin, without readings that no arm makes.
+fn lessons(
+    request: &Request,
+    session: &mut Session<'_>,
+    odd: &mut Notes,
+    progress: &dyn Fn(&str),
+) -> Result<[Vec<Lesson>; 2], EvaluateError> {
+    let (mut train, mut validation) = (Vec::new(), Vec::new());
+    for recording in &request.recordings {
+        let lessons = match recording.role {
+            Role::Train => &mut train,
+            Role::Validation => &mut validation,
+            Role::Test => continue,
+        };
+        let what = format!("reading {}", recording.name);
+        let played = play(session, recording, odd, &mut |_| progress(&what))?;
+        let mut lesson = session::lesson(recording, played.samples);
+        let bad = bad_readings::leave_out(&mut lesson, &request.cell.facts);
+        odd.all.extend(bad);
+        lessons.push(lesson);
+    }
+    Ok([train, validation])
 }
 
 /// Leaves out the detectors that could not judge `recording`, and notes why; one that was asked for by name is an

@@ -124,6 +124,15 @@ fn header(evaluation: &Evaluation, judged: &[Judged<'_>]) -> Markup {
     }
 }
 
+/// How many false alarms there were, in words.
+fn false_alarms(judged: &Judged<'_>) -> String {
+    let numbers = judged.first();
+    format!(
+        "{} false alarms ({} counted strictly)",
+        numbers.false_alarms, numbers.strict_false_alarms
+    )
+}
+
 /// Who leads in what, in a sentence.
 fn verdict(judged: &[Judged<'_>]) -> String {
     let auc = |judged: &Judged<'_>| {
@@ -145,9 +154,9 @@ fn verdict(judged: &[Judged<'_>]) -> String {
         .unwrap_or_default();
     if judged.len() == 1 {
         return format!(
-            "{} finds {most} of {of} contacts with {} false alarms; its AUC is {:.3}",
+            "{} finds {most} of {of} contacts with {}; its AUC is {:.3}",
             best.label,
-            best.first().false_alarms,
+            false_alarms(best),
             auc(best)
         );
     }
@@ -155,10 +164,10 @@ fn verdict(judged: &[Judged<'_>]) -> String {
         .filter(|judged| judged.first().found == most)
         .collect();
     finders.sort_by_key(|judged| judged.first().false_alarms);
-    let named = finders.iter().take(MOST_NAMED).map(|judged| {
-        let false_alarms = judged.first().false_alarms;
-        format!("{} with {false_alarms} false alarms", judged.label)
-    });
+    let named = finders
+        .iter()
+        .take(MOST_NAMED)
+        .map(|judged| format!("{} with {}", judged.label, false_alarms(judged)));
     let mut named: Vec<String> = named.collect();
     if finders.len() > MOST_NAMED {
         named.push(format!("{} more", finders.len() - MOST_NAMED));

@@ -103,16 +103,6 @@ impl Request {
         let model: &Model = self.cell.model.as_ref()?;
         model.links()[model.link_index(link)?].joint
     }
-
-    /// How long after a contact's end an alarm is no false one: a real robot has stopped \[s\].
-    pub fn rest_s(&self) -> f64 {
-        // A cyclic machine has stopped; an arm under impedance control swings back.
-        match (&self.set.cycle_s, &self.set.impedance) {
-            (Some(_), _) => 6.0,
-            (None, Some(_)) => 0.3,
-            (None, None) => 0.15,
-        }
-    }
 }
 
 /// Reads the set at `path` and looks up everything that it and the command line name.

@@ -1,15 +1,15 @@
-//! Detectors trained, thresholded and scored on labelled recordings.
+#![doc = include_str!("../README.md")]
 
 mod bad_readings;
 mod error;
 mod evaluation;
 mod files;
-mod heard;
 mod html;
 mod input;
 mod judged;
 mod labels;
 mod metrics;
+mod notes;
 mod parquet;
 mod recording;
 mod registry;

@@ -119,6 +119,7 @@ fn numbers(rows: &mut Rows, numbers: &Numbers) {
     rows.count("events", numbers.events);
     rows.count("found", numbers.found);
     rows.count("false_alarms", numbers.false_alarms);
+    rows.count("strict_false_alarms", numbers.strict_false_alarms);
     rows.count("links", numbers.links);
     rows.count("link_exact", numbers.link_exact);
     rows.count("link_within_one", numbers.link_within_one);
@@ -133,6 +134,8 @@ fn numbers(rows: &mut Rows, numbers: &Numbers) {
     rows.number("window_best_sigmas", window(|w| w.best_sigmas));
     rows.number("window_auc", window(|w| w.auc));
     rows.number("false_alarms_per_hour", numbers.false_alarms_per_hour);
+    let strict_per_hour = numbers.strict_false_alarms_per_hour;
+    rows.number("strict_false_alarms_per_hour", strict_per_hour);
     rows.number("free_hours", numbers.free_hours);
     rows.number("free_share_in_alarm", numbers.free_share_in_alarm);
     rows.number("delay_mean_s", numbers.delay_s.mean);

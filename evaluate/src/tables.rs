@@ -46,7 +46,7 @@ pub fn all(evaluation: &Evaluation, judged: &[Judged<'_>]) -> Vec<Table> {
     if any_label {
         tables.push(overall::samples(judged));
         tables.extend(overall::windows(judged));
-        tables.push(overall::events(judged));
+        tables.push(overall::events(judged, evaluation.request.set.recovery_s));
         tables.push(overall::places(judged));
         tables.extend(contacts::tables(judged));
         tables.extend(cycles::tables(&evaluation.request, judged));

@@ -19,7 +19,7 @@ const BEFORE_NS: i64 = 100_000_000;
 /// Nor is one this close behind its end: the arm swings, and the filters remember \[ns\].
 const AFTER_NS: i64 = 500_000_000;
 
-/// No drive reports more than this many times the effort that the model expects.
+/// No joint reports more than this many times the effort that the model expects.
 const LARGEST_GAIN: f64 = 5.0;
 
 /// A twin, ready.
@@ -140,7 +140,7 @@ impl Prepared {
         Ok(())
     }
 
-    /// Fitted gains that no drive has.
+    /// Fitted gains that no joint can have.
     pub fn doubts(&self) -> Option<String> {
         self.fit_s?;
         let said: Vec<String> = (self.file.joints.iter())
@@ -149,7 +149,7 @@ impl Prepared {
             .collect();
         (!said.is_empty()).then(|| {
             format!(
-                "{}: the fitted gain is {}: friction, or what else the model leaves out, outweighs there what it knows",
+                "{}: the fitted gain is {}: effort that the model leaves out, such as friction, is larger there than the modelled effort",
                 self.name,
                 said.join(", ")
             )

@@ -163,7 +163,7 @@ pub fn detect_setup(
     let correction = correction(model, cell)?;
     let constants = cell.facts.torque_constants_nm_per_a.as_deref();
     let joints = correction.joints.iter().enumerate().map(|(index, joint)| {
-        // A gain is no drive's where friction outweighs what the model knows.
+        // Where friction outweighs the modelled effort, the fitted gain is no scale from torque to current.
         let effort_per_nm = match (cell.facts.effort_unit, constants) {
             (EffortUnit::Nm, _) => 1.0,
             (EffortUnit::A, Some(constants)) => 1.0 / constants[index],

@@ -115,7 +115,7 @@ impl Job<'_> {
         for (name, fit) in self.cell.facts.joint_names.iter().zip(&fits) {
             let joint = JointCorrection {
                 gain: fit.gain,
-                // Somebody else's twin in A knows its drives, its gain does not tell them.
+                // A twin in A already contains its torque constants; the fitted gain does not tell them.
                 gain_deviation: (from_topic && !in_nm)
                     .then_some(fit.gain.abs().max(f64::MIN_POSITIVE)),
                 offset: fit.offset,

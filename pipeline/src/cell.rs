@@ -8,6 +8,7 @@ use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+pub use tauscope_bus::EffortUnit;
 use tauscope_bus::MAX_JOINTS;
 use tauscope_dynamics::Model;
 
@@ -124,30 +125,6 @@ impl Cell {
 /// What is said of a cell with too many joints.
 pub(crate) fn too_many(joints: usize) -> String {
     format!("{joints} joints, at most {MAX_JOINTS} are supported")
-}
-
-/// Unit of a measured effort.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema, clap::ValueEnum,
-)]
-pub enum EffortUnit {
-    /// Torque \[N m\] (force \[N\] for a prismatic joint).
-    #[default]
-    #[value(name = "Nm")]
-    Nm,
-    /// Motor current \[A\].
-    #[value(name = "A")]
-    A,
-}
-
-impl EffortUnit {
-    /// As it is written in files.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Nm => "Nm",
-            Self::A => "A",
-        }
-    }
 }
 
 /// A rigid body attached to a link.

@@ -1,6 +1,4 @@
-//! The files that people write (pipeline, case, set), checked with the place of everything that is wrong, and the
-//! stages that they name, built and run in one process: what the program and the evaluation share.
-
+#![doc = include_str!("../README.md")]
 #![cfg_attr(
     test,
     allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use tauscope_bus::Keep;
 
 pub use file::{HostEntry, KeepEntry, PipelineFile};
-pub use role::{Role, words_for};
+pub use role::{ROLE_KEYS, Role, words_for};
 
 use crate::cell::Cell;
 use crate::report::{Problem, Report};

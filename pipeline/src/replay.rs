@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use tauscope_bus::{Detection, JointState, SampleKind, Source, TwinState};
 use tauscope_ingest::{ArchivedTwin, RecordedSource};
 use tauscope_record::{Existing, FileName};
+use tauscope_twin::TwinFile;
 
 use crate::build;
 use crate::cell::Cell;
@@ -148,15 +149,10 @@ impl<'a> Replay<'a> {
                 (Settings::Ingest(config), _) => {
                     Some(graph.source(&stage.name, self.open(config, recording)?)?)
                 }
-                (Settings::Twin { config, model }, Some(input)) => Some(match self.twin {
-                    TwinChoice::Recompute => {
-                        let twin = build::twin(config, model.as_ref(), cell)?;
-                        graph.stage(&stage.name, Box::new(twin), &input)?
-                    }
-                    TwinChoice::Keep => {
-                        graph.source(&stage.name, Box::new(self.open_twin(recording)?))?
-                    }
-                }),
+                (Settings::Twin { config, model }, Some(input)) => {
+                    let model = model.as_ref();
+                    Some(self.add_twin(&mut graph, stage, (config, model), &input, recording)?)
+                }
                 (Settings::Detect { config, model }, Some(input)) => {
                     let behind = stage.inputs.first().copied().unwrap_or(index);
                     let shared = Some(shared.entry(behind).or_default().clone());
@@ -258,6 +254,24 @@ impl<'a> Replay<'a> {
         Ok(ArchivedTwin::open(recording, &topics, config, &setup)?)
     }
 
+    /// The twin, computed anew or as it is in the recording.
+    fn add_twin(
+        &self,
+        graph: &mut Graph<'_>,
+        stage: &Stage,
+        (config, model): (&tauscope_twin::Config, Option<&TwinFile>),
+        input: &Stream,
+        recording: &Path,
+    ) -> Result<Stream, ReplayError> {
+        Ok(match self.twin {
+            TwinChoice::Recompute => {
+                let twin = build::twin(config, model, self.cell())?;
+                graph.stage(&stage.name, Box::new(twin), input)?
+            }
+            TwinChoice::Keep => graph.source(&stage.name, Box::new(self.open_twin(recording)?))?,
+        })
+    }
+
     fn add_recorder(
         &self,
         graph: &mut Graph<'_>,
@@ -265,15 +279,15 @@ impl<'a> Replay<'a> {
         config: &tauscope_record::Config,
         streams: &BTreeMap<usize, Stream>,
     ) -> Result<(), ReplayError> {
-        let heard: Vec<usize> = stage
+        let listened: Vec<usize> = stage
             .inputs
             .iter()
             .copied()
             .filter(|input| streams.contains_key(input))
             .collect();
-        let recorder = self.pipeline.recorder(config, &heard)?;
-        let mut inputs = self.inputs(graph, heard.iter().copied(), streams)?;
-        for index in heard {
+        let recorder = self.pipeline.recorder(config, &listened)?;
+        let mut inputs = self.inputs(graph, listened.iter().copied(), streams)?;
+        for index in listened {
             inputs.push(graph.listen_to_health(&streams[&index])?);
         }
         graph.sink(&stage.name, Box::new(recorder), inputs);

@@ -11,6 +11,7 @@ use tauscope_pipeline::provenance;
 use tauscope_pipeline::report::Problem;
 use tauscope_twin::{Expected, Motion, TwinFile};
 
+use super::effort_unit;
 use crate::exit::{Exit, Failure};
 use crate::output::Output;
 use crate::progress::Progress;
@@ -37,7 +38,7 @@ pub struct Args {
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     validation: Vec<PathBuf>,
     /// Unit of the measured effort.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_parser = effort_unit(), default_value_t)]
     effort_unit: EffortUnit,
     /// Torque constant of a joint in N m/A, for efforts in A; for all joints or for none.
     #[arg(long, value_name = "JOINT=CONSTANT", value_parser = joint_constant)]

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use tauscope_pipeline::cell::EffortUnit;
 
+use super::effort_unit;
 use crate::exit::{Exit, Failure};
 use crate::explain::{self, Arguments, Kept, Request};
 use crate::output::Output;
@@ -39,7 +40,7 @@ pub struct Args {
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     holdout: Vec<PathBuf>,
     /// Unit of the measured effort.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_parser = effort_unit(), default_value_t)]
     effort_unit: EffortUnit,
     /// Torque constant of a joint in N m/A, for efforts in A; for all joints or for none.
     #[arg(long, value_name = "JOINT=CONSTANT", value_parser = super::calibrate::joint_constant)]

@@ -4,11 +4,9 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 use tauscope_bus::seat::{Cell as SeatCell, Input, Output, OutputLink, TransportKind};
-use tauscope_bus::{
-    Audience, Domain, EffortUnit as SeatUnit, Keep, SampleKind, Seat, ZenohEndpoints,
-};
+use tauscope_bus::{Audience, Domain, Keep, SampleKind, Seat, ZenohEndpoints};
 use tauscope_pipeline::build::StreamFacts;
-use tauscope_pipeline::cell::{CellFacts, EffortUnit};
+use tauscope_pipeline::cell::CellFacts;
 use tauscope_pipeline::pipeline::{Pipeline, Role};
 use tauscope_pipeline::scenario::ScenarioFacts;
 use tauscope_pipeline::settings::Settings;
@@ -143,10 +141,7 @@ impl Planner<'_> {
         Some(SeatCell {
             name: facts.name.clone(),
             joints: facts.joint_names.clone(),
-            effort_unit: match facts.effort_unit {
-                EffortUnit::Nm => SeatUnit::Nm,
-                EffortUnit::A => SeatUnit::A,
-            },
+            effort_unit: facts.effort_unit,
         })
     }
 

@@ -3,12 +3,13 @@
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use tauscope_archive::ros::JointState;
 use tauscope_archive::{Compression, McapWriter, Recording};
 
-use crate::common::{Out, bundled, tauscope, write};
+use crate::common::{Out, bundled, write};
 
 const STATES: &str = "/joint_states";
 
@@ -61,14 +62,13 @@ impl Set {
 
 /// `tauscope evaluate`.
 pub fn evaluate(set: &Path, out: &Path, more: &[&str]) -> Out {
-    let mut command = tauscope();
-    command
-        .arg("evaluate")
-        .arg(set)
-        .arg("--out")
-        .arg(out)
-        .args(more);
-    Out::of(command)
+    let named = [
+        "evaluate".as_ref(),
+        set.as_os_str(),
+        "--out".as_ref(),
+        out.as_os_str(),
+    ];
+    Out::answer(named.into_iter().chain(more.iter().map(OsStr::new)))
 }
 
 /// A copy of a bundled recording whose joint states went through `change`; those it says `false` to are gone.

@@ -53,10 +53,14 @@ impl LearntPipeline<'_> {
 
 /// `tauscope replay --json` of `recording`.
 pub fn replay(pipeline: &Path, recording: &Path, out: &Path) -> Out {
-    let mut command = tauscope();
-    command.args(["replay", "--json", "--pipeline"]);
-    command.arg(pipeline).arg(recording).arg("--out").arg(out);
-    Out::of(command)
+    let pipeline = [
+        "replay".as_ref(),
+        "--json".as_ref(),
+        "--pipeline".as_ref(),
+        pipeline.as_os_str(),
+    ];
+    let recording = [recording.as_os_str(), "--out".as_ref(), out.as_os_str()];
+    Out::answer(pipeline.into_iter().chain(recording))
 }
 
 /// Detectors that learn.

@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test file uses its own part")]
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
+use std::ffi::OsString;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -54,6 +55,20 @@ pub struct Out {
 }
 
 impl Out {
+    /// What the program answers to these arguments, asked as a function: no process is started.
+    pub fn answer<A: Into<OsString>>(arguments: impl IntoIterator<Item = A>) -> Self {
+        let tauscope::Answer {
+            code,
+            stdout,
+            stderr,
+        } = tauscope::answer(arguments);
+        Self {
+            code: code.into(),
+            stdout,
+            stderr,
+        }
+    }
+
     /// Runs `command` to its end.
     pub fn of(mut command: Command) -> Self {
         let out = command.output().unwrap();

@@ -256,16 +256,10 @@ impl<T: Sample> Receiver<T> for InProcessReceiver<T> {
         read: &mut dyn FnMut(&T),
     ) -> Result<Received, LinkError> {
         while let Some(message) = self.queue.pop(timeout) {
-            self.tracker.came_in(self.queue.begin());
-            if !self.tracker.note(message.instance, message.sequence) {
-                continue;
+            let (begin, sample) = (self.queue.begin(), &*message.payload);
+            if let Some(received) = self.tracker.take(begin, message.instance, sample, read) {
+                return Ok(received);
             }
-            if message.payload.header().has(flags::END) {
-                return Ok(Received::End);
-            }
-            self.tracker.received();
-            read(&message.payload);
-            return Ok(Received::Sample);
         }
         Ok(Received::Nothing)
     }

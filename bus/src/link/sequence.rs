@@ -1,6 +1,7 @@
 //! Holes in a stream, over the lives of its sender.
 
-use super::{Position, ReceiverCounts};
+use super::{Position, Received, ReceiverCounts};
+use crate::sample::{Sample, flags};
 
 /// Follows the sequence numbers that a receiver hears.
 ///
@@ -16,7 +17,7 @@ pub(crate) struct Tracker {
 impl Tracker {
     /// Takes note of a sample. Returns false if it is older than one already heard and so must not
     /// be handed on: it has been counted as lost.
-    pub(crate) fn note(&mut self, instance: u64, sequence: u64) -> bool {
+    fn note(&mut self, instance: u64, sequence: u64) -> bool {
         let known = [&mut self.present, &mut self.former]
             .into_iter()
             .flatten()
@@ -42,14 +43,32 @@ impl Tracker {
 
     /// The receiver's place in the stream when it came in, if this is the first it hears: what it
     /// did not hear from there on is lost.
-    pub(crate) fn came_in(&mut self, begin: Option<Position>) {
+    fn came_in(&mut self, begin: Option<Position>) {
         if self.present.is_none() {
             self.present = begin;
         }
     }
 
-    pub(crate) fn received(&mut self) {
+    /// Takes a message of the sender's life `instance` and hands its sample to `read`, unless it is the end of the
+    /// stream; `None` if it has been heard before. `begin` is where the receiver came in.
+    pub(crate) fn take<T: Sample>(
+        &mut self,
+        begin: Option<Position>,
+        instance: u64,
+        sample: &T,
+        read: &mut dyn FnMut(&T),
+    ) -> Option<Received> {
+        self.came_in(begin);
+        let header = sample.header();
+        if !self.note(instance, header.sequence) {
+            return None;
+        }
+        if header.has(flags::END) {
+            return Some(Received::End);
+        }
         self.counts.received += 1;
+        read(sample);
+        Some(Received::Sample)
     }
 
     pub(crate) fn counts(&self) -> ReceiverCounts {

@@ -38,14 +38,17 @@ pub struct Matching<'a> {
     pub events: Vec<Matched<'a>>,
     /// Detections of nothing.
     pub false_alarms: Vec<&'a Event>,
+    /// How many detections begin outside every labelled contact, nothing forgiven: no tolerance before and behind a
+    /// contact, no recovery time, none merged.
+    pub strict_false_alarms: usize,
 }
 
 impl<'a> Matching<'a> {
     /// A detection belongs to the latest-starting event that lasts at the alarm's instant, widened by [`TOLERANCE_S`]
     /// before and [`AFTER_S`] behind. The first of an event is its hit, later ones count for nothing. One that belongs to no
-    /// event is a false alarm, unless it comes within `rest_s` of the end of one, or within [`MERGE_S`] of the
+    /// event is a false alarm, unless it comes within `recovery_s` of the end of one, or within [`MERGE_S`] of the
     /// last false alarm that was counted.
-    pub fn of(truth: &'a Truth, detections: &'a [Event], rest_s: f64) -> Self {
+    pub fn of(truth: &'a Truth, detections: &'a [Event], recovery_s: f64) -> Self {
         let mut events: Vec<Matched<'a>> = (truth.events.iter())
             .map(|event| Matched {
                 event,
@@ -65,18 +68,26 @@ impl<'a> Matching<'a> {
                 own.detection.get_or_insert(detection);
                 continue;
             }
-            let rests = |m: &Matched<'_>| (m.event.t_on..=m.event.t_off + rest_s).contains(&t);
+            let recovers =
+                |m: &Matched<'_>| (m.event.t_on..=m.event.t_off + recovery_s).contains(&t);
             let counted = false_alarms
                 .last()
                 .is_some_and(|last| t - last.t <= MERGE_S);
-            if !counted && !events.iter().any(rests) {
+            if !counted && !events.iter().any(recovers) {
                 false_alarms.push(detection);
             }
         }
+        let touched = |t: f64| {
+            events
+                .iter()
+                .any(|m| (m.event.t_on..=m.event.t_off).contains(&t))
+        };
+        let strict_false_alarms = detections.iter().filter(|d| !touched(d.t)).count();
         events.retain(|matched| !matched.event.ignore);
         Self {
             events,
             false_alarms,
+            strict_false_alarms,
         }
     }
 }
@@ -169,13 +180,15 @@ mod tests {
     }
 
     #[test]
-    fn false_alarms_close_together_count_once_and_none_counts_in_the_rest_after_a_contact() {
+    fn false_alarms_close_together_count_once_and_none_counts_in_the_recovery_time_after_a_contact()
+    {
         let truth = truth(vec![event(10.0, 11.0, false)]);
         let times = [1.0, 1.2, 1.26, 9.97, 11.1, 11.2, 11.6];
         let found: Vec<_> = times.into_iter().map(detection).collect();
         let matching = Matching::of(&truth, &found, 0.5);
         let alarms: Vec<_> = matching.false_alarms.iter().map(|alarm| alarm.t).collect();
         assert_eq!(alarms, [1.0, 1.26, 9.97, 11.6]);
+        assert_eq!(matching.strict_false_alarms, times.len());
         assert_eq!(matching.events[0].detection.map(|d| d.t), Some(11.1));
     }
 
@@ -185,6 +198,7 @@ mod tests {
         let found = [detection(1.5)];
         let matching = Matching::of(&truth, &found, 0.15);
         assert!(matching.events.is_empty() && matching.false_alarms.is_empty());
+        assert_eq!(matching.strict_false_alarms, 0);
     }
 
     #[test]

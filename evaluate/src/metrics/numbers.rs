@@ -47,7 +47,7 @@ impl<'a> Scored<'a> {
         let duration_s = duration_s(truth, last);
         Some(Self {
             output,
-            matching: Matching::of(truth, &output.events, request.rest_s()),
+            matching: Matching::of(truth, &output.events, request.set.recovery_s),
             samples,
             windows,
             eventful: !truth.events.is_empty(),
@@ -102,12 +102,16 @@ pub struct Numbers {
     pub events: usize,
     /// Those that were found.
     pub found: usize,
-    /// Alarms in all: also those that came again while an event lasted, or in the rest after one.
+    /// Alarms in all: also those that came again while an event lasted, or in the recovery time after one.
     pub alarms: usize,
     /// Detections of nothing.
     pub false_alarms: usize,
     /// The same per hour of contact-free time.
     pub false_alarms_per_hour: f64,
+    /// Alarms that begin outside every labelled contact, nothing forgiven: no tolerance, no recovery time, none merged.
+    pub strict_false_alarms: usize,
+    /// The same per hour of contact-free time.
+    pub strict_false_alarms_per_hour: f64,
     /// Contact-free time \[h\].
     pub free_hours: f64,
     /// Share of the contact-free time in alarm.
@@ -146,6 +150,9 @@ impl Numbers {
             .iter()
             .map(|one| one.matching.false_alarms.len())
             .sum();
+        let strict_false_alarms: usize = (scored.iter())
+            .map(|one| one.matching.strict_false_alarms)
+            .sum();
         let free_hours = scored.iter().map(|one| one.free_s).sum::<f64>() / 3600.0;
         let alarm_s: f64 = scored.iter().map(|one| one.in_alarm_s.0).sum();
         let grid_s: f64 = scored.iter().map(|one| one.in_alarm_s.1).sum();
@@ -169,6 +176,8 @@ impl Numbers {
             found: matched.iter().filter(|m| m.detection.is_some()).count(),
             false_alarms,
             false_alarms_per_hour: false_alarms as f64 / free_hours,
+            strict_false_alarms,
+            strict_false_alarms_per_hour: strict_false_alarms as f64 / free_hours,
             free_hours,
             free_share_in_alarm: alarm_s / grid_s,
             delay_s: Distribution::of(matched.iter().filter_map(Matched::delay_s)),

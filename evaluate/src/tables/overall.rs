@@ -6,6 +6,7 @@ use super::{Table, mean_sd_ms, ms, number, over_seeds, part};
 use crate::evaluation::Evaluation;
 use crate::judged::Judged;
 use crate::metrics::Numbers;
+use crate::metrics::events::MERGE_S;
 use crate::metrics::numbers::SampleNumbers;
 use crate::recording::Role;
 
@@ -145,14 +146,14 @@ fn scores(numbers: &[Numbers], of: impl Fn(&Numbers) -> Option<&SampleNumbers>) 
 }
 
 /// Events, false alarms and delays.
-pub fn events(judged: &[Judged<'_>]) -> Table {
+pub fn events(judged: &[Judged<'_>], recovery_s: f64) -> Table {
     let minutes = judged
         .first()
         .map_or(f64::NAN, |j| 60.0 * j.first().free_hours);
     let mut table = Table::new(
         "Event by event",
         format!(
-            "{minutes:.1} contact-free minutes; delays from the labelled beginning to the alarm. Alarms: in all, with those that came again while a contact lasted."
+            "{minutes:.1} contact-free minutes. Alarms: all, also repeated ones while a contact lasts. False alarms: those that belong to no contact and come later than {recovery_s} s after one (`recovery_s` of the set); those within {MERGE_S} s count once. Strict: every alarm that begins outside the labelled contacts. Delay: from the labelled beginning to the alarm."
         ),
         &[
             "detector",
@@ -160,6 +161,8 @@ pub fn events(judged: &[Judged<'_>]) -> Table {
             "alarms",
             "false alarms",
             "per hour",
+            "strict",
+            "strict per hour",
             "free time in alarm",
             "delay [ms]",
             "p50 [ms]",
@@ -172,12 +175,17 @@ pub fn events(judged: &[Judged<'_>]) -> Table {
         let rates: Vec<f64> = (judged.numbers.iter())
             .map(|n| n.false_alarms_per_hour)
             .collect();
+        let strict_rates: Vec<f64> = (judged.numbers.iter())
+            .map(|n| n.strict_false_alarms_per_hour)
+            .collect();
         table.row([
             judged.label.clone(),
             part(first.found, first.events),
             first.alarms.to_string(),
             first.false_alarms.to_string(),
             over_seeds(&rates, 1),
+            first.strict_false_alarms.to_string(),
+            over_seeds(&strict_rates, 1),
             format!("{} %", number(100.0 * first.free_share_in_alarm, 2)),
             mean_sd_ms(&first.delay_s),
             ms(first.delay_s.p50),

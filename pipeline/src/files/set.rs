@@ -56,6 +56,11 @@ pub struct SetFile {
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub free_first_s: f64,
+    /// How long after the end of a contact an alarm does not count as false \[s\]: the time in which the arm recovers, such as
+    /// that of a protective stop.
+    #[serde(default = "recovery_s")]
+    #[schemars(range(min = 0.0))]
+    pub recovery_s: f64,
     /// Settings of detectors by name, as a pipeline's `detect` has them. `threshold` and `hold_s` beside them are for all.
     #[serde(default)]
     pub detectors: tauscope_detect::Config,
@@ -68,6 +73,11 @@ pub struct SetFile {
     /// Recordings that are scored.
     #[serde(default)]
     pub test: Vec<PathBuf>,
+}
+
+/// So long after its end an alarm may still be of the contact, because filters are slow.
+fn recovery_s() -> f64 {
+    0.15
 }
 
 /// Topics of a set's recordings.

@@ -56,11 +56,11 @@ impl Pipeline {
     pub fn recorder(
         &self,
         config: &tauscope_record::Config,
-        heard: &[usize],
+        inputs: &[usize],
     ) -> Result<Recorder, RecordError> {
-        let streams = self.streams(heard);
-        let is_heard = |cell: &&Cell| streams.iter().any(|stream| stream.cell == cell.facts.name);
-        let cells: Vec<&Cell> = self.cells.values().filter(is_heard).collect();
+        let streams = self.streams(inputs);
+        let is_inputs = |cell: &&Cell| streams.iter().any(|stream| stream.cell == cell.facts.name);
+        let cells: Vec<&Cell> = self.cells.values().filter(is_inputs).collect();
         build::recorder(config, &cells, &streams, &self.provenance())
     }
 

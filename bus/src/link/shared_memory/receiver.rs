@@ -11,7 +11,7 @@ use iceoryx2::service::ipc_threadsafe::Service;
 use super::{END_TAKEN, Joined, MAX_SENDERS, Samples, SharedMemory, greeting, open_error, wait};
 use crate::link::sequence::Tracker;
 use crate::link::{Keep, LinkError, MAX_DEPTH, Position, Received, Receiver, ReceiverCounts};
-use crate::sample::{Sample, flags};
+use crate::sample::Sample;
 
 pub(super) struct SharedMemoryReceiver<T: Sample> {
     stream: String,
@@ -63,24 +63,23 @@ impl<T: Sample> SharedMemoryReceiver<T> {
     /// What is there now; the sample is read where it lies in the sender's segment.
     fn take(&mut self, read: &mut dyn FnMut(&T)) -> Result<Received, LinkError> {
         while let Some(sample) = self.subscriber.receive().map_err(|e| self.error(&e))? {
-            let header = *sample.payload().header();
+            let header = sample.payload().header();
             let publisher = sample.origin().value();
             let instance = (publisher >> 64) as u64 ^ publisher as u64;
-            self.tracker.came_in(Some(Position {
+            let begin = Position {
                 instance,
                 next: sample.user_header().since.min(header.sequence),
-            }));
-            if !self.tracker.note(instance, header.sequence) {
-                continue;
-            }
-            if header.has(flags::END) {
+            };
+            let taken = self
+                .tracker
+                .take(Some(begin), instance, sample.payload(), read);
+            if taken == Some(Received::End) {
                 drop(sample);
                 self.tell(END_TAKEN)?;
-                return Ok(Received::End);
             }
-            self.tracker.received();
-            read(sample.payload());
-            return Ok(Received::Sample);
+            if let Some(received) = taken {
+                return Ok(received);
+            }
         }
         Ok(Received::Nothing)
     }

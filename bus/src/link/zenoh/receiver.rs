@@ -119,17 +119,14 @@ impl<T: Sample> Receiver<T> for ZenohReceiver<T> {
                 expected: format!("{} of {} bytes", T::KIND.type_name(), size_of::<T>()),
                 found,
             })?;
-            self.tracker.came_in(self.queue.begin());
-            if !self.tracker.note(message.instance, message.sequence) {
-                continue;
-            }
-            if sample.header().has(flags::END) {
+            let begin = self.queue.begin();
+            let taken = self.tracker.take(begin, message.instance, &sample, read);
+            if taken == Some(Received::End) {
                 self.acknowledge_end(message.instance)?;
-                return Ok(Received::End);
             }
-            self.tracker.received();
-            read(&sample);
-            return Ok(Received::Sample);
+            if let Some(received) = taken {
+                return Ok(received);
+            }
         }
         Ok(Received::Nothing)
     }

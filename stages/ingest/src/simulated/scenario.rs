@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+pub use tauscope_bus::EffortUnit;
 use tauscope_dynamics::terms::TermSpec;
 
 use super::conceal::ConcealSpec;
@@ -98,16 +99,6 @@ fn default_start_s() -> u32 {
 
 fn default_rate_hz() -> f64 {
     100.0
-}
-
-/// Unit of an effort.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-pub enum EffortUnit {
-    /// N m (N for a prismatic joint).
-    #[default]
-    Nm,
-    /// A: motor current.
-    A,
 }
 
 /// A tool.

@@ -1,13 +1,13 @@
 //! What was odd in the recordings of a set.
 
-mod session;
+mod totals;
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use tauscope_bus::flags;
 use tauscope_pipeline::suggest;
 
-use self::session::Totals;
+use self::totals::Totals;
 use crate::error::EvaluateError;
 use crate::input::Request;
 use crate::metrics::events::{LAST_S, TOLERANCE_S};
@@ -20,18 +20,18 @@ const MOST_SINGLY: usize = 4;
 
 /// What was odd, over all recordings behind one twin.
 #[derive(Debug, Default)]
-pub struct Heard {
+pub struct Notes {
     /// Samples and stretches that were lost or refused.
     pub lost: u64,
     /// What the reader should know.
-    pub notes: Vec<String>,
+    pub all: Vec<String>,
     /// Recordings of which the twin's filters passed over more than half.
     unsettled: BTreeSet<String>,
     /// What only all of them together tell.
     totals: Totals,
 }
 
-impl Heard {
+impl Notes {
     /// Takes down what was odd in `recording`.
     ///
     /// # Errors
@@ -45,7 +45,7 @@ impl Heard {
         }
         let damaged = played.damage.len() as u64;
         self.lost += played.refused + damaged;
-        let mut note = |text: String| self.notes.push(format!("{name}: {text}"));
+        let mut note = |text: String| self.all.push(format!("{name}: {text}"));
         for damage in &played.damage {
             note(format!("{damage}; what can be read of it is evaluated"));
         }
@@ -58,16 +58,16 @@ impl Heard {
         }
         if played.unsettled == count as u64 {
             note(format!(
-                "none of its {count} samples could be judged: the twin's filters never settled; what stands for it is silence"
+                "none of its {count} samples could be judged: the twin's filters never settled; its samples count as no contact"
             ));
         } else if 2 * played.unsettled > count as u64 {
             note(format!(
-                "{} of its {count} samples were not judged: the twin's filters had not settled; what stands for them is silence",
+                "{} of its {count} samples were not judged: the twin's filters had not settled; these samples count as no contact",
                 played.unsettled
             ));
         } else if played.gaps > 0 {
             note(format!(
-                "{} gap(s) in time; {} of {count} samples passed over while the filters settled",
+                "{} gap(s) in time; {} of {count} samples were not judged while the filters settled",
                 played.gaps, played.unsettled
             ));
         }
@@ -83,7 +83,7 @@ impl Heard {
 
     /// What the recordings together are odd in, once all are there.
     pub fn close(&mut self, request: &Request) {
-        self.notes.extend(self.totals.notes(request));
+        self.all.extend(self.totals.notes(request));
     }
 
     /// Test recordings of which detectors judged less than half, though the twin's filters had settled.
@@ -107,14 +107,14 @@ impl Heard {
         let names: Vec<&str> = by_recording.keys().copied().collect();
         if names.len() > MOST_SINGLY {
             return vec![format!(
-                "of {} test recordings some detectors judged less than half of the samples, because their filters had not settled; what stands for the others is silence: {}",
+                "of {} test recordings some detectors judged less than half of the samples, because their filters had not settled; the samples that were not judged count as no contact: {}",
                 names.len(),
                 suggest::some(&names)
             )];
         }
         let note = |(name, (count, who)): (&str, (usize, Vec<String>))| {
             format!(
-                "{name}: of its {count} samples were not judged, because their filters had not settled: {}; what stands for them is silence",
+                "{name}: of its {count} samples were not judged, because their filters had not settled: {}; these samples count as no contact",
                 who.join(", ")
             )
         };
@@ -133,7 +133,7 @@ fn beyond(recording: &Named, last_s: f64) -> Vec<String> {
         .filter(|labelled| *labelled > last_s + LAST_S)
     {
         notes.push(format!(
-            "the labels give it a length of {duration} s, and its samples end at {last_s:.2} s: these count"
+            "the labels give it a length of {duration} s, but its samples end at {last_s:.2} s: the samples count"
         ));
     }
     let reach = |t: f64| !(-TOLERANCE_S..=last_s + LAST_S).contains(&t);
@@ -158,7 +158,7 @@ pub fn silent(runners: &[Runner]) -> Vec<String> {
         let largest = runner.largest_score?;
         (runner.seed == 0 && runner.threshold >= largest).then(|| {
             format!(
-                "{} can never raise an alarm: its threshold is {:.4}, and its score stays below {largest:.4} whatever it sees; give a lower one in the set, `detectors: {{threshold: {{sigmas: ...}}}}`",
+                "{} can never raise an alarm: its threshold is {:.4}, and its score is always below {largest:.4}; give a lower one in the set, `detectors: {{threshold: {{sigmas: ...}}}}`",
                 runner.entry.name, runner.threshold
             )
         })

@@ -93,7 +93,7 @@ impl Totals {
         for (recordings, joints) in alike {
             let recordings: Vec<&str> = recordings.iter().map(String::as_str).collect();
             notes.push(format!(
-                "the effort of {} never changes in {}: what touches the robot cannot be felt there",
+                "the effort of {} never changes in {}: no detector can notice a contact there",
                 suggest::some(&joints),
                 suggest::some(&recordings)
             ));
@@ -105,7 +105,7 @@ impl Totals {
             .collect();
         if !stand.is_empty() {
             notes.push(format!(
-                "still in the train recordings, but not in the test recordings: {}; what their motion costs was not learnt",
+                "still in the train recordings, but not in the test recordings: {}; the effort of their motion was not learnt",
                 suggest::some(&stand)
             ));
         }
@@ -139,7 +139,7 @@ impl Totals {
         let mut notes = Vec::new();
         if is_little(&self.train) {
             notes.push(format!(
-                "the train recordings hold {:.1} s in which nothing touches the robot and the filters have settled: what is learnt from so little is a guess",
+                "the train recordings hold {:.1} s in which nothing touches the robot and the filters have settled: what is learnt from so little is unreliable",
                 self.train.free_s
             ));
         }

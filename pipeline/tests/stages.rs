@@ -1,0 +1,247 @@
+//! What every stage promises, whatever its role: twin, detectors and watch go through one suite.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use tauscope_bus::{EffortUnit, Emit, JointState, LinkError, Sample, Stage, TwinState, flags};
+use tauscope_detect::{Config, DETECTORS, Threshold};
+use tauscope_pipeline::build;
+use tauscope_pipeline::cell::Cell;
+use tauscope_pipeline::pipeline::ROLE_KEYS;
+use tauscope_pipeline::report::Problem;
+
+/// The system's allocator, counting per thread.
+struct Counting;
+
+thread_local! {
+    static ALLOCATIONS: std::cell::Cell<usize> = const { std::cell::Cell::new(0) };
+}
+
+fn count() {
+    ALLOCATIONS.with(|allocations| allocations.set(allocations.get() + 1));
+}
+
+// SAFETY: every call is passed on to the system's allocator as it came.
+#[allow(
+    unsafe_code,
+    reason = "a global allocator is unsafe by its nature; test only"
+)]
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count();
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        unsafe { System.dealloc(pointer, layout) }
+    }
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        count();
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+const RATE_HZ: i64 = 500;
+/// Long enough for every filter to settle and every window to fill \[samples\].
+const WARM: usize = 2500;
+
+/// Keeps what comes out, up to what was reserved.
+struct Kept<O>(Vec<O>);
+
+impl<O: Sample> Emit<O> for Kept<O> {
+    fn emit(&mut self, write: &mut dyn FnMut(&mut O)) -> Result<(), LinkError> {
+        let mut sample = O::default();
+        write(&mut sample);
+        self.0.push(sample);
+        Ok(())
+    }
+}
+
+/// A way to make a stage anew.
+type Make<'a, I, O> = &'a dyn Fn() -> Box<dyn Stage<I, O>>;
+
+fn run<I: Sample, O: Sample>(make: Make<'_, I, O>, stream: &[I]) -> Vec<O> {
+    let (mut stage, mut out) = (make(), Kept(Vec::new()));
+    for sample in stream {
+        stage.accept(sample, &mut out).unwrap();
+    }
+    stage.finish(&mut out).unwrap();
+    out.0
+}
+
+/// Seven joints that swing, each at a frequency of its own.
+fn motion(count: usize, rate_hz: i64) -> Vec<JointState> {
+    let period_ns = 1_000_000_000 / rate_hz;
+    let sample = |i: usize| {
+        let mut state = JointState::default();
+        state.header.stamp_ns = (i as i64 + 1) * period_ns;
+        state.header.sequence = i as u64;
+        state.header.joint_count = 7;
+        state.header.flags = flags::EFFORT_MEASURED;
+        let t = state.header.stamp_ns as f64 * 1e-9;
+        for j in 0..7 {
+            let w = 0.8 + 0.3 * j as f64;
+            state.position[j] = 0.4 * (w * t).sin();
+            state.velocity[j] = 0.4 * w * (w * t).cos();
+            state.effort[j] = 2.0 * (w * t).sin() + 0.1 * (17.0 * w * t).sin();
+        }
+        state
+    };
+    (0..count).map(sample).collect()
+}
+
+/// The suite. `stream` turns a motion into what the stage takes.
+fn keeps_its_promises<I: Sample, O: Sample>(
+    name: &str,
+    make: Make<'_, I, O>,
+    stream: &dyn Fn(&[JointState]) -> Vec<I>,
+) {
+    let usual = motion(2 * WARM, RATE_HZ);
+    let input = stream(&usual);
+    is_deterministic(name, make, &input);
+    allocates_nothing(name, make, &input);
+
+    let mut with_gap = usual.clone();
+    for state in &mut with_gap[WARM..] {
+        state.header.stamp_ns += 3_000_000_000;
+    }
+    ends_ready(name, "a gap of 3 s", make, &stream(&with_gap));
+
+    let mut with_nan = input.clone();
+    for sample in &mut with_nan[300..310] {
+        poison(sample);
+    }
+    ends_ready(name, "ten samples of NaN", make, &with_nan);
+
+    ends_ready(name, "100 Hz", make, &stream(&motion(2 * WARM, 100)));
+
+    let mut reset = input.clone();
+    reset[WARM].header_mut().flags |= flags::RESET;
+    ends_ready(name, "a reset", make, &reset);
+}
+
+fn is_deterministic<I: Sample, O: Sample>(name: &str, make: Make<'_, I, O>, input: &[I]) {
+    let (first, second) = (run(make, input), run(make, input));
+    assert_eq!(first.len(), input.len(), "{name}: a sample out for each in");
+    for (taken, given) in input.iter().zip(&first) {
+        let stamps = [taken.header().stamp_ns, given.header().stamp_ns];
+        assert_eq!(
+            stamps[0], stamps[1],
+            "{name}: time is taken from the samples"
+        );
+    }
+    let same = first.iter().zip(&second).all(|(a, b)| bytes(a) == bytes(b));
+    assert!(same, "{name}: the same samples give the same bytes");
+}
+
+fn bytes<T: Sample>(sample: &T) -> &[u8] {
+    bytemuck::bytes_of(sample)
+}
+
+fn allocates_nothing<I: Sample, O: Sample>(name: &str, make: Make<'_, I, O>, input: &[I]) {
+    let (mut stage, mut out) = (make(), Kept(Vec::with_capacity(input.len())));
+    let mut before = 0;
+    for (i, sample) in input.iter().enumerate() {
+        if i == WARM {
+            before = ALLOCATIONS.with(std::cell::Cell::get);
+        }
+        stage.accept(sample, &mut out).unwrap();
+    }
+    let after = ALLOCATIONS.with(std::cell::Cell::get);
+    assert_eq!(
+        after,
+        before,
+        "{name}: allocations in {} samples",
+        input.len() - WARM
+    );
+}
+
+/// Whatever came before, at the end the stage works as ever and nothing that it says is NaN.
+fn ends_ready<I: Sample, O: Sample>(name: &str, what: &str, make: Make<'_, I, O>, input: &[I]) {
+    let out = run(make, input);
+    let last = out.last().unwrap();
+    assert!(
+        last.header().has(flags::READY),
+        "{name} is not ready at the end of {what}"
+    );
+    let stamps = out
+        .windows(2)
+        .all(|pair| pair[0].header().stamp_ns < pair[1].header().stamp_ns);
+    assert!(stamps, "{name}: time runs backwards in {what}");
+}
+
+/// Every number of a sample but its header becomes NaN.
+fn poison<T: Sample>(sample: &mut T) {
+    let header = *sample.header();
+    for number in bytemuck::cast_slice_mut::<u8, u64>(bytemuck::bytes_of_mut(sample)) {
+        *number = f64::NAN.to_bits();
+    }
+    *sample.header_mut() = header;
+}
+
+fn cell() -> Cell {
+    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/demo_arm.urdf");
+    let none = BTreeMap::new();
+    Cell::from_urdf(&urdf, EffortUnit::Nm, &none, &|_, title| {
+        Problem::new(title)
+    })
+    .unwrap()
+}
+
+fn twin(cell: &Cell) -> Box<dyn Stage<JointState, TwinState>> {
+    Box::new(build::twin(&tauscope_twin::Config::default(), None, cell).unwrap())
+}
+
+#[test]
+fn every_stage_is_deterministic_allocates_nothing_and_gets_over_gaps_nan_rates_and_resets() {
+    let cell = cell();
+    let behind_twin = |states: &[JointState]| run(&|| twin(&cell), states);
+    for role in ROLE_KEYS {
+        match role {
+            "twin" => keeps_its_promises(role, &|| twin(&cell), &<[JointState]>::to_vec),
+            "detect" => detectors(&cell, &behind_twin),
+            "explain" => {
+                let config = tauscope_watch::Config::default();
+                let make = || -> Box<dyn Stage<_, _>> {
+                    Box::new(build::watch(&config, None, 20.0, &cell).unwrap())
+                };
+                keeps_its_promises(role, &make, &behind_twin);
+            }
+            // A source, a sink, and a program that is not ours.
+            "ingest" | "record" | "outside" => {}
+            other => panic!("no promises are held to a `{other}` stage"),
+        }
+    }
+}
+
+/// Every detector of the table that runs without having learnt; the others are refused before they start.
+fn detectors(cell: &Cell, stream: &dyn Fn(&[JointState]) -> Vec<TwinState>) {
+    let mut judged = 0;
+    for entry in DETECTORS {
+        let config = Config {
+            threshold: Threshold {
+                score: Some(100.0),
+                sigmas: None,
+            },
+            ..Config::default()
+        };
+        let config = config.with_any((entry.settings)());
+        if build::detect(&config, None, cell, None).is_err() {
+            continue;
+        }
+        judged += 1;
+        let make = || -> Box<dyn Stage<_, _>> {
+            Box::new(build::detect(&config, None, cell, None).unwrap())
+        };
+        keeps_its_promises(entry.name, &make, stream);
+    }
+    assert!(
+        judged >= 5,
+        "only {judged} detectors run without having learnt"
+    );
+}
