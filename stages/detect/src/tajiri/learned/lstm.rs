@@ -3,15 +3,15 @@
 
 use candle_core::{D, DType, Device, Tensor, Var};
 use candle_nn::ops::sigmoid;
-use rand::Rng;
+use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::TrainingSettings;
 use super::runner::{Course, Scorer};
 use super::scaling::Scaling;
 use super::signals::Signal;
 use super::training::{drop_out, fit, numbers, start};
-use crate::frame::{Trained, TrainedError};
+use super::{TrainingSettings, demand};
+use crate::frame::{LearnError, SignalSettings, Task, Trained, TrainedError};
 
 /// Input numbers a joint: q(t), q̇(t), q̇(t-1).
 const INPUTS: usize = 3;
@@ -43,6 +43,34 @@ struct Sequence {
 }
 
 impl Lstm {
+    /// The detector `name` with so many hidden units, on sequences of so many samples.
+    ///
+    /// # Errors
+    /// If a setting is out of range, there is no robot's model, too little data, or the training diverges.
+    pub fn train(
+        name: &'static str,
+        signals: &SignalSettings,
+        [hidden, length]: [usize; 2],
+        training: &TrainingSettings,
+        task: &Task<'_>,
+    ) -> Result<Trained, LearnError> {
+        demand(name, hidden > 0, "`hidden` must be at least 1")?;
+        training.check(name)?;
+        let course = Course::new(name, signals, length, task)?;
+        let mut rng = ChaCha8Rng::seed_from_u64(task.seed);
+        let net = Self::fit(&course, hidden, length, training, &mut rng);
+        let net = net.map_err(|error| course.failed(error))?;
+        course.end(|trained| net.save(trained), Self::scorer)
+    }
+
+    /// What scores, from a trained detector.
+    ///
+    /// # Errors
+    /// If an array is not there or has another shape.
+    pub fn scorer(trained: &Trained) -> Result<Box<dyn Scorer>, TrainedError> {
+        Ok(Box::new(LstmScorer::load(trained)?))
+    }
+
     /// Trains on sequences of `length` samples, with `hidden` units.
     ///
     /// # Errors
@@ -311,7 +339,6 @@ impl Scorer for LstmScorer {
 
 #[cfg(test)]
 mod tests {
-    use rand::SeedableRng;
 
     use super::*;
 
