@@ -321,19 +321,17 @@ fn behind_a_gap_every_score_is_finite_again() {
 }
 
 #[test]
-fn a_reading_that_is_no_number_is_forgotten_after_a_reset() {
-    // Ingest lets none through; a stage must not be spoilt for good by one all the same.
+fn a_reading_that_is_no_number_costs_its_sample_alone() {
+    // Ingest lets none through; no stage may be spoilt by one all the same.
     let own = setup(false);
-    let mut samples = swing(&own, 0, 3 * RATE_HZ, false);
-    samples[700].effort[1] = f64::NAN;
-    samples[700].filtered_effort[1] = f64::NAN;
-    samples[700].residual[1] = f64::NAN;
-    let mut after = swing(&own, 8 * RATE_HZ, 3 * RATE_HZ, false);
-    after[0].header.flags |= flags::RESET;
-    samples.extend(after);
+    let mut samples = swing(&own, 0, 4 * RATE_HZ, false);
+    samples[1200].effort[1] = f64::NAN;
+    samples[1200].filtered_effort[1] = f64::NAN;
+    samples[1200].residual[1] = f64::INFINITY;
     for pupil in pupils() {
         let said = pupil.run(&samples).unwrap();
-        let late = &said[said.len() - 100..];
+        assert!(!said[1200].header.has(flags::READY), "{}", pupil.entry.name);
+        let late = &said[1201..];
         assert!(
             late.iter().all(|of| of.score.is_finite()),
             "{}",
