@@ -2,8 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::Inertia;
-use crate::data::Slot;
+use crate::inertia::Inertia;
 
 mod document;
 mod error;
@@ -16,6 +15,7 @@ pub use error::ModelError;
 pub use shape::{Geometry, Shape};
 
 /// Standard gravity as simulators take it \[m/s²\]; along the world's -z.
+/// Physical: URDF and its simulators use 9.81 instead of the standard 9.80665.
 const GRAVITY_M_S2: f64 = 9.81;
 
 /// A robot with a fixed base. Cheap to share by reference; what changes while it runs (gravity, tool)
@@ -146,23 +146,6 @@ pub(crate) struct Frame {
 }
 
 impl Body {
-    /// Poses the body in its parent's frame.
-    #[inline]
-    pub fn place(&self, q: f64, slot: &mut Slot) {
-        let r = &self.rotation;
-        if self.prismatic {
-            slot.rotation = *r;
-            slot.translation = self.translation + r.column(2) * q;
-        } else {
-            let (sin, cos) = q.sin_cos();
-            let (x, y) = (r.column(0), r.column(1));
-            slot.rotation.set_column(0, &(x * cos + y * sin));
-            slot.rotation.set_column(1, &(y * cos - x * sin));
-            slot.rotation.set_column(2, &r.column(2));
-            slot.translation = self.translation;
-        }
-    }
-
     /// With the tool.
     pub fn inertia(&self) -> Inertia {
         self.own + self.tool

@@ -5,14 +5,13 @@ mod assembly;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use tauscope_dynamics::terms::EFFECTS;
+use tauscope_dynamics::terms::{EFFECTS, UNKNOWN};
+use tauscope_pipeline::cell::{Cell, EffortUnit};
+use tauscope_pipeline::files::CaseFile;
+use tauscope_pipeline::report::{Problem, Report};
+use tauscope_pipeline::suggest;
+use tauscope_pipeline::yaml::{self, Located, Place};
 use tauscope_twin::TwinFile;
-
-use crate::files::CaseFile;
-use crate::pipeline::{Cell, EffortUnit};
-use crate::report::{Problem, Report};
-use crate::suggest;
-use crate::yaml::{self, Located, Place};
 
 use self::assembly::{Assembly, Spot};
 
@@ -85,8 +84,8 @@ pub struct Arguments<'a> {
 pub fn without(effects: &[String]) -> Result<BTreeSet<String>, Report> {
     let mut report = Report::default();
     let known = || {
-        let names = EFFECTS.iter().map(|effect| effect.name);
-        names.filter(|name| *name != "unknown")
+        let named = EFFECTS.iter().filter(|effect| ***effect != UNKNOWN);
+        named.map(|effect| effect.name)
     };
     for effect in effects {
         if !known().any(|name| name == effect) {

@@ -1,68 +1,24 @@
 //! From recordings to a report: the whole way.
 
-use std::collections::{BTreeMap, BTreeSet};
+mod at_rest;
+mod in_motion;
+mod judged;
 
-use tauscope_dynamics::Model;
-use tauscope_dynamics::terms::{Layer, Site, TermError, TermSpec};
+use std::collections::BTreeMap;
 
-use crate::active::{Active, Hypothesis};
-use crate::at_rest;
-use crate::audit;
-use crate::drive;
-use crate::findings::{self, Named};
-use crate::fit::Fit;
-use crate::friction;
-use crate::library;
-use crate::locate;
-use crate::problem::Problem;
-use crate::recording::Recording;
-use crate::report::{RecordingPicture, Report, Undetectable, Verdict};
-use crate::start::{Start, scales};
-use crate::track::Track;
-use crate::verdict;
-use crate::windows::{TimeKind, time_kind};
+use tauscope_dynamics::terms::TermError;
 
-/// What is to be explained.
-#[derive(Debug)]
-pub struct Input {
-    /// Name of the case.
-    pub case: String,
-    /// The robot; massless joints where the twin is a topic.
-    pub model: Model,
-    /// Whether the robot's bodies are known: not where the twin is a topic.
-    pub bodies: bool,
-    /// Unit of the recordings' effort: `Nm` or `A`.
-    pub effort_unit: String,
-    /// By joint, where the unit is `A` and they are known \[N m/A\].
-    pub torque_constants_nm_per_a: Option<Vec<f64>>,
-    /// Recordings that may be fitted.
-    pub fit: Vec<Recording>,
-    /// Recordings that nothing is fitted on.
-    pub holdout: Vec<Recording>,
-    /// A corrected twin to start from, if there is one.
-    pub start: Option<Start>,
-    /// Effects that are left out of the library.
-    pub without: BTreeSet<String>,
-}
+use crate::context::Context;
+use crate::data::noise::white_noise;
+use crate::data::units::scales;
+use crate::outcome::Outcome;
+use crate::read::audit;
+use crate::read::input::Input;
+use crate::read::start::Start;
+use crate::report::schema::{Report, Verdict};
+use crate::report::{findings, locate, notes, verdict};
 
-/// What came of it.
-#[derive(Debug)]
-pub struct Outcome {
-    /// What is said.
-    pub report: Report,
-    /// The physics of the corrected twin that lasts: what the start had and what was found.
-    pub terms: Vec<TermSpec>,
-    /// Gain of each joint's bodies \[effort unit per model unit\].
-    pub gain: Vec<f64>,
-    /// Standard deviation of each gain that stands for a torque constant; 0 where none does.
-    pub gain_deviation: Vec<f64>,
-    /// The corrected twin's effort on each hold-out recording: row-major, one row per recorded row \[effort unit\].
-    pub predictions: Vec<(String, Vec<f64>)>,
-    /// What is drawn.
-    pub pictures: Vec<RecordingPicture>,
-    /// Trajectories to record next: file name and CSV text.
-    pub trajectories: Vec<(String, String)>,
-}
+use judged::Judged;
 
 /// Explains. `progress` is told the share that is done, 0 to 1, and what is being done.
 ///
@@ -93,7 +49,7 @@ pub fn explain(
         .map(|recording| recording.start_ns)
         .min()
         .unwrap_or(0);
-    let mut setup = Setup {
+    let mut setup = Context {
         input: &input,
         constants: &constants,
         unit_nm: &unit_nm,
@@ -130,7 +86,7 @@ pub fn explain(
     progress(0.95, "proof");
     let proof = setup.proof(&problem, &before, &found)?;
     let noise_floor: Vec<f64> = (0..joints.len())
-        .map(|j| audit::white_noise(&input.fit, j, joints.len()))
+        .map(|j| white_noise(&input.fit, j, joints.len()))
         .collect();
     let left_elsewhere = verdict::left_elsewhere(&proof, &noise_floor);
     let verdict = verdict::verdict(&found, &named.findings, &left_elsewhere);
@@ -140,7 +96,7 @@ pub fn explain(
     let mut notes = named.notes;
     let unit = if input.effort_unit == "A" { "A" } else { "N m" };
     notes.extend(verdict::note(&proof, &left_elsewhere, &joints, unit));
-    notes.extend(audit::notes(&input, &problem, &found, &rests_count));
+    notes.extend(notes::notes(&input, &problem, &found, &rests_count));
     let report = Report {
         case: input.case.clone(),
         verdict,
@@ -170,22 +126,6 @@ pub fn explain(
         pictures: proof.pictures,
         trajectories: named.trajectories,
     })
-}
-
-/// What a search came to.
-pub(crate) struct Judged {
-    /// The recordings that were fitted.
-    pub problem: Problem,
-    /// The twin as it was, its scales fitted where nobody knows them.
-    pub before: Fit,
-    /// The twin as it should be.
-    pub found: Fit,
-    /// What is said of it.
-    pub named: Named,
-    /// The smallest effects that would have been found.
-    pub undetectable: Vec<Undetectable>,
-    /// By joint, whether its standstills count.
-    pub rests_count: Vec<bool>,
 }
 
 /// Without hold-out recordings some of those to be fitted are held out: about a third, the last ones, so that
@@ -222,166 +162,5 @@ fn not_evaluated(input: &Input, joints: Vec<String>, reason: String) -> Outcome 
         predictions: Vec::new(),
         pictures: Vec::new(),
         trajectories: Vec::new(),
-    }
-}
-
-/// What every step needs.
-pub(crate) struct Setup<'a> {
-    pub input: &'a Input,
-    /// Torque constants by joint \[N m/A\]; 1 where there are none.
-    constants: &'a [f64],
-    /// N m per recorded unit by joint; 1 where nobody knows it.
-    pub unit_nm: &'a [f64],
-    /// Joints of which nobody knows the scale between the recordings' unit and N m, and the gain of their bodies at first.
-    pub unscaled: Vec<(usize, f64)>,
-    /// New bodies that were found and that the start's physics has to bear.
-    loads: Vec<TermSpec>,
-    session_start_ns: i64,
-    /// Whether no joint moves.
-    pub at_rest: bool,
-}
-
-impl Setup<'_> {
-    pub fn hypotheses(&self) -> Vec<Hypothesis> {
-        let input = self.input;
-        let mut all = library::hypotheses(&input.model, input.bodies, &input.without);
-        // The scale of such a joint is free as it is.
-        let unscaled = |joint: usize| self.unscaled.iter().any(|(other, _)| *other == joint);
-        all.retain(|h| h.effect.name != "torque_gain" || !unscaled(h.place.joint));
-        all
-    }
-
-    pub fn track(&self, recording: &Recording, motion_cutoff_hz: f64) -> Result<Track, TermError> {
-        let session_s = (recording.start_ns - self.session_start_ns) as f64 * 1e-9;
-        let model = &self.input.model;
-        let mut track = Track::new(
-            recording,
-            session_s,
-            model,
-            motion_cutoff_hz,
-            self.constants,
-        );
-        if let Some(start) = &self.input.start {
-            start.apply(
-                &mut track,
-                model,
-                &self.loads,
-                self.constants,
-                &self.first_gains(),
-            )?;
-        }
-        // Not of recordings held out: what is predicted for them comes from the motion alone.
-        let fitted = self
-            .input
-            .fit
-            .iter()
-            .any(|own| std::ptr::eq(own, recording));
-        if self.at_rest && fitted {
-            at_rest::start_at_measured(&mut track, recording, self.unit_nm);
-        }
-        Ok(track)
-    }
-
-    /// What there is of some recordings, compared as those are that are fitted.
-    pub fn problem(
-        &self,
-        recordings: &[Recording],
-        rests_count: &[bool],
-    ) -> Result<Problem, TermError> {
-        let cutoff_hz = Problem::cutoff_hz(&self.input.fit);
-        let motion_cutoff_hz = Problem::motion_cutoff_hz(cutoff_hz);
-        let tracks = recordings
-            .iter()
-            .map(|recording| self.track(recording, motion_cutoff_hz))
-            .collect::<Result<Vec<_>, _>>()?;
-        let mut problem = Problem::new(
-            &self.input.model,
-            recordings,
-            tracks,
-            cutoff_hz,
-            self.unit_nm,
-            rests_count,
-        );
-        if let Some(start) = &self.input.start {
-            problem.known_friction = start.friction(&self.input.model);
-            if self.input.torque_constants_nm_per_a.is_none() {
-                for (known, unit) in problem.known_friction.iter_mut().zip(self.unit_nm) {
-                    *known = known.map(|value| value * unit);
-                }
-            }
-        }
-        Ok(problem)
-    }
-
-    /// What the bodies of each joint are taken by at first, from the model's unit into the recording's.
-    fn first_gains(&self) -> Vec<f64> {
-        let mut gains: Vec<f64> = self.unit_nm.iter().map(|unit| 1.0 / unit).collect();
-        if !self.at_rest {
-            for &(joint, gain) in &self.unscaled {
-                gains[joint] = gain;
-            }
-        }
-        gains
-    }
-
-    /// Gain of each joint's bodies in the corrected twin, and its standard deviation, given those of the gains that were fitted.
-    fn final_gains(&self, found: &Fit, fitted: &[(usize, f64)]) -> (Vec<f64>, Vec<f64>) {
-        let n = self.unit_nm.len();
-        let start = self.input.start.as_ref();
-        let mut gain = start.map_or_else(|| vec![1.0; n], |start| start.gain.clone());
-        let mut deviation =
-            start.map_or_else(|| vec![0.0; n], |start| start.gain_deviation.clone());
-        let of_fit = drive::gains(&found.actives, n);
-        for &(joint, of_gain) in fitted {
-            (gain[joint], deviation[joint]) = (of_fit[joint], of_gain);
-        }
-        (gain, deviation)
-    }
-
-    /// A piece of physics as files hold it.
-    fn spec(&self, active: &Active) -> TermSpec {
-        let model = &self.input.model;
-        let place = active.hypothesis.place;
-        let site = Site {
-            model,
-            joint: place.joint,
-            source: place.source,
-            link: place.link,
-        };
-        TermSpec::of(&*active.term_for(model), &site)
-    }
-
-    /// The bodies of an explanation that its gears bear for long.
-    fn bodies(&self, found: &Fit) -> Vec<TermSpec> {
-        let of_bodies = |active: &&Active| {
-            let hypothesis = active.hypothesis;
-            let lasts = !matches!(time_kind(hypothesis), TimeKind::Once);
-            hypothesis.effect.layer == Layer::Body && !drive::is_drive(&hypothesis) && lasts
-        };
-        let bodies = found.actives.iter().filter(of_bodies);
-        bodies.map(|active| self.spec(active)).collect()
-    }
-
-    /// What a corrected twin keeps: not what came and went.
-    fn lasting_terms(&self, found: &Fit) -> Vec<TermSpec> {
-        let mut terms = self
-            .input
-            .start
-            .as_ref()
-            .map_or_else(Vec::new, |start| start.terms.clone());
-        for active in &found.actives {
-            if drive::is_drive(&active.hypothesis) || !findings::lasts(active.hypothesis) {
-                continue;
-            }
-            let term = self.spec(active);
-            // With torque constants the terms of a twin are in N m, else in what was recorded.
-            let term = if self.input.torque_constants_nm_per_a.is_none() {
-                friction::in_recorded_units(&term, &self.input.model, self.unit_nm)
-            } else {
-                term
-            };
-            friction::add(term, &mut terms);
-        }
-        terms
     }
 }

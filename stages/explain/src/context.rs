@@ -1,0 +1,120 @@
+//! The context that every step of an explanation shares.
+
+use tauscope_dynamics::terms::{TermError, TermSpec};
+
+use crate::data::problem::Problem;
+use crate::data::track::Track;
+use crate::physics::active::Hypothesis;
+use crate::physics::library;
+use crate::read::input::Input;
+use crate::read::recording::Recording;
+
+/// What every step of an explanation shares.
+pub struct Context<'a> {
+    /// What is to be explained.
+    pub input: &'a Input,
+    /// Torque constants by joint \[N m/A\]; 1 where there are none.
+    pub constants: &'a [f64],
+    /// N m per recorded unit by joint; 1 where nobody knows it.
+    pub unit_nm: &'a [f64],
+    /// Joints of which nobody knows the scale between the recordings' unit and N m, and the gain of their bodies at first.
+    pub unscaled: Vec<(usize, f64)>,
+    /// New bodies that were found and that the start's physics has to bear.
+    pub loads: Vec<TermSpec>,
+    /// Stamp of the first sample of all recordings \[ns since the epoch\].
+    pub session_start_ns: i64,
+    /// Whether no joint moves.
+    pub at_rest: bool,
+}
+
+impl Context<'_> {
+    /// Every hypothesis for the robot.
+    pub fn hypotheses(&self) -> Vec<Hypothesis> {
+        let input = self.input;
+        let mut all = library::hypotheses(&input.model, input.bodies, &input.without);
+        // The scale of such a joint is free as it is.
+        let unscaled = |joint: usize| self.unscaled.iter().any(|(other, _)| *other == joint);
+        all.retain(|h| !h.effect.traits.is_scale || !unscaled(h.place.joint));
+        all
+    }
+
+    /// The motion of a recording and what the twin says of it.
+    ///
+    /// # Errors
+    /// If a term of the start cannot be built for the robot.
+    pub fn track(&self, recording: &Recording, motion_cutoff_hz: f64) -> Result<Track, TermError> {
+        let session_s = (recording.start_ns - self.session_start_ns) as f64 * 1e-9;
+        let model = &self.input.model;
+        let mut track = Track::new(
+            recording,
+            session_s,
+            model,
+            motion_cutoff_hz,
+            self.constants,
+        );
+        if let Some(start) = &self.input.start {
+            start.apply(
+                &mut track,
+                model,
+                &self.loads,
+                self.constants,
+                &self.first_gains(),
+            )?;
+        }
+        // Not of recordings held out: what is predicted for them comes from the motion alone.
+        let fitted = self
+            .input
+            .fit
+            .iter()
+            .any(|own| std::ptr::eq(own, recording));
+        if self.at_rest && fitted {
+            track.start_at_measured(recording, self.unit_nm);
+        }
+        Ok(track)
+    }
+
+    /// What there is of some recordings, compared as those are that are fitted.
+    ///
+    /// # Errors
+    /// If a term of the start cannot be built for the robot.
+    pub fn problem(
+        &self,
+        recordings: &[Recording],
+        rests_count: &[bool],
+    ) -> Result<Problem, TermError> {
+        let cutoff_hz = Problem::cutoff_hz(&self.input.fit);
+        let motion_cutoff_hz = Problem::motion_cutoff_hz(cutoff_hz);
+        let tracks = recordings
+            .iter()
+            .map(|recording| self.track(recording, motion_cutoff_hz))
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut problem = Problem::new(
+            &self.input.model,
+            recordings,
+            tracks,
+            cutoff_hz,
+            self.unit_nm,
+            rests_count,
+        );
+        if let Some(start) = &self.input.start {
+            problem.known_friction = start.friction(&self.input.model);
+            if self.input.torque_constants_nm_per_a.is_none() {
+                for (known, unit) in problem.known_friction.iter_mut().zip(self.unit_nm) {
+                    known.values_mut().for_each(|value| *value *= unit);
+                }
+            }
+        }
+        Ok(problem)
+    }
+
+    /// What the bodies of each joint are taken by at first, from the model's unit into the recording's.
+    fn first_gains(&self) -> Vec<f64> {
+        let mut gains: Vec<f64> = self.unit_nm.iter().map(|unit| 1.0 / unit).collect();
+        if !self.at_rest {
+            for &(joint, gain) in &self.unscaled {
+                gains[joint] = gain;
+            }
+        }
+        gains
+    }
+}

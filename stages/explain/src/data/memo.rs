@@ -1,0 +1,119 @@
+//! What was computed before for a problem, so that it is computed once.
+
+use std::collections::{HashMap, VecDeque};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::data::column::Columns;
+use crate::data::efforts::TrackEfforts;
+
+/// Problems with more rows than this do without the memo.
+pub const MOST_ROWS: usize = 12_000;
+/// No more numbers than these are kept of each kind: 400 MB.
+const KEPT_NUMBERS: usize = 50_000_000;
+
+/// An effect, its place (joint, source joint, link), and the bits of its shape parameters.
+pub type Key = (&'static str, [usize; 3], Vec<u64>);
+
+/// Columns and efforts of effects, by effect, place and shape.
+#[derive(Debug, Default)]
+pub struct ColumnCache {
+    /// Filtered columns where effects only add to what is recorded.
+    pub columns: Kept<Columns>,
+    /// Unfiltered efforts of effects on bodies.
+    pub bodies: Kept<BodyEfforts>,
+}
+
+/// The effort of an effect on bodies at some shape, unfiltered and before torque scales.
+#[derive(Debug)]
+pub struct BodyEfforts {
+    /// What its shape alone does, `None` if nothing.
+    pub alone: Option<TrackEfforts>,
+    /// The effort of each of its factors per unit.
+    pub factors: Vec<TrackEfforts>,
+}
+
+/// A quantity in which the effort of bodies is linear.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Unit {
+    /// The ten inertial parameters at a link's frame, see [`tauscope_dynamics::Inertia::parameters`].
+    Inertia(usize),
+    /// Gravity along the base's axes \[m/s²\].
+    Gravity,
+}
+
+/// Efforts of unit quantities, at most one set for each link.
+#[derive(Debug, Default)]
+pub struct UnitEfforts {
+    /// Unfiltered.
+    pub efforts: Shared<Vec<TrackEfforts>>,
+    /// Filtered, as signals.
+    pub signals: Shared<Vec<Vec<f64>>>,
+}
+
+/// A map that is filled as its entries are asked for.
+#[derive(Debug)]
+pub struct Shared<T>(Mutex<HashMap<Unit, Arc<T>>>);
+
+impl<T> Default for Shared<T> {
+    fn default() -> Self {
+        Self(Mutex::default())
+    }
+}
+
+impl<T> Shared<T> {
+    /// What is kept of `unit`, or else what `compute` gives.
+    pub fn get_or(&self, unit: Unit, compute: impl FnOnce() -> T) -> Arc<T> {
+        let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = lock().get(&unit) {
+            return Arc::clone(known);
+        }
+        let new = Arc::new(compute());
+        Arc::clone(lock().entry(unit).or_insert(new))
+    }
+}
+
+/// Keeps the newest of what was computed, up to [`KEPT_NUMBERS`].
+#[derive(Debug)]
+pub struct Kept<T>(Mutex<KeptInner<T>>);
+
+#[derive(Debug)]
+struct KeptInner<T> {
+    all: HashMap<Key, Arc<T>>,
+    /// From the oldest on, with how many numbers each holds.
+    order: VecDeque<(Key, usize)>,
+    numbers: usize,
+}
+
+impl<T> Default for Kept<T> {
+    fn default() -> Self {
+        Self(Mutex::new(KeptInner {
+            all: HashMap::new(),
+            order: VecDeque::new(),
+            numbers: 0,
+        }))
+    }
+}
+
+impl<T> Kept<T> {
+    /// What is kept under `key`, or else what `compute` gives, with how many numbers it holds.
+    pub fn get_or(&self, key: Key, compute: impl FnOnce() -> (T, usize)) -> Arc<T> {
+        let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = lock().all.get(&key) {
+            return Arc::clone(known);
+        }
+        let (new, numbers) = compute();
+        let new = Arc::new(new);
+        let mut kept = lock();
+        if kept.all.insert(key.clone(), Arc::clone(&new)).is_none() {
+            kept.order.push_back((key, numbers));
+            kept.numbers += numbers;
+        }
+        while kept.numbers > KEPT_NUMBERS
+            && let Some((oldest, numbers)) = kept.order.pop_front()
+        {
+            kept.all.remove(&oldest);
+            kept.numbers -= numbers;
+        }
+        new
+    }
+}

@@ -1,0 +1,133 @@
+//! From recordings to the data of a fit.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, OnceLock};
+
+use tauscope_dynamics::Model;
+
+use crate::data::effective_samples::per_row;
+use crate::data::noise::white_variance;
+use crate::data::problem::Problem;
+use crate::data::smoother::LowPass;
+use crate::data::track::{FitTrack, Track, moving_joints, spaced, thinned};
+use crate::read::recording::Recording;
+
+/// What is compared lies below this frequency, unless the recordings are too slow for it \[Hz\].
+const CUTOFF_HZ: f64 = 8.0;
+/// The cutoff is at most this share of the sample rate.
+const CUTOFF_OF_RATE: f64 = 0.1;
+/// Motion is smoothed this many times higher, so that its filter does not show below the cutoff.
+const MOTION_CUTOFF_RATIO: f64 = 2.0;
+/// Recordings faster than this are thinned for the fit \[Hz\]; where there are many samples down to the lower.
+const FIT_RATE_HZ: [f64; 2] = [50.0, 130.0];
+/// From how many samples on.
+const FIT_SAMPLES: f64 = 8000.0;
+/// Fast recordings are filtered this many times higher than what is compared before they are thinned.
+const ALIASING_RATIO: f64 = 5.0;
+
+impl Problem {
+    /// The frequency below which these recordings are compared \[Hz\].
+    pub fn cutoff_hz(recordings: &[Recording]) -> f64 {
+        let rate = |r: &Recording| (r.len() - 1) as f64 / r.duration_s().max(1e-3);
+        let slowest = recordings.iter().map(rate).fold(f64::INFINITY, f64::min);
+        CUTOFF_HZ.min(CUTOFF_OF_RATE * slowest)
+    }
+
+    /// The half amplitude of the smoother of motion for a comparison below `cutoff_hz` \[Hz\].
+    pub fn motion_cutoff_hz(cutoff_hz: f64) -> f64 {
+        MOTION_CUTOFF_RATIO * cutoff_hz
+    }
+
+    /// Prepares recordings with effort, and their `tracks` at all samples, for a fit below `cutoff_hz`; `unit_nm`
+    /// turns the recordings' unit into N m, by joint. Standstills of the joints in `rests_count` are compared, too.
+    pub fn new(
+        model: &Model,
+        recordings: &[Recording],
+        tracks: Vec<Track>,
+        cutoff_hz: f64,
+        unit_nm: &[f64],
+        rests_count: &[bool],
+    ) -> Self {
+        let n = model.dof();
+        let mut problem = Self {
+            model: model.clone(),
+            joints: n,
+            tracks: Vec::new(),
+            rows: 0,
+            measured: Vec::new(),
+            weight: Vec::new(),
+            white_noise: vec![0.0; n],
+            largest_effort: vec![0.0; n],
+            cutoff_hz,
+            effective_samples: Vec::new(),
+            known_friction: vec![BTreeMap::new(); n],
+            cache: Arc::default(),
+            units: Arc::default(),
+            bare: OnceLock::new(),
+            rigid: OnceLock::new(),
+            expansions: vec![OnceLock::new(); n],
+        };
+        let (mut measured, mut weight) = (Vec::new(), Vec::new());
+        let mut variances = vec![Vec::new(); n];
+        let total_s: f64 = recordings.iter().map(Recording::duration_s).sum();
+        let fit_rate_hz = (FIT_SAMPLES / total_s).clamp(FIT_RATE_HZ[0], FIT_RATE_HZ[1]);
+        let tracks: Vec<(Track, Track, Vec<usize>)> = tracks
+            .into_iter()
+            .map(|full| {
+                let kept = thinned(&full.time_s, 1.0 / fit_rate_hz);
+                (full.thin(&kept, n), full, kept)
+            })
+            .collect();
+        let moves = moving_joints(tracks.iter().map(|(track, _, _)| track), n);
+        for (recording, (track, full, kept)) in recordings.iter().zip(tracks) {
+            let compared = spaced(&track.time_s, 0.5 / cutoff_hz);
+            let mut filters = Vec::with_capacity(n);
+            for j in 0..n {
+                let counts = track.counts(j, moves[j] && !rests_count[j], cutoff_hz);
+                let filter = LowPass::weighted(&track.time_s, cutoff_hz, |k| counts[k]);
+                let of_joint = (0..full.len()).map(|k| k * n + j);
+                let largest = of_joint.clone().fold(0.0_f64, |most, at| {
+                    most.max((recording.effort[at] * unit_nm[j]).abs())
+                });
+                problem.largest_effort[j] = problem.largest_effort[j].max(largest);
+                let mut signal: Vec<f64> = of_joint
+                    .map(|at| (recording.effort[at] - full.beside[at]) * unit_nm[j])
+                    .collect();
+                let rate = (full.len() - 1) as f64 / recording.duration_s();
+                variances[j].push(white_variance(&signal) * cutoff_hz * 0.95 / (0.5 * rate));
+                if kept.len() < full.len() {
+                    // Against aliasing.
+                    LowPass::new(&full.time_s, ALIASING_RATIO * cutoff_hz).apply(&mut signal);
+                }
+                let mut signal: Vec<f64> = kept.iter().map(|&k| signal[k]).collect();
+                filter.apply(&mut signal);
+                measured.push(compared.iter().map(|&k| signal[k]).collect::<Vec<_>>());
+                weight.push(
+                    compared
+                        .iter()
+                        .map(|&k| f64::from(counts[k]))
+                        .collect::<Vec<_>>(),
+                );
+                filters.push(filter);
+            }
+            let first_row = problem.rows;
+            problem.rows += compared.len();
+            problem.tracks.push(FitTrack {
+                track,
+                filters,
+                compared,
+                first_row,
+            });
+        }
+        for j in 0..n {
+            for r in 0..recordings.len() {
+                problem.measured.extend(&measured[r * n + j]);
+                problem.weight.extend(&weight[r * n + j]);
+            }
+            variances[j].sort_by(f64::total_cmp);
+            problem.white_noise[j] = variances[j][variances[j].len() / 2].sqrt();
+        }
+        problem.effective_samples = per_row(&problem);
+        problem
+    }
+}

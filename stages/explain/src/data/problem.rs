@@ -1,0 +1,128 @@
+//! The data of a fit: smoothed motion, rigid-body effort and filtered measured effort of the recordings.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, OnceLock};
+
+use tauscope_dynamics::terms::Expansion;
+use tauscope_dynamics::{Data, Model};
+
+use crate::data::column::Column;
+use crate::data::efforts::Efforts;
+use crate::data::memo::{ColumnCache, UnitEfforts};
+use crate::data::track::FitTrack;
+
+/// Everything that a fit works on. A *signal* is joint-major: `rows` numbers for joint 0, then for joint 1,
+/// and so on; the rows of each joint are those of the tracks, one after the other.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    /// The robot.
+    pub model: Model,
+    /// Number of joints.
+    pub joints: usize,
+    /// The recordings.
+    pub tracks: Vec<FitTrack>,
+    /// Rows per joint.
+    pub rows: usize,
+    /// Measured effort, filtered \[N m or N\].
+    pub measured: Vec<f64>,
+    /// 1 where a joint's row counts, 0 where it stands still or the filters have no footing.
+    pub weight: Vec<f64>,
+    /// Standard deviation of the measured effort's white noise after the filter, by joint \[N m\]: the least
+    /// that any model can leave.
+    pub white_noise: Vec<f64>,
+    /// Largest measured effort by joint, unfiltered \[N m\].
+    pub largest_effort: Vec<f64>,
+    /// Half amplitude of the filter \[Hz\].
+    pub cutoff_hz: f64,
+    /// Effective (independent) samples per row of noise, by joint: 0 to 1.
+    pub effective_samples: Vec<f64>,
+    /// Coulomb and viscous friction by joint that the twin has already: by so much they may be less.
+    pub known_friction: Vec<BTreeMap<&'static str, f64>>,
+    /// Columns that were computed before.
+    pub cache: Arc<ColumnCache>,
+    /// What unit bodies cost.
+    pub units: Arc<UnitEfforts>,
+    pub(super) bare: OnceLock<Efforts>,
+    pub(super) rigid: OnceLock<Vec<f64>>,
+    pub(super) expansions: Vec<OnceLock<Arc<Expansion>>>,
+}
+
+impl Problem {
+    /// The same where one recording does not count.
+    #[must_use]
+    pub fn without(&self, track: usize) -> Self {
+        let mut others = self.clone();
+        for joint in 0..self.joints {
+            let rows = others.joint_rows(joint);
+            others.weight[rows][self.tracks[track].rows()].fill(0.0);
+        }
+        others
+    }
+
+    /// What the twin says without any physics beside it.
+    pub fn bare(&self) -> &Efforts {
+        self.bare.get_or_init(|| {
+            let rigid = self.tracks.iter().map(|t| t.track.rigid.clone()).collect();
+            Efforts::of_bodies(Arc::new(rigid))
+        })
+    }
+
+    /// The same as a signal.
+    pub fn rigid(&self) -> &[f64] {
+        self.rigid.get_or_init(|| self.signal(&self.bare().body))
+    }
+
+    /// What bodies cost as a joint's link leaves the motion, over all tracks.
+    pub fn expansion(&self, joint: usize) -> &Arc<Expansion> {
+        self.expansions[joint].get_or_init(|| {
+            let (model, mut data) = (&self.model, Data::new(&self.model));
+            let mut all = Expansion::new(model, joint);
+            for track in &self.tracks {
+                track.track.each(|_, at| {
+                    all.push(model, &mut data, at.position, at.velocity, at.acceleration);
+                });
+            }
+            Arc::new(all)
+        })
+    }
+
+    /// The part of a signal that is joint `joint`'s.
+    pub fn joint_rows(&self, joint: usize) -> std::ops::Range<usize> {
+        joint * self.rows..(joint + 1) * self.rows
+    }
+
+    /// Filters efforts over all tracks (row-major, one `Vec` per track) into a signal.
+    pub fn signal(&self, efforts: &[Vec<f64>]) -> Vec<f64> {
+        let mut signal = vec![0.0; self.joints * self.rows];
+        for j in 0..self.joints {
+            self.joint_signal(efforts, j, &mut signal[j * self.rows..(j + 1) * self.rows]);
+        }
+        signal
+    }
+
+    /// The same for one joint.
+    pub fn joint_signal(&self, efforts: &[Vec<f64>], joint: usize, into: &mut [f64]) {
+        for (track, effort) in self.tracks.iter().zip(efforts) {
+            let one = effort
+                .iter()
+                .skip(joint)
+                .step_by(self.joints)
+                .copied()
+                .collect();
+            track.compare(joint, one, &mut into[track.rows()]);
+        }
+    }
+
+    /// An effort over all tracks as a column: of one joint, or of all.
+    pub fn column(&self, effort: &[Vec<f64>], joint: Option<usize>) -> Column {
+        let values = match joint {
+            Some(joint) => {
+                let mut values = vec![0.0; self.rows];
+                self.joint_signal(effort, joint, &mut values);
+                values
+            }
+            None => self.signal(effort),
+        };
+        Column { joint, values }
+    }
+}

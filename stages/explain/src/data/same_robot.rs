@@ -1,0 +1,102 @@
+//! Whether measured and computed efforts are those of one robot, in one unit.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::data::problem::Problem;
+use crate::read::audit::MOVES;
+use crate::read::input::Input;
+
+/// A joint's twin effort varies enough to compare with the measured one from this many times the noise.
+const STRONG: f64 = 5.0;
+/// A slope of measured effort over the twin's beyond this, either way, is a wrong unit rather than physics.
+const WRONG_SCALE: f64 = 3.0;
+/// A joint follows the twin if scaled it explains this share of what friction does not.
+const FOLLOWS: f64 = 0.15;
+
+/// Why nothing can be said, found by comparing the efforts as they are: a wrong robot, or a wrong unit.
+pub fn reason_against(input: &Input, problem: &Problem) -> Option<String> {
+    if !input.bodies || input.start.is_some() {
+        return None;
+    }
+    let (mut strong, mut following, mut slopes) = (0, 0, Vec::new());
+    for j in 0..problem.joints {
+        let (share, slope, spread) = regression(problem, j);
+        if spread < STRONG * problem.white_noise[j] {
+            continue;
+        }
+        strong += 1;
+        if share > FOLLOWS && slope > 0.0 {
+            following += 1;
+            slopes.push(slope);
+        }
+    }
+    if strong == 0 {
+        return None;
+    }
+    if 2 * following < strong || (strong >= 2 && following == 0) {
+        return Some(format!(
+            "the effort of {} of {strong} joints has nothing to do with what this robot's motion costs: it is the \
+             recording of another robot, its joints have other signs, or gravity is taken off the effort",
+            strong - following
+        ));
+    }
+    slopes.sort_by(f64::total_cmp);
+    let middle = slopes[slopes.len() / 2];
+    let known_scale = input.effort_unit == "Nm" || input.torque_constants_nm_per_a.is_some();
+    if known_scale && !(1.0 / WRONG_SCALE..=WRONG_SCALE).contains(&middle) {
+        return Some(format!(
+            "the measured effort is {middle:.2} times what this robot's motion costs: the unit or the torque \
+             constants are wrong"
+        ));
+    }
+    None
+}
+
+/// Share of a joint's measured variance that the twin's effort explains beside direction and speed, the slope, and
+/// the standard deviation of the twin's effort \[N m\].
+fn regression(problem: &Problem, joint: usize) -> (f64, f64, f64) {
+    let rows = problem.joint_rows(joint);
+    let n = problem.joints;
+    let rigid: Vec<Vec<f64>> = problem
+        .tracks
+        .iter()
+        .map(|t| t.track.rigid.clone())
+        .collect();
+    let mut model = vec![0.0; problem.rows];
+    problem.joint_signal(&rigid, joint, &mut model);
+    let (mut xs, mut ys) = (Vec::new(), Vec::new());
+    for track in &problem.tracks {
+        for (row, &k) in track.rows().zip(&track.compared) {
+            if problem.weight[rows.start + row] > 0.0 {
+                let velocity = track.track.velocity[k * n + joint];
+                let sign = if velocity.abs() < MOVES {
+                    0.0
+                } else {
+                    velocity.signum()
+                };
+                xs.push([1.0, sign, velocity, model[row]]);
+                ys.push(problem.measured[rows.start + row]);
+            }
+        }
+    }
+    let m = ys.len();
+    if m < 20 {
+        return (1.0, 1.0, 0.0);
+    }
+    let mean = xs.iter().map(|x| x[3]).sum::<f64>() / m as f64;
+    let spread = (xs.iter().map(|x| (x[3] - mean).powi(2)).sum::<f64>() / m as f64).sqrt();
+    let y = DVector::from_vec(ys);
+    let left = |columns: usize| {
+        let x = DMatrix::from_fn(m, columns, |a, b| xs[a][b]);
+        let mut normal = x.transpose() * &x;
+        for a in 0..columns {
+            normal[(a, a)] += 1e-9 * normal.trace() + 1e-12;
+        }
+        let solution = normal.cholesky().map(|c| c.solve(&(x.transpose() * &y)));
+        let solution = solution.unwrap_or_else(|| DVector::zeros(columns));
+        ((&y - &x * &solution).norm_squared(), solution[columns - 1])
+    };
+    let (without, _) = left(3);
+    let (with, slope) = left(4);
+    (1.0 - with / without.max(1e-300), slope, spread)
+}

@@ -1,0 +1,357 @@
+//! One recording as a fit sees it: smoothed motion, what the twin says of it, and what counts.
+
+use nalgebra::Vector3;
+use tauscope_dynamics::terms::{MotionSample, Physics};
+use tauscope_dynamics::{Data, Model, rnea};
+
+use crate::data::smoother::{LowPass, MotionSmoother};
+use crate::data::standstill;
+use crate::read::recording::{MAX_GAP_S, Recording};
+
+/// Below this speed a joint stands: its friction is any value up to breakaway \[rad/s\].
+pub const STANDSTILL_RAD_S: f64 = 0.01;
+/// Samples nearer than this to an end of the recording are left out, in periods of the cutoff.
+const END_PERIODS: f64 = 0.8;
+/// And nearer than this to a standstill or reversal of the joint: what friction does there, the motion does not tell.
+const REVERSAL_PERIODS: f64 = 0.4;
+/// A joint that moves in less than this share of the time is judged at rest, too.
+const LEAST_MOVING_SHARE: f64 = 0.2;
+
+/// What the arm bears at the beginning of a recording is what it bears without anything that comes and goes \[s\].
+pub const BEGINNING_S: f64 = 1.0;
+
+/// One recording as a fit sees it. Matrices are row-major: one number per joint and sample.
+#[derive(Debug, Clone)]
+pub struct Track {
+    /// The recording's name.
+    pub name: String,
+    /// Its start \[s from the start of the session\].
+    pub session_s: f64,
+    /// \[s from its start\]
+    pub time_s: Vec<f64>,
+    /// Smoothed position \[rad or m\].
+    pub position: Vec<f64>,
+    /// Smoothed velocity \[rad/s or m/s\].
+    pub velocity: Vec<f64>,
+    /// Smoothed acceleration \[rad/s² or m/s²\].
+    pub acceleration: Vec<f64>,
+    /// What the twin says \[N m or N\].
+    pub rigid: Vec<f64>,
+    /// What a corrected twin says beside its bodies \[the recording's unit\].
+    pub beside: Vec<f64>,
+}
+
+impl Track {
+    /// The motion of a recording, at all its samples, and what the twin says of it. Motion is smoothed with half
+    /// amplitude at `motion_cutoff_hz`; `constants` turn the recording's unit into the model's, by joint.
+    pub fn new(
+        recording: &Recording,
+        session_s: f64,
+        model: &Model,
+        motion_cutoff_hz: f64,
+        constants: &[f64],
+    ) -> Self {
+        let n = model.dof();
+        let count = recording.len();
+        let smoother = MotionSmoother::new(&recording.time_s, motion_cutoff_hz);
+        let mut track = Self {
+            name: recording.name.clone(),
+            session_s,
+            time_s: recording.time_s.clone(),
+            position: vec![0.0; n * count],
+            velocity: vec![0.0; n * count],
+            acceleration: vec![0.0; n * count],
+            rigid: vec![0.0; n * count],
+            beside: vec![0.0; n * count],
+        };
+        for j in 0..n {
+            let measured: Vec<f64> = (0..count).map(|k| recording.position[k * n + j]).collect();
+            let mut states = smoother.smooth(&measured);
+            standstill::resmooth(&recording.time_s, &measured, &mut states);
+            for (k, state) in states.iter().enumerate() {
+                track.position[k * n + j] = state.x;
+                track.velocity[k * n + j] = state.y;
+                track.acceleration[k * n + j] = state.z;
+            }
+        }
+        if recording.reference.is_empty() {
+            let mut data = Data::new(model);
+            for k in 0..count {
+                let row = k * n..(k + 1) * n;
+                let effort = rnea(
+                    model,
+                    &mut data,
+                    &track.position[row.clone()],
+                    &track.velocity[row.clone()],
+                    &track.acceleration[row.clone()],
+                );
+                track.rigid[row].copy_from_slice(effort);
+            }
+        } else {
+            for (k, value) in recording.reference.iter().enumerate() {
+                track.rigid[k] = value * constants[k % n];
+            }
+        }
+        track
+    }
+
+    /// Takes the velocity from positions smoothed with another half amplitude \[Hz\] or, without one, as it was recorded, but for
+    /// standstills; what the twin says stays.
+    pub(crate) fn sharpen_velocity(&mut self, recording: &Recording, cutoff_hz: Option<f64>) {
+        let n = self.velocity.len() / self.len().max(1);
+        let smoother = cutoff_hz.map(|hz| MotionSmoother::new(&recording.time_s, hz));
+        for j in 0..n {
+            let of_joint = |all: &[f64]| all.iter().skip(j).step_by(n).copied().collect::<Vec<_>>();
+            let measured = of_joint(&recording.position);
+            let mut states = match &smoother {
+                Some(smoother) => smoother.smooth(&measured),
+                None => (of_joint(&recording.velocity).into_iter())
+                    .map(|velocity| Vector3::new(0.0, velocity, 0.0))
+                    .collect(),
+            };
+            standstill::resmooth(&recording.time_s, &measured, &mut states);
+            for (velocity, state) in self.velocity.iter_mut().skip(j).step_by(n).zip(&states) {
+                *velocity = state.y;
+            }
+        }
+    }
+
+    /// Shifts what the twin says of an arm at rest so that it begins with what is measured: load, friction and offset cannot be told
+    /// apart there.
+    pub fn start_at_measured(&mut self, recording: &Recording, unit_nm: &[f64]) {
+        let n = unit_nm.len();
+        let samples = self.time_s.partition_point(|t| *t < BEGINNING_S);
+        if recording.effort.is_empty() || samples == 0 {
+            return;
+        }
+        for (j, unit) in unit_nm.iter().enumerate() {
+            let off = |k: usize| {
+                let at = k * n + j;
+                (recording.effort[at] - self.beside[at]) * unit - self.rigid[at]
+            };
+            let mean = (0..samples).map(off).sum::<f64>() / samples as f64;
+            for value in self.rigid.iter_mut().skip(j).step_by(n) {
+                *value += mean;
+            }
+        }
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.time_s.is_empty()
+    }
+
+    /// Keeps the samples of these indices.
+    pub(crate) fn thin(&self, keep: &[usize], n: usize) -> Self {
+        let rows = |from: &[f64]| -> Vec<f64> {
+            keep.iter()
+                .flat_map(|&k| from[k * n..(k + 1) * n].to_vec())
+                .collect()
+        };
+        Self {
+            name: self.name.clone(),
+            session_s: self.session_s,
+            time_s: keep.iter().map(|&k| self.time_s[k]).collect(),
+            position: rows(&self.position),
+            velocity: rows(&self.velocity),
+            acceleration: rows(&self.acceleration),
+            rigid: rows(&self.rigid),
+            beside: rows(&self.beside),
+        }
+    }
+
+    /// Runs `physics` over the track, from `start` efforts (row-major) to what is recorded.
+    pub fn run(&self, physics: &mut Physics, start: &[f64]) -> Vec<f64> {
+        let mut effort = start.to_vec();
+        physics.reset();
+        self.each(|k, at| {
+            let n = at.position.len();
+            physics.act(at, &mut effort[k * n..(k + 1) * n]);
+        });
+        effort
+    }
+
+    /// Calls `visit` with every sample in order.
+    pub fn each(&self, mut visit: impl FnMut(usize, &MotionSample<'_>)) {
+        let n = self.position.len() / self.len().max(1);
+        for k in 0..self.len() {
+            let row = k * n..(k + 1) * n;
+            let at = MotionSample {
+                dt_s: if k == 0 {
+                    0.0
+                } else {
+                    self.time_s[k] - self.time_s[k - 1]
+                },
+                recording_s: self.time_s[k],
+                session_s: self.session_s + self.time_s[k],
+                position: &self.position[row.clone()],
+                velocity: &self.velocity[row.clone()],
+                acceleration: &self.acceleration[row.clone()],
+                transmitted: &self.rigid[row],
+            };
+            visit(k, &at);
+        }
+    }
+}
+
+impl Track {
+    /// Which samples of a joint are compared: not the ends, not beside a gap and, where the joint `moves`
+    /// at all, not its standstills and reversals.
+    pub(crate) fn counts(&self, joint: usize, moves: bool, cutoff_hz: f64) -> Vec<bool> {
+        let n = self.position.len() / self.len();
+        let time = &self.time_s;
+        let mut counts = vec![true; time.len()];
+        let mut spoil = |from: f64, to: f64| {
+            let first = time.partition_point(|t| *t < from);
+            let last = time.partition_point(|t| *t <= to);
+            counts[first..last].fill(false);
+        };
+        let margin = END_PERIODS / cutoff_hz;
+        let (start, end) = (time[0], time[time.len() - 1]);
+        spoil(start, start + margin);
+        spoil(end - margin, end);
+        for pair in time.windows(2) {
+            if pair[1] - pair[0] > MAX_GAP_S {
+                spoil(pair[0] - margin, pair[1] + margin);
+            }
+        }
+        if moves {
+            let margin = REVERSAL_PERIODS / cutoff_hz;
+            let velocity = |k: usize| self.velocity[k * n + joint];
+            for (k, &t) in time.iter().enumerate() {
+                let reverses = k > 0 && velocity(k) * velocity(k - 1) < 0.0;
+                if reverses || velocity(k).abs() < STANDSTILL_RAD_S {
+                    spoil(t - margin, t + margin);
+                }
+            }
+        }
+        counts
+    }
+}
+
+/// A track with the filter of its clock and the samples that are compared.
+#[derive(Debug, Clone)]
+pub struct FitTrack {
+    /// The motion, thinned.
+    pub track: Track,
+    /// By joint, passing over what does not count there.
+    pub(crate) filters: Vec<LowPass>,
+    /// Samples at which filtered signals are compared.
+    pub compared: Vec<usize>,
+    /// Where they begin in the rows of the problem.
+    pub first_row: usize,
+}
+
+impl FitTrack {
+    /// Rows of the problem that are this track's.
+    pub fn rows(&self) -> std::ops::Range<usize> {
+        self.first_row..self.first_row + self.compared.len()
+    }
+
+    /// Filters one joint's signal on the track's clock and writes what is compared.
+    pub fn compare(&self, joint: usize, mut signal: Vec<f64>, into: &mut [f64]) {
+        self.filters[joint].apply(&mut signal);
+        for (value, &k) in into.iter_mut().zip(&self.compared) {
+            *value = signal[k];
+        }
+    }
+}
+
+/// Which joints move in a fair share of the time; the others are judged at rest, too.
+pub(crate) fn moving_joints<'a>(tracks: impl Iterator<Item = &'a Track>, n: usize) -> Vec<bool> {
+    let (mut moving, mut samples) = (vec![0_usize; n], 0);
+    for track in tracks {
+        samples += track.len();
+        for (k, velocity) in track.velocity.iter().enumerate() {
+            moving[k % n] += usize::from(velocity.abs() > 2.0 * STANDSTILL_RAD_S);
+        }
+    }
+    let share = |count: &usize| *count as f64 > LEAST_MOVING_SHARE * samples as f64;
+    moving.iter().map(share).collect()
+}
+
+/// Indices of samples at least `step_s` apart (but for a tenth of it, for uneven clocks).
+pub(crate) fn thinned(time_s: &[f64], step_s: f64) -> Vec<usize> {
+    let mut kept = Vec::new();
+    let mut next = f64::NEG_INFINITY;
+    for (k, &t) in time_s.iter().enumerate() {
+        if t >= next {
+            kept.push(k);
+            next = t + 0.9 * step_s;
+        }
+    }
+    kept
+}
+
+/// Indices of the samples nearest to an even grid of `step_s`.
+pub(crate) fn spaced(time_s: &[f64], step_s: f64) -> Vec<usize> {
+    let mut kept = Vec::new();
+    let mut at = time_s[0] + 0.5 * step_s;
+    let end = time_s[time_s.len() - 1];
+    while at < end {
+        let k = time_s.partition_point(|t| *t < at).min(time_s.len() - 1);
+        if kept.last() != Some(&k) {
+            kept.push(k);
+        }
+        at += step_s;
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::read::recording::Losses;
+
+    /// A joint that creeps at 2 mrad/s for half a second and then slips at 1 rad/s.
+    #[test]
+    fn a_joint_that_slips_has_its_recorded_velocity_at_once_and_none_of_its_noise_at_rest() {
+        let time_s: Vec<f64> = (0..100).map(|k| 0.01 * f64::from(k)).collect();
+        let slips = |t: f64| (t - 0.495).max(0.0);
+        let position: Vec<f64> = time_s.iter().map(|t| 0.002 * t + slips(*t)).collect();
+        let noise = |k: usize| if k.is_multiple_of(2) { 0.004 } else { -0.004 };
+        let velocity: Vec<f64> = (0..100)
+            .map(|k| {
+                if slips(time_s[k]) > 0.0 {
+                    1.0
+                } else {
+                    0.002 + noise(k)
+                }
+            })
+            .collect();
+        let recording = Recording {
+            name: String::new(),
+            path: std::path::PathBuf::new(),
+            start_ns: 0,
+            time_s: time_s.clone(),
+            position: position.clone(),
+            velocity,
+            effort: Vec::new(),
+            reference: Vec::new(),
+            sample_of_row: (0..100).collect(),
+            losses: Losses::default(),
+        };
+        let mut track = Track {
+            name: String::new(),
+            session_s: 0.0,
+            time_s,
+            position,
+            velocity: vec![0.0; 100],
+            acceleration: vec![0.0; 100],
+            rigid: vec![0.0; 100],
+            beside: vec![0.0; 100],
+        };
+        track.sharpen_velocity(&recording, None);
+        assert!(
+            track.velocity[5..45]
+                .iter()
+                .all(|v| (v - 0.002).abs() < 1e-3)
+        );
+        assert!(track.velocity[50..].iter().all(|v| (v - 1.0).abs() < 1e-9));
+    }
+}

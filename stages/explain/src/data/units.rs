@@ -1,0 +1,93 @@
+//! N m per recorded unit, by joint: given, told by a corrected twin, or guessed from gravity.
+
+use tauscope_dynamics::{Data, gravity_effort};
+
+use crate::read::input::Input;
+use crate::read::start::Start;
+
+/// And one that is better than none.
+const LIKELY: f64 = 2.0;
+/// A joint bears weight from this share of what the one that bears most does.
+const BEARS: f64 = 0.1;
+
+impl Start {
+    /// N m per recorded unit by joint, where the gains stand for torque constants; 1 where a gain tells nothing.
+    pub fn units_nm(&self) -> Vec<f64> {
+        let of = |joint| {
+            if self.is_scale_known(joint) {
+                1.0 / self.gain[joint]
+            } else {
+                1.0
+            }
+        };
+        (0..self.gain.len()).map(of).collect()
+    }
+
+    /// The likeliest N m per recorded unit by joint, where the gains stand for torque constants: of a gain that tells next to nothing
+    /// the middle one of the others.
+    pub fn likely_units_nm(&self) -> Vec<f64> {
+        let gains = self.gain.iter().zip(&self.gain_deviation);
+        let told = gains.map(|(gain, deviation)| (*gain > LIKELY * deviation).then(|| 1.0 / gain));
+        filled(&told.collect::<Vec<_>>())
+    }
+}
+
+/// The middle one of the known, or 1, where nothing is known.
+fn filled(known: &[Option<f64>]) -> Vec<f64> {
+    let mut told: Vec<f64> = known.iter().copied().flatten().collect();
+    told.sort_by(f64::total_cmp);
+    let middle = told.get(told.len() / 2).copied().unwrap_or(1.0);
+    known.iter().map(|unit| unit.unwrap_or(middle)).collect()
+}
+
+/// About how many N m a recorded unit is by joint, from what gravity asks of an arm at rest: friction bears part of it, so that forces that
+/// hang on this are no more than about right.
+fn units_under_gravity(input: &Input) -> Vec<f64> {
+    let n = input.model.dof();
+    let mut data = Data::new(&input.model);
+    let (mut weight_nm, mut effort) = (vec![0.0; n], vec![0.0; n]);
+    for recording in &input.fit {
+        let rows = recording
+            .position
+            .chunks_exact(n)
+            .zip(recording.effort.chunks_exact(n));
+        for (position, measured) in rows {
+            let gravity = gravity_effort(&input.model, &mut data, position);
+            for j in 0..n {
+                weight_nm[j] += gravity[j];
+                effort[j] += measured[j];
+            }
+        }
+    }
+    let most_nm = weight_nm.iter().fold(0.0_f64, |most, w| most.max(w.abs()));
+    let unit = |j: usize| {
+        let unit = weight_nm[j] / effort[j];
+        (weight_nm[j].abs() > BEARS * most_nm && unit.is_finite() && unit > 0.0).then_some(unit)
+    };
+    filled(&(0..n).map(unit).collect::<Vec<_>>())
+}
+
+/// N m per recorded unit by joint, and the joints of which nobody knows it, with the gain that their bodies are taken by at first.
+pub fn scales(input: &Input, constants: &[f64], at_rest: bool) -> (Vec<f64>, Vec<(usize, f64)>) {
+    if input.effort_unit != "A" || input.torque_constants_nm_per_a.is_some() {
+        return (constants.to_vec(), Vec::new());
+    }
+    let joints = 0..constants.len();
+    let Some(start) = &input.start else {
+        // At rest nothing else would tell them.
+        let units_nm = if at_rest {
+            units_under_gravity(input)
+        } else {
+            constants.to_vec()
+        };
+        return (units_nm, joints.map(|j| (j, 1.0)).collect());
+    };
+    let unknown = joints.filter(|&j| !start.is_scale_known(j));
+    let unknown = unknown.map(|j| (j, start.gain[j])).collect();
+    let units_nm = if at_rest {
+        start.likely_units_nm()
+    } else {
+        start.units_nm()
+    };
+    (units_nm, unknown)
+}

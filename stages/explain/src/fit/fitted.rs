@@ -1,0 +1,162 @@
+//! An explanation with its numbers: what it says of the recordings, and what it leaves.
+
+use std::sync::Arc;
+
+use crate::data::column::{Column, Columns};
+use crate::data::efforts::{Efforts, TrackEfforts};
+use crate::data::problem::Problem;
+use crate::fit::least_squares::Products;
+use crate::physics::active::{Active, Hypothesis};
+use crate::physics::columns::columns;
+use crate::physics::efforts::change;
+use crate::physics::parts::Parts;
+
+/// An explanation with its numbers, and what it leaves.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// The physics.
+    pub actives: Vec<Active>,
+    /// What each piece adds to the recordings.
+    pub parts: Parts,
+    /// Measured minus explained, a signal \[N m or N\].
+    pub residual: Vec<f64>,
+    /// Variance of what is left, by joint; not below the white noise.
+    pub variance: Vec<f64>,
+    /// Sum of squares of what is left, by joint.
+    pub squares: Vec<f64>,
+    /// Rows that count, by joint.
+    pub count: Vec<f64>,
+}
+
+impl Fit {
+    /// Evaluates an explanation as it is.
+    pub fn new(problem: &Problem, actives: Vec<Active>) -> Self {
+        Self::beside(problem, actives, None)
+    }
+
+    /// The same, where much is as in the fit `before`.
+    pub(crate) fn beside(problem: &Problem, actives: Vec<Active>, before: Option<&Self>) -> Self {
+        let known = before.map(|before| (&before.actives[..], &before.parts));
+        let parts = Parts::new(problem, &actives, known);
+        let mut fit = Self {
+            actives,
+            parts,
+            residual: Vec::new(),
+            variance: Vec::new(),
+            squares: Vec::new(),
+            count: Vec::new(),
+        };
+        let mut residual = problem.measured.clone();
+        for joint in 0..problem.joints {
+            let explained = if fit.parts.transformed[joint] {
+                let mut signal = vec![0.0; problem.rows];
+                problem.joint_signal(&fit.efforts(problem).recorded, joint, &mut signal);
+                signal
+            } else {
+                fit.parts.recorded(problem, &fit.actives, joint)
+            };
+            for (left, explained) in residual[problem.joint_rows(joint)]
+                .iter_mut()
+                .zip(&explained)
+            {
+                *left -= explained;
+            }
+        }
+        fit.residual = residual;
+        let products = Products::new(problem, &[], &fit.residual, None);
+        fit.variance = variances(problem, &products.square, &products.count);
+        fit.squares = products.square;
+        fit.count = products.count;
+        fit
+    }
+
+    /// What it says of the recordings, unfiltered.
+    pub fn efforts(&self, problem: &Problem) -> &Efforts {
+        self.parts.efforts(problem, &self.actives)
+    }
+
+    /// What the gears transmit, unfiltered.
+    pub fn load(&self, problem: &Problem) -> Arc<TrackEfforts> {
+        self.parts.load(problem, &self.actives)
+    }
+
+    /// The columns of a hypothesis at some shape, beside what the fit holds.
+    pub fn columns(
+        &self,
+        problem: &Problem,
+        hypothesis: Hypothesis,
+        shape: &[f64],
+    ) -> Arc<Columns> {
+        columns(problem, (&self.actives, &self.parts), hypothesis, shape)
+    }
+
+    /// Log-likelihood of what is left as if it were white, but for a constant: `-n/2 ln(variance)` summed over joints.
+    pub fn likelihood(&self) -> f64 {
+        likelihood(&self.variance, &self.count)
+    }
+
+    /// The joints whose effort a piece of physics changes: one, or all.
+    pub fn joints_of(hypothesis: &Hypothesis, joints: usize) -> Vec<usize> {
+        hypothesis
+            .only_joint()
+            .map_or_else(|| (0..joints).collect(), |joint| vec![joint])
+    }
+
+    /// Gain of log-likelihood from another fit to this, samples weighted by their `effective`.
+    pub fn gain_over(&self, other: &Self, effective: &[f64]) -> f64 {
+        (0..self.variance.len())
+            .map(|j| {
+                0.5 * effective[j] * self.count[j] * (other.variance[j] / self.variance[j]).ln()
+            })
+            .sum()
+    }
+
+    /// What a piece of physics would add.
+    pub fn added(&self, problem: &Problem, active: &Active) -> Column {
+        let gains = &self.parts.gains;
+        let joint = active.hypothesis.only_joint();
+        if self.parts.is_plain(&active.hypothesis) && joint.is_some() {
+            let efforts = if active.needs_load() {
+                &Efforts::of_bodies(self.load(problem))
+            } else {
+                problem.bare()
+            };
+            return problem.column(&change(problem, &[], efforts, active, gains), joint);
+        }
+        let joint = joint.filter(|&joint| !self.parts.feeds(joint));
+        let changed = change(problem, &self.actives, self.efforts(problem), active, gains);
+        problem.column(&changed, joint)
+    }
+
+    /// The fit with one of its pieces of physics taken out, not refined.
+    #[must_use]
+    pub fn without(&self, problem: &Problem, index: usize) -> Self {
+        let mut actives = self.actives.clone();
+        actives.remove(index);
+        Self::beside(problem, actives, Some(self))
+    }
+
+    /// The fit with one more, not refined.
+    #[must_use]
+    pub fn with(&self, problem: &Problem, active: Active) -> Self {
+        let mut actives = self.actives.clone();
+        actives.push(active);
+        Self::beside(problem, actives, Some(self))
+    }
+}
+
+/// `-n/2 ln(variance)`, summed over joints.
+pub fn likelihood(variance: &[f64], count: &[f64]) -> f64 {
+    variance
+        .iter()
+        .zip(count)
+        .map(|(v, n)| -0.5 * n * v.ln())
+        .sum()
+}
+
+/// Variances by joint from sums of squares, not below the white noise.
+pub fn variances(problem: &Problem, squares: &[f64], count: &[f64]) -> Vec<f64> {
+    let all = squares.iter().zip(count).zip(&problem.white_noise);
+    all.map(|((s, n), noise)| (s / n.max(1.0)).max(noise * noise).max(1e-16))
+        .collect()
+}

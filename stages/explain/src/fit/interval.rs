@@ -1,0 +1,198 @@
+//! How well the numbers of an explanation are known.
+
+use nalgebra::{DMatrix, DVector};
+use tauscope_dynamics::terms::CoordinateKind;
+
+use crate::data::problem::Problem;
+use crate::fit::body_prior;
+use crate::fit::fitted::Fit;
+use crate::physics::active::Active;
+
+/// Lags over which what is left is taken to be correlated, in compared samples.
+const LAGS: usize = 6;
+/// What smoothing and differentiation leave of a number, as a share of it: measured on arms simulated by another engine.
+const SYSTEMATIC: f64 = 0.003;
+/// The same of what happens within the fastest of the motion, around reversals and in the spring of a gear.
+const SYSTEMATIC_WHEN_FAST: f64 = 0.02;
+/// Rows nearer than this to a gap tell of a change within the gap, in periods of the cutoff.
+const NEAR_GAP_PERIODS: f64 = 0.5;
+/// Half width of a 95 % interval of a normal variable, in standard deviations.
+pub const HALF_WIDTH_95: f64 = 1.96;
+
+/// Half width of a 95 % interval of a number with a deviation by [`covariance`], in these: that is itself an estimate, from as many rows
+/// as there are, and too small on average by what its lags are of them. Of Bartlett's weights at 97.5 % (Kiefer and Vogelsang, "A New
+/// Asymptotic Theory for Heteroskedasticity-Autocorrelation Robust Tests", 2005, table 1).
+pub fn half_width_95(problem: &Problem) -> f64 {
+    let lags = (LAGS + 1) as f64 / f64::max(problem.rows as f64, 1.0);
+    let b = lags.min(1.0);
+    HALF_WIDTH_95 + b * (2.9694 + b * (0.4160 - b * 0.5324))
+}
+
+/// Covariance of all free coordinates of a fit, in the order of [`Fit::parameters`].
+///
+/// The sandwich `A⁻¹ B A⁻¹` with A the normal matrix and B the covariance of the scores, autocorrelation within
+/// each recording counted with Bartlett's weights (Newey and West, "A Simple, Positive Semi-Definite,
+/// Heteroskedasticity and Autocorrelation Consistent Covariance Matrix", 1987), but never less than white noise
+/// of the variance that is left gives.
+pub fn covariance(problem: &Problem, fit: &Fit) -> DMatrix<f64> {
+    let jacobian = fit.jacobian(problem);
+    let p = jacobian.len();
+    let mut normal = DMatrix::<f64>::zeros(p, p);
+    let mut scores = DMatrix::<f64>::zeros(p, p);
+    for j in 0..problem.joints {
+        let touching: Vec<(usize, &[f64])> = jacobian
+            .iter()
+            .enumerate()
+            .filter_map(|(a, column)| Some((a, column.of_joint(j, problem.rows)?)))
+            .collect();
+        let variance = fit.squares[j] / (fit.count[j] - touching.len() as f64).max(1.0);
+        let variance = variance.max(1e-16);
+        let rows = problem.joint_rows(j);
+        for track in &problem.tracks {
+            let mut past: Vec<DVector<f64>> = Vec::new();
+            for row in track.rows() {
+                let mut score = DVector::zeros(p);
+                let at = rows.start + row;
+                if problem.weight[at] > 0.0 {
+                    let mut column = DVector::zeros(p);
+                    for (a, values) in &touching {
+                        column[*a] = values[row];
+                    }
+                    normal.ger(1.0 / variance, &column, &column, 1.0);
+                    score = column * (fit.residual[at] / variance);
+                }
+                scores.ger(1.0, &score, &score, 1.0);
+                for (lag, earlier) in past.iter().rev().take(LAGS).enumerate() {
+                    let weight = 1.0 - (lag + 1) as f64 / (LAGS + 1) as f64;
+                    scores.ger(weight, &score, earlier, 1.0);
+                    scores.ger(weight, earlier, &score, 1.0);
+                }
+                past.push(score);
+                if past.len() > LAGS {
+                    past.remove(0);
+                }
+            }
+        }
+    }
+    // What is known before counts as if it had been measured, too.
+    let (known, _) = body_prior::normal(&problem.model, &fit.actives, &fit.parameters());
+    normal += &known;
+    scores += known;
+    let scale: Vec<f64> = (0..p).map(|a| normal[(a, a)].max(1e-300).sqrt()).collect();
+    let mut scaled = DMatrix::from_fn(p, p, |a, b| normal[(a, b)] / (scale[a] * scale[b]));
+    for a in 0..p {
+        scaled[(a, a)] += 1e-9;
+    }
+    let Some(inverse) = scaled.try_inverse() else {
+        return DMatrix::from_diagonal_element(p, p, f64::INFINITY);
+    };
+    let inverse = DMatrix::from_fn(p, p, |a, b| inverse[(a, b)] / (scale[a] * scale[b]));
+    let mut covariance = &inverse * scores * &inverse;
+    for a in 0..p {
+        let (robust, white) = (covariance[(a, a)], inverse[(a, a)]);
+        if robust < white {
+            let grow = (white / robust.max(1e-300)).sqrt();
+            for b in 0..p {
+                covariance[(a, b)] *= grow;
+                covariance[(b, a)] *= grow;
+            }
+        }
+    }
+    covariance
+}
+
+/// Standard deviations of the parameters of one piece of physics from the covariance of its coordinates, with what is
+/// systematic: smoothing and differentiation, and that nothing tells when between two rows something changed.
+pub fn parameter_deviations(
+    problem: &Problem,
+    fit: &Fit,
+    covariance: &DMatrix<f64>,
+    index: usize,
+) -> Vec<f64> {
+    let first: usize = fit.actives[..index]
+        .iter()
+        .map(|a| a.coordinates.len())
+        .sum();
+    let active = &fit.actives[index];
+    let count = active.coordinates.len();
+    let mut own = covariance.view((first, first), (count, count)).into_owned();
+    let times: Vec<bool> = (0..count).map(|c| is_time(active.kind(c))).collect();
+    for c in (0..count).filter(|c| times[*c]) {
+        own[(c, c)] += between_rows(problem, active, c).powi(2) / 12.0;
+    }
+    let centre = active.parameters();
+    let mut slopes = DMatrix::<f64>::zeros(centre.len(), count);
+    for c in 0..count {
+        let step = (1e-3 * own[(c, c)].max(0.0).sqrt())
+            .max(1e-9 * active.coordinates[c].abs())
+            .max(1e-12);
+        if !step.is_finite() {
+            return vec![f64::INFINITY; centre.len()];
+        }
+        let mut there = active.clone();
+        there.coordinates[c] += step;
+        for (row, (a, b)) in there.parameters().iter().zip(&centre).enumerate() {
+            let mut change = a - b;
+            // Angles may wrap between the two.
+            if change.abs() > std::f64::consts::PI {
+                change -= change.signum() * std::f64::consts::TAU;
+            }
+            slopes[(row, c)] = change / step;
+        }
+    }
+    let spread = &slopes * own * slopes.transpose();
+    let share = if active.hypothesis.effect.traits.is_fast {
+        SYSTEMATIC_WHEN_FAST
+    } else {
+        SYSTEMATIC
+    };
+    let in_time = |row: usize| (0..count).any(|c| times[c] && slopes[(row, c)] != 0.0);
+    (0..centre.len())
+        .map(|row| {
+            let systematic = if in_time(row) {
+                0.0
+            } else {
+                share * centre[row]
+            };
+            (spread[(row, row)].max(0.0) + systematic * systematic).sqrt()
+        })
+        .collect()
+}
+
+fn is_time(kind: CoordinateKind) -> bool {
+    matches!(
+        kind,
+        CoordinateKind::RecordingTime | CoordinateKind::SessionTime
+    )
+}
+
+/// How far apart the rows are between which a time lies that a piece of physics has: of its joint only those that count \[s\]. What
+/// lies beside a gap may lie within, because the filter bridges gaps.
+fn between_rows(problem: &Problem, active: &Active, c: usize) -> f64 {
+    let of_session = active.kind(c) == CoordinateKind::SessionTime;
+    let joint = active.hypothesis.only_joint();
+    let at = active.coordinates[c];
+    let mut times: Vec<f64> = Vec::new();
+    for track in &problem.tracks {
+        let shift = if of_session {
+            track.track.session_s
+        } else {
+            0.0
+        };
+        for (row, &k) in track.rows().zip(&track.compared) {
+            if joint.is_none_or(|j| problem.weight[j * problem.rows + row] > 0.0) {
+                times.push(shift + track.track.time_s[k]);
+            }
+        }
+    }
+    times.sort_by(f64::total_cmp);
+    let near_s = NEAR_GAP_PERIODS / problem.cutoff_hz;
+    let pairs = times.windows(2).map(|pair| [pair[0], pair[1]]);
+    pairs
+        .filter(|[first, last]| {
+            let margin_s = if last - first > near_s { near_s } else { 0.0 };
+            first - margin_s <= at && at < last + margin_s
+        })
+        .map(|[first, last]| last - first)
+        .fold(0.0, f64::max)
+}

@@ -1,0 +1,196 @@
+//! Weighted least squares over signals, by joint, from products that are formed once.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::data::column::Column;
+use crate::data::problem::Problem;
+
+/// Sums are formed in this many parts, which a processor adds at once.
+const LANES: usize = 8;
+
+/// Sum of `weight * x * y`.
+pub fn weighted_dot(weight: &[f64], x: &[f64], y: &[f64]) -> f64 {
+    let mut sums = [0.0; LANES];
+    let (ws, w_rest) = weight.as_chunks::<LANES>();
+    let (xs, x_rest) = x.as_chunks::<LANES>();
+    let (ys, y_rest) = y.as_chunks::<LANES>();
+    for ((w, x), y) in ws.iter().zip(xs).zip(ys) {
+        for lane in 0..LANES {
+            sums[lane] += w[lane] * x[lane] * y[lane];
+        }
+    }
+    let rest = w_rest.iter().zip(x_rest).zip(y_rest);
+    sums.iter().sum::<f64>() + rest.map(|((w, x), y)| w * x * y).sum::<f64>()
+}
+
+/// Least share that is added to the diagonal, so that columns that are nearly dependent may be solved for.
+const LEAST_DAMPING: f64 = 1e-10;
+
+/// Solves normal equations for the columns in `used`, the others stay at 0, with `damping` in shares of the diagonal (Levenberg
+/// and Marquardt). `None` if the columns are not independent even so.
+pub fn solved(
+    normal: &DMatrix<f64>,
+    right: &DVector<f64>,
+    used: &[bool],
+    damping: f64,
+) -> Option<DVector<f64>> {
+    let index: Vec<usize> = (0..used.len()).filter(|&i| used[i]).collect();
+    let m = index.len();
+    let scale: Vec<f64> = index
+        .iter()
+        .map(|&i| normal[(i, i)].max(1e-300).sqrt())
+        .collect();
+    let mut scaled = DMatrix::from_fn(m, m, |a, b| {
+        normal[(index[a], index[b])] / (scale[a] * scale[b])
+    });
+    for a in 0..m {
+        scaled[(a, a)] += damping + LEAST_DAMPING;
+    }
+    let side = DVector::from_fn(m, |a, _| right[index[a]] / scale[a]);
+    let within = scaled.cholesky()?.solve(&side);
+    let mut solution = DVector::zeros(used.len());
+    for (a, &i) in index.iter().enumerate() {
+        solution[i] = within[a] / scale[a];
+    }
+    Some(solution)
+}
+
+/// The products of a set of columns with each other and with a residual, joint by joint.
+#[derive(Debug, Clone)]
+pub struct Products {
+    /// Per joint: columns with columns.
+    pub gram: Vec<DMatrix<f64>>,
+    /// Per joint: columns with the residual.
+    pub right: Vec<DVector<f64>>,
+    /// Per joint: the residual with itself.
+    pub square: Vec<f64>,
+    /// Per joint: rows that count.
+    pub count: Vec<f64>,
+}
+
+impl Products {
+    /// Over the rows of one track, or of all.
+    pub fn new(
+        problem: &Problem,
+        columns: &[&Column],
+        residual: &[f64],
+        track: Option<usize>,
+    ) -> Self {
+        let rows = track.map_or(0..problem.rows, |r| problem.tracks[r].rows());
+        let p = columns.len();
+        let mut products = Self {
+            gram: Vec::new(),
+            right: Vec::new(),
+            square: Vec::new(),
+            count: Vec::new(),
+        };
+        for j in 0..problem.joints {
+            let own = problem.joint_rows(j);
+            let weight = &problem.weight[own.clone()][rows.clone()];
+            let e = &residual[own][rows.clone()];
+            let mut gram = DMatrix::zeros(p, p);
+            let mut right = DVector::zeros(p);
+            let parts: Vec<Option<&[f64]>> = columns
+                .iter()
+                .map(|c| c.of_joint(j, problem.rows).map(|v| &v[rows.clone()]))
+                .collect();
+            for a in 0..p {
+                let Some(x) = parts[a] else { continue };
+                right[a] = weighted_dot(weight, x, e);
+                for b in a..p {
+                    let Some(y) = parts[b] else { continue };
+                    let product = weighted_dot(weight, x, y);
+                    gram[(a, b)] = product;
+                    gram[(b, a)] = product;
+                }
+            }
+            products.gram.push(gram);
+            products.right.push(right);
+            products.square.push(weighted_dot(weight, e, e));
+            products.count.push(weight.iter().sum());
+        }
+        products
+    }
+
+    /// The difference of two, over the same columns.
+    #[must_use]
+    pub fn without(&self, other: &Self) -> Self {
+        let pair = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).collect();
+        Self {
+            gram: self
+                .gram
+                .iter()
+                .zip(&other.gram)
+                .map(|(a, b)| a - b)
+                .collect(),
+            right: self
+                .right
+                .iter()
+                .zip(&other.right)
+                .map(|(a, b)| a - b)
+                .collect(),
+            square: pair(&self.square, &other.square),
+            count: pair(&self.count, &other.count),
+        }
+    }
+
+    /// Sum of squares that `solution` leaves at a joint.
+    pub fn left(&self, joint: usize, solution: &DVector<f64>) -> f64 {
+        let quadratic = (&self.gram[joint] * solution).dot(solution);
+        (self.square[joint] - 2.0 * self.right[joint].dot(solution) + quadratic).max(0.0)
+    }
+
+    /// Sum of squares that `solution` leaves, by joint.
+    pub fn all_left(&self, solution: &DVector<f64>) -> Vec<f64> {
+        (0..self.square.len())
+            .map(|j| self.left(j, solution))
+            .collect()
+    }
+
+    /// The solution for these variances by joint, with `ridge` added to the diagonal and the columns not in
+    /// `used` left at 0. `None` if the columns are not independent even so.
+    pub fn solve(&self, variance: &[f64], ridge: &[f64], used: &[bool]) -> Option<DVector<f64>> {
+        let (normal, right) = self.normal(variance, ridge);
+        solved(&normal, &right, used, 0.0)
+    }
+
+    /// The normal equations for these variances by joint.
+    pub fn normal(&self, variance: &[f64], ridge: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
+        let p = ridge.len();
+        let mut normal = DMatrix::from_diagonal(&DVector::from_row_slice(ridge));
+        let mut right = DVector::zeros(p);
+        for (j, variance) in variance.iter().enumerate() {
+            normal += &self.gram[j] / *variance;
+            right += &self.right[j] / *variance;
+        }
+        (normal, right)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sum_in_lanes_is_the_sum() {
+        for n in [0, 1, 7, 8, 9, 31, 64] {
+            let of =
+                |shift: f64| -> Vec<f64> { (0..n).map(|k| (f64::from(k) + shift).sin()).collect() };
+            let (w, x, y) = (of(0.1), of(0.7), of(1.9));
+            let plain: f64 = w.iter().zip(&x).zip(&y).map(|((w, x), y)| w * x * y).sum();
+            assert!((weighted_dot(&w, &x, &y) - plain).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn what_is_not_used_stays_at_zero_and_damping_shortens_the_step() {
+        let normal = DMatrix::from_row_slice(3, 3, &[4.0, 1.0, 0.0, 1.0, 3.0, 1.0, 0.0, 1.0, 2.0]);
+        let right = DVector::from_row_slice(&[1.0, 2.0, 3.0]);
+        let all = solved(&normal, &right, &[true; 3], 0.0).unwrap();
+        assert!((&normal * &all - &right).norm() < 1e-8);
+        let some = solved(&normal, &right, &[true, false, true], 0.0).unwrap();
+        assert!(some[1].abs() <= 0.0 && (some[2] - 1.5).abs() < 1e-8);
+        let damped = solved(&normal, &right, &[true; 3], 1.0).unwrap();
+        assert!(damped.norm() < all.norm());
+    }
+}

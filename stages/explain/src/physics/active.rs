@@ -1,0 +1,360 @@
+//! A piece of physics that is part of an explanation: what, where, and its numbers.
+
+use tauscope_dynamics::terms::{
+    Against, Coordinate, CoordinateKind, Effect, Family, Layer, MotionSample, PlaceKind, Site,
+    Table, Term, table,
+};
+
+pub use tauscope_dynamics::terms::Time as TimeKind;
+use tauscope_dynamics::{Inertia, Model};
+
+/// Where an effect is: indices into the model's joints and links; what its kind of place does not ask for is 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
+pub struct Whereabouts {
+    /// The joint.
+    pub joint: usize,
+    /// The joint whose effort is coupled into it.
+    pub source: usize,
+    /// The link.
+    pub link: usize,
+}
+
+impl Whereabouts {
+    /// The same in a robot.
+    pub fn site(self, model: &Model) -> Site<'_> {
+        let Self {
+            joint,
+            source,
+            link,
+        } = self;
+        Site {
+            model,
+            joint,
+            source,
+            link,
+        }
+    }
+}
+
+/// Inertial parameters of a body.
+pub const BODY: usize = 10;
+
+/// The scale between a joint's torque and its recorded effort, see `torque_scale.rs`.
+pub const TORQUE_SCALE: &str = "torque_scale";
+
+/// Slow, but fast enough for a sign.
+const SLOW_RAD_S: f64 = 0.02;
+
+/// An effect at a place, without its numbers.
+#[derive(Debug, Clone, Copy)]
+pub struct Hypothesis {
+    /// What.
+    pub effect: &'static Effect,
+    /// Where.
+    pub place: Whereabouts,
+}
+
+impl PartialEq for Hypothesis {
+    fn eq(&self, other: &Self) -> bool {
+        self.effect == other.effect && self.place == other.place
+    }
+}
+
+impl Hypothesis {
+    /// With numbers.
+    pub fn with(self, coordinates: Vec<f64>) -> Active {
+        Active {
+            hypothesis: self,
+            coordinates,
+            curve: None,
+        }
+    }
+
+    /// The one joint whose effort it changes, if there is only one.
+    pub fn only_joint(&self) -> Option<usize> {
+        let at_joint = matches!(self.effect.place, PlaceKind::Joint | PlaceKind::TwoJoints);
+        (at_joint && (self.effect.layer != Layer::Body || self.is_torque_scale()))
+            .then_some(self.place.joint)
+    }
+
+    /// Whether its effort jumps where a joint reverses, so that at rest it may be anything in between.
+    pub fn is_set_valued(&self, model: &Model) -> bool {
+        let Some(joint) = self.only_joint() else {
+            return false;
+        };
+        let site = self.place.site(model);
+        let middle = |c: &Coordinate| match c.kind {
+            CoordinateKind::Factor { .. } => 1.0,
+            CoordinateKind::Shape { lower, upper, .. } => (lower * upper).abs().sqrt(),
+            _ => 0.0,
+        };
+        let coordinates: Vec<f64> = self.effect.coordinates.iter().map(middle).collect();
+        let mut term = (self.effect.build)(&site, &coordinates);
+        let n = model.dof();
+        let (zero, one) = (vec![0.0; n], vec![1.0; n]);
+        let mut at = |velocity: f64| {
+            let velocity = vec![velocity; n];
+            let mut effort = vec![0.0; n];
+            // Long enough for what has a memory to forget.
+            let at = MotionSample {
+                dt_s: 1e3,
+                recording_s: 1.0,
+                session_s: 1.0,
+                position: &zero,
+                velocity: &velocity,
+                acceleration: &zero,
+                transmitted: &one,
+            };
+            term.act(&at, &mut effort);
+            effort[joint]
+        };
+        let jump = (at(SLOW_RAD_S) - at(-SLOW_RAD_S)).abs();
+        jump > 0.5 * at(1.0).abs().max(1e-12)
+    }
+
+    /// Whether it depends on what the gear transmits.
+    pub fn needs_load(&self) -> bool {
+        self.effect.traits.needs_load
+    }
+
+    /// Whether its first ten coordinates are those of a body, see [`Inertia::parameters`].
+    fn is_body(&self) -> bool {
+        self.effect.place == PlaceKind::Tool && self.effect.coordinates.len() >= BODY
+    }
+
+    /// Whether it is the scale between a joint's torque and its recorded effort.
+    pub fn is_torque_scale(&self) -> bool {
+        self.effect.name == TORQUE_SCALE
+    }
+
+    /// Whether it splits a joint in rotor and link: such effects are costly to try.
+    pub fn has_rotor(&self) -> bool {
+        self.effect.splits_joint()
+    }
+
+    /// Whether it is Coulomb or viscous friction, which a curve of friction goes with.
+    pub fn is_plain_friction(&self) -> bool {
+        self.effect.is_plain_friction()
+    }
+
+    /// Whether it is a function of its joint's position alone.
+    pub fn is_of_position(&self) -> bool {
+        self.effect.traits.drawn_over == Some(Against::Position)
+    }
+
+    /// Whether it multiplies all effort of a joint.
+    pub fn is_gain(&self) -> bool {
+        self.effect.name == "torque_gain"
+    }
+
+    /// How it depends on time.
+    pub fn time_kind(&self) -> TimeKind {
+        self.effect.time()
+    }
+
+    /// Whether it is part of the arm, not something that came and went.
+    pub fn lasts(&self) -> bool {
+        self.effect.lasts()
+    }
+
+    /// What it is called in reports: what only describes is `unknown`.
+    pub fn said(&self) -> &'static str {
+        self.effect.said()
+    }
+
+    /// Whether it describes a link's body without a name for what is wrong with it.
+    pub fn is_unnamed_body(&self) -> bool {
+        self.effect.traits.describes_only && self.effect.family == Family::Body
+    }
+
+    /// Whether all its coordinates are factors.
+    pub fn is_linear(&self) -> bool {
+        self.factors().len() == self.effect.coordinates.len()
+    }
+
+    /// Indices of the coordinates that are factors.
+    pub fn factors(&self) -> Vec<usize> {
+        let is_factor = |c: &Coordinate| matches!(c.kind, CoordinateKind::Factor { .. });
+        let coordinates = self.effect.coordinates.iter().enumerate();
+        coordinates
+            .filter(|(_, c)| is_factor(c))
+            .map(|(i, _)| i)
+            .collect()
+    }
+}
+
+/// An effect at a place with its numbers.
+#[derive(Debug, Clone)]
+pub struct Active {
+    /// What and where.
+    pub hypothesis: Hypothesis,
+    /// In the effect's coordinates; the values at the knots for a curve, but for those that are held at zero.
+    pub coordinates: Vec<f64>,
+    /// What an `unknown` effect is drawn against; its own values are passed over.
+    pub curve: Option<Table>,
+}
+
+impl Active {
+    /// The term for a robot.
+    pub fn term(&self, model: &Model) -> Box<dyn Term> {
+        let site = self.hypothesis.place.site(model);
+        let curve = self.curve.as_ref().and_then(|curve| {
+            let values = self.values_at_knots(curve);
+            table(
+                &site,
+                Table {
+                    values,
+                    ..curve.clone()
+                },
+            )
+            .ok()
+        });
+        curve.unwrap_or_else(|| (self.hypothesis.effect.build)(&site, &self.coordinates))
+    }
+
+    /// The values of its curve at all knots.
+    pub fn values_at_knots(&self, curve: &Table) -> Vec<f64> {
+        let held = held_knots(curve, self.hypothesis.place.joint);
+        let mut free = self.coordinates.iter();
+        let mut value = |k: usize| {
+            let value = (!held.contains(&k)).then(|| free.next().copied());
+            value.flatten().unwrap_or(0.0)
+        };
+        (0..curve.knots.len()).map(&mut value).collect()
+    }
+
+    /// Whether it is a curve over its joint's own velocity: friction, whatever bends it.
+    pub fn is_friction_curve(&self) -> bool {
+        let curve = self.curve.as_ref();
+        curve.is_some_and(|curve| curve.is_friction_of(self.hypothesis.place.joint))
+    }
+
+    /// Whether its effort jumps where its joint reverses.
+    pub fn is_set_valued(&self, model: &Model) -> bool {
+        match &self.curve {
+            Some(curve) => curve.by_direction,
+            None => self.hypothesis.is_set_valued(model),
+        }
+    }
+
+    /// Whether it depends on what the gear transmits.
+    pub fn needs_load(&self) -> bool {
+        match &self.curve {
+            Some(curve) => curve.against == Against::Load,
+            None => self.hypothesis.needs_load(),
+        }
+    }
+
+    /// Whether it is a part of the recording that is changed, not only added to: see [`Layer::Record`].
+    pub fn is_of_record(&self) -> bool {
+        self.hypothesis.effect.layer == Layer::Record
+    }
+
+    /// Whether through it one joint's recording feels another's.
+    pub fn is_coupling(&self) -> bool {
+        self.hypothesis.effect.place == PlaceKind::TwoJoints
+    }
+
+    /// Its coordinates with the factors at zero.
+    pub fn shape(&self) -> Vec<f64> {
+        let mut shape = self.coordinates.clone();
+        for i in self.hypothesis.factors() {
+            shape[i] = 0.0;
+        }
+        shape
+    }
+
+    /// How a coordinate enters.
+    pub fn kind(&self, coordinate: usize) -> CoordinateKind {
+        let of_effect = self.hypothesis.effect.coordinates.get(coordinate);
+        of_effect.map_or(Coordinate::factor("value_nm").kind, |c| c.kind)
+    }
+
+    /// The body that it is or that it makes of a link, if it does, and what the URDF says of that link.
+    pub fn body(&self, model: &Model) -> Option<(Inertia, Option<Inertia>)> {
+        let ten = Inertia::from_parameters(*self.coordinates.first_chunk::<BODY>()?);
+        if self.hypothesis.is_unnamed_body() {
+            let link = model.links()[self.hypothesis.place.link].inertia;
+            return Some((link + ten, Some(link)));
+        }
+        self.hypothesis.is_body().then_some((ten, None))
+    }
+
+    /// Whether it only describes what it does: a curve, or a body that no name fits.
+    pub fn is_unnamed(&self) -> bool {
+        self.curve.is_some() || self.hypothesis.is_unnamed_body()
+    }
+
+    /// Its parameters, as reports hold them.
+    pub fn parameters(&self) -> Vec<f64> {
+        (self.hypothesis.effect.to_parameters)(&self.coordinates)
+    }
+}
+
+/// Whether another joint's recording feels a joint's.
+pub fn feeds(actives: &[Active], joint: usize) -> bool {
+    let couplings = actives.iter().filter(|active| active.is_coupling());
+    couplings
+        .map(|active| active.hypothesis.place.source)
+        .any(|source| source == joint)
+}
+
+/// Effects in the order in which they act within their layer: torque scales last.
+pub fn in_order(actives: &[Active]) -> Vec<&Active> {
+    let mut all: Vec<&Active> = actives.iter().collect();
+    all.sort_by_key(|active| active.hypothesis.is_torque_scale());
+    all
+}
+
+/// The knots of a curve in a joint that are held at zero. A curve over the joint's own velocity is what Coulomb and viscous
+/// friction leave: these are the straight line between its slowest and its fastest knot in each direction.
+pub fn held_knots(curve: &Table, joint: usize) -> Vec<usize> {
+    if !curve.is_friction_of(joint) {
+        return Vec::new();
+    }
+    let middle = curve.knots.partition_point(|knot| *knot < 0.0);
+    let directions = [0..middle, middle..curve.knots.len()];
+    directions
+        .into_iter()
+        .filter(|knots| knots.len() >= 2)
+        .flat_map(|knots| [knots.start, knots.end - 1])
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use tauscope_dynamics::terms::effect;
+
+    use super::*;
+
+    #[test]
+    fn a_curve_of_friction_is_what_lines_through_its_ends_leave() {
+        let curve = Table {
+            against: Against::Velocity,
+            of_joint: 2,
+            by_direction: true,
+            period: None,
+            knots: vec![-1.0, -0.5, -0.1, 0.1, 0.4, 0.9],
+            values: vec![0.0; 6],
+        };
+        let active = Active {
+            hypothesis: Hypothesis {
+                effect: effect("unknown").unwrap(),
+                place: Whereabouts {
+                    joint: 2,
+                    ..Whereabouts::default()
+                },
+            },
+            coordinates: vec![3.0, 4.0],
+            curve: Some(curve.clone()),
+        };
+        assert!(active.is_friction_curve());
+        let values = active.values_at_knots(&curve);
+        assert_eq!(values, [0.0, 3.0, 0.0, 0.0, 4.0, 0.0]);
+        let of_another = Table {
+            of_joint: 1,
+            ..curve
+        };
+        assert!(held_knots(&of_another, 2).is_empty());
+    }
+}

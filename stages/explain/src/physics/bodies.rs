@@ -1,0 +1,129 @@
+//! What bodies cost over the recordings of a problem, from that of unit inertias and unit gravity: computed once.
+
+use std::sync::Arc;
+
+use tauscope_dynamics::terms::Term;
+use tauscope_dynamics::{Data, Inertia, Model, gravity_effort, rnea};
+
+use crate::data::efforts::{TrackEfforts, zeros};
+use crate::data::memo::{MOST_ROWS, Unit};
+use crate::data::problem::Problem;
+use crate::data::track::FitTrack;
+use crate::physics::act::act_over;
+use crate::physics::active::Active;
+
+/// Adds what a piece of physics of bodies costs to efforts over all tracks; `rigid` is what the twin says of the motion.
+pub fn add(problem: &Problem, active: &Active, rigid: &[Vec<f64>], into: &mut [Vec<f64>]) {
+    let hypothesis = active.hypothesis;
+    let mut term = active.term(&problem.model);
+    if let Some((unit, factors)) = in_units(problem, &*term) {
+        add_units(&units(problem, unit), &factors, into);
+    } else {
+        if problem.rows <= MOST_ROWS && hypothesis.has_rotor() {
+            term.expand(problem.expansion(hypothesis.place.joint));
+        }
+        let added = act_over(problem, &mut *term, &zeros(rigid), rigid);
+        add_units(&[added], &[1.0], into);
+    }
+}
+
+/// What a unit of rotor inertia costs at a joint with rotor and link: the first factor of what has both.
+pub fn rotor(problem: &Problem, joint: usize) -> TrackEfforts {
+    let mut effort = zeros(&problem.bare().body);
+    for (track, effort) in problem.tracks.iter().zip(&mut effort) {
+        let of_joint = effort.iter_mut().zip(&track.track.acceleration);
+        let of_joint = of_joint.skip(joint).step_by(problem.joints);
+        of_joint.for_each(|(effort, acceleration)| *effort = *acceleration);
+    }
+    effort
+}
+
+/// What a piece of physics of bodies costs as a signal, if it is so many times some units.
+pub fn signal(problem: &Problem, active: &Active) -> Option<Vec<f64>> {
+    let (unit, factors) = in_units(problem, &*active.term(&problem.model))?;
+    let signals = problem.units.signals.get_or(unit, || {
+        let units = units(problem, unit);
+        units.iter().map(|unit| problem.signal(unit)).collect()
+    });
+    let mut sum = vec![0.0; problem.joints * problem.rows];
+    for (signal, factor) in signals.iter().zip(&factors).filter(|(_, f)| **f != 0.0) {
+        for (sum, signal) in sum.iter_mut().zip(signal) {
+            *sum += factor * signal;
+        }
+    }
+    Some(sum)
+}
+
+/// How many times which units a term costs, if its effort is linear in some, and these may be kept.
+fn in_units(problem: &Problem, term: &dyn Term) -> Option<(Unit, Vec<f64>)> {
+    if problem.rows > MOST_ROWS {
+        return None;
+    }
+    if let Some((link, inertia)) = term.inertia() {
+        return Some((Unit::Inertia(link), inertia.parameters().to_vec()));
+    }
+    let mut altered = problem.model.clone();
+    term.alter(&mut altered).then(|| {
+        let (before, after) = (problem.model.gravity(), altered.gravity());
+        let change = after
+            .iter()
+            .zip(before)
+            .map(|(after, before)| after - before);
+        (Unit::Gravity, change.collect())
+    })
+}
+
+fn add_units(units: &[TrackEfforts], factors: &[f64], into: &mut [Vec<f64>]) {
+    for (unit, factor) in units.iter().zip(factors).filter(|(_, f)| **f != 0.0) {
+        for (into, unit) in into.iter_mut().zip(unit) {
+            for (into, unit) in into.iter_mut().zip(unit) {
+                *into += factor * unit;
+            }
+        }
+    }
+}
+
+fn units(problem: &Problem, unit: Unit) -> Arc<Vec<TrackEfforts>> {
+    let one = |k: usize| match unit {
+        Unit::Inertia(link) => {
+            let mut parameters = [0.0; 10];
+            parameters[k] = 1.0;
+            let model = problem
+                .model
+                .ghost(link, Inertia::from_parameters(parameters));
+            over_tracks(problem, &model, true)
+        }
+        Unit::Gravity => {
+            let mut gravity = [0.0; 3];
+            gravity[k] = 1.0;
+            let mut model = problem.model.clone();
+            model.set_gravity(gravity);
+            over_tracks(problem, &model, false)
+        }
+    };
+    let count = match unit {
+        Unit::Inertia(_) => 10,
+        Unit::Gravity => 3,
+    };
+    problem
+        .units
+        .efforts
+        .get_or(unit, || (0..count).map(one).collect())
+}
+
+/// What a model costs over the motion of all tracks, or what holds it still there.
+fn over_tracks(problem: &Problem, model: &Model, moving: bool) -> TrackEfforts {
+    let mut data = Data::new(model);
+    let mut of = |track: &FitTrack| {
+        let mut effort = Vec::with_capacity(track.track.position.len());
+        track.track.each(|_, at| {
+            effort.extend_from_slice(if moving {
+                rnea(model, &mut data, at.position, at.velocity, at.acceleration)
+            } else {
+                gravity_effort(model, &mut data, at.position)
+            });
+        });
+        effort
+    };
+    problem.tracks.iter().map(&mut of).collect()
+}

@@ -1,0 +1,99 @@
+//! Columns of a hypothesis beside other effects, by factor.
+
+use std::sync::Arc;
+
+use tauscope_dynamics::terms::Layer;
+
+use crate::data::column::{Column, Columns};
+use crate::data::efforts::{Efforts, TrackEfforts, scale};
+use crate::data::memo::MOST_ROWS;
+use crate::data::problem::Problem;
+use crate::physics::active::{Active, Hypothesis};
+use crate::physics::efforts::recorded_on_top;
+use crate::physics::parts::Parts;
+use crate::physics::shaped_bodies::{bodies_of, in_time, steps};
+use crate::physics::unit_columns::{computed, units};
+
+/// The columns of a hypothesis at some shape, beside other effects and what those add.
+pub fn columns(
+    problem: &Problem,
+    (actives, parts): (&[Active], &Parts),
+    hypothesis: Hypothesis,
+    shape: &[f64],
+) -> Arc<Columns> {
+    let gains = &parts.gains;
+    let body = hypothesis.effect.layer == Layer::Body;
+    if hypothesis.needs_load() && parts.is_plain(&hypothesis) {
+        let efforts = Efforts::of_bodies(parts.load(problem, actives));
+        return Arc::new(computed(problem, &[], &efforts, hypothesis, shape, gains));
+    }
+    let plain = parts.is_plain(&hypothesis);
+    if !plain && body && !in_time(hypothesis, shape) && problem.rows <= MOST_ROWS {
+        return Arc::new(recorded(problem, (actives, parts), hypothesis, shape));
+    }
+    if !plain {
+        let efforts = parts.efforts(problem, actives);
+        return Arc::new(computed(
+            problem, actives, efforts, hypothesis, shape, gains,
+        ));
+    }
+    let units = units(problem, hypothesis, shape);
+    if !body || gains.iter().all(|gain| (gain - 1.0).abs() <= 0.0) {
+        return units;
+    }
+    let scale = |column: &Column| {
+        let mut column = column.clone();
+        for (k, value) in column.values.iter_mut().enumerate() {
+            *value *= gains[column.joint.unwrap_or(k / problem.rows)];
+        }
+        column
+    };
+    Arc::new(Columns {
+        alone: units.alone.as_ref().map(scale),
+        factors: units.factors.iter().map(|c| Arc::new(scale(c))).collect(),
+    })
+}
+
+/// The columns of bodies where some joints' recordings are transformed: there what is recorded of them.
+fn recorded(
+    problem: &Problem,
+    (actives, parts): (&[Active], &Parts),
+    hypothesis: Hypothesis,
+    shape: &[f64],
+) -> Columns {
+    let efforts = parts.efforts(problem, actives);
+    let gains = &parts.gains;
+    let plain = units(problem, hypothesis, shape);
+    let bodies = bodies_of(problem, hypothesis, shape);
+    let of = |body: &TrackEfforts, plain: &Column, step: f64| {
+        let mut scaled = body.clone();
+        scale(&mut scaled, gains);
+        let on_top = recorded_on_top(problem, actives, efforts, &scaled, step);
+        let mut values = plain.values.clone();
+        for joint in 0..problem.joints {
+            let own = &mut values[problem.joint_rows(joint)];
+            if parts.transformed[joint] {
+                problem.joint_signal(&on_top, joint, own);
+                for value in own {
+                    *value /= step;
+                }
+            } else {
+                for value in own {
+                    *value *= gains[joint];
+                }
+            }
+        }
+        Column {
+            joint: None,
+            values,
+        }
+    };
+    let steps = steps(hypothesis);
+    let factors = bodies.factors.iter().zip(&plain.factors).zip(steps);
+    let factors = factors.map(|((body, plain), (_, step))| Arc::new(of(body, plain, step)));
+    let alone = bodies.alone.as_ref().zip(plain.alone.as_ref());
+    Columns {
+        factors: factors.collect(),
+        alone: alone.map(|(body, plain)| of(body, plain, 1.0)),
+    }
+}

@@ -1,0 +1,112 @@
+//! What physics does to the recordings, unfiltered: from the bodies to what is recorded.
+
+use std::sync::Arc;
+
+use tauscope_dynamics::terms::{Layer, Term};
+
+use crate::data::efforts::{Efforts, TrackEfforts, scale, subtract, zeros};
+use crate::data::problem::Problem;
+use crate::physics::act::{act_over, run};
+use crate::physics::active::Active;
+use crate::physics::bodies;
+use crate::physics::shaped_bodies::add_shaped;
+use crate::physics::torque_scale::gains;
+
+fn terms_of(problem: &Problem, actives: &[Active], layer: Layer) -> Vec<Box<dyn Term>> {
+    // The scale of a drive is that of all bodies, and is put to them when they are summed.
+    let of_layer = |active: &&Active| {
+        active.hypothesis.effect.layer == layer && !active.hypothesis.is_torque_scale()
+    };
+    let of_layer = actives.iter().filter(of_layer);
+    of_layer.map(|active| active.term(&problem.model)).collect()
+}
+
+/// What the gears transmit under the physics of `actives`.
+pub fn transmitted(problem: &Problem, actives: &[Active]) -> TrackEfforts {
+    let rigid = &problem.bare().body;
+    let mut body = TrackEfforts::clone(rigid);
+    let of_bodies =
+        |a: &&Active| a.hypothesis.effect.layer == Layer::Body && !a.hypothesis.is_torque_scale();
+    for active in actives.iter().filter(of_bodies) {
+        if !add_shaped(problem, active, &mut body) {
+            bodies::add(problem, active, rigid, &mut body);
+        }
+    }
+    scale(&mut body, &gains(actives, problem.joints));
+    body
+}
+
+/// Under the physics of `actives`, of which the gears transmit `body`.
+pub fn evaluated(problem: &Problem, actives: &[Active], body: Arc<TrackEfforts>) -> Efforts {
+    let mechanical = run(problem, terms_of(problem, actives, Layer::Joint), &body);
+    let recorded = record(problem, actives, &mechanical);
+    Efforts {
+        body,
+        mechanical: Arc::new(mechanical),
+        recorded: Arc::new(recorded),
+    }
+}
+
+/// What is recorded of mechanical efforts.
+pub fn record(problem: &Problem, actives: &[Active], mechanical: &[Vec<f64>]) -> TrackEfforts {
+    run(
+        problem,
+        terms_of(problem, actives, Layer::Record),
+        mechanical,
+    )
+}
+
+/// What `active` alone changes in what is recorded: added to the physics `others` that made `efforts`, what bodies cost
+/// scaled by `gains`.
+///
+/// [`Layer::Record`] terms of `others` are passed through; one that is itself of that layer acts after them.
+pub fn change(
+    problem: &Problem,
+    others: &[Active],
+    efforts: &Efforts,
+    active: &Active,
+    gains: &[f64],
+) -> TrackEfforts {
+    let through = others.iter().any(Active::is_of_record);
+    match active.hypothesis.effect.layer {
+        Layer::Record => {
+            let mut term = active.term(&problem.model);
+            let changed = act_over(problem, &mut *term, &efforts.recorded, &efforts.body);
+            return subtract(changed, &efforts.recorded);
+        }
+        Layer::Joint if through => {
+            let mut term = active.term(&problem.model);
+            let changed = act_over(problem, &mut *term, &efforts.mechanical, &efforts.body);
+            return subtract(record(problem, others, &changed), &efforts.recorded);
+        }
+        Layer::Joint => {
+            let mut term = active.term(&problem.model);
+            return act_over(problem, &mut *term, &zeros(&efforts.body), &efforts.body);
+        }
+        Layer::Body => {}
+    }
+    let mut added = zeros(&efforts.body);
+    bodies::add(problem, active, &efforts.body, &mut added);
+    scale(&mut added, gains);
+    if !through {
+        return added;
+    }
+    recorded_on_top(problem, others, efforts, &added, 1.0)
+}
+
+/// What is recorded of `share` times something added to the mechanical efforts, less what is recorded without.
+pub fn recorded_on_top(
+    problem: &Problem,
+    others: &[Active],
+    efforts: &Efforts,
+    added: &[Vec<f64>],
+    share: f64,
+) -> TrackEfforts {
+    let mut changed = TrackEfforts::clone(&efforts.mechanical);
+    for (changed, added) in changed.iter_mut().zip(added) {
+        for (changed, added) in changed.iter_mut().zip(added) {
+            *changed += share * added;
+        }
+    }
+    subtract(record(problem, others, &changed), &efforts.recorded)
+}

@@ -1,0 +1,88 @@
+//! Which hypotheses there are for a robot.
+
+use std::collections::BTreeSet;
+
+use tauscope_dynamics::Model;
+use tauscope_dynamics::terms::{EFFECTS, Effect, PlaceKind};
+
+use crate::physics::active::{Hypothesis, Whereabouts};
+
+/// The links whose bodies may be described where no name fits: those that move and have a body in the URDF, but for that at
+/// the end, where any body is a payload.
+pub fn unnamed_bodies(model: &Model, without: &BTreeSet<String>) -> Vec<Hypothesis> {
+    let describes =
+        |effect: &&&Effect| effect.traits.describes_only && effect.place == PlaceKind::Link;
+    let effect = EFFECTS.iter().find(describes);
+    let Some(&effect) = effect.filter(|effect| !without.contains(effect.name)) else {
+        return Vec::new();
+    };
+    let tool = model.links()[model.tool_link()].joint;
+    let joints = model.joints().iter().enumerate();
+    let links = joints.filter(|(joint, _)| Some(*joint) != tool);
+    let has_body = |link: &usize| {
+        let inertia = model.links()[*link].inertia;
+        inertia.mass_kg() > 0.0 && inertia.nearest_consistent(0.0) == inertia
+    };
+    let links = links.map(|(_, joint)| joint.child_link).filter(has_body);
+    let at = |link: usize| Hypothesis {
+        effect,
+        place: Whereabouts {
+            link,
+            ..Whereabouts::default()
+        },
+    };
+    links.map(at).collect()
+}
+
+/// Every hypothesis for a robot, but for the effects named in `without`. Where the twin is a topic, `bodies`
+/// is false: nothing is known of masses and links.
+pub fn hypotheses(model: &Model, bodies: bool, without: &BTreeSet<String>) -> Vec<Hypothesis> {
+    let joints = 0..model.dof();
+    let mut all = Vec::new();
+    for &effect in EFFECTS {
+        if effect.traits.describes_only || without.contains(effect.name) {
+            continue;
+        }
+        let mut add = |place: Whereabouts| all.push(Hypothesis { effect, place });
+        match effect.place {
+            PlaceKind::Joint if bodies || effect.layer != tauscope_dynamics::terms::Layer::Body => {
+                joints.clone().for_each(|joint| {
+                    add(Whereabouts {
+                        joint,
+                        ..Whereabouts::default()
+                    });
+                });
+            }
+            PlaceKind::TwoJoints => {
+                for joint in joints.clone() {
+                    for source in joints.clone().filter(|source| *source != joint) {
+                        add(Whereabouts {
+                            joint,
+                            source,
+                            link: 0,
+                        });
+                    }
+                }
+            }
+            PlaceKind::Link if bodies => {
+                // The child link of each joint stands for all that is fixed to it.
+                for joint in model.joints() {
+                    add(Whereabouts {
+                        link: joint.child_link,
+                        ..Whereabouts::default()
+                    });
+                }
+            }
+            PlaceKind::Tool if bodies => {
+                add(Whereabouts {
+                    link: model.tool_link(),
+                    ..Whereabouts::default()
+                });
+            }
+            PlaceKind::Base if bodies => add(Whereabouts::default()),
+            PlaceKind::All => add(Whereabouts::default()),
+            _ => {}
+        }
+    }
+    all
+}

@@ -1,0 +1,20 @@
+//! Units of parameters, from their canonical names.
+
+use tauscope_dynamics::terms::words;
+
+/// Unit of a parameter, from its canonical name; empty for a pure number.
+pub fn unit(parameter: &str) -> &'static str {
+    words::unit(parameter).map_or("", |(_, unit)| unit)
+}
+
+/// Whether a parameter is so much effort, or so much of it by something.
+pub fn is_of_effort(parameter: &str) -> bool {
+    let unit = unit(parameter);
+    unit.starts_with("N m") || unit == "kg m²"
+}
+
+/// Whether a parameter of a body or a force grows with the effort that it is read from.
+pub fn grows_with_effort(parameter: &str) -> bool {
+    let whole = ["mass_kg", "stiffness_n_per_m"].contains(&parameter);
+    whole || parameter.starts_with("force_") || parameter.starts_with("delta_")
+}

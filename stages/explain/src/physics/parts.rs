@@ -1,0 +1,249 @@
+//! An explanation's effort as a sum of what its pieces add, each filtered once: most pieces only add to what is recorded,
+//! and a change of one leaves the others as they are. What transforms a joint's recording is evaluated as a whole.
+
+use std::sync::{Arc, OnceLock};
+
+use tauscope_dynamics::terms::{Coordinate, CoordinateKind, Layer, PlaceKind};
+
+use crate::data::column::Column;
+use crate::data::efforts::{Efforts, TrackEfforts};
+use crate::data::memo::MOST_ROWS;
+use crate::data::problem::Problem;
+use crate::physics::active::{Active, Hypothesis, feeds};
+use crate::physics::bodies;
+use crate::physics::efforts::{change, evaluated, transmitted};
+use crate::physics::torque_scale::gains;
+use crate::physics::unit_columns::units;
+
+/// What the pieces of an explanation add.
+#[derive(Debug, Clone)]
+pub struct Parts {
+    /// Torque scale of each joint.
+    pub gains: Vec<f64>,
+    /// Joints whose recording is more than a sum: something transforms it.
+    pub transformed: Vec<bool>,
+    /// By active, what it adds before torque scales; `None` if it does not simply add.
+    columns: Vec<Option<Arc<Column>>>,
+    /// What the gears transmit, if a part depends on it.
+    load: Option<Arc<TrackEfforts>>,
+    /// Joints whose recording another joint's feels.
+    feeds: Vec<bool>,
+    /// What is recorded of the whole, unfiltered; where it was asked for.
+    efforts: OnceLock<Arc<Efforts>>,
+}
+
+impl Parts {
+    /// The parts of `actives`; what is the same in the fit `before` is taken from there.
+    pub fn new(problem: &Problem, actives: &[Active], before: Option<(&[Active], &Self)>) -> Self {
+        let mut parts = Self {
+            gains: gains(actives, problem.joints),
+            transformed: transformed(actives, problem.joints),
+            columns: Vec::with_capacity(actives.len()),
+            load: None,
+            feeds: (0..problem.joints)
+                .map(|joint| feeds(actives, joint))
+                .collect(),
+            efforts: OnceLock::new(),
+        };
+        if actives.iter().any(Active::needs_load) {
+            let known = before.filter(|(others, _)| same_bodies(actives, others));
+            parts.load = known
+                .and_then(|(_, before)| before.load.clone())
+                .or_else(|| Some(Arc::new(transmitted(problem, actives))));
+        }
+        for active in actives {
+            let part = parts.adds(active).then(|| {
+                let known = before.and_then(|(others, before)| {
+                    let at = others.iter().position(|other| is_same(active, other))?;
+                    let alike = !active.needs_load()
+                        || matches!((&parts.load, &before.load), (Some(a), Some(b)) if Arc::ptr_eq(a, b));
+                    before.columns[at].clone().filter(|_| alike)
+                });
+                known.unwrap_or_else(|| Arc::new(parts.part(problem, active)))
+            });
+            parts.columns.push(part);
+        }
+        parts
+    }
+
+    /// Whether a piece only adds, as far as this is of interest: to a joint that nothing transforms.
+    fn adds(&self, active: &Active) -> bool {
+        let hypothesis = &active.hypothesis;
+        if hypothesis.is_torque_scale() {
+            return false;
+        }
+        match hypothesis.only_joint() {
+            Some(joint) => !self.transformed[joint],
+            None => hypothesis.effect.layer == Layer::Body,
+        }
+    }
+
+    /// Whether a piece would only add, to joints that nothing transforms and no other joint feels.
+    pub fn is_plain(&self, hypothesis: &Hypothesis) -> bool {
+        let of_record = hypothesis.effect.layer == Layer::Record && !only_adds(hypothesis);
+        !of_record
+            && !hypothesis.is_torque_scale()
+            && match hypothesis.only_joint() {
+                Some(joint) => !self.transformed[joint] && !self.feeds[joint],
+                None => !self.transformed.contains(&true),
+            }
+    }
+
+    /// Whether another joint's recording feels a joint's.
+    pub fn feeds(&self, joint: usize) -> bool {
+        self.feeds[joint]
+    }
+
+    /// What the effects of the parts say of the recordings, unfiltered.
+    pub fn efforts(&self, problem: &Problem, actives: &[Active]) -> &Efforts {
+        self.efforts.get_or_init(|| {
+            let body = match &self.load {
+                Some(load) => Arc::clone(load),
+                None => Arc::new(transmitted(problem, actives)),
+            };
+            Arc::new(evaluated(problem, actives, body))
+        })
+    }
+
+    /// What the gears transmit under the effects of the parts, unfiltered.
+    pub fn load(&self, problem: &Problem, actives: &[Active]) -> Arc<TrackEfforts> {
+        match &self.load {
+            Some(load) => Arc::clone(load),
+            None => Arc::clone(&self.efforts(problem, actives).body),
+        }
+    }
+
+    /// What an active adds by itself, before torque scales.
+    pub fn part(&self, problem: &Problem, active: &Active) -> Column {
+        let hypothesis = active.hypothesis;
+        let joint = hypothesis.only_joint();
+        if active.needs_load()
+            && let Some(load) = &self.load
+        {
+            let efforts = Efforts::of_bodies(Arc::clone(load));
+            let ones = vec![1.0; problem.joints];
+            return problem.column(&change(problem, &[], &efforts, active, &ones), joint);
+        }
+        if hypothesis.effect.layer == Layer::Body
+            && let Some(values) = bodies::signal(problem, active)
+        {
+            return Column { joint, values };
+        }
+        if is_kept(problem, active) {
+            let units = units(problem, hypothesis, &active.shape());
+            let count = problem.rows * joint.map_or(problem.joints, |_| 1);
+            let mut values = match &units.alone {
+                Some(alone) => alone.values.clone(),
+                None => vec![0.0; count],
+            };
+            let factors = hypothesis
+                .factors()
+                .into_iter()
+                .map(|i| active.coordinates[i]);
+            for (unit, factor) in units.factors.iter().zip(factors) {
+                for (value, unit) in values.iter_mut().zip(&unit.values) {
+                    *value += factor * unit;
+                }
+            }
+            return Column { joint, values };
+        }
+        let ones = vec![1.0; problem.joints];
+        let added = change(problem, &[], problem.bare(), active, &ones);
+        problem.column(&added, joint)
+    }
+
+    /// What an active adds, before torque scales, if it does.
+    pub fn of(&self, index: usize) -> Option<&Arc<Column>> {
+        self.columns[index].as_ref()
+    }
+
+    /// What bodies cost at a joint, before its torque scale.
+    pub fn bodies(&self, problem: &Problem, actives: &[Active], joint: usize) -> Vec<f64> {
+        let mut sum = problem.rigid()[problem.joint_rows(joint)].to_vec();
+        for (active, part) in actives.iter().zip(&self.columns) {
+            let values = part
+                .as_ref()
+                .filter(|_| active.hypothesis.effect.layer == Layer::Body);
+            if let Some(values) = values.and_then(|part| part.of_joint(joint, problem.rows)) {
+                add(&mut sum, values);
+            }
+        }
+        sum
+    }
+
+    /// What is recorded at a joint that nothing transforms.
+    pub fn recorded(&self, problem: &Problem, actives: &[Active], joint: usize) -> Vec<f64> {
+        let mut sum = self.bodies(problem, actives, joint);
+        for value in &mut sum {
+            *value *= self.gains[joint];
+        }
+        for (active, part) in actives.iter().zip(&self.columns) {
+            let values = part
+                .as_ref()
+                .filter(|_| active.hypothesis.effect.layer != Layer::Body);
+            if let Some(values) = values.and_then(|part| part.of_joint(joint, problem.rows)) {
+                add(&mut sum, values);
+            }
+        }
+        sum
+    }
+}
+
+/// Whether the columns of an active may be kept: not those of every interval of time.
+pub fn is_kept(problem: &Problem, active: &Active) -> bool {
+    let timeless = |c: &Coordinate| {
+        matches!(
+            c.kind,
+            CoordinateKind::Factor { .. } | CoordinateKind::Shape { .. }
+        )
+    };
+    active.curve.is_none()
+        && active.hypothesis.effect.coordinates.iter().all(timeless)
+        && problem.rows <= MOST_ROWS
+}
+
+fn add(into: &mut [f64], what: &[f64]) {
+    for (into, what) in into.iter_mut().zip(what) {
+        *into += what;
+    }
+}
+
+fn only_adds(hypothesis: &Hypothesis) -> bool {
+    hypothesis.effect.traits.only_adds
+}
+
+/// The joints whose recording something transforms; an offset alone does not.
+fn transformed(actives: &[Active], joints: usize) -> Vec<bool> {
+    let mut transformed = vec![false; joints];
+    for active in actives
+        .iter()
+        .filter(|a| a.is_of_record() && !only_adds(&a.hypothesis))
+    {
+        if active.hypothesis.effect.place == PlaceKind::All {
+            return vec![true; joints];
+        }
+        transformed[active.hypothesis.place.joint] = true;
+    }
+    transformed
+}
+
+/// Whether two are the same, numbers and all.
+fn is_same(a: &Active, b: &Active) -> bool {
+    let bits = |active: &Active| {
+        active
+            .coordinates
+            .iter()
+            .map(|x| x.to_bits())
+            .collect::<Vec<_>>()
+    };
+    a.hypothesis == b.hypothesis && a.curve == b.curve && bits(a) == bits(b)
+}
+
+fn same_bodies(a: &[Active], b: &[Active]) -> bool {
+    let bodies = |all: &[Active]| -> Vec<Active> {
+        let of_bodies = |a: &&Active| a.hypothesis.effect.layer == Layer::Body;
+        all.iter().filter(of_bodies).cloned().collect()
+    };
+    let (a, b) = (bodies(a), bodies(b));
+    a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| is_same(a, b))
+}

@@ -1,0 +1,87 @@
+//! The scale between N m and a recorded current, where nobody knows the torque constants.
+
+use tauscope_dynamics::terms::{
+    Coordinate, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind, Simulated,
+    Term, Traits, Words,
+};
+
+use crate::physics::active::{Active, Hypothesis, TORQUE_SCALE, Whereabouts};
+
+/// Effort of the bodies times 1 + x: not a finding, but a number that every fit needs. Acts after all other
+/// [`Layer::Body`] terms.
+pub static EFFECT: Effect = Effect {
+    name: TORQUE_SCALE,
+    words: Words::new(
+        "Torque scale",
+        "torque scale",
+        "What a recorded effort of 1 is in N m.",
+        "The effort of joint {place} is recorded {gain} times the model's.",
+    ),
+    family: Family::Recording,
+    place: PlaceKind::Joint,
+    layer: Layer::Body,
+    parameters: &[Parameter::ratio("gain", f64::NEG_INFINITY)],
+    coordinates: &[Coordinate::factor("gain_minus_one")],
+    to_parameters: |c| vec![1.0 + c[0]],
+    to_coordinates: |p| vec![p[0] - 1.0],
+    simpler: None,
+    limit: None,
+    excitation: Excitation::Poses,
+    simulated: Simulated::Record,
+    concealed: None,
+    traits: Traits::NONE,
+    build: |site, values| {
+        Box::new(TorqueScale {
+            joint: site.joint,
+            values: [values[0]],
+        })
+    },
+};
+
+#[derive(Debug)]
+struct TorqueScale {
+    joint: usize,
+    values: [f64; 1],
+}
+
+impl Term for TorqueScale {
+    fn effect(&self) -> &'static Effect {
+        &EFFECT
+    }
+
+    fn coordinates(&self) -> &[f64] {
+        &self.values
+    }
+
+    fn act(&mut self, _at: &MotionSample<'_>, effort: &mut [f64]) {
+        effort[self.joint] *= 1.0 + self.values[0];
+    }
+}
+
+/// The scales of joints that nobody knows, as they are at first.
+pub fn unknown_scales(first: &[(usize, f64)]) -> Vec<Active> {
+    let one = |&(joint, gain): &(usize, f64)| {
+        let place = Whereabouts {
+            joint,
+            ..Whereabouts::default()
+        };
+        Hypothesis {
+            effect: &EFFECT,
+            place,
+        }
+        .with(vec![gain - 1.0])
+    };
+    first.iter().map(one).collect()
+}
+
+/// The scale of each joint in an explanation; 1 where it is out of the question.
+pub fn gains(actives: &[Active], joints: usize) -> Vec<f64> {
+    let mut gains = vec![1.0; joints];
+    for active in actives
+        .iter()
+        .filter(|active| active.hypothesis.is_torque_scale())
+    {
+        gains[active.hypothesis.place.joint] = 1.0 + active.coordinates[0];
+    }
+    gains
+}

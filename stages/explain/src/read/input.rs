@@ -1,0 +1,31 @@
+//! What is to be explained.
+
+use std::collections::BTreeSet;
+
+use tauscope_dynamics::Model;
+
+use crate::read::recording::Recording;
+use crate::read::start::Start;
+
+/// What is to be explained.
+#[derive(Debug)]
+pub struct Input {
+    /// Name of the case.
+    pub case: String,
+    /// The robot; massless joints where the twin is a topic.
+    pub model: Model,
+    /// Whether the robot's bodies are known: not where the twin is a topic.
+    pub bodies: bool,
+    /// Unit of the recordings' effort: `Nm` or `A`.
+    pub effort_unit: String,
+    /// By joint, where the unit is `A` and they are known \[N m/A\].
+    pub torque_constants_nm_per_a: Option<Vec<f64>>,
+    /// Recordings that may be fitted.
+    pub fit: Vec<Recording>,
+    /// Recordings that nothing is fitted on.
+    pub holdout: Vec<Recording>,
+    /// A corrected twin to start from, if there is one.
+    pub start: Option<Start>,
+    /// Effects that are left out of the library.
+    pub without: BTreeSet<String>,
+}

@@ -1,0 +1,71 @@
+//! The corrected twin: the physics and the gains that it has beside those that it started with.
+
+use tauscope_dynamics::terms::{Layer, Site, TermSpec};
+
+use crate::context::Context;
+use crate::fit::fitted::Fit;
+use crate::physics::active::{Active, TimeKind};
+use crate::physics::{friction, torque_scale};
+
+impl Context<'_> {
+    /// Gain of each joint's bodies in the corrected twin, and its standard deviation, given those of the gains that were fitted.
+    pub fn final_gains(&self, found: &Fit, fitted: &[(usize, f64)]) -> (Vec<f64>, Vec<f64>) {
+        let n = self.unit_nm.len();
+        let start = self.input.start.as_ref();
+        let mut gain = start.map_or_else(|| vec![1.0; n], |start| start.gain.clone());
+        let mut deviation =
+            start.map_or_else(|| vec![0.0; n], |start| start.gain_deviation.clone());
+        let of_fit = torque_scale::gains(&found.actives, n);
+        for &(joint, of_gain) in fitted {
+            (gain[joint], deviation[joint]) = (of_fit[joint], of_gain);
+        }
+        (gain, deviation)
+    }
+
+    /// A piece of physics as files hold it.
+    fn spec(&self, active: &Active) -> TermSpec {
+        let model = &self.input.model;
+        let place = active.hypothesis.place;
+        let site = Site {
+            model,
+            joint: place.joint,
+            source: place.source,
+            link: place.link,
+        };
+        TermSpec::of(&*active.term(model), &site)
+    }
+
+    /// The bodies of an explanation that its gears bear for long.
+    pub fn bodies(&self, found: &Fit) -> Vec<TermSpec> {
+        let of_bodies = |active: &&Active| {
+            let hypothesis = active.hypothesis;
+            let lasts = !matches!(hypothesis.time_kind(), TimeKind::Once);
+            hypothesis.effect.layer == Layer::Body && !hypothesis.is_torque_scale() && lasts
+        };
+        let bodies = found.actives.iter().filter(of_bodies);
+        bodies.map(|active| self.spec(active)).collect()
+    }
+
+    /// What a corrected twin keeps: not what came and went.
+    pub fn lasting_terms(&self, found: &Fit) -> Vec<TermSpec> {
+        let mut terms = self
+            .input
+            .start
+            .as_ref()
+            .map_or_else(Vec::new, |start| start.terms.clone());
+        for active in &found.actives {
+            if active.hypothesis.is_torque_scale() || !active.hypothesis.lasts() {
+                continue;
+            }
+            let term = self.spec(active);
+            // With torque constants the terms of a twin are in N m, else in what was recorded.
+            let term = if self.input.torque_constants_nm_per_a.is_none() {
+                friction::in_recorded_units(&term, &self.input.model, self.unit_nm)
+            } else {
+                term
+            };
+            friction::add(term, &mut terms);
+        }
+        terms
+    }
+}

@@ -1,0 +1,353 @@
+//! From the winning explanation to what is said: findings with intervals, rivals, what could have hidden.
+
+mod confidence;
+mod contest;
+mod doubt;
+mod scales;
+mod undetectable;
+mod waves;
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+use tauscope_dynamics::terms::PlaceKind;
+
+use crate::fit::fitted::Fit;
+use crate::fit::interval::{covariance, half_width_95, parameter_deviations};
+use crate::physics::active::{Active, Hypothesis, TimeKind};
+use crate::physics::friction::least;
+use crate::read::input::Input;
+use crate::report::schema::{Finding, NextMotion, Rejected, Rival, Verdict};
+use crate::report::{next_motion, sentences};
+use crate::select::explanation::Explanation;
+use crate::select::search::Search;
+
+use confidence::{Grounds, confidence};
+use contest::contest;
+pub use doubt::doubt_patches;
+use scales::{Scales, StartScales};
+pub use undetectable::undetectable;
+use waves::merge_waves;
+
+/// A time that is known no better than this has no interval \[s\].
+const VAGUE_S: f64 = 5.0;
+
+/// What is said of an explanation.
+#[derive(Debug, Default)]
+pub struct Named {
+    /// That which explains most first.
+    pub findings: Vec<Finding>,
+    /// Rivals.
+    pub rejected: Vec<Rejected>,
+    /// For what cannot be told apart.
+    pub next_motions: Vec<NextMotion>,
+    /// Their files: name and text.
+    pub trajectories: Vec<(String, String)>,
+    /// On the scales of drives.
+    pub notes: Vec<String>,
+    /// Standard deviations of the gains that were fitted, by joint.
+    pub gain_deviation: Vec<(usize, f64)>,
+}
+
+impl Named {
+    /// Adds what is said of another.
+    pub fn extend(&mut self, other: Self) {
+        self.findings.extend(other.findings);
+        self.rejected.extend(other.rejected);
+        self.next_motions.extend(other.next_motions);
+        self.trajectories.extend(other.trajectories);
+        self.notes.extend(other.notes);
+    }
+}
+
+fn place_of(
+    input: &Input,
+    joints: &[String],
+    hypothesis: &Hypothesis,
+) -> (Option<String>, Option<String>) {
+    let link = |index: usize| Some(input.model.links()[index].name.clone());
+    match hypothesis.effect.place {
+        PlaceKind::Joint | PlaceKind::TwoJoints => {
+            (Some(joints[hypothesis.place.joint].clone()), None)
+        }
+        PlaceKind::Link if hypothesis.is_unnamed_body() => {
+            let carrier = input.model.links()[hypothesis.place.link].joint;
+            let joint = carrier.map(|joint| joints[joint].clone());
+            (joint, link(hypothesis.place.link))
+        }
+        PlaceKind::Link | PlaceKind::Tool => (None, link(hypothesis.place.link)),
+        PlaceKind::Base => (None, link(input.model.base_link())),
+        PlaceKind::All => (None, None),
+    }
+}
+
+fn rival(input: &Input, joints: &[String], hypothesis: &Hypothesis) -> Rival {
+    let (joint, link) = place_of(input, joints, hypothesis);
+    Rival {
+        effect: hypothesis.said().to_owned(),
+        joint,
+        link,
+    }
+}
+
+/// Names everything in `found`.
+pub fn of(
+    search: &Search<'_>,
+    found: &Explanation,
+    before: &Fit,
+    input: &Input,
+    joints: &[String],
+) -> Named {
+    let fit = &found.fit;
+    let effective = &search.problem.effective_samples;
+    let spread = covariance(search.problem, fit);
+    let total = mismatch(before, fit, before);
+    let scales = Scales::of(search.problem, fit, &spread);
+    let of_start = StartScales::of(input);
+    let mut named = Named {
+        notes: scales.notes(joints),
+        gain_deviation: scales.deviations().collect(),
+        ..Named::default()
+    };
+    for (index, active) in fit.actives.iter().enumerate() {
+        if active.hypothesis.is_torque_scale() {
+            continue;
+        }
+        let deviations = parameter_deviations(search.problem, fit, &spread, index);
+        let less = search.without(found, index);
+        let evidence = found.ahead_of(&less, effective);
+        let contest = contest(search, found, &less, active);
+        let (mut parameters, mut intervals) = (BTreeMap::new(), BTreeMap::new());
+        let effect = active.hypothesis.effect;
+        let values = active.parameters();
+        for ((parameter, value), deviation) in
+            effect.parameters.iter().zip(&values).zip(&deviations)
+        {
+            parameters.insert(parameter.name.to_owned(), number(*value));
+            // A change between two recordings has no sharper time than that.
+            let vague = parameter.name.contains("time") && *deviation > VAGUE_S;
+            if deviation.is_finite() && !vague {
+                let half = half_width_95(search.problem) * deviation;
+                let least = least(search.problem, active.hypothesis, parameter.minimum);
+                let low = (value - half).max(least);
+                intervals.insert(parameter.name.to_owned(), [low, value + half]);
+            }
+        }
+        if effect.place == PlaceKind::TwoJoints {
+            let source = joints[active.hypothesis.place.source].clone();
+            parameters.insert("source_joint".to_owned(), Value::from(source));
+        }
+        if effect.traits.cuts_off {
+            parameters.insert("mode".to_owned(), Value::from("sensor"));
+        }
+        describe_curve(active, &mut parameters);
+        let (joint, link) = place_of(input, joints, &active.hypothesis);
+        let place = link.clone().or_else(|| joint.clone()).unwrap_or_default();
+        let when = when(search, active, &mut parameters, &mut intervals);
+        drop_no_force(&mut parameters, &mut intervals);
+        let in_amperes = scales.to_nm(active.hypothesis, &mut parameters, &mut intervals);
+        of_start.widen(active.hypothesis, &parameters, &mut intervals);
+        let mut sentence = sentences::sentence(active, &place, &parameters, &intervals, joints);
+        if in_amperes {
+            sentence = sentences::in_amperes(&sentence);
+        }
+        let equivalent_to: Vec<Rival> = contest
+            .ties
+            .iter()
+            .map(|h| rival(input, joints, h))
+            .collect();
+        for (hypothesis, reason) in contest.rejected {
+            let (joint, link) = place_of(input, joints, &hypothesis);
+            let effect = hypothesis.effect.name.to_owned();
+            named.rejected.push(Rejected {
+                effect,
+                joint,
+                link,
+                reason,
+            });
+        }
+        if let Some((next, trajectory)) =
+            next_motion::of(&active.hypothesis, &contest.ties, input, joints)
+        {
+            if let Some(file) = &next.trajectory {
+                named.trajectories.push((file.clone(), trajectory));
+            }
+            named.next_motions.push(next);
+        }
+        named.findings.push(Finding {
+            effect: active.hypothesis.said().to_owned(),
+            joint,
+            link,
+            parameters,
+            intervals_95: intervals,
+            in_amperes,
+            confidence: confidence(Grounds::of(fit, &less.fit, active, evidence)),
+            recording: when.recording,
+            t_start: when.start,
+            t_end: when.end,
+            explains: (mismatch(&less.fit, fit, before) / total).clamp(0.0, 1.0),
+            equivalent_to,
+            sentence,
+        });
+    }
+    doubt::doubt(&mut named, search.problem, &fit.actives);
+    merge_waves(&mut named.findings);
+    named
+        .findings
+        .sort_by(|a, b| b.explains.total_cmp(&a.explains));
+    named
+}
+
+/// What a curve is drawn against, and where it is largest.
+fn describe_curve(active: &Active, parameters: &mut BTreeMap<String, Value>) {
+    let Some(curve) = &active.curve else {
+        return;
+    };
+    let against = serde_json::to_value(curve.against).unwrap_or(Value::Null);
+    parameters.insert("against".to_owned(), against);
+    parameters.insert("by_direction".to_owned(), Value::from(curve.by_direction));
+    let values = active.values_at_knots(curve);
+    let all = values.iter().zip(&curve.knots);
+    if let Some((most, at)) = all.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs())) {
+        parameters.insert("largest_nm".to_owned(), number(*most));
+        parameters.insert("largest_at".to_owned(), number(*at));
+    }
+    if let Some(period) = curve.period {
+        parameters.insert("period_s".to_owned(), Value::from(period));
+    }
+}
+
+/// A weaker force at a link's frame is none \[N\].
+const LEAST_FORCE_N: f64 = 0.01;
+
+/// Takes out the force of a push where it is none, and how well its times are known, which hangs on it: the link's frame lies on
+/// the axes of all joints that feel the push, so that no force there does what was felt.
+fn drop_no_force(
+    parameters: &mut BTreeMap<String, Value>,
+    intervals: &mut BTreeMap<String, [f64; 2]>,
+) {
+    let names = ["x", "y", "z"].map(|axis| format!("force_{axis}_n"));
+    let force: Vec<f64> = (names.iter())
+        .filter_map(|name| parameters.get(name)?.as_f64())
+        .collect();
+    if force.len() == names.len() && force.iter().all(|f| f.abs() < LEAST_FORCE_N) {
+        for name in &names {
+            parameters.remove(name);
+        }
+        intervals.clear();
+    }
+}
+
+fn number(value: f64) -> Value {
+    serde_json::Number::from_f64(value).map_or(Value::Null, Value::Number)
+}
+
+/// What `with` explains of what `without` leaves, in units of each joint's final noise.
+fn mismatch(without: &Fit, with: &Fit, count: &Fit) -> f64 {
+    (0..with.variance.len())
+        .map(|j| {
+            (without.squares[j] - with.squares[j]).max(0.0)
+                / with.variance[j]
+                / count.count[j].max(1.0)
+        })
+        .sum::<f64>()
+        .max(1e-12)
+}
+
+struct When {
+    recording: Option<String>,
+    start: Option<f64>,
+    end: Option<f64>,
+}
+
+/// The times of a finding, taken out of its parameters where they hold for one recording.
+fn when(
+    search: &Search<'_>,
+    active: &Active,
+    parameters: &mut BTreeMap<String, Value>,
+    intervals: &mut BTreeMap<String, [f64; 2]>,
+) -> When {
+    let mut none = When {
+        recording: None,
+        start: None,
+        end: None,
+    };
+    let known = parameters.clone();
+    let get = |name: &str| known.get(name).and_then(Value::as_f64);
+    match active.hypothesis.time_kind() {
+        TimeKind::Always => none,
+        TimeKind::Step => {
+            none.start = get("change_time_session_s");
+            none
+        }
+        TimeKind::EveryRecording => {
+            (none.start, none.end) = (get("t_start_s"), get("t_end_s"));
+            none
+        }
+        TimeKind::Once => {
+            let (Some(start), Some(end)) = (get("t_start_s"), get("t_end_s")) else {
+                return none;
+            };
+            let middle = 0.5 * (start + end);
+            let track = search
+                .problem
+                .tracks
+                .iter()
+                .map(|track| &track.track)
+                .rfind(|track| track.session_s <= middle);
+            let Some(track) = track else { return none };
+            for name in ["t_start_s", "t_end_s"] {
+                if let Some(value) = get(name) {
+                    parameters.insert(name.to_owned(), number(value - track.session_s));
+                }
+                if let Some(interval) = intervals.get_mut(name) {
+                    *interval = interval.map(|t| t - track.session_s);
+                }
+            }
+            When {
+                recording: Some(track.name.clone()),
+                start: Some(start - track.session_s),
+                end: Some(end - track.session_s),
+            }
+        }
+    }
+}
+
+/// From this share of the error on, it is said to have stayed as it was.
+const UNCHANGED: f64 = 0.98;
+
+/// The verdict in a sentence.
+pub fn summary(verdict: Verdict, findings: &[Finding], before: &[f64], after: &[f64]) -> String {
+    let ratio = {
+        let sum = |all: &[f64]| all.iter().map(|x| x * x).sum::<f64>().sqrt();
+        sum(after) / sum(before)
+    };
+    let proof = if !ratio.is_finite() {
+        String::new()
+    } else if ratio < UNCHANGED {
+        format!(
+            " On recordings that were not fitted the error falls to {:.0} %.",
+            100.0 * ratio
+        )
+    } else {
+        " On recordings that were not fitted it makes no difference.".to_owned()
+    };
+    match verdict {
+        Verdict::NothingMissing => {
+            "Nothing is missing: what the twin leaves is the noise of the measurement.".to_owned()
+        }
+        Verdict::NotEvaluated => "Nothing was evaluated.".to_owned(),
+        Verdict::UnknownRemains if findings.is_empty() => {
+            "The fitted recordings show nothing that is missing; those held out do, and no name is given to it.".to_owned()
+        }
+        Verdict::Explained | Verdict::UnknownRemains => {
+            let first = findings.first().map_or("", |f| f.sentence.as_str());
+            let more = match findings.len() {
+                0 | 1 => String::new(),
+                2 => " One more effect was found.".to_owned(),
+                n => format!(" {} more effects were found.", n - 1),
+            };
+            format!("{first}{more}{proof}")
+        }
+    }
+}

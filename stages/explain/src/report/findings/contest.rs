@@ -1,0 +1,60 @@
+//! Every rival in the place of a finding.
+
+use crate::physics::active::{Active, Hypothesis};
+use crate::report::sentences;
+use crate::select::evidence::tie;
+use crate::select::explanation::Explanation;
+use crate::select::search::Search;
+
+/// How many rivals of a finding are refined, and how many are told.
+const RIVALS: usize = 5;
+
+/// What came of it.
+pub struct Contest {
+    /// Those that this data cannot tell from the finding.
+    pub ties: Vec<Hypothesis>,
+    /// Those that fit worse, and by how much.
+    pub rejected: Vec<(Hypothesis, String)>,
+}
+
+/// Every rival in the place of one piece of physics.
+pub fn contest(
+    search: &Search<'_>,
+    found: &Explanation,
+    less: &Explanation,
+    active: &Active,
+) -> Contest {
+    let mut result = Contest {
+        ties: Vec::new(),
+        rejected: Vec::new(),
+    };
+    if active.is_unnamed() {
+        return result;
+    }
+    let effective = &search.problem.effective_samples;
+    let evidence = found.ahead_of(less, effective);
+    let proposals = search.rivals(&less.fit, &found.fit, active);
+    let rivals = proposals
+        .iter()
+        .filter(|p| p.active.hypothesis != active.hypothesis && p.evidence() > 0.0);
+    for proposal in rivals.take(RIVALS) {
+        let other = search.joined(less, proposal, found.fit.likelihood());
+        let behind = found.ahead_of(&other, effective);
+        let hypothesis = proposal.active.hypothesis;
+        if behind < tie(evidence) {
+            result.ties.push(hypothesis);
+            continue;
+        }
+        let share = ((other.fit.likelihood() - less.fit.likelihood())
+            / (found.fit.likelihood() - less.fit.likelihood()).max(1e-9))
+        .clamp(0.0, 1.0);
+        let reason = format!(
+            "in the place of {} it takes away {:.0} % of the mismatch that this takes away; the recordings are {} times less likely with it",
+            active.hypothesis.effect.words.noun,
+            100.0 * share,
+            sentences::odds(behind)
+        );
+        result.rejected.push((hypothesis, reason));
+    }
+    result
+}

@@ -1,0 +1,210 @@
+//! What a finding is doubted for beside the others.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use tauscope_dynamics::Model;
+use tauscope_dynamics::terms::{Against, PlaceKind};
+
+use crate::data::problem::Problem;
+use crate::physics::active::{Active, Hypothesis, TimeKind};
+use crate::physics::kinematic_tree::bearing;
+use crate::report::schema::Finding;
+
+use super::Named;
+
+/// What is doubted is as likely as not, at most.
+const DOUBTED: f64 = 0.5;
+/// What explains less than this share of what the largest finding does may patch it.
+const PATCH: f64 = 0.02;
+/// Pushes whose times differ by less than this from recording to recording come at the same time \[s\].
+const SAME_TIME_S: f64 = 0.3;
+/// In at least so many recordings.
+const TOO_OFTEN: usize = 3;
+
+fn doubt_it(finding: &mut Finding) {
+    finding.confidence = finding.confidence.min(DOUBTED);
+}
+
+/// Doubts what is said of the physics that was found, and says why.
+pub fn doubt(named: &mut Named, problem: &Problem, actives: &[Active]) {
+    let said = actives.iter().filter(|a| !a.hypothesis.is_torque_scale());
+    for (finding, active) in named.findings.iter_mut().zip(said) {
+        if is_shadowed(&problem.model, actives, active.hypothesis) {
+            doubt_it(finding);
+        }
+    }
+    let pushed = doubt_pushes(&mut named.findings, problem.tracks.len());
+    named.notes.extend(pushed);
+}
+
+/// Doubts what explains next to nothing beside the largest finding, where what was found does not carry over: it may only patch what
+/// is wrong elsewhere.
+pub fn doubt_patches(findings: &mut [Finding]) {
+    let largest = findings.iter().map(|f| f.explains).fold(0.0, f64::max);
+    let small = |finding: &&mut Finding| finding.explains < PATCH * largest;
+    for finding in findings.iter_mut().filter(small) {
+        doubt_it(finding);
+    }
+}
+
+/// Whether a body, or how gravity acts on it, is named beside a curve that a joint which carries it has without a name: what weighs
+/// there weighs here too, and the name could be part of it.
+fn is_shadowed(model: &Model, actives: &[Active], hypothesis: Hypothesis) -> bool {
+    let lasts = hypothesis.time_kind() == TimeKind::Always && hypothesis.lasts();
+    let carriers = match hypothesis.effect.place {
+        PlaceKind::Link | PlaceKind::Tool if lasts => bearing(model, hypothesis.place.link),
+        PlaceKind::Base => (0..model.dof()).collect(),
+        _ => return false,
+    };
+    actives.iter().any(|active| {
+        let weighs = active.curve.as_ref().is_some_and(|curve| {
+            !curve.by_direction
+                && matches!(
+                    curve.against,
+                    Against::Position | Against::Acceleration | Against::Load
+                )
+        });
+        weighs && carriers.contains(&active.hypothesis.place.joint)
+    })
+}
+
+/// Doubts pushes on one link that come in each of `recordings` at the same time, and says so: they belong to the programme.
+fn doubt_pushes(findings: &mut [Finding], recordings: usize) -> Vec<String> {
+    let mut by_link: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+    for (i, finding) in findings.iter().enumerate() {
+        if let (Some(_), Some(link)) = (&finding.recording, &finding.link) {
+            by_link.entry(link.clone()).or_default().push(i);
+        }
+    }
+    let mut notes = Vec::new();
+    for (link, all) in by_link {
+        let apart = |a: Option<f64>, b: Option<f64>| Some((a? - b?).abs());
+        let together = |&i: &usize| {
+            let (a, b) = (&findings[i], &findings[all[0]]);
+            let starts = apart(a.t_start, b.t_start);
+            let ends = apart(a.t_end, b.t_end);
+            starts
+                .zip(ends)
+                .is_some_and(|(s, e)| s.max(e) < SAME_TIME_S)
+        };
+        let same: Vec<usize> = all.iter().copied().filter(together).collect();
+        let names: BTreeSet<&String> = same
+            .iter()
+            .filter_map(|&i| findings[i].recording.as_ref())
+            .collect();
+        if names.len() < recordings.max(TOO_OFTEN) {
+            continue;
+        }
+        let from = findings[same[0]].t_start.unwrap_or(f64::NAN);
+        let to = findings[same[0]].t_end.unwrap_or(f64::NAN);
+        notes.push(format!(
+            "Link {link} is pushed in every recording from {from:.1} to {to:.1} s: that belongs to the programme, e.g. something that is \
+             carried or pressed on, and is no push from outside. What it does in other recordings is not predicted."
+        ));
+        for i in same {
+            doubt_it(&mut findings[i]);
+        }
+    }
+    notes
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use tauscope_dynamics::terms::{Table, effect};
+
+    use super::*;
+    use crate::fit::body_prior::tests::model;
+    use crate::physics::active::Whereabouts;
+
+    fn hypothesis(name: &str, joint: usize, link: usize) -> Hypothesis {
+        let place = Whereabouts {
+            joint,
+            link,
+            ..Whereabouts::default()
+        };
+        let effect = effect(name).unwrap();
+        Hypothesis { effect, place }
+    }
+
+    /// A curve in a joint.
+    fn curve(joint: usize, against: Against) -> Active {
+        Active {
+            hypothesis: hypothesis("unknown", joint, 0),
+            coordinates: vec![1.0; 3],
+            curve: Some(Table {
+                against,
+                of_joint: joint,
+                by_direction: false,
+                period: None,
+                knots: vec![-1.0, 0.0, 1.0],
+                values: vec![1.0; 3],
+            }),
+        }
+    }
+
+    #[test]
+    fn a_mass_is_doubted_beside_something_unknown_that_weighs_on_a_joint_that_carries_it() {
+        let model = model();
+        let link = |joint: usize| model.joints()[joint].child_link;
+        let mass = |joint: usize| hypothesis("link_mass", 0, link(joint));
+        let doubted = |against: Against, hypothesis: Hypothesis| {
+            is_shadowed(&model, &[curve(2, against)], hypothesis)
+        };
+        assert!(doubted(Against::Position, mass(4)));
+        assert!(doubted(Against::Position, hypothesis("base_tilt", 0, 0)));
+        // The joint does not carry it, friction does not weigh, and other names are no bodies.
+        assert!(!doubted(Against::Position, mass(1)));
+        assert!(!doubted(Against::Velocity, mass(4)));
+        let friction = hypothesis("coulomb_friction", 4, 0);
+        assert!(!doubted(Against::Position, friction));
+    }
+
+    /// A push on a link in a recording.
+    fn push(recording: &str, start_s: f64) -> Finding {
+        Finding {
+            effect: "external_push".to_owned(),
+            joint: None,
+            link: Some("forearm".to_owned()),
+            parameters: BTreeMap::new(),
+            intervals_95: BTreeMap::new(),
+            in_amperes: false,
+            confidence: 0.99,
+            recording: Some(recording.to_owned()),
+            t_start: Some(start_s),
+            t_end: Some(start_s + 1.0),
+            explains: 0.3,
+            equivalent_to: Vec::new(),
+            sentence: String::new(),
+        }
+    }
+
+    #[test]
+    fn what_explains_next_to_nothing_is_doubted_where_the_whole_does_not_carry_over() {
+        let mut found = [push("a", 2.0), push("b", 5.0), push("c", 7.0)];
+        for (finding, explains) in found.iter_mut().zip([0.9, 0.03, 0.01]) {
+            finding.explains = explains;
+        }
+        doubt_patches(&mut found);
+        let confidence = found.map(|finding| finding.confidence);
+        assert!(confidence[0] > 0.9 && confidence[1] > 0.9 && confidence[2] <= DOUBTED);
+    }
+
+    #[test]
+    fn pushes_at_the_same_time_in_every_recording_are_doubted() {
+        let every = || vec![push("a", 2.0), push("b", 2.1), push("c", 1.9)];
+        let mut pushes = every();
+        let notes = doubt_pushes(&mut pushes, 3);
+        assert!(pushes.iter().all(|push| push.confidence <= DOUBTED));
+        assert!(notes[0].contains("Link forearm is pushed in every recording"));
+        // In one of the recordings there is none, or at another time.
+        for (mut pushes, recordings) in [
+            (every(), 4),
+            (vec![push("a", 2.0), push("b", 2.1), push("c", 5.0)], 3),
+        ] {
+            assert!(doubt_pushes(&mut pushes, recordings).is_empty());
+            assert!(pushes.iter().all(|push| push.confidence > 0.9));
+        }
+    }
+}

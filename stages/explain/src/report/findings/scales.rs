@@ -1,0 +1,183 @@
+//! What a recorded current is in N m, where nobody knows the torque constants and the motion may tell.
+
+use std::collections::BTreeMap;
+
+use nalgebra::DMatrix;
+use serde_json::Value;
+use tauscope_dynamics::terms::Layer;
+use tauscope_dynamics::terms::words::number;
+
+use crate::data::problem::Problem;
+use crate::fit::fitted::Fit;
+use crate::fit::interval::{HALF_WIDTH_95, parameter_deviations};
+use crate::fit::urdf_uncertainty::off_with_the_links;
+use crate::physics::active::Hypothesis;
+use crate::physics::parameter_units::{grows_with_effort, is_of_effort};
+use crate::read::input::Input;
+use crate::read::start::KNOWN;
+
+/// The torque scale of one joint \[A per N m\].
+#[derive(Debug, Clone, Copy)]
+struct Scale {
+    joint: usize,
+    gain: f64,
+    deviation: f64,
+}
+
+impl Scale {
+    fn is_known(&self) -> bool {
+        self.deviation.is_finite() && self.gain > KNOWN * self.deviation
+    }
+}
+
+/// The torque scales that were fitted.
+#[derive(Debug)]
+pub struct Scales(Vec<Scale>);
+
+impl Scales {
+    /// As a fit has them; how far they are known counts that the URDF's masses are not exact.
+    pub fn of(problem: &Problem, fit: &Fit, spread: &DMatrix<f64>) -> Self {
+        let fitted: Vec<usize> = (0..fit.actives.len())
+            .filter(|&index| fit.actives[index].hypothesis.is_torque_scale())
+            .collect();
+        if fitted.is_empty() {
+            return Self(Vec::new());
+        }
+        let off = off_with_the_links(problem, fit);
+        let of = |index: usize| {
+            let own = parameter_deviations(problem, fit, spread, index)[0];
+            let actives = &fit.actives;
+            let at: usize = actives[..index].iter().map(|a| a.coordinates.len()).sum();
+            Scale {
+                joint: actives[index].hypothesis.place.joint,
+                gain: 1.0 + actives[index].coordinates[0],
+                deviation: own.hypot(off[at]),
+            }
+        };
+        Self(fitted.into_iter().map(of).collect())
+    }
+
+    /// What is known of each.
+    pub fn notes(&self, joints: &[String]) -> Vec<String> {
+        self.0.iter().map(|scale| note(scale, joints)).collect()
+    }
+
+    /// Turns the numbers of an effect on the recorded effort into N m where the scale of its joint is known; tells whether
+    /// they are still in A.
+    pub fn to_nm(
+        &self,
+        hypothesis: Hypothesis,
+        parameters: &mut BTreeMap<String, Value>,
+        intervals: &mut BTreeMap<String, [f64; 2]>,
+    ) -> bool {
+        let of_bodies = hypothesis.effect.layer == Layer::Body;
+        let joint = hypothesis.only_joint().filter(|_| !of_bodies);
+        let Some(scale) = self.0.iter().find(|scale| Some(scale.joint) == joint) else {
+            return false;
+        };
+        if !scale.is_known() {
+            return true;
+        }
+        let share = scale.deviation / scale.gain;
+        for (name, value) in parameters {
+            let Some(number) = value.as_f64().filter(|_| is_of_effort(name)) else {
+                continue;
+            };
+            let known = number / scale.gain;
+            *value = Value::from(known);
+            if let Some(interval) = intervals.get_mut(name) {
+                *interval = wider(interval.map(|end| end / scale.gain), known, share);
+            }
+        }
+        false
+    }
+
+    /// Joints, and how well their scales are known \[A per N m\].
+    pub fn deviations(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.0.iter().map(|scale| (scale.joint, scale.deviation))
+    }
+}
+
+/// An interval about a number that a scale goes into, known but for this share of it.
+fn wider(interval: [f64; 2], number: f64, share: f64) -> [f64; 2] {
+    interval.map(|end| {
+        let own = end - number;
+        let wide = number + own.signum() * own.hypot(HALF_WIDTH_95 * share * number);
+        // No scale turns a sign.
+        if wide * end < 0.0 || end == 0.0 {
+            0.0
+        } else {
+            wide
+        }
+    })
+}
+
+/// How well the scales of a corrected twin are known that was started from, by joint, as shares of them.
+#[derive(Debug)]
+pub struct StartScales(Vec<f64>);
+
+impl StartScales {
+    /// Nothing to widen where the recordings are in N m or torque constants are known.
+    pub fn of(input: &Input) -> Self {
+        let unknown = input.effort_unit == "A" && input.torque_constants_nm_per_a.is_none();
+        let start = input.start.as_ref().filter(|_| unknown);
+        let share = |start: &crate::Start| {
+            let each = start.gain.iter().zip(&start.gain_deviation);
+            each.map(|(gain, deviation)| deviation / gain.abs())
+                .collect()
+        };
+        Self(start.map_or_else(Vec::new, share))
+    }
+
+    /// Counts in the intervals of an effect that its numbers are no better known than the scale: of its own joint, or of the joint
+    /// whose is known best where all joints feel it.
+    pub fn widen(
+        &self,
+        hypothesis: Hypothesis,
+        parameters: &BTreeMap<String, Value>,
+        intervals: &mut BTreeMap<String, [f64; 2]>,
+    ) {
+        let best = self.0.iter().fold(f64::INFINITY, |best, s| best.min(*s));
+        let share = match hypothesis.only_joint() {
+            Some(joint) => self.0.get(joint).copied().unwrap_or(0.0),
+            None => best,
+        };
+        // A scale that nobody knows is part of the fit.
+        if !share.is_finite() || share * KNOWN >= 1.0 {
+            return;
+        }
+        for (name, interval) in intervals {
+            let scaled = is_of_effort(name) || grows_with_effort(name);
+            if let Some(number) = parameters.get(name).and_then(Value::as_f64)
+                && scaled
+            {
+                *interval = wider(*interval, number, share);
+            }
+        }
+    }
+}
+
+fn note(scale: &Scale, joints: &[String]) -> String {
+    let Scale {
+        joint,
+        gain,
+        deviation,
+    } = *scale;
+    let joint = &joints[joint];
+    let half = HALF_WIDTH_95 * deviation;
+    if !scale.is_known() {
+        return format!(
+            "The gain of joint {joint} is not identifiable: hardly any gravity or inertia acts on it in these recordings, and what \
+             does hangs on how exact the URDF's masses are ({} A per N m, 95 % interval {} to {}). The numbers of its effects are in A.",
+            number(gain),
+            number(gain - half),
+            number(gain + half)
+        );
+    }
+    format!(
+        "The drive of joint {joint} has {} N m/A (95 % interval {} to {}).",
+        number(1.0 / gain),
+        number(1.0 / (gain + half)),
+        number(1.0 / (gain - half))
+    )
+}

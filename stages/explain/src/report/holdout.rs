@@ -1,0 +1,255 @@
+//! The proof: the corrected twin on recordings that were never fitted.
+
+use std::ops::RangeInclusive;
+
+use tauscope_dynamics::terms::{Physics, TermError};
+
+use crate::context::Context;
+use crate::data::problem::Problem;
+use crate::data::track::Track;
+use crate::fit::fitted::Fit;
+use crate::physics::active::in_order;
+use crate::read::recording::Recording;
+use crate::report::schema::{JointPicture, RecordingPicture};
+
+/// Motion of a prediction is smoothed with the best of these, as shares of the fit's cutoff.
+const PREDICTION_CUTOFFS: [f64; 5] = [0.75, 1.0, 1.4, 2.0, 3.0];
+/// And the velocity that friction turns on with these times that, or taken as it was recorded: friction of a few mrad/s has a sign.
+const VELOCITY_CUTOFFS: [f64; 3] = [2.0, 4.0, 8.0];
+/// No smoothing above this share of the rate of rows.
+const MOST_OF_RATE: f64 = 0.4;
+/// So near to the end of a recording little is known of accelerations \[s\].
+const END_S: f64 = 0.25;
+/// Samples of a picture, at most.
+const PICTURE_SAMPLES: usize = 2000;
+
+/// The hold-out's errors and what is drawn of them.
+pub struct Proof {
+    /// RMS error of the twin as it was, by joint \[effort unit\].
+    pub before: Vec<f64>,
+    /// The same of the corrected twin.
+    pub after: Vec<f64>,
+    /// The same but for the ends of the recordings, where nothing tells accelerations: of those held out and of those fitted.
+    pub within: [Vec<f64>; 2],
+    /// The corrected twin's effort by hold-out recording.
+    pub predictions: Vec<(String, Vec<f64>)>,
+    /// What is drawn, hold-out recordings first.
+    pub pictures: Vec<RecordingPicture>,
+}
+
+/// How the motion of a prediction is smoothed.
+#[derive(Debug, Clone, Copy)]
+struct Smoothing {
+    motion_hz: f64,
+    velocity: Velocity,
+}
+
+/// Where the velocity comes from that friction turns on.
+#[derive(Debug, Clone, Copy)]
+enum Velocity {
+    AsMotion,
+    /// Half amplitude at \[Hz\].
+    Smoothed(f64),
+    Recorded,
+}
+
+impl Context<'_> {
+    /// The corrected twin's effort over a track, in the recording's unit.
+    fn predict(&self, problem: &Problem, fit: &Fit, track: &Track) -> Vec<f64> {
+        let terms = in_order(&fit.actives)
+            .into_iter()
+            .map(|active| active.term(&problem.model))
+            .collect();
+        let mut physics = Physics::new(terms, self.unit_nm.len());
+        let mut effort = track.run(&mut physics, &track.rigid);
+        for (k, value) in effort.iter_mut().enumerate() {
+            *value = *value / self.unit_nm[k % self.unit_nm.len()] + track.beside[k];
+        }
+        effort
+    }
+
+    /// How unlikely the fitted recordings' unfiltered effort is if their motion is smoothed so.
+    fn unlikeliness(
+        &self,
+        problem: &Problem,
+        found: &Fit,
+        smoothing: &Smoothing,
+    ) -> Result<f64, TermError> {
+        let n = self.unit_nm.len();
+        let mut sum = vec![0.0; n];
+        let mut count = 0.0;
+        for recording in &self.input.fit {
+            let track = self.smoothed(recording, smoothing)?;
+            let predicted = self.predict(problem, found, &track);
+            for (k, (p, m)) in predicted.iter().zip(&recording.effort).enumerate() {
+                sum[k % n] += (m - p) * (m - p);
+            }
+            count += recording.len() as f64;
+        }
+        Ok(sum.iter().map(|s| (s / count).max(1e-16).ln()).sum())
+    }
+
+    fn smoothed(&self, recording: &Recording, by: &Smoothing) -> Result<Track, TermError> {
+        let mut track = self.track(recording, by.motion_hz)?;
+        match by.velocity {
+            Velocity::AsMotion => {}
+            Velocity::Smoothed(hz) => track.sharpen_velocity(recording, Some(hz)),
+            Velocity::Recorded => track.sharpen_velocity(recording, None),
+        }
+        Ok(track)
+    }
+
+    /// The smoothing that predicts the fitted recordings' unfiltered effort best.
+    fn best_smoothing(&self, problem: &Problem, found: &Fit) -> Result<Smoothing, TermError> {
+        let start = Smoothing {
+            motion_hz: Problem::motion_cutoff_hz(problem.cutoff_hz),
+            velocity: Velocity::AsMotion,
+        };
+        let mut best = (f64::INFINITY, start);
+        let try_it = |smoothing: Smoothing, best: &mut (f64, Smoothing)| {
+            let unlikeliness = self.unlikeliness(problem, found, &smoothing)?;
+            if unlikeliness < best.0 {
+                *best = (unlikeliness, smoothing);
+            }
+            Ok::<(), TermError>(())
+        };
+        for share in PREDICTION_CUTOFFS {
+            let motion_hz = share * problem.cutoff_hz;
+            try_it(Smoothing { motion_hz, ..start }, &mut best)?;
+        }
+        let motion_hz = best.1.motion_hz;
+        let rate_hz = |r: &Recording| r.len().saturating_sub(1) as f64 / r.duration_s().max(1e-9);
+        let fit = &self.input.fit;
+        let most_hz = MOST_OF_RATE * fit.iter().map(rate_hz).fold(f64::INFINITY, f64::min);
+        let sharper = VELOCITY_CUTOFFS.map(|times| (times * motion_hz).min(most_hz));
+        let mut velocities: Vec<Velocity> = sharper.into_iter().map(Velocity::Smoothed).collect();
+        let is_recorded = |r: &Recording| {
+            r.velocity.len() == r.position.len() && r.velocity.iter().all(|v| v.is_finite())
+        };
+        if fit.iter().chain(&self.input.holdout).all(is_recorded) {
+            velocities.push(Velocity::Recorded);
+        }
+        for velocity in velocities {
+            let smoothing = Smoothing {
+                motion_hz,
+                velocity,
+            };
+            try_it(smoothing, &mut best)?;
+        }
+        Ok(best.1)
+    }
+
+    /// Runs the corrected twin over the hold-out recordings.
+    pub fn proof(&self, problem: &Problem, scaled: &Fit, found: &Fit) -> Result<Proof, TermError> {
+        let n = self.unit_nm.len();
+        let names: Vec<&str> = self.input.model.joint_names().collect();
+        let smoothing = self.best_smoothing(problem, found)?;
+        let (mut before, mut after) = (Errors::new(n), Errors::new(n));
+        let mut within = [Errors::new(n), Errors::new(n)];
+        let (mut predictions, mut pictures) = (Vec::new(), Vec::new());
+        let held = self.input.holdout.iter().map(|recording| (recording, true));
+        let of_fit = self.input.fit.iter().map(|recording| (recording, false));
+        for (recording, held_out) in held.chain(of_fit) {
+            let track = self.smoothed(recording, &smoothing)?;
+            let predicted = self.predict(problem, found, &track);
+            let rigid = self.predict(problem, scaled, &track);
+            let all = 0.0..=f64::INFINITY;
+            let end_s = recording.duration_s() - END_S;
+            within[usize::from(!held_out)].add(recording, &predicted, &(END_S..=end_s));
+            if held_out {
+                before.add(recording, &rigid, &all);
+                after.add(recording, &predicted, &all);
+                let rows = recording
+                    .sample_of_row
+                    .iter()
+                    .flat_map(|&k| predicted[k * n..(k + 1) * n].iter().copied());
+                predictions.push((recording.name.clone(), rows.collect()));
+            }
+            if !recording.effort.is_empty() {
+                pictures.push(picture(
+                    &names, recording, held_out, &track, &rigid, &predicted,
+                ));
+            }
+        }
+        Ok(Proof {
+            before: before.rms(),
+            after: after.rms(),
+            within: within.map(|errors| errors.rms()),
+            predictions,
+            pictures,
+        })
+    }
+}
+
+/// Squared errors of a twin by joint, and of how many samples.
+struct Errors {
+    squares: Vec<f64>,
+    count: f64,
+}
+
+impl Errors {
+    fn new(joints: usize) -> Self {
+        Self {
+            squares: vec![0.0; joints],
+            count: 0.0,
+        }
+    }
+
+    /// Adds those of a recording between two times \[s\].
+    fn add(&mut self, recording: &Recording, twin: &[f64], during: &RangeInclusive<f64>) {
+        let n = self.squares.len();
+        let rows = recording.effort.chunks_exact(n).zip(twin.chunks_exact(n));
+        let timed = recording.time_s.iter().zip(rows);
+        for (_, (measured, twin)) in timed.filter(|(t, _)| during.contains(t)) {
+            for (sum, (measured, twin)) in self.squares.iter_mut().zip(measured.iter().zip(twin)) {
+                *sum += (measured - twin).powi(2);
+            }
+            self.count += 1.0;
+        }
+    }
+
+    /// By joint; not a number where there was nothing to compare with.
+    fn rms(&self) -> Vec<f64> {
+        let each = self.squares.iter();
+        each.map(|square| (square / self.count).sqrt()).collect()
+    }
+}
+
+fn picture(
+    names: &[&str],
+    recording: &Recording,
+    held_out: bool,
+    track: &Track,
+    before: &[f64],
+    after: &[f64],
+) -> RecordingPicture {
+    let n = before.len() / track.len().max(1);
+    let stride = track.len().div_ceil(PICTURE_SAMPLES).max(1);
+    let joint = |j: usize, name: &str| {
+        let thin = |values: &[f64]| -> Vec<f64> {
+            (0..track.len())
+                .step_by(stride)
+                .map(|k| values[k * n + j])
+                .collect()
+        };
+        JointPicture {
+            joint: name.to_owned(),
+            time_s: track.time_s.iter().step_by(stride).copied().collect(),
+            position: thin(&track.position),
+            velocity: thin(&track.velocity),
+            measured: thin(&recording.effort),
+            before: thin(before),
+            after: thin(after),
+        }
+    };
+    RecordingPicture {
+        recording: recording.name.clone(),
+        held_out,
+        start_ns: recording.start_ns,
+        joints: names
+            .iter()
+            .enumerate()
+            .map(|(j, name)| joint(j, name))
+            .collect(),
+    }
+}

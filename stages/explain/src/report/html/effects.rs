@@ -1,0 +1,42 @@
+//! What effects are called, and what they mean at the arm.
+
+use tauscope_dynamics::terms;
+
+use super::number_format::sentence_case;
+
+/// An effect's name in words.
+pub(super) fn effect_title(effect: &str) -> String {
+    terms::effect(effect).map_or_else(
+        || sentence_case(effect),
+        |effect| effect.words.title.to_owned(),
+    )
+}
+
+/// What an effect is, in a sentence; nothing for one that is not known.
+pub(super) fn effect_meaning(effect: &str) -> Option<&'static str> {
+    terms::effect(effect).map(|effect| effect.words.meaning)
+}
+
+/// An effect and where it is: `Coulomb friction of joint3`.
+pub(super) fn effect_at(effect: &str, joint: Option<&str>, link: Option<&str>) -> String {
+    let title = effect_title(effect);
+    match place(joint, link) {
+        Some(place) => format!("{title}, {place}"),
+        None => title,
+    }
+}
+
+/// `joint3`, `link tool`; nothing for an effect of the whole arm.
+pub(super) fn place(joint: Option<&str>, link: Option<&str>) -> Option<String> {
+    match (joint, link) {
+        (Some(joint), _) if mentions(joint, "joint") => Some(joint.to_owned()),
+        (Some(joint), _) => Some(format!("joint {joint}")),
+        (None, Some(link)) if mentions(link, "link") => Some(link.to_owned()),
+        (None, Some(link)) => Some(format!("link {link}")),
+        (None, None) => None,
+    }
+}
+
+fn mentions(name: &str, word: &str) -> bool {
+    name.to_ascii_lowercase().contains(word)
+}

@@ -1,0 +1,178 @@
+//! The findings, a card each.
+
+use maud::{Markup, html};
+use tauscope_dynamics::terms::UNKNOWN;
+
+use super::chart::{Axis, r};
+use super::effects::{effect_at, effect_meaning, effect_title, place};
+use super::number_format::{almost_all, number_text, parameter, percent, value, with_digits_of};
+use super::proof;
+use crate::report::schema::{Finding, Report, Verdict};
+use crate::report::sentences::in_amperes;
+
+/// A card a finding, or that there is none.
+pub(super) fn cards(report: &Report) -> Option<Markup> {
+    if report.verdict == Verdict::NotEvaluated && report.findings.is_empty() {
+        return None;
+    }
+    Some(html! {
+        @if report.findings.is_empty() {
+            p {
+                @if report.verdict == Verdict::NothingMissing && !proof::rows(report).iter().any(proof::Row::is_left) {
+                    "Nothing. What is left between the twin and the recordings is noise, as far as this data shows."
+                } @else {
+                    "Nothing was named."
+                }
+            }
+        }
+        @for (index, finding) in report.findings.iter().enumerate() {
+            (card(index + 1, finding))
+        }
+    })
+}
+
+fn card(number: usize, finding: &Finding) -> Markup {
+    let kind = if finding.effect == UNKNOWN.name {
+        "card unknown"
+    } else {
+        "card"
+    };
+    let when = when(finding);
+    html! {
+        article class=(kind) {
+            h3 {
+                span.number { (number) }
+                (effect_title(&finding.effect))
+                @if let Some(place) = place(finding.joint.as_deref(), finding.link.as_deref()) {
+                    span.place { (place) }
+                }
+            }
+            div.halves { div {
+            p.sentence { (finding.sentence) }
+            @if let Some(meaning) = effect_meaning(&finding.effect) { p.meaning { (meaning) } }
+            p.figures {
+                span { "Explains " b { (percent(finding.explains)) } " of the mismatch " (meter(finding.explains)) }
+                span { "Confidence " b { (almost_all(finding.confidence)) } }
+                @if let Some(when) = when { span { (when) } }
+            }
+            }
+            @if !finding.parameters.is_empty() { (parameters(finding)) }
+            }
+            @if !finding.equivalent_to.is_empty() {
+                p.rival {
+                    b { "Cannot be told apart from " }
+                    (list(finding.equivalent_to.iter().map(|rival| {
+                        effect_at(&rival.effect, rival.joint.as_deref(), rival.link.as_deref())
+                    })))
+                    ". This data fits both; the name above is the more probable one."
+                }
+            }
+        }
+    }
+}
+
+/// Names with commas and an `or`, most probable first.
+pub(super) fn list(names: impl Iterator<Item = String>) -> String {
+    let mut names: Vec<_> = names.collect();
+    let last = names.pop().unwrap_or_default();
+    if names.is_empty() {
+        last
+    } else {
+        format!("{} or {last}", names.join("; "))
+    }
+}
+
+fn when(finding: &Finding) -> Option<String> {
+    let recording = |text: String| match &finding.recording {
+        Some(recording) => format!("{text} in {recording}"),
+        None => text,
+    };
+    let time = |seconds: f64| format!("{} s", number_text((seconds * 100.0).round() / 100.0));
+    match (finding.t_start, finding.t_end) {
+        (Some(start), Some(end)) => {
+            Some(recording(format!("From {} to {}", time(start), time(end))))
+        }
+        (Some(start), None) => Some(recording(format!("From {} on", time(start)))),
+        (None, Some(end)) => Some(recording(format!("Until {}", time(end)))),
+        (None, None) => finding.recording.as_ref().map(|name| format!("In {name}")),
+    }
+}
+
+/// A share as a small bar.
+pub(super) fn meter(share: f64) -> Markup {
+    let width = if share.is_finite() {
+        share.clamp(0.0, 1.0) * 80.0
+    } else {
+        0.0
+    };
+    html! {
+        svg.meter viewBox="0 0 80 8" aria-hidden="true" {
+            rect.rail width="80" height="8" rx="4" {}
+            rect.fill width=(r(width)) height="8" rx="4" {}
+        }
+    }
+}
+
+fn parameters(finding: &Finding) -> Markup {
+    // A mass says more than where it is, and when comes last.
+    let rank = |name: &str| match name {
+        "coulomb_after_nm" => 2,
+        "t_start_s" | "change_time_session_s" => 3,
+        "t_end_s" => 4,
+        name => usize::from(!name.contains("mass")),
+    };
+    let mut parameters: Vec<_> = finding.parameters.iter().collect();
+    parameters.sort_by_key(|(name, _)| rank(name));
+    html! {
+        table.parameters {
+            thead { tr { th { "Parameter" } th.num { "Value" } th.num { "95 % interval" } th {} } }
+            tbody {
+                @for (name, given) in parameters {
+                    @let (label, unit) = parameter(name);
+                    @let amperes = finding.in_amperes.then(|| in_amperes(unit));
+                    @let unit = amperes.as_deref().unwrap_or(unit);
+                    @let interval = finding.intervals_95.get(name).copied();
+                    tr {
+                        th scope="row" { (label) }
+                        td.num { b { (value(given, interval)) } " " (unit) (degrees(given.as_f64(), unit)) }
+                        @if let Some([low, high]) = interval {
+                            td.num { (with_digits_of(low, [low, high])) " to " (with_digits_of(high, [low, high])) }
+                            td { (interval_picture(given.as_f64(), [low, high])) }
+                        } @else {
+                            td {} td {}
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// An angle in degrees as well.
+fn degrees(value: Option<f64>, unit: &str) -> Markup {
+    html! {
+        @if let Some(angle) = value && unit == "rad" {
+            span.muted { " (" (number_text(angle.to_degrees())) "°)" }
+        }
+    }
+}
+
+/// The interval on an axis with zero: how far is it from nothing?
+fn interval_picture(value: Option<f64>, [low, high]: [f64; 2]) -> Markup {
+    let all = [Some(0.0), value, Some(low), Some(high)];
+    let axis = (low.is_finite() && high.is_finite())
+        .then(|| Axis::over(all.into_iter().flatten(), 5.0, 135.0))
+        .flatten();
+    html! {
+        @if let Some(axis) = axis {
+            svg.interval viewBox="0 0 140 16" role="img" aria-label="the interval on an axis with zero" {
+                line.axis x1="5" x2="135" y1="8" y2="8" {}
+                line.zero x1=(r(axis.px(0.0))) x2=(r(axis.px(0.0))) y1="2" y2="14" {}
+                rect.range x=(r(axis.px(low))) y="5" width=(r((axis.px(high) - axis.px(low)).max(2.0))) height="6" rx="2" {}
+                @if let Some(value) = value.filter(|value| value.is_finite()) {
+                    circle.value cx=(r(axis.px(value))) cy="8" r="3.6" {}
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! Numbers, units and sentences.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+use tauscope_dynamics::terms::words::{self, Told, number};
+
+use crate::physics::active::Active;
+use crate::physics::parameter_units::unit;
+
+/// How much likelier something is that is ahead by so many nats, e.g. `40`, `10^17`.
+pub fn odds(nats: f64) -> String {
+    /// From here on powers of ten are easier to read.
+    const MANY: f64 = 1000.0;
+    let odds = nats.max(0.0).exp();
+    if odds < MANY {
+        return format!("{odds:.0}");
+    }
+    format!("10^{:.0}", nats / std::f64::consts::LN_10)
+}
+
+/// A sentence on an effort whose numbers are in A.
+pub fn in_amperes(sentence: &str) -> String {
+    sentence.replace("N m", "A").replace("kg m²", "A s²/rad")
+}
+
+/// A finding in a sentence; `place` is what the joint or link is called.
+pub fn sentence(
+    active: &Active,
+    place: &str,
+    parameters: &BTreeMap<String, Value>,
+    intervals: &BTreeMap<String, [f64; 2]>,
+    joints: &[String],
+) -> String {
+    let effect = active.hypothesis.effect;
+    let value = |name: &str| parameters.get(name).and_then(Value::as_f64);
+    if let Some(curve) = &active.curve {
+        let peak = value("largest_nm").zip(value("largest_at"));
+        return curve.sentence(active.hypothesis.place.joint, place, joints, peak);
+    }
+    let first = effect.parameters.first().map_or("", |p| p.name);
+    let less = value(first).filter(|value| *value < 0.0);
+    let is_told = |(name, _): (&str, Told)| {
+        let is_parameter = effect.parameters.iter().any(|p| p.name == name);
+        !is_parameter || parameters.contains_key(name)
+    };
+    let template = match (effect.words.less, effect.words.without_numbers) {
+        (Some(template), _) if less.is_some() => template,
+        (_, Some(template)) if !words::places(effect.words.finding).all(is_told) => template,
+        _ => effect.words.finding,
+    };
+    words::fill(template, |name, told| match name {
+        "place" => place.to_owned(),
+        "source" => joints[active.hypothesis.place.source].clone(),
+        "less" => format!("{} {}", number(-less.unwrap_or(f64::NAN)), unit(first)),
+        name => {
+            let unit = if told == Told::Whole { unit(name) } else { "" };
+            let interval = intervals.get(name).filter(|_| told != Told::Number);
+            with_interval(value(name).unwrap_or(f64::NAN), unit, interval)
+        }
+    })
+}
+
+/// `4.1 N m (3.9 to 4.3)`.
+fn with_interval(value: f64, unit: &str, interval: Option<&[f64; 2]>) -> String {
+    let mut text = number(value);
+    if !unit.is_empty() {
+        text += &format!(" {unit}");
+    }
+    if let Some([low, high]) = interval {
+        text += &format!(" ({} to {})", number(*low), number(*high));
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn odds_are_told_in_powers_of_ten_where_they_are_long() {
+        assert_eq!(odds(0.0), "1");
+        assert_eq!(odds(3.0), "20");
+        assert_eq!(odds(100.0), "10^43");
+    }
+}

@@ -1,0 +1,94 @@
+//! Which hypotheses are tried beside a fit, and with what promise.
+
+use tauscope_dynamics::terms::{Layer, PlaceKind};
+
+use crate::fit::fitted::Fit;
+use crate::physics::active::{Active, Hypothesis};
+use crate::select::evidence::{LEAST_EVIDENCE, is_drawn_already, worse_joints};
+use crate::select::parallel;
+use crate::select::propose::{Base, Proposal};
+use crate::select::search::Search;
+
+/// A joint whose variance is below this many times its white noise is not tried with costly effects.
+const QUIET: f64 = 1.15;
+
+impl Search<'_> {
+    /// Every hypothesis that could change the effort of one of `joints`, beside what `fit` holds, most evidence
+    /// first.
+    pub fn proposals(&self, fit: &Fit, joints: &[usize]) -> Vec<Proposal> {
+        self.proposals_for(fit, |h| {
+            h.only_joint().is_none_or(|joint| joints.contains(&joint))
+        })
+    }
+
+    /// The rivals of one piece of physics, once it is taken out of `without`: friction has rivals in its joint alone.
+    pub fn rivals(&self, without: &Fit, best: &Fit, active: &Active) -> Vec<Proposal> {
+        let worse = worse_joints(without, best);
+        let own = active.hypothesis.only_joint();
+        let friction =
+            active.is_set_valued(&self.problem.model) || active.hypothesis.is_plain_friction();
+        self.proposals_for(without, |h| match h.only_joint() {
+            Some(joint) => worse.contains(&joint),
+            None => !(friction && own.is_some()),
+        })
+    }
+
+    fn proposals_for(&self, fit: &Fit, touches: impl Fn(&Hypothesis) -> bool) -> Vec<Proposal> {
+        let base = Base::new(self.problem, fit, self.hypotheses.len());
+        let wanted: Vec<Hypothesis> = self
+            .hypotheses
+            .iter()
+            .filter(|h| touches(h) && self.is_candidate(fit, **h))
+            .copied()
+            .collect();
+        // A joint split in rotor and link is costly to try: where the rotor alone is no help, it is not.
+        let simpler_helps = |split: &Hypothesis| {
+            let Some(simpler) = split.effect.simpler else {
+                return true;
+            };
+            let is =
+                |h: &&Hypothesis| h.effect == simpler.effect && h.place.joint == split.place.joint;
+            let hypothesis = self.hypotheses.iter().find(is);
+            hypothesis.is_none_or(|h| base.propose(*h).is_some_and(|p| p.gain > LEAST_EVIDENCE))
+                || fit.actives.iter().any(|a| is(&&a.hypothesis))
+        };
+        let wanted: Vec<Hypothesis> = wanted
+            .into_iter()
+            .filter(|h| !h.has_rotor() || simpler_helps(h))
+            .collect();
+        let mut all: Vec<Proposal> = parallel::map(&wanted, |h| base.propose_in_time(*h))
+            .into_iter()
+            .flatten()
+            .collect();
+        all.sort_by(|a, b| {
+            let place = |p: &Proposal| (p.active.hypothesis.effect.name, p.active.hypothesis.place);
+            b.evidence()
+                .total_cmp(&a.evidence())
+                .then_with(|| place(a).cmp(&place(b)))
+        });
+        all
+    }
+
+    fn is_candidate(&self, fit: &Fit, hypothesis: Hypothesis) -> bool {
+        let same = fit
+            .actives
+            .iter()
+            .filter(|active| active.hypothesis == hypothesis)
+            .count();
+        if same >= hypothesis.effect.traits.most_at_one_place || is_drawn_already(fit, hypothesis) {
+            return false;
+        }
+        let excess = |j: usize| {
+            fit.variance[j] > QUIET * self.problem.white_noise[j] * self.problem.white_noise[j]
+        };
+        match hypothesis.only_joint() {
+            Some(joint) => excess(joint),
+            None if hypothesis.effect.layer == Layer::Body
+                && hypothesis.effect.place == PlaceKind::Joint =>
+            {
+                excess(hypothesis.place.joint)
+            }
+            None => (0..self.problem.joints).any(excess),
+        }
+    }
+}

@@ -1,0 +1,213 @@
+//! What no name fits: a curve beside the names of a joint, or in their place.
+
+use crate::fit::fitted::Fit;
+use crate::physics::active::{Active, Hypothesis, TimeKind};
+use crate::physics::kinematic_tree::bearing;
+use crate::select::cross_validation::{carries_over, left_elsewhere};
+use crate::select::curve_shapes;
+use crate::select::evidence::{CURVE_EVIDENCE, CURVE_SIZE, is_drawn_already};
+use crate::select::evidence::{overwhelming, worse_joints};
+use crate::select::explanation::Explanation;
+use crate::select::plausible::is_open_wave;
+use crate::select::propose::Base;
+use crate::select::search::Search;
+
+/// A curve is not looked for at a joint whose variance is below this many times its white noise.
+const CURVE_EXCESS: f64 = 1.6;
+/// Names that leave less of the variance than this on recordings that they were not fitted on carry over, and so do those that
+/// leave at most so many times the share that they leave where they were.
+const MOST_LEFT: f64 = 0.1;
+const MOST_WORSE: f64 = 10.0;
+/// More functions of one joint's position than this, each wave of a ripple counted, draw any curve.
+const MOST_OF_POSITION: usize = 3;
+/// That is asked where the variance without them is this many times the white noise.
+const LOUD: f64 = 4.0;
+
+impl Search<'_> {
+    /// The explanation with a curve in a joint, where names do not do: beside the names, if much is left, or in place
+    /// of them, if it does better than they.
+    pub fn with_curve_at(&self, best: &Explanation, joint: usize) -> Option<Explanation> {
+        let excess = |fit: &Fit| {
+            fit.variance[joint]
+                / (self.problem.white_noise[joint] * self.problem.white_noise[joint])
+        };
+        let own: Vec<usize> = (0..best.fit.actives.len())
+            .filter(|&i| {
+                let hypothesis = &best.fit.actives[i].hypothesis;
+                hypothesis.only_joint() == Some(joint) && !hypothesis.is_torque_scale()
+            })
+            .collect();
+        if own.iter().any(|&i| best.fit.actives[i].curve.is_some()) {
+            return None;
+        }
+        // What it explains must be much, so that its rows may count in full.
+        let white = vec![1.0; self.problem.joints];
+        if !own.is_empty() {
+            let bare = self.stripped(best, &own, joint);
+            let mut instead = self.with_curve(&bare, joint);
+            // Friction it is, whatever bends its curve.
+            let shaped = |i: &usize| !best.fit.actives[*i].hypothesis.is_plain_friction();
+            let shaped: Vec<usize> = own.iter().copied().filter(shaped).collect();
+            let plain = self.with_plain_friction(&self.stripped(best, &shaped, joint), joint);
+            let bent = self.with_curve(&plain, joint);
+            let bent = bent.filter(|e| e.fit.actives.last().is_some_and(Active::is_friction_curve));
+            if let Some(bent) = bent
+                && instead
+                    .as_ref()
+                    .is_none_or(|other| bent.ahead_of(other, &white) > 0.0)
+            {
+                instead = Some(bent);
+            }
+            if let Some(instead) = instead
+                && instead.ahead_of(best, &white) > CURVE_EVIDENCE
+            {
+                return Some(instead);
+            }
+        }
+        if excess(&best.fit) < CURVE_EXCESS {
+            return None;
+        }
+        let mut beside = self.with_curve(best, joint)?;
+        let drawn = |i: &usize| is_drawn_already(&beside.fit, best.fit.actives[*i].hypothesis);
+        let drawn: Vec<usize> = own.iter().copied().filter(drawn).collect();
+        if !drawn.is_empty() {
+            beside = self.with_curve(&self.stripped(best, &drawn, joint), joint)?;
+        }
+        let less = best.fit.variance[joint] / beside.fit.variance[joint];
+        (beside.ahead_of(best, &white) > CURVE_EVIDENCE && less > CURVE_SIZE).then_some(beside)
+    }
+
+    /// The explanation with a curve in one joint in the place of all that lasted for an interval, if that does better: what comes
+    /// back at a place, or time and again, looks like many pushes. They are evident, so that it need only beat them.
+    pub fn with_curve_for_intervals(&self, best: &Explanation) -> Option<Explanation> {
+        let once = |&i: &usize| best.fit.actives[i].hypothesis.time_kind() == TimeKind::Once;
+        let intervals: Vec<usize> = (0..best.fit.actives.len()).filter(once).collect();
+        if intervals.len() < 2 {
+            return None;
+        }
+        let less = |from: Explanation, index: &usize| self.without(&from, *index);
+        let bare = intervals.iter().rev().fold(best.clone(), less);
+        let white = vec![1.0; self.problem.joints];
+        let joints = worse_joints(&bare.fit, &best.fit);
+        // A force that time and again acts on one joint alone of several that carry its link is none.
+        let model = &self.problem.model;
+        let is_borne =
+            |&i: &usize| bearing(model, best.fit.actives[i].hypothesis.place.link).len() > 1;
+        let local = joints.len() == 1 && intervals.iter().all(is_borne);
+        let with = joints.iter().filter_map(|&joint| {
+            let with = self.curved(&bare, joint)?;
+            let most = with.fit.variance[joint] < MOST_LEFT * bare.fit.variance[joint];
+            let does = with.ahead_of(best, &white) > CURVE_EVIDENCE;
+            (does || (local && most && self.is_evident(&with, &bare))).then_some(with)
+        });
+        with.max_by(|a, b| a.ahead_of(b, &white).total_cmp(&0.0))
+    }
+
+    /// The explanation with the curve that does best in a joint, if there is evidence for one and it carries over.
+    fn with_curve(&self, from: &Explanation, joint: usize) -> Option<Explanation> {
+        let with = self.curved(from, joint)?;
+        self.is_evident(&with, from).then_some(with)
+    }
+
+    /// Whether there is evidence for the curve in one explanation that the other lacks.
+    fn is_evident(&self, with: &Explanation, without: &Explanation) -> bool {
+        with.ahead_of(without, &self.problem.effective_samples) > CURVE_EVIDENCE
+            || overwhelming(with, without)
+    }
+
+    /// The explanation with the curve that does best in a joint, if it carries over.
+    fn curved(&self, from: &Explanation, joint: usize) -> Option<Explanation> {
+        let base = Base::new(self.problem, &from.fit, self.hypotheses.len());
+        let curve = base.propose_curve(joint)?;
+        let fit = from.fit.with(self.problem, curve.active);
+        let fit = fit.refined_at(self.problem, Some(&[joint]), from.fit.likelihood());
+        let mut actives = fit.actives;
+        if let Some(curve) = actives.last_mut()
+            && !curve.is_friction_curve()
+        {
+            curve_shapes::keep_what_is_evident(curve);
+        }
+        let fit = Fit::new(self.problem, actives);
+        let penalties = [&from.penalties[..], &[curve.penalty]].concat();
+        let with = Explanation { fit, penalties };
+        carries_over(self.problem, &with.fit, &from.fit, &[joint]).then_some(with)
+    }
+
+    /// The explanation with Coulomb and viscous friction in a joint, which a curve of friction goes with.
+    fn with_plain_friction(&self, from: &Explanation, joint: usize) -> Explanation {
+        let plain = self.hypotheses.iter().filter(|h| {
+            let missing = from.fit.actives.iter().all(|a| a.hypothesis != **h);
+            h.place.joint == joint && h.is_plain_friction() && missing
+        });
+        let add = |from: Explanation, hypothesis: &Hypothesis| {
+            let base = Base::new(self.problem, &from.fit, self.hypotheses.len());
+            let proposal = base.propose(*hypothesis);
+            proposal.map_or_else(
+                || from.clone(),
+                |proposal| self.joined(&from, &proposal, from.fit.likelihood()),
+            )
+        };
+        plain.fold(from.clone(), add)
+    }
+
+    /// The explanation without some of its pieces, refined at the joint that they are in.
+    fn stripped(&self, best: &Explanation, pieces: &[usize], joint: usize) -> Explanation {
+        let mut bare = best.clone();
+        for &i in pieces.iter().rev() {
+            bare.fit.actives.remove(i);
+            bare.penalties.remove(i);
+        }
+        let fit = Fit::new(self.problem, bare.fit.actives);
+        bare.fit = fit.refined_at(self.problem, Some(&[joint]), best.fit.likelihood());
+        bare
+    }
+
+    /// Takes the names of a joint back that are too many functions of its position or waves that no gear makes, or that leave much more on recordings that they were not fitted on, each left out in
+    /// turn, than where they were: together they only draw a curve, which is said in their place.
+    pub fn with_names_that_hold(&self, found: Explanation) -> Explanation {
+        let pieces = found.fit.actives.len();
+        let mut best = found;
+        for joint in 0..self.problem.joints {
+            let local = |&i: &usize| {
+                let active = &best.fit.actives[i];
+                active.hypothesis.only_joint() == Some(joint)
+                    && active.curve.is_none()
+                    && !active.hypothesis.is_torque_scale()
+            };
+            let names: Vec<usize> = (0..best.fit.actives.len()).filter(local).collect();
+            let of = |i: usize| best.fit.actives[i].hypothesis;
+            let lasting = names.iter().all(|&i| of(i).time_kind() == TimeKind::Always);
+            let shaped = names.iter().any(|&i| !of(i).is_linear());
+            if !lasting || !shaped {
+                continue;
+            }
+            let bare = self.stripped(&best, &names, joint);
+            let of_position = names.iter().filter(|&&i| of(i).is_of_position()).count();
+            let open = names.iter().any(|&i| is_open_wave(&best.fit.actives[i]));
+            if (of_position > MOST_OF_POSITION || open)
+                && let Some(curve) = self.with_curve(&bare, joint)
+            {
+                best = curve;
+                continue;
+            }
+            let noise = self.problem.white_noise[joint] * self.problem.white_noise[joint];
+            if bare.fit.variance[joint] < LOUD * noise {
+                continue;
+            }
+            let left_here = best.fit.squares[joint] / bare.fit.squares[joint];
+            let left_there = left_elsewhere(self.problem, &best.fit, joint)
+                / left_elsewhere(self.problem, &bare.fit, joint);
+            (self.say)(&format!(
+                "! joint {joint}: {left_there:.3} left, {left_here:.3} where fitted"
+            ));
+            if left_there > MOST_LEFT.max(MOST_WORSE * left_here) {
+                best = self.with_curve(&bare, joint).unwrap_or(bare);
+            }
+        }
+        if best.fit.actives.len() < pieces {
+            // What patched those names is not needed beside what stands in their place.
+            best = self.pruned(best);
+        }
+        best
+    }
+}

@@ -1,0 +1,171 @@
+//! What counts as evidence for a piece of physics, and how much of it is asked for.
+
+use nalgebra::{DMatrix, DVector};
+use tauscope_dynamics::terms::{Against, CoordinateKind};
+
+use crate::data::column::Column;
+use crate::data::problem::Problem;
+use crate::fit::fitted::Fit;
+use crate::fit::least_squares::Products;
+use crate::physics::active::{Active, Hypothesis, TimeKind};
+use crate::select::explanation::Explanation;
+
+/// Evidence that a piece of physics needs \[nats\].
+pub const LEAST_EVIDENCE: f64 = 8.0;
+/// Least share of what is then left at some joint that a piece of physics must explain: less is in reach of what
+/// differentiation and filters leave.
+pub const LEAST_SIZE: f64 = 0.12;
+/// The same for what lasts only for an interval, which must have this much more evidence.
+const LEAST_SIZE_OF_INTERVAL: f64 = 0.03;
+const INTERVAL_EVIDENCE: f64 = 40.0;
+/// Least share beside a curve without a name in the same joint, or of an interval beside any: the name may only patch the curve.
+const LEAST_SIZE_BESIDE_CURVE: f64 = 3.0;
+/// Evidence that needs no account of correlation, if rows counted in full \[nats\].
+const OVERWHELMING: f64 = 40.0;
+/// And what is left over what is then left: of what lasts, which may follow slow noise all the time; of what comes and goes; and of a
+/// curve, which bends to any slow noise and must do much more.
+const FAIR_SHARE: f64 = 1.8;
+const FAIR_SHARE_FOR_A_WHILE: f64 = 1.3;
+const FAIR_SHARE_OF_CURVE: f64 = 3.0;
+/// Nearer than this \[nats\], or than this share of the evidence for either, two rivals cannot be told apart.
+pub const TIE: f64 = 5.0;
+const TIE_SHARE: f64 = 0.01;
+/// How many proposals of a round are refined before one is taken.
+pub const REFINED: usize = 3;
+/// An exchange must gain this \[nats\].
+pub const LEAST_GAIN: f64 = 0.5;
+
+/// Evidence that a curve without a name needs \[nats\].
+pub const CURVE_EVIDENCE: f64 = 25.0;
+/// A curve must divide the variance that is left at its joint by this.
+pub const CURVE_SIZE: f64 = 1.35;
+/// What contains a simpler effect must be ahead of it by this \[nats\], odds of twenty to one.
+pub const MORE_THAN_SIMPLE: f64 = 3.0;
+
+/// By how much a rival may be behind \[nats\] and still not be told from what has so much evidence.
+pub fn tie(evidence: f64) -> f64 {
+    TIE.max(TIE_SHARE * evidence)
+}
+
+/// Whether an explanation takes away a fair share of what another leaves at some joint, with much evidence if rows counted
+/// in full: however correlated the rest is, that much is no chance.
+pub fn overwhelming(explanation: &Explanation, other: &Explanation) -> bool {
+    let white = vec![1.0; other.fit.variance.len()];
+    let more = |is: &dyn Fn(&Active) -> bool| {
+        let count = |e: &Explanation| e.fit.actives.iter().filter(|a| is(a)).count();
+        count(explanation) > count(other)
+    };
+    let share = if more(&|a| a.curve.is_some()) {
+        FAIR_SHARE_OF_CURVE
+    } else if more(&|a| a.hypothesis.time_kind() == TimeKind::Once) {
+        FAIR_SHARE_FOR_A_WHILE
+    } else {
+        FAIR_SHARE
+    };
+    let less = |(with, without): (&f64, &f64)| *without > share * with;
+    explanation.ahead_of(other, &white) > OVERWHELMING
+        && explanation
+            .fit
+            .variance
+            .iter()
+            .zip(&other.fit.variance)
+            .any(less)
+}
+
+/// By piece, the square of its factors in units of their covariance, as if what is left were white.
+pub fn wald(problem: &Problem, fit: &Fit) -> Vec<f64> {
+    let jacobian = fit.jacobian(problem);
+    let columns: Vec<&Column> = jacobian.iter().map(AsRef::as_ref).collect();
+    let products = Products::new(problem, &columns, &fit.residual, None);
+    let (normal, _) = products.normal(&fit.variance, &vec![0.0; columns.len()]);
+    let p = columns.len();
+    let scale: Vec<f64> = (0..p).map(|a| normal[(a, a)].max(1e-300).sqrt()).collect();
+    let mut scaled = DMatrix::from_fn(p, p, |a, b| normal[(a, b)] / (scale[a] * scale[b]));
+    for a in 0..p {
+        scaled[(a, a)] += 1e-9;
+    }
+    let Some(inverse) = scaled.try_inverse() else {
+        return vec![0.0; fit.actives.len()];
+    };
+    let mut first = 0;
+    fit.actives
+        .iter()
+        .map(|active| {
+            let index: Vec<usize> = (0..active.coordinates.len())
+                .filter(|&c| matches!(active.kind(c), CoordinateKind::Factor { .. }))
+                .map(|c| first + c)
+                .collect();
+            let theta = DVector::from_iterator(
+                index.len(),
+                index
+                    .iter()
+                    .map(|&a| active.coordinates[a - first] * scale[a]),
+            );
+            first += active.coordinates.len();
+            let own = DMatrix::from_fn(index.len(), index.len(), |a, b| {
+                inverse[(index[a], index[b])]
+            });
+            own.try_inverse()
+                .map_or(0.0, |own| (own * &theta).dot(&theta))
+        })
+        .collect()
+}
+
+/// Evidence and size that a piece of physics needs beside what `fit` holds.
+pub fn needs(hypothesis: Hypothesis, fit: &Fit) -> (f64, f64) {
+    let joint = hypothesis.only_joint();
+    let once = hypothesis.time_kind() == TimeKind::Once;
+    let goes_with = |a: &Active| hypothesis.is_plain_friction() && a.is_friction_curve();
+    let curve = |a: &Active| {
+        a.curve.is_some() && (once || a.hypothesis.only_joint() == joint) && !goes_with(a)
+    };
+    let beside_curve = (once || joint.is_some()) && fit.actives.iter().any(curve);
+    let (evidence, size) = if once {
+        (INTERVAL_EVIDENCE, LEAST_SIZE_OF_INTERVAL)
+    } else {
+        (LEAST_EVIDENCE, LEAST_SIZE)
+    };
+    if beside_curve {
+        return (evidence, LEAST_SIZE_BESIDE_CURVE);
+    }
+    (evidence, size)
+}
+
+/// The joint variances that are this many times the white noise are noise alone, or something that nobody has named.
+const QUIET_RATIO: f64 = 1.5;
+const LOUD_RATIO: f64 = 4.0;
+
+/// Whether at some joint the `with` fit leaves less than `without` by a share of what it still leaves: `least`, and up to
+/// `loud` where that is far above the white noise. What cannot be named there could do what a small piece seems to do.
+pub fn matters(problem: &Problem, with: &Fit, without: &Fit, least: f64, loud: f64) -> bool {
+    (0..problem.joints).any(|j| {
+        let ratio = with.variance[j] / (problem.white_noise[j] * problem.white_noise[j]).max(1e-16);
+        let share = ((ratio - QUIET_RATIO) / (LOUD_RATIO - QUIET_RATIO)).clamp(0.0, 1.0);
+        let needed = least.max(least + share * (loud - least));
+        without.variance[j] - with.variance[j] >= needed * with.variance[j]
+    })
+}
+
+/// The joints at which `fit` leaves clearly more than `better`.
+pub fn worse_joints(fit: &Fit, better: &Fit) -> Vec<usize> {
+    let worse = |&j: &usize| fit.variance[j] > (1.0 + LEAST_SIZE) * better.variance[j];
+    (0..fit.variance.len()).filter(worse).collect()
+}
+
+/// Whether a curve in the joint says already what a hypothesis would: friction that is not plain, or a function of position. Beside the curve it could take any size that the curve takes back.
+pub fn is_drawn_already(fit: &Fit, hypothesis: Hypothesis) -> bool {
+    let bends = hypothesis.effect.traits.drawn_over == Some(Against::Velocity);
+    let joint = hypothesis.only_joint();
+    let draws = |active: &Active| {
+        active.curve.as_ref().is_some_and(|curve| {
+            let own = Some(curve.of_joint) == joint && active.hypothesis.only_joint() == joint;
+            let of_position = curve.against == Against::Position && !curve.by_direction;
+            own && if of_position {
+                hypothesis.is_of_position()
+            } else {
+                bends && active.is_friction_curve()
+            }
+        })
+    };
+    fit.actives.iter().any(draws)
+}

@@ -1,0 +1,119 @@
+//! Each piece of physics is taken out in turn, and every rival tried in its place.
+
+use crate::physics::active::{Hypothesis, TimeKind};
+use crate::select::evidence::LEAST_GAIN;
+use crate::select::explanation::{Explanation, describe};
+use crate::select::explanation::{Piece, pieces, place_of};
+use crate::select::propose::{Base, Proposal};
+use crate::select::search::Search;
+
+/// A rival may gain this much less to first order than what it is to replace.
+const COULD_DO_BETTER: f64 = 0.85;
+
+/// Beyond so many pieces of physics they are no longer exchanged two at a time: that grows with the square of them.
+const MOST_PAIRED: usize = 12;
+
+impl Search<'_> {
+    /// The best of the proposals that could be better than `best`, by what they gain to first order.
+    fn rival_of(
+        &self,
+        best: &Explanation,
+        without: &Explanation,
+        proposals: &[Proposal],
+    ) -> Option<Explanation> {
+        let gain = best.fit.likelihood() - without.fit.likelihood();
+        let able: Vec<Proposal> = proposals
+            .iter()
+            .filter(|p| p.gain > COULD_DO_BETTER * gain)
+            .cloned()
+            .collect();
+        self.best_of(without, &able, best.fit.likelihood())
+    }
+
+    /// Takes each piece out, all pushes together, and each two at one joint, and tries all rivals in their place: once over
+    /// all of them.
+    pub fn exchange(&self, mut best: Explanation) -> Explanation {
+        for piece in pieces(&best) {
+            let Some(index) = place_of(&best, piece) else {
+                continue;
+            };
+            let without = self.without(&best, index);
+            if let Some(better) = self.replaced(&best, &without, index) {
+                (self.say)(&format!("= {}", describe(&better)));
+                best = better;
+            }
+        }
+        // Several pushes may be one wall.
+        let once = |&i: &usize| best.fit.actives[i].hypothesis.time_kind() == TimeKind::Once;
+        let pushes: Vec<usize> = (0..best.fit.actives.len()).filter(once).collect();
+        if pushes.len() > 1 {
+            let less = |from: Explanation, index: &usize| self.without(&from, *index);
+            let without = pushes.iter().rev().fold(best.clone(), less);
+            let better = self.replaced(&best, &without, pushes[0]);
+            if let Some(better) = better.or_else(|| self.with_wall(&best, &without)) {
+                (self.say)(&format!("== {}", describe(&better)));
+                best = better;
+            }
+        }
+        let all = pieces(&best);
+        if all.len() > MOST_PAIRED {
+            return best;
+        }
+        for (i, a) in all.iter().enumerate() {
+            for b in &all[..i] {
+                let joint = |piece: &Piece| piece.0.only_joint();
+                let (Some(first), Some(second)) = (place_of(&best, *a), place_of(&best, *b)) else {
+                    continue;
+                };
+                if joint(a).is_none() || joint(a) != joint(b) {
+                    continue;
+                }
+                let (low, high) = (first.min(second), first.max(second));
+                let without = self.without(&self.without(&best, high), low);
+                if let Some(better) = self.replaced(&best, &without, low) {
+                    (self.say)(&format!("== {}", describe(&better)));
+                    best = better;
+                }
+            }
+        }
+        best
+    }
+
+    /// The better explanation that a wall makes in the place of all pushes, if it does: where it is, only a search tells, so that what
+    /// it gains at first is no measure.
+    fn with_wall(&self, best: &Explanation, without: &Explanation) -> Option<Explanation> {
+        let wall = |h: &&Hypothesis| h.effect.is_surface();
+        let hypothesis = self.hypotheses.iter().find(wall)?;
+        let base = Base::new(self.problem, &without.fit, self.hypotheses.len());
+        let proposal = base.propose_in_time(*hypothesis)?;
+        let walled = self.joined(without, &proposal, best.fit.likelihood());
+        // Pushes are evident by rows that count in full, whatever is left beside them.
+        let white = vec![1.0; self.problem.joints];
+        let is_better = |e: &Explanation| {
+            let stands = e.fit.actives.iter().any(|a| wall(&&a.hypothesis));
+            stands
+                && e.ahead_of(best, &white) > LEAST_GAIN
+                && e.ahead_of(best, &self.problem.effective_samples) > LEAST_GAIN
+        };
+        let walled = is_better(&walled).then(|| self.pruned(walled))?;
+        is_better(&walled).then_some(walled)
+    }
+
+    /// The better explanation that a rival makes in place of what `without` lacks, if one does; one of the pieces taken
+    /// out is at `index`.
+    fn replaced(
+        &self,
+        best: &Explanation,
+        without: &Explanation,
+        index: usize,
+    ) -> Option<Explanation> {
+        let effective = &self.problem.effective_samples;
+        let proposals = self.rivals(&without.fit, &best.fit, &best.fit.actives[index]);
+        let other = self.rival_of(best, without, &proposals)?;
+        if other.ahead_of(best, effective) <= LEAST_GAIN {
+            return None;
+        }
+        let other = self.pruned(other);
+        (other.ahead_of(best, effective) > LEAST_GAIN).then_some(other)
+    }
+}

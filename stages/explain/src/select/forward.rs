@@ -1,0 +1,122 @@
+//! Forward selection: one piece of physics at a time, always the one with the most evidence.
+
+use crate::data::effective_samples;
+use crate::fit::fitted::Fit;
+use crate::physics::active::{Hypothesis, TimeKind};
+use crate::select::cross_validation::carries_over;
+use crate::select::evidence::{LEAST_EVIDENCE, REFINED, matters, needs, overwhelming};
+use crate::select::explanation::{Explanation, describe};
+use crate::select::parallel;
+use crate::select::plausible::{is_timely, plausible};
+use crate::select::propose::Proposal;
+use crate::select::search::Search;
+
+/// Where much is left that no name fits, what a name must explain of it while there is more to be found.
+const LOUD_SIZE: f64 = 0.25;
+/// More pieces of physics than this are not looked for.
+const MOST_PIECES: usize = 48;
+
+impl Search<'_> {
+    /// Adds pieces of physics while there is evidence for more.
+    pub fn forward(&self, mut best: Explanation) -> Explanation {
+        let pieces = |e: &Explanation| {
+            e.fit
+                .actives
+                .iter()
+                .filter(|a| !a.hypothesis.is_torque_scale())
+                .count()
+        };
+        let all: Vec<usize> = (0..self.problem.joints).collect();
+        // What is added and taken out again would be added for ever.
+        let mut barred: Vec<Hypothesis> = Vec::new();
+        while pieces(&best) < MOST_PIECES {
+            let mut proposals = self.proposals(&best.fit, &all);
+            proposals.retain(|p| !barred.contains(&p.active.hypothesis));
+            let Some(next) = self.best_of(&best, &proposals, best.fit.likelihood()) else {
+                break;
+            };
+            (self.say)(&format!("+ {}", describe(&next)));
+            let new = next.fit.actives.last().map(|active| active.hypothesis);
+            let next = self.pruned(next);
+            let once = new.is_some_and(|new| new.time_kind() == TimeKind::Once);
+            // What lasts for a while makes noise look correlated as long as it is not explained.
+            let effective = if once {
+                effective_samples::at_least(self.problem, &next.fit.residual)
+            } else {
+                self.problem.effective_samples.clone()
+            };
+            let evident = next.ahead_of(&best, &effective) >= LEAST_EVIDENCE;
+            if !evident && (once || !overwhelming(&next, &best)) {
+                barred.extend(new);
+            } else {
+                best = next;
+            }
+        }
+        best
+    }
+
+    /// The best explanation with one of the proposals, if there is evidence enough for any, refined to be compared with a
+    /// `rival` likelihood.
+    pub fn best_of(
+        &self,
+        now: &Explanation,
+        proposals: &[Proposal],
+        rival: f64,
+    ) -> Option<Explanation> {
+        let promising = proposals.iter().filter(|p| {
+            let (evidence, size) = needs(p.active.hypothesis, &now.fit);
+            let possible =
+                is_timely(self.problem, &p.active) && plausible(&p.active, &self.problem.model);
+            p.evidence() > evidence && p.size > size && possible
+        });
+        let mut promising: Vec<&Proposal> = promising.collect();
+        // Where those with the most promise do not keep it, as beside a piece that is stuck at its joint, those elsewhere may.
+        while !promising.is_empty() {
+            let tried: Vec<&Proposal> = promising.iter().take(REFINED).copied().collect();
+            if let Some(found) = self.best_refined(now, &tried, rival) {
+                return Some(found);
+            }
+            let joints = |p: &Proposal| Fit::joints_of(&p.active.hypothesis, self.problem.joints);
+            let spent: Vec<Vec<usize>> = tried.iter().map(|p| joints(p)).collect();
+            promising.retain(|p| !spent.contains(&joints(p)));
+        }
+        None
+    }
+
+    /// The best explanation with one of these proposals, as they are once they are refined.
+    fn best_refined(
+        &self,
+        now: &Explanation,
+        promising: &[&Proposal],
+        rival: f64,
+    ) -> Option<Explanation> {
+        let effective = &self.problem.effective_samples;
+        let mut able: Vec<(Explanation, &Proposal)> = Vec::new();
+        let joined = parallel::map(promising, |proposal| self.joined(now, proposal, rival));
+        for (next, &proposal) in joined.into_iter().zip(promising) {
+            let (evidence, _) = needs(proposal.active.hypothesis, &now.fit);
+            let evident = next.ahead_of(now, effective) >= evidence || overwhelming(&next, now);
+            let once = proposal.active.hypothesis.time_kind() == TimeKind::Once;
+            if evident && (once || matters(self.problem, &next.fit, &now.fit, 0.0, LOUD_SIZE)) {
+                able.push((next, proposal));
+            }
+        }
+        able.sort_by(|(a, _), (b, _)| b.ahead_of(a, effective).total_cmp(&0.0));
+        let mut able = able.into_iter();
+        able.find(|(next, proposal)| {
+            let joints = Fit::joints_of(&proposal.active.hypothesis, self.problem.joints);
+            carries_over(self.problem, &next.fit, &now.fit, &joints)
+        })
+        .map(|(next, _)| next)
+    }
+
+    /// An explanation with a proposal, refined where it touches to be compared with a `rival` likelihood.
+    pub fn joined(&self, now: &Explanation, proposal: &Proposal, rival: f64) -> Explanation {
+        let joints = Fit::joints_of(&proposal.active.hypothesis, self.problem.joints);
+        let fit = now.fit.with(self.problem, proposal.active.clone());
+        Explanation {
+            fit: fit.refined_at(self.problem, Some(&joints), rival),
+            penalties: [&now.penalties[..], &[proposal.penalty]].concat(),
+        }
+    }
+}

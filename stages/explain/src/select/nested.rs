@@ -1,0 +1,74 @@
+//! Effects that contain a simpler one, which is said unless the other is much likelier.
+
+use crate::fit::fitted::Fit;
+use crate::physics::active::{Active, Hypothesis};
+use crate::select::evidence::{LEAST_EVIDENCE, overwhelming, tie};
+use crate::select::explanation::{Explanation, describe};
+use crate::select::explanation::{pieces, place_of};
+use crate::select::plausible::at_bound;
+use crate::select::propose::penalty;
+
+use crate::select::search::Search;
+
+impl Search<'_> {
+    /// Puts the simpler effect that a piece contains in its place, where it is not ahead by `enough` for the evidence for it
+    /// \[nats\]; more is asked of a shape that ends its range.
+    pub fn simplified(&self, mut best: Explanation, enough: impl Fn(f64) -> f64) -> Explanation {
+        for piece in pieces(&best) {
+            let Some(index) = place_of(&best, piece) else {
+                continue;
+            };
+            let less = self.without(&best, index);
+            let effective = &self.problem.effective_samples;
+            let evidence = best.ahead_of(&less, effective);
+            let enough = if at_bound(&best.fit.actives[index]) {
+                tie(evidence)
+            } else {
+                enough(evidence)
+            };
+            if let Some(simple) = self.simpler(&best, &less, index)
+                && best.ahead_of(&simple, effective) < enough
+            {
+                (self.say)(&format!("~ {}", describe(&simple)));
+                best = simple;
+            }
+        }
+        best
+    }
+
+    /// The explanation `less` with the simpler effect that the piece taken out of `best` contains, if there is evidence for it: a
+    /// friction that does not step is still friction.
+    pub fn simpler(
+        &self,
+        best: &Explanation,
+        less: &Explanation,
+        index: usize,
+    ) -> Option<Explanation> {
+        let Active {
+            hypothesis,
+            coordinates,
+            ..
+        } = &best.fit.actives[index];
+        let simple = Hypothesis {
+            effect: hypothesis.effect.simpler?.effect,
+            place: hypothesis.place,
+        };
+        let there = |a: &Active| a.hypothesis == simple;
+        if !self.hypotheses.contains(&simple) || less.fit.actives.iter().any(there) {
+            return None;
+        }
+        let joints = Fit::joints_of(&simple, self.problem.joints);
+        let library = (self.hypotheses.len() as f64).ln();
+        let penalty = penalty(&less.fit, library, 1, simple.only_joint());
+        let fit = less
+            .fit
+            .with(self.problem, simple.with(vec![coordinates[0]]));
+        let with = Explanation {
+            fit: fit.refined_at(self.problem, Some(&joints), less.fit.likelihood()),
+            penalties: [&less.penalties[..], &[penalty]].concat(),
+        };
+        let effective = &self.problem.effective_samples;
+        let evident = with.ahead_of(less, effective) >= LEAST_EVIDENCE || overwhelming(&with, less);
+        evident.then_some(with)
+    }
+}

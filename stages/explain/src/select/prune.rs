@@ -1,0 +1,121 @@
+//! Backward elimination: what is no longer needed is taken out.
+
+use crate::fit::fitted::Fit;
+use crate::physics::active::TimeKind;
+use crate::select::evidence::{
+    CURVE_EVIDENCE, CURVE_SIZE, LEAST_SIZE, matters, needs, overwhelming, wald,
+};
+use crate::select::explanation::Explanation;
+use crate::select::parallel;
+use crate::select::plausible::{is_timely, plausible};
+use crate::select::search::Search;
+
+/// Where much is left that no name fits, what a name must explain of it in the end.
+const NAMED_SIZE: f64 = 0.5;
+
+impl Search<'_> {
+    /// Takes out what is no longer needed.
+    pub fn pruned(&self, mut best: Explanation) -> Explanation {
+        'again: loop {
+            let sure = self.sure(&best.fit);
+            let doubtful =
+                |&i: &usize| !sure[i] && !best.fit.actives[i].hypothesis.is_torque_scale();
+            let doubtful: Vec<usize> = (0..sure.len()).filter(doubtful).collect();
+            for some in doubtful.chunks(parallel::threads()) {
+                let without = parallel::map(some, |&index| self.without(&best, index));
+                for (&index, less) in some.iter().zip(without) {
+                    if self.is_needed(&best, &less, index) {
+                        continue;
+                    }
+                    (self.say)(&format!(
+                        "- {}",
+                        best.fit.actives[index].hypothesis.effect.name
+                    ));
+                    best = self.simpler(&best, &less, index).unwrap_or(less);
+                    continue 'again;
+                }
+            }
+            return best;
+        }
+    }
+
+    /// Whether one of the pieces is needed, to judge by the explanation without it.
+    fn is_needed(&self, best: &Explanation, less: &Explanation, index: usize) -> bool {
+        let active = &best.fit.actives[index];
+        let (evidence, least) = if active.is_unnamed() {
+            (CURVE_EVIDENCE, CURVE_SIZE - 1.0)
+        } else {
+            needs(active.hypothesis, &best.fit)
+        };
+        let effective = &self.problem.effective_samples;
+        let strong = best.ahead_of(less, effective) >= evidence || overwhelming(best, less);
+        let matters = matters(self.problem, &best.fit, &less.fit, least, least);
+        let possible = is_timely(self.problem, active) && plausible(active, &self.problem.model);
+        possible && strong && matters
+    }
+
+    /// Which pieces are beyond doubt by their own numbers, to first order: Wald's test, with much to spare.
+    fn sure(&self, fit: &Fit) -> Vec<bool> {
+        let wald = wald(self.problem, fit);
+        let effective = &self.problem.effective_samples;
+        let each = fit.actives.iter().zip(wald);
+        each.map(|(active, chi_square)| {
+            let joints = Fit::joints_of(&active.hypothesis, self.problem.joints);
+            let rows: f64 = joints.iter().map(|&j| fit.count[j]).sum();
+            let effective = joints.iter().map(|&j| effective[j]).fold(1.0, f64::min);
+            let (evidence, size) = needs(active.hypothesis, fit);
+            is_timely(self.problem, active)
+                && plausible(active, &self.problem.model)
+                && !active.is_unnamed()
+                && 0.5 * effective * chi_square > 4.0 * evidence + 60.0
+                && chi_square > 4.0 * size * rows
+        })
+        .collect()
+    }
+
+    /// The explanation without one of its pieces, refined.
+    pub fn without(&self, from: &Explanation, index: usize) -> Explanation {
+        let mut penalties = from.penalties.clone();
+        penalties.remove(index);
+        let joints = Fit::joints_of(&from.fit.actives[index].hypothesis, self.problem.joints);
+        Explanation {
+            fit: from.fit.without(self.problem, index).refined_at(
+                self.problem,
+                Some(&joints),
+                from.fit.likelihood(),
+            ),
+            penalties,
+        }
+    }
+
+    /// Takes out the names that explain less than half of what is left where they are and that is far above the noise: there
+    /// something is that no name fits, and it could be what they seem to be. The smallest go first.
+    pub fn without_small(&self, mut best: Explanation) -> Explanation {
+        loop {
+            let names: Vec<usize> = (0..best.fit.actives.len())
+                .filter(|&i| {
+                    let active = &best.fit.actives[i];
+                    let once = active.hypothesis.time_kind() == TimeKind::Once;
+                    !active.is_unnamed() && !once && !active.hypothesis.is_torque_scale()
+                })
+                .collect();
+            let without = parallel::map(&names, |&i| self.without(&best, i));
+            let size = |less: &Explanation| {
+                let each = less.fit.variance.iter().zip(&best.fit.variance);
+                each.map(|(less, best)| less / best).fold(0.0, f64::max)
+            };
+            let small = names.iter().zip(without).filter(|(_, less)| {
+                !matters(self.problem, &best.fit, &less.fit, LEAST_SIZE, NAMED_SIZE)
+            });
+            let Some((&index, less)) = small.min_by(|(_, a), (_, b)| size(a).total_cmp(&size(b)))
+            else {
+                return best;
+            };
+            (self.say)(&format!(
+                "- {}",
+                best.fit.actives[index].hypothesis.effect.name
+            ));
+            best = less;
+        }
+    }
+}

@@ -1,0 +1,253 @@
+//! Effects in time: a change point, an interval within every recording, an interval in one of them. Found by
+//! scanning all of them with running sums, then tried exactly.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+use tauscope_dynamics::terms::CoordinateKind;
+
+use crate::data::column::Column;
+use crate::physics::active::Hypothesis;
+use crate::physics::active::TimeKind;
+use crate::select::propose::{Base, Proposal, best_of};
+
+/// Shortest interval that is looked for \[s\].
+const SHORTEST_S: f64 = 0.35;
+/// How many of the best intervals are tried exactly.
+const TRIED: usize = 4;
+/// A change needs so many rows on either side of it.
+const LEAST_ROWS: usize = 8;
+/// Steps per recording that change points and intervals are looked for on, at most.
+const STEPS: usize = 100;
+/// Factors beyond these are left out of the scan: inertias hardly show in it.
+const SCANNED_FACTORS: usize = 4;
+
+impl Base<'_> {
+    /// The best of a hypothesis whose effect has a time.
+    pub fn propose_in_time(&self, hypothesis: Hypothesis) -> Option<Proposal> {
+        match hypothesis.time_kind() {
+            TimeKind::Always if hypothesis.effect.is_surface() => self.propose_wall(hypothesis),
+            TimeKind::Always => self.propose(hypothesis),
+            TimeKind::Step => self.propose_step(hypothesis),
+            TimeKind::EveryRecording => self.propose_interval(hypothesis, None),
+            TimeKind::Once => (0..self.problem.tracks.len())
+                .filter_map(|track| self.propose_interval(hypothesis, Some(track)))
+                .max_by(|a, b| a.evidence().total_cmp(&b.evidence())),
+        }
+    }
+
+    /// A factor before and another after the change.
+    fn propose_step(&self, hypothesis: Hypothesis) -> Option<Proposal> {
+        let problem = self.problem;
+        let mut shape = vec![0.0; hypothesis.effect.coordinates.len()];
+        let time = time_index(hypothesis)?;
+        shape[time] = f64::NEG_INFINITY;
+        let all = self.fit.columns(problem, hypothesis, &shape);
+        // With the change before everything, the second factor's column is the whole effect.
+        let whole = all.factors.last()?;
+        let joint = hypothesis.only_joint()?;
+        let split = |first: usize| {
+            let (mut before, mut after) = (Column::clone(whole), Column::clone(whole));
+            // Of each joint that the column goes over.
+            for block in before.values.chunks_mut(problem.rows) {
+                block[first..].fill(0.0);
+            }
+            for block in after.values.chunks_mut(problem.rows) {
+                block[..first].fill(0.0);
+            }
+            [before, after]
+        };
+        let weight = &problem.weight[problem.joint_rows(joint)];
+        let own = whole.of_joint(joint, problem.rows)?;
+        let moves = |(value, weight): (&f64, &f64)| *value != 0.0 && *weight > 0.0;
+        let rows: Vec<usize> = (0..problem.rows)
+            .filter(|&row| moves((&own[row], &weight[row])))
+            .collect();
+        let mut times = Vec::new();
+        for track in &problem.tracks {
+            let own = track.rows();
+            let stride = (own.len() / STEPS).max(1);
+            for first in own.clone().step_by(stride) {
+                let before = rows.partition_point(|row| *row < first);
+                if before >= LEAST_ROWS && rows.len() - before >= LEAST_ROWS {
+                    let at = track.compared[first - own.start];
+                    times.push((first, track.track.session_s + track.track.time_s[at]));
+                }
+            }
+        }
+        let scores = times
+            .iter()
+            .map(|&(first, _)| self.first_order_score(hypothesis, None, &split(first)));
+        let (best, _) = best_of(scores)?;
+        let (first, time_s) = times[best];
+        shape[time] = time_s;
+        let mut proposal = self.propose_columns(hypothesis, &shape, None, &split(first))?;
+        // One of as many times as were tried.
+        proposal.penalty += (STEPS as f64).ln();
+        Some(proposal)
+    }
+
+    /// Factors within an interval, of one track or of all.
+    fn propose_interval(&self, hypothesis: Hypothesis, only: Option<usize>) -> Option<Proposal> {
+        let problem = self.problem;
+        let times = time_indices(hypothesis);
+        let [start, end] = times[..] else { return None };
+        let mut shape = vec![0.0; hypothesis.effect.coordinates.len()];
+        (shape[start], shape[end]) = (f64::NEG_INFINITY, f64::INFINITY);
+        let all = self.fit.columns(problem, hypothesis, &shape);
+        let all = &all.factors;
+        let scanned = &all[..all.len().min(SCANNED_FACTORS)];
+        let intervals = self.scan(scanned, only);
+        let scores = intervals.iter().map(|&interval| {
+            let masked = self.all_within(all, interval, only);
+            self.first_order_score(hypothesis, None, &masked)
+        });
+        let (best, _) = best_of(scores)?;
+        self.propose_within(hypothesis, intervals[best], only)
+    }
+
+    /// Factors within an interval of recording time \[s\], of one track or of all.
+    pub fn propose_within(
+        &self,
+        hypothesis: Hypothesis,
+        (from_s, to_s): (f64, f64),
+        only: Option<usize>,
+    ) -> Option<Proposal> {
+        let times = time_indices(hypothesis);
+        let [start, end] = times[..] else { return None };
+        let mut shape = vec![0.0; hypothesis.effect.coordinates.len()];
+        (shape[start], shape[end]) = (f64::NEG_INFINITY, f64::INFINITY);
+        let all = self.fit.columns(self.problem, hypothesis, &shape);
+        let masked = self.all_within(&all.factors, (from_s, to_s), only);
+        let session_s = only.map_or(0.0, |track| self.problem.tracks[track].track.session_s);
+        (shape[start], shape[end]) = (session_s + from_s, session_s + to_s);
+        let mut proposal = self.propose_columns(hypothesis, &shape, None, &masked)?;
+        // One of as many beginnings and ends as there are.
+        proposal.penalty += 2.0 * (STEPS as f64).ln();
+        Some(proposal)
+    }
+
+    fn all_within(
+        &self,
+        columns: &[Arc<Column>],
+        (from_s, to_s): (f64, f64),
+        only: Option<usize>,
+    ) -> Vec<Column> {
+        let within = |column: &Arc<Column>| self.within(column, from_s, to_s, only);
+        columns.iter().map(within).collect()
+    }
+
+    /// A column with what lies outside an interval of recording time \[s\] set to zero.
+    fn within(&self, column: &Column, from_s: f64, to_s: f64, only: Option<usize>) -> Column {
+        let problem = self.problem;
+        let mut masked = column.clone();
+        let blocks = if column.joint.is_some() {
+            1
+        } else {
+            problem.joints
+        };
+        for (r, track) in problem.tracks.iter().enumerate() {
+            for (row, &k) in track.rows().zip(&track.compared) {
+                let t = track.track.time_s[k];
+                if only.is_some_and(|only| only != r) || t < from_s || t >= to_s {
+                    for j in 0..blocks {
+                        masked.values[j * problem.rows + row] = 0.0;
+                    }
+                }
+            }
+        }
+        masked
+    }
+
+    /// The most promising intervals \[s of recording time\], what the fit already holds left out of account.
+    fn scan(&self, columns: &[Arc<Column>], only: Option<usize>) -> Vec<(f64, f64)> {
+        let problem = self.problem;
+        let q = columns.len();
+        let tracks: Vec<usize> = match only {
+            Some(track) => vec![track],
+            None => (0..problem.tracks.len()).collect(),
+        };
+        let duration = tracks
+            .iter()
+            .filter_map(|&r| problem.tracks[r].track.time_s.last().copied())
+            .fold(0.0, f64::max);
+        let bin_s = (duration / STEPS as f64).max(0.05);
+        let bins = (duration / bin_s).ceil() as usize + 1;
+        let mut gram = vec![DMatrix::<f64>::zeros(q, q); bins + 1];
+        let mut right = vec![DVector::<f64>::zeros(q); bins + 1];
+        for &r in &tracks {
+            let track = &problem.tracks[r];
+            for (row, &k) in track.rows().zip(&track.compared) {
+                let bin = (track.track.time_s[k] / bin_s) as usize + 1;
+                for j in 0..problem.joints {
+                    let at = j * problem.rows + row;
+                    let weight = problem.weight[at] / self.fit.variance[j];
+                    if weight == 0.0 {
+                        continue;
+                    }
+                    let value = |c: &Arc<Column>| {
+                        c.of_joint(j, problem.rows)
+                            .map_or(0.0, |values| values[row])
+                    };
+                    let x: DVector<f64> = DVector::from_iterator(q, columns.iter().map(value));
+                    gram[bin].ger(weight, &x, &x, 1.0);
+                    right[bin].axpy(weight * self.fit.residual[at], &x, 1.0);
+                }
+            }
+        }
+        for bin in 1..=bins {
+            let (before, here) = gram.split_at_mut(bin);
+            here[0] += &before[bin - 1];
+            let (before, here) = right.split_at_mut(bin);
+            here[0] += &before[bin - 1];
+        }
+        let shortest = (SHORTEST_S / bin_s).ceil() as usize;
+        let mut found: Vec<(f64, usize, usize)> = Vec::new();
+        for from in 0..bins {
+            for to in (from + shortest.max(1))..=bins {
+                let mut normal = &gram[to] - &gram[from];
+                let rhs = &right[to] - &right[from];
+                let trace = normal.trace();
+                for a in 0..q {
+                    normal[(a, a)] += 1e-9 * trace + 1e-12;
+                }
+                if let Some(factor) = normal.cholesky() {
+                    found.push((rhs.dot(&factor.solve(&rhs)), from, to));
+                }
+            }
+        }
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        // Not several of the same.
+        let mut kept: Vec<(usize, usize)> = Vec::new();
+        for (_, from, to) in found {
+            let near = |&(a, b): &(usize, usize)| a.abs_diff(from) + b.abs_diff(to) <= 4;
+            if !kept.iter().any(near) {
+                kept.push((from, to));
+            }
+            if kept.len() == TRIED {
+                break;
+            }
+        }
+        kept.iter()
+            .map(|&(from, to)| (from as f64 * bin_s, to as f64 * bin_s))
+            .collect()
+    }
+}
+
+fn time_indices(hypothesis: Hypothesis) -> Vec<usize> {
+    let is_time = |kind| {
+        matches!(
+            kind,
+            CoordinateKind::RecordingTime | CoordinateKind::SessionTime
+        )
+    };
+    let coordinates = hypothesis.effect.coordinates.iter().enumerate();
+    coordinates
+        .filter(|(_, c)| is_time(c.kind))
+        .map(|(i, _)| i)
+        .collect()
+}
+
+fn time_index(hypothesis: Hypothesis) -> Option<usize> {
+    time_indices(hypothesis).first().copied()
+}

@@ -1,0 +1,159 @@
+//! A stage that watches a twin's residual and speaks up when it changes character: what changed, since when,
+//! at which joint or link, by how much, and whether it was a contact or a change of the arm.
+//!
+//! The residual is regressed, joint by joint, on what friction, a gain, a bias and the load would add to it.
+//! How it is as a rule is learned from the stream's own motion (the *reference*), and so is how far half
+//! seconds and longer windows stray from that rule by chance; a twin with standing errors, friction that
+//! warms up and coloured noise therefore say nothing. A change is what the newest seconds of motion show
+//! beside the reference, far beyond what is usual, in every part of the time since it began; a contact is
+//! what is over within seconds. Standstill is passed over: friction at rest has any value within its limits.
+//!
+//! Memory is fixed and nothing is allocated once the stage is made; time is taken from the samples.
+
+mod blocks;
+mod config;
+mod finding;
+mod judge;
+mod messages;
+mod moments;
+mod monitor;
+mod rows;
+mod scale;
+#[cfg(test)]
+mod tests;
+mod touch;
+mod usual;
+mod window;
+
+use tauscope_bus::{Detection, Emit, Name, Stage, StageError, TwinState, flags};
+use tauscope_dynamics::Model;
+
+pub use config::Config;
+pub use finding::{Cause, Finding};
+pub use messages::{amount, in_words};
+
+use monitor::{Monitor, News};
+use rows::Rows;
+
+/// The stage's canonical name in archives, where detectors have theirs.
+pub const NAME: &str = "residual_watch";
+
+/// What the stage must know of its cell and its twin.
+#[derive(Debug, Clone)]
+pub struct Setup {
+    /// The robot; without it payloads and links are not told.
+    pub model: Option<Model>,
+    /// By joint in URDF order, how much the measured effort changes by 1 N m at the joint \[effort unit per
+    /// N m\]; NaN where that is not known, and the joint tells nothing of a payload.
+    pub effort_per_nm: Vec<f64>,
+    /// The twin's low-pass on efforts \[Hz\].
+    pub effort_cutoff_hz: f64,
+}
+
+/// The watching stage: twin states in, a detection for each out.
+#[derive(Debug)]
+pub struct Watch {
+    name: Name,
+    rows: Rows,
+    monitor: Monitor,
+    /// Names of the links: of the tool, and by joint of the link that it moves.
+    tool: Name,
+    links: Vec<Name>,
+    /// The change that was told and is being learned.
+    changed: Option<Finding>,
+    /// A contact was told with the sample before.
+    ends: bool,
+}
+
+impl Watch {
+    /// A watch over a twin.
+    pub fn new(config: &Config, setup: &Setup) -> Self {
+        let model = setup.model.as_ref();
+        let name = |model: &Model, link: usize| Name::new(&model.links()[link].name);
+        let links = model.map_or_else(Vec::new, |model| {
+            let children = model.joints().iter().map(|joint| joint.child_link);
+            children.map(|link| name(model, link)).collect()
+        });
+        Self {
+            name: Name::new(NAME),
+            rows: Rows::new(setup),
+            monitor: Monitor::new(setup.effort_per_nm.len(), config.learn_s, config.caution),
+            tool: model.map_or_else(Name::default, |model| name(model, model.tool_link())),
+            links,
+            changed: None,
+            ends: false,
+        }
+    }
+
+    /// Where it is, in words of the robot.
+    fn link(&self, finding: &Finding) -> Name {
+        match finding.cause {
+            Cause::Payload => self.tool,
+            _ => (finding.link.and_then(|link| self.links.get(link)))
+                .copied()
+                .unwrap_or_default(),
+        }
+    }
+}
+
+impl Stage<TwinState, Detection> for Watch {
+    fn accept(
+        &mut self,
+        sample: &TwinState,
+        out: &mut dyn Emit<Detection>,
+    ) -> Result<(), StageError> {
+        let news = self
+            .rows
+            .take(sample)
+            .and_then(|row| self.monitor.take(row));
+        let mut event = 0;
+        let mut told = self.changed;
+        if self.ends {
+            self.ends = false;
+            event = Detection::OFFSET;
+        }
+        match news {
+            Some(News::Found(finding)) => {
+                event = Detection::ONSET;
+                told = Some(finding);
+                if finding.cause == Cause::Contact {
+                    self.ends = true;
+                } else {
+                    self.changed = told;
+                }
+            }
+            Some(News::Learned) => {
+                event = Detection::OFFSET;
+                told = None;
+                self.changed = None;
+            }
+            None => {}
+        }
+        let watches = self.monitor.watches();
+        out.emit(&mut |slot| {
+            slot.header = sample.header;
+            slot.header.flags = sample.header.flags & flags::RESET;
+            if watches {
+                slot.header.flags |= flags::READY;
+            }
+            slot.detector = self.name;
+            slot.event = event;
+            slot.score = self.monitor.score();
+            slot.threshold = 1.0;
+            slot.state = Name::new(match &told {
+                Some(finding) => finding.cause.name(),
+                None if watches => "free",
+                None => "not_ready",
+            });
+            if let Some(finding) = &told {
+                slot.header.flags |= flags::ALARM;
+                finding.tell(slot);
+                slot.link = self.link(finding);
+                if finding.cause != Cause::Contact {
+                    slot.header.flags |= flags::CHANGE;
+                }
+            }
+        })?;
+        Ok(())
+    }
+}
