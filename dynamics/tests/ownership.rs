@@ -24,7 +24,7 @@ fn sources(folder: &Path, into: &mut Vec<PathBuf>) {
     }
 }
 
-/// The lines of a file up to its tests.
+/// The lines of a file up to its tests, comments left out.
 fn code(text: &str) -> impl Iterator<Item = &str> {
     let tests = text
         .match_indices("#[cfg(test)]")
@@ -34,7 +34,8 @@ fn code(text: &str) -> impl Iterator<Item = &str> {
             rest.find(|line| !line.starts_with("#["))
                 .is_some_and(|line| line.contains("mod ") && line.ends_with('{'))
         });
-    text[..tests.unwrap_or(text.len())].lines()
+    let lines = text[..tests.unwrap_or(text.len())].lines();
+    lines.filter(|line| !line.trim_start().starts_with("//"))
 }
 
 #[test]

@@ -144,7 +144,7 @@ impl Hypothesis {
 
     /// Whether it multiplies all effort of a joint.
     pub fn is_gain(&self) -> bool {
-        self.effect.name == "torque_gain"
+        self.effect.traits.is_scale
     }
 
     /// How it depends on time.
