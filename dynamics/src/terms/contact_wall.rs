@@ -24,7 +24,8 @@ pub(super) static EFFECT: Effect = Effect {
         Coordinate::positive_factor("stiffness_n_per_m"),
         Coordinate::shape("azimuth_rad", -PI, PI, 12, Scale::Linear),
         Coordinate::shape("elevation_rad", -FRAC_PI_2, FRAC_PI_2, 7, Scale::Linear),
-        Coordinate::shape("offset_m", -1.5, 1.5, 25, Scale::Linear),
+        // Farther than any arm on a fixed base reaches.
+        Coordinate::shape("offset_m", -10.0, 10.0, 25, Scale::Linear),
     ],
     to_parameters: |c| {
         let normal = normal(c[1], c[2]);

@@ -5,25 +5,28 @@ use tauscope_dynamics::{Limits, Model};
 
 use crate::data::problem::Problem;
 use crate::physics::active::{Active, TimeKind};
+use crate::physics::kinematic_tree::{extent_m, moving_link, reach_m};
 
 /// Friction that changes, once or as the joint warms up, leaves at least this share of what it was: none comes from nothing or
 /// goes for good.
 const LEAST_LEFT: f64 = 0.1;
 /// What lasts for an interval of one recording lasts at most for this share of it; what lasts longer is not told from an offset.
 const LONGEST_SHARE: f64 = 0.75;
-/// Friction of one direction is at least this share of the other's; what looks more lopsided is friction and an offset.
+/// Friction of one direction is at least this share of the other's; what looks more lopsided is friction and an offset. In
+/// motion the two are the same: a forward and b backward are friction of (a + b)/2 and an offset of (a - b)/2. The share
+/// says which of two equal descriptions is named: at 0.2 the offset is two thirds of the friction. A convention.
 const LEAST_SYMMETRY: f64 = 0.2;
 /// Friction that falls with speed keeps at least this share of what it is when a joint breaks away: none falls to nothing.
 const LEAST_SLIDING: f64 = 0.2;
-/// A link's centre of mass is not off by more than this many times its radius of gyration, or by this \[m\] if that is more.
-const MOST_GYRATIONS: f64 = 1.0;
-const FAR_OFF_M: f64 = 0.1;
+/// A link's centre of mass stays within the link. Physical: a uniform rod ends the root of 3 radii of gyration from its
+/// centre (its moment of inertia is m l²/12), a plumper body nearer; a link that reaches farther to one of its frames is
+/// at least as long as that.
+const MOST_GYRATIONS: f64 = 1.732;
 /// What is behind a gear comes back after a revolution: slower waves are whole numbers of cycles in it, within what is known of them.
 const MOST_WHOLE_CYCLES: f64 = 30.0;
 const NEARLY_WHOLE: f64 = 0.15;
-/// A wall gives way by no more than this, and is within reach: what is softer or farther is a force that is always there.
+/// A wall is at least so stiff: what is softer is a force that is always there. (It must also be within the arm's reach.)
 const SOFTEST_WALL_N_PER_M: f64 = 5.0;
-const FARTHEST_WALL_M: f64 = 1.49;
 /// A spring hangs loose within the range of its joint or this many times its width beside it: farther off it is a constant effort. Where the
 /// URDF knows no range it is taken to be a turn either way.
 const LOOSE_BESIDE: f64 = 1.0;
@@ -113,9 +116,13 @@ pub fn plausible(active: &Active, model: &Model) -> bool {
                 .map(|d| d * d)
                 .sum::<f64>()
                 .sqrt();
-            shift_m < FAR_OFF_M.max(MOST_GYRATIONS * link.gyration_radius_m())
+            let extent_m = extent_m(model, active.hypothesis.place.link);
+            shift_m < extent_m.max(MOST_GYRATIONS * link.gyration_radius_m())
         }
-        "contact_wall" => x[0] >= SOFTEST_WALL_N_PER_M && x[3].abs() < FARTHEST_WALL_M,
+        "contact_wall" => {
+            let link = moving_link(model, active.hypothesis.place.link);
+            x[0] >= SOFTEST_WALL_N_PER_M && x[3].abs() < reach_m(model, link)
+        }
         "external_push" => x[..3].iter().map(|f| f * f).sum::<f64>().sqrt() < STRONGEST_N,
         "cable_spring" => {
             let joint = &model.joints()[active.hypothesis.place.joint];

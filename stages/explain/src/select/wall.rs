@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use tauscope_dynamics::{Data, forward_kinematics, link_jacobian, link_pose};
 
 use crate::physics::active::Hypothesis;
+use crate::physics::kinematic_tree::moving_link;
 use crate::select::propose::{Base, Proposal};
 
 /// A sample belongs to a contact if a force there gains this much of the sum of squares over the variance.
@@ -32,7 +33,8 @@ impl Base<'_> {
 
     /// The gain and the shape of the best wall, from forces that are evident beside these variances of the joints.
     fn wall_of(&self, hypothesis: Hypothesis, variance: &[f64]) -> Option<(f64, [f64; 4])> {
-        let contacts = self.contacts(variance);
+        let link = moving_link(&self.problem.model, hypothesis.place.link);
+        let contacts = self.contacts(link, variance);
         if contacts.len() < LEAST_SAMPLES {
             return None;
         }
@@ -67,14 +69,10 @@ impl Base<'_> {
         best
     }
 
-    /// Samples at which a force on the last moving link is evident: where its frame is, and the force \[N\].
-    fn contacts(&self, variance: &[f64]) -> Vec<(Point3<f64>, Vector3<f64>)> {
+    /// Samples at which a force on a link is evident: where its frame is, and the force \[N\].
+    fn contacts(&self, link: usize, variance: &[f64]) -> Vec<(Point3<f64>, Vector3<f64>)> {
         let problem = self.problem;
         let n = problem.joints;
-        let Some(last) = problem.model.joints().last() else {
-            return Vec::new();
-        };
-        let link = last.child_link;
         let mut data = Data::new(&problem.model);
         let mut found = Vec::new();
         for track in &problem.tracks {
