@@ -103,3 +103,98 @@ impl Base<'_> {
         found
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use tauscope_dynamics::Model;
+    use tauscope_dynamics::terms::effect;
+
+    use crate::fit::fitted::Fit;
+    use crate::fixture::{URDF, problem, recording};
+    use crate::physics::active::{Hypothesis, Whereabouts};
+    use crate::physics::kinematic_tree::{bearing, moving_link, reach_m};
+    use crate::select::plausible::plausible;
+    use crate::select::propose::Base;
+
+    /// A floor at 0.5 m that the end of the arm is pressed on, and the wall that is found: stiffness \[N/m\], offset \[m\].
+    fn found(urdf: &str) -> (f64, f64) {
+        let model = Model::from_urdf(urdf).unwrap();
+        let place = Whereabouts {
+            link: model.link_index("lower").unwrap(),
+            ..Whereabouts::default()
+        };
+        let wall = Hypothesis {
+            effect: effect("contact_wall").unwrap(),
+            place,
+        };
+        let truth = wall.with((wall.effect.to_coordinates)(&[
+            800.0, 0.0, 0.0, -1.0, -0.62,
+        ]));
+        let mut term = truth.term(&model);
+        let zero = vec![0.0; model.dof()];
+        let press = |q: &[f64], qd: &[f64], effort: &mut [f64]| {
+            let at = tauscope_dynamics::terms::MotionSample {
+                dt_s: 0.01,
+                recording_s: 0.0,
+                session_s: 0.0,
+                position: q,
+                velocity: qd,
+                acceleration: &zero,
+                transmitted: &zero,
+            };
+            term.act(&at, effort);
+        };
+        let data = problem(&model, &[recording(&model, 3, press)]);
+        let nothing = Fit::new(&data, Vec::new());
+        let base = Base::new(&data, &nothing, 40);
+        let proposal = base.propose_wall(wall).unwrap();
+        assert!(plausible(&proposal.active, &model));
+        let parameters =
+            nothing.with(&data, proposal.active).refined(&data).actives[0].parameters();
+        (parameters[0], parameters[4])
+    }
+
+    /// The same robot, its joints named in another order, and with two sliding fingers on its last link.
+    fn shuffled_with_a_gripper() -> String {
+        let start = URDF.find("  <joint name=\"shoulder\"").unwrap();
+        let middle = URDF.find("  <joint name=\"elbow\"").unwrap();
+        let end = URDF.find("</robot>").unwrap();
+        let finger = |name: &str, y: f64| {
+            format!(
+                r#"<link name="{name}_pad"/><joint name="{name}" type="prismatic"><parent link="lower"/><child link="{name}_pad"/>
+                <origin xyz="0 {y} 0.3"/><axis xyz="0 1 0"/><limit lower="0" upper="0.04" velocity="1" effort="20"/></joint>"#
+            )
+        };
+        [
+            &URDF[..start],
+            &finger("left", 0.02),
+            &URDF[middle..end],
+            &URDF[start..middle],
+            &finger("right", -0.02),
+            "</robot>",
+        ]
+        .concat()
+    }
+
+    #[test]
+    fn the_order_of_joints_in_the_urdf_and_a_gripper_change_nothing() {
+        let ((stiffness, offset), (other_stiffness, other_offset)) =
+            (found(URDF), found(&shuffled_with_a_gripper()));
+        assert!((stiffness / 800.0 - 1.0).abs() < 0.1, "{stiffness} N/m");
+        assert!((offset + 0.62).abs() < 0.02, "{offset} m");
+        assert!((stiffness / other_stiffness - 1.0).abs() < 1e-3);
+        assert!((offset - other_offset).abs() < 1e-3);
+        let names = |urdf: &str| {
+            let model = Model::from_urdf(urdf).unwrap();
+            let link = model.link_index("lower").unwrap();
+            let joints = bearing(&model, link).into_iter();
+            let mut names: Vec<String> = joints
+                .map(|joint| model.joints()[joint].name.clone())
+                .collect();
+            names.sort();
+            let reach_mm = (1e3 * reach_m(&model, link)).round() as i64;
+            (names, reach_mm, moving_link(&model, link) == link)
+        };
+        assert_eq!(names(URDF), names(&shuffled_with_a_gripper()));
+    }
+}
