@@ -1,6 +1,7 @@
 //! From the winning explanation to what is said: findings with intervals, rivals, what could have hidden.
 
 mod clipping;
+mod confidence;
 mod contest;
 mod doubt;
 mod scales;
@@ -24,6 +25,7 @@ use crate::select::explanation::Explanation;
 use crate::select::search::Search;
 
 use clipping::is_clipped;
+use confidence::{Grounds, confidence};
 use contest::contest;
 pub use doubt::doubt_patches;
 use scales::{Scales, StartScales};
@@ -160,7 +162,7 @@ pub fn of(
             parameters,
             intervals_95: intervals,
             in_amperes,
-            confidence: confidence(evidence, contest.margin),
+            confidence: confidence(Grounds::of(fit, &less.fit, active, evidence)),
             recording: when.recording,
             t_start: when.start,
             t_end: when.end,
@@ -203,7 +205,7 @@ fn numbers(
         let source = joints[active.hypothesis.place.source].clone();
         parameters.insert("source_joint".to_owned(), Value::from(source));
     }
-    if effect.name == "torque_saturation" && is_clipped(problem, fit, active) {
+    if effect.traits.cuts_off && is_clipped(problem, fit, active) {
         parameters.insert("mode".to_owned(), Value::from("sensor"));
     }
     describe_curve(active, &mut parameters);
@@ -264,12 +266,6 @@ fn mismatch(without: &Fit, with: &Fit, count: &Fit) -> f64 {
         })
         .sum::<f64>()
         .max(1e-12)
-}
-
-/// From the evidence against leaving it out and against the best rival \[nats\].
-fn confidence(evidence: f64, margin: f64) -> f64 {
-    let odds = |nats: f64| 1.0 / (1.0 + (-nats / 4.0).exp());
-    (odds(evidence) * odds(margin)).clamp(0.5, 0.999)
 }
 
 struct When {

@@ -2,7 +2,6 @@
 
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis, TimeKind};
-use crate::physics::kinematic_tree::bearing;
 use crate::select::cross_validation::{carries_over, left_elsewhere};
 use crate::select::curve_shapes;
 use crate::select::evidence::{CURVE_EVIDENCE, CURVE_SIZE, is_drawn_already};
@@ -11,6 +10,7 @@ use crate::select::explanation::Explanation;
 use crate::select::plausible::is_open_wave;
 use crate::select::propose::Base;
 use crate::select::search::Search;
+use tauscope_dynamics::kinematic_tree::bearing;
 
 /// A curve is not looked for at a joint whose variance is below this many times its white noise.
 const CURVE_EXCESS: f64 = 1.6;

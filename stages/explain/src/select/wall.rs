@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use tauscope_dynamics::{Data, forward_kinematics, link_jacobian, link_pose};
 
 use crate::physics::active::Hypothesis;
-use crate::physics::kinematic_tree::moving_link;
 use crate::select::propose::{Base, Proposal};
+use tauscope_dynamics::kinematic_tree::moving_link;
 
 /// A sample belongs to a contact if a force there gains this much of the sum of squares over the variance.
 const EVIDENT: f64 = 30.0;
@@ -112,9 +112,9 @@ mod tests {
     use crate::fit::fitted::Fit;
     use crate::fixture::{URDF, problem, recording};
     use crate::physics::active::{Hypothesis, Whereabouts};
-    use crate::physics::kinematic_tree::{bearing, moving_link, reach_m};
     use crate::select::plausible::plausible;
     use crate::select::propose::Base;
+    use tauscope_dynamics::kinematic_tree::{bearing, moving_link, reach_m};
 
     /// A floor at 0.5 m that the end of the arm is pressed on, and the wall that is found: stiffness \[N/m\], offset \[m\].
     fn found(urdf: &str) -> (f64, f64) {

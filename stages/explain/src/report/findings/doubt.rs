@@ -7,12 +7,12 @@ use tauscope_dynamics::terms::{Against, PlaceKind};
 
 use crate::data::problem::Problem;
 use crate::physics::active::{Active, Hypothesis, TimeKind};
-use crate::physics::kinematic_tree::bearing;
 use crate::report::schema::Finding;
+use tauscope_dynamics::kinematic_tree::bearing;
 
 use super::Named;
 
-/// What is doubted is as likely as not.
+/// What is doubted is as likely as not, at most.
 const DOUBTED: f64 = 0.5;
 /// What explains less than this share of what the largest finding does may patch it.
 const PATCH: f64 = 0.02;
@@ -21,12 +21,16 @@ const SAME_TIME_S: f64 = 0.3;
 /// In at least so many recordings.
 const TOO_OFTEN: usize = 3;
 
+fn doubt_it(finding: &mut Finding) {
+    finding.confidence = finding.confidence.min(DOUBTED);
+}
+
 /// Doubts what is said of the physics that was found, and says why.
 pub fn doubt(named: &mut Named, problem: &Problem, actives: &[Active]) {
     let said = actives.iter().filter(|a| !a.hypothesis.is_torque_scale());
     for (finding, active) in named.findings.iter_mut().zip(said) {
         if is_shadowed(&problem.model, actives, active.hypothesis) {
-            finding.confidence = DOUBTED;
+            doubt_it(finding);
         }
     }
     let pushed = doubt_pushes(&mut named.findings, problem.tracks.len());
@@ -39,15 +43,14 @@ pub fn doubt_patches(findings: &mut [Finding]) {
     let largest = findings.iter().map(|f| f.explains).fold(0.0, f64::max);
     let small = |finding: &&mut Finding| finding.explains < PATCH * largest;
     for finding in findings.iter_mut().filter(small) {
-        finding.confidence = DOUBTED;
+        doubt_it(finding);
     }
 }
 
 /// Whether a body, or how gravity acts on it, is named beside a curve that a joint which carries it has without a name: what weighs
 /// there weighs here too, and the name could be part of it.
 fn is_shadowed(model: &Model, actives: &[Active], hypothesis: Hypothesis) -> bool {
-    let lasts =
-        hypothesis.time_kind() == TimeKind::Always && hypothesis.effect.name != "contact_wall";
+    let lasts = hypothesis.time_kind() == TimeKind::Always && hypothesis.lasts();
     let carriers = match hypothesis.effect.place {
         PlaceKind::Link | PlaceKind::Tool if lasts => bearing(model, hypothesis.place.link),
         PlaceKind::Base => (0..model.dof()).collect(),
@@ -99,7 +102,7 @@ fn doubt_pushes(findings: &mut [Finding], recordings: usize) -> Vec<String> {
              carried or pressed on, and is no push from outside. What it does in other recordings is not predicted."
         ));
         for i in same {
-            findings[i].confidence = DOUBTED;
+            doubt_it(&mut findings[i]);
         }
     }
     notes

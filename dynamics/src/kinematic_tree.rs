@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use tauscope_dynamics::{Data, JointKind, Model, forward_kinematics, link_pose};
+use crate::{Data, JointKind, Model, forward_kinematics, link_pose};
 
 /// The joints that carry a link.
 pub fn bearing(model: &Model, link: usize) -> BTreeSet<usize> {
@@ -56,7 +56,10 @@ pub fn extent_m(model: &Model, link: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::body_prior::tests::model;
+
+    fn model() -> Model {
+        Model::from_urdf(include_str!("../../tests/data/demo_arm.urdf")).unwrap()
+    }
 
     #[test]
     fn no_pose_brings_the_tool_beyond_its_reach_and_a_stretched_chain_comes_near() {
