@@ -41,6 +41,7 @@ mod data;
 pub mod derivative;
 mod inertia;
 mod inertial_effort;
+pub mod kinematic_tree;
 mod kinematics;
 pub mod lowpass;
 mod model;

@@ -9,13 +9,14 @@ use super::{
     Coordinate, Draw, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind,
     Scale, Simulated, Site, Term, Traits, Words,
 };
+use crate::kinematic_tree::{moving_link, reach_m};
 use crate::{Data, forward_kinematics, link_pose};
 
-/// A wall gives way by no more than this, and is within reach: what is softer or farther is a force that is always there.
+/// A wall is at least so stiff, and within reach: what is softer or farther is a force that is always there.
 /// Tuned: not swept.
 const SOFTEST_N_PER_M: f64 = 5.0;
-/// The end of the range that is searched, less a little. Tuned: not swept.
-const FARTHEST_M: f64 = 1.49;
+/// The wall's range that is searched \[m\]. Physical: farther than any arm on a fixed base reaches.
+const RANGE_M: f64 = 10.0;
 /// A wall is drawn so that the arm is in it for a fifth of the time.
 /// Tuned: for simulated cells only; not swept.
 const IN_IT: usize = 5;
@@ -66,7 +67,7 @@ pub(super) static EFFECT: Effect = Effect {
         Coordinate::positive_factor("stiffness_n_per_m"),
         Coordinate::shape("azimuth_rad", -PI, PI, 12, Scale::Linear),
         Coordinate::shape("elevation_rad", -FRAC_PI_2, FRAC_PI_2, 7, Scale::Linear),
-        Coordinate::shape("offset_m", -1.5, 1.5, 25, Scale::Linear),
+        Coordinate::shape("offset_m", -RANGE_M, RANGE_M, 25, Scale::Linear),
     ],
     to_parameters: |c| {
         let normal = normal(c[1], c[2]);
@@ -78,7 +79,10 @@ pub(super) static EFFECT: Effect = Effect {
         vec![p[0], azimuth, elevation, p[4]]
     },
     simpler: None,
-    limit: Some(|_, x| x[0] >= SOFTEST_N_PER_M && x[3].abs() < FARTHEST_M),
+    limit: Some(|site, x| {
+        let link = moving_link(site.model, site.link);
+        x[0] >= SOFTEST_N_PER_M && x[3].abs() < reach_m(site.model, link)
+    }),
     excitation: Excitation::Poses,
     simulated: Simulated::Load,
     concealed: Some(|draw| {

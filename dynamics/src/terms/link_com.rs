@@ -6,12 +6,12 @@ use super::{
     Simulated, Traits, Words,
 };
 use crate::Inertia;
+use crate::kinematic_tree::extent_m;
 
-/// A link's centre of mass is not off by more than this many times its radius of gyration, or by this \[m\] if that is more.
-/// Physical: a body has its centre of mass within its extent, which is about its radius of gyration.
-const MOST_GYRATIONS: f64 = 1.0;
-/// Tuned: not swept.
-const FAR_OFF_M: f64 = 0.1;
+/// A link's centre of mass stays within the link: it is off by less than this many radii of gyration, or than the link
+/// extends by its frames. Physical: a uniform rod ends the root of 3 radii of gyration from its centre (its moment of
+/// inertia is m l²/12), a plumper body nearer.
+const MOST_GYRATIONS: f64 = 1.732;
 /// How far it may be off in a URDF, in radii of gyration.
 /// Tuned: a guess at how exact URDFs are; not swept.
 const CENTRE_OFF: f64 = 0.2;
@@ -48,7 +48,7 @@ pub(super) static EFFECT: Effect = Effect {
     limit: Some(|site, x| {
         let shift_m = x.iter().map(|d| d * d).sum::<f64>().sqrt();
         let gyration_m = site.model.links()[site.link].gyration_radius_m();
-        shift_m < FAR_OFF_M.max(MOST_GYRATIONS * gyration_m)
+        shift_m < extent_m(site.model, site.link).max(MOST_GYRATIONS * gyration_m)
     }),
     excitation: Excitation::Poses,
     simulated: Simulated::Model,

@@ -49,7 +49,7 @@ pub fn explain(
         .map(|recording| recording.start_ns)
         .min()
         .unwrap_or(0);
-    let mut setup = Context {
+    let mut context = Context {
         input: &input,
         constants: &constants,
         unit_nm: &unit_nm,
@@ -59,22 +59,33 @@ pub fn explain(
         at_rest,
     };
     let mut judged = if at_rest {
-        setup.at_rest(progress)?
+        context.at_rest(progress)?
     } else {
-        setup.in_motion(progress)?
+        context.in_motion(progress)?
     };
     if let Ok(first) = &judged
         && input.start.as_ref().is_some_and(Start::needs_load)
     {
-        setup.loads = setup.bodies(&first.found);
-        if !setup.loads.is_empty() && !at_rest {
-            judged = setup.in_motion(progress)?;
+        context.loads = context.bodies(&first.found);
+        if !context.loads.is_empty() && !at_rest {
+            judged = context.in_motion(progress)?;
         }
     }
     let judged = match judged {
         Ok(judged) => judged,
         Err(reason) => return Ok(not_evaluated(&input, joints, reason)),
     };
+    conclude(&context, judged, joints, progress)
+}
+
+/// The report on what a search came to, with the proof on the recordings held out.
+fn conclude(
+    context: &Context<'_>,
+    judged: Judged,
+    joints: Vec<String>,
+    progress: &(dyn Fn(f64, &str) + Sync),
+) -> Result<Outcome, TermError> {
+    let input = context.input;
     let Judged {
         problem,
         before,
@@ -84,7 +95,7 @@ pub fn explain(
         rests_count,
     } = judged;
     progress(0.95, "proof");
-    let proof = setup.proof(&problem, &before, &found)?;
+    let proof = context.proof(&problem, &before, &found)?;
     let noise_floor: Vec<f64> = (0..joints.len())
         .map(|j| white_noise(&input.fit, j, joints.len()))
         .collect();
@@ -96,7 +107,7 @@ pub fn explain(
     let mut notes = named.notes;
     let unit = if input.effort_unit == "A" { "A" } else { "N m" };
     notes.extend(verdict::note(&proof, &left_elsewhere, &joints, unit));
-    notes.extend(notes::notes(&input, &problem, &found, &rests_count));
+    notes.extend(notes::notes(input, &problem, &found, &rests_count));
     let report = Report {
         case: input.case.clone(),
         verdict,
@@ -116,10 +127,10 @@ pub fn explain(
         holdout_predictions: BTreeMap::new(),
     };
     progress(1.0, "done");
-    let (gain, gain_deviation) = setup.final_gains(&found, &named.gain_deviation);
+    let (gain, gain_deviation) = context.final_gains(&found, &named.gain_deviation);
     Ok(Outcome {
         report,
-        terms: setup.lasting_terms(&found),
+        terms: context.lasting_terms(&found),
         gain,
         gain_deviation,
         predictions: proof.predictions,

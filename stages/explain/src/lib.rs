@@ -1,10 +1,12 @@
-//! Why a twin and a recording differ: locate the mismatch, name the physics that was left out, model it and prove it
-//! on recordings that were never fitted.
+#![doc = include_str!("../README.md")]
 
 mod context;
 mod data;
 mod explain;
 mod fit;
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod fixture;
 mod outcome;
 mod physics;
 mod read;
@@ -14,6 +16,6 @@ mod select;
 pub use explain::explain;
 pub use outcome::Outcome;
 pub use read::input::Input;
-pub use read::recording::{Recording, RecordingError, RecordingTopics};
+pub use read::recording::{Losses, Recording, RecordingError, RecordingTopics};
 pub use read::start::Start;
 pub use report::html;

@@ -12,7 +12,6 @@ pub mod bodies;
 pub mod columns;
 pub mod efforts;
 pub mod friction;
-pub mod kinematic_tree;
 pub mod library;
 pub mod parameter_units;
 pub mod parts;

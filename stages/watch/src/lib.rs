@@ -1,14 +1,4 @@
-//! A stage that watches a twin's residual and speaks up when it changes character: what changed, since when,
-//! at which joint or link, by how much, and whether it was a contact or a change of the arm.
-//!
-//! The residual is regressed, joint by joint, on what friction, a gain, a bias and the load would add to it.
-//! How it is as a rule is learned from the stream's own motion (the *reference*), and so is how far half
-//! seconds and longer windows stray from that rule by chance; a twin with standing errors, friction that
-//! warms up and coloured noise therefore say nothing. A change is what the newest seconds of motion show
-//! beside the reference, far beyond what is usual, in every part of the time since it began; a contact is
-//! what is over within seconds. Standstill is passed over: friction at rest has any value within its limits.
-//!
-//! Memory is fixed and nothing is allocated once the stage is made; time is taken from the samples.
+#![doc = include_str!("../README.md")]
 
 mod blocks;
 mod config;

@@ -173,3 +173,44 @@ fn calm_correlation(problem: &Problem, joint: usize, left: &[f64]) -> f64 {
         .copied()
         .unwrap_or(0.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{Noise, model, problem, recording};
+
+    /// Effective samples per row of the first joint, with noise that keeps `share` of itself from sample to sample.
+    fn with_noise(share: f64) -> f64 {
+        let model = model();
+        let mut noise = Noise(7);
+        let mut last = 0.0;
+        let of = |seed| {
+            recording(&model, seed, |_, _, effort| {
+                last = share * last + (1.0 - share * share).sqrt() * noise.next();
+                effort[0] += 0.2 * last;
+            })
+        };
+        let recordings: Vec<_> = [1, 2].map(of).into();
+        per_row(&problem(&model, &recordings))[0]
+    }
+
+    #[test]
+    fn rows_of_slow_noise_count_less_than_rows_of_white_noise() {
+        let (white, slow) = (with_noise(0.0), with_noise(0.99));
+        assert!(white > 0.5, "{white}");
+        assert!(slow < 0.5 * white, "{slow} of {white}");
+        assert!(slow >= LEAST);
+    }
+
+    #[test]
+    fn a_whiter_residual_shows_that_the_noise_is_no_more_correlated_than_that() {
+        let model = model();
+        let mut data = problem(&model, &[recording(&model, 1, |_, _, _| {})]);
+        data.effective_samples = vec![0.1, 0.9];
+        let mut noise = Noise(3);
+        let white: Vec<f64> = (0..data.joints * data.rows).map(|_| noise.next()).collect();
+        let constant = vec![1.0; white.len()];
+        assert!(at_least(&data, &white)[0] > 0.5);
+        assert_eq!(at_least(&data, &constant), [0.1, 0.9]);
+    }
+}

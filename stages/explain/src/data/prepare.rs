@@ -49,24 +49,7 @@ impl Problem {
         rests_count: &[bool],
     ) -> Self {
         let n = model.dof();
-        let mut problem = Self {
-            model: model.clone(),
-            joints: n,
-            tracks: Vec::new(),
-            rows: 0,
-            measured: Vec::new(),
-            weight: Vec::new(),
-            white_noise: vec![0.0; n],
-            largest_effort: vec![0.0; n],
-            cutoff_hz,
-            effective_samples: Vec::new(),
-            known_friction: vec![BTreeMap::new(); n],
-            cache: Arc::default(),
-            units: Arc::default(),
-            bare: OnceLock::new(),
-            rigid: OnceLock::new(),
-            expansions: vec![OnceLock::new(); n],
-        };
+        let mut problem = Self::empty(model, cutoff_hz);
         let (mut measured, mut weight) = (Vec::new(), Vec::new());
         let mut variances = vec![Vec::new(); n];
         let total_s: f64 = recordings.iter().map(Recording::duration_s).sum();
@@ -129,5 +112,28 @@ impl Problem {
         }
         problem.effective_samples = per_row(&problem);
         problem
+    }
+
+    /// No recordings of a robot.
+    fn empty(model: &Model, cutoff_hz: f64) -> Self {
+        let n = model.dof();
+        Self {
+            model: model.clone(),
+            joints: n,
+            tracks: Vec::new(),
+            rows: 0,
+            measured: Vec::new(),
+            weight: Vec::new(),
+            white_noise: vec![0.0; n],
+            largest_effort: vec![0.0; n],
+            cutoff_hz,
+            effective_samples: Vec::new(),
+            known_friction: vec![BTreeMap::new(); n],
+            cache: Arc::default(),
+            units: Arc::default(),
+            bare: OnceLock::new(),
+            rigid: OnceLock::new(),
+            expansions: vec![OnceLock::new(); n],
+        }
     }
 }

@@ -9,7 +9,6 @@ use crate::data::track::BEGINNING_S;
 use crate::explain::judged::Judged;
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Hypothesis, TimeKind};
-use crate::physics::kinematic_tree::bearing;
 use crate::read::audit;
 use crate::read::recording::Recording;
 use crate::report::findings;
@@ -17,6 +16,7 @@ use crate::select::explanation::Explanation;
 use crate::select::plausible::plausible;
 use crate::select::propose::Base;
 use crate::select::search::Search;
+use tauscope_dynamics::kinematic_tree::bearing;
 
 /// What is left stands out where it is so many times its deviation in the beginning, over all joints,
 const STANDS_OUT: f64 = 8.0;

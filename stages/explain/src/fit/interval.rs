@@ -196,3 +196,48 @@ fn between_rows(problem: &Problem, active: &Active, c: usize) -> f64 {
         .map(|[first, last]| last - first)
         .fold(0.0, f64::max)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{at_joint, problem_with};
+
+    const TRUE: f64 = 0.8;
+
+    /// A viscous friction and its half width, fitted with noise from a seed.
+    fn fitted(seed: u64) -> (f64, f64) {
+        let problem = problem_with(seed, |_, qd, effort| effort[0] += TRUE * qd[0]);
+        let active = at_joint("viscous_friction", 0).with(vec![0.0]);
+        let fit = Fit::new(&problem, vec![active]).refined(&problem);
+        let spread = covariance(&problem, &fit);
+        let deviation = parameter_deviations(&problem, &fit, &spread, 0)[0];
+        (
+            fit.actives[0].coordinates[0],
+            half_width_95(&problem) * deviation,
+        )
+    }
+
+    #[test]
+    fn intervals_hold_the_true_number_nearly_always_and_are_no_wider_than_they_must_be() {
+        let all: Vec<(f64, f64)> = (1..=20).map(fitted).collect();
+        let held = all
+            .iter()
+            .filter(|(value, half)| (value - TRUE).abs() <= *half);
+        assert!(held.count() >= 17, "{all:?}");
+        let error = |(value, _): &(f64, f64)| (value - TRUE).powi(2);
+        let rms = (all.iter().map(error).sum::<f64>() / 20.0).sqrt();
+        let half = all.iter().map(|(_, half)| half).sum::<f64>() / 20.0;
+        assert!(
+            half < 4.0 * HALF_WIDTH_95 * rms,
+            "{half} for errors of {rms}"
+        );
+    }
+
+    #[test]
+    fn fewer_rows_make_a_half_width_wider_than_the_normal_one() {
+        let mut problem = problem_with(1, |_, _, _| {});
+        let many = half_width_95(&problem);
+        problem.rows = 20;
+        assert!(many > HALF_WIDTH_95 && half_width_95(&problem) > many + 0.5);
+    }
+}

@@ -97,3 +97,62 @@ fn recorded(
         alone: alone.map(|(body, plain)| of(body, plain, 1.0)),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use crate::fit::fitted::Fit;
+    use crate::fixture::{at_joint, problem_with};
+    use crate::physics::library;
+
+    #[test]
+    fn the_column_of_viscous_friction_is_the_filtered_velocity() {
+        let problem = problem_with(1, |_, _, _| {});
+        let fit = Fit::new(&problem, Vec::new());
+        let columns = fit.columns(&problem, at_joint("viscous_friction", 1), &[0.0]);
+        assert!(columns.alone.is_none());
+        let mut expected = vec![0.0; problem.rows];
+        let velocity: Vec<Vec<f64>> = (problem.tracks.iter())
+            .map(|track| track.track.velocity.clone())
+            .collect();
+        problem.joint_signal(&velocity, 1, &mut expected);
+        let column = columns.factors[0].of_joint(1, problem.rows).unwrap();
+        let off = column.iter().zip(&expected).map(|(a, b)| (a - b).abs());
+        assert!(off.fold(0.0, f64::max) < 1e-9);
+        assert!(columns.factors[0].of_joint(0, problem.rows).is_none());
+    }
+
+    /// Also where another effect transforms what is recorded.
+    #[test]
+    fn so_many_times_its_column_is_what_a_linear_effect_adds() {
+        let problem = problem_with(2, |_, _, _| {});
+        let gain = at_joint("torque_gain", 0).with(vec![0.2]);
+        for beside in [Vec::new(), vec![gain]] {
+            let fit = Fit::new(&problem, beside);
+            let all = library::hypotheses(&problem.model, true, &BTreeSet::new());
+            for hypothesis in all
+                .into_iter()
+                .filter(|h| h.is_linear() && !h.factors().is_empty())
+            {
+                let shape = vec![0.0; hypothesis.effect.coordinates.len()];
+                let columns = fit.columns(&problem, hypothesis, &shape);
+                let mut coordinates = shape;
+                coordinates[0] = 0.3;
+                let added = fit.added(&problem, &hypothesis.with(coordinates));
+                for joint in 0..problem.joints {
+                    let of = |column: &crate::data::column::Column| {
+                        let values = column.of_joint(joint, problem.rows).map(<[f64]>::to_vec);
+                        values.unwrap_or_else(|| vec![0.0; problem.rows])
+                    };
+                    let (unit, added) = (of(&columns.factors[0]), of(&added));
+                    let size = 1.0 + added.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+                    for (unit, added) in unit.iter().zip(&added) {
+                        let off = (0.3 * unit - added).abs();
+                        assert!(off < 0.02 * size, "{}: {off}", hypothesis.effect.name);
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,5 +1,6 @@
 //! From the winning explanation to what is said: findings with intervals, rivals, what could have hidden.
 
+mod clipping;
 mod confidence;
 mod contest;
 mod doubt;
@@ -12,6 +13,7 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 use tauscope_dynamics::terms::PlaceKind;
 
+use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::fit::interval::{covariance, half_width_95, parameter_deviations};
 use crate::physics::active::{Active, Hypothesis, TimeKind};
@@ -22,6 +24,7 @@ use crate::report::{next_motion, sentences};
 use crate::select::explanation::Explanation;
 use crate::select::search::Search;
 
+use clipping::is_clipped;
 use confidence::{Grounds, confidence};
 use contest::contest;
 pub use doubt::doubt_patches;
@@ -117,30 +120,8 @@ pub fn of(
         let less = search.without(found, index);
         let evidence = found.ahead_of(&less, effective);
         let contest = contest(search, found, &less, active);
-        let (mut parameters, mut intervals) = (BTreeMap::new(), BTreeMap::new());
-        let effect = active.hypothesis.effect;
-        let values = active.parameters();
-        for ((parameter, value), deviation) in
-            effect.parameters.iter().zip(&values).zip(&deviations)
-        {
-            parameters.insert(parameter.name.to_owned(), number(*value));
-            // A change between two recordings has no sharper time than that.
-            let vague = parameter.name.contains("time") && *deviation > VAGUE_S;
-            if deviation.is_finite() && !vague {
-                let half = half_width_95(search.problem) * deviation;
-                let least = least(search.problem, active.hypothesis, parameter.minimum);
-                let low = (value - half).max(least);
-                intervals.insert(parameter.name.to_owned(), [low, value + half]);
-            }
-        }
-        if effect.place == PlaceKind::TwoJoints {
-            let source = joints[active.hypothesis.place.source].clone();
-            parameters.insert("source_joint".to_owned(), Value::from(source));
-        }
-        if effect.traits.cuts_off {
-            parameters.insert("mode".to_owned(), Value::from("sensor"));
-        }
-        describe_curve(active, &mut parameters);
+        let (mut parameters, mut intervals) =
+            numbers(search.problem, fit, active, &deviations, joints);
         let (joint, link) = place_of(input, joints, &active.hypothesis);
         let place = link.clone().or_else(|| joint.clone()).unwrap_or_default();
         let when = when(search, active, &mut parameters, &mut intervals);
@@ -196,6 +177,39 @@ pub fn of(
         .findings
         .sort_by(|a, b| b.explains.total_cmp(&a.explains));
     named
+}
+
+/// The numbers of a piece of physics by name, and their 95 % intervals.
+fn numbers(
+    problem: &Problem,
+    fit: &Fit,
+    active: &Active,
+    deviations: &[f64],
+    joints: &[String],
+) -> (BTreeMap<String, Value>, BTreeMap<String, [f64; 2]>) {
+    let (mut parameters, mut intervals) = (BTreeMap::new(), BTreeMap::new());
+    let effect = active.hypothesis.effect;
+    let values = active.parameters();
+    for ((parameter, value), deviation) in effect.parameters.iter().zip(&values).zip(deviations) {
+        parameters.insert(parameter.name.to_owned(), number(*value));
+        // A change between two recordings has no sharper time than that.
+        let vague = parameter.name.contains("time") && *deviation > VAGUE_S;
+        if deviation.is_finite() && !vague {
+            let half = half_width_95(problem) * deviation;
+            let least = least(problem, active.hypothesis, parameter.minimum);
+            let low = (value - half).max(least);
+            intervals.insert(parameter.name.to_owned(), [low, value + half]);
+        }
+    }
+    if effect.place == PlaceKind::TwoJoints {
+        let source = joints[active.hypothesis.place.source].clone();
+        parameters.insert("source_joint".to_owned(), Value::from(source));
+    }
+    if effect.traits.cuts_off && is_clipped(problem, fit, active) {
+        parameters.insert("mode".to_owned(), Value::from("sensor"));
+    }
+    describe_curve(active, &mut parameters);
+    (parameters, intervals)
 }
 
 /// What a curve is drawn against, and where it is largest.

@@ -12,112 +12,117 @@ const CONCENTRATED: f64 = 1.4;
 const LEAST_ROWS: usize = 12;
 
 /// The joints' mismatch over all, and for each the states in which it is concentrated; the largest first.
-#[expect(
-    clippy::too_many_lines,
-    reason = "one state after the other, each a line"
-)]
 pub fn located(problem: &Problem, before: &Fit, joints: &[String]) -> Vec<Located> {
-    let n = problem.joints;
     let mut all = Vec::new();
     for (j, name) in joints.iter().enumerate() {
+        let rows = rows_of(problem, before, j);
+        let total: f64 = rows.iter().map(|s| s.square).sum();
+        let mean = total / rows.len().max(1) as f64;
         let noise = problem.white_noise[j].max(1e-12);
-        let rows = problem.joint_rows(j);
-        let mut samples = Vec::new();
-        for (r, track) in problem.tracks.iter().enumerate() {
-            for (row, &k) in track.rows().zip(&track.compared) {
-                if problem.weight[rows.start + row] > 0.0 {
-                    let at = k * n + j;
-                    samples.push(Row {
-                        square: before.residual[rows.start + row].powi(2),
-                        position: track.track.position[at],
-                        velocity: track.track.velocity[at],
-                        acceleration: track.track.acceleration[at],
-                        load: track.track.rigid[at],
-                        recording: r,
-                        time_s: track.track.time_s[k],
-                    });
-                }
-            }
-        }
-        let total: f64 = samples.iter().map(|s| s.square).sum();
-        let mean = total / samples.len().max(1) as f64;
         let over_noise = mean.sqrt() / noise;
         if over_noise < LEAST_OVER_NOISE {
             continue;
         }
-        let mut states: Vec<Located> = Vec::new();
-        let mut state = |place: String, of: &dyn Fn(&Row) -> bool| {
-            let (count, sum) = samples
-                .iter()
-                .filter(|s| of(s))
-                .fold((0, 0.0), |(count, sum), s| (count + 1, sum + s.square));
-            let square = sum / f64::from(count.max(1));
-            if count as usize >= LEAST_ROWS && square > CONCENTRATED * mean {
-                states.push(Located {
-                    joint: name.clone(),
-                    place,
-                    share_of_residual: sum / total,
-                    over_noise: square.sqrt() / noise,
-                });
-            }
-        };
-        let slow = quantile(&samples, |s| s.velocity.abs(), 0.2);
-        let fast = quantile(&samples, |s| s.velocity.abs(), 0.8);
-        state(
-            format!("slow and around reversals, |qd| < {slow:.3} rad/s"),
-            &|s| s.velocity.abs() < slow,
-        );
-        state(format!("fast, |qd| > {fast:.2} rad/s"), &|s| {
-            s.velocity.abs() > fast
-        });
-        state("moving forward".to_owned(), &|s| s.velocity > 0.0);
-        state("moving backward".to_owned(), &|s| s.velocity < 0.0);
-        let hard = quantile(&samples, |s| s.acceleration.abs(), 0.8);
-        state(
-            format!("accelerating hard, |qdd| > {hard:.2} rad/s²"),
-            &|s| s.acceleration.abs() > hard,
-        );
-        let loaded = quantile(&samples, |s| s.load.abs(), 0.8);
-        state(
-            format!("under high load, |effort| > {loaded:.1} N m"),
-            &|s| s.load.abs() > loaded,
-        );
-        for fifth in 0..5 {
-            let low = quantile(&samples, |s| s.position, 0.2 * f64::from(fifth));
-            let high = quantile(&samples, |s| s.position, 0.2 * f64::from(fifth + 1));
-            state(format!("position {low:.2} to {high:.2} rad"), &|s| {
-                s.position >= low && s.position < high
-            });
-        }
-        for (r, track) in problem.tracks.iter().enumerate() {
-            let recording = &track.track.name;
-            state(format!("recording {recording}"), &|s| s.recording == r);
-            let end = track.track.time_s.last().copied().unwrap_or(0.0);
-            for part in 0..4 {
-                let (from, to) = (end * f64::from(part) / 4.0, end * f64::from(part + 1) / 4.0);
-                state(
-                    format!("recording {recording}, {from:.1} to {to:.1} s"),
-                    &|s| s.recording == r && s.time_s >= from && s.time_s < to,
-                );
-            }
-        }
-        states.sort_by(|a, b| b.over_noise.total_cmp(&a.over_noise));
-        states.truncate(3);
-        all.push((
+        let whole = Located {
+            joint: name.clone(),
+            place: "all of the motion".to_owned(),
+            share_of_residual: 1.0,
             over_noise,
-            Located {
-                joint: name.clone(),
-                place: "all of the motion".to_owned(),
-                share_of_residual: 1.0,
-                over_noise,
-            },
-            states,
-        ));
+        };
+        all.push((over_noise, whole, concentrated(problem, &rows, name, noise)));
     }
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
     all.into_iter()
         .flat_map(|(_, joint, states)| std::iter::once(joint).chain(states))
         .collect()
+}
+
+/// The rows of a joint that count.
+fn rows_of(problem: &Problem, before: &Fit, joint: usize) -> Vec<Row> {
+    let rows = problem.joint_rows(joint);
+    let mut all = Vec::new();
+    for (r, track) in problem.tracks.iter().enumerate() {
+        for (row, &k) in track.rows().zip(&track.compared) {
+            if problem.weight[rows.start + row] > 0.0 {
+                let at = k * problem.joints + joint;
+                all.push(Row {
+                    square: before.residual[rows.start + row].powi(2),
+                    position: track.track.position[at],
+                    velocity: track.track.velocity[at],
+                    acceleration: track.track.acceleration[at],
+                    load: track.track.rigid[at],
+                    recording: r,
+                    time_s: track.track.time_s[k],
+                });
+            }
+        }
+    }
+    all
+}
+
+/// The states of a joint in which its mismatch is concentrated: the three with the most.
+fn concentrated(problem: &Problem, rows: &[Row], name: &str, noise: f64) -> Vec<Located> {
+    let total: f64 = rows.iter().map(|s| s.square).sum();
+    let mean = total / rows.len().max(1) as f64;
+    let mut states: Vec<Located> = Vec::new();
+    let mut state = |place: String, of: &dyn Fn(&Row) -> bool| {
+        let (count, sum) = rows
+            .iter()
+            .filter(|s| of(s))
+            .fold((0, 0.0), |(count, sum), s| (count + 1, sum + s.square));
+        let square = sum / f64::from(count.max(1));
+        if count as usize >= LEAST_ROWS && square > CONCENTRATED * mean {
+            states.push(Located {
+                joint: name.to_owned(),
+                place,
+                share_of_residual: sum / total,
+                over_noise: square.sqrt() / noise,
+            });
+        }
+    };
+    let slow = quantile(rows, |s| s.velocity.abs(), 0.2);
+    let fast = quantile(rows, |s| s.velocity.abs(), 0.8);
+    state(
+        format!("slow and around reversals, |qd| < {slow:.3} rad/s"),
+        &|s| s.velocity.abs() < slow,
+    );
+    state(format!("fast, |qd| > {fast:.2} rad/s"), &|s| {
+        s.velocity.abs() > fast
+    });
+    state("moving forward".to_owned(), &|s| s.velocity > 0.0);
+    state("moving backward".to_owned(), &|s| s.velocity < 0.0);
+    let hard = quantile(rows, |s| s.acceleration.abs(), 0.8);
+    state(
+        format!("accelerating hard, |qdd| > {hard:.2} rad/s²"),
+        &|s| s.acceleration.abs() > hard,
+    );
+    let loaded = quantile(rows, |s| s.load.abs(), 0.8);
+    state(
+        format!("under high load, |effort| > {loaded:.1} N m"),
+        &|s| s.load.abs() > loaded,
+    );
+    for fifth in 0..5 {
+        let low = quantile(rows, |s| s.position, 0.2 * f64::from(fifth));
+        let high = quantile(rows, |s| s.position, 0.2 * f64::from(fifth + 1));
+        state(format!("position {low:.2} to {high:.2} rad"), &|s| {
+            s.position >= low && s.position < high
+        });
+    }
+    for (r, track) in problem.tracks.iter().enumerate() {
+        let recording = &track.track.name;
+        state(format!("recording {recording}"), &|s| s.recording == r);
+        let end = track.track.time_s.last().copied().unwrap_or(0.0);
+        for part in 0..4 {
+            let (from, to) = (end * f64::from(part) / 4.0, end * f64::from(part + 1) / 4.0);
+            state(
+                format!("recording {recording}, {from:.1} to {to:.1} s"),
+                &|s| s.recording == r && s.time_s >= from && s.time_s < to,
+            );
+        }
+    }
+    states.sort_by(|a, b| b.over_noise.total_cmp(&a.over_noise));
+    states.truncate(3);
+    states
 }
 
 struct Row {
@@ -130,8 +135,8 @@ struct Row {
     time_s: f64,
 }
 
-fn quantile(samples: &[Row], of: impl Fn(&Row) -> f64, share: f64) -> f64 {
-    let mut values: Vec<f64> = samples.iter().map(of).collect();
+fn quantile(rows: &[Row], of: impl Fn(&Row) -> f64, share: f64) -> f64 {
+    let mut values: Vec<f64> = rows.iter().map(of).collect();
     values.sort_by(f64::total_cmp);
     let last = values.len().saturating_sub(1);
     values

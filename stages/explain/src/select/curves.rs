@@ -2,7 +2,6 @@
 
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis, TimeKind};
-use crate::physics::kinematic_tree::bearing;
 use crate::select::cross_validation::{carries_over, left_elsewhere};
 use crate::select::curve_shapes;
 use crate::select::evidence::{CURVE_EVIDENCE, CURVE_SIZE, is_drawn_already};
@@ -11,6 +10,7 @@ use crate::select::explanation::Explanation;
 use crate::select::plausible::is_open_wave;
 use crate::select::propose::Base;
 use crate::select::search::Search;
+use tauscope_dynamics::kinematic_tree::bearing;
 
 /// A curve is not looked for at a joint whose variance is below this many times its white noise.
 const CURVE_EXCESS: f64 = 1.6;
@@ -209,5 +209,54 @@ impl Search<'_> {
             best = self.pruned(best);
         }
         best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tauscope_dynamics::terms::Against;
+
+    use super::*;
+    use crate::fixture::{at_joint, problem_with};
+    use crate::select::evidence::needs;
+
+    #[test]
+    fn an_effort_of_no_name_is_drawn_against_what_it_depends_on() {
+        for (against, of) in [
+            (
+                Against::Position,
+                (|q, _| (2.5 * q - 0.4).cos().powi(3)) as fn(f64, f64) -> f64,
+            ),
+            (Against::Acceleration, |_, _| 0.0),
+        ] {
+            let problem = problem_with(1, |q, qd, effort| effort[1] += 2.0 * of(q[1], qd[1]));
+            let nothing = Fit::new(&problem, Vec::new());
+            let base = Base::new(&problem, &nothing, 40);
+            let curve = base.propose_curve(1).unwrap();
+            let drawn = curve.active.curve.as_ref().unwrap();
+            if against == Against::Position {
+                assert_eq!((drawn.against, drawn.of_joint), (against, 1));
+                assert!(curve.evidence() > CURVE_EVIDENCE);
+            } else {
+                // Nothing is there to be drawn.
+                assert!(curve.evidence() < CURVE_EVIDENCE);
+            }
+        }
+    }
+
+    #[test]
+    fn beside_a_curve_of_position_other_functions_of_position_are_not_tried() {
+        let problem = problem_with(2, |q, _, effort| {
+            effort[1] += 2.0 * (3.0 * q[1]).sin().powi(3)
+        });
+        let nothing = Fit::new(&problem, Vec::new());
+        let curve = Base::new(&problem, &nothing, 40).propose_curve(1).unwrap();
+        let with = nothing.with(&problem, curve.active);
+        assert!(is_drawn_already(&with, at_joint("cable_spring", 1)));
+        assert!(!is_drawn_already(&with, at_joint("cable_spring", 0)));
+        assert!(!is_drawn_already(&with, at_joint("viscous_friction", 1)));
+        // What has a name beside a curve must explain much more.
+        let beside = needs(at_joint("viscous_friction", 1), &with).1;
+        assert!(beside > needs(at_joint("viscous_friction", 1), &nothing).1);
     }
 }

@@ -169,3 +169,94 @@ pub fn is_drawn_already(fit: &Fit, hypothesis: Hypothesis) -> bool {
     };
     fit.actives.iter().any(draws)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{at_joint, problem_with};
+    use crate::select::propose::Base;
+
+    /// The explanation with one effect beside nothing, on data with so much viscous friction in the first joint.
+    fn with(effect: &str, viscous: f64) -> (Problem, Explanation, Explanation) {
+        let problem = problem_with(1, |_, qd, effort| effort[0] += viscous * qd[0]);
+        let nothing = Fit::new(&problem, Vec::new());
+        let base = Base::new(&problem, &nothing, 40);
+        let proposal = base.propose_at(at_joint(effect, 0), &[0.0]).unwrap();
+        let fit = nothing.with(&problem, proposal.active).refined(&problem);
+        let with = Explanation {
+            fit,
+            penalties: vec![proposal.penalty],
+        };
+        let without = Explanation {
+            fit: nothing,
+            penalties: Vec::new(),
+        };
+        (problem, with, without)
+    }
+
+    #[test]
+    fn an_effect_that_is_there_has_evidence_and_one_that_is_not_has_less_than_none() {
+        let (problem, with, without) = with("viscous_friction", 0.8);
+        let evidence = with.ahead_of(&without, &problem.effective_samples);
+        assert!(evidence > 10.0 * LEAST_EVIDENCE, "{evidence}");
+        assert!(overwhelming(&with, &without));
+        assert!(matters(
+            &problem,
+            &with.fit,
+            &without.fit,
+            LEAST_SIZE,
+            LEAST_SIZE
+        ));
+        assert_eq!(worse_joints(&without.fit, &with.fit), [0]);
+        let (problem, with, without) = self::with("torque_bias", 0.0);
+        assert!(with.ahead_of(&without, &problem.effective_samples) < 0.0);
+        assert!(!overwhelming(&with, &without));
+        assert!(!matters(
+            &problem,
+            &with.fit,
+            &without.fit,
+            LEAST_SIZE,
+            LEAST_SIZE
+        ));
+    }
+
+    #[test]
+    fn evidence_for_one_is_evidence_against_the_other_and_correlation_makes_it_less() {
+        let (problem, with, without) = with("viscous_friction", 0.8);
+        let white = vec![1.0; problem.joints];
+        let (there, back) = (
+            with.ahead_of(&without, &white),
+            without.ahead_of(&with, &white),
+        );
+        assert!((there + back).abs() < 1e-6);
+        assert!(with.ahead_of(&without, &[0.2, 0.2]) < 0.3 * there);
+    }
+
+    #[test]
+    fn rivals_of_a_strong_effect_tie_within_a_share_of_its_evidence() {
+        assert_eq!(tie(10.0), TIE);
+        assert!((tie(1e5) - TIE_SHARE * 1e5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_lasts_for_an_interval_needs_more_evidence_than_what_lasts() {
+        let problem = problem_with(2, |_, _, _| {});
+        let nothing = Fit::new(&problem, Vec::new());
+        let (lasting, _) = needs(at_joint("viscous_friction", 0), &nothing);
+        let (once, _) = needs(at_joint("external_push", 0), &nothing);
+        assert_eq!(lasting, LEAST_EVIDENCE);
+        assert_eq!(once, INTERVAL_EVIDENCE);
+    }
+
+    #[test]
+    fn walds_test_is_the_square_of_a_number_over_its_deviation() {
+        let (problem, strong, _) = with("viscous_friction", 0.8);
+        let (weak_problem, weak, _) = with("viscous_friction", 0.2);
+        let (strong, weak) = (
+            wald(&problem, &strong.fit)[0],
+            wald(&weak_problem, &weak.fit)[0],
+        );
+        // Four times the friction under the same noise: sixteen times the square.
+        assert!((strong / weak / 16.0 - 1.0).abs() < 0.3, "{strong} {weak}");
+    }
+}

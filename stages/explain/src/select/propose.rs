@@ -336,3 +336,49 @@ pub fn shapes(problem: &Problem, hypothesis: Hypothesis) -> Vec<Vec<f64>> {
     }
     grid
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{at_joint, problem_with};
+
+    #[test]
+    fn the_number_of_a_linear_effect_is_found_and_what_is_not_there_gains_nothing() {
+        let problem = problem_with(3, |_, qd, effort| effort[0] += 0.8 * qd[0]);
+        let nothing = Fit::new(&problem, Vec::new());
+        let base = Base::new(&problem, &nothing, 40);
+        let found = base.propose(at_joint("viscous_friction", 0)).unwrap();
+        assert!((found.active.coordinates[0] - 0.8).abs() < 0.02);
+        assert!(found.evidence() > 100.0 && found.size > 1.0);
+        let other = base.propose(at_joint("viscous_friction", 1));
+        assert!(other.is_none_or(|other| other.evidence() < 0.0));
+    }
+
+    #[test]
+    fn friction_is_not_negative() {
+        let problem = problem_with(4, |_, qd, effort| effort[0] -= 0.8 * qd[0]);
+        let nothing = Fit::new(&problem, Vec::new());
+        let base = Base::new(&problem, &nothing, 40);
+        assert!(base.propose(at_joint("viscous_friction", 0)).is_none());
+    }
+
+    #[test]
+    fn the_shape_of_an_effect_is_searched_over_its_range() {
+        let problem = problem_with(5, |q, _, effort| effort[1] += 1.5 * (20.0 * q[1]).sin());
+        let nothing = Fit::new(&problem, Vec::new());
+        let base = Base::new(&problem, &nothing, 40);
+        let found = base.propose(at_joint("torque_ripple", 1)).unwrap();
+        let cycles = found.active.parameters()[1];
+        assert!((cycles / 20.0 - 1.0).abs() < 0.05, "{cycles} cycles");
+    }
+
+    #[test]
+    fn more_numbers_rows_and_rivals_cost_more() {
+        let problem = problem_with(6, |_, _, _| {});
+        let fit = Fit::new(&problem, Vec::new());
+        let one = penalty(&fit, 0.0, 1, Some(0));
+        assert!((penalty(&fit, 0.0, 2, Some(0)) - 2.0 * one).abs() < 1e-12);
+        assert!(penalty(&fit, 0.0, 1, None) > one);
+        assert!((penalty(&fit, 3.0, 1, Some(0)) - one - 3.0).abs() < 1e-12);
+    }
+}

@@ -5,6 +5,7 @@ use tauscope_dynamics::{Data, forward_kinematics, link_jacobian, link_pose};
 
 use crate::physics::active::Hypothesis;
 use crate::select::propose::{Base, Proposal};
+use tauscope_dynamics::kinematic_tree::moving_link;
 
 /// A sample belongs to a contact if a force there gains this much of the sum of squares over the variance.
 const EVIDENT: f64 = 30.0;
@@ -32,7 +33,8 @@ impl Base<'_> {
 
     /// The gain and the shape of the best wall, from forces that are evident beside these variances of the joints.
     fn wall_of(&self, hypothesis: Hypothesis, variance: &[f64]) -> Option<(f64, [f64; 4])> {
-        let contacts = self.contacts(variance);
+        let link = moving_link(&self.problem.model, hypothesis.place.link);
+        let contacts = self.contacts(link, variance);
         if contacts.len() < LEAST_SAMPLES {
             return None;
         }
@@ -67,14 +69,10 @@ impl Base<'_> {
         best
     }
 
-    /// Samples at which a force on the last moving link is evident: where its frame is, and the force \[N\].
-    fn contacts(&self, variance: &[f64]) -> Vec<(Point3<f64>, Vector3<f64>)> {
+    /// Samples at which a force on a link is evident: where its frame is, and the force \[N\].
+    fn contacts(&self, link: usize, variance: &[f64]) -> Vec<(Point3<f64>, Vector3<f64>)> {
         let problem = self.problem;
         let n = problem.joints;
-        let Some(last) = problem.model.joints().last() else {
-            return Vec::new();
-        };
-        let link = last.child_link;
         let mut data = Data::new(&problem.model);
         let mut found = Vec::new();
         for track in &problem.tracks {
@@ -103,5 +101,100 @@ impl Base<'_> {
             }
         }
         found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tauscope_dynamics::Model;
+    use tauscope_dynamics::terms::effect;
+
+    use crate::fit::fitted::Fit;
+    use crate::fixture::{URDF, problem, recording};
+    use crate::physics::active::{Hypothesis, Whereabouts};
+    use crate::select::plausible::plausible;
+    use crate::select::propose::Base;
+    use tauscope_dynamics::kinematic_tree::{bearing, moving_link, reach_m};
+
+    /// A floor at 0.5 m that the end of the arm is pressed on, and the wall that is found: stiffness \[N/m\], offset \[m\].
+    fn found(urdf: &str) -> (f64, f64) {
+        let model = Model::from_urdf(urdf).unwrap();
+        let place = Whereabouts {
+            link: model.link_index("lower").unwrap(),
+            ..Whereabouts::default()
+        };
+        let wall = Hypothesis {
+            effect: effect("contact_wall").unwrap(),
+            place,
+        };
+        let truth = wall.with((wall.effect.to_coordinates)(&[
+            800.0, 0.0, 0.0, -1.0, -0.62,
+        ]));
+        let mut term = truth.term(&model);
+        let zero = vec![0.0; model.dof()];
+        let press = |q: &[f64], qd: &[f64], effort: &mut [f64]| {
+            let at = tauscope_dynamics::terms::MotionSample {
+                dt_s: 0.01,
+                recording_s: 0.0,
+                session_s: 0.0,
+                position: q,
+                velocity: qd,
+                acceleration: &zero,
+                transmitted: &zero,
+            };
+            term.act(&at, effort);
+        };
+        let data = problem(&model, &[recording(&model, 3, press)]);
+        let nothing = Fit::new(&data, Vec::new());
+        let base = Base::new(&data, &nothing, 40);
+        let proposal = base.propose_wall(wall).unwrap();
+        assert!(plausible(&proposal.active, &model));
+        let parameters =
+            nothing.with(&data, proposal.active).refined(&data).actives[0].parameters();
+        (parameters[0], parameters[4])
+    }
+
+    /// The same robot, its joints named in another order, and with two sliding fingers on its last link.
+    fn shuffled_with_a_gripper() -> String {
+        let start = URDF.find("  <joint name=\"shoulder\"").unwrap();
+        let middle = URDF.find("  <joint name=\"elbow\"").unwrap();
+        let end = URDF.find("</robot>").unwrap();
+        let finger = |name: &str, y: f64| {
+            format!(
+                r#"<link name="{name}_pad"/><joint name="{name}" type="prismatic"><parent link="lower"/><child link="{name}_pad"/>
+                <origin xyz="0 {y} 0.3"/><axis xyz="0 1 0"/><limit lower="0" upper="0.04" velocity="1" effort="20"/></joint>"#
+            )
+        };
+        [
+            &URDF[..start],
+            &finger("left", 0.02),
+            &URDF[middle..end],
+            &URDF[start..middle],
+            &finger("right", -0.02),
+            "</robot>",
+        ]
+        .concat()
+    }
+
+    #[test]
+    fn the_order_of_joints_in_the_urdf_and_a_gripper_change_nothing() {
+        let ((stiffness, offset), (other_stiffness, other_offset)) =
+            (found(URDF), found(&shuffled_with_a_gripper()));
+        assert!((stiffness / 800.0 - 1.0).abs() < 0.1, "{stiffness} N/m");
+        assert!((offset + 0.62).abs() < 0.02, "{offset} m");
+        assert!((stiffness / other_stiffness - 1.0).abs() < 1e-3);
+        assert!((offset - other_offset).abs() < 1e-3);
+        let names = |urdf: &str| {
+            let model = Model::from_urdf(urdf).unwrap();
+            let link = model.link_index("lower").unwrap();
+            let joints = bearing(&model, link).into_iter();
+            let mut names: Vec<String> = joints
+                .map(|joint| model.joints()[joint].name.clone())
+                .collect();
+            names.sort();
+            let reach_mm = (1e3 * reach_m(&model, link)).round() as i64;
+            (names, reach_mm, moving_link(&model, link) == link)
+        };
+        assert_eq!(names(URDF), names(&shuffled_with_a_gripper()));
     }
 }

@@ -7,8 +7,8 @@ use tauscope_dynamics::terms::{Against, PlaceKind};
 
 use crate::data::problem::Problem;
 use crate::physics::active::{Active, Hypothesis, TimeKind};
-use crate::physics::kinematic_tree::bearing;
 use crate::report::schema::Finding;
+use tauscope_dynamics::kinematic_tree::bearing;
 
 use super::Named;
 
