@@ -208,7 +208,7 @@ def show(o):
         mean = lambda x: f"{sum(x) / len(x):.3f}" if x else ""
         print(f"| {kind} | {len(own)} | {mean([c for c, _ in own])} | {mean([r for _, r in own])} | {len(sure)} | {mean(sure)} |")
     if o.fit:
-        names = ["BASE", "PER_LOG_SIZE", "PER_NAT_BELOW", "IMITATED", "BESIDE_ANOTHER"]
+        names = ["BASE", "PER_LOG_OVER_REST", "PER_NAT_BELOW", "IMITATED", "BESIDE_ANOTHER"]
         print("\n" + ", ".join(f"{n} {x:.3f}" for n, x in zip(names, regression(rows, [r for _, r in pairs]))))
     if o.svg:
         o.svg.write_text(svg(pairs))
