@@ -153,14 +153,14 @@ def svg(pairs):
     for tick in (0., 0.25, 0.5, 0.75, 1.):
         x, y = at(tick, tick)
         parts += [f'<text x="{x:.0f}" y="460" text-anchor="middle">{tick}</text>', f'<text x="52" y="{y + 4:.0f}" text-anchor="end">{tick}</text>']
-    for low, high in zip(EDGES, EDGES[1:]):
+    for k, (low, high) in enumerate(zip(EDGES, EDGES[1:])):
         own = [(c, r) for c, r in pairs if low <= c < high]
         if own:
             mean, right = sum(c for c, _ in own) / len(own), sum(r for _, r in own)
             (x, y), ends = at(mean, right / len(own)), [at(mean, e)[1] for e in wilson(right, len(own))]
             parts += [f'<path d="M{x:.1f} {ends[0]:.1f} V{ends[1]:.1f}" stroke="#1f6feb" stroke-width="2"/>',
                       f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="#1f6feb"/>',
-                      f'<text x="{x - 8:.1f}" y="{y - 8:.1f}" text-anchor="end" fill="#555">{len(own)}</text>']
+                      f'<text x="{x:.1f}" y="{max(ends) + 15 + 13 * (k % 3):.1f}" text-anchor="middle" fill="#555">{len(own)}</text>']
     parts += ['<text x="260" y="485" text-anchor="middle">mean confidence of the findings in a bin</text>',
               '<text x="18" y="240" text-anchor="middle" transform="rotate(-90 18 240)">share of them that is right</text>', "</svg>"]
     return "\n".join(parts) + "\n"
