@@ -84,7 +84,7 @@ json.dump(held, open(sys.argv[1], "w"))' "$some/answers.json"
 else
     run "proof" proof tests/proof/set target/release/tauscope
 fi
-run "CONTRIBUTING.md" tests/contributing.sh
+run "CONTRIBUTING.md" tests/contributing.py
 
 printf '\n| what | seconds | result |\n| --- | ---: | --- |\n'
 printf '%s\n' "${rows[@]}"
