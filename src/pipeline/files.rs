@@ -5,7 +5,7 @@ mod model_fits;
 mod outputs;
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use tauscope_ingest::SourceSettings;
 use tauscope_twin::{Expected, Motion, TwinFile};
@@ -278,10 +278,11 @@ impl<'a> Resolver<'a> {
         let Some(ingest) = &self.entry(source).ingest else {
             return;
         };
-        let (topics, key) = match ingest.input() {
-            Ok(Input::File(file)) => (&file.topics, "file"),
-            Ok(Input::Zenoh(zenoh)) => (&zenoh.topics, "zenoh"),
-            _ => return,
+        let Ok((key, source_settings)) = ingest.source() else {
+            return;
+        };
+        let Some(topics) = source_settings.topics() else {
+            return;
         };
         let source_place = stage_place(source).key("ingest").key(key).key("topics");
         let wants = [

@@ -18,7 +18,7 @@ impl Resolver<'_> {
                 continue;
             };
             let place = stage_place(index).key("ingest");
-            for path in config.paths_mut() {
+            if let Some(path) = config.path_mut() {
                 let key = (entry.host.as_deref(), self.plain(path));
                 taken.insert(key, (place.clone(), format!("`{}` reads it", entry.name)));
             }
