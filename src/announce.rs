@@ -1,9 +1,9 @@
 //! Says on the terminal what a detector or a watch finds, as it finds it.
 
 use tauscope_bus::{Detection, Emit, EventKind, LinkError, Stage, StageError, TwinState, flags};
-use tauscope_watch as watch;
 
-use crate::pipeline::CellFacts;
+use tauscope_pipeline::cell::CellFacts;
+use tauscope_watch as watch;
 
 /// A detect or explain stage whose events are told on standard error. Its stream is untouched.
 pub struct Announced<S> {

@@ -36,3 +36,9 @@ pub enum Command {
     #[command(hide = true)]
     Exec(stage::ExecArgs),
 }
+
+impl Default for Command {
+    fn default() -> Self {
+        Self::Run(run::Args::default())
+    }
+}

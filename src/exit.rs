@@ -1,8 +1,10 @@
 //! How a command ends.
 
-use std::process::ExitCode;
+use std::io::IsTerminal;
 
-use crate::report::{Problem, Report};
+use tauscope_pipeline::report::{Problem, Report};
+
+use crate::output::Output;
 
 /// How a command ended that did what was asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,27 +55,39 @@ impl From<Report> for Failure {
     }
 }
 
+impl From<tauscope_evaluate::WriteError> for Failure {
+    fn from(error: tauscope_evaluate::WriteError) -> Self {
+        match error {
+            tauscope_evaluate::WriteError::Refused(report) => Self::Rejected(report),
+            error @ tauscope_evaluate::WriteError::Failed { .. } => {
+                Self::Failed(anyhow::Error::msg(error.to_string()))
+            }
+        }
+    }
+}
+
 impl From<anyhow::Error> for Failure {
     fn from(error: anyhow::Error) -> Self {
         Self::Failed(error)
     }
 }
 
-/// The exit code, which is the same for every command; what went wrong is printed.
+/// The exit code, which is the same for every command; what went wrong is said.
 ///
 /// 0 done; 1 failed; 2 wrong arguments or files, nothing was started; 3 done, but data was lost.
-pub fn code(outcome: Result<Exit, Failure>) -> ExitCode {
-    ExitCode::from(match outcome {
+pub fn code(outcome: Result<Exit, Failure>, out: &mut Output) -> u8 {
+    match outcome {
         Ok(Exit::Done) => 0,
         Ok(Exit::Failed) => 1,
         Ok(Exit::Lossy) => 3,
         Err(Failure::Failed(error)) => {
-            eprintln!("error: {error:#}");
+            out.say(&format!("error: {error:#}"));
             1
         }
         Err(Failure::Rejected(report)) => {
-            report.print();
+            let styled = matches!(out, Output::Terminal) && std::io::stderr().is_terminal();
+            out.say(&report.render(styled));
             2
         }
-    })
+    }
 }

@@ -10,19 +10,21 @@ mod twin;
 mod words;
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+
+use tauscope_pipeline::provenance;
+use tauscope_pipeline::report::Problem;
+use tauscope_pipeline::whole_file;
 
 use crate::exit::Failure;
-use crate::provenance;
-use crate::report::Problem;
 
 pub use input::{Arguments, Request, from_arguments, from_case, without};
 pub use output::{json, prepare, write};
-pub use read::{Kept, first_joint_names, read};
+pub use read::{Kept, read};
 pub use words::text;
 
 /// What went in, by name and hash.
-fn provenance_of(request: &Request) -> anyhow::Result<BTreeMap<String, String>> {
+fn provenance_of(request: &Request) -> std::io::Result<BTreeMap<String, String>> {
     let version = env!("CARGO_PKG_VERSION").to_owned();
     let mut all = BTreeMap::from([("tauscope".to_owned(), version)]);
     if let Some(urdf) = &request.cell.facts.urdf {
@@ -44,14 +46,9 @@ fn provenance_of(request: &Request) -> anyhow::Result<BTreeMap<String, String>> 
     Ok(all)
 }
 
-/// Writes a file beside `path` and moves it there once it is whole.
-pub fn write_whole(path: &Path, content: &[u8]) -> Result<(), Failure> {
-    let mut part = path.as_os_str().to_owned();
-    part.push(".part");
-    let part = PathBuf::from(part);
-    std::fs::write(&part, content)
-        .and_then(|()| std::fs::rename(&part, path))
-        .map_err(|error| {
-            Failure::Rejected(Problem::of_file(path, format!("cannot write: {error}")).into())
-        })
+/// Writes a file, whole or not at all.
+fn write_whole(path: &Path, content: &[u8]) -> Result<(), Failure> {
+    whole_file::write(path, content).map_err(|error| {
+        Failure::Rejected(Problem::of_file(path, format!("cannot write: {error}")).into())
+    })
 }

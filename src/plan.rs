@@ -5,8 +5,7 @@ mod table;
 
 use serde::Serialize;
 use tauscope_bus::{Keep, SampleKind};
-
-use crate::pipeline::Pipeline;
+use tauscope_pipeline::pipeline::Pipeline;
 
 pub use picture::{dot, mermaid};
 pub use table::{keep_word, table};

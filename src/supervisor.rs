@@ -24,7 +24,6 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::mpsc;
 use tokio::time::Instant;
 
-use crate::pipeline::Pipeline;
 use crate::plan::{Link, Over};
 
 use crate::progress::Progress;
@@ -33,6 +32,7 @@ use process::{Event, Process};
 use router::Router;
 pub use seats::Instructions;
 pub use summary::Summary;
+use tauscope_pipeline::pipeline::Pipeline;
 
 /// A stage whose inputs have all ended has this long to finish by itself before it is asked to.
 const GRACE: Duration = Duration::from_secs(2);

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use crate::ArchiveError;
 use crate::damage::{Damage, DamageKind};
+use crate::error::ArchiveError;
 
 /// What a bag's folder says of it.
 #[derive(Debug)]

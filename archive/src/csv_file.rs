@@ -14,9 +14,9 @@ use std::path::{Path, PathBuf};
 pub use error::{CsvError, CsvProblem};
 pub use mapping::{Column, Columns, CsvMapping};
 
-use crate::ArchiveError;
+use crate::cursor::{Cursor, RawMessage};
 use crate::damage::{Damage, DamageKind};
-use crate::recording::{Cursor, RawMessage};
+use crate::error::ArchiveError;
 use crate::ros;
 use rows::{Row, Rows};
 

@@ -7,9 +7,10 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use crate::damage::{Damage, seconds};
+use crate::error::ArchiveError;
 use crate::recording::{Message, Recording, RecordingKind};
 use crate::ros::{JointState, Message as _};
-use crate::{ArchiveError, Topic};
+use crate::topic::Topic;
 
 /// A pause counts as a gap if it is this many times as long as the topic's mean period.
 const GAP_PERIODS: i64 = 5;

@@ -10,6 +10,7 @@
 
 mod bag_folder;
 mod csv_file;
+mod cursor;
 mod damage;
 mod error;
 mod info;
@@ -19,6 +20,7 @@ mod recording;
 mod repair;
 pub mod ros;
 mod sqlite_file;
+mod topic;
 
 pub use csv_file::{Column, Columns, CsvError, CsvMapping, CsvProblem, limits as csv_limits};
 pub use damage::{Damage, DamageKind};
@@ -27,5 +29,6 @@ pub use info::{Gap, Info, JointsInfo, TopicInfo};
 pub use mcap_write::{
     CHUNK_SPAN_NS, Compression, McapWriter, PROVENANCE, TopicWriter, WriteError, Written,
 };
-pub use recording::{JointStates, Message, Messages, Recording, RecordingKind, Stamped, Topic};
+pub use recording::{JointStates, Message, Messages, Recording, RecordingKind, Stamped};
 pub use repair::{RepairError, Repaired, repair, repaired_path};
+pub use topic::Topic;

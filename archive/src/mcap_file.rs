@@ -10,6 +10,7 @@ mod chunk;
 mod cursor;
 mod index;
 mod layout;
+mod read;
 mod scan;
 mod walk;
 

@@ -4,7 +4,6 @@ mod joint_states;
 mod messages;
 mod open;
 mod several;
-mod topic;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,20 +11,19 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use crate::ArchiveError;
 use crate::csv_file::CsvTable;
+use crate::cursor::Cursor;
 use crate::damage::Damage;
+use crate::error::ArchiveError;
 use crate::mcap_file::{Layout, McapCursor, Order};
 use crate::mcap_write::PROVENANCE;
 use crate::ros;
 use crate::sqlite_file::SqliteFile;
+use crate::topic::{Topic, Topics};
 
 pub use joint_states::{JointStates, Stamped};
-pub(crate) use messages::{Cursor, RawMessage};
 pub use messages::{Message, Messages};
 use several::{Part, SeveralCursor};
-pub use topic::Topic;
-use topic::Topics;
 
 /// What a recording is stored as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

@@ -8,11 +8,12 @@ use std::sync::Arc;
 
 use mcap::records::{MessageHeader, Metadata};
 
+use crate::cursor::Cursor;
 use crate::damage::{Damage, DamageKind};
+use crate::error::ArchiveError;
 use crate::mcap_file::{Layout, McapCursor, Order, attachment_header};
 use crate::mcap_write::{self, Compression, WriteError, Written};
-use crate::recording::Cursor;
-use crate::{ArchiveError, Recording, RecordingKind};
+use crate::recording::{Recording, RecordingKind};
 
 /// Name of the metadata record that says what was repaired.
 const REPAIR: &str = "tauscope_repair";

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, OpenFlags};
 
-use crate::ArchiveError;
+use crate::cursor::{Cursor, RawMessage};
 use crate::damage::{Damage, DamageKind};
-use crate::recording::{Cursor, RawMessage, Topic};
+use crate::error::ArchiveError;
+use crate::topic::Topic;
 
 /// How every SQLite database begins.
 pub(crate) const MAGIC: &[u8] = b"SQLite format 3\0";

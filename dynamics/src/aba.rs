@@ -2,9 +2,10 @@
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 
+use crate::data::Data;
 use crate::data::{Articulated, check_lengths};
 use crate::kinematics::forward_kinematics;
-use crate::{Data, Model};
+use crate::model::Model;
 
 /// What the surroundings do to a link.
 #[derive(Debug, Clone, Copy, PartialEq)]

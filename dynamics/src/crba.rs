@@ -1,19 +1,12 @@
 //! The joint-space mass matrix.
 
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::DMatrix;
 
-use crate::data::check_lengths;
+use crate::data::Data;
+use crate::data::{Composite, check_lengths};
 use crate::inertia::symmetric;
 use crate::kinematics::forward_kinematics;
-use crate::{Data, Model};
-
-/// A subtree's mass, first moment and pseudo-inertia ∫ r rᵀ dm about the world's origin, along its axes.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Composite {
-    mass: f64,
-    first_moment: Vector3<f64>,
-    pseudo_inertia: Matrix3<f64>,
-}
+use crate::model::Model;
 
 /// The mass matrix \[kg m², kg m, kg\] at `q`, tool included: n x n, symmetric, both triangles filled,
 /// by the composite-rigid-body algorithm (RBDA section 6.2). [`link_pose`](crate::link_pose) and

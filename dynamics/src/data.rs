@@ -2,9 +2,8 @@
 
 use nalgebra::{DMatrix, Matrix3, Matrix6, Matrix6xX, Vector3, Vector6};
 
-use crate::Model;
-use crate::crba::Composite;
-use crate::regressor::PARAMETERS_PER_BODY;
+use crate::inertia::PARAMETERS_PER_BODY;
+use crate::model::{Body, Model};
 
 /// Working memory and results for one [`Model`] (or any other with the same tree). Each algorithm
 /// overwrites what it answers with; nothing is allocated after [`Data::new`].
@@ -62,6 +61,33 @@ pub(crate) struct Articulated {
     pub pivot: f64,
     pub free_effort: f64,
     pub acceleration: Vector6<f64>,
+}
+
+/// A subtree's mass, first moment and pseudo-inertia ∫ r rᵀ dm about the world's origin, along its axes.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Composite {
+    pub mass: f64,
+    pub first_moment: Vector3<f64>,
+    pub pseudo_inertia: Matrix3<f64>,
+}
+
+impl Slot {
+    /// Poses the body in its parent's frame with its joint at `q` \[rad or m\].
+    #[inline]
+    pub fn place(&mut self, body: &Body, q: f64) {
+        let r = &body.rotation;
+        if body.prismatic {
+            self.rotation = *r;
+            self.translation = body.translation + r.column(2) * q;
+        } else {
+            let (sin, cos) = q.sin_cos();
+            let (x, y) = (r.column(0), r.column(1));
+            self.rotation.set_column(0, &(x * cos + y * sin));
+            self.rotation.set_column(1, &(y * cos - x * sin));
+            self.rotation.set_column(2, &r.column(2));
+            self.translation = body.translation;
+        }
+    }
 }
 
 impl Data {

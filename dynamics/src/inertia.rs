@@ -4,6 +4,9 @@ use std::ops::{Add, AddAssign, Sub};
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
+/// How many inertial parameters a rigid body has, and so columns of [`regressor`](crate::regressor) per moving body.
+pub const PARAMETERS_PER_BODY: usize = 10;
+
 /// The ten inertial parameters of a rigid body, in some frame: mass, first moment, and the second
 /// moment about the frame's origin (RBDA section 2.13). Linear: bodies that move together add up.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -4,9 +4,10 @@ use std::ops::{Add, AddAssign, Mul, Sub};
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::data::Data;
 use crate::data::check_lengths;
+use crate::model::Model;
 use crate::sines::sines;
-use crate::{Data, Model};
 
 /// The product of the mass matrix and accelerations at the newest and at the previous position, without the matrix: [`rnea`](crate::rnea)
 /// without velocities and gravity (RBDA section 5.3), in body frames, whose inertias stand still. Both

@@ -2,8 +2,9 @@
 
 use nalgebra::{Isometry3, Matrix6xX, Rotation3, UnitQuaternion, Vector3};
 
+use crate::data::Data;
 use crate::data::{Slot, check_lengths};
-use crate::{Data, Model};
+use crate::model::Model;
 
 /// Computes the pose of every link at the positions `q` \[rad or m\]; [`link_pose`] and
 /// [`link_jacobian`] answer from it (RBDA section 4.4).
@@ -15,7 +16,7 @@ pub fn forward_kinematics(model: &Model, data: &mut Data, q: &[f64]) {
     for (i, body) in model.bodies.iter().enumerate() {
         let (done, rest) = data.slots.split_at_mut(i + 1);
         let (parent, slot) = (&done[body.parent], &mut rest[0]);
-        body.place(q[body.joint], slot);
+        slot.place(body, q[body.joint]);
         slot.world_rotation = parent.world_rotation * slot.rotation;
         slot.world_translation =
             parent.world_translation + parent.world_rotation * slot.translation;

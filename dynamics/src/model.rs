@@ -2,8 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::Inertia;
-use crate::data::Slot;
+use crate::inertia::Inertia;
 
 mod document;
 mod error;
@@ -146,23 +145,6 @@ pub(crate) struct Frame {
 }
 
 impl Body {
-    /// Poses the body in its parent's frame.
-    #[inline]
-    pub fn place(&self, q: f64, slot: &mut Slot) {
-        let r = &self.rotation;
-        if self.prismatic {
-            slot.rotation = *r;
-            slot.translation = self.translation + r.column(2) * q;
-        } else {
-            let (sin, cos) = q.sin_cos();
-            let (x, y) = (r.column(0), r.column(1));
-            slot.rotation.set_column(0, &(x * cos + y * sin));
-            slot.rotation.set_column(1, &(y * cos - x * sin));
-            slot.rotation.set_column(2, &r.column(2));
-            slot.translation = self.translation;
-        }
-    }
-
     /// With the tool.
     pub fn inertia(&self) -> Inertia {
         self.own + self.tool

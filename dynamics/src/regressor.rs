@@ -2,12 +2,11 @@
 
 use nalgebra::{DMatrix, Matrix3, SMatrix, Vector3};
 
+use crate::data::Data;
 use crate::data::check_lengths;
+use crate::inertia::PARAMETERS_PER_BODY;
+use crate::model::Model;
 use crate::rnea::accelerate;
-use crate::{Data, Model};
-
-/// Columns of [`regressor`] per moving body.
-pub const PARAMETERS_PER_BODY: usize = 10;
 
 /// The joint-torque regressor Y of the motion, with effort = Y θ: n x 10 n. Row i is joint i; columns
 /// 10 j to 10 j + 9 are the parameters of the body that joint j moves, in the frame of its child link:

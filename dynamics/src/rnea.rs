@@ -2,8 +2,9 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::data::Data;
 use crate::data::{Slot, check_lengths};
-use crate::{Data, Model};
+use crate::model::Model;
 
 /// The effort \[N m or N\] that the motion `q`, `qd`, `qdd` costs at each joint, gravity and tool
 /// included: the recursive Newton-Euler algorithm (RBDA section 5.3).
@@ -87,7 +88,7 @@ pub(crate) fn accelerate(
         let (done, rest) = data.slots.split_at_mut(i + 1);
         let (parent, slot) = (&done[body.parent], &mut rest[0]);
         let (q, qd, qdd) = motion(body.joint);
-        body.place(q, slot);
+        slot.place(body, q);
         follow(parent, slot, body.prismatic, qd, qdd);
     }
 }

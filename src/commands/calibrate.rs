@@ -5,15 +5,15 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use comfy_table::{CellAlignment, Table, presets};
 use tauscope_ingest::Topics;
+use tauscope_pipeline::calibrate::{Calibrated, Job};
+use tauscope_pipeline::cell::{Cell, ConstantSpot, EffortUnit};
+use tauscope_pipeline::provenance;
+use tauscope_pipeline::report::Problem;
 use tauscope_twin::{Expected, Motion, TwinFile};
 
-use super::print;
-use crate::calibrate::{Calibrated, Job};
 use crate::exit::{Exit, Failure};
-use crate::pipeline::{Cell, ConstantSpot, EffortUnit};
+use crate::output::Output;
 use crate::progress::Progress;
-use crate::provenance;
-use crate::report::Problem;
 
 /// Below this share of the measured effort's variance that the model explains, the gain is worth
 /// little.
@@ -83,7 +83,7 @@ fn motion(text: &str) -> Result<Motion, String> {
 }
 
 /// Calibrates and writes the twin.
-pub fn run(args: &Args) -> Result<Exit, Failure> {
+pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let constants = args.torque_constant.iter().cloned().collect();
     let problem = |_: ConstantSpot<'_>, title| Problem::new(title);
     let cell = Cell::from_urdf(&args.robot, args.effort_unit, &constants, &problem)?;
@@ -131,9 +131,9 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
     calibrated.file.provenance = provenance(args)?;
     write(&args.out, &calibrated.file)?;
     if args.json {
-        print(&serde_json::to_string_pretty(&calibrated.file).context("the twin")?)?;
+        out.print(&serde_json::to_string_pretty(&calibrated.file).context("the twin")?)?;
     } else {
-        print(&report(&calibrated, &cell, args))?;
+        out.print(&report(&calibrated, &cell, args))?;
     }
     Ok(Exit::from_loss(calibrated.lost > 0))
 }
@@ -165,7 +165,7 @@ fn write(path: &Path, file: &TwinFile) -> Result<(), Failure> {
     std::fs::write(&part, text)
         .and_then(|()| std::fs::rename(&part, path))
         .map_err(|error| Problem::of_file(path, format!("cannot write: {error}")).into())
-        .map_err(|report: crate::report::Report| Failure::Rejected(report))
+        .map_err(|report: tauscope_pipeline::report::Report| Failure::Rejected(report))
 }
 
 fn report(calibrated: &Calibrated, cell: &Cell, args: &Args) -> String {

@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 use serde_json::json;
+use tauscope_pipeline::files::FileKind;
+use tauscope_pipeline::pipeline::Pipeline;
 
-use crate::build;
 use crate::exit::{Exit, Failure};
-use crate::files::FileKind;
-use crate::pipeline::Pipeline;
+use crate::output::Output;
 use crate::plan;
 
 /// Check a pipeline file, and print its stages, hosts and links; or check another kind of file.
@@ -46,13 +46,15 @@ enum Format {
 }
 
 /// Checks and prints.
-pub fn run(args: &Args) -> Result<Exit, Failure> {
+pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     if args.kind != FileKind::Pipeline {
         args.kind.check_shape(&args.file)?;
         return Ok(Exit::Done);
     }
     let pipeline = Pipeline::load(&args.file, args.host.as_deref())?;
-    build::warn(&pipeline, args.host.as_deref());
+    for warning in pipeline.warnings(args.host.as_deref()) {
+        out.say(&format!("warning: {warning}"));
+    }
     let links = plan::links(&pipeline);
     let format = if args.json { Format::Json } else { args.format };
     let text = match format {
@@ -64,7 +66,7 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
             text.map_err(anyhow::Error::from)?
         }
     };
-    super::print(&text)?;
+    out.print(&text)?;
     Ok(Exit::Done)
 }
 

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::Context as _;
 use serde::Serialize;
+use tauscope_evaluate::{Evaluation, Judged, Options, Table};
 
-use super::print;
-use crate::evaluate::{self, Evaluation, Judged, Options, Table};
 use crate::exit::{Exit, Failure};
+use crate::output::Output;
 use crate::progress::Progress;
 
 /// Train, threshold and score detectors on a labelled set; print the papers' tables.
@@ -49,17 +49,17 @@ fn cutoff(text: &str) -> Result<f64, String> {
 }
 
 /// Evaluates, and writes what came of it.
-pub fn run(args: &Args) -> Result<Exit, Failure> {
+pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let options = Options {
         detectors: args.detectors.clone(),
         twins: args.twin.clone(),
         cutoffs_hz: [args.velocity_cutoff_hz, args.effort_cutoff_hz],
         jobs: usize::from(args.jobs),
     };
-    let request = evaluate::load(&args.set, &options)?;
-    evaluate::prepare(&args.out, &request)?;
+    let request = tauscope_evaluate::load(&args.set, &options)?;
+    tauscope_evaluate::prepare(&args.out, &request)?;
     let progress = Progress::of_work();
-    let result = evaluate::run(request, &args.out, &|share, what| {
+    let result = tauscope_evaluate::run(request, &args.out, &|share, what| {
         progress.doing(share, what);
     });
     let evaluation = result.map_err(|error| {
@@ -72,16 +72,16 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
     })?;
     progress.doing(1.0, "writing");
     let judged = Judged::all(&evaluation);
-    let tables = evaluate::tables(&evaluation, &judged);
-    let files = evaluate::write(&args.out, &evaluation, &judged, &tables)?;
+    let tables = tauscope_evaluate::tables(&evaluation, &judged);
+    let files = tauscope_evaluate::write(&args.out, &evaluation, &judged, &tables)?;
     drop(progress);
     if args.json {
         let summary = Summary::of(&evaluation, &judged, &tables, &files);
-        print(&serde_json::to_string_pretty(&summary).context("the results")?)?;
+        out.print(&serde_json::to_string_pretty(&summary).context("the results")?)?;
     } else {
-        print(&evaluate::text(&tables, &evaluation.notes))?;
+        out.print(&tauscope_evaluate::text(&tables, &evaluation.notes))?;
         for file in &files {
-            print(&format!("wrote {}", file.display()))?;
+            out.print(&format!("wrote {}", file.display()))?;
         }
     }
     Ok(Exit::from_loss(evaluation.lost > 0))
@@ -104,7 +104,7 @@ struct Numbered<'a> {
     twin: &'a str,
     threshold: f64,
     /// Over the labelled test recordings, by seed; `null` where nothing was scored.
-    seeds: &'a [evaluate::Numbers],
+    seeds: &'a [tauscope_evaluate::Numbers],
 }
 
 impl<'a> Summary<'a> {

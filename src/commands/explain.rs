@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
-use super::print;
+use tauscope_pipeline::cell::EffortUnit;
+
 use crate::exit::{Exit, Failure};
 use crate::explain::{self, Arguments, Kept, Request};
-use crate::pipeline::EffortUnit;
+use crate::output::Output;
 use crate::progress::Progress;
 
 /// Shares of the bar: reading ends here, and here the engine.
@@ -81,7 +82,7 @@ impl Args {
 }
 
 /// Explains, and writes what was found.
-pub fn run(args: &Args) -> Result<Exit, Failure> {
+pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let request = args.request()?;
     let progress = Progress::of_work();
     let input = explain::read(&request, &|share, what| progress.doing(READ * share, what))?;
@@ -94,9 +95,9 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
     let made = explain::write(&args.out, &request, &kept, &mut outcome)?;
     drop(progress);
     if args.json {
-        print(&explain::json(&outcome)?)?;
+        out.print(&explain::json(&outcome)?)?;
     } else {
-        print(&explain::text(&outcome.report, &made))?;
+        out.print(&explain::text(&outcome.report, &made))?;
     }
     Ok(Exit::from_loss(kept.lost > 0))
 }

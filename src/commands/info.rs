@@ -9,6 +9,7 @@ use tauscope_archive::ros::{self, Message as _};
 use tauscope_archive::{Damage, Recording, RecordingKind, Topic};
 
 use crate::exit::{Exit, Failure};
+use crate::output::Output;
 
 /// Say what is in a recording: its topics, how long it is, whose joints move, what is damaged.
 #[derive(Debug, clap::Args)]
@@ -46,7 +47,7 @@ struct Joints {
 }
 
 /// Prints it.
-pub fn run(args: &Args) -> Result<Exit, Failure> {
+pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let recording =
         Recording::open(&args.recording).map_err(|error| Failure::rejected(error.to_string()))?;
     let seconds = |ns: i64| ns as f64 * 1e-9;
@@ -67,7 +68,7 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
     } else {
         words(&info)
     };
-    super::print(&text)?;
+    out.print(&text)?;
     Ok(Exit::from_loss(info.damage.iter().any(Damage::loses_data)))
 }
 

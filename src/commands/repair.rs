@@ -7,6 +7,7 @@ use serde_json::json;
 use tauscope_archive::{Damage, RepairError, repair, repaired_path};
 
 use crate::exit::{Exit, Failure};
+use crate::output::Output;
 
 /// Rebuild an archive whose writer died, or whose end was cut off: all that can be read of it, with
 /// a sound index, in a new file.
@@ -23,12 +24,12 @@ pub struct Args {
 }
 
 /// Rebuilds it.
-pub fn run(args: &Args) -> Result<Exit, Failure> {
-    let out = args
+pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
+    let file = args
         .out
         .clone()
         .unwrap_or_else(|| repaired_path(&args.recording));
-    let repaired = repair(&args.recording, &out).map_err(|error| match error {
+    let repaired = repair(&args.recording, &file).map_err(|error| match error {
         RepairError::Write(_) => Failure::Failed(error.into()),
         _ => Failure::rejected(error.to_string()),
     })?;
@@ -55,7 +56,7 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
         );
         lines.join("\n")
     };
-    super::print(&text)?;
+    out.print(&text)?;
     Ok(Exit::from_loss(
         repaired.damage.iter().any(Damage::loses_data),
     ))

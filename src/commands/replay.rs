@@ -2,23 +2,21 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use anyhow::Context as _;
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
+use tauscope_pipeline::parallel;
+use tauscope_pipeline::pipeline::Pipeline;
+use tauscope_pipeline::replay::{Outcome, Replay, ReplayError, TwinChoice, stem};
+use tauscope_pipeline::report::{Problem, Report};
+use tauscope_pipeline::tables::{write_events, write_summary};
+use tauscope_pipeline::tally::{Event, JointRms};
 use tauscope_watch::amount;
 
-use super::print;
-use crate::build;
 use crate::exit::{Exit, Failure};
-use crate::pipeline::Pipeline;
+use crate::output::Output;
 use crate::progress::Progress;
-use crate::replay::{
-    Event, JointRms, Outcome, Replay, ReplayError, TwinChoice, stem, write_events, write_summary,
-};
-use crate::report::{Problem, Report};
 
 /// Run a pipeline's stages over recordings, in process, as fast as the machine allows: the same bytes
 /// every time. The recordings take the place of the pipeline's own source.
@@ -49,20 +47,22 @@ pub struct Args {
 }
 
 /// Replays them.
-pub fn run(args: &Args) -> Result<Exit, Failure> {
+pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let pipeline = Pipeline::load(&args.pipeline, None)?;
     check_names(args)?;
-    build::warn(&pipeline, None);
+    for warning in pipeline.warnings(None) {
+        out.say(&format!("warning: {warning}"));
+    }
     let replay = Replay::new(&pipeline, args.source.as_deref(), args.twin)
         .map_err(|error| Failure::rejected(error.to_string()))?;
     for stage in replay.left_out() {
-        eprintln!(
+        out.say(&format!(
             "note: stage `{stage}` is a program of its own and not replayed; `tauscope run` runs it"
-        );
+        ));
     }
-    if let Some(out) = &args.out {
-        std::fs::create_dir_all(out).map_err(|error| {
-            Failure::rejected(format!("cannot make {}: {error}", out.display()))
+    if let Some(folder) = &args.out {
+        std::fs::create_dir_all(folder).map_err(|error| {
+            Failure::rejected(format!("cannot make {}: {error}", folder.display()))
         })?;
     }
     let results = replay_all(&replay, args);
@@ -76,20 +76,20 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
                 wrong.push(Problem::of_file(recording, error.to_string()));
             }
             Err(error) => {
-                eprintln!("error: {}: {error}", recording.display());
+                out.say(&format!("error: {}: {error}", recording.display()));
                 failed = Some(Exit::Failed);
             }
         }
     }
-    if let Some(out) = &args.out {
-        write_summary(out, &outcomes).context("the summary")?;
-        write_events(out, &outcomes).context("the events")?;
+    if let Some(folder) = &args.out {
+        write_summary(folder, &outcomes).context("the summary")?;
+        write_events(folder, &outcomes).context("the events")?;
     }
     if args.json {
         let all: Vec<_> = outcomes.iter().map(Summary::of).collect();
-        print(&serde_json::to_string_pretty(&all).context("the summary")?)?;
+        out.print(&serde_json::to_string_pretty(&all).context("the summary")?)?;
     } else if !outcomes.is_empty() {
-        print(&table(&outcomes))?;
+        out.print(&table(&outcomes))?;
     }
     wrong.into_result(())?;
     let lossy = outcomes.iter().any(|outcome| outcome.lost > 0);
@@ -133,33 +133,15 @@ fn same_file(a: &Path, b: &Path) -> bool {
 
 /// The result of each recording, in their order, whatever the number of jobs.
 fn replay_all(replay: &Replay<'_>, args: &Args) -> Vec<Result<Outcome, ReplayError>> {
-    let next = AtomicUsize::new(0);
-    let results: Mutex<Vec<_>> = Mutex::new(args.recordings.iter().map(|_| None).collect());
     let progress = Progress::new(args.recordings.len());
-    std::thread::scope(|scope| {
-        for _ in 0..usize::from(args.jobs).min(args.recordings.len()) {
-            scope.spawn(|| {
-                loop {
-                    let index = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(recording) = args.recordings.get(index) else {
-                        break;
-                    };
-                    let result = replay.run(recording, args.out.as_deref(), &mut |fraction| {
-                        progress.set(index, fraction);
-                    });
-                    progress.set(index, 1.0);
-                    let mut results = results
-                        .lock()
-                        .unwrap_or_else(std::sync::PoisonError::into_inner);
-                    results[index] = Some(result);
-                }
-            });
-        }
-    });
-    let results = results
-        .into_inner()
-        .unwrap_or_else(std::sync::PoisonError::into_inner);
-    results.into_iter().flatten().collect()
+    let recordings = args.recordings.iter().enumerate().collect();
+    parallel::map(usize::from(args.jobs), recordings, |(index, recording)| {
+        let result = replay.run(recording, args.out.as_deref(), &mut |fraction| {
+            progress.set(index, fraction);
+        });
+        progress.set(index, 1.0);
+        result
+    })
 }
 
 /// What is told of a recording.
@@ -173,7 +155,7 @@ struct Summary<'a> {
     joints: &'a [String],
     twins: Vec<TwinSummary<'a>>,
     detectors: Vec<DetectorSummary<'a>>,
-    stages: &'a [crate::replay::StageCounts],
+    stages: &'a [tauscope_pipeline::graph::StageCounts],
     files: &'a [PathBuf],
 }
 

@@ -3,13 +3,14 @@
 use std::path::PathBuf;
 
 use anyhow::Context;
+use tauscope_pipeline::pipeline::Pipeline;
+use tauscope_pipeline::report::Problem;
+use tauscope_pipeline::settings::Settings;
+use tauscope_pipeline::suggest;
 
-use crate::build;
 use crate::exit::{Exit, Failure};
-use crate::pipeline::{Pipeline, Settings};
+use crate::output::Output;
 use crate::plan;
-use crate::report::Problem;
-use crate::suggest;
 use crate::supervisor::{self, Summary};
 
 /// Run a pipeline: check the file, start this host's stages, look after them until the source ends
@@ -40,7 +41,7 @@ impl Default for Args {
 }
 
 /// Runs it.
-pub fn run(args: &Args) -> Result<Exit, Failure> {
+pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let pipeline = Pipeline::load(&args.pipeline, args.host.as_deref())?;
     let names = || pipeline.hosts.keys().map(String::as_str);
     let host = match (&args.host, pipeline.hosts.len()) {
@@ -51,7 +52,9 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
         }
         (host, _) => host.as_deref(),
     };
-    build::warn(&pipeline, host);
+    for warning in pipeline.warnings(host) {
+        out.say(&format!("warning: {warning}"));
+    }
     let links = plan::links(&pipeline);
     let summary = supervisor::run(&pipeline, &links, host)?;
     let text = if args.json {
@@ -59,9 +62,9 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
     } else {
         summary.table()
     };
-    super::print(&text)?;
+    out.print(&text)?;
     if !args.json {
-        super::print(&written(&pipeline, &summary))?;
+        out.print(&written(&pipeline, &summary))?;
     }
     Ok(summary.exit())
 }

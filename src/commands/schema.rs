@@ -1,9 +1,10 @@
 //! `tauscope schema`.
 
 use serde_json::Value;
+use tauscope_pipeline::files::FileKind;
 
 use crate::exit::{Exit, Failure};
-use crate::files::FileKind;
+use crate::output::Output;
 
 /// Print the JSON Schema of the pipeline file, or of another kind of file, for editors that complete
 /// and check it.
@@ -15,11 +16,11 @@ pub struct Args {
 }
 
 /// Prints it.
-pub fn run(args: &Args) -> Result<Exit, Failure> {
+pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let mut schema = args.kind.schema().to_value();
     plain_descriptions(&mut schema);
     let text = serde_json::to_string_pretty(&schema).map_err(anyhow::Error::from)?;
-    super::print(&text)?;
+    out.print(&text)?;
     Ok(Exit::Done)
 }
 

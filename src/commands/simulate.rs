@@ -9,11 +9,12 @@ use std::path::PathBuf;
 use anyhow::Context as _;
 use tauscope_archive::Written;
 use tauscope_ingest::simulated::{self, ScenarioError};
+use tauscope_pipeline::provenance;
+use tauscope_pipeline::scenario::ScenarioFacts;
 
 use crate::exit::{Exit, Failure};
-use crate::pipeline::ScenarioFacts;
+use crate::output::Output;
 use crate::progress::Progress;
-use crate::provenance;
 
 /// Make recordings of a simulated cell, with the physics and the contacts that a scenario chooses.
 #[derive(Debug, clap::Args)]
@@ -31,7 +32,7 @@ pub struct Args {
 }
 
 /// Makes them.
-pub fn run(args: &Args) -> Result<Exit, Failure> {
+pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let facts = ScenarioFacts::load(&args.scenario)?;
     let robot = facts.robot().context("cannot use the URDF")?;
     // What is concealed cannot be had from the recordings.
@@ -94,7 +95,7 @@ pub fn run(args: &Args) -> Result<Exit, Failure> {
         lines.extend(others.map(|path| path.display().to_string()));
         lines.join("\n")
     };
-    super::print(&text)?;
+    out.print(&text)?;
     Ok(Exit::Done)
 }
 

@@ -6,12 +6,14 @@ use std::process::{Command, ExitCode};
 use rustix::process::{Signal, set_parent_process_death_signal};
 use tauscope_bus::shell::{Child, ChildError};
 use tauscope_ingest::SimulatedRobot;
+use tauscope_pipeline::build::{self, BuildError};
+use tauscope_pipeline::cell::Cell;
+use tauscope_pipeline::learnt_state::{self, Kept};
+use tauscope_pipeline::report::Report;
+use tauscope_pipeline::scenario::ScenarioFacts;
+use tauscope_pipeline::settings::Settings;
 
 use crate::announce::Announced;
-use crate::build::{self, BuildError};
-use crate::learnt_state::{self, Kept};
-use crate::pipeline::{Cell, ScenarioFacts, Settings};
-use crate::report::Report;
 use crate::supervisor::Instructions;
 
 /// A stage of ours: its seat stands on standard input.
@@ -134,7 +136,7 @@ impl Made {
             }
             Settings::Record(config) => {
                 let cells: Vec<&Cell> = cells.iter().collect();
-                let recorder = build::recorder_of(config, &cells, &told.streams, &told.provenance)?;
+                let recorder = build::recorder(config, &cells, &told.streams, &told.provenance)?;
                 Self::Record(Box::new(recorder))
             }
             Settings::Outside(_) => return Err(SeatError::Outside),

@@ -6,13 +6,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use tauscope_dynamics::terms::EFFECTS;
+use tauscope_pipeline::cell::{Cell, EffortUnit};
+use tauscope_pipeline::files::CaseFile;
+use tauscope_pipeline::report::{Problem, Report};
+use tauscope_pipeline::suggest;
+use tauscope_pipeline::yaml::{self, Located, Place};
 use tauscope_twin::TwinFile;
-
-use crate::files::CaseFile;
-use crate::pipeline::{Cell, EffortUnit};
-use crate::report::{Problem, Report};
-use crate::suggest;
-use crate::yaml::{self, Located, Place};
 
 use self::assembly::{Assembly, Spot};
 

@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use tauscope_explain::report::Verdict;
 use tauscope_explain::{Outcome, html};
+use tauscope_pipeline::report::{Problem, Report};
 
 use super::input::Request;
 use super::read::Kept;
 use super::{picture, provenance_of, robot, twin, write_whole};
 use crate::exit::Failure;
-use crate::report::{Problem, Report};
 
 const PAGE: &str = "report.html";
 const PICTURE: &str = "explain.rrd";
@@ -78,7 +78,7 @@ pub fn write(
             joint.joint.clone_from(name);
         }
     }
-    let provenance = provenance_of(request)?;
+    let provenance = provenance_of(request).context("what went in")?;
     let mut made = Made::default();
     let mut predictions = Vec::new();
     for (recording, rows) in &outcome.predictions {

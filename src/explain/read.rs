@@ -1,15 +1,13 @@
 //! Recordings into what the engine takes.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
-use tauscope_archive::Recording as Archive;
 use tauscope_dynamics::Model;
 use tauscope_explain::{Input, Recording, RecordingTopics, Start};
+use tauscope_pipeline::report::{Problem, Report};
 use tauscope_twin::JointCorrection;
 
 use super::input::{Named, Request};
-use crate::report::{Problem, Report};
 
 /// What is known of the input once the engine has taken it.
 #[derive(Debug)]
@@ -46,26 +44,6 @@ impl Kept {
             lost: recordings().map(|recording| recording.losses.lost()).sum(),
         }
     }
-}
-
-/// The joints of the first message that can be read, in its order.
-pub fn first_joint_names(path: &Path, topic: &str) -> Result<Vec<String>, Report> {
-    let wrong = |title: String| Report::from(Problem::new(title));
-    let archive = Archive::open(path).map_err(|error| wrong(error.to_string()))?;
-    let mut states = archive
-        .joint_states(topic)
-        .map_err(|error| wrong(error.to_string()))?;
-    while let Some(state) = states.next_state() {
-        if let Ok(state) = state
-            && !state.message.name.is_empty()
-        {
-            return Ok(state.message.name.clone());
-        }
-    }
-    let path = path.display();
-    Err(wrong(format!(
-        "{path}: no message on `{topic}` names its joints"
-    )))
 }
 
 /// Reads the recordings of `request`; `progress` is told the share of them that is read, and which is next.

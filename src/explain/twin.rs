@@ -7,11 +7,11 @@ use tauscope_dynamics::terms::TermSpec;
 use tauscope_explain::Outcome;
 use tauscope_explain::report::{Finding, Report};
 use tauscope_ingest::Topics;
+use tauscope_pipeline::calibrate::{CalibrateError, Job};
 use tauscope_twin::{Expected, JointCorrection, TwinFile};
 
 use super::input::Request;
 use super::read::Kept;
-use crate::calibrate::{CalibrateError, Job};
 
 /// The corrected twin. Its noise, and the scores that thresholds rest on, are measured with the pipeline's
 /// own twin on the fitted recordings in which nothing came and went; where there is none they are left out,

@@ -3,8 +3,9 @@
 
 use std::fmt::Write;
 
+use tauscope_pipeline::pipeline::{Pipeline, Stage, words_for};
+
 use super::{Link, Over};
-use crate::pipeline::{Pipeline, Stage, words_for};
 
 /// A Mermaid flowchart, hosts as boxes around their stages.
 pub fn mermaid(pipeline: &Pipeline, links: &[Link]) -> String {

@@ -2,9 +2,9 @@
 
 use comfy_table::{Table, presets};
 use tauscope_bus::Keep;
+use tauscope_pipeline::pipeline::{Pipeline, words_for};
 
 use super::Link;
-use crate::pipeline::{Pipeline, words_for};
 
 /// Stages, hosts and links.
 pub fn table(pipeline: &Pipeline, links: &[Link]) -> String {

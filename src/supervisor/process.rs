@@ -8,11 +8,10 @@ use std::time::Duration;
 use anyhow::Context;
 use rustix::process::{Pid, Signal, kill_process_group};
 use tauscope_bus::Seat;
+use tauscope_pipeline::settings::{OutsideEntry, Settings};
 use tokio::io::{AsyncBufReadExt, AsyncRead, AsyncWriteExt, BufReader};
 use tokio::process::{Child, ChildStdin, Command};
 use tokio::sync::mpsc;
-
-use crate::pipeline::{OutsideEntry, Settings};
 
 /// Longer lines of a stage are cut.
 const LONGEST_LINE_BYTES: usize = 64 * 1024;

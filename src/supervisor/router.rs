@@ -4,8 +4,8 @@ use std::net::{Ipv4Addr, TcpListener};
 
 use anyhow::Context;
 use tauscope_bus::{ZenohEndpoints, ZenohRouter};
+use tauscope_pipeline::pipeline::Pipeline;
 
-use crate::pipeline::Pipeline;
 use crate::plan::{Link, Over};
 
 /// Holds this host's endpoints, which only one process can, and passes on between them and the

@@ -7,11 +7,13 @@ use tauscope_bus::seat::{Cell as SeatCell, Input, Output, OutputLink, TransportK
 use tauscope_bus::{
     Audience, Domain, EffortUnit as SeatUnit, Keep, SampleKind, Seat, ZenohEndpoints,
 };
+use tauscope_pipeline::build::StreamFacts;
+use tauscope_pipeline::cell::{CellFacts, EffortUnit};
+use tauscope_pipeline::pipeline::{Pipeline, Role};
+use tauscope_pipeline::scenario::ScenarioFacts;
+use tauscope_pipeline::settings::Settings;
 
-use crate::build::{self, StreamFacts};
-use crate::pipeline::{CellFacts, EffortUnit, Pipeline, Role, ScenarioFacts, Settings};
 use crate::plan::{Link, Over};
-use crate::provenance;
 
 /// Samples that a stage which keeps all may leave unread before those before it wait.
 const DEPTH_ALL: usize = 1024;
@@ -122,12 +124,12 @@ impl Planner<'_> {
             settings: settings.clone(),
             cells: cells.map(|cell| cell.facts.clone()).collect(),
             streams: if is_recorder {
-                build::streams(self.pipeline, &stage.inputs)
+                self.pipeline.streams(&stage.inputs)
             } else {
                 Vec::new()
             },
             provenance: if is_recorder {
-                provenance::of(self.pipeline)
+                self.pipeline.provenance()
             } else {
                 BTreeMap::new()
             },

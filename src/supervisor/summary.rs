@@ -3,10 +3,10 @@
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
 use tauscope_bus::SampleKind;
+use tauscope_pipeline::pipeline::Pipeline;
 
 use super::local::Local;
 use crate::exit::Exit;
-use crate::pipeline::Pipeline;
 use crate::plan::{Link, Over};
 
 /// What came of a run on this host.

@@ -5,7 +5,7 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::ArchiveError;
+use crate::error::ArchiveError;
 
 /// Which column of a table is what. Columns are counted from 1, as `cut` and spreadsheets do.
 ///

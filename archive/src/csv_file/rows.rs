@@ -8,7 +8,7 @@ use super::error::{CsvError, CsvProblem, shown};
 use super::limits;
 use super::lines::{Lines, MAX_LINE_BYTES};
 use super::mapping::{CsvMapping, Found};
-use crate::ArchiveError;
+use crate::error::ArchiveError;
 use crate::ros::{JointState, Time};
 
 const NS_PER_S: f64 = 1e9;

@@ -9,9 +9,9 @@ use mcap::records::op;
 use super::chunk::{Unpacker, inner_records};
 use super::layout::{Extent, ExtentKind, Layout};
 use super::{MAX_LOADED_BYTES, MESSAGE_HEADER_BYTES, RECORD_PREFIX_BYTES};
-use crate::ArchiveError;
+use crate::cursor::{Cursor, RawMessage};
 use crate::damage::{Damage, DamageKind};
-use crate::recording::{Cursor, RawMessage};
+use crate::error::ArchiveError;
 
 /// In which order messages come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,16 +1,13 @@
 //! What an MCAP file holds, and where.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use mcap::records::{Channel, Metadata, Record, op};
 
 use super::chunk::MessageHeader;
-use super::{index, scan};
-use crate::ArchiveError;
 use crate::damage::{Damage, DamageKind};
+use crate::topic::{Topic, Topics};
 
 /// Where messages lie.
 #[derive(Debug, Clone)]
@@ -51,7 +48,7 @@ pub(crate) struct Layout {
     pub(crate) path: PathBuf,
     pub(crate) file_bytes: u64,
     /// Whether the first record could be read.
-    header_read: bool,
+    pub(super) header_read: bool,
     pub(crate) profile: String,
     pub(crate) library: String,
     pub(crate) schemas: BTreeMap<u16, Schema>,
@@ -68,35 +65,7 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// Reads the index of the file, or the whole file if it has none that is sound.
-    ///
-    /// # Errors
-    /// If it cannot be opened, or not even its first record can be read.
-    pub(crate) fn read(path: &Path) -> Result<Self, ArchiveError> {
-        let file = File::open(path).map_err(ArchiveError::io(path))?;
-        let file_bytes = file.metadata().map_err(ArchiveError::io(path))?.len();
-        check_magic(&file, path)?;
-        let mut layout = Self::empty(path, file_bytes);
-        match index::read(&file, &mut layout).map_err(ArchiveError::io(path))? {
-            index::Outcome::Complete => return layout.checked(),
-            index::Outcome::Absent => layout = Self::empty(path, file_bytes),
-            index::Outcome::Unsound { at, reason } => {
-                layout = Self::empty(path, file_bytes);
-                layout.damage(at, DamageKind::Index { reason });
-            }
-        }
-        scan::read(&file, &mut layout).map_err(ArchiveError::io(path))?;
-        // Of a file that is torn within its data, that it has no index goes without saying.
-        let torn = |damage: &Damage| damage.kind == DamageKind::TornTail;
-        if layout.damage.iter().any(torn) {
-            layout
-                .damage
-                .retain(|damage| !matches!(damage.kind, DamageKind::Index { .. }));
-        }
-        layout.checked()
-    }
-
-    fn empty(path: &Path, file_bytes: u64) -> Self {
+    pub(super) fn empty(path: &Path, file_bytes: u64) -> Self {
         Self {
             path: path.to_owned(),
             file_bytes,
@@ -114,16 +83,21 @@ impl Layout {
         }
     }
 
-    /// A layout of which at least the first record could be read.
-    fn checked(self) -> Result<Self, ArchiveError> {
-        if self.header_read {
-            return Ok(self);
+    /// The topics, and which channel belongs to which.
+    pub(crate) fn topics(&self) -> Topics {
+        let mut topics = Topics::default();
+        for (&id, channel) in &self.channels {
+            let schema = self.schemas.get(&channel.schema_id);
+            let topic = Topic {
+                name: channel.topic.clone(),
+                type_name: schema.map_or_else(String::new, |schema| schema.name.clone()),
+                message_encoding: channel.message_encoding.clone(),
+                type_hash: channel.metadata.get("topic_type_hash").cloned(),
+                message_count: self.counts.get(&id).copied().unwrap_or(0),
+            };
+            topics.add_channel(id, topic);
         }
-        let reason = self.damage.first().map(|damage| damage.kind.to_string());
-        Err(ArchiveError::Unreadable {
-            reason: reason.unwrap_or_else(|| "it has no header".to_owned()),
-            path: self.path,
-        })
+        topics
     }
 
     pub(super) fn damage(&mut self, at: u64, kind: DamageKind) {
@@ -191,18 +165,4 @@ pub(super) fn words(error: &dyn std::error::Error) -> String {
         cause = error.source();
     }
     text
-}
-
-fn check_magic(file: &File, path: &Path) -> Result<(), ArchiveError> {
-    let mut magic = Vec::new();
-    file.take(mcap::MAGIC.len() as u64)
-        .read_to_end(&mut magic)
-        .map_err(ArchiveError::io(path))?;
-    if magic == mcap::MAGIC {
-        return Ok(());
-    }
-    Err(ArchiveError::Unreadable {
-        path: path.to_owned(),
-        reason: "it does not begin as an MCAP file does".to_owned(),
-    })
 }

@@ -1,7 +1,7 @@
 //! Joint states of one topic, decoded.
 
 use super::messages::Messages;
-use crate::ArchiveError;
+use crate::error::ArchiveError;
 use crate::ros::JointState;
 
 /// A message with the times of its way.

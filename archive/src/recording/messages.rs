@@ -3,33 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::topic::{Topic, Topics};
-use crate::ArchiveError;
+use crate::cursor::Cursor;
+use crate::error::ArchiveError;
 use crate::ros;
-
-/// A format's way through its messages.
-pub(crate) trait Cursor: Send {
-    /// Goes to the next message; `false` at the end.
-    ///
-    /// # Errors
-    /// If a part cannot be read; asked again, it goes on behind that if it can.
-    fn advance(&mut self) -> Result<bool, ArchiveError>;
-
-    /// The message it stands on, if any.
-    fn current(&self) -> Option<RawMessage<'_>>;
-}
-
-/// A message as a [`Cursor`] gives it.
-pub(crate) struct RawMessage<'a> {
-    /// Its topic's place in the list of topics.
-    pub(crate) topic: usize,
-    pub(crate) log_time_ns: i64,
-    pub(crate) publish_time_ns: i64,
-    pub(crate) sequence: u32,
-    /// Where it lies in the file.
-    pub(crate) at: u64,
-    pub(crate) body: &'a [u8],
-}
+use crate::topic::{Topic, Topics};
 
 /// A message of a recording.
 #[derive(Debug, Clone, Copy)]

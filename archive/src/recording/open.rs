@@ -7,15 +7,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::several::Part;
-use super::topic::{Topic, Topics};
 use super::{Recording, RecordingKind, Store};
-use crate::ArchiveError;
 use crate::bag_folder::BagFolder;
 use crate::csv_file::{self, CsvMapping, CsvTable};
 use crate::damage::{Damage, DamageKind};
+use crate::error::ArchiveError;
 use crate::mcap_file::Layout;
 use crate::ros::{JointState, Message as _};
 use crate::sqlite_file::{self, SqliteFile};
+use crate::topic::{Topic, Topics};
 
 impl Recording {
     /// Opens the recording at `path`: an MCAP file (also an unfinished `.part`), the folder of a
@@ -75,7 +75,7 @@ impl Recording {
         Self {
             path: layout.path.clone(),
             kind: RecordingKind::Mcap,
-            topics: Arc::new(Topics::of_mcap(&layout)),
+            topics: Arc::new(layout.topics()),
             log_times_ns: layout
                 .log_times
                 .map(|(start, end)| (time(start), time(end))),

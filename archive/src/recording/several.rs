@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::Recording;
-use super::messages::{Cursor, RawMessage};
-use crate::ArchiveError;
+use crate::cursor::{Cursor, RawMessage};
+use crate::error::ArchiveError;
 
 /// One of several recordings.
 pub(super) struct Part {

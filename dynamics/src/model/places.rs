@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Body, Frame, GRAVITY_M_S2, Joint, JointKind, Limits, Link, Load, Model};
-use crate::Inertia;
+use crate::inertia::Inertia;
 
 impl Model {
     /// The link that holds tools and payloads: the one named `tool` or, failing that, `tool0`; else,

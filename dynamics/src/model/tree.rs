@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::urdf::{RawJoint, RawLink, Robot};
 use super::{Body, Frame, GRAVITY_M_S2, Joint, Link, Load, Model, ModelError};
-use crate::Inertia;
+use crate::inertia::Inertia;
 
 /// Puts the tree together.
 ///

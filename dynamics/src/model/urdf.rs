@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::document::{self, JointMarks};
 use super::{Geometry, JointKind, Limits, ModelError, Shape};
-use crate::Inertia;
+use crate::inertia::Inertia;
 use crate::inertia::symmetric;
 
 /// A robot as written.

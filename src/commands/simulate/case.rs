@@ -6,10 +6,9 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use serde::Serialize;
 use tauscope_ingest::simulated::{EffortUnit, fit_count};
+use tauscope_pipeline::scenario::ScenarioFacts;
 
-use crate::pipeline::ScenarioFacts;
-
-/// As [`crate::files::CaseFile`] reads it.
+/// As [`tauscope_pipeline::files::CaseFile`] reads it.
 #[expect(clippy::struct_field_names, reason = "the key is the file's")]
 #[derive(Debug, Serialize)]
 struct Case<'a> {

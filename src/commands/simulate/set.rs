@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use serde::{Deserialize, Serialize};
 use tauscope_ingest::simulated::{EffortUnit, Role};
+use tauscope_pipeline::files::Impedance;
+use tauscope_pipeline::scenario::ScenarioFacts;
 
 use super::case;
-use crate::files::Impedance;
-use crate::pipeline::ScenarioFacts;
 
-/// As [`crate::files::SetFile`] reads it.
+/// As [`tauscope_pipeline::files::SetFile`] reads it.
 #[derive(Debug, Serialize)]
 struct Set<'a> {
     #[serde(rename = "set")]

@@ -4,13 +4,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use tauscope_dynamics::Model;
+use tauscope_pipeline::cell::{
+    Cell, CellFacts, ConstantSpot, EffortUnit, first_joint_names, torque_constants,
+};
+use tauscope_pipeline::report::{Problem, Report};
+use tauscope_pipeline::yaml;
 use tauscope_twin::TwinFile;
 
 use super::{Named, Request, StartFile};
-use crate::explain::read;
-use crate::pipeline::{self, Cell, CellFacts, ConstantSpot, EffortUnit};
-use crate::report::{Problem, Report};
-use crate::yaml;
 
 /// Where in the input something stands that may be wrong.
 pub enum Spot<'a> {
@@ -189,13 +190,13 @@ impl Assembly<'_> {
         let Some(first) = fit.first() else {
             return Err(Problem::new("there is no recording to fit").into());
         };
-        read::first_joint_names(&first.path, &self.state_topic)
+        first_joint_names(&first.path, &self.state_topic)
     }
 
     fn torque_constants(&self, joints: &[String], report: &mut Report) -> Option<Vec<f64>> {
         let constants = self.constants.as_ref()?;
         let problem = |spot: ConstantSpot<'_>, title| (self.problem)(Spot::Constants(spot), title);
-        pipeline::torque_constants(constants, joints, self.effort_unit, &problem, report)
+        torque_constants(constants, joints, self.effort_unit, &problem, report)
     }
 
     /// A twin to start from must be one of this robot, in this unit.

@@ -1,4 +1,12 @@
 //! Step 2, prepare: smoothed motion, filtered effort, and the rows that are compared.
+//!
+//! In: the recordings of step 1. Out: a [`problem::Problem`], the data of a regression. Position, velocity and
+//! acceleration come from a quintic smoothing spline (de Boor, *A Practical Guide to Splines*, revised edition 2001,
+//! chapter XIV). Measured effort and every regressor column pass through one zero-phase low-pass (Eilers, "A Perfect
+//! Smoother", *Analytical Chemistry* 75, 2003), so that filtering biases no parameter; identification of robots calls
+//! this the parallel filter (Khalil and Dombre, *Modeling, Identification and Control of Robots*, 2002, chapter 12).
+//! Rows are thinned to twice the cutoff, standstills and gaps are masked, and the noise is measured: its variance from
+//! fourth differences, its correlation as an effective sample size.
 
 pub mod column;
 pub mod effective_samples;

@@ -1,4 +1,9 @@
-//! Step 6, report: findings in words, with intervals, rivals and the proof on recordings held out.
+//! Step 6, report: findings in words, with intervals and rivals, and the test on recordings held out.
+//!
+//! In: the explanation of step 5. Out: a [`schema::Report`] (written as `report.json`), the same as a page
+//! ([`html`]), the corrected twin, and its predictions for the recordings held out, which no number was fitted to
+//! (Hastie, Tibshirani and Friedman, *The Elements of Statistical Learning*, 2009, section 7.2). Rivals whose evidence
+//! differs by less than 5 nats count as a tie and are reported with the motion that would separate them.
 
 pub(crate) mod corrected_twin;
 pub(crate) mod findings;

@@ -1,4 +1,5 @@
-//! What a row is worth: how correlated the noise is, told from what even a rich model leaves.
+//! Effective sample size: neighbouring rows of correlated noise count as less than one independent sample each. The
+//! correlation is measured on what even a rich regression leaves.
 
 use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::{MotionSample, sign};
@@ -11,17 +12,17 @@ const STRETCH_ROWS: usize = 20;
 /// place does not make noise of the rest.
 const CALM: f64 = 0.3;
 const CALM_BIAS: f64 = 0.12;
-/// A row is worth at least this share of an independent sample.
+/// A row counts as at least this share of an independent sample.
 const LEAST: f64 = 0.03;
 /// Speeds over which friction may fall \[rad/s\].
 const STRIBECK_RAD_S: [f64; 2] = [0.05, 0.3];
 
-/// By joint, how many independent samples one row of noise is worth: `(1 - r) / (1 + r)` with r the correlation of
-/// neighbours, as for a first-order autoregression.
+/// Effective samples per row, by joint, 0 to 1: `(1 - r) / (1 + r)` with r the correlation of neighbouring rows, as for
+/// a first-order autoregression.
 ///
 /// The noise is what a regression on many functions of the joint's motion and of all efforts leaves: it names nothing,
 /// but takes out most of what any effect in the joint does.
-pub fn worth(problem: &Problem) -> Vec<f64> {
+pub fn per_row(problem: &Problem) -> Vec<f64> {
     (0..problem.joints)
         .map(|joint| {
             let left = left_by_rich_model(problem, joint);
@@ -39,7 +40,12 @@ pub fn at_least(problem: &Problem, residual: &[f64]) -> Vec<f64> {
             &residual[problem.joint_rows(joint)],
         ))
     };
-    problem.worth.iter().enumerate().map(of_joint).collect()
+    problem
+        .effective_samples
+        .iter()
+        .enumerate()
+        .map(of_joint)
+        .collect()
 }
 
 fn of_left(problem: &Problem, joint: usize, left: &[f64]) -> f64 {

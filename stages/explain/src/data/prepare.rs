@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use tauscope_dynamics::Model;
 
-use crate::data::effective_samples::worth;
+use crate::data::effective_samples::per_row;
 use crate::data::noise::white_variance;
 use crate::data::problem::Problem;
 use crate::data::smoother::LowPass;
@@ -58,7 +58,7 @@ impl Problem {
             white_noise: vec![0.0; n],
             largest_effort: vec![0.0; n],
             cutoff_hz,
-            worth: Vec::new(),
+            effective_samples: Vec::new(),
             known_friction: vec![[0.0; 2]; n],
             cache: Arc::default(),
             units: Arc::default(),
@@ -126,7 +126,7 @@ impl Problem {
             variances[j].sort_by(f64::total_cmp);
             problem.white_noise[j] = variances[j][variances[j].len() / 2].sqrt();
         }
-        problem.worth = worth(&problem);
+        problem.effective_samples = per_row(&problem);
         problem
     }
 }

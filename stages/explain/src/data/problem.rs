@@ -33,8 +33,8 @@ pub struct Problem {
     pub largest_effort: Vec<f64>,
     /// Half amplitude of the filter \[Hz\].
     pub cutoff_hz: f64,
-    /// Independent samples that a row of noise is worth, by joint.
-    pub worth: Vec<f64>,
+    /// Effective (independent) samples per row of noise, by joint: 0 to 1.
+    pub effective_samples: Vec<f64>,
     /// Coulomb and viscous friction by joint that the twin has already: by so much they may be less.
     pub known_friction: Vec<[f64; 2]>,
     /// Columns that were computed before.

@@ -200,7 +200,7 @@ impl Track {
 }
 
 impl Track {
-    /// Which samples of a joint are worth comparing: not the ends, not beside a gap and, where the joint `moves`
+    /// Which samples of a joint are compared: not the ends, not beside a gap and, where the joint `moves`
     /// at all, not its standstills and reversals.
     pub(crate) fn counts(&self, joint: usize, moves: bool, cutoff_hz: f64) -> Vec<bool> {
         let n = self.position.len() / self.len();

@@ -31,7 +31,7 @@ impl Context<'_> {
             Vec::new()
         };
         // Where nobody knows the scale of the drives, the twin is only one once they are fitted.
-        let drives = || torque_scale::unknown_gains(&self.unscaled);
+        let scales = || torque_scale::unknown_scales(&self.unscaled);
         let say = |text: &str| {
             // Nobody knows how many rounds there will be: each takes a share of what is left.
             progress(0.1, text);
@@ -42,8 +42,8 @@ impl Context<'_> {
             unnamed_bodies: &unnamed_bodies,
             say: &say,
         };
-        let penalties = vec![0.0; drives().len()];
-        let moving = search.first_guess(drives(), penalties);
+        let penalties = vec![0.0; scales().len()];
+        let moving = search.first_guess(scales(), penalties);
         // Where friction is not set-valued, standstills tell as much as motion.
         progress(0.3, "standstills");
         let dry = (input.start.as_ref()).map_or_else(
@@ -71,7 +71,7 @@ impl Context<'_> {
         };
         let found = search.run(moving.fit.actives, moving.penalties);
         progress(0.8, "rivals");
-        let before = Fit::new(&problem, drives()).refined(&problem);
+        let before = Fit::new(&problem, scales()).refined(&problem);
         let named = findings::of(&search, &found, &before, input, &joints);
         let undetectable = findings::undetectable(&search, &found, &joints);
         Ok(Ok(Judged {

@@ -102,11 +102,11 @@ impl Fit {
             .map_or_else(|| (0..joints).collect(), |joint| vec![joint])
     }
 
-    /// Gain of log-likelihood from another fit to this, samples weighted by their `efficiency`.
-    pub fn gain_over(&self, other: &Self, efficiency: &[f64]) -> f64 {
+    /// Gain of log-likelihood from another fit to this, samples weighted by their `effective`.
+    pub fn gain_over(&self, other: &Self, effective: &[f64]) -> f64 {
         (0..self.variance.len())
             .map(|j| {
-                0.5 * efficiency[j] * self.count[j] * (other.variance[j] / self.variance[j]).ln()
+                0.5 * effective[j] * self.count[j] * (other.variance[j] / self.variance[j]).ln()
             })
             .sum()
     }

@@ -12,7 +12,7 @@ use tauscope_dynamics::{Inertia, Model};
 pub struct Whereabouts {
     /// The joint.
     pub joint: usize,
-    /// The joint that drives it.
+    /// The joint whose effort is coupled into it.
     pub source: usize,
     /// The link.
     pub link: usize,

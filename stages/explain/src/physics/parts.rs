@@ -18,11 +18,11 @@ use crate::physics::unit_columns::units;
 /// What the pieces of an explanation add.
 #[derive(Debug, Clone)]
 pub struct Parts {
-    /// Scale of each joint's drive.
+    /// Torque scale of each joint.
     pub gains: Vec<f64>,
     /// Joints whose recording is more than a sum: something transforms it.
     pub transformed: Vec<bool>,
-    /// By active, what it adds before the drives; `None` if it does not simply add.
+    /// By active, what it adds before torque scales; `None` if it does not simply add.
     columns: Vec<Option<Arc<Column>>>,
     /// What the gears transmit, if a part depends on it.
     load: Option<Arc<TrackEfforts>>,
@@ -113,7 +113,7 @@ impl Parts {
         }
     }
 
-    /// What an active adds by itself, before the drives.
+    /// What an active adds by itself, before torque scales.
     pub fn part(&self, problem: &Problem, active: &Active) -> Column {
         let hypothesis = active.hypothesis;
         let joint = hypothesis.only_joint();
@@ -152,12 +152,12 @@ impl Parts {
         problem.column(&added, joint)
     }
 
-    /// What an active adds, before the drives, if it does.
+    /// What an active adds, before torque scales, if it does.
     pub fn of(&self, index: usize) -> Option<&Arc<Column>> {
         self.columns[index].as_ref()
     }
 
-    /// What bodies cost at a joint, before its drive.
+    /// What bodies cost at a joint, before its torque scale.
     pub fn bodies(&self, problem: &Problem, actives: &[Active], joint: usize) -> Vec<f64> {
         let mut sum = problem.rigid()[problem.joint_rows(joint)].to_vec();
         for (active, part) in actives.iter().zip(&self.columns) {

@@ -45,7 +45,7 @@ impl Term for TorqueScale {
 }
 
 /// The scales of joints that nobody knows, as they are at first.
-pub fn unknown_gains(first: &[(usize, f64)]) -> Vec<Active> {
+pub fn unknown_scales(first: &[(usize, f64)]) -> Vec<Active> {
     let one = |&(joint, gain): &(usize, f64)| {
         let place = Whereabouts {
             joint,

@@ -97,7 +97,7 @@ pub fn of(
     joints: &[String],
 ) -> Named {
     let fit = &found.fit;
-    let efficiency = &search.problem.worth;
+    let effective = &search.problem.effective_samples;
     let spread = covariance(search.problem, fit);
     let total = mismatch(before, fit, before);
     let scales = Scales::of(search.problem, fit, &spread);
@@ -112,8 +112,8 @@ pub fn of(
             continue;
         }
         let deviations = parameter_deviations(search.problem, fit, &spread, index);
-        let less = search.less(found, index);
-        let evidence = found.ahead_of(&less, efficiency);
+        let less = search.without(found, index);
+        let evidence = found.ahead_of(&less, effective);
         let contest = contest(search, found, &less, active);
         let (mut parameters, mut intervals) = (BTreeMap::new(), BTreeMap::new());
         let effect = active.hypothesis.effect;

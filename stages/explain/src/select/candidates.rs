@@ -40,7 +40,7 @@ impl Search<'_> {
         let wanted: Vec<Hypothesis> = self
             .hypotheses
             .iter()
-            .filter(|h| touches(h) && self.is_worth_a_try(fit, **h))
+            .filter(|h| touches(h) && self.is_candidate(fit, **h))
             .copied()
             .collect();
         // An elastic joint or one with play has a rotor: where a rotor's inertia is no help, they are not tried.
@@ -67,7 +67,7 @@ impl Search<'_> {
         all
     }
 
-    fn is_worth_a_try(&self, fit: &Fit, hypothesis: Hypothesis) -> bool {
+    fn is_candidate(&self, fit: &Fit, hypothesis: Hypothesis) -> bool {
         let same = fit
             .actives
             .iter()

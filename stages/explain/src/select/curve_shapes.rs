@@ -112,7 +112,7 @@ pub fn keep_what_is_evident(curve: &mut Active) {
     }
 }
 
-/// Curves worth a try in a joint, their knots spread evenly over the samples.
+/// Curves to try in a joint, their knots spread evenly over the samples.
 fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
     let mut all = Vec::new();
     let mut add = |against: Against, of_joint: usize, count: usize| {

@@ -26,7 +26,7 @@ const LOUD: f64 = 4.0;
 impl Search<'_> {
     /// The explanation with a curve in a joint, where names do not do: beside the names, if much is left, or in place
     /// of them, if it does better than they.
-    pub fn described(&self, best: &Explanation, joint: usize) -> Option<Explanation> {
+    pub fn with_curve_at(&self, best: &Explanation, joint: usize) -> Option<Explanation> {
         let excess = |fit: &Fit| {
             fit.variance[joint]
                 / (self.problem.white_noise[joint] * self.problem.white_noise[joint])
@@ -79,13 +79,13 @@ impl Search<'_> {
 
     /// The explanation with a curve in one joint in the place of all that lasted for an interval, if that does better: what comes
     /// back at a place, or time and again, looks like many pushes. They are evident, so that it need only beat them.
-    pub fn described_for_intervals(&self, best: &Explanation) -> Option<Explanation> {
+    pub fn with_curve_for_intervals(&self, best: &Explanation) -> Option<Explanation> {
         let once = |&i: &usize| best.fit.actives[i].hypothesis.time_kind() == TimeKind::Once;
         let intervals: Vec<usize> = (0..best.fit.actives.len()).filter(once).collect();
         if intervals.len() < 2 {
             return None;
         }
-        let less = |from: Explanation, index: &usize| self.less(&from, *index);
+        let less = |from: Explanation, index: &usize| self.without(&from, *index);
         let bare = intervals.iter().rev().fold(best.clone(), less);
         let white = vec![1.0; self.problem.joints];
         let joints = worse_joints(&bare.fit, &best.fit);
@@ -111,7 +111,8 @@ impl Search<'_> {
 
     /// Whether there is evidence for the curve in one explanation that the other lacks.
     fn is_evident(&self, with: &Explanation, without: &Explanation) -> bool {
-        with.ahead_of(without, &self.problem.worth) > CURVE_EVIDENCE || overwhelming(with, without)
+        with.ahead_of(without, &self.problem.effective_samples) > CURVE_EVIDENCE
+            || overwhelming(with, without)
     }
 
     /// The explanation with the curve that does best in a joint, if it carries over.
@@ -163,7 +164,7 @@ impl Search<'_> {
 
     /// Takes the names of a joint back that are too many functions of its position or waves that no gear makes, or that leave much more on recordings that they were not fitted on, each left out in
     /// turn, than where they were: together they only draw a curve, which is said in their place.
-    pub fn upheld(&self, found: Explanation) -> Explanation {
+    pub fn with_names_that_hold(&self, found: Explanation) -> Explanation {
         let pieces = found.fit.actives.len();
         let mut best = found;
         for joint in 0..self.problem.joints {

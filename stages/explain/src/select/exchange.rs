@@ -37,7 +37,7 @@ impl Search<'_> {
             let Some(index) = place_of(&best, piece) else {
                 continue;
             };
-            let without = self.less(&best, index);
+            let without = self.without(&best, index);
             if let Some(better) = self.replaced(&best, &without, index) {
                 (self.say)(&format!("= {}", describe(&better)));
                 best = better;
@@ -47,10 +47,10 @@ impl Search<'_> {
         let once = |&i: &usize| best.fit.actives[i].hypothesis.time_kind() == TimeKind::Once;
         let pushes: Vec<usize> = (0..best.fit.actives.len()).filter(once).collect();
         if pushes.len() > 1 {
-            let less = |from: Explanation, index: &usize| self.less(&from, *index);
+            let less = |from: Explanation, index: &usize| self.without(&from, *index);
             let without = pushes.iter().rev().fold(best.clone(), less);
             let better = self.replaced(&best, &without, pushes[0]);
-            if let Some(better) = better.or_else(|| self.walled(&best, &without)) {
+            if let Some(better) = better.or_else(|| self.with_wall(&best, &without)) {
                 (self.say)(&format!("== {}", describe(&better)));
                 best = better;
             }
@@ -69,7 +69,7 @@ impl Search<'_> {
                     continue;
                 }
                 let (low, high) = (first.min(second), first.max(second));
-                let without = self.less(&self.less(&best, high), low);
+                let without = self.without(&self.without(&best, high), low);
                 if let Some(better) = self.replaced(&best, &without, low) {
                     (self.say)(&format!("== {}", describe(&better)));
                     best = better;
@@ -81,7 +81,7 @@ impl Search<'_> {
 
     /// The better explanation that a wall makes in the place of all pushes, if it does: where it is, only a search tells, so that what
     /// it gains at first is no measure.
-    fn walled(&self, best: &Explanation, without: &Explanation) -> Option<Explanation> {
+    fn with_wall(&self, best: &Explanation, without: &Explanation) -> Option<Explanation> {
         let wall = |h: &&Hypothesis| h.effect.name == "contact_wall";
         let hypothesis = self.hypotheses.iter().find(wall)?;
         let base = Base::new(self.problem, &without.fit, self.hypotheses.len());
@@ -93,7 +93,7 @@ impl Search<'_> {
             let stands = e.fit.actives.iter().any(|a| wall(&&a.hypothesis));
             stands
                 && e.ahead_of(best, &white) > LEAST_GAIN
-                && e.ahead_of(best, &self.problem.worth) > LEAST_GAIN
+                && e.ahead_of(best, &self.problem.effective_samples) > LEAST_GAIN
         };
         let walled = is_better(&walled).then(|| self.pruned(walled))?;
         is_better(&walled).then_some(walled)
@@ -107,13 +107,13 @@ impl Search<'_> {
         without: &Explanation,
         index: usize,
     ) -> Option<Explanation> {
-        let worth = &self.problem.worth;
+        let effective = &self.problem.effective_samples;
         let proposals = self.rivals(&without.fit, &best.fit, &best.fit.actives[index]);
         let other = self.rival_of(best, without, &proposals)?;
-        if other.ahead_of(best, worth) <= LEAST_GAIN {
+        if other.ahead_of(best, effective) <= LEAST_GAIN {
             return None;
         }
         let other = self.pruned(other);
-        (other.ahead_of(best, worth) > LEAST_GAIN).then_some(other)
+        (other.ahead_of(best, effective) > LEAST_GAIN).then_some(other)
     }
 }

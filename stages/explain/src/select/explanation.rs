@@ -13,10 +13,10 @@ pub struct Explanation {
 }
 
 impl Explanation {
-    /// Evidence for this rather than another \[nats\], rows weighted by their `worth`.
-    pub fn ahead_of(&self, other: &Self, worth: &[f64]) -> f64 {
+    /// Evidence for this rather than another \[nats\], rows weighted by `effective`, the independent samples per row of each joint.
+    pub fn ahead_of(&self, other: &Self, effective: &[f64]) -> f64 {
         let penalty = |e: &Self| e.penalties.iter().sum::<f64>();
-        self.fit.gain_over(&other.fit, worth) - penalty(self) + penalty(other)
+        self.fit.gain_over(&other.fit, effective) - penalty(self) + penalty(other)
     }
 }
 

@@ -40,12 +40,12 @@ impl Search<'_> {
             let next = self.pruned(next);
             let once = new.is_some_and(|new| new.time_kind() == TimeKind::Once);
             // What lasts for a while makes noise look correlated as long as it is not explained.
-            let worth = if once {
+            let effective = if once {
                 effective_samples::at_least(self.problem, &next.fit.residual)
             } else {
-                self.problem.worth.clone()
+                self.problem.effective_samples.clone()
             };
-            let evident = next.ahead_of(&best, &worth) >= LEAST_EVIDENCE;
+            let evident = next.ahead_of(&best, &effective) >= LEAST_EVIDENCE;
             if !evident && (once || !overwhelming(&next, &best)) {
                 barred.extend(new);
             } else {
@@ -63,40 +63,45 @@ impl Search<'_> {
         proposals: &[Proposal],
         rival: f64,
     ) -> Option<Explanation> {
-        let worthy = proposals.iter().filter(|p| {
+        let promising = proposals.iter().filter(|p| {
             let (evidence, size) = needs(p.active.hypothesis, &now.fit);
             let possible =
                 is_timely(self.problem, &p.active) && plausible(&p.active, &self.problem.model);
             p.evidence() > evidence && p.size > size && possible
         });
-        let mut worthy: Vec<&Proposal> = worthy.collect();
+        let mut promising: Vec<&Proposal> = promising.collect();
         // Where those with the most promise do not keep it, as beside a piece that is stuck at its joint, those elsewhere may.
-        while !worthy.is_empty() {
-            let tried: Vec<&Proposal> = worthy.iter().take(REFINED).copied().collect();
-            if let Some(found) = self.able(now, &tried, rival) {
+        while !promising.is_empty() {
+            let tried: Vec<&Proposal> = promising.iter().take(REFINED).copied().collect();
+            if let Some(found) = self.best_refined(now, &tried, rival) {
                 return Some(found);
             }
             let joints = |p: &Proposal| Fit::joints_of(&p.active.hypothesis, self.problem.joints);
             let spent: Vec<Vec<usize>> = tried.iter().map(|p| joints(p)).collect();
-            worthy.retain(|p| !spent.contains(&joints(p)));
+            promising.retain(|p| !spent.contains(&joints(p)));
         }
         None
     }
 
     /// The best explanation with one of these proposals, as they are once they are refined.
-    fn able(&self, now: &Explanation, worthy: &[&Proposal], rival: f64) -> Option<Explanation> {
-        let worth = &self.problem.worth;
+    fn best_refined(
+        &self,
+        now: &Explanation,
+        promising: &[&Proposal],
+        rival: f64,
+    ) -> Option<Explanation> {
+        let effective = &self.problem.effective_samples;
         let mut able: Vec<(Explanation, &Proposal)> = Vec::new();
-        let joined = parallel::map(worthy, |proposal| self.joined(now, proposal, rival));
-        for (next, &proposal) in joined.into_iter().zip(worthy) {
+        let joined = parallel::map(promising, |proposal| self.joined(now, proposal, rival));
+        for (next, &proposal) in joined.into_iter().zip(promising) {
             let (evidence, _) = needs(proposal.active.hypothesis, &now.fit);
-            let evident = next.ahead_of(now, worth) >= evidence || overwhelming(&next, now);
+            let evident = next.ahead_of(now, effective) >= evidence || overwhelming(&next, now);
             let once = proposal.active.hypothesis.time_kind() == TimeKind::Once;
             if evident && (once || matters(self.problem, &next.fit, &now.fit, 0.0, LOUD_SIZE)) {
                 able.push((next, proposal));
             }
         }
-        able.sort_by(|(a, _), (b, _)| b.ahead_of(a, worth).total_cmp(&0.0));
+        able.sort_by(|(a, _), (b, _)| b.ahead_of(a, effective).total_cmp(&0.0));
         let mut able = able.into_iter();
         able.find(|(next, proposal)| {
             let joints = Fit::joints_of(&proposal.active.hypothesis, self.problem.joints);

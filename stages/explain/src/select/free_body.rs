@@ -12,7 +12,7 @@ use crate::select::search::Search;
 impl Search<'_> {
     /// The explanation with another body for one link, beside the names or in the place of those that only imitated it, if it does
     /// clearly better than they: couplings, gains and masses together may look like one body at many joints.
-    pub fn embodied(&self, best: &Explanation) -> Option<Explanation> {
+    pub fn with_free_body(&self, best: &Explanation) -> Option<Explanation> {
         let base = Base::new(self.problem, &best.fit, self.hypotheses.len());
         let there = |p: &Proposal| {
             let same = |a: &Active| a.hypothesis == p.active.hypothesis;
@@ -26,17 +26,18 @@ impl Search<'_> {
             .collect();
         proposals.sort_by(|a, b| b.evidence().total_cmp(&a.evidence()));
         proposals.truncate(REFINED);
-        let worth = &self.problem.worth;
+        let effective = &self.problem.effective_samples;
         let with = parallel::map(&proposals, |proposal| {
             self.joined(best, proposal, best.fit.likelihood())
         });
         let better = with
             .into_iter()
-            .max_by(|a, b| a.ahead_of(b, worth).total_cmp(&0.0))?;
+            .max_by(|a, b| a.ahead_of(b, effective).total_cmp(&0.0))?;
         let body = better.fit.actives.last()?.hypothesis;
         let better = self.pruned(better);
         let stands = better.fit.actives.iter().any(|a| a.hypothesis == body);
-        let evident = better.ahead_of(best, worth) > CURVE_EVIDENCE || overwhelming(&better, best);
+        let evident =
+            better.ahead_of(best, effective) > CURVE_EVIDENCE || overwhelming(&better, best);
         let all: Vec<usize> = (0..self.problem.joints).collect();
         (stands && evident && carries_over(self.problem, &better.fit, &best.fit, &all))
             .then_some(better)

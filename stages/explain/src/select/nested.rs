@@ -26,21 +26,21 @@ const SIMPLER: [(&str, &str); 7] = [
 impl Search<'_> {
     /// Puts the simpler effect that a piece contains in its place, where it is not ahead by `enough` for the evidence for it
     /// \[nats\]; more is asked of a shape that ends its range.
-    pub fn plainer(&self, mut best: Explanation, enough: impl Fn(f64) -> f64) -> Explanation {
+    pub fn simplified(&self, mut best: Explanation, enough: impl Fn(f64) -> f64) -> Explanation {
         for piece in pieces(&best) {
             let Some(index) = place_of(&best, piece) else {
                 continue;
             };
-            let less = self.less(&best, index);
-            let worth = &self.problem.worth;
-            let evidence = best.ahead_of(&less, worth);
+            let less = self.without(&best, index);
+            let effective = &self.problem.effective_samples;
+            let evidence = best.ahead_of(&less, effective);
             let enough = if at_bound(&best.fit.actives[index]) {
                 tie(evidence)
             } else {
                 enough(evidence)
             };
             if let Some(simple) = self.simpler(&best, &less, index)
-                && best.ahead_of(&simple, worth) < enough
+                && best.ahead_of(&simple, effective) < enough
             {
                 (self.say)(&format!("~ {}", describe(&simple)));
                 best = simple;
@@ -83,8 +83,8 @@ impl Search<'_> {
             fit: fit.refined_at(self.problem, Some(&joints), less.fit.likelihood()),
             penalties: [&less.penalties[..], &[penalty]].concat(),
         };
-        let worth = &self.problem.worth;
-        let evident = with.ahead_of(less, worth) >= LEAST_EVIDENCE || overwhelming(&with, less);
+        let effective = &self.problem.effective_samples;
+        let evident = with.ahead_of(less, effective) >= LEAST_EVIDENCE || overwhelming(&with, less);
         evident.then_some(with)
     }
 }

@@ -109,7 +109,7 @@ impl<'a> Base<'a> {
     }
 
     /// What a hypothesis with these columns would gain to first order, as the variances are: to tell the best of many.
-    pub fn glance<C: Borrow<Column>>(
+    pub fn first_order_score<C: Borrow<Column>>(
         &self,
         hypothesis: Hypothesis,
         alone: Option<&Column>,
@@ -124,9 +124,9 @@ impl<'a> Base<'a> {
     }
 
     /// The same at one shape.
-    pub fn glance_at(&self, hypothesis: Hypothesis, shape: &[f64]) -> Option<f64> {
+    pub fn first_order_score_at(&self, hypothesis: Hypothesis, shape: &[f64]) -> Option<f64> {
         let columns = self.fit.columns(self.problem, hypothesis, shape);
-        self.glance(hypothesis, columns.alone.as_ref(), &columns.factors)
+        self.first_order_score(hypothesis, columns.alone.as_ref(), &columns.factors)
     }
 
     /// Tries `columns` as additional factors, after `alone` is taken off the residual. Gives the factors, the
@@ -180,7 +180,10 @@ impl<'a> Base<'a> {
     /// The best of a hypothesis over the grid of its shapes; effects in time have their own search.
     pub fn propose(&self, hypothesis: Hypothesis) -> Option<Proposal> {
         let grid = shapes(self.problem, hypothesis);
-        let (at, gain) = best_of(grid.iter().map(|shape| self.glance_at(hypothesis, shape)))?;
+        let (at, gain) = best_of(
+            grid.iter()
+                .map(|shape| self.first_order_score_at(hypothesis, shape)),
+        )?;
         let penalty = self.penalty(grid[at].len(), hypothesis.only_joint());
         let shape = match shape_index(hypothesis) {
             Some(c) if gain > penalty => self.sharpened(hypothesis, c, &grid, (at, gain)),
@@ -208,7 +211,7 @@ impl<'a> Base<'a> {
             for (value, around) in [(left, (below, centre)), (right, (centre, above))] {
                 let mut shape = best.clone();
                 shape[c] = value;
-                if let Some(other) = self.glance_at(hypothesis, &shape)
+                if let Some(other) = self.first_order_score_at(hypothesis, &shape)
                     && other > gain
                 {
                     (best, gain) = (shape, other);
@@ -251,7 +254,7 @@ impl<'a> Base<'a> {
     }
 }
 
-/// What `free` numbers at these joints gain by chance, for being one of `library` nats' worth of hypotheses.
+/// What `free` numbers at these joints gain by chance, with a prior of `library` nats against any one hypothesis of the library.
 pub fn penalty(fit: &Fit, library: f64, free: usize, only_joint: Option<usize>) -> f64 {
     let rows: f64 = match only_joint {
         Some(joint) => fit.count[joint],

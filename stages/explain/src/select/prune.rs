@@ -22,7 +22,7 @@ impl Search<'_> {
                 |&i: &usize| !sure[i] && !best.fit.actives[i].hypothesis.is_torque_scale();
             let doubtful: Vec<usize> = (0..sure.len()).filter(doubtful).collect();
             for some in doubtful.chunks(parallel::threads()) {
-                let without = parallel::map(some, |&index| self.less(&best, index));
+                let without = parallel::map(some, |&index| self.without(&best, index));
                 for (&index, less) in some.iter().zip(without) {
                     if self.is_needed(&best, &less, index) {
                         continue;
@@ -47,8 +47,8 @@ impl Search<'_> {
         } else {
             needs(active.hypothesis, &best.fit)
         };
-        let worth = &self.problem.worth;
-        let strong = best.ahead_of(less, worth) >= evidence || overwhelming(best, less);
+        let effective = &self.problem.effective_samples;
+        let strong = best.ahead_of(less, effective) >= evidence || overwhelming(best, less);
         let matters = matters(self.problem, &best.fit, &less.fit, least, least);
         let possible = is_timely(self.problem, active) && plausible(active, &self.problem.model);
         possible && strong && matters
@@ -57,24 +57,24 @@ impl Search<'_> {
     /// Which pieces are beyond doubt by their own numbers, to first order: Wald's test, with much to spare.
     fn sure(&self, fit: &Fit) -> Vec<bool> {
         let wald = wald(self.problem, fit);
-        let worth = &self.problem.worth;
+        let effective = &self.problem.effective_samples;
         let each = fit.actives.iter().zip(wald);
         each.map(|(active, chi_square)| {
             let joints = Fit::joints_of(&active.hypothesis, self.problem.joints);
             let rows: f64 = joints.iter().map(|&j| fit.count[j]).sum();
-            let worth = joints.iter().map(|&j| worth[j]).fold(1.0, f64::min);
+            let effective = joints.iter().map(|&j| effective[j]).fold(1.0, f64::min);
             let (evidence, size) = needs(active.hypothesis, fit);
             is_timely(self.problem, active)
                 && plausible(active, &self.problem.model)
                 && !active.is_unnamed()
-                && 0.5 * worth * chi_square > 4.0 * evidence + 60.0
+                && 0.5 * effective * chi_square > 4.0 * evidence + 60.0
                 && chi_square > 4.0 * size * rows
         })
         .collect()
     }
 
     /// The explanation without one of its pieces, refined.
-    pub fn less(&self, from: &Explanation, index: usize) -> Explanation {
+    pub fn without(&self, from: &Explanation, index: usize) -> Explanation {
         let mut penalties = from.penalties.clone();
         penalties.remove(index);
         let joints = Fit::joints_of(&from.fit.actives[index].hypothesis, self.problem.joints);
@@ -90,7 +90,7 @@ impl Search<'_> {
 
     /// Takes out the names that explain less than half of what is left where they are and that is far above the noise: there
     /// something is that no name fits, and it could be what they seem to be. The smallest go first.
-    pub fn culled(&self, mut best: Explanation) -> Explanation {
+    pub fn without_small(&self, mut best: Explanation) -> Explanation {
         loop {
             let names: Vec<usize> = (0..best.fit.actives.len())
                 .filter(|&i| {
@@ -99,7 +99,7 @@ impl Search<'_> {
                     !active.is_unnamed() && !once && !active.hypothesis.is_torque_scale()
                 })
                 .collect();
-            let without = parallel::map(&names, |&i| self.less(&best, i));
+            let without = parallel::map(&names, |&i| self.without(&best, i));
             let size = |less: &Explanation| {
                 let each = less.fit.variance.iter().zip(&best.fit.variance);
                 each.map(|(less, best)| less / best).fold(0.0, f64::max)

@@ -27,53 +27,53 @@ pub struct Search<'a> {
 impl Search<'_> {
     /// Adds names one at a time, without a second look at any: enough to tell which joints have dry friction.
     pub fn first_guess(&self, start: Vec<Active>, penalties: Vec<f64>) -> Explanation {
-        self.plainer(self.forward(self.begun(start, penalties)), tie)
+        self.simplified(self.forward(self.started(start, penalties)), tie)
     }
 
     /// Finds the explanation, from pieces of physics with their penalties that are taken for true at first.
     pub fn run(&self, start: Vec<Active>, penalties: Vec<f64>) -> Explanation {
-        let mut best = self.begun(start, penalties);
-        best = self.named(best);
-        if let Some(described) = self.described_for_intervals(&best) {
+        let mut best = self.started(start, penalties);
+        best = self.with_names(best);
+        if let Some(described) = self.with_curve_for_intervals(&best) {
             (self.say)(&format!("? {}", describe(&described)));
-            best = self.named(self.pruned(described));
+            best = self.with_names(self.pruned(described));
         }
         // A body that the names take back might be described again for ever.
         for _ in self.unnamed_bodies {
-            let Some(described) = self.embodied(&best) else {
+            let Some(described) = self.with_free_body(&best) else {
                 break;
             };
             (self.say)(&format!("? {}", describe(&described)));
-            best = self.named(described);
+            best = self.with_names(described);
         }
         for joint in 0..self.problem.joints {
-            if let Some(described) = self.described(&best, joint) {
+            if let Some(described) = self.with_curve_at(&best, joint) {
                 (self.say)(&format!("? {}", describe(&described)));
-                best = self.named(self.pruned(described));
+                best = self.with_names(self.pruned(described));
             }
         }
         // What it was compared with until now is no measure of how precise its numbers are to be.
         best.fit = best.fit.refined(self.problem);
-        self.parted(self.upheld(best))
+        self.with_split_pushes(self.with_names_that_hold(best))
     }
 
-    fn begun(&self, start: Vec<Active>, penalties: Vec<f64>) -> Explanation {
+    fn started(&self, start: Vec<Active>, penalties: Vec<f64>) -> Explanation {
         let fit = Fit::new(self.problem, start).refined(self.problem);
         self.pruned(Explanation { fit, penalties })
     }
 
     /// Adds and exchanges names until nothing is gained.
-    fn named(&self, mut best: Explanation) -> Explanation {
+    fn with_names(&self, mut best: Explanation) -> Explanation {
         for _ in 0..MOST_ROUNDS {
             best = self.forward(best);
-            let worth = &self.problem.worth;
+            let effective = &self.problem.effective_samples;
             let exchanged = self.exchange(best.clone());
-            let gained = exchanged.ahead_of(&best, worth) > LEAST_GAIN;
+            let gained = exchanged.ahead_of(&best, effective) > LEAST_GAIN;
             best = exchanged;
             if !gained {
                 break;
             }
         }
-        self.plainer(self.culled(best), |_| MORE_THAN_SIMPLE)
+        self.simplified(self.without_small(best), |_| MORE_THAN_SIMPLE)
     }
 }

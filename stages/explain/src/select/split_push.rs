@@ -13,7 +13,7 @@ const CANCELS: f64 = 0.3;
 impl Search<'_> {
     /// Puts two pushes in the place of one that another one undoes for a while, which is the same, if they do as well: nothing pushed
     /// in between.
-    pub fn parted(&self, mut best: Explanation) -> Explanation {
+    pub fn with_split_pushes(&self, mut best: Explanation) -> Explanation {
         let pieces = best.fit.actives.len();
         for long in 0..pieces {
             for pause in 0..pieces {
@@ -29,7 +29,7 @@ impl Search<'_> {
                     fit: fit.refined_at(self.problem, Some(&joints), best.fit.likelihood()),
                     penalties: best.penalties.clone(),
                 };
-                if other.ahead_of(&best, &self.problem.worth) > -TIE {
+                if other.ahead_of(&best, &self.problem.effective_samples) > -TIE {
                     (self.say)(&format!("= {}", describe(&other)));
                     best = other;
                 }

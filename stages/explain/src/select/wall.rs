@@ -57,7 +57,7 @@ impl Base<'_> {
                 let azimuth = direction.y.atan2(direction.x);
                 let elevation = direction.z.clamp(-1.0, 1.0).asin();
                 let shape = [0.0, azimuth, elevation, offset];
-                if let Some(gain) = self.glance_at(hypothesis, &shape)
+                if let Some(gain) = self.first_order_score_at(hypothesis, &shape)
                     && best.is_none_or(|(most, _)| gain > most)
                 {
                     best = Some((gain, shape));

@@ -77,10 +77,10 @@ impl Base<'_> {
                 }
             }
         }
-        let glances = times
+        let scores = times
             .iter()
-            .map(|&(first, _)| self.glance(hypothesis, None, &split(first)));
-        let (best, _) = best_of(glances)?;
+            .map(|&(first, _)| self.first_order_score(hypothesis, None, &split(first)));
+        let (best, _) = best_of(scores)?;
         let (first, time_s) = times[best];
         shape[time] = time_s;
         let mut proposal = self.propose_columns(hypothesis, &shape, None, &split(first))?;
@@ -100,11 +100,11 @@ impl Base<'_> {
         let all = &all.factors;
         let scanned = &all[..all.len().min(SCANNED_FACTORS)];
         let intervals = self.scan(scanned, only);
-        let glances = intervals.iter().map(|&interval| {
+        let scores = intervals.iter().map(|&interval| {
             let masked = self.all_within(all, interval, only);
-            self.glance(hypothesis, None, &masked)
+            self.first_order_score(hypothesis, None, &masked)
         });
-        let (best, _) = best_of(glances)?;
+        let (best, _) = best_of(scores)?;
         self.propose_within(hypothesis, intervals[best], only)
     }
 

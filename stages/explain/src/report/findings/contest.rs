@@ -34,15 +34,15 @@ pub fn contest(
     if active.is_unnamed() {
         return result;
     }
-    let efficiency = &search.problem.worth;
-    let evidence = found.ahead_of(less, efficiency);
+    let effective = &search.problem.effective_samples;
+    let evidence = found.ahead_of(less, effective);
     let proposals = search.rivals(&less.fit, &found.fit, active);
     let rivals = proposals
         .iter()
         .filter(|p| p.active.hypothesis != active.hypothesis && p.evidence() > 0.0);
     for proposal in rivals.take(RIVALS) {
         let other = search.joined(less, proposal, found.fit.likelihood());
-        let behind = found.ahead_of(&other, efficiency);
+        let behind = found.ahead_of(&other, effective);
         let hypothesis = proposal.active.hypothesis;
         if behind < tie(evidence) {
             result.ties.push(hypothesis);

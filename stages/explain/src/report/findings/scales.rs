@@ -16,7 +16,7 @@ use crate::read::input::Input;
 use crate::read::start::KNOWN;
 use crate::report::sentences;
 
-/// The scale of one drive \[A per N m\].
+/// The torque scale of one joint \[A per N m\].
 #[derive(Debug, Clone, Copy)]
 struct Scale {
     joint: usize,
@@ -30,17 +30,17 @@ impl Scale {
     }
 }
 
-/// The scales of all drives that were fitted.
+/// The torque scales that were fitted.
 #[derive(Debug)]
 pub struct Scales(Vec<Scale>);
 
 impl Scales {
     /// As a fit has them; how far they are known counts that the URDF's masses are not exact.
     pub fn of(problem: &Problem, fit: &Fit, spread: &DMatrix<f64>) -> Self {
-        let drives: Vec<usize> = (0..fit.actives.len())
+        let fitted: Vec<usize> = (0..fit.actives.len())
             .filter(|&index| fit.actives[index].hypothesis.is_torque_scale())
             .collect();
-        if drives.is_empty() {
+        if fitted.is_empty() {
             return Self(Vec::new());
         }
         let off = off_with_the_links(problem, fit);
@@ -54,7 +54,7 @@ impl Scales {
                 deviation: own.hypot(off[at]),
             }
         };
-        Self(drives.into_iter().map(of).collect())
+        Self(fitted.into_iter().map(of).collect())
     }
 
     /// What is known of each.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use tauscope_dynamics::terms::{Layer, PlaceKind};
+use tauscope_dynamics::terms::PlaceKind;
 
 use crate::data::column::Column;
 use crate::fit::fitted::Fit;
@@ -24,8 +24,7 @@ pub fn undetectable(
         let factors = hypothesis.factors();
         let simple = factors.len() == hypothesis.effect.coordinates.len()
             && (factors.len() == 1 || hypothesis.effect.name == "payload")
-            && hypothesis.effect.place != PlaceKind::TwoJoints
-            && (hypothesis.effect.layer != Layer::Body || hypothesis.effect.name != "drive_gain");
+            && hypothesis.effect.place != PlaceKind::TwoJoints;
         let there = found
             .fit
             .actives

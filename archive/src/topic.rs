@@ -1,0 +1,54 @@
+//! Topics of a recording.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+/// A topic of a recording.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Topic {
+    /// Its name.
+    pub name: String,
+    /// Type of its messages, e.g. `sensor_msgs/msg/JointState`; empty if the recording does not say.
+    pub type_name: String,
+    /// How a message is encoded: `cdr` in ROS 2.
+    pub message_encoding: String,
+    /// Hash of the type, if the recording says it.
+    pub type_hash: Option<String>,
+    /// Messages that can be read.
+    pub message_count: u64,
+}
+
+/// The topics of a recording, and which channel belongs to which.
+#[derive(Debug, Default)]
+pub(crate) struct Topics {
+    pub(crate) list: Vec<Topic>,
+    by_channel: BTreeMap<u16, usize>,
+}
+
+impl Topics {
+    /// Adds a topic as [`Topics::add`] does, to which the channel belongs.
+    pub(crate) fn add_channel(&mut self, channel: u16, topic: Topic) {
+        let index = self.add(topic);
+        self.by_channel.insert(channel, index);
+    }
+
+    /// Adds a topic, or its messages to the one of the same name and type.
+    pub(crate) fn add(&mut self, topic: Topic) -> usize {
+        let same = |known: &Topic| {
+            known.name == topic.name
+                && known.type_name == topic.type_name
+                && known.message_encoding == topic.message_encoding
+        };
+        if let Some(index) = self.list.iter().position(same) {
+            self.list[index].message_count += topic.message_count;
+            return index;
+        }
+        self.list.push(topic);
+        self.list.len() - 1
+    }
+
+    pub(crate) fn of_channel(&self, channel: u16) -> Option<usize> {
+        self.by_channel.get(&channel).copied()
+    }
+}

@@ -1,0 +1,264 @@
+//! The course of an evaluation: twins, detectors that learn, recordings that they judge.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use tauscope_bus::StageError;
+use tauscope_detect::{Entry, Lesson, Lessons};
+use tauscope_pipeline::parallel;
+
+use crate::error::EvaluateError;
+use crate::heard::{self, Heard};
+use crate::input::Request;
+use crate::recording::{Named, Role};
+use crate::registry::{SEEDS, Task};
+use crate::runner::Runner;
+use crate::twin::Prepared;
+use crate::{bad_readings, session};
+
+/// A detector behind a twin, with each of its seeds.
+pub struct Run {
+    /// The twin, a place in [`Evaluation::twins`].
+    pub twin: usize,
+    /// One per seed; a detector without chance has one.
+    pub seeds: Vec<Runner>,
+}
+
+/// What came of it all.
+pub struct Evaluation {
+    /// What was asked for.
+    pub request: Request,
+    /// The twins.
+    pub twins: Vec<Prepared>,
+    /// By twin and detector.
+    pub runs: Vec<Run>,
+    /// Samples that were lost or refused.
+    pub lost: u64,
+    /// What the reader should know.
+    pub notes: Vec<String>,
+}
+
+/// How far it is, 0 to 1, and what it does.
+pub type Progress<'a> = dyn Fn(f64, &str) + Sync + 'a;
+
+/// Evaluates. Trained weights go to `out`.
+///
+/// # Errors
+/// If nothing can be learnt or read. A detector that nobody asked for by name and that cannot learn from
+/// this set is left out and noted instead.
+pub fn run(
+    request: Request,
+    out: &Path,
+    progress: &Progress<'_>,
+) -> Result<Evaluation, EvaluateError> {
+    let mut evaluation = Evaluation {
+        notes: (request.notes.iter().cloned())
+            .chain(heard::unlabelled(&request))
+            .collect(),
+        twins: Vec::new(),
+        runs: Vec::new(),
+        lost: 0,
+        request,
+    };
+    let count = evaluation.request.twins.len() as f64;
+    for index in 0..evaluation.request.twins.len() {
+        let from = index as f64 / count;
+        let step = |share: f64, what: &str| progress(from + share / count, what);
+        evaluation.behind(index, out, &step)?;
+    }
+    Ok(evaluation)
+}
+
+impl Evaluation {
+    /// All detectors behind one twin.
+    fn behind(
+        &mut self,
+        index: usize,
+        out: &Path,
+        progress: &Progress<'_>,
+    ) -> Result<(), EvaluateError> {
+        const FITTED: f64 = 0.1;
+        const LEARNT: f64 = 0.6;
+        let request = &self.request;
+        let name = &request.twins[index].name;
+        let count = request.recordings.len() as f64;
+        let what = format!("{name}: fitting the twin");
+        let mut twin = Prepared::new(request, &request.twins[index], &|at, fraction| {
+            progress(FITTED * (at as f64 + fraction) / count, &what);
+        })?;
+        let mut session = twin.session(request)?;
+        let failed = |recording: &Named, source| EvaluateError::Recording {
+            recording: recording.path.display().to_string(),
+            source,
+        };
+        let (mut train, mut validation) = (Vec::new(), Vec::new());
+        let mut heard = Heard::default();
+        for recording in &request.recordings {
+            let lessons = match recording.role {
+                Role::Train => &mut train,
+                Role::Validation => &mut validation,
+                Role::Test => continue,
+            };
+            let what = format!("{name}: reading {}", recording.name);
+            let played = session
+                .play(recording, &mut |_| progress(FITTED, &what))
+                .map_err(|source| failed(recording, source))?;
+            heard.add(recording, &played)?;
+            let mut lesson = session::lesson(recording, played.samples);
+            let bad = bad_readings::leave_out(&mut lesson, &request.cell.facts);
+            heard.notes.extend(bad);
+            lessons.push(lesson);
+        }
+        let measured: &[Lesson] = if validation.is_empty() {
+            &train
+        } else {
+            &validation
+        };
+        twin.measure(request, measured)?;
+        let lessons = Lessons {
+            train: &train,
+            validation: &validation,
+        };
+        let (mut runners, mut notes) = learn(request, &twin, lessons, out, &|share, what| {
+            progress(
+                FITTED + (LEARNT - FITTED) * share,
+                &format!("{name}: {what}"),
+            );
+        })?;
+        for (at, recording) in request.recordings.iter().enumerate() {
+            let played;
+            let samples = match recording.role {
+                Role::Train => continue,
+                Role::Validation => validation
+                    .iter()
+                    .find(|l| l.name == recording.name)
+                    .map(|l| &l.samples),
+                Role::Test => {
+                    played = session
+                        .play(recording, &mut |_| {})
+                        .map_err(|source| failed(recording, source))?;
+                    heard.add(recording, &played)?;
+                    Some(&played.samples)
+                }
+            };
+            let Some(samples) = samples else { continue };
+            let joints = &request.cell.facts.joint_names;
+            let results = parallel::map(request.jobs, runners.iter_mut().collect(), |runner| {
+                runner.pass(recording, samples, joints)
+            });
+            leave_out_failed(&mut runners, results, recording, request, &mut notes)?;
+            let share = LEARNT + (1.0 - LEARNT) * (at + 1) as f64 / count;
+            progress(share, &format!("{name}: {}", recording.name));
+        }
+        heard.close(request);
+        notes.extend(twin.doubts());
+        notes.extend(heard.unjudged(&runners));
+        notes.extend(heard::silent(&runners));
+        self.lost += heard.lost;
+        for note in notes.into_iter().chain(heard.notes) {
+            if !self.notes.contains(&note) {
+                self.notes.push(note);
+            }
+        }
+        for runner in runners {
+            match self.runs.last_mut() {
+                Some(run) if run.twin == index && run.seeds[0].entry.name == runner.entry.name => {
+                    run.seeds.push(runner);
+                }
+                _ => self.runs.push(Run {
+                    twin: index,
+                    seeds: vec![runner],
+                }),
+            }
+        }
+        self.twins.push(twin);
+        Ok(())
+    }
+}
+
+/// Leaves out the detectors that could not judge `recording`, and notes why; one that was asked for by name is an
+/// error, and so is that none is left.
+fn leave_out_failed(
+    runners: &mut Vec<Runner>,
+    results: Vec<Result<(), StageError>>,
+    recording: &Named,
+    request: &Request,
+    notes: &mut Vec<String>,
+) -> Result<(), EvaluateError> {
+    let mut results = results.into_iter();
+    let mut faults = Vec::new();
+    runners.retain(|runner| match results.next() {
+        Some(Err(source)) => {
+            faults.push((runner.entry.name, source));
+            false
+        }
+        _ => true,
+    });
+    for (detector, source) in faults {
+        if request.explicit || runners.is_empty() {
+            return Err(EvaluateError::Recording {
+                recording: recording.path.display().to_string(),
+                source: source.into(),
+            });
+        }
+        notes.push(format!(
+            "{detector} is left out: {}: {source}",
+            recording.name
+        ));
+    }
+    Ok(())
+}
+
+/// Lets every detector learn. Those that cannot are noted, unless somebody asked for just them.
+fn learn(
+    request: &Request,
+    twin: &Prepared,
+    lessons: Lessons<'_>,
+    out: &Path,
+    progress: &Progress<'_>,
+) -> Result<(Vec<Runner>, Vec<String>), EvaluateError> {
+    let setup = twin.setup(request)?;
+    let seeds = |entry: &Entry| if entry.random { SEEDS } else { 1 };
+    let pupils: Vec<(&'static Entry, u64)> = (request.detectors.iter())
+        .flat_map(|entry| (0..seeds(entry)).map(move |seed| (*entry, seed)))
+        .collect();
+    let (count, done) = (pupils.len() as f64, AtomicUsize::new(0));
+    let results = parallel::map(request.jobs, pupils, |(entry, seed)| {
+        let share = done.load(Ordering::Relaxed) as f64 / count;
+        progress(share, &format!("{} learns", entry.name));
+        let file = format!("{}.{}.{seed}", twin.name, entry.name);
+        let task = Task {
+            setup: &setup,
+            lessons,
+            free_first_s: request.set.free_first_s,
+            seed,
+            twin_fit_s: twin.fit_s,
+            given: &request.set.detectors,
+            weights: out.join("models").join(file),
+        };
+        let runner = Runner::new(entry, &task);
+        done.fetch_add(1, Ordering::Relaxed);
+        runner
+    });
+    let (mut runners, mut notes) = (Vec::new(), Vec::new());
+    for result in results {
+        match result {
+            Ok(runner) => {
+                // What its random siblings say, too, is said once.
+                let warning = runner.config.warning(&setup);
+                notes.extend(warning.filter(|warning| !notes.contains(warning)));
+                notes.extend(runner.config.all().filter_map(|settings| settings.note()));
+                runners.push(runner);
+            }
+            Err(EvaluateError::Learn { detector, source }) if !request.explicit => {
+                notes.push(format!("{detector} is left out: {source}"));
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    if runners.is_empty() {
+        let why = notes.join("; ");
+        return Err(EvaluateError::NoDetector { why });
+    }
+    Ok((runners, notes))
+}

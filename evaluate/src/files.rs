@@ -1,0 +1,195 @@
+//! What an evaluation leaves behind.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use tauscope_detect::Config;
+use tauscope_pipeline::report::{Problem, Report};
+use tauscope_pipeline::tally::Event;
+use tauscope_pipeline::whole_file;
+use tauscope_twin::ScoreStatistics;
+
+use crate::evaluation::{Evaluation, Run};
+use crate::input::Request;
+use crate::judged::Judged;
+use crate::runner::{Output, Runner};
+use crate::tables::Table;
+use crate::twin::Prepared;
+use crate::{html, parquet};
+
+/// Why results are not written.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// A file or folder cannot be written where it was asked for.
+    #[error(transparent)]
+    Refused(#[from] Report),
+    /// A result cannot be put into its format.
+    #[error("{what}: {source}")]
+    Failed {
+        /// The result.
+        what: &'static str,
+        /// Why.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+}
+
+fn failed(
+    what: &'static str,
+    source: impl Into<Box<dyn std::error::Error + Send + Sync>>,
+) -> WriteError {
+    let source = source.into();
+    WriteError::Failed { what, source }
+}
+
+fn yaml(what: &'static str, value: &impl Serialize) -> Result<String, WriteError> {
+    serde_saphyr::to_string(value).map_err(|error| failed(what, error))
+}
+
+fn write_whole(path: &Path, content: &[u8]) -> Result<(), WriteError> {
+    whole_file::write(path, content).map_err(|error| {
+        let problem = Problem::of_file(path, format!("cannot write: {error}"));
+        WriteError::Refused(problem.into())
+    })
+}
+
+/// One recording and detector, as the scorer reads it.
+#[derive(Debug, Serialize)]
+struct Detections<'a> {
+    recording: &'a str,
+    detector: &'a str,
+    twin: &'a str,
+    /// The table of scores beside the file.
+    scores: &'a str,
+    threshold: Option<f64>,
+    events: &'a [Event],
+}
+
+/// Writes everything to `out`: by recording and detector the events and scores of the first seed, the tables
+/// and the page. The results behind the first twin lie at the top, those behind another in a folder of its
+/// name, there with `@` and the twin's name behind the detector's, so that one who reads all of them cannot
+/// mistake one for the other.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn write(
+    out: &Path,
+    evaluation: &Evaluation,
+    judged: &[Judged<'_>],
+    tables: &[Table],
+) -> Result<Vec<PathBuf>, WriteError> {
+    for run in &evaluation.runs {
+        let (runner, twin) = (run.first(), &evaluation.twins[run.twin].name);
+        let (folder, detector) = if run.twin == 0 {
+            (out.to_owned(), runner.entry.name.to_owned())
+        } else {
+            (out.join(twin), format!("{}@{twin}", runner.entry.name))
+        };
+        make(&folder)?;
+        for output in &runner.outputs {
+            write_output(&folder, &detector, twin, runner, output)?;
+        }
+    }
+    for (index, twin) in evaluation.twins.iter().enumerate() {
+        let folder = if index == 0 {
+            out.to_owned()
+        } else {
+            out.join(&twin.name)
+        };
+        let own = || evaluation.runs.iter().filter(move |run| run.twin == index);
+        write_twin(&folder, twin, own().map(Run::first))?;
+        let learnt: BTreeMap<&str, &Config> = own()
+            .map(|run| (run.first().entry.name, &run.first().config))
+            .collect();
+        let text = yaml("what was learnt", &learnt)?;
+        write_whole(&folder.join("learnt.yaml"), text.as_bytes())?;
+    }
+    parquet::write_results(&out.join("results.parquet"), evaluation)
+        .map_err(|e| failed("the results", e))?;
+    parquet::write_events(&out.join("events.parquet"), judged)
+        .map_err(|e| failed("the events", e))?;
+    let page = html::page(evaluation, judged, tables).map_err(|e| failed("the page", e))?;
+    write_whole(&out.join("report.html"), page.as_bytes())?;
+    let names = ["report.html", "results.parquet", "events.parquet"];
+    Ok(names.map(|name| out.join(name)).to_vec())
+}
+
+/// The twin as a pipeline loads it, with the statistics that thresholds are made from.
+fn write_twin<'a>(
+    folder: &Path,
+    twin: &Prepared,
+    runners: impl Iterator<Item = &'a Runner>,
+) -> Result<(), WriteError> {
+    let mut file = twin.file.clone();
+    for runner in runners {
+        let statistics = ScoreStatistics {
+            mean: runner.statistics.mean,
+            standard_deviation: runner.statistics.standard_deviation,
+            samples: runner.counted,
+        };
+        file.scores.insert(runner.entry.name.to_owned(), statistics);
+    }
+    let text = yaml("the twin", &file)?;
+    write_whole(&folder.join("twin.yaml"), text.as_bytes())
+}
+
+/// Makes the folder for results.
+///
+/// # Errors
+/// If it cannot be made, or a twin that was given would be overwritten.
+pub fn prepare(out: &Path, request: &Request) -> Result<(), WriteError> {
+    make(out)?;
+    for (index, twin) in request.twins.iter().enumerate() {
+        let folder = if index == 0 {
+            out.to_owned()
+        } else {
+            out.join(&twin.name)
+        };
+        let result = folder.join("twin.yaml").canonicalize().ok();
+        let mut given = request.twins.iter().filter_map(|twin| twin.path.as_ref());
+        if result.is_some() && given.any(|path| path.canonicalize().ok() == result) {
+            let title = format!(
+                "the result {}/twin.yaml would overwrite the twin",
+                folder.display()
+            );
+            let problem = Problem::new(title).help("give another folder with --out");
+            return Err(WriteError::Refused(problem.into()));
+        }
+    }
+    Ok(())
+}
+
+fn make(folder: &Path) -> Result<(), WriteError> {
+    std::fs::create_dir_all(folder).map_err(|error| {
+        let title = format!("cannot make {}: {error}", folder.display());
+        WriteError::Refused(Problem::new(title).into())
+    })
+}
+
+fn write_output(
+    folder: &Path,
+    detector: &str,
+    twin: &str,
+    runner: &Runner,
+    output: &Output,
+) -> Result<(), WriteError> {
+    let stem = format!("{}.{}", output.recording, runner.entry.name);
+    let scores = format!("{stem}.csv");
+    let mut table = String::from("t,score\n");
+    for (t, score) in output.t.iter().zip(&output.scores) {
+        let _ = writeln!(table, "{t},{score}");
+    }
+    write_whole(&folder.join(&scores), table.as_bytes())?;
+    let detections = Detections {
+        recording: &output.recording,
+        detector,
+        twin,
+        scores: &scores,
+        threshold: Some(runner.threshold).filter(|threshold| threshold.is_finite()),
+        events: &output.events,
+    };
+    let text =
+        serde_json::to_string_pretty(&detections).map_err(|e| failed("the detections", e))?;
+    write_whole(&folder.join(format!("{stem}.json")), text.as_bytes())
+}

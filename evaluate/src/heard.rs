@@ -1,0 +1,182 @@
+//! What was odd in the recordings of a set.
+
+mod session;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use tauscope_bus::flags;
+use tauscope_pipeline::suggest;
+
+use self::session::Totals;
+use crate::error::EvaluateError;
+use crate::input::Request;
+use crate::metrics::events::{LAST_S, TOLERANCE_S};
+use crate::recording::{Named, Role};
+use crate::runner::Runner;
+use crate::session::Played;
+
+/// Recordings with an oddity are named one by one up to so many.
+const MOST_SINGLY: usize = 4;
+
+/// What was odd, over all recordings behind one twin.
+#[derive(Debug, Default)]
+pub struct Heard {
+    /// Samples and stretches that were lost or refused.
+    pub lost: u64,
+    /// What the reader should know.
+    pub notes: Vec<String>,
+    /// Recordings of which the twin's filters passed over more than half.
+    unsettled: BTreeSet<String>,
+    /// What only all of them together tell.
+    totals: Totals,
+}
+
+impl Heard {
+    /// Takes down what was odd in `recording`.
+    ///
+    /// # Errors
+    /// If no sample of it holds efforts: there is nothing that any detector could judge.
+    pub fn add(&mut self, recording: &Named, played: &Played) -> Result<(), EvaluateError> {
+        let (name, samples) = (&recording.name, &played.samples);
+        let holds = |flag| samples.iter().any(|sample| sample.header.has(flag));
+        if !holds(flags::EFFORT_MEASURED) {
+            let recording = recording.path.display().to_string();
+            return Err(EvaluateError::NoEffort { recording });
+        }
+        let damaged = played.damage.len() as u64;
+        self.lost += played.refused + damaged;
+        let mut note = |text: String| self.notes.push(format!("{name}: {text}"));
+        for damage in &played.damage {
+            note(format!("{damage}; what can be read of it is evaluated"));
+        }
+        if played.refused > 0 {
+            note(format!("{} samples were lost or refused", played.refused));
+        }
+        let count = samples.len();
+        if 2 * played.unsettled > count as u64 {
+            self.unsettled.insert(name.clone());
+        }
+        if played.unsettled == count as u64 {
+            note(format!(
+                "none of its {count} samples could be judged: the twin's filters never settled; what stands for it is silence"
+            ));
+        } else if 2 * played.unsettled > count as u64 {
+            note(format!(
+                "{} of its {count} samples were not judged: the twin's filters had not settled; what stands for them is silence",
+                played.unsettled
+            ));
+        } else if played.gaps > 0 {
+            note(format!(
+                "{} gap(s) in time; {} of {count} samples passed over while the filters settled",
+                played.gaps, played.unsettled
+            ));
+        }
+        let last_s = (samples.last()).map_or(0.0, |last| {
+            (last.header.stamp_ns - recording.start_ns) as f64 / 1e9
+        });
+        for text in beyond(recording, last_s) {
+            note(text);
+        }
+        self.totals.add(recording, samples);
+        Ok(())
+    }
+
+    /// What the recordings together are odd in, once all are there.
+    pub fn close(&mut self, request: &Request) {
+        self.notes.extend(self.totals.notes(request));
+    }
+
+    /// Test recordings of which detectors judged less than half, though the twin's filters had settled.
+    pub fn unjudged(&self, runners: &[Runner]) -> Vec<String> {
+        let mut by_recording: BTreeMap<&str, (usize, Vec<String>)> = BTreeMap::new();
+        for runner in runners.iter().filter(|runner| runner.seed == 0) {
+            for output in &runner.outputs {
+                let count = output.t.len();
+                if output.role == Role::Test
+                    && !self.unsettled.contains(&output.recording)
+                    && 2 * output.not_judged > count
+                {
+                    let of_it = by_recording.entry(&output.recording).or_default();
+                    of_it.0 = count;
+                    of_it
+                        .1
+                        .push(format!("{} {}", runner.entry.name, output.not_judged));
+                }
+            }
+        }
+        let names: Vec<&str> = by_recording.keys().copied().collect();
+        if names.len() > MOST_SINGLY {
+            return vec![format!(
+                "of {} test recordings some detectors judged less than half of the samples, because their filters had not settled; what stands for the others is silence: {}",
+                names.len(),
+                suggest::some(&names)
+            )];
+        }
+        let note = |(name, (count, who)): (&str, (usize, Vec<String>))| {
+            format!(
+                "{name}: of its {count} samples were not judged, because their filters had not settled: {}; what stands for them is silence",
+                who.join(", ")
+            )
+        };
+        by_recording.into_iter().map(note).collect()
+    }
+}
+
+/// What the labels of a recording say of times at which there is none of it.
+fn beyond(recording: &Named, last_s: f64) -> Vec<String> {
+    let Some(truth) = &recording.truth else {
+        return Vec::new();
+    };
+    let mut notes = Vec::new();
+    if let Some(duration) = truth
+        .duration
+        .filter(|labelled| *labelled > last_s + LAST_S)
+    {
+        notes.push(format!(
+            "the labels give it a length of {duration} s, and its samples end at {last_s:.2} s: these count"
+        ));
+    }
+    let reach = |t: f64| !(-TOLERANCE_S..=last_s + LAST_S).contains(&t);
+    let events = || truth.events.iter();
+    let beyond = events().filter(|event| reach(event.t_on) || reach(event.t_off));
+    let outside = events().filter(|event| event.t_off < 0.0 || event.t_on > last_s);
+    match (beyond.count(), outside.count()) {
+        (0, _) => {}
+        (count, 0) => notes.push(format!(
+            "{count} labelled contact(s) reach beyond the recording, which lasts {last_s:.2} s: they are counted as far as it goes"
+        )),
+        (count, outside) => notes.push(format!(
+            "{count} labelled contact(s) reach beyond the recording, which lasts {last_s:.2} s: they are counted as far as it goes, and {outside} that lie outside of it count as missed"
+        )),
+    }
+    notes
+}
+
+/// Detectors whose threshold no score can reach.
+pub fn silent(runners: &[Runner]) -> Vec<String> {
+    let note = |runner: &Runner| {
+        let largest = runner.largest_score?;
+        (runner.seed == 0 && runner.threshold >= largest).then(|| {
+            format!(
+                "{} can never raise an alarm: its threshold is {:.4}, and its score stays below {largest:.4} whatever it sees; give a lower one in the set, `detectors: {{threshold: {{sigmas: ...}}}}`",
+                runner.entry.name, runner.threshold
+            )
+        })
+    };
+    runners.iter().filter_map(note).collect()
+}
+
+/// Says which recordings are learnt from as free of contacts because nobody has said what touched the robot
+/// in them.
+pub fn unlabelled(request: &Request) -> Option<String> {
+    let learnt_from =
+        |recording: &&Named| recording.role != Role::Test && recording.truth.is_none();
+    let names: Vec<&str> = (request.recordings.iter())
+        .filter(learnt_from)
+        .map(|recording| recording.name.as_str())
+        .collect();
+    (!names.is_empty()).then(|| {
+        let names = suggest::some(&names);
+        format!("without labels, and taken to be free of contacts: {names}")
+    })
+}

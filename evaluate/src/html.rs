@@ -1,0 +1,241 @@
+//! `report.html`: the tables with receiver operating characteristics and delays, one page that needs nothing
+//! else; it looks as explain's page does and keeps its rules.
+
+mod delays;
+mod roc;
+mod tuning;
+
+use std::collections::BTreeMap;
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use tauscope_explain::html::{POLICY, STYLE};
+use tauscope_pipeline::provenance;
+
+use crate::evaluation::Evaluation;
+use crate::judged::Judged;
+use crate::metrics::statistics::mean_sd;
+use crate::recording::Role;
+use crate::tables::Table;
+
+/// What explain's style sheet has no name for.
+const OWN_STYLE: &str = include_str!("html/style.css");
+
+/// Colours of the style sheet; further detectors take them again with a dashed line.
+const COLOURS: usize = 7;
+
+/// Of detectors that lead together, so many are named.
+const MOST_NAMED: usize = 3;
+
+/// The page.
+///
+/// # Errors
+/// If the set's files cannot be read any more.
+pub fn page(
+    evaluation: &Evaluation,
+    judged: &[Judged<'_>],
+    tables: &[Table],
+) -> std::io::Result<String> {
+    let provenance = provenance_of(evaluation)?;
+    let sections = [
+        (
+            "roc",
+            "Receiver operating characteristics",
+            roc::section(judged),
+        ),
+        ("delays", "Detection delays", delays::section(judged)),
+        ("tuning", "Tuning", tuning::section(judged)),
+        ("tables", "Tables", Some(self::tables(tables))),
+        ("notes", "Notes", notes(&evaluation.notes)),
+    ];
+    let sections: Vec<(&str, &str, Markup)> = (sections.into_iter())
+        .filter_map(|(id, title, body)| Some((id, title, body?)))
+        .collect();
+    let set = &evaluation.request.set.set;
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta http-equiv="Content-Security-Policy" content=(POLICY);
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { (set) ": detectors evaluated" }
+                style { (PreEscaped(STYLE)) (PreEscaped(OWN_STYLE)) }
+            }
+            body {
+                main {
+                    (header(evaluation, judged))
+                    nav { @for (id, title, _) in &sections { a href={ "#" (id) } { (title) } } }
+                    @for (id, title, body) in &sections {
+                        section id=(id) { h2 { (title) } (body) }
+                    }
+                    (footer(&provenance))
+                }
+            }
+        }
+    };
+    Ok(page.into_string())
+}
+
+/// Class of a detector's line.
+fn line_class(index: usize) -> String {
+    let dashed = if index >= COLOURS { " dashed" } else { "" };
+    format!("c{}{dashed}", index % COLOURS)
+}
+
+fn header(evaluation: &Evaluation, judged: &[Judged<'_>]) -> Markup {
+    let request = &evaluation.request;
+    let tests = request
+        .recordings
+        .iter()
+        .filter(|r| r.role == Role::Test)
+        .count();
+    let scored = judged.first().map_or(0, |judged| judged.scored.len());
+    let (class, sign) = if scored > 0 {
+        ("nothing", "✓")
+    } else {
+        ("none", "–")
+    };
+    let mut facts = vec![(
+        format!("{scored} of {tests}"),
+        "test recordings scored".to_owned(),
+    )];
+    if let Some(first) = judged.first().filter(|judged| !judged.scored.is_empty()) {
+        let numbers = first.first();
+        facts.push((numbers.events.to_string(), "contacts in them".to_owned()));
+        let minutes = format!("{:.1} min", 60.0 * numbers.free_hours);
+        facts.push((minutes, "without contact".to_owned()));
+    }
+    if evaluation.lost > 0 {
+        facts.push((
+            evaluation.lost.to_string(),
+            "samples lost or refused".to_owned(),
+        ));
+    }
+    html! {
+        header class={ "verdict " (class) } {
+            p.kicker {
+                span.badge { span.sign aria-hidden="true" { (sign) } " Evaluated" }
+                span.case { (request.set.set) }
+            }
+            h1 { (verdict(judged)) }
+            dl.facts { @for (number, text) in facts { div { dt { (number) } dd { (text) } } } }
+        }
+    }
+}
+
+/// Who leads in what, in a sentence.
+fn verdict(judged: &[Judged<'_>]) -> String {
+    let auc = |judged: &Judged<'_>| {
+        let seeds: Vec<f64> = judged.numbers.iter().map(|n| n.samples.auc).collect();
+        mean_sd(&seeds).0
+    };
+    let best = (judged.iter())
+        .filter(|judged| auc(judged).is_finite())
+        .max_by(|a, b| auc(a).total_cmp(&auc(b)));
+    let Some(best) = best else {
+        return format!(
+            "{} detectors ran; nothing was scored, because no labelled test recording holds a contact",
+            judged.len()
+        );
+    };
+    let (most, of) = (judged.iter())
+        .map(|judged| (judged.first().found, judged.first().events))
+        .max()
+        .unwrap_or_default();
+    if judged.len() == 1 {
+        return format!(
+            "{} finds {most} of {of} contacts with {} false alarms; its AUC is {:.3}",
+            best.label,
+            best.first().false_alarms,
+            auc(best)
+        );
+    }
+    let mut finders: Vec<&Judged<'_>> = (judged.iter())
+        .filter(|judged| judged.first().found == most)
+        .collect();
+    finders.sort_by_key(|judged| judged.first().false_alarms);
+    let named = finders.iter().take(MOST_NAMED).map(|judged| {
+        let false_alarms = judged.first().false_alarms;
+        format!("{} with {false_alarms} false alarms", judged.label)
+    });
+    let mut named: Vec<String> = named.collect();
+    if finders.len() > MOST_NAMED {
+        named.push(format!("{} more", finders.len() - MOST_NAMED));
+    }
+    let said = named.join(" and ");
+    format!(
+        "The largest AUC is {:.3}, of {}; the most contacts, {most} of {of}, are found by {said}",
+        auc(best),
+        best.label
+    )
+}
+
+fn tables(tables: &[Table]) -> Markup {
+    html! {
+        @for table in tables {
+            div.card {
+                h3 { (table.title) }
+                @if !table.note.is_empty() { p.muted { (table.note) } }
+                div.wide {
+                    table.matrix {
+                        thead {
+                            tr {
+                                @for (index, name) in table.head.iter().enumerate() {
+                                    th.num[index > 0] scope="col" { (name) }
+                                }
+                            }
+                        }
+                        tbody {
+                            @for row in &table.rows {
+                                tr {
+                                    @for (index, cell) in row.iter().enumerate() {
+                                        @if index == 0 { th scope="row" { (cell) } } @else { td.num { (cell) } }
+                                    }
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn notes(notes: &[String]) -> Option<Markup> {
+    (!notes.is_empty()).then(|| html! { ul { @for note in notes { li { (note) } } } })
+}
+
+fn provenance_of(evaluation: &Evaluation) -> std::io::Result<BTreeMap<String, String>> {
+    let request = &evaluation.request;
+    let mut all = BTreeMap::from([
+        ("tauscope".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+        ("set".to_owned(), provenance::sha256_of_file(&request.path)?),
+    ]);
+    for recording in &request.recordings {
+        let key = format!("{}/{}", recording.role.as_str(), recording.name);
+        all.insert(key, provenance::sha256_of_file(&recording.path)?);
+    }
+    Ok(all)
+}
+
+fn footer(provenance: &BTreeMap<String, String>) -> Markup {
+    html! {
+        footer {
+            details {
+                summary { "How to read this page" }
+                dl.words {
+                    dt { "AUC" } dd { "The probability that a sample in a contact scores higher than one outside." }
+                    dt { "F1" } dd { "Harmonic mean of precision and recall of the samples at a threshold." }
+                    dt { "Best F1" } dd { "The best over thresholds of mean + i standard deviations of the validation scores: what the method could do, not what a user would get." }
+                    dt { "Found" } dd { "An alarm from 20 ms before the labelled beginning to 150 ms after the end." }
+                    dt { "False alarm" } dd { "An alarm that belongs to no contact, nor comes in the rest after one; those within 250 ms of each other count once." }
+                }
+            }
+            details.provenance {
+                summary { "Made from" }
+                dl { @for (key, value) in provenance { dt { (key) } dd { (value) } } }
+            }
+        }
+    }
+}

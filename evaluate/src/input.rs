@@ -1,0 +1,252 @@
+//! What is to be evaluated: the set file and the arguments, everything named looked up.
+
+mod arm;
+mod labelled;
+mod twins;
+
+use std::path::{Path, PathBuf};
+
+use tauscope_archive::Recording;
+use tauscope_detect::{DETECTORS, Entry};
+use tauscope_dynamics::Model;
+use tauscope_ingest::Topics;
+use tauscope_pipeline::cell::Cell;
+use tauscope_pipeline::files::SetFile;
+use tauscope_pipeline::replay::stem;
+use tauscope_pipeline::report::{Problem, Report};
+use tauscope_pipeline::suggest;
+use tauscope_pipeline::yaml::{self, Located, Place};
+use tauscope_twin::TwinFile;
+
+use crate::labels::{self, LabelsFile, Truth};
+use crate::recording::{Named, Role};
+use crate::registry::Facts;
+
+/// Where the expected effort comes from.
+#[derive(Debug, Clone)]
+pub enum TwinSource {
+    /// The robot's model as the URDF has it.
+    Rigid,
+    /// The same with a gain and an offset per joint, fitted on the set's train recordings.
+    Regression,
+    /// Somebody else's twin on a topic, with a gain and an offset per joint.
+    Topic,
+    /// A corrected twin out of a file.
+    File(Box<TwinFile>),
+}
+
+/// A twin to evaluate detectors behind.
+#[derive(Debug, Clone)]
+pub struct TwinChoice {
+    /// What it goes by in tables and folders.
+    pub name: String,
+    /// What it is.
+    pub source: TwinSource,
+    /// The file it came from.
+    pub path: Option<PathBuf>,
+}
+
+/// What is to be evaluated.
+#[derive(Debug)]
+pub struct Request {
+    /// The set.
+    pub set: SetFile,
+    /// The file it came from.
+    pub path: PathBuf,
+    /// The arm.
+    pub cell: Cell,
+    /// In the order of the session: train, validation, test.
+    pub recordings: Vec<Named>,
+    /// What runs.
+    pub detectors: Vec<&'static Entry>,
+    /// Whether somebody asked for just these: then one that cannot run is an error.
+    pub explicit: bool,
+    /// Behind which twins.
+    pub twins: Vec<TwinChoice>,
+    /// Low-pass on the velocity and on the efforts \[Hz\], where not the twin's own.
+    pub cutoffs_hz: [Option<f64>; 2],
+    /// How many detectors run at once.
+    pub jobs: usize,
+    /// What the reader of the tables should know.
+    pub notes: Vec<String>,
+}
+
+/// What the command line says beside the set.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// Names of detectors; empty for those that fit the set, `all` for all.
+    pub detectors: Vec<String>,
+    /// `rigid`, `regression`, `topic`, or paths of twins; empty for the usual one.
+    pub twins: Vec<String>,
+    /// See [`Request::cutoffs_hz`].
+    pub cutoffs_hz: [Option<f64>; 2],
+    /// See [`Request::jobs`].
+    pub jobs: usize,
+}
+
+impl Request {
+    /// Topics of the recordings, with the other twin's where `reference`.
+    pub fn topics(&self, reference: bool) -> Topics {
+        let topics = &self.set.topics;
+        Topics {
+            state: topics.state.clone(),
+            command: topics.command.clone(),
+            twin: topics.twin.clone().filter(|_| reference),
+            tool: None,
+            learn: None,
+        }
+    }
+
+    /// Where a link stands along the arm: the place of the joint that moves it. Of links that are fixed to
+    /// each other all have the same.
+    pub fn place(&self, link: &str) -> Option<usize> {
+        let model: &Model = self.cell.model.as_ref()?;
+        model.links()[model.link_index(link)?].joint
+    }
+
+    /// How long after a contact's end an alarm is no false one: a real robot has stopped \[s\].
+    pub fn rest_s(&self) -> f64 {
+        // A cyclic machine has stopped; an arm under impedance control swings back.
+        match (&self.set.cycle_s, &self.set.impedance) {
+            (Some(_), _) => 6.0,
+            (None, Some(_)) => 0.3,
+            (None, None) => 0.15,
+        }
+    }
+}
+
+/// Reads the set at `path` and looks up everything that it and the command line name.
+///
+/// # Errors
+/// Everything that is wrong with them.
+pub fn load(path: &Path, options: &Options) -> Result<Request, Report> {
+    let file: Located<SetFile> = yaml::load(path)?;
+    let set = file.value.clone();
+    let root = Place::root();
+    let mut report = Report::default();
+    let mut notes = Vec::new();
+    let cell = arm::cell(&file, &mut notes, &mut report)?;
+    let labels = labelled::find(&file, &mut notes, &mut report);
+    let recordings = recordings(&file, labels.as_ref(), &mut report);
+    notes.extend(labelled::doubts(labels.as_ref(), &recordings, &cell));
+    if set.test.is_empty() && set.validation.is_empty() {
+        let problem = file.at_key(&root, "neither `test` nor `validation` recordings");
+        report.push(problem.help("name the recordings that are to be scored under `test`"));
+    }
+    learnt_here(&file, &mut report);
+    let facts = Facts::of(&set, &recordings);
+    let detectors = detectors(&options.detectors, facts, &mut report);
+    let twins = twins::choices(&file, &cell, &options.twins, &mut report);
+    report.into_result(Request {
+        set,
+        path: path.to_owned(),
+        cell,
+        recordings,
+        detectors,
+        explicit: !(options.detectors.is_empty() || options.detectors == ["all"]),
+        twins,
+        cutoffs_hz: options.cutoffs_hz,
+        jobs: options.jobs.max(1),
+        notes,
+    })
+}
+
+/// The set's recordings with what touched the robot in them.
+fn recordings(
+    file: &Located<SetFile>,
+    labels: Option<&LabelsFile>,
+    report: &mut Report,
+) -> Vec<Named> {
+    let set = &file.value;
+    let mut all: Vec<Named> = Vec::new();
+    for (role, paths) in [
+        (Role::Train, &set.train),
+        (Role::Validation, &set.validation),
+        (Role::Test, &set.test),
+    ] {
+        for (index, path) in paths.iter().enumerate() {
+            let place = Place::root().key(role.as_str()).index(index);
+            let path = file.resolve(path);
+            let name = stem(&path);
+            if all.iter().any(|other| other.name == name) {
+                let problem = file.at(&place, format!("a second recording named `{name}`"));
+                report.push(problem.help("results and labels go by the name: give each its own"));
+                continue;
+            }
+            let contact = set.topics.contact.as_deref().filter(|_| labels.is_none());
+            match open(&path, &set.topics.state, contact) {
+                Ok((start_ns, flagged)) => {
+                    let labelled = labels.and_then(|labels| labels.recordings.get(&name));
+                    all.push(Named {
+                        truth: labelled.cloned().or(flagged),
+                        name,
+                        path,
+                        role,
+                        start_ns,
+                    });
+                }
+                Err(wrong) => report.push(file.at(&place, wrong)),
+            }
+        }
+    }
+    all
+}
+
+/// The stamp of a recording's first joint state, and what its topic of contacts says.
+fn open(path: &Path, state: &str, contact: Option<&str>) -> Result<(i64, Option<Truth>), String> {
+    let wrong = |error: tauscope_archive::ArchiveError| error.to_string();
+    let recording = Recording::open(path).map_err(wrong)?;
+    let mut states = recording.joint_states(state).map_err(wrong)?;
+    let (start_ns, start_log_ns) = loop {
+        match states.next_state() {
+            Some(Ok(first)) => break (first.message.header.stamp.ns(), first.log_time_ns),
+            Some(Err(_)) => {}
+            None => return Err(format!("{}: nothing on `{state}`", path.display())),
+        }
+    };
+    let truth = match contact {
+        Some(topic) => labels::from_topic(&recording, topic, start_log_ns).map_err(wrong)?,
+        None => None,
+    };
+    Ok((start_ns, truth))
+}
+
+/// Refuses what an evaluation finds itself among the detectors' settings.
+fn learnt_here(file: &Located<SetFile>, report: &mut Report) {
+    let found = file.value.detectors.all().flat_map(|settings| {
+        let keys = settings.found_by_evaluation().into_iter();
+        keys.map(|key| (settings.name(), key))
+    });
+    for (detector, key) in found {
+        let place = Place::root().key("detectors").key(detector).key(key);
+        let title = format!("`{key}` of {detector}: an evaluation lets every detector learn anew");
+        report.push(
+            file.at_key(&place, title)
+                .help(format!("leave `{key}` out")),
+        );
+    }
+}
+
+fn detectors(names: &[String], facts: Facts, report: &mut Report) -> Vec<&'static Entry> {
+    if names.is_empty() {
+        let usual = DETECTORS.iter().filter(|entry| facts.suit(entry));
+        return usual.collect();
+    }
+    if names == ["all"] {
+        return DETECTORS.iter().collect();
+    }
+    let mut found: Vec<&'static Entry> = Vec::new();
+    for name in names {
+        match DETECTORS.iter().find(|entry| entry.name == name) {
+            Some(entry) if found.iter().any(|other| other.name == entry.name) => {}
+            Some(entry) => found.push(entry),
+            None => {
+                let known = DETECTORS.iter().map(|entry| entry.name);
+                let help = suggest::help(name, "the detectors are", known);
+                let title = format!("--detectors: there is no detector `{name}`");
+                report.push(Problem::new(title).maybe_help(help));
+            }
+        }
+    }
+    found
+}

@@ -1,0 +1,223 @@
+//! One detector over the session: it learns, its threshold is set on the validation recordings, and then
+//! every sample of validation and test passes through the same stage that a pipeline runs.
+
+use std::time::Instant;
+
+use tauscope_bus::{Detection, Emit, LinkError, Stage as _, StageError, TwinState, flags};
+use tauscope_detect::{Config, Entry, Lesson, ScoreStatistics, Setup, Sweeps, Training};
+use tauscope_pipeline::build::BuildError;
+use tauscope_pipeline::tally::{DetectionTally, Event};
+use tauscope_pipeline::trained;
+
+use crate::error::EvaluateError;
+use crate::recording::{Named, Role};
+use crate::registry::Task;
+use crate::twin::is_free_of;
+
+/// What a detector made of one recording.
+#[derive(Debug, Clone)]
+pub struct Output {
+    /// The recording.
+    pub recording: String,
+    /// What it is for.
+    pub role: Role,
+    /// Stamps \[s from the first joint state\].
+    pub t: Vec<f64>,
+    /// The score of each sample. One that the detector was not ready for cannot raise an alarm: it stands with
+    /// the lowest score of the validation recordings, and within these with their mean, so that it does
+    /// not move the threshold.
+    pub scores: Vec<f64>,
+    /// What it found.
+    pub events: Vec<Event>,
+    /// Samples that the detector was not ready for.
+    pub not_judged: usize,
+    /// How long it took \[s\].
+    pub took_s: f64,
+}
+
+/// A detector that has learnt, on its way through the session: started anew with each recording, as a pipeline starts it, and told what it
+/// kept of its life before.
+pub struct Runner {
+    /// Which it is.
+    pub entry: &'static Entry,
+    /// Its seed.
+    pub seed: u64,
+    /// Its part of a pipeline file, with all that the training and validation recordings taught it.
+    pub config: Config,
+    /// The curves behind what it has learnt.
+    pub sweeps: Option<Sweeps>,
+    /// How long it learnt \[s\], without the curves; NaN if it learns nothing.
+    pub training_s: f64,
+    /// What its score does on the validation recordings while nothing touches the robot.
+    pub statistics: ScoreStatistics,
+    /// Over how many samples.
+    pub counted: u64,
+    /// Its score from which on it raises an alarm.
+    pub threshold: f64,
+    /// What its score cannot exceed, where there is such a bound.
+    pub largest_score: Option<f64>,
+    /// What it has said so far.
+    pub outputs: Vec<Output>,
+    /// The same, with what it has learnt since.
+    now: Config,
+    setup: Setup,
+    lowest: f64,
+}
+
+impl Runner {
+    /// Lets the detector learn and sets its threshold: mean + 4 standard deviations of its score on the
+    /// contact-free part of the validation recordings (of the train recordings if there are none), unless
+    /// it has rules of its own.
+    ///
+    /// # Errors
+    /// If it cannot learn from these recordings.
+    pub fn new(entry: &'static Entry, task: &Task<'_>) -> Result<Self, EvaluateError> {
+        let failed = |source| EvaluateError::Learn {
+            detector: entry.name,
+            source,
+        };
+        let began = Instant::now();
+        let config = task.learn(entry).map_err(failed)?;
+        let training_s = match entry.training {
+            Training::None => f64::NAN,
+            Training::Twin => task.twin_fit_s.unwrap_or(f64::NAN),
+            Training::Own => began.elapsed().as_secs_f64(),
+        };
+        let sweeps = task.sweeps(&config).map_err(failed)?;
+        let measured = match task.lessons.validation {
+            [] => task.lessons.train,
+            some => some,
+        };
+        let mut setup = task.setup.clone();
+        trained::read(&config, &mut setup).map_err(BuildError::from)?;
+        let (statistics, lowest, counted) = statistics(&config, &setup, measured)
+            .map_err(|error| failed(error.into()))?
+            .ok_or(EvaluateError::NeverReady {
+                detector: entry.name,
+            })?;
+        let trained = setup.trained.get(entry.name);
+        let largest_score = trained.and_then(|trained| (entry.largest_score)(trained));
+        setup.scores.insert(entry.name.to_owned(), statistics);
+        config
+            .stage(setup.clone())
+            .map_err(|error| failed(error.into()))?;
+        Ok(Self {
+            entry,
+            seed: task.seed,
+            now: config.clone(),
+            config,
+            sweeps,
+            training_s,
+            statistics,
+            counted,
+            threshold: f64::NAN,
+            largest_score,
+            outputs: Vec::new(),
+            setup,
+            lowest,
+        })
+    }
+
+    /// How many samples it judges at once, if it judges windows.
+    pub fn window(&self) -> Option<usize> {
+        self.config.all().find_map(|settings| settings.window())
+    }
+
+    /// Lets the next recording of the session pass through.
+    ///
+    /// # Errors
+    /// If the stage fails.
+    pub fn pass(
+        &mut self,
+        recording: &Named,
+        samples: &[TwinState],
+        joint_names: &[String],
+    ) -> Result<(), StageError> {
+        let mut last = Last(Detection::default());
+        let mut tally = DetectionTally::new(self.entry.name, joint_names).since(recording.start_ns);
+        let mut scores = Vec::with_capacity(samples.len());
+        let not_ready = match recording.role {
+            Role::Test => self.lowest,
+            Role::Train | Role::Validation => self.statistics.mean,
+        };
+        let mut stage = (self.now.stage(self.setup.clone())).map_err(StageError::failed)?;
+        let mut not_judged = 0;
+        let began = Instant::now();
+        for sample in samples {
+            stage.accept(sample, &mut last)?;
+            let said = &last.0;
+            let judged = said.header.has(flags::READY) && said.score.is_finite();
+            not_judged += usize::from(!judged);
+            scores.push(if judged { said.score } else { not_ready });
+            tally.add(said);
+        }
+        let took_s = began.elapsed().as_secs_f64();
+        if let Some(learnt) = stage.learnt() {
+            self.now.resume(&learnt).map_err(StageError::failed)?;
+        }
+        if recording.role != Role::Test {
+            self.config.clone_from(&self.now);
+        }
+        if !samples.is_empty() {
+            self.threshold = last.0.threshold;
+        }
+        let seconds =
+            |sample: &TwinState| (sample.header.stamp_ns - recording.start_ns) as f64 / 1e9;
+        self.outputs.push(Output {
+            recording: recording.name.clone(),
+            role: recording.role,
+            t: samples.iter().map(seconds).collect(),
+            scores,
+            events: tally.events,
+            not_judged,
+            took_s,
+        });
+        Ok(())
+    }
+}
+
+/// Keeps the newest sample only.
+struct Last(Detection);
+
+impl Emit<Detection> for Last {
+    fn emit(&mut self, write: &mut dyn FnMut(&mut Detection)) -> Result<(), LinkError> {
+        self.0 = Detection::default();
+        write(&mut self.0);
+        Ok(())
+    }
+}
+
+/// What the score does on the contact-free part of `lessons`, the lowest of all, and how many samples were
+/// counted; those that the detector is not ready for count with the mean. `None` if it never is ready.
+fn statistics(
+    config: &Config,
+    setup: &Setup,
+    lessons: &[Lesson],
+) -> Result<Option<(ScoreStatistics, f64, u64)>, tauscope_detect::ConfigError> {
+    let mut detector = config.detector(setup)?;
+    let (mut scores, mut count) = (Vec::new(), 0_u64);
+    let mut lowest = f64::INFINITY;
+    for lesson in lessons {
+        for sample in &lesson.samples {
+            let judgement = detector.judge(sample);
+            let judged = judgement.ready && judgement.score.is_finite();
+            if judged {
+                lowest = lowest.min(judgement.score);
+            }
+            if is_free_of(lesson, sample.header.stamp_ns) {
+                count += 1;
+                scores.extend(judged.then_some(judgement.score));
+            }
+        }
+    }
+    if scores.is_empty() {
+        return Ok(None);
+    }
+    let mean = scores.iter().sum::<f64>() / scores.len() as f64;
+    let squares: f64 = scores.iter().map(|score| (score - mean).powi(2)).sum();
+    let statistics = ScoreStatistics {
+        mean,
+        standard_deviation: (squares / count as f64).sqrt(),
+    };
+    Ok(Some((statistics, lowest, count)))
+}

@@ -1,0 +1,126 @@
+//! The papers' tables, and ours: the same rows for the terminal, the page and `--json`.
+
+mod contacts;
+mod cycles;
+mod overall;
+
+use comfy_table::{CellAlignment, presets};
+use serde::Serialize;
+
+use crate::evaluation::Evaluation;
+use crate::judged::Judged;
+use crate::metrics::statistics::{Distribution, mean_sd};
+
+/// A table.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Table {
+    /// What it tells.
+    pub title: String,
+    /// How to read it.
+    pub note: String,
+    /// Names of the columns.
+    pub head: Vec<String>,
+    /// The first cell of a row says what it is of.
+    pub rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    fn new(title: impl Into<String>, note: impl Into<String>, head: &[&str]) -> Self {
+        Self {
+            title: title.into(),
+            note: note.into(),
+            head: head.iter().map(|name| (*name).to_owned()).collect(),
+            rows: Vec::new(),
+        }
+    }
+
+    fn row<S: Into<String>>(&mut self, cells: impl IntoIterator<Item = S>) {
+        self.rows.push(cells.into_iter().map(Into::into).collect());
+    }
+}
+
+/// All tables that say something of this set.
+pub fn all(evaluation: &Evaluation, judged: &[Judged<'_>]) -> Vec<Table> {
+    let mut tables = vec![overall::twins(evaluation)];
+    let any_label = judged.iter().any(|judged| !judged.scored.is_empty());
+    if any_label {
+        tables.push(overall::samples(judged));
+        tables.extend(overall::windows(judged));
+        tables.push(overall::events(judged));
+        tables.push(overall::places(judged));
+        tables.extend(contacts::tables(judged));
+        tables.extend(cycles::tables(&evaluation.request, judged));
+    } else {
+        tables.push(overall::unscored(evaluation, judged));
+    }
+    tables.extend(overall::smallest(judged));
+    tables
+}
+
+/// For a terminal.
+pub fn text(tables: &[Table], notes: &[String]) -> String {
+    let mut text = String::new();
+    for table in tables {
+        text.push_str(&format!("\n{}\n", table.title));
+        if !table.note.is_empty() {
+            text.push_str(&format!("  {}\n", table.note));
+        }
+        let mut drawn = comfy_table::Table::new();
+        drawn.load_preset(presets::NOTHING);
+        drawn.set_header(&table.head);
+        for row in &table.rows {
+            drawn.add_row(row);
+        }
+        for column in drawn.column_iter_mut().skip(1) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+        text.push_str(&format!("{drawn}\n"));
+    }
+    for note in notes {
+        text.push_str(&format!("\nnote: {note}"));
+    }
+    text
+}
+
+/// A number with so many decimals, a dash if it is none.
+fn number(value: f64, decimals: usize) -> String {
+    if value.is_finite() {
+        format!("{value:.decimals$}")
+    } else {
+        "-".to_owned()
+    }
+}
+
+/// `7 of 9 (78 %)`.
+fn part(count: usize, all: usize) -> String {
+    match all {
+        0 => "-".to_owned(),
+        _ => format!("{count}/{all} ({} %)", percent(count, all)),
+    }
+}
+
+fn percent(count: usize, all: usize) -> String {
+    number(100.0 * count as f64 / all as f64, 1)
+}
+
+/// Mean over seeds, and the spread if there are several.
+fn over_seeds(values: &[f64], decimals: usize) -> String {
+    let (mean, sd) = mean_sd(values);
+    match values {
+        [_] => number(mean, decimals),
+        _ if mean.is_nan() => "-".to_owned(),
+        _ => format!("{mean:.decimals$} ± {sd:.decimals$}"),
+    }
+}
+
+/// Mean and spread in ms.
+fn mean_sd_ms(of: &Distribution) -> String {
+    match of.count {
+        0 => "-".to_owned(),
+        _ => format!("{:.0} ± {:.0}", 1e3 * of.mean, 1e3 * of.sd),
+    }
+}
+
+fn ms(seconds: f64) -> String {
+    number(1e3 * seconds, 0)
+}

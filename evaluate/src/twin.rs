@@ -1,0 +1,199 @@
+//! The twins that detectors are evaluated behind: made, or fitted on what touches nothing.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use tauscope_bus::flags;
+use tauscope_detect::{Impedance, Lesson, Setup};
+use tauscope_pipeline::build;
+use tauscope_pipeline::calibrate::Job;
+use tauscope_twin::{Expected, JointCorrection, TwinFile};
+
+use crate::error::EvaluateError;
+use crate::input::{Request, TwinChoice, TwinSource};
+use crate::recording::{Named, Role};
+use crate::session::Session;
+
+/// A sample this close before the beginning of a contact is not taken for free \[ns\].
+const BEFORE_NS: i64 = 100_000_000;
+/// Nor is one this close behind its end: the arm swings, and the filters remember \[ns\].
+const AFTER_NS: i64 = 500_000_000;
+
+/// No drive reports more than this many times the effort that the model expects.
+const LARGEST_GAIN: f64 = 5.0;
+
+/// A twin, ready.
+#[derive(Debug)]
+pub struct Prepared {
+    /// What it goes by.
+    pub name: String,
+    /// How its stage is configured.
+    pub config: tauscope_twin::Config,
+    /// What corrects it.
+    pub file: TwinFile,
+    /// How long the fit of gains and offsets took, reading included \[s\].
+    pub fit_s: Option<f64>,
+}
+
+impl Prepared {
+    /// Makes the twin of `choice`; a regression is fitted on the contact-free part of the train
+    /// recordings.
+    ///
+    /// # Errors
+    /// If there is nothing to fit on.
+    pub fn new(
+        request: &Request,
+        choice: &TwinChoice,
+        progress: &dyn Fn(usize, f64),
+    ) -> Result<Self, EvaluateError> {
+        let mut config = tauscope_twin::Config::default();
+        let reference = match &choice.source {
+            TwinSource::Topic => true,
+            // A corrected topic has no robot.
+            TwinSource::File(file) => {
+                file.robot.name.is_empty() && request.set.topics.twin.is_some()
+            }
+            TwinSource::Rigid | TwinSource::Regression => false,
+        };
+        if reference {
+            config.expected = Expected::Topic;
+        }
+        [config.velocity_cutoff_hz, config.effort_cutoff_hz] = request.cutoffs_hz;
+
+        let fit = train(request);
+        let topics = request.topics(reference);
+        let job = Job {
+            cell: &request.cell,
+            topics: &topics,
+            twin: &config,
+            fit: &fit,
+            validation: &[],
+        };
+        let (mut file, mut fit_s) = (job.file(), None);
+        match &choice.source {
+            TwinSource::File(given) => file = (**given).clone(),
+            TwinSource::Rigid => {
+                for name in &request.cell.facts.joint_names {
+                    file.joints.insert(name.clone(), JointCorrection::default());
+                }
+            }
+            TwinSource::Regression | TwinSource::Topic => {
+                if fit.is_empty() {
+                    return Err(EvaluateError::NothingToFit {
+                        twin: choice.name.clone(),
+                    });
+                }
+                let began = Instant::now();
+                let is_free = |path: &Path, stamp_ns: i64| {
+                    let recording = request.recordings.iter().find(|r| r.path == path);
+                    recording.is_none_or(|recording| is_free(recording, stamp_ns))
+                };
+                file = job.fit(&is_free, progress)?.file;
+                fit_s = Some(began.elapsed().as_secs_f64());
+            }
+        }
+        Ok(Self {
+            name: choice.name.clone(),
+            config,
+            file,
+            fit_s,
+        })
+    }
+
+    /// The set's recordings behind it.
+    ///
+    /// # Errors
+    /// If it does not fit the robot.
+    pub fn session<'a>(&self, request: &'a Request) -> Result<Session<'a>, EvaluateError> {
+        let reference = self.config.expected == Expected::Topic;
+        let twin = build::twin(&self.config, Some(&self.file), &request.cell)?;
+        Ok(Session::new(&request.cell, request.topics(reference), twin))
+    }
+
+    /// Measures the noise of the residual on the contact-free part of `lessons`, about zero: a standing
+    /// error of the twin is noise to a detector, too.
+    ///
+    /// # Errors
+    /// If there is no such part.
+    pub fn measure(&mut self, request: &Request, lessons: &[Lesson]) -> Result<(), EvaluateError> {
+        let names = &request.cell.facts.joint_names;
+        let (mut squares, mut count) = (vec![0.0; names.len()], 0_u64);
+        for lesson in lessons {
+            for sample in &lesson.samples {
+                let stamp_ns = sample.header.stamp_ns;
+                if sample.header.has(flags::READY) && is_free_of(lesson, stamp_ns) {
+                    count += 1;
+                    for (sum, residual) in squares.iter_mut().zip(sample.residual) {
+                        *sum += residual * residual;
+                    }
+                }
+            }
+        }
+        if count == 0 {
+            return Err(EvaluateError::NothingFree);
+        }
+        for (name, sum) in names.iter().zip(squares) {
+            let joint = self.file.joints.entry(name.clone()).or_default();
+            joint.noise = Some((sum / count as f64).sqrt());
+        }
+        self.file.scores.clear();
+        Ok(())
+    }
+
+    /// Fitted gains that no drive has.
+    pub fn doubts(&self) -> Option<String> {
+        self.fit_s?;
+        let said: Vec<String> = (self.file.joints.iter())
+            .filter(|(_, joint)| !(0.0..=LARGEST_GAIN).contains(&joint.gain))
+            .map(|(name, joint)| format!("{:.2} at {name}", joint.gain))
+            .collect();
+        (!said.is_empty()).then(|| {
+            format!(
+                "{}: the fitted gain is {}: friction, or what else the model leaves out, outweighs there what it knows",
+                self.name,
+                said.join(", ")
+            )
+        })
+    }
+
+    /// What a detector behind it must know.
+    ///
+    /// # Errors
+    /// If it does not fit the robot.
+    pub fn setup(&self, request: &Request) -> Result<Setup, EvaluateError> {
+        let (set, model) = (&request.set, request.cell.model.as_ref());
+        let link = (set.tool_link.as_ref()).and_then(|link| model?.link_index(link));
+        let impedance = set.impedance.as_ref().map(|impedance| Impedance {
+            translational_n_per_m: impedance.translational_n_per_m,
+            rotational_nm_per_rad: impedance.rotational_nm_per_rad,
+        });
+        Ok(Setup {
+            tool_link: link,
+            contact_point_on_tool_m: set.contact_point_on_tool_m,
+            impedance,
+            ..build::detect_setup(Some(&self.file), &request.cell)?
+        })
+    }
+}
+
+fn train(request: &Request) -> Vec<PathBuf> {
+    let train = (request.recordings.iter()).filter(|recording| recording.role == Role::Train);
+    train.map(|recording| recording.path.clone()).collect()
+}
+
+/// Whether, as far as anybody has said, nothing touches the robot at this instant, nor has just done so.
+pub fn is_free(recording: &Named, stamp_ns: i64) -> bool {
+    let events = recording.truth.iter().flat_map(|truth| &truth.events);
+    let mut spans = events.map(|event| event.labelled(recording.start_ns));
+    !spans.any(|contact| touches(contact.on_ns, contact.off_ns, stamp_ns))
+}
+
+/// The same of a lesson.
+pub fn is_free_of(lesson: &Lesson, stamp_ns: i64) -> bool {
+    let mut contacts = lesson.contacts.iter().flatten();
+    !contacts.any(|contact| touches(contact.on_ns, contact.off_ns, stamp_ns))
+}
+
+fn touches(on_ns: i64, off_ns: i64, stamp_ns: i64) -> bool {
+    (on_ns - BEFORE_NS..=off_ns + AFTER_NS).contains(&stamp_ns)
+}

@@ -1,0 +1,258 @@
+//! From what the pipeline file says to stages that run: the same for `run`, `replay` and the check,
+//! which builds every twin and detector to see whether it can be.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use tauscope_bus::{Emit, JointState, LinkError, Progress, SampleKind, Source, StageError};
+use tauscope_detect::Detect;
+use tauscope_ingest::{IngestError, Paced, Rate, SimulatedRobot};
+use tauscope_record::{CellInfo, RecordError, Recorder, StreamInfo};
+use tauscope_twin::{Correction, Twin, TwinFile};
+use tauscope_watch::{self as watch, Watch};
+
+use crate::cell::{Cell, EffortUnit};
+use crate::trained;
+
+/// Why a stage cannot be built.
+#[derive(Debug, thiserror::Error)]
+pub enum BuildError {
+    /// The twin's model does not fit the cell.
+    #[error(transparent)]
+    TwinFile(#[from] tauscope_twin::TwinFileError),
+    /// The twin.
+    #[error(transparent)]
+    Twin(#[from] tauscope_twin::TwinError),
+    /// The detector.
+    #[error(transparent)]
+    Detect(#[from] tauscope_detect::ConfigError),
+    /// The file of a trained detector.
+    #[error(transparent)]
+    Trained(#[from] trained::TrainedFileError),
+}
+
+/// What a source of `cell` must know of it.
+pub fn ingest_setup(cell: &Cell) -> tauscope_ingest::Setup {
+    tauscope_ingest::Setup {
+        cell: cell.facts.name.clone(),
+        joint_names: cell.facts.joint_names.clone(),
+        tool: cell
+            .facts
+            .tool
+            .as_ref()
+            .filter(|tool| tool.mass_kg > 0.0)
+            .map(|tool| tauscope_ingest::Tool {
+                mass_kg: tool.mass_kg,
+                com_m: tool.com_m,
+                inertia_kgm2: tool.inertia_kgm2,
+            }),
+    }
+}
+
+/// A source of `cell`. One that is started again goes on behind the sample with the stamp
+/// `after_ns`.
+pub fn ingest(
+    config: &tauscope_ingest::Config,
+    robot: Option<&SimulatedRobot>,
+    cell: &Cell,
+    after_ns: Option<i64>,
+) -> Result<Box<dyn Source<JointState>>, IngestError> {
+    let setup = ingest_setup(cell);
+    let Some(after_ns) = after_ns else {
+        return tauscope_ingest::open(config, &setup, robot);
+    };
+    // What was given out before is read again as fast as can be, and only then paced.
+    let fast = tauscope_ingest::Config {
+        rate: Rate::Fast,
+        ..config.clone()
+    };
+    let rest = After {
+        inner: tauscope_ingest::open(&fast, &setup, robot)?,
+        after_ns,
+    };
+    Ok(match config.rate.factor() {
+        Some(factor) => Box::new(Paced::new(rest, factor)),
+        None => Box::new(rest),
+    })
+}
+
+/// A source without the samples up to a stamp.
+struct After {
+    inner: Box<dyn Source<JointState>>,
+    after_ns: i64,
+}
+
+struct EmitAfter<'a> {
+    out: &'a mut dyn Emit<JointState>,
+    after_ns: i64,
+}
+
+impl Emit<JointState> for EmitAfter<'_> {
+    fn emit(&mut self, write: &mut dyn FnMut(&mut JointState)) -> Result<(), LinkError> {
+        let mut sample = JointState::default();
+        write(&mut sample);
+        if sample.header.stamp_ns <= self.after_ns {
+            return Ok(());
+        }
+        self.out.emit(&mut |slot| *slot = sample)
+    }
+}
+
+impl Source<JointState> for After {
+    fn step(&mut self, out: &mut dyn Emit<JointState>) -> Result<Progress, StageError> {
+        self.inner.step(&mut EmitAfter {
+            out,
+            after_ns: self.after_ns,
+        })
+    }
+
+    fn dropped(&self) -> u64 {
+        self.inner.dropped()
+    }
+
+    fn fraction_done(&self) -> Option<f64> {
+        self.inner.fraction_done()
+    }
+}
+
+/// What `model` corrects in `cell`; nothing without one.
+pub fn correction(model: Option<&TwinFile>, cell: &Cell) -> Result<Correction, BuildError> {
+    let joints = &cell.facts.joint_names;
+    Ok(match model {
+        Some(model) => model.resolve(joints, cell.facts.effort_unit.as_str())?,
+        None => Correction::none(joints.len()),
+    })
+}
+
+/// A twin of `cell`.
+pub fn twin(
+    config: &tauscope_twin::Config,
+    model: Option<&TwinFile>,
+    cell: &Cell,
+) -> Result<Twin, BuildError> {
+    let setup = tauscope_twin::Setup {
+        model: cell.model.clone(),
+        joint_names: cell.facts.joint_names.clone(),
+        torque_constants_nm_per_a: cell.facts.torque_constants_nm_per_a.clone(),
+        tool_link: cell.tool_link(),
+    };
+    let config = config
+        .clone()
+        .with(config.filters(model.map(|model| model.filters)));
+    Ok(Twin::new(&config, setup, correction(model, cell)?)?)
+}
+
+/// A detector behind a twin of `cell` with this `model`, and what it shares with others.
+pub fn detect(
+    config: &tauscope_detect::Config,
+    model: Option<&TwinFile>,
+    cell: &Cell,
+    shared: Option<tauscope_detect::Shared>,
+) -> Result<Detect, BuildError> {
+    let mut setup = detect_setup(model, cell)?;
+    setup.shared = shared;
+    trained::read(config, &mut setup)?;
+    Ok(config.stage(setup)?)
+}
+
+/// What a detector behind a twin of `cell` with this `model` must know.
+pub fn detect_setup(
+    model: Option<&TwinFile>,
+    cell: &Cell,
+) -> Result<tauscope_detect::Setup, BuildError> {
+    let correction = correction(model, cell)?;
+    let constants = cell.facts.torque_constants_nm_per_a.as_deref();
+    let joints = correction.joints.iter().enumerate().map(|(index, joint)| {
+        // A gain is no drive's where friction outweighs what the model knows.
+        let effort_per_nm = match (cell.facts.effort_unit, constants) {
+            (EffortUnit::Nm, _) => 1.0,
+            (EffortUnit::A, Some(constants)) => 1.0 / constants[index],
+            (EffortUnit::A, None) if joint.tells_torque() => joint.gain,
+            (EffortUnit::A, None) => f64::NAN,
+        };
+        tauscope_detect::JointSetup {
+            gain: joint.gain,
+            offset: joint.offset,
+            noise: joint.noise,
+            effort_per_nm,
+        }
+    });
+    let scores = model
+        .into_iter()
+        .flat_map(|model| &model.scores)
+        .map(|(name, score)| {
+            let score = tauscope_detect::ScoreStatistics {
+                mean: score.mean,
+                standard_deviation: score.standard_deviation,
+            };
+            (name.clone(), score)
+        });
+    Ok(tauscope_detect::Setup {
+        joints: joints.collect(),
+        joint_names: cell.facts.joint_names.clone(),
+        model: cell.model.clone(),
+        scores: scores.collect(),
+        tool_link: cell.tool_link(),
+        contact_point_on_tool_m: cell.contact_point_on_tool_m(),
+        impedance: cell.facts.impedance,
+        trained: BTreeMap::new(),
+        shared: None,
+    })
+}
+
+/// A watch over a twin of `cell` with this `model` and low-pass on efforts.
+pub fn watch(
+    config: &watch::Config,
+    model: Option<&TwinFile>,
+    effort_cutoff_hz: f64,
+    cell: &Cell,
+) -> Result<Watch, BuildError> {
+    let joints = detect_setup(model, cell)?.joints;
+    let setup = watch::Setup {
+        model: cell.model.clone(),
+        effort_per_nm: joints.iter().map(|joint| joint.effort_per_nm).collect(),
+        effort_cutoff_hz,
+    };
+    Ok(Watch::new(config, &setup))
+}
+
+/// What a recorder must know of a stream.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct StreamFacts {
+    /// The stage that makes it.
+    pub stage: String,
+    /// Its cell.
+    pub cell: String,
+    /// What it carries.
+    pub kind: SampleKind,
+    /// The detector, where it is one of ours.
+    pub detector: Option<String>,
+}
+
+/// A recorder of `streams`, which belong to `cells`.
+pub fn recorder(
+    config: &tauscope_record::Config,
+    cells: &[&Cell],
+    streams: &[StreamFacts],
+    provenance: &BTreeMap<String, String>,
+) -> Result<Recorder, RecordError> {
+    let cells: Vec<CellInfo> = cells
+        .iter()
+        .map(|cell| CellInfo {
+            name: cell.facts.name.clone(),
+            joint_names: cell.facts.joint_names.clone(),
+            model: cell.model.clone(),
+            effort_unit: cell.facts.effort_unit.as_str().to_owned(),
+        })
+        .collect();
+    let streams: Vec<StreamInfo> = streams
+        .iter()
+        .map(|stream| StreamInfo {
+            stage: stream.stage.clone(),
+            cell: stream.cell.clone(),
+            kind: stream.kind,
+            detector: stream.detector.clone(),
+        })
+        .collect();
+    Recorder::new(config, &cells, &streams, provenance)
+}

@@ -1,0 +1,331 @@
+//! Calibration: what a twin's gain, offset and noise per joint are, and what the detectors' scores do
+//! while nothing touches the robot. The stages are the pipeline's own, so that the numbers hold there.
+
+use std::path::{Path, PathBuf};
+
+use tauscope_bus::{SampleRef, Sink, StageError, TwinState, flags};
+use tauscope_detect::Detector;
+use tauscope_ingest::{FileConfig, RecordedSource, Topics};
+use tauscope_twin::{Calibration, Expected, JointCorrection, Robot, ScoreStatistics, TwinFile};
+
+use crate::build;
+use crate::cell::{Cell, EffortUnit};
+use crate::graph::Graph;
+use crate::provenance;
+use crate::replay::ReplayError;
+
+/// What to calibrate, and on what.
+#[derive(Debug)]
+pub struct Job<'a> {
+    /// The cell.
+    pub cell: &'a Cell,
+    /// Topics of the recordings.
+    pub topics: &'a Topics,
+    /// The twin, without a model.
+    pub twin: &'a tauscope_twin::Config,
+    /// Contact-free recordings that the gains are fitted on.
+    pub fit: &'a [PathBuf],
+    /// Contact-free recordings that noise and scores are measured on; those of the fit if empty.
+    pub validation: &'a [PathBuf],
+}
+
+/// Why a calibration gives nothing.
+#[derive(Debug, thiserror::Error)]
+pub enum CalibrateError {
+    /// A recording cannot be run through the stages.
+    #[error("{}: {source}", recording.display())]
+    Recording {
+        /// The recording.
+        recording: PathBuf,
+        /// Why.
+        source: ReplayError,
+    },
+    /// The recordings are over before the filters have settled, or hold no effort.
+    #[error(
+        "no sample to calibrate on: the recordings hold no effort, or end before the twin's filters have settled"
+    )]
+    TooShort,
+}
+
+impl CalibrateError {
+    /// Whether the arguments or files are wrong (exit code 2), rather than what happened since.
+    pub fn is_input(&self) -> bool {
+        match self {
+            Self::Recording { source, .. } => source.is_input(),
+            Self::TooShort => true,
+        }
+    }
+}
+
+/// A calibrated twin, and what was lost on the way to it.
+#[derive(Debug)]
+pub struct Calibrated {
+    /// The twin.
+    pub file: TwinFile,
+    /// Samples that the gains were fitted on.
+    pub samples: u64,
+    /// Samples of the recordings that were lost or refused.
+    pub lost: u64,
+}
+
+impl Job<'_> {
+    /// Fits gain and offset, then measures noise and scores. `progress` is told the place of the
+    /// recording among all that are read, and how far it is.
+    ///
+    /// # Errors
+    /// If a recording cannot be read, or all are too short.
+    pub fn run(&self, progress: &dyn Fn(usize, f64)) -> Result<Calibrated, CalibrateError> {
+        let mut calibrated = self.fit(&|_, _| true, progress)?;
+        let lost = self.measure(&mut calibrated.file, self.measured(), &|index, fraction| {
+            progress(self.fit.len() + index, fraction);
+        })?;
+        calibrated.lost += if self.validation.is_empty() { 0 } else { lost };
+        Ok(calibrated)
+    }
+
+    /// Fits gain and offset on the samples of which `is_free`, told the recording and the stamp, says that
+    /// nothing touches the robot.
+    ///
+    /// # Errors
+    /// If a recording cannot be read, or all are too short.
+    pub fn fit(
+        &self,
+        is_free: &(dyn Fn(&Path, i64) -> bool + Sync),
+        progress: &dyn Fn(usize, f64),
+    ) -> Result<Calibrated, CalibrateError> {
+        let joint_count = self.cell.facts.joint_names.len();
+        let mut lost = 0;
+        let facts = &self.cell.facts;
+        let in_nm =
+            facts.effort_unit == EffortUnit::Nm || facts.torque_constants_nm_per_a.is_some();
+        let from_topic = self.twin.expected == Expected::Topic;
+        let mut calibration = Calibration::new(joint_count, in_nm || from_topic);
+        for (index, recording) in self.fit.iter().enumerate() {
+            let step = &mut |fraction| progress(index, fraction);
+            lost += self.each(recording, None, step, &mut |sample| {
+                if is_free(recording, sample.header.stamp_ns) {
+                    calibration.add(sample);
+                }
+            })?;
+        }
+        let Some(fits) = calibration.fit() else {
+            return Err(CalibrateError::TooShort);
+        };
+        let mut file = self.file();
+        for (name, fit) in self.cell.facts.joint_names.iter().zip(&fits) {
+            let joint = JointCorrection {
+                gain: fit.gain,
+                // Somebody else's twin in A knows its drives, its gain does not tell them.
+                gain_deviation: (from_topic && !in_nm)
+                    .then_some(fit.gain.abs().max(f64::MIN_POSITIVE)),
+                offset: fit.offset,
+                noise: None,
+                explained: Some(fit.explained),
+            };
+            file.joints.insert(name.clone(), joint);
+        }
+        Ok(Calibrated {
+            file,
+            samples: calibration.samples(),
+            lost,
+        })
+    }
+
+    /// Measures the noise of the residual and the detectors' scores with the corrected twin `file` on
+    /// `recordings`, in which nothing may touch the robot, and writes them into it. Returns what was lost.
+    ///
+    /// # Errors
+    /// If a recording cannot be read, or the twin does not fit the cell.
+    pub fn measure(
+        &self,
+        file: &mut TwinFile,
+        recordings: &[PathBuf],
+        progress: &dyn Fn(usize, f64),
+    ) -> Result<u64, CalibrateError> {
+        let names = &self.cell.facts.joint_names;
+        let mut noise = vec![Spread::default(); names.len()];
+        let mut detectors = self
+            .detectors(file)
+            .map_err(|source| CalibrateError::Recording {
+                recording: recordings.first().cloned().unwrap_or_default(),
+                source,
+            })?;
+        let mut lost = 0;
+        for (index, recording) in recordings.iter().enumerate() {
+            let step = &mut |fraction| progress(index, fraction);
+            lost += self.each(recording, Some(file), step, &mut |sample| {
+                for (spread, residual) in noise.iter_mut().zip(sample.residual) {
+                    spread.add(residual);
+                }
+                for (detector, spread) in &mut detectors {
+                    let judgement = detector.judge(sample);
+                    if judgement.ready {
+                        spread.add(judgement.score);
+                    }
+                }
+            })?;
+        }
+        for (name, spread) in names.iter().zip(&noise) {
+            if let Some(joint) = file.joints.get_mut(name) {
+                // About zero: a standing error of the twin is noise to a detector, too.
+                joint.noise = (spread.count > 0).then(|| spread.root_mean_square());
+            }
+        }
+        file.scores = (detectors.iter())
+            .filter(|(_, spread)| spread.count > 0)
+            .map(|(detector, spread)| (detector.name().to_owned(), spread.statistics()))
+            .collect();
+        Ok(lost)
+    }
+
+    /// What noise and scores are measured on.
+    fn measured(&self) -> &[PathBuf] {
+        if self.validation.is_empty() {
+            self.fit
+        } else {
+            self.validation
+        }
+    }
+
+    /// How many recordings are read, for a progress bar.
+    pub fn recordings(&self) -> usize {
+        self.fit.len() + self.measured().len()
+    }
+
+    /// Runs a recording through source and twin and hands over every sample whose filters have
+    /// settled; returns what was lost.
+    fn each(
+        &self,
+        recording: &Path,
+        model: Option<&TwinFile>,
+        progress: &mut dyn FnMut(f64),
+        take: &mut (dyn FnMut(&TwinState) + Send),
+    ) -> Result<u64, CalibrateError> {
+        let failed = |source: ReplayError| CalibrateError::Recording {
+            recording: recording.to_owned(),
+            source,
+        };
+        let mut run = || -> Result<u64, ReplayError> {
+            let config = tauscope_ingest::Config::default();
+            let file = FileConfig {
+                path: recording.to_owned(),
+                topics: self.topics.clone(),
+            };
+            let setup = build::ingest_setup(self.cell);
+            let source = RecordedSource::open_file(&file, &config, &setup)?;
+            let twin = build::twin(self.twin, model, self.cell)?;
+            let mut graph = Graph::default();
+            let states = graph.source("ingest", Box::new(source))?;
+            let twins = graph.stage("twin", Box::new(twin), &states)?;
+            let input = graph.listen::<TwinState>(&twins)?;
+            graph.sink(
+                "calibration",
+                Box::new(Settled { take, reset: true }),
+                vec![input],
+            );
+            let counts = graph.run(progress)?;
+            Ok(counts.iter().map(|stage| stage.dropped).sum())
+        };
+        run().map_err(failed)
+    }
+
+    /// The twin as far as it is known before the fit.
+    pub fn file(&self) -> TwinFile {
+        let facts = &self.cell.facts;
+        TwinFile {
+            version: tauscope_twin::TWIN_FILE_VERSION,
+            robot: Robot {
+                name: self
+                    .cell
+                    .model
+                    .as_ref()
+                    .map_or_else(String::new, |m| m.name().to_owned()),
+                urdf_sha256: facts
+                    .urdf
+                    .as_ref()
+                    .map_or_else(String::new, |urdf| provenance::sha256(urdf.as_bytes())),
+            },
+            effort_unit: facts.effort_unit.as_str().to_owned(),
+            filters: self.twin.filters(None),
+            joints: std::collections::BTreeMap::new(),
+            terms: Vec::new(),
+            scores: std::collections::BTreeMap::new(),
+            provenance: std::collections::BTreeMap::new(),
+        }
+    }
+
+    /// Every detector behind this twin, its score not yet measured.
+    fn detectors(&self, file: &TwinFile) -> Result<Vec<Scored>, ReplayError> {
+        let setup = build::detect_setup(Some(file), self.cell)?;
+        let all = tauscope_detect::Config::calibrated(&setup).map_err(build::BuildError::from)?;
+        Ok(all
+            .into_iter()
+            .map(|detector| (detector, Spread::default()))
+            .collect())
+    }
+}
+
+/// Hands every sample whose filters have settled to a closure; the first one after a reset says so.
+struct Settled<'a> {
+    take: &'a mut (dyn FnMut(&TwinState) + Send),
+    reset: bool,
+}
+
+impl Sink for Settled<'_> {
+    fn accept(&mut self, _from: &str, sample: SampleRef<'_>) -> Result<(), StageError> {
+        let SampleRef::TwinState(sample) = sample else {
+            return Ok(());
+        };
+        self.reset |= sample.header.has(flags::RESET);
+        if sample.header.has(flags::READY) {
+            if std::mem::take(&mut self.reset) {
+                let mut first = *sample;
+                first.header.flags |= flags::RESET;
+                (self.take)(&first);
+            } else {
+                (self.take)(sample);
+            }
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self) -> Result<(), StageError> {
+        Ok(())
+    }
+}
+
+/// A detector and what its score has done.
+type Scored = (Box<dyn Detector>, Spread);
+
+/// Mean and spread of a number, as it comes (Welford).
+#[derive(Debug, Clone, Copy, Default)]
+struct Spread {
+    count: u64,
+    mean: f64,
+    squares: f64,
+}
+
+impl Spread {
+    fn add(&mut self, value: f64) {
+        self.count += 1;
+        let delta = value - self.mean;
+        self.mean += delta / self.count as f64;
+        self.squares += delta * (value - self.mean);
+    }
+
+    fn variance(&self) -> f64 {
+        self.squares / self.count.max(1) as f64
+    }
+
+    fn root_mean_square(&self) -> f64 {
+        (self.variance() + self.mean * self.mean).sqrt()
+    }
+
+    fn statistics(&self) -> ScoreStatistics {
+        ScoreStatistics {
+            mean: self.mean,
+            standard_deviation: self.variance().sqrt(),
+            samples: self.count,
+        }
+    }
+}

@@ -1,0 +1,172 @@
+//! A cell: its robot, and the facts that its stages need.
+
+mod constants;
+mod joints;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tauscope_bus::MAX_JOINTS;
+use tauscope_dynamics::Model;
+
+pub use constants::{ConstantSpot, torque_constants};
+pub use joints::first_joint_names;
+
+use crate::report::{Problem, Report};
+
+/// A cell, its names looked up.
+#[derive(Debug, Clone)]
+pub struct Cell {
+    /// The facts as they can be handed to another process.
+    pub facts: CellFacts,
+    /// The robot.
+    pub model: Option<Model>,
+}
+
+/// What a stage must know of its cell.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct CellFacts {
+    /// The cell's name.
+    pub name: String,
+    /// The robot's URDF as text.
+    pub urdf: Option<String>,
+    /// The joints, in the order of the samples' arrays.
+    pub joint_names: Vec<String>,
+    /// Unit of the measured effort.
+    pub effort_unit: EffortUnit,
+    /// By joint \[N m/A\], where the effort is a current and they are known.
+    pub torque_constants_nm_per_a: Option<Vec<f64>>,
+    /// The tool.
+    pub tool: Option<ToolEntry>,
+    /// The impedance that a Cartesian controller holds the tool with.
+    pub impedance: Option<tauscope_detect::Impedance>,
+}
+
+impl Cell {
+    /// The cell from its facts.
+    ///
+    /// # Errors
+    /// If the URDF is not one, which the check of the file had excluded.
+    pub fn from_facts(facts: CellFacts) -> Result<Self, tauscope_dynamics::ModelError> {
+        let model = facts.urdf.as_deref().map(Model::from_urdf).transpose()?;
+        Ok(Self { facts, model })
+    }
+
+    /// A cell of the robot at `path`, without a pipeline file; `constants` by joint \[N m/A\], none where they are not
+    /// known. `problem` says where they stand.
+    ///
+    /// # Errors
+    /// If the URDF cannot be read or used, or the constants are not those of its joints.
+    pub fn from_urdf(
+        path: &Path,
+        effort_unit: EffortUnit,
+        constants: &BTreeMap<String, f64>,
+        problem: &dyn Fn(ConstantSpot<'_>, String) -> Problem,
+    ) -> Result<Self, Report> {
+        let urdf = std::fs::read_to_string(path)
+            .map_err(|error| Problem::of_file(path, format!("cannot read the URDF: {error}")))?;
+        let model = Model::from_urdf(&urdf)
+            .map_err(|error| Problem::of_file(path, format!("cannot use the URDF: {error}")))?;
+        let joint_names = model.joint_names().map(str::to_owned).collect();
+        let name = model.name().to_owned();
+        let mut cell = Self::from_joints(name, joint_names, effort_unit, constants, problem)?;
+        cell.facts.urdf = Some(urdf);
+        cell.model = Some(model);
+        Ok(cell)
+    }
+
+    /// A cell of which no more than the joints is known; else as [`Cell::from_urdf`].
+    ///
+    /// # Errors
+    /// If there are too many joints, or the constants are not theirs.
+    pub fn from_joints(
+        name: String,
+        joint_names: Vec<String>,
+        effort_unit: EffortUnit,
+        constants: &BTreeMap<String, f64>,
+        problem: &dyn Fn(ConstantSpot<'_>, String) -> Problem,
+    ) -> Result<Self, Report> {
+        if joint_names.len() > MAX_JOINTS {
+            return Err(Problem::new(too_many(joint_names.len())).into());
+        }
+        let mut report = Report::default();
+        let mut by_joint = None;
+        if !constants.is_empty() {
+            by_joint = torque_constants(constants, &joint_names, effort_unit, problem, &mut report);
+        }
+        let facts = CellFacts {
+            name,
+            urdf: None,
+            joint_names,
+            effort_unit,
+            torque_constants_nm_per_a: by_joint,
+            tool: None,
+            impedance: None,
+        };
+        report.into_result(Self { facts, model: None })
+    }
+
+    /// The link the tool is attached to.
+    pub fn tool_link(&self) -> Option<usize> {
+        self.model
+            .as_ref()?
+            .link_index(&self.facts.tool.as_ref()?.link)
+    }
+
+    /// The point of the tool that touches things, in its link's frame \[m\].
+    pub fn contact_point_on_tool_m(&self) -> Option<[f64; 3]> {
+        self.facts.tool.as_ref()?.contact_point_m
+    }
+}
+
+/// What is said of a cell with too many joints.
+pub(crate) fn too_many(joints: usize) -> String {
+    format!("{joints} joints, at most {MAX_JOINTS} are supported")
+}
+
+/// Unit of a measured effort.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema, clap::ValueEnum,
+)]
+pub enum EffortUnit {
+    /// Torque \[N m\] (force \[N\] for a prismatic joint).
+    #[default]
+    #[value(name = "Nm")]
+    Nm,
+    /// Motor current \[A\].
+    #[value(name = "A")]
+    A,
+}
+
+impl EffortUnit {
+    /// As it is written in files.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Nm => "Nm",
+            Self::A => "A",
+        }
+    }
+}
+
+/// A rigid body attached to a link.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ToolEntry {
+    /// The link it is attached to.
+    pub link: String,
+    /// Its mass \[kg\]. 0 where only a topic tells of a tool.
+    #[serde(default)]
+    #[schemars(range(min = 0.0))]
+    pub mass_kg: f64,
+    /// Its centre of mass in the link's frame \[m\].
+    #[serde(default)]
+    pub com_m: [f64; 3],
+    /// Its inertia about its centre of mass, axes of the link: xx, xy, xz, yy, yz, zz \[kg m²\].
+    #[serde(default)]
+    pub inertia_kgm2: [f64; 6],
+    /// The point of it that touches things, in the link's frame \[m\]. By default the link's origin.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contact_point_m: Option<[f64; 3]>,
+}

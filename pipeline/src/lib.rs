@@ -1,0 +1,27 @@
+//! The files that people write (pipeline, case, set), checked with the place of everything that is wrong, and the
+//! stages that they name, built and run in one process: what the program and the evaluation share.
+
+#![cfg_attr(
+    test,
+    allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")
+)]
+
+pub mod build;
+pub mod calibrate;
+pub mod cell;
+pub mod files;
+pub mod graph;
+pub mod learnt_state;
+pub mod parallel;
+pub mod pipeline;
+pub mod provenance;
+pub mod replay;
+pub mod report;
+pub mod scenario;
+pub mod settings;
+pub mod suggest;
+pub mod tables;
+pub mod tally;
+pub mod trained;
+pub mod whole_file;
+pub mod yaml;

@@ -1,0 +1,384 @@
+//! What the stages' own parts of the file name: recordings, twins, programs, outputs.
+
+mod detector;
+mod model_fits;
+mod outputs;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use tauscope_ingest::SourceSettings;
+use tauscope_twin::{Expected, Motion, TwinFile};
+
+use super::file::{PipelineFile, StageEntry, stage_place};
+use super::role::Role;
+use super::wiring::Wiring;
+use crate::build;
+use crate::cell::Cell;
+use crate::provenance;
+use crate::report::Report;
+use crate::scenario::ScenarioFacts;
+use crate::settings::{OutsideEntry, Settings};
+use crate::yaml::{self, Located, Place};
+
+/// What the files that stages name hold.
+pub struct Files {
+    /// What each stage is told; `None` where something is wrong.
+    pub settings: Vec<Option<Settings>>,
+    /// SHA-256 of each twin's model, by the stage's name.
+    pub model_sha256: BTreeMap<String, String>,
+    /// The scenarios of simulated sources.
+    pub scenarios: BTreeMap<usize, ScenarioFacts>,
+}
+
+/// Reads and checks what each stage names, by place in the file.
+pub fn resolve(
+    file: &Located<PipelineFile>,
+    host: Option<&str>,
+    cells: &BTreeMap<String, Cell>,
+    wiring: Option<&Wiring>,
+    report: &mut Report,
+) -> Files {
+    let mut resolver = Resolver {
+        file,
+        host,
+        cells,
+        wiring,
+        report,
+        models: BTreeMap::new(),
+        model_sha256: BTreeMap::new(),
+        scenarios: BTreeMap::new(),
+    };
+    let count = file.value.stages.len();
+    // Twins before detectors, which rest on their models.
+    for index in 0..count {
+        resolver.twin_model(index);
+    }
+    let settings = (0..count).map(|index| resolver.stage(index)).collect();
+    resolver.outputs_apart();
+    Files {
+        settings,
+        model_sha256: resolver.model_sha256,
+        scenarios: resolver.scenarios,
+    }
+}
+
+struct Resolver<'a> {
+    file: &'a Located<PipelineFile>,
+    host: Option<&'a str>,
+    cells: &'a BTreeMap<String, Cell>,
+    wiring: Option<&'a Wiring>,
+    report: &'a mut Report,
+    /// By twin stage; absent where the twin names none or it is wrong.
+    models: BTreeMap<usize, TwinFile>,
+    model_sha256: BTreeMap<String, String>,
+    scenarios: BTreeMap<usize, ScenarioFacts>,
+}
+
+impl<'a> Resolver<'a> {
+    fn entry(&self, index: usize) -> &'a StageEntry {
+        &self.file.value.stages[index]
+    }
+
+    /// Whether the stage runs where the check runs, as far as one knows.
+    fn is_here(&self, index: usize) -> bool {
+        let host = &self.entry(index).host;
+        self.host.is_none() || host.is_none() || host.as_deref() == self.host
+    }
+
+    /// The stage's cell, if stage and cell are sound so far.
+    fn cell(&self, index: usize) -> Option<&'a Cell> {
+        self.cells.get(self.wiring?.cells[index].first()?)
+    }
+
+    /// The stage that this one rests on, going up from input to input, which is a `wanted`.
+    fn above(&self, index: usize, wanted: fn(Role) -> bool) -> Option<usize> {
+        let wiring = self.wiring?;
+        let mut at = index;
+        while let [input] = wiring.inputs[at].as_slice() {
+            at = *input;
+            if wanted(wiring.roles[at]) {
+                return Some(at);
+            }
+        }
+        None
+    }
+
+    fn stage(&mut self, index: usize) -> Option<Settings> {
+        let entry = self.entry(index);
+        let place = stage_place(index);
+        if let Some(config) = &entry.ingest {
+            return self.ingest(index, &place.key("ingest"), config);
+        }
+        if let Some(config) = &entry.twin {
+            return self.twin(index, &place.key("twin"), config);
+        }
+        if let Some(config) = &entry.detect {
+            return self.detect(index, &place.key("detect"), config);
+        }
+        if let Some(config) = &entry.explain {
+            return self.explain(index, &place.key("explain"), config);
+        }
+        if let Some(config) = &entry.record {
+            return self.record(&place.key("record"), config);
+        }
+        let outside = entry.outside.as_ref()?;
+        self.outside(index, &place.key("outside").key("command"), outside)
+    }
+
+    fn ingest(
+        &mut self,
+        index: usize,
+        place: &Place,
+        config: &tauscope_ingest::Config,
+    ) -> Option<Settings> {
+        let (key, source) = match config.source() {
+            Ok(source) => source,
+            Err(error) => {
+                self.report.push(self.file.at_key(place, error.to_string()));
+                return None;
+            }
+        };
+        if let Some((title, help)) = source.fault() {
+            let problem = self.file.at_key(&place.key(key), title);
+            self.report.push(problem.help(help));
+        }
+        let file = source.file();
+        let path_place = file.map_or(place.clone(), |(path, _)| place.key(key).key(path));
+        let mut config = config.clone();
+        if let Some(path) = config.path_mut() {
+            *path = self.file.resolve(path);
+        }
+        let missing = config.path_mut().filter(|path| !path.exists()).cloned();
+        if let (Some(path), Some((_, what))) = (missing, file)
+            && self.is_here(index)
+        {
+            let title = format!("there is no {what} {}", path.display());
+            self.report.push(self.file.at(&path_place, title));
+            return None;
+        }
+        let scenario = match &config.simulate {
+            Some(simulate) if self.is_here(index) => {
+                match ScenarioFacts::load(&simulate.scenario) {
+                    Ok(scenario) => Some(scenario),
+                    Err(problems) => {
+                        self.report.append(problems);
+                        return None;
+                    }
+                }
+            }
+            _ => None,
+        };
+        self.try_to_open(index, &path_place, &config, scenario.as_ref());
+        self.scenarios
+            .extend(scenario.map(|scenario| (index, scenario)));
+        Some(Settings::Ingest(Box::new(config)))
+    }
+
+    /// Opens a source that reads files, as the stage will: what is wrong with them is known before
+    /// anything starts.
+    fn try_to_open(
+        &mut self,
+        index: usize,
+        place: &Place,
+        config: &tauscope_ingest::Config,
+        scenario: Option<&ScenarioFacts>,
+    ) {
+        let Some(cell) = self.cell(index) else { return };
+        let is_live = |(_, source): (_, &dyn SourceSettings)| source.file().is_none();
+        if config.source().is_ok_and(is_live) || !self.is_here(index) {
+            return;
+        }
+        let opened = scenario
+            .map(ScenarioFacts::robot)
+            .transpose()
+            .map_err(|error| error.to_string())
+            .and_then(|robot| {
+                build::ingest(config, robot.as_ref(), cell, None).map_err(|error| error.to_string())
+            });
+        if let Err(text) = opened {
+            self.report.push(self.file.at(place, text));
+        }
+    }
+
+    fn twin_model(&mut self, index: usize) {
+        let entry = self.entry(index);
+        let Some(path) = entry.twin.as_ref().and_then(|twin| twin.model.as_ref()) else {
+            return;
+        };
+        let path = self.file.resolve(path);
+        let place = stage_place(index).key("twin").key("model");
+        if !path.exists() {
+            let problem = self
+                .file
+                .at(&place, format!("there is no twin {}", path.display()));
+            let help = "`tauscope calibrate` makes one; without `model` the twin is the URDF's";
+            self.report.push(problem.help(help));
+            return;
+        }
+        match yaml::load::<TwinFile>(&path) {
+            Ok(model) => {
+                let wrong = self.cell(index).and_then(|cell| {
+                    let facts = &cell.facts;
+                    let unit = facts.effort_unit.as_str();
+                    model.value.resolve(&facts.joint_names, unit).err()
+                });
+                if let Some(error) = wrong {
+                    self.report.push(self.file.at(&place, error.to_string()));
+                    return;
+                }
+                let hash = provenance::sha256(model.text().as_bytes());
+                self.model_sha256.insert(entry.name.clone(), hash);
+                self.models.insert(index, model.value);
+            }
+            Err(problems) => self.report.append(problems),
+        }
+    }
+
+    fn twin(
+        &mut self,
+        index: usize,
+        place: &Place,
+        config: &tauscope_twin::Config,
+    ) -> Option<Settings> {
+        self.topics_for(index, place, config);
+        let model = self.models.get(&index);
+        if config.model.is_some() && model.is_none() {
+            return None;
+        }
+        let cell = self.cell(index);
+        if let Some(cell) = cell
+            && let Err(error) = build::twin(config, model, cell)
+        {
+            let place = if config.model.is_some() {
+                place.key("model")
+            } else {
+                place.clone()
+            };
+            self.report
+                .push(self.file.at_key(&place, error.to_string()));
+            return None;
+        }
+        let model = model.cloned();
+        if let (Some(cell), Some(model)) = (cell, &model) {
+            self.model_fits(place, config, model, cell);
+        }
+        Some(Settings::Twin {
+            config: config.clone(),
+            model,
+        })
+    }
+
+    /// What a twin wants of the source, the source must read.
+    fn topics_for(&mut self, index: usize, place: &Place, config: &tauscope_twin::Config) {
+        let Some(source) = self.above(index, |role| role == Role::Ingest) else {
+            return;
+        };
+        let Some(ingest) = &self.entry(source).ingest else {
+            return;
+        };
+        let Ok((key, settings)) = ingest.source() else {
+            return;
+        };
+        let Some(topics) = settings.topics() else {
+            return;
+        };
+        let source_place = stage_place(source).key("ingest").key(key).key("topics");
+        let wants = [
+            (
+                config.motion == Motion::Commanded,
+                &topics.command,
+                "motion",
+                "command",
+            ),
+            (
+                config.expected == Expected::Topic,
+                &topics.twin,
+                "expected",
+                "twin",
+            ),
+        ];
+        for (wanted, topic, twin_key, topic_key) in wants {
+            if wanted && topic.is_none() {
+                let name = &self.entry(source).name;
+                let title = format!("the source `{name}` reads no `{topic_key}` topic for this");
+                let problem = self
+                    .file
+                    .at(&place.key(twin_key), title)
+                    .also(self.file.key_span(&source_place), "its topics")
+                    .help(format!("name it there: `{topic_key}: /its/name`"));
+                self.report.push(problem);
+            }
+        }
+    }
+
+    fn explain(
+        &mut self,
+        index: usize,
+        place: &Place,
+        config: &tauscope_watch::Config,
+    ) -> Option<Settings> {
+        let twin = self.above(index, |role| role == Role::Twin);
+        let model = twin.and_then(|twin| self.models.get(&twin));
+        let twin_config = twin.and_then(|twin| self.entry(twin).twin.clone());
+        let twin_config = twin_config.unwrap_or_default();
+        if twin_config.model.is_some() && model.is_none() {
+            // The twin's model is wrong, which has been said.
+            return None;
+        }
+        let effort_cutoff_hz = twin_config
+            .filters(model.map(|model| model.filters))
+            .effort_cutoff_hz;
+        if let Some(cell) = self.cell(index)
+            && let Err(error) = build::watch(config, model, effort_cutoff_hz, cell)
+        {
+            self.report.push(self.file.at_key(place, error.to_string()));
+            return None;
+        }
+        Some(Settings::Explain {
+            config: config.clone(),
+            model: model.cloned(),
+            effort_cutoff_hz,
+        })
+    }
+
+    fn record(&mut self, place: &Place, config: &tauscope_record::Config) -> Option<Settings> {
+        let mut config = config.clone();
+        let picture = config.rerun.as_mut();
+        let picture_goes_nowhere = picture
+            .as_ref()
+            .is_none_or(|rerun| rerun.file.is_none() && rerun.connect.is_none());
+        if config.mcap.is_none() && picture_goes_nowhere {
+            let problem = self.file.at_key(place, "a recorder that writes nothing");
+            self.report.push(
+                problem.help("give `mcap: out/archive.mcap`, or `rerun: {file: out/picture.rrd}`"),
+            );
+            return None;
+        }
+        for path in config
+            .mcap
+            .iter_mut()
+            .chain(picture.and_then(|rerun| rerun.file.as_mut()))
+        {
+            *path = self.file.resolve(path);
+        }
+        Some(Settings::Record(config))
+    }
+
+    fn outside(&mut self, index: usize, place: &Place, outside: &OutsideEntry) -> Option<Settings> {
+        let mut outside = outside.clone();
+        let program = outside.command.first_mut()?;
+        if program.contains('/') {
+            let path = self.file.resolve(Path::new(program.as_str()));
+            if self.is_here(index) && !path.is_file() {
+                let title = format!("there is no program {}", path.display());
+                self.report.push(self.file.at(&place.index(0), title));
+                return None;
+            }
+            // Absolute, because it is started in the folder of the file.
+            let path = std::path::absolute(&path).unwrap_or(path);
+            *program = path.display().to_string();
+        }
+        Some(Settings::Outside(outside))
+    }
+}

@@ -1,0 +1,57 @@
+//! Whether a twin's model was made for what it is used for.
+
+use tauscope_twin::TwinFile;
+
+use super::Resolver;
+use crate::cell::Cell;
+use crate::yaml::Place;
+
+impl Resolver<'_> {
+    /// A model holds for the robot and the filters it was made with: behind others, its noise and the
+    /// thresholds that rest on its scores mean nothing.
+    pub(super) fn model_fits(
+        &mut self,
+        place: &Place,
+        config: &tauscope_twin::Config,
+        model: &TwinFile,
+        cell: &Cell,
+    ) {
+        if let Some(robot) = &cell.model
+            && let Some(title) = model.made_for_other(robot.name())
+        {
+            let problem = self.file.at(&place.key("model"), title);
+            self.report
+                .push(problem.help("calibrate one for this robot: `tauscope calibrate`"));
+        }
+        let cutoffs = [
+            (
+                "velocity_cutoff_hz",
+                config.velocity_cutoff_hz,
+                model.filters.velocity_cutoff_hz,
+            ),
+            (
+                "effort_cutoff_hz",
+                config.effort_cutoff_hz,
+                model.filters.effort_cutoff_hz,
+            ),
+        ];
+        for (key, here, there) in cutoffs {
+            #[expect(
+                clippy::float_cmp,
+                reason = "both were written by people, not computed"
+            )]
+            let other = here.filter(|here| *here != there);
+            if let Some(here) = other
+                && !model.scores.is_empty()
+            {
+                let title =
+                    format!("`{key}` is {here}, but the twin's model was made with {there}");
+                let problem = self.file.at(&place.key(key), title);
+                let help = format!(
+                    "leave it out or give `{key}: {there}`, or calibrate anew: its thresholds hold for no other"
+                );
+                self.report.push(problem.help(help));
+            }
+        }
+    }
+}

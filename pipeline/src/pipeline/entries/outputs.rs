@@ -1,0 +1,67 @@
+//! What recorders write must be apart from each other and from what sources read.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use super::Resolver;
+use crate::pipeline::file::stage_place;
+use crate::yaml::Place;
+
+impl Resolver<'_> {
+    /// Two recorders on one file would spoil each other's, and one that writes what a source reads
+    /// would spoil that.
+    pub(super) fn outputs_apart(&mut self) {
+        let mut taken: BTreeMap<(Option<&str>, PathBuf), (Place, String)> = BTreeMap::new();
+        for index in 0..self.file.value.stages.len() {
+            let entry = self.entry(index);
+            let Some(mut config) = entry.ingest.clone() else {
+                continue;
+            };
+            let place = stage_place(index).key("ingest");
+            if let Some(path) = config.path_mut() {
+                let key = (entry.host.as_deref(), self.plain(path));
+                taken.insert(key, (place.clone(), format!("`{}` reads it", entry.name)));
+            }
+        }
+        for index in 0..self.file.value.stages.len() {
+            let entry = self.entry(index);
+            let Some(config) = &entry.record else {
+                continue;
+            };
+            let place = stage_place(index).key("record");
+            let outputs = [
+                (config.mcap.clone(), place.key("mcap")),
+                (
+                    config.rerun.as_ref().and_then(|rerun| rerun.file.clone()),
+                    place.key("rerun").key("file"),
+                ),
+            ];
+            for (path, place) in outputs {
+                let Some(path) = path else { continue };
+                let key = (entry.host.as_deref(), self.plain(&path));
+                if let Some((other, label)) = taken.get(&key) {
+                    let title = format!("`{}` would overwrite {}", entry.name, path.display());
+                    let problem = self.file.at(&place, title);
+                    self.report
+                        .push(problem.also(self.file.key_span(other), label.clone()));
+                    continue;
+                }
+                taken.insert(key, (place, format!("`{}` writes it", entry.name)));
+            }
+        }
+    }
+
+    /// The path without `.` and `..`, as far as can be said without the files being there.
+    fn plain(&self, path: &Path) -> PathBuf {
+        let path = std::path::absolute(self.file.resolve(path)).unwrap_or_else(|_| path.to_owned());
+        path.components().fold(PathBuf::new(), |mut plain, part| {
+            match part {
+                std::path::Component::ParentDir => {
+                    plain.pop();
+                }
+                other => plain.push(other),
+            }
+            plain
+        })
+    }
+}

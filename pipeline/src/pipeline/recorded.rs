@@ -1,0 +1,83 @@
+//! What the recorders of a pipeline are told, and what speaks against its detectors.
+
+use std::collections::BTreeMap;
+
+use tauscope_record::{RecordError, Recorder};
+use tauscope_watch as watch;
+
+use super::{Pipeline, Stage};
+use crate::build::{self, StreamFacts};
+use crate::cell::Cell;
+use crate::provenance::sha256;
+use crate::settings::Settings;
+
+impl Pipeline {
+    /// What speaks against running its detectors (on `host`, if one is given) as they are set, though they can be run.
+    pub fn warnings(&self, host: Option<&str>) -> Vec<String> {
+        let here = |stage: &&Stage| host.is_none() || stage.host.as_deref() == host;
+        let mut warnings = Vec::new();
+        for stage in self.stages.iter().filter(here) {
+            let Settings::Detect { config, model } = &stage.settings else {
+                continue;
+            };
+            let cell = stage.cells.first().and_then(|cell| self.cells.get(cell));
+            // What is wrong with it has been said.
+            let setup = cell.and_then(|cell| build::detect_setup(model.as_ref(), cell).ok());
+            if let Some(warning) = setup.and_then(|setup| config.warning(&setup)) {
+                warnings.push(format!("{}: {warning}", stage.name));
+            }
+        }
+        warnings
+    }
+
+    /// What a recorder must know of the streams of these stages.
+    pub fn streams(&self, stages: &[usize]) -> Vec<StreamFacts> {
+        let makers = stages.iter().map(|&from| &self.stages[from]);
+        let facts = makers.filter_map(|maker| {
+            let detector = match &maker.settings {
+                Settings::Detect { config, .. } => {
+                    let detector = config.name();
+                    detector.map(str::to_owned)
+                }
+                Settings::Explain { .. } => Some(watch::NAME.to_owned()),
+                _ => None,
+            };
+            Some(StreamFacts {
+                stage: maker.name.clone(),
+                cell: maker.cells.first()?.clone(),
+                kind: maker.role.gives()?,
+                detector,
+            })
+        });
+        facts.collect()
+    }
+
+    /// A recorder of the streams that these stages put out.
+    pub fn recorder(
+        &self,
+        config: &tauscope_record::Config,
+        heard: &[usize],
+    ) -> Result<Recorder, RecordError> {
+        let streams = self.streams(heard);
+        let is_heard = |cell: &&Cell| streams.iter().any(|stream| stream.cell == cell.facts.name);
+        let cells: Vec<&Cell> = self.cells.values().filter(is_heard).collect();
+        build::recorder(config, &cells, &streams, &self.provenance())
+    }
+
+    /// For the metadata of everything that it records.
+    pub fn provenance(&self) -> BTreeMap<String, String> {
+        let mut all = BTreeMap::from([
+            ("tauscope".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+            ("pipeline_sha256".to_owned(), sha256(self.text.as_bytes())),
+        ]);
+        for (name, cell) in &self.cells {
+            if let Some(urdf) = &cell.facts.urdf {
+                all.insert(format!("cells/{name}/urdf_sha256"), sha256(urdf.as_bytes()));
+            }
+        }
+        for (stage, hash) in &self.model_sha256 {
+            all.insert(format!("stages/{stage}/twin_sha256"), hash.clone());
+        }
+        all
+    }
+}

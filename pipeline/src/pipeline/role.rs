@@ -1,0 +1,124 @@
+//! What a stage is: which of the six, what it takes and what it gives.
+
+use tauscope_bus::SampleKind;
+
+use super::file::StageEntry;
+use crate::settings::OutputEntry;
+
+/// Which of the six kinds of stage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// A source of joint states.
+    Ingest,
+    /// The twin.
+    Twin,
+    /// A detector.
+    Detect,
+    /// A watch over a twin.
+    Explain,
+    /// A recorder.
+    Record,
+    /// A program that is not ours, and what it puts out.
+    Outside(Option<SampleKind>),
+}
+
+/// What a stage may listen to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Takes {
+    /// It is a source.
+    Nothing,
+    /// One stream of this kind.
+    One(SampleKind),
+    /// One stream of any kind, or none.
+    AnyOne,
+    /// Any number of streams, at least one.
+    Many,
+}
+
+/// The keys of a stage that say what it is.
+pub const ROLE_KEYS: [&str; 6] = ["ingest", "twin", "detect", "explain", "record", "outside"];
+
+impl Role {
+    /// All that `entry` claims to be, with the key that says so. Exactly one in a good file.
+    pub fn claimed(entry: &StageEntry) -> Vec<(&'static str, Self)> {
+        let outside = entry
+            .outside
+            .as_ref()
+            .map(|outside| Self::Outside(outside.output.map(kind_of)));
+        let claims = [
+            entry.ingest.as_ref().map(|_| Self::Ingest),
+            entry.twin.as_ref().map(|_| Self::Twin),
+            entry.detect.as_ref().map(|_| Self::Detect),
+            entry.explain.as_ref().map(|_| Self::Explain),
+            entry.record.as_ref().map(|_| Self::Record),
+            outside,
+        ];
+        ROLE_KEYS
+            .into_iter()
+            .zip(claims)
+            .filter_map(|(key, role)| Some((key, role?)))
+            .collect()
+    }
+
+    /// The key in the file.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Ingest => "ingest",
+            Self::Twin => "twin",
+            Self::Detect => "detect",
+            Self::Explain => "explain",
+            Self::Record => "record",
+            Self::Outside(_) => "outside",
+        }
+    }
+
+    /// What it may listen to.
+    pub fn takes(self) -> Takes {
+        match self {
+            Self::Ingest => Takes::Nothing,
+            Self::Twin => Takes::One(SampleKind::JointState),
+            Self::Detect | Self::Explain => Takes::One(SampleKind::TwinState),
+            Self::Record | Self::Outside(None) => Takes::Many,
+            Self::Outside(Some(_)) => Takes::AnyOne,
+        }
+    }
+
+    /// What it puts out.
+    pub fn gives(self) -> Option<SampleKind> {
+        match self {
+            Self::Ingest => Some(SampleKind::JointState),
+            Self::Twin => Some(SampleKind::TwinState),
+            Self::Detect | Self::Explain => Some(SampleKind::Detection),
+            Self::Record => None,
+            Self::Outside(output) => output,
+        }
+    }
+}
+
+/// The stages that put out `kind`, for people.
+pub fn makers_of(kind: SampleKind) -> &'static str {
+    match kind {
+        SampleKind::JointState => "an `ingest` stage",
+        SampleKind::TwinState => "a `twin` stage",
+        SampleKind::Detection => "a `detect` or `explain` stage",
+        SampleKind::Health => "any stage",
+    }
+}
+
+/// A kind of sample in words.
+pub fn words_for(kind: SampleKind) -> &'static str {
+    match kind {
+        SampleKind::JointState => "joint states",
+        SampleKind::TwinState => "twin states",
+        SampleKind::Detection => "detections",
+        SampleKind::Health => "health reports",
+    }
+}
+
+fn kind_of(output: OutputEntry) -> SampleKind {
+    match output {
+        OutputEntry::JointState => SampleKind::JointState,
+        OutputEntry::TwinState => SampleKind::TwinState,
+        OutputEntry::Detection => SampleKind::Detection,
+    }
+}

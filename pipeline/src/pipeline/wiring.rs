@@ -1,0 +1,208 @@
+//! Who listens to whom, and whether that makes a pipeline.
+
+mod inputs;
+mod order;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use tauscope_bus::Name;
+
+use super::file::{PipelineFile, StageEntry, stage_place};
+use super::role::{ROLE_KEYS, Role};
+use crate::report::Report;
+use crate::suggest;
+use crate::yaml::{Located, Place};
+
+/// The graph of a pipeline; stages by their place in the file.
+#[derive(Debug)]
+pub struct Wiring {
+    /// What each stage is.
+    pub roles: Vec<Role>,
+    /// What each stage listens to.
+    pub inputs: Vec<Vec<usize>>,
+    /// All stages, each after those it listens to.
+    pub order: Vec<usize>,
+    /// The cells each stage belongs to: one, but for a stage that takes many streams.
+    pub cells: Vec<BTreeSet<String>>,
+    /// The host each stage runs on, where the file names hosts.
+    pub hosts: Vec<Option<String>>,
+}
+
+/// Checks names, roles, inputs, cells and hosts; `None` if they make no pipeline.
+pub fn check(file: &Located<PipelineFile>, report: &mut Report) -> Option<Wiring> {
+    let mut checker = Checker {
+        file,
+        stages: &file.value.stages,
+        report,
+        broken: false,
+    };
+    checker.names();
+    let roles = checker.roles();
+    let hosts = checker.hosts();
+    let by_name = checker.stages_by_name();
+    let inputs = checker.inputs(&roles, &by_name);
+    checker.kinds(&roles, &inputs);
+    let order = checker.order(&inputs);
+    let cells = order
+        .as_ref()
+        .map(|order| checker.cells(&roles, &inputs, order));
+    if checker.broken {
+        return None;
+    }
+    let inputs = inputs
+        .into_iter()
+        .map(|all| all.into_iter().map(|input| input.stage).collect());
+    Some(Wiring {
+        roles: roles.into_iter().collect::<Option<_>>()?,
+        inputs: inputs.collect(),
+        order: order?,
+        cells: cells?,
+        hosts,
+    })
+}
+
+/// One thing that a stage listens to.
+struct Input {
+    stage: usize,
+    place: Place,
+}
+
+struct Checker<'a> {
+    file: &'a Located<PipelineFile>,
+    stages: &'a [StageEntry],
+    report: &'a mut Report,
+    broken: bool,
+}
+
+impl Checker<'_> {
+    fn wrong(&mut self, problem: crate::report::Problem) {
+        self.report.push(problem);
+        self.broken = true;
+    }
+
+    /// Names become parts of keys on the bus and of entity paths, and must be told apart.
+    fn names(&mut self) {
+        let top = Place::root();
+        let cells = self
+            .file
+            .value
+            .cells
+            .keys()
+            .map(|name| (name, top.key("cells").key(name), "cell"));
+        let hosts = self
+            .file
+            .value
+            .hosts
+            .keys()
+            .map(|name| (name, top.key("hosts").key(name), "host"));
+        let stages = self.stages.iter().enumerate();
+        let stages = stages.map(|(at, stage)| (&stage.name, stage_place(at).key("name"), "stage"));
+        for (name, place, what) in cells.chain(hosts).chain(stages).collect::<Vec<_>>() {
+            let simple = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+            if name.is_empty() || !name.chars().all(simple) {
+                let problem = match what {
+                    "stage" => self
+                        .file
+                        .at(&place, format!("`{name}` cannot be a {what}'s name")),
+                    _ => self
+                        .file
+                        .at_key(&place, format!("`{name}` cannot be a {what}'s name")),
+                };
+                self.wrong(problem.help("a name is made of letters, digits, `_` and `-`"));
+            } else if name.len() > Name::CAPACITY {
+                let title = format!(
+                    "the name is {} bytes long, at most {} fit",
+                    name.len(),
+                    Name::CAPACITY
+                );
+                self.wrong(self.file.at(&place, title));
+            }
+        }
+        if self.file.value.cells.is_empty() {
+            let problem = self.file.at_key(&top.key("cells"), "there is no cell");
+            self.wrong(problem.help("name one: `cells: {demo: {robot: robot.urdf}}`"));
+        }
+        let mut first: BTreeMap<&str, usize> = BTreeMap::new();
+        for (index, stage) in self.stages.iter().enumerate() {
+            let Some(&earlier) = first.get(stage.name.as_str()) else {
+                first.insert(&stage.name, index);
+                continue;
+            };
+            let place = stage_place(index).key("name");
+            let problem = self
+                .file
+                .at(&place, format!("two stages are named `{}`", stage.name))
+                .label("the second one")
+                .also(
+                    self.file.span(&stage_place(earlier).key("name")),
+                    "the first one",
+                );
+            self.wrong(problem);
+        }
+    }
+
+    fn roles(&mut self) -> Vec<Option<Role>> {
+        let mut roles = Vec::new();
+        for (index, stage) in self.stages.iter().enumerate() {
+            let place = stage_place(index);
+            let claimed = Role::claimed(stage);
+            match claimed.as_slice() {
+                [(_, role)] => {
+                    roles.push(Some(*role));
+                    continue;
+                }
+                [] => {
+                    let title = format!("stage `{}` does not say what it is", stage.name);
+                    let keys = suggest::list(ROLE_KEYS);
+                    self.wrong(
+                        self.file
+                            .at(&place, title)
+                            .help(format!("give one of {keys}")),
+                    );
+                }
+                [(first, _), (second, _), ..] => {
+                    let title = format!("stage `{}` is two things at once", stage.name);
+                    let problem = self
+                        .file
+                        .at_key(&place.key(second), title)
+                        .label(format!("`{second}`"))
+                        .also(self.file.key_span(&place.key(first)), format!("`{first}`"))
+                        .help("make two stages of it");
+                    self.wrong(problem);
+                }
+            }
+            roles.push(None);
+        }
+        roles
+    }
+
+    fn hosts(&mut self) -> Vec<Option<String>> {
+        let known = &self.file.value.hosts;
+        let only = (known.len() == 1)
+            .then(|| known.keys().next().cloned())
+            .flatten();
+        let mut hosts = Vec::new();
+        for (index, stage) in self.stages.iter().enumerate() {
+            let place = stage_place(index);
+            match &stage.host {
+                Some(host) if !known.contains_key(host) => {
+                    let names = known.keys().map(String::as_str);
+                    let help = suggest::help(host, "the hosts are", names)
+                        .unwrap_or_else(|| "name it under `hosts`".to_owned());
+                    let title = format!("there is no host `{host}`");
+                    self.wrong(self.file.at(&place.key("host"), title).help(help));
+                }
+                None if known.len() > 1 => {
+                    let title =
+                        format!("stage `{}` does not say on which host it runs", stage.name);
+                    let names = suggest::list(known.keys().map(String::as_str));
+                    let problem = self.file.at(&place.key("name"), title);
+                    self.wrong(problem.help(format!("give `host`, one of {names}")));
+                }
+                _ => {}
+            }
+            hosts.push(stage.host.clone().or_else(|| only.clone()));
+        }
+        hosts
+    }
+}

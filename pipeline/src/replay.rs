@@ -1,0 +1,370 @@
+//! Replay: the stages of a pipeline over a recording, in process, as fast as the machine allows, the
+//! same bytes every time.
+
+mod error;
+mod observe;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use tauscope_bus::{Detection, JointState, SampleKind, Source, TwinState};
+use tauscope_ingest::{ArchivedTwin, RecordedSource};
+
+use crate::build;
+use crate::cell::Cell;
+use crate::graph::{Graph, SinkInput, StageCounts, Stream};
+use crate::pipeline::{Pipeline, Stage};
+use crate::settings::Settings;
+use crate::tally::{DetectionTally, TwinTally};
+
+pub use error::ReplayError;
+pub use observe::Observer;
+
+/// What to do with an archive that already holds a twin's effort.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+pub enum TwinChoice {
+    /// Compute it anew.
+    #[default]
+    Recompute,
+    /// Take `/twin/joint_states` and `/residual` as they are in the archive.
+    Keep,
+}
+
+/// What a replay of one recording gave.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// The recording's name without its ending.
+    pub recording: String,
+    /// The cell.
+    pub cell: String,
+    /// Unit of the efforts.
+    pub effort_unit: String,
+    /// The joints, in URDF order.
+    pub joint_names: Vec<String>,
+    /// From the first to the last sample \[s\].
+    pub duration_s: f64,
+    /// Samples that were lost or refused, over all stages.
+    pub lost: u64,
+    /// By twin stage.
+    pub twins: Vec<TwinTally>,
+    /// By detect stage.
+    pub detectors: Vec<DetectionTally>,
+    /// By stage, in the order of the pipeline.
+    pub stages: Vec<StageCounts>,
+    /// What was written.
+    pub files: Vec<PathBuf>,
+}
+
+/// A pipeline prepared to be replayed: its sources replaced by recordings.
+#[derive(Debug)]
+pub struct Replay<'a> {
+    pipeline: &'a Pipeline,
+    /// The source whose place the recordings take.
+    source: &'a Stage,
+    /// That source and everything that follows from it alone, by place in the pipeline.
+    members: Vec<usize>,
+    twin: TwinChoice,
+}
+
+impl<'a> Replay<'a> {
+    /// Prepares `pipeline`; `source` names the stage whose place the recordings take, where there are
+    /// several.
+    ///
+    /// # Errors
+    /// If it is not clear which stage that is.
+    pub fn new(
+        pipeline: &'a Pipeline,
+        source: Option<&str>,
+        twin: TwinChoice,
+    ) -> Result<Self, ReplayError> {
+        let is_source = |stage: &&Stage| matches!(stage.settings, Settings::Ingest(_));
+        let sources: Vec<&Stage> = pipeline.stages.iter().filter(is_source).collect();
+        let names = || {
+            sources
+                .iter()
+                .map(|stage| stage.name.clone())
+                .collect::<Vec<_>>()
+        };
+        let source = match (source, &sources[..]) {
+            (_, []) => return Err(ReplayError::NoSource),
+            (None, [only]) => *only,
+            (None, _) => return Err(ReplayError::ManySources { stages: names() }),
+            (Some(name), _) => {
+                let found = sources.iter().find(|stage| stage.name == name);
+                *found.ok_or_else(|| ReplayError::UnknownSource {
+                    name: name.to_owned(),
+                    known: names().join(", "),
+                })?
+            }
+        };
+        let members = members(pipeline, source);
+        Ok(Self {
+            pipeline,
+            source,
+            members,
+            twin,
+        })
+    }
+
+    /// Stages that a replay leaves out although they hang on its source, because they are programs of
+    /// their own; what listens to them alone is left out, too.
+    pub fn left_out(&self) -> Vec<&'a str> {
+        let outside = |stage: &&Stage| matches!(stage.settings, Settings::Outside(_));
+        self.pipeline
+            .stages
+            .iter()
+            .filter(outside)
+            .map(|stage| stage.name.as_str())
+            .collect()
+    }
+
+    /// Replays one recording into `out`, if there is one; `progress` is told how far it is, 0 to 1.
+    ///
+    /// # Errors
+    /// If it cannot be read or not be written; what was begun is left with `.part` at its end.
+    pub fn run(
+        &self,
+        recording: &Path,
+        out: Option<&Path>,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Outcome, ReplayError> {
+        let cell = self.cell();
+        let stem = stem(recording);
+        let mut observer = Observer::new(&cell.facts.joint_names);
+        let mut files = Vec::new();
+        let mut graph = Graph::default();
+        let mut streams: BTreeMap<usize, Stream> = BTreeMap::new();
+        // Detectors behind one twin are given the same samples, one after the other.
+        let mut shared: BTreeMap<usize, tauscope_detect::Shared> = BTreeMap::new();
+        for &index in &self.members {
+            let stage = &self.pipeline.stages[index];
+            let input = stage
+                .inputs
+                .first()
+                .and_then(|input| streams.get(input))
+                .cloned();
+            let stream = match (&stage.settings, input) {
+                (Settings::Ingest(config), _) => {
+                    Some(graph.source(&stage.name, self.open(config, recording)?)?)
+                }
+                (Settings::Twin { config, model }, Some(input)) => Some(match self.twin {
+                    TwinChoice::Recompute => {
+                        let twin = build::twin(config, model.as_ref(), cell)?;
+                        graph.stage(&stage.name, Box::new(twin), &input)?
+                    }
+                    TwinChoice::Keep => {
+                        graph.source(&stage.name, Box::new(self.open_twin(recording)?))?
+                    }
+                }),
+                (Settings::Detect { config, model }, Some(input)) => {
+                    let behind = stage.inputs.first().copied().unwrap_or(index);
+                    let shared = Some(shared.entry(behind).or_default().clone());
+                    let detect = build::detect(config, model.as_ref(), cell, shared)?;
+                    Some(graph.stage(&stage.name, Box::new(detect), &input)?)
+                }
+                (
+                    Settings::Explain {
+                        config,
+                        model,
+                        effort_cutoff_hz,
+                    },
+                    Some(input),
+                ) => {
+                    let watch = build::watch(config, model.as_ref(), *effort_cutoff_hz, cell)?;
+                    Some(graph.stage(&stage.name, Box::new(watch), &input)?)
+                }
+                (Settings::Record(config), _) => {
+                    if let Some(config) = redirect(config, out, &stem, &mut files) {
+                        self.add_recorder(&mut graph, stage, &config, &streams)?;
+                    }
+                    None
+                }
+                (
+                    Settings::Twin { .. }
+                    | Settings::Detect { .. }
+                    | Settings::Explain { .. }
+                    | Settings::Outside(_),
+                    _,
+                ) => None,
+            };
+            if let Some(stream) = stream {
+                streams.insert(index, stream);
+            }
+        }
+        let inputs = self.inputs(&mut graph, streams.keys().copied(), &streams)?;
+        graph.sink("observer", Box::new(&mut observer), inputs);
+        let mut stages = graph.run(progress)?;
+        // The observer is no stage of the pipeline.
+        stages.pop();
+        drop(graph);
+        let observed = observer.observed;
+        let (first_ns, last_ns) = observed.stamps_ns.unwrap_or_default();
+        Ok(Outcome {
+            recording: stem,
+            cell: cell.facts.name.clone(),
+            effort_unit: cell.facts.effort_unit.as_str().to_owned(),
+            joint_names: cell.facts.joint_names.clone(),
+            duration_s: (last_ns - first_ns) as f64 * 1e-9,
+            lost: stages.iter().map(|stage| stage.dropped).sum(),
+            twins: observed.twins.into_values().collect(),
+            detectors: observed.detectors.into_values().collect(),
+            stages,
+            files,
+        })
+    }
+
+    fn cell(&self) -> &'a Cell {
+        let name = self.source.cells.first().map_or("", String::as_str);
+        &self.pipeline.cells[name]
+    }
+
+    /// The recording in the place of the pipeline's own source, not paced.
+    fn open(
+        &self,
+        config: &tauscope_ingest::Config,
+        recording: &Path,
+    ) -> Result<Box<dyn Source<JointState>>, ReplayError> {
+        let setup = build::ingest_setup(self.cell());
+        let table = recording
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("csv"));
+        Ok(Box::new(if table {
+            let Some(csv) = &config.csv else {
+                return Err(ReplayError::NoColumns {
+                    path: recording.to_owned(),
+                    stage: self.source.name.clone(),
+                });
+            };
+            let csv = tauscope_ingest::CsvConfig {
+                path: recording.to_owned(),
+                ..csv.clone()
+            };
+            RecordedSource::open_csv(&csv, config, &setup)?
+        } else {
+            RecordedSource::open_file(&file_config(config, recording), config, &setup)?
+        }))
+    }
+
+    fn open_twin(&self, recording: &Path) -> Result<ArchivedTwin, ReplayError> {
+        let Settings::Ingest(config) = &self.source.settings else {
+            return Err(ReplayError::NoSource);
+        };
+        let topics = tauscope_ingest::ArchivedTwinTopics {
+            state: file_config(config, recording).topics.state,
+            ..Default::default()
+        };
+        let setup = build::ingest_setup(self.cell());
+        Ok(ArchivedTwin::open(recording, &topics, config, &setup)?)
+    }
+
+    fn add_recorder(
+        &self,
+        graph: &mut Graph<'_>,
+        stage: &Stage,
+        config: &tauscope_record::Config,
+        streams: &BTreeMap<usize, Stream>,
+    ) -> Result<(), ReplayError> {
+        let heard: Vec<usize> = stage
+            .inputs
+            .iter()
+            .copied()
+            .filter(|input| streams.contains_key(input))
+            .collect();
+        let recorder = self.pipeline.recorder(config, &heard)?;
+        let mut inputs = self.inputs(graph, heard.iter().copied(), streams)?;
+        for index in heard {
+            inputs.push(graph.listen_to_health(&streams[&index])?);
+        }
+        graph.sink(&stage.name, Box::new(recorder), inputs);
+        Ok(())
+    }
+
+    /// Receiving ends of these stages' streams.
+    fn inputs(
+        &self,
+        graph: &mut Graph<'_>,
+        stages: impl Iterator<Item = usize>,
+        streams: &BTreeMap<usize, Stream>,
+    ) -> Result<Vec<SinkInput>, ReplayError> {
+        let mut inputs = Vec::new();
+        for index in stages {
+            let stream = &streams[&index];
+            inputs.push(match self.pipeline.stages[index].role.gives() {
+                Some(SampleKind::JointState) => graph.listen::<JointState>(stream)?,
+                Some(SampleKind::TwinState) => graph.listen::<TwinState>(stream)?,
+                Some(SampleKind::Detection) => graph.listen::<Detection>(stream)?,
+                Some(SampleKind::Health) | None => continue,
+            });
+        }
+        Ok(inputs)
+    }
+}
+
+/// A recording's name: of the file without its ending, or of the bag's folder.
+pub fn stem(recording: &Path) -> String {
+    let name = if recording.is_dir() {
+        recording.file_name()
+    } else {
+        recording.file_stem()
+    };
+    name.map_or_else(
+        || "recording".to_owned(),
+        |name| name.to_string_lossy().into_owned(),
+    )
+}
+
+/// `source` and every stage that hangs on it without a program that is not ours in between, in the
+/// order of the pipeline.
+fn members(pipeline: &Pipeline, source: &Stage) -> Vec<usize> {
+    let mut members: Vec<usize> = Vec::new();
+    for (index, stage) in pipeline.stages.iter().enumerate() {
+        let hangs = stage.inputs.iter().any(|input| members.contains(input));
+        let ours = !matches!(stage.settings, Settings::Outside(_));
+        if stage.name == source.name || (hangs && ours) {
+            members.push(index);
+        }
+    }
+    members
+}
+
+/// The pipeline's topics, for a recording of its robot.
+fn file_config(config: &tauscope_ingest::Config, recording: &Path) -> tauscope_ingest::FileConfig {
+    let topics = config.source().ok().and_then(|(_, source)| source.topics());
+    // What a simulated cell was asked for is in its archive, too.
+    let simulated = || tauscope_ingest::Topics {
+        learn: Some("/learn".to_owned()),
+        ..tauscope_ingest::Topics::default()
+    };
+    tauscope_ingest::FileConfig {
+        path: recording.to_owned(),
+        topics: topics.cloned().unwrap_or_else(simulated),
+    }
+}
+
+/// A recorder's configuration for a replay: the same kinds of file, into `out`, named after the
+/// recording; no live picture. Nothing if there is no `out`.
+fn redirect(
+    config: &tauscope_record::Config,
+    out: Option<&Path>,
+    stem: &str,
+    files: &mut Vec<PathBuf>,
+) -> Option<tauscope_record::Config> {
+    let out = out?;
+    let mut config = config.clone();
+    if config.mcap.is_some() {
+        config.mcap = Some(out.join(format!("{stem}.mcap")));
+        files.extend(config.mcap.clone());
+    }
+    if let Some(rerun) = &mut config.rerun {
+        rerun.connect = None;
+        if rerun.file.is_some() {
+            rerun.file = Some(out.join(format!("{stem}.rrd")));
+            files.extend(rerun.file.clone());
+        }
+    }
+    let picture = config
+        .rerun
+        .as_ref()
+        .is_some_and(|rerun| rerun.file.is_some());
+    (config.mcap.is_some() || picture).then_some(config)
+}

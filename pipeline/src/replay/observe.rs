@@ -1,0 +1,73 @@
+//! A sink that listens to all twins and detectors of a replay and tallies what they say.
+
+use std::collections::BTreeMap;
+
+use tauscope_bus::{SampleRef, Sink, StageError};
+
+use crate::tally::{DetectionTally, TwinTally};
+
+/// What was observed.
+#[derive(Debug, Clone, Default)]
+pub struct Observed {
+    /// By twin stage.
+    pub twins: BTreeMap<String, TwinTally>,
+    /// By detect stage.
+    pub detectors: BTreeMap<String, DetectionTally>,
+    /// First and newest stamp of all \[ns\].
+    pub stamps_ns: Option<(i64, i64)>,
+}
+
+/// The sink.
+#[derive(Debug)]
+pub struct Observer {
+    joint_names: Vec<String>,
+    /// What it has seen so far.
+    pub observed: Observed,
+}
+
+impl Observer {
+    /// An observer of a cell with these joints.
+    pub fn new(joint_names: &[String]) -> Self {
+        Self {
+            joint_names: joint_names.to_vec(),
+            observed: Observed::default(),
+        }
+    }
+}
+
+impl Sink for &mut Observer {
+    fn accept(&mut self, from: &str, sample: SampleRef<'_>) -> Result<(), StageError> {
+        let observed = &mut self.observed;
+        let stamp_ns = match sample {
+            SampleRef::TwinState(sample) => {
+                if !observed.twins.contains_key(from) {
+                    let tally = TwinTally::new(from, self.joint_names.len());
+                    observed.twins.insert(from.to_owned(), tally);
+                }
+                if let Some(tally) = observed.twins.get_mut(from) {
+                    tally.add(sample);
+                }
+                sample.header.stamp_ns
+            }
+            SampleRef::Detection(sample) => {
+                if !observed.detectors.contains_key(from) {
+                    let tally = DetectionTally::new(from, &self.joint_names);
+                    observed.detectors.insert(from.to_owned(), tally);
+                }
+                if let Some(tally) = observed.detectors.get_mut(from) {
+                    tally.add(sample);
+                }
+                sample.header.stamp_ns
+            }
+            SampleRef::JointState(sample) => sample.header.stamp_ns,
+            SampleRef::Health(_) => return Ok(()),
+        };
+        let (first, _) = observed.stamps_ns.unwrap_or((stamp_ns, stamp_ns));
+        observed.stamps_ns = Some((first, stamp_ns));
+        Ok(())
+    }
+
+    fn finish(&mut self) -> Result<(), StageError> {
+        Ok(())
+    }
+}

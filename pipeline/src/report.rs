@@ -1,0 +1,226 @@
+//! What is wrong with files, all at once, each with its place: printed as rustc prints errors.
+
+use std::fmt;
+use std::ops::Range;
+use std::path::Path;
+use std::sync::Arc;
+
+use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
+
+/// A text that was read, and where from.
+#[derive(Debug)]
+pub struct Source {
+    /// The path as the user would write it.
+    pub path: String,
+    /// The whole text.
+    pub text: String,
+}
+
+impl Source {
+    /// `text` as read from `path`.
+    pub fn new(path: &Path, text: String) -> Arc<Self> {
+        Arc::new(Self {
+            path: path.display().to_string(),
+            text,
+        })
+    }
+}
+
+/// A place in a [`Source`], and what is to be said there.
+#[derive(Debug, Clone)]
+struct Label {
+    span: Range<usize>,
+    text: String,
+}
+
+/// One thing that is wrong.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    title: String,
+    source: Option<Arc<Source>>,
+    /// The first is where it is wrong, the others are what it clashes with.
+    labels: Vec<Label>,
+    /// A file without a text: one that could not be read.
+    path: Option<String>,
+    help: Option<String>,
+}
+
+impl Problem {
+    /// Something wrong that has no place in a file.
+    pub fn new(title: impl Into<String>) -> Self {
+        Self {
+            title: title.into(),
+            source: None,
+            labels: Vec::new(),
+            path: None,
+            help: None,
+        }
+    }
+
+    /// Something wrong with a file as a whole.
+    pub fn of_file(path: &Path, title: impl Into<String>) -> Self {
+        Self {
+            path: Some(path.display().to_string()),
+            ..Self::new(title)
+        }
+    }
+
+    /// Something wrong at a range of bytes of a text.
+    pub fn at(source: &Arc<Source>, span: Range<usize>, title: impl Into<String>) -> Self {
+        Self {
+            source: Some(Arc::clone(source)),
+            labels: vec![Label {
+                span,
+                text: String::new(),
+            }],
+            ..Self::new(title)
+        }
+    }
+
+    /// Says `text` at the place itself.
+    pub fn label(mut self, text: impl Into<String>) -> Self {
+        if let Some(label) = self.labels.first_mut() {
+            label.text = text.into();
+        }
+        self
+    }
+
+    /// Points at a second place of the same text.
+    pub fn also(mut self, span: Range<usize>, text: impl Into<String>) -> Self {
+        self.labels.push(Label {
+            span,
+            text: text.into(),
+        });
+        self
+    }
+
+    /// Says what would mend it.
+    pub fn help(mut self, text: impl Into<String>) -> Self {
+        self.help = Some(text.into());
+        self
+    }
+
+    /// As [`Problem::help`], if there is something to say.
+    pub fn maybe_help(mut self, text: Option<String>) -> Self {
+        self.help = text.or(self.help);
+        self
+    }
+
+    fn position(&self) -> (String, usize) {
+        let path = self.source.as_ref().map(|source| source.path.clone());
+        let start = self.labels.first().map_or(0, |label| label.span.start);
+        (
+            path.or_else(|| self.path.clone()).unwrap_or_default(),
+            start,
+        )
+    }
+
+    fn render(&self, renderer: &Renderer) -> String {
+        let mut group = Group::with_title(Level::ERROR.primary_title(self.title.as_str()));
+        if let Some(source) = &self.source {
+            let annotations = self.labels.iter().enumerate().map(|(index, label)| {
+                let kind = if index == 0 {
+                    AnnotationKind::Primary
+                } else {
+                    AnnotationKind::Context
+                };
+                let text = (!label.text.is_empty()).then_some(label.text.as_str());
+                kind.span(label.span.clone()).label(text)
+            });
+            group = group.element(
+                Snippet::source(source.text.as_str())
+                    .path(source.path.as_str())
+                    .annotations(annotations),
+            );
+        } else if let Some(path) = &self.path {
+            group = group.element(Origin::path(path.as_str()));
+        }
+        if let Some(help) = &self.help {
+            group = group.element(Level::HELP.message(help.as_str()));
+        }
+        renderer.render(&[group])
+    }
+}
+
+/// Everything that is wrong. Never empty where it is returned as an error.
+#[derive(Debug, Clone, Default)]
+pub struct Report {
+    problems: Vec<Problem>,
+}
+
+impl Report {
+    /// Adds a problem.
+    pub fn push(&mut self, problem: Problem) {
+        self.problems.push(problem);
+    }
+
+    /// Adds all of another report.
+    pub fn append(&mut self, mut other: Self) {
+        self.problems.append(&mut other.problems);
+    }
+
+    /// All but the problems whose place is in one of these ranges of bytes.
+    #[must_use]
+    pub fn without_those_in(mut self, ranges: &[Range<usize>]) -> Self {
+        self.problems.retain(|problem| {
+            let at = problem.labels.first().map(|label| label.span.start);
+            !at.is_some_and(|at| ranges.iter().any(|range| range.contains(&at)))
+        });
+        self
+    }
+
+    /// Whether nothing is wrong.
+    pub fn is_empty(&self) -> bool {
+        self.problems.is_empty()
+    }
+
+    /// `Ok(value)` if nothing is wrong.
+    ///
+    /// # Errors
+    /// The report itself, its problems in the order of their places, if anything is.
+    pub fn into_result<T>(mut self, value: T) -> Result<T, Self> {
+        if self.is_empty() {
+            return Ok(value);
+        }
+        self.problems.sort_by_cached_key(Problem::position);
+        Err(self)
+    }
+
+    /// Every problem as rustc prints errors, with colours if `styled`, and their number.
+    pub fn render(&self, styled: bool) -> String {
+        let renderer = if styled {
+            Renderer::styled()
+        } else {
+            Renderer::plain()
+        };
+        let mut text = String::new();
+        for problem in &self.problems {
+            text += &problem.render(&renderer);
+            text += "\n\n";
+        }
+        let count = self.problems.len();
+        let plural = if count == 1 { "" } else { "s" };
+        text + &format!("{count} error{plural}; nothing was started")
+    }
+}
+
+impl From<Problem> for Report {
+    fn from(problem: Problem) -> Self {
+        Self {
+            problems: vec![problem],
+        }
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let texts: Vec<String> = self
+            .problems
+            .iter()
+            .map(|problem| problem.render(&Renderer::plain()))
+            .collect();
+        f.write_str(&texts.join("\n\n"))
+    }
+}
+
+impl std::error::Error for Report {}

@@ -1,0 +1,102 @@
+//! The `tauscope` program: command line, supervisor, and what it writes for people. Its physics is in the stages, its
+//! files and the stages built from them are in `tauscope_pipeline`.
+//!
+//! [`answer`] runs a command as a function.
+
+mod announce;
+mod cli;
+mod commands;
+mod exit;
+mod explain;
+mod output;
+mod plan;
+mod progress;
+mod supervisor;
+
+use std::ffi::OsString;
+use std::io::IsTerminal;
+use std::process::ExitCode;
+
+use clap::Parser;
+use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::prelude::*;
+
+use cli::{Cli, Command};
+use output::Output;
+
+/// The program: its arguments are the command line, its words go to the terminal.
+pub fn main() -> ExitCode {
+    // What stages warn of, and what libraries fail in, goes where errors go.
+    let targets = Targets::new()
+        .with_default(LevelFilter::ERROR)
+        .with_target("tauscope", LevelFilter::WARN);
+    let lines = tracing_subscriber::fmt::layer()
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .without_time()
+        .with_target(false);
+    tracing_subscriber::registry()
+        .with(lines.with_filter(targets))
+        .init();
+    match Cli::parse().command.unwrap_or_default() {
+        Command::Stage(args) => commands::stage::run(&args),
+        Command::Exec(args) => commands::stage::exec(&args),
+        command => ExitCode::from(run(&command, &mut Output::Terminal)),
+    }
+}
+
+/// What a command answered.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Answer {
+    /// The exit code.
+    pub code: u8,
+    /// What the program would have written to standard output.
+    pub stdout: String,
+    /// What it would have written to standard error, but for what stages warn of through `tracing`.
+    pub stderr: String,
+}
+
+/// Runs a command as a function, without a process: `arguments` are those behind the program's name.
+///
+/// Not for `run`, whose stages are processes of this program.
+pub fn answer(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> Answer {
+    let name = OsString::from(env!("CARGO_PKG_NAME"));
+    let arguments = arguments.into_iter().map(Into::into);
+    let mut output = Output::Memory(String::new(), String::new());
+    let code = match Cli::try_parse_from(std::iter::once(name).chain(arguments)) {
+        Ok(cli) => run(&cli.command.unwrap_or_default(), &mut output),
+        Err(error) => {
+            output.say(&error.to_string());
+            u8::try_from(error.exit_code()).unwrap_or(u8::MAX)
+        }
+    };
+    let (stdout, stderr) = match output {
+        Output::Memory(stdout, stderr) => (stdout, stderr),
+        Output::Terminal => Default::default(),
+    };
+    Answer {
+        code,
+        stdout,
+        stderr,
+    }
+}
+
+/// Runs a command that needs no process of its own; its exit code.
+fn run(command: &Command, out: &mut Output) -> u8 {
+    let outcome = match command {
+        Command::Run(args) => commands::run::run(args, out),
+        Command::Check(args) => commands::check::run(args, out),
+        Command::Schema(args) => commands::schema::run(args, out),
+        Command::Replay(args) => commands::replay::run(args, out),
+        Command::Calibrate(args) => commands::calibrate::run(args, out),
+        Command::Explain(args) => commands::explain::run(args, out),
+        Command::Evaluate(args) => commands::evaluate::run(args, out),
+        Command::Simulate(args) => commands::simulate::run(args, out),
+        Command::Info(args) => commands::info::run(args, out),
+        Command::Repair(args) => commands::repair::run(args, out),
+        Command::Stage(_) | Command::Exec(_) => Err(exit::Failure::rejected(
+            "this command is for `tauscope run`",
+        )),
+    };
+    exit::code(outcome, out)
+}

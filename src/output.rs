@@ -1,0 +1,41 @@
+//! Where the words of a command go.
+
+use std::io::Write as _;
+
+/// Where a command writes its result and its warnings.
+#[derive(Debug)]
+pub enum Output {
+    /// To standard output and standard error.
+    Terminal,
+    /// Into memory: what would go to standard output, and what would go to standard error.
+    Memory(String, String),
+}
+
+impl Output {
+    /// Writes a result. A reader that has gone, as `head` does, is no failure.
+    pub fn print(&mut self, text: &str) -> anyhow::Result<()> {
+        let text = text.trim_end();
+        match self {
+            Self::Terminal => match writeln!(std::io::stdout().lock(), "{text}") {
+                Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
+                _ => Ok(()),
+            },
+            Self::Memory(results, _) => {
+                results.push_str(text);
+                results.push('\n');
+                Ok(())
+            }
+        }
+    }
+
+    /// Writes a line for people: a warning, a note or an error.
+    pub fn say(&mut self, line: &str) {
+        match self {
+            Self::Terminal => eprintln!("{line}"),
+            Self::Memory(_, said) => {
+                said.push_str(line);
+                said.push('\n');
+            }
+        }
+    }
+}
