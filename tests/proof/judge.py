@@ -14,6 +14,8 @@ PARTS = {"stribeck_friction": {"coulomb_friction", "viscous_friction"}, "asymmet
          "temperature_viscous": {"viscous_friction"}, "backlash": {"rotor_inertia"}, "joint_elasticity": {"rotor_inertia"},
          "counterbalance_spring": {"torque_bias"}, "cable_spring": {"torque_bias"}, "payload_pickup": {"payload"},
          "unknown": {"coulomb_friction", "viscous_friction", "torque_bias"}}
+# What is the nearest name of something off the list at the same joint: not wrong, not right.
+NEAREST = {"gear_efficiency": {"load_dependent_friction"}, "load_squared_friction": {"load_dependent_friction"}}
 BODIES = {"payload", "link_mass", "link_com", "unknown"}     # where the bodies are off, a body is never wrong
 
 
@@ -48,6 +50,7 @@ def judge(findings, effects, robot):
     # Coulomb friction and an offset are asymmetric friction, and the other way round.
     both = {p for (e, p), _ in truths if e == "coulomb_friction"} & {p for (e, p), _ in truths if e == "torque_bias"}
     said = {named(f, where) for f in findings}
+    nearest = {(name, where[e["joint"]]) for e in effects for name in NEAREST.get(e["parameters"].get("kind"), ())}
 
     def one(finding):
         own = named(finding, where)
@@ -60,7 +63,7 @@ def judge(findings, effects, robot):
             return "right"
         if any(agrees(named(r, where), t, source) for r in finding["equivalent_to"][:3] for t, source in truths):
             return "right"
-        if any(own[0] in PARTS.get(e, ()) and own[1] == p for (e, p), _ in truths):
+        if any(own[0] in PARTS.get(e, ()) and own[1] == p for (e, p), _ in truths) or own in nearest:
             return None
         # So is what the report itself cannot tell from a body: the spring of a joint may be the weight of its link.
         body = own == ("rotor_inertia", 0) or any(x["effect"] in BODIES and x.get("link") for x in (finding, *finding["equivalent_to"][:3]))

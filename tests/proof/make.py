@@ -40,6 +40,7 @@ def options():
     a.add_argument("--rates", default="100,125", help="Hz, divisors of 1000")
     a.add_argument("--clock", default="even", choices=["even", "uneven"])
     a.add_argument("--noise-correlation", default="0,0", help="range of the correlation time of the torque noise, s")
+    a.add_argument("--white-share", type=float, default=0., help="share of the power of correlated noise that is white after all")
     a.add_argument("--recordings", default="4,2", help="to fit, held out")
     a.add_argument("--seconds", default="8.5,10", help="range of a recording's length")
     a.add_argument("--several", type=float, default=0., help="probability that an effect of a combination comes on a second joint too")
@@ -226,6 +227,8 @@ def attempt(o, ident, kind, names, robot, rng, folder, rejected):
         t, rows = stamps(o, rng, len(command) / motion.RATE, rate)
         at = lambda x: np.stack([np.interp(t, m.t, column) for column in x.T], 1)
         noise = coloured(rng, t, robot.n, correlation) * sigma
+        if o.white_share:
+            noise = np.sqrt(1 - o.white_share) * noise + np.sqrt(o.white_share) * rng.normal(size=noise.shape) * sigma
         measured, true_rigid = at(clean) + noise, at(rigid)
         fine = np.where(robot.slides, 0.2, 1.)
         q = np.round((at(m.q) + fine * ENCODER_NOISE * rng.normal(size=measured.shape)) / (fine * ENCODER_STEP)) * fine * ENCODER_STEP

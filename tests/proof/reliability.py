@@ -3,8 +3,8 @@
     python reliability.py TAUSCOPE OUT [--first 1] [--cases 1000] [--table] [--svg FILE]
 
 Case by case, from its seed: a small arm (small_arm.py), recordings of it by `make.py`'s generator with an effect of the library, two to four
-at once, nothing (under white and under slow noise), something off the library (`make.py`'s and off_list.py's), or an arm as real ones
-are (friction everywhere, its bodies off, and in half of the cases something off the library besides). MuJoCo integrates half of them; of the
+at once, nothing (all under white noise or partly slow noise), something off the library (`make.py`'s and off_list.py's), or an arm as real ones
+are (friction everywhere, its bodies off, and in half of the cases something off the library besides). MuJoCo integrates a quarter of them; of the
 others, and of whole arms, the motion is as commanded (`make.py --followed`), which is faster. Then `explain`, and each finding judged
 by name and place (judge.py). What is there already is not made again; `--table` makes nothing at all.
 """
@@ -54,12 +54,12 @@ def plan(seed, joints, rng):
              "null": list,
              "unknown": lambda: [off],
              "arm": lambda: ["bodies_off", *draws.whole_arm(joints, rng), *([off] if rng.random() < 0.5 else [])]}[kind]()
-    slow, plant = rng.random() < 0.4, rng.random() < 0.5
+    slow, plant = rng.random() < 0.4, rng.random() < 0.25
     followed = kind == "arm" or not plant and not {"joint_elasticity", "backlash", "torque_saturation"} & set(names)
     around = argparse.Namespace(
         seed=seed, strength=1., snr="6,50", several=0.2, no_constants=0.3, twin_topic=False, followed=followed, recordings="3,1",
         seconds="4.5,6.5", rates=str(rng.choice([100, 125, 200])), clock=str(rng.choice(["even", "uneven"], p=[0.7, 0.3])),
-        noise_correlation="0.02,0.9" if slow else "0,0")
+        noise_correlation="0.02,0.9" if slow else "0,0", white_share=float(rng.uniform(0.2, 0.7)) if slow else 0.)
     return kind, names, around
 
 

@@ -166,13 +166,14 @@ def build(tree, copy, target, constants, say):
 
 def put_back(copy, undo, run, say):
     """Undoes the lines that a compiler complains of."""
-    places = set()
+    places, said = set(), [run.stderr[-3000:]]
     for message in map(json.loads, filter(lambda x: x.startswith("{"), run.stdout.splitlines())):
         if message.get("reason") == "compiler-message" and message["message"]["level"] == "error":
+            said.append(message["message"]["rendered"])
             places |= {(s["file_name"], line) for s in message["message"]["spans"] for line in range(s["line_start"], s["line_end"] + 1)}
     back = [place for place in places if place in undo]
     if not back:
-        raise SystemExit(f"the copy does not compile at {sorted(places)[:20]}:\n{run.stderr[-3000:]}")
+        raise SystemExit("the copy does not compile:\n" + "\n".join(said))
     for file, line in back:
         lines = (copy / file).read_text().splitlines()
         was, constants = undo.pop((file, line))

@@ -149,6 +149,11 @@ impl Hypothesis {
         )
     }
 
+    /// Whether it multiplies all effort of a joint.
+    pub fn is_gain(&self) -> bool {
+        self.effect.name == "torque_gain"
+    }
+
     /// How it depends on time.
     pub fn time_kind(&self) -> TimeKind {
         let count = |kind: CoordinateKind| {

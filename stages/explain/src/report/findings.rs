@@ -1,5 +1,6 @@
 //! From the winning explanation to what is said: findings with intervals, rivals, what could have hidden.
 
+mod confidence;
 mod contest;
 mod doubt;
 mod scales;
@@ -21,6 +22,7 @@ use crate::report::{next_motion, sentences};
 use crate::select::explanation::Explanation;
 use crate::select::search::Search;
 
+use confidence::{Grounds, confidence};
 use contest::contest;
 pub use doubt::doubt_patches;
 use scales::{Scales, StartScales};
@@ -179,7 +181,7 @@ pub fn of(
             parameters,
             intervals_95: intervals,
             in_amperes,
-            confidence: confidence(evidence, contest.margin),
+            confidence: confidence(Grounds::of(fit, &less.fit, active, evidence)),
             recording: when.recording,
             t_start: when.start,
             t_end: when.end,
@@ -250,12 +252,6 @@ fn mismatch(without: &Fit, with: &Fit, count: &Fit) -> f64 {
         })
         .sum::<f64>()
         .max(1e-12)
-}
-
-/// From the evidence against leaving it out and against the best rival \[nats\].
-fn confidence(evidence: f64, margin: f64) -> f64 {
-    let odds = |nats: f64| 1.0 / (1.0 + (-nats / 4.0).exp());
-    (odds(evidence) * odds(margin)).clamp(0.5, 0.999)
 }
 
 struct When {

@@ -73,7 +73,7 @@ pub struct Finding {
     /// Whether its efforts are in A and not in N m, whatever the names of its numbers say: nobody knows the scale of its joint.
     #[serde(default, skip_serializing_if = "is_false")]
     pub in_amperes: bool,
-    /// 0 to 1.
+    /// Probability that effect and place are right, up to what no recording can tell apart.
     pub confidence: f64,
     /// The recording that the times hold for; all if absent, or the session for a change that lasts.
     pub recording: Option<String>,

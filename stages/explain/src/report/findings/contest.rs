@@ -15,8 +15,6 @@ pub struct Contest {
     pub ties: Vec<Hypothesis>,
     /// Those that fit worse, and by how much.
     pub rejected: Vec<(Hypothesis, String)>,
-    /// Evidence for the winner over the best rival that is no tie \[nats\].
-    pub margin: f64,
 }
 
 /// Every rival in the place of one piece of physics.
@@ -29,7 +27,6 @@ pub fn contest(
     let mut result = Contest {
         ties: Vec::new(),
         rejected: Vec::new(),
-        margin: f64::INFINITY,
     };
     if active.is_unnamed() {
         return result;
@@ -48,7 +45,6 @@ pub fn contest(
             result.ties.push(hypothesis);
             continue;
         }
-        result.margin = result.margin.min(behind);
         let share = ((other.fit.likelihood() - less.fit.likelihood())
             / (found.fit.likelihood() - less.fit.likelihood()).max(1e-9))
         .clamp(0.0, 1.0);

@@ -12,7 +12,7 @@ use crate::report::schema::Finding;
 
 use super::Named;
 
-/// What is doubted is as likely as not.
+/// What is doubted is as likely as not, at most.
 const DOUBTED: f64 = 0.5;
 /// What explains less than this share of what the largest finding does may patch it.
 const PATCH: f64 = 0.02;
@@ -21,12 +21,16 @@ const SAME_TIME_S: f64 = 0.3;
 /// In at least so many recordings.
 const TOO_OFTEN: usize = 3;
 
+fn doubt_it(finding: &mut Finding) {
+    finding.confidence = finding.confidence.min(DOUBTED);
+}
+
 /// Doubts what is said of the physics that was found, and says why.
 pub fn doubt(named: &mut Named, problem: &Problem, actives: &[Active]) {
     let said = actives.iter().filter(|a| !a.hypothesis.is_torque_scale());
     for (finding, active) in named.findings.iter_mut().zip(said) {
         if is_shadowed(&problem.model, actives, active.hypothesis) {
-            finding.confidence = DOUBTED;
+            doubt_it(finding);
         }
     }
     let pushed = doubt_pushes(&mut named.findings, problem.tracks.len());
@@ -39,7 +43,7 @@ pub fn doubt_patches(findings: &mut [Finding]) {
     let largest = findings.iter().map(|f| f.explains).fold(0.0, f64::max);
     let small = |finding: &&mut Finding| finding.explains < PATCH * largest;
     for finding in findings.iter_mut().filter(small) {
-        finding.confidence = DOUBTED;
+        doubt_it(finding);
     }
 }
 
@@ -99,7 +103,7 @@ fn doubt_pushes(findings: &mut [Finding], recordings: usize) -> Vec<String> {
              carried or pressed on, and is no push from outside. What it does in other recordings is not predicted."
         ));
         for i in same {
-            findings[i].confidence = DOUBTED;
+            doubt_it(&mut findings[i]);
         }
     }
     notes
