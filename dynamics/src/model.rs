@@ -15,6 +15,7 @@ pub use error::ModelError;
 pub use shape::{Geometry, Shape};
 
 /// Standard gravity as simulators take it \[m/s²\]; along the world's -z.
+/// Physical: URDF and its simulators use 9.81 instead of the standard 9.80665.
 const GRAVITY_M_S2: f64 = 9.81;
 
 /// A robot with a fixed base. Cheap to share by reference; what changes while it runs (gravity, tool)

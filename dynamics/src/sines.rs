@@ -1,16 +1,20 @@
 //! Sines and cosines of many angles at once.
 
 /// 2/π, and π/2 as the sum of its first 33 bits, of which a small multiple is exact, and the rest.
+/// Physical: the digits of 2/π and π/2.
 const TWO_OVER_PI: f64 = std::f64::consts::FRAC_2_PI;
 const HALF_PI_HIGH: f64 = 1.570_796_326_734_125_6;
 const HALF_PI_LOW: f64 = 6.077_100_506_506_192e-11;
 /// Added and taken off again, it rounds to the next integer, which stands in the last bits meanwhile.
+/// Physical: 1.5 · 2⁵², from which on a double has no fraction.
 const ROUNDING: f64 = 6_755_399_441_055_744.0;
 /// Beyond this angle \[rad\] the multiple of π/2 is not exact any more.
+/// Physical: a multiple of the first 33 bits of π/2 is exact up to 2²⁰ of them; this is well below.
 const FAR: f64 = 1e5;
 
 /// Coefficients of the polynomials in r² with which FDLIBM (Sun Microsystems, 1993) has
 /// sin r = r + r³ (…) and cos r = 1 - r²/2 + r⁴ (…) on |r| ≤ π/4, highest power first.
+/// Physical: the minimax coefficients as published.
 const SINE: [f64; 6] = [
     1.589_690_995_211_55e-10,
     -2.505_076_025_340_686_3e-8,

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
+use tauscope_dynamics::terms::UNKNOWN;
 use tauscope_pipeline::parallel;
 use tauscope_pipeline::pipeline::Pipeline;
 use tauscope_pipeline::replay::{Outcome, Replay, ReplayError, TwinChoice, stem};
@@ -281,7 +282,7 @@ fn rms_table(outcome: &Outcome, rms: &[JointRms]) -> Table {
 
 fn event_line(event: &Event, effort_unit: &str) -> String {
     let mut line = format!("{:8.3} s to {:8.3} s  {}", event.t, event.t_off, event.kind);
-    if let Some(size) = event.size.filter(|_| event.kind != "unknown") {
+    if let Some(size) = event.size.filter(|_| event.kind != UNKNOWN.name) {
         let _ = write!(line, " {}", amount(&event.kind, size, effort_unit));
     }
     if let Some(link) = &event.link {

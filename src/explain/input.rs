@@ -5,7 +5,7 @@ mod assembly;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use tauscope_dynamics::terms::EFFECTS;
+use tauscope_dynamics::terms::{EFFECTS, UNKNOWN};
 use tauscope_pipeline::cell::{Cell, EffortUnit};
 use tauscope_pipeline::files::CaseFile;
 use tauscope_pipeline::report::{Problem, Report};
@@ -84,8 +84,8 @@ pub struct Arguments<'a> {
 pub fn without(effects: &[String]) -> Result<BTreeSet<String>, Report> {
     let mut report = Report::default();
     let known = || {
-        let names = EFFECTS.iter().map(|effect| effect.name);
-        names.filter(|name| *name != "unknown")
+        let named = EFFECTS.iter().filter(|effect| ***effect != UNKNOWN);
+        named.map(|effect| effect.name)
     };
     for effect in effects {
         if !known().any(|name| name == effect) {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use tauscope_dynamics::terms::TermSpec;
+use tauscope_dynamics::terms::{self, Effect, TermSpec, Time};
 use tauscope_explain::Outcome;
 use tauscope_explain::report::{Finding, Report};
 use tauscope_ingest::Topics;
@@ -45,7 +45,7 @@ pub fn file(
         validation: &[],
     };
     let mut file = job.file();
-    file.terms = outcome.terms.iter().map(from_now_on).collect();
+    file.terms = outcome.terms.iter().map(TermSpec::from_now_on).collect();
     file.provenance.clone_from(provenance);
     for (index, name) in request.cell.facts.joint_names.iter().enumerate() {
         let start = kept.start.as_ref();
@@ -72,40 +72,22 @@ pub fn file(
     }
 }
 
-/// A step of friction in a session that is over leaves what came after it; a pipeline's session begins anew.
-fn from_now_on(term: &TermSpec) -> TermSpec {
-    let after = term.parameters.get("coulomb_after_nm");
-    let (true, Some(after)) = (term.effect == "friction_step", after) else {
-        return term.clone();
-    };
-    TermSpec {
-        effect: "coulomb_friction".to_owned(),
-        parameters: BTreeMap::from([("coulomb_nm".to_owned(), *after)]),
-        ..term.clone()
-    }
-}
-
 /// The fitted recordings that the corrected twin holds for from end to end.
 fn quiet(request: &Request, kept: &Kept, report: &Report) -> Vec<PathBuf> {
-    let disturbs = |finding: &Finding, name: &str| match finding.effect.as_str() {
-        "contact_wall" => true,
-        "friction_step" => {
-            let begins_s = kept
-                .begins_s
-                .get(name)
-                .copied()
-                .unwrap_or(f64::NEG_INFINITY);
-            finding
+    let disturbs = |finding: &Finding, name: &str| {
+        let effect = terms::effect(&finding.effect);
+        if effect.is_some_and(Effect::is_surface) {
+            return true;
+        }
+        if effect.is_some_and(|effect| effect.time() == Time::Step) {
+            let begins_s = kept.begins_s.get(name).copied();
+            let begins_s = begins_s.unwrap_or(f64::NEG_INFINITY);
+            return finding
                 .t_start
-                .is_some_and(|changed_s| begins_s < changed_s)
+                .is_some_and(|changed_s| begins_s < changed_s);
         }
-        _ => {
-            let here = finding
-                .recording
-                .as_deref()
-                .is_none_or(|other| other == name);
-            here && finding.t_start.is_some()
-        }
+        let recording = finding.recording.as_deref();
+        recording.is_none_or(|other| other == name) && finding.t_start.is_some()
     };
     let findings = &report.findings;
     let is_quiet = |name: &str| !findings.iter().any(|finding| disturbs(finding, name));

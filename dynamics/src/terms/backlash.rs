@@ -1,21 +1,25 @@
 //! A joint whose transmission has play.
 
-use std::sync::Arc;
-
 use super::law::array;
-use super::two_masses::{Deviation, Oscillator, Transmission, TwoMasses};
+use super::split_joint::split_joint;
+use super::two_masses::{Deviation, Oscillator, Transmission};
 use super::{
-    Coordinate, Effect, Expansion, Layer, MotionSample, Parameter, PlaceKind, Scale, Term,
+    Compliance, Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Scale,
+    Simpler, Simulated, Traits, Words,
 };
 
 /// Natural frequency \[rad/s\] and damping ratio of the contact on either side of the play: it settles
 /// within some 20 ms and does not bounce. Stiffer contacts only turn the noise of a measured acceleration
 /// into impacts.
+/// Tuned: by hand on a simulation of both masses, not swept.
 const CONTACT_FREQUENCY: f64 = 300.0;
+/// Physical: about 1/√2, at which a step of second order hardly overshoots.
 const CONTACT_DAMPING: f64 = 0.7;
 
 /// Longest step through the play \[s\].
+/// Physical: a third of the contact's time constant, 1 / 300 rad/s.
 const STEP_S: f64 = 1e-3;
+/// At most so many steps between two samples. Tuned: to bound the work after a gap; not swept.
 const MOST_STEPS: f64 = 200.0;
 
 /// Between rotor and link there is a play of a total width; within it nothing comes through, on either
@@ -23,6 +27,13 @@ const MOST_STEPS: f64 = 200.0;
 /// encoder; the link starts at rest on the side that it loads.
 pub(super) static EFFECT: Effect = Effect {
     name: "backlash",
+    words: Words::new(
+        "Backlash",
+        "backlash",
+        "Play in the gear: for a moment after each reversal the motor turns alone.",
+        "Joint {place} has a play of {gap_rad} behind a rotor of {rotor_inertia_kgm2}.",
+    ),
+    family: Family::Transmission,
     place: PlaceKind::Joint,
     layer: Layer::Body,
     parameters: &[
@@ -35,16 +46,32 @@ pub(super) static EFFECT: Effect = Effect {
     ],
     to_parameters: |c| vec![c[1], c[0]],
     to_coordinates: |p| vec![p[1], p[0]],
-    build: |site, values| {
-        let values: [f64; 2] = array(values);
-        Box::new(Backlash {
-            joint: site.joint,
-            values,
-            play: Play {
-                half: 0.5 * values[1].max(0.0),
-            },
-            masses: TwoMasses::new(site),
+    simpler: Some(Simpler {
+        effect: &super::rotor_inertia::EFFECT,
+        numbers: &["rotor_inertia_kgm2"],
+    }),
+    limit: None,
+    excitation: Excitation::Fast,
+    simulated: Simulated::Transmission(|x, inertia| Compliance {
+        stiffness: inertia * CONTACT_FREQUENCY * CONTACT_FREQUENCY,
+        damping: 2.0 * CONTACT_DAMPING * CONTACT_FREQUENCY * inertia,
+        half_gap: Some(0.5 * x[1]),
+    }),
+    concealed: Some(|draw| {
+        let rotor = draw.moved_kgm2()? * draw.chance.between(0.02, 0.1);
+        Drawn::new([5e-4, 0.03], move |gap| {
+            vec![("gap_rad", gap), ("rotor_inertia_kgm2", rotor)]
         })
+    }),
+    traits: Traits {
+        is_fast: true,
+        ..Traits::NONE
+    },
+    build: |site, values| {
+        let between = Play {
+            half: 0.5 * array::<2>(values)[1].max(0.0),
+        };
+        split_joint(&EFFECT, site, values, between)
     },
 };
 
@@ -103,37 +130,6 @@ impl Transmission for Play {
 
     fn acceleration(&self, _inertia: f64, at: Deviation) -> f64 {
         self.push(at)
-    }
-}
-
-#[derive(Debug)]
-struct Backlash {
-    joint: usize,
-    values: [f64; 2],
-    play: Play,
-    masses: TwoMasses,
-}
-
-impl Term for Backlash {
-    fn effect(&self) -> &'static Effect {
-        &EFFECT
-    }
-
-    fn coordinates(&self) -> &[f64] {
-        &self.values
-    }
-
-    fn expand(&mut self, along: &Arc<Expansion>) {
-        self.masses.expand(along);
-    }
-
-    fn reset(&mut self) {
-        self.masses.reset();
-    }
-
-    fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
-        self.masses.act(at, &self.play, effort);
-        effort[self.joint] += self.values[0] * at.acceleration[self.joint];
     }
 }
 

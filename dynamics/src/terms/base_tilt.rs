@@ -1,21 +1,44 @@
 //! A base that does not stand level.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{Rotation3, Vector3};
 
 use super::law::array;
-use super::{Coordinate, CoordinateKind, Effect, Layer, MotionSample, Parameter, PlaceKind, Term};
+use super::{
+    Coordinate, CoordinateKind, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter,
+    PlaceKind, Simulated, Term, Traits, Words,
+};
 use crate::{Data, Model, gravity_effort};
 
 /// The base is rolled about its x axis and then pitched about the y axis that results, R = Rx(roll)
 /// Ry(pitch); gravity in its frame is Rᵀ g. To first order linear in the angles.
 pub(super) static EFFECT: Effect = Effect {
     name: "base_tilt",
+    words: Words::new(
+        "Base tilt",
+        "a base that is tilted",
+        "The base does not stand level, or is mounted otherwise than the model says.",
+        "The base is tilted: roll {roll_rad}, pitch {pitch_rad}.",
+    ),
+    family: Family::Mounting,
     place: PlaceKind::Base,
     layer: Layer::Body,
     parameters: &[Parameter::any("roll_rad"), Parameter::any("pitch_rad")],
     coordinates: &[angle("roll_rad"), angle("pitch_rad")],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
+    simpler: None,
+    limit: None,
+    excitation: Excitation::Poses,
+    simulated: Simulated::Model,
+    concealed: Some(|draw| {
+        let (sin, cos) = draw.chance.between(0.0, TAU).sin_cos();
+        Drawn::new([1e-3, 0.3], move |angle| {
+            vec![("roll_rad", angle * cos), ("pitch_rad", angle * sin)]
+        })
+    }),
+    traits: Traits::NONE,
     build: |site, values| {
         let mut model = site.model.clone();
         let level = Vector3::from(model.gravity());

@@ -1,14 +1,38 @@
 //! A cable or hose that pulls the joint back to where it hangs loose.
 
 use super::law::joint_law;
-use super::{Coordinate, Effect, Layer, Parameter, PlaceKind};
+use super::{
+    Against, Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated,
+    Traits, Words,
+};
+use crate::Limits;
 
 /// Softer than this it is no spring \[N m/rad\].
+/// Physical: far below any spring; it only keeps the rest angle finite.
 const LEAST_STIFFNESS: f64 = 1e-9;
+
+/// A spring hangs loose within the range of its joint or this many times its width beside it: farther off it is a constant
+/// effort. Where the URDF knows no range it is taken to be a turn either way.
+/// Tuned: not swept.
+const LOOSE_BESIDE: f64 = 1.0;
+
+fn hangs_loose_near(limits: &Limits, rest: f64) -> bool {
+    let turn = std::f64::consts::TAU;
+    let (lower, upper) = (limits.lower.unwrap_or(-turn), limits.upper.unwrap_or(turn));
+    let beside = LOOSE_BESIDE * (upper - lower);
+    (lower - beside..=upper + beside).contains(&rest)
+}
 
 /// Effort k (q - q0), searched as k q plus a constant.
 pub(super) static EFFECT: Effect = Effect {
     name: "cable_spring",
+    words: Words::new(
+        "Cable spring",
+        "cable spring",
+        "A cable or hose pulls the joint back to where it hangs freely.",
+        "A cable or dress pack pulls at joint {place} with {stiffness_nm_per_rad}, at rest at {rest_angle_rad}.",
+    ),
+    family: Family::Spring,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
     parameters: &[
@@ -24,6 +48,27 @@ pub(super) static EFFECT: Effect = Effect {
         vec![stiffness, (0.0 - c[1]) / stiffness.max(LEAST_STIFFNESS)]
     },
     to_coordinates: |p| vec![p[0], -p[0] * p[1]],
+    simpler: None,
+    limit: Some(|site, x| {
+        let limits = &site.model.joints()[site.joint].limits;
+        hangs_loose_near(limits, (EFFECT.to_parameters)(x)[1])
+    }),
+    excitation: Excitation::WholeRange,
+    simulated: Simulated::Joint,
+    concealed: Some(|draw| {
+        let (reach, middle) = (draw.half_range_rad, draw.middle_rad);
+        let rest = middle + draw.chance.between(-0.4, 0.4);
+        Drawn::new(draw.efforts_nm(), move |f| {
+            vec![
+                ("stiffness_nm_per_rad", f / reach),
+                ("rest_angle_rad", rest),
+            ]
+        })
+    }),
+    traits: Traits {
+        drawn_over: Some(Against::Position),
+        ..Traits::NONE
+    },
     build: |site, values| {
         joint_law(&EFFECT, site, values, |[stiffness, constant], j, at| {
             stiffness * at.position[j] + constant

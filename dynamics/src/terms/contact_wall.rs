@@ -5,19 +5,61 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::external_push::AtLink;
 use super::law::array;
-use super::{Coordinate, Effect, Layer, MotionSample, Parameter, PlaceKind, Scale, Site, Term};
+use super::{
+    Coordinate, Draw, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind,
+    Scale, Simulated, Site, Term, Traits, Words,
+};
+use crate::{Data, forward_kinematics, link_pose};
+
+/// A wall gives way by no more than this, and is within reach: what is softer or farther is a force that is always there.
+/// Tuned: not swept.
+const SOFTEST_N_PER_M: f64 = 5.0;
+/// The end of the range that is searched, less a little. Tuned: not swept.
+const FARTHEST_M: f64 = 1.49;
+/// A wall is drawn so that the arm is in it for a fifth of the time.
+/// Tuned: for simulated cells only; not swept.
+const IN_IT: usize = 5;
+
+/// How far away a wall is that the arm is in for that share of the time \[m\]; `None` if it begins in it.
+fn drawn_offset(draw: &Draw<'_>) -> Option<f64> {
+    let normal = draw.direction;
+    let model = draw.site.model;
+    let tool = &model.links()[model.tool_link()];
+    let link = model.joints()[tool.joint?].child_link;
+    let mut data = Data::new(model);
+    let along = draw.path.iter().map(|(_, position)| {
+        forward_kinematics(model, &mut data, position);
+        let place = link_pose(model, &data, link).translation.vector;
+        (0..3).map(|k| normal[k] * place[k]).sum::<f64>()
+    });
+    let along: Vec<f64> = along.collect();
+    let mut sorted = along.clone();
+    sorted.sort_by(f64::total_cmp);
+    let offset = *sorted.get(sorted.len() * (IN_IT - 1) / IN_IT)?;
+    let begins_in_it =
+        |((recording_s, _), along): (&(f64, &[f64]), &f64)| *recording_s == 0.0 && *along > offset;
+    let possible = !draw.path.iter().zip(&along).any(begins_in_it);
+    possible.then_some(offset)
+}
 
 /// The force -k (n·p - d) n on the origin p of the last moving link's frame where n·p > d, in the world
 /// frame: effort -Jᵀ F. Searched with the normal's azimuth and elevation.
 pub(super) static EFFECT: Effect = Effect {
     name: "contact_wall",
+    words: Words::new(
+        "Contact with a wall",
+        "contact with something stiff",
+        "The arm pressed against something firm.",
+        "The end of the arm runs into something stiff, {stiffness_n_per_m}.",
+    ),
+    family: Family::Contact,
     place: PlaceKind::Tool,
     layer: Layer::Body,
     parameters: &[
         Parameter::at_least("stiffness_n_per_m", 0.0),
-        Parameter::any("normal_x"),
-        Parameter::any("normal_y"),
-        Parameter::any("normal_z"),
+        Parameter::ratio("normal_x", f64::NEG_INFINITY),
+        Parameter::ratio("normal_y", f64::NEG_INFINITY),
+        Parameter::ratio("normal_z", f64::NEG_INFINITY),
         Parameter::any("offset_m"),
     ],
     coordinates: &[
@@ -35,6 +77,20 @@ pub(super) static EFFECT: Effect = Effect {
         let elevation = p[3].atan2(p[1].hypot(p[2]));
         vec![p[0], azimuth, elevation, p[4]]
     },
+    simpler: None,
+    limit: Some(|_, x| x[0] >= SOFTEST_N_PER_M && x[3].abs() < FARTHEST_M),
+    excitation: Excitation::Poses,
+    simulated: Simulated::Load,
+    concealed: Some(|draw| {
+        let offset = drawn_offset(draw)?;
+        let normal = draw.along(["normal_x", "normal_y", "normal_z"])(1.0);
+        Drawn::new([10.0, 5000.0], move |stiffness| {
+            let mut all = normal.clone();
+            all.extend([("stiffness_n_per_m", stiffness), ("offset_m", offset)]);
+            all
+        })
+    }),
+    traits: Traits::NONE,
     build: |site, values| Box::new(ContactWall::new(site, array(values))),
 };
 

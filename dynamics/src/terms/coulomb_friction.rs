@@ -1,17 +1,39 @@
 //! Friction that does not depend on speed.
 
 use super::law::joint_law;
-use super::{Coordinate, Effect, Layer, Parameter, PlaceKind, sign};
+use super::{
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated, Traits,
+    Words, sign,
+};
 
 /// Effort Fc sgn(qd) (Siciliano et al., *Robotics*, 2009, equation 7.42).
-pub(super) static EFFECT: Effect = Effect {
+pub static EFFECT: Effect = Effect {
     name: "coulomb_friction",
+    words: Words {
+        less: Some("Joint {place} has {less} less Coulomb friction than the twin says."),
+        ..Words::new(
+            "Coulomb friction",
+            "Coulomb friction",
+            "A constant resistance against the motion, whatever the speed: dry friction in gear and bearings.",
+            "Joint {place} has Coulomb friction of {coulomb_nm} that the twin leaves out.",
+        )
+    },
+    family: Family::PlainFriction,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
     parameters: &[Parameter::at_least("coulomb_nm", 0.0)],
     coordinates: &[Coordinate::positive_factor("coulomb_nm")],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
+    simpler: None,
+    limit: None,
+    excitation: Excitation::Speeds,
+    simulated: Simulated::Joint,
+    concealed: Some(|draw| Drawn::new(draw.efforts_nm(), |f| vec![("coulomb_nm", f)])),
+    traits: Traits {
+        smallest_told_as: Some("coulomb_nm"),
+        ..Traits::NONE
+    },
     build: |site, values| {
         joint_law(&EFFECT, site, values, |[fc], j, at| {
             fc * sign(at.velocity[j])

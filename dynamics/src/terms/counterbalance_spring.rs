@@ -1,11 +1,23 @@
 //! A spring that turns with the joint like a weight, to carry the arm.
 
+use std::f64::consts::PI;
+
 use super::law::joint_law;
-use super::{Coordinate, Effect, Layer, Parameter, PlaceKind};
+use super::{
+    Against, Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated,
+    Traits, Words,
+};
 
 /// Effort A sin(q - q0), searched as A cos q0 sin q - A sin q0 cos q.
 pub(super) static EFFECT: Effect = Effect {
     name: "counterbalance_spring",
+    words: Words::new(
+        "Counterbalance spring",
+        "counterbalance spring",
+        "A spring or gas strut carries part of the weight.",
+        "A counterbalance of {amplitude_nm} acts on joint {place}, at rest at {rest_angle_rad}.",
+    ),
+    family: Family::Spring,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
     parameters: &[
@@ -18,6 +30,20 @@ pub(super) static EFFECT: Effect = Effect {
     ],
     to_parameters: |c| vec![c[0].hypot(c[1]), (0.0 - c[1]).atan2(c[0])],
     to_coordinates: |p| vec![p[0] * p[1].cos(), -p[0] * p[1].sin()],
+    simpler: None,
+    limit: None,
+    excitation: Excitation::WholeRange,
+    simulated: Simulated::Joint,
+    concealed: Some(|draw| {
+        let rest = draw.chance.between(-PI, PI);
+        Drawn::new(draw.efforts_nm(), move |f| {
+            vec![("amplitude_nm", f), ("rest_angle_rad", rest)]
+        })
+    }),
+    traits: Traits {
+        drawn_over: Some(Against::Position),
+        ..Traits::NONE
+    },
     build: |site, values| {
         joint_law(&EFFECT, site, values, |[sine, cosine], j, at| {
             let (sin, cos) = at.position[j].sin_cos();

@@ -3,6 +3,7 @@
 use crate::{Data, Model, rnea};
 
 /// Steps of the difference quotients: position \[rad or m\]; effort is quadratic in velocity and linear in acceleration.
+/// Physical: the error of a central difference, some 1e-6 of the effort, is below that of any recording.
 const POSITION_STEP: f64 = 1e-3;
 /// Numbers per joint and sample: the effort, by position once and twice, by velocity, by acceleration.
 const ORDERS: usize = 5;

@@ -3,13 +3,32 @@
 use nalgebra::Vector3;
 
 use super::law::array;
-use super::{Coordinate, CoordinateKind, Effect, Layer, MotionSample, Parameter, PlaceKind, Term};
+use super::{
+    Coordinate, CoordinateKind, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter,
+    PlaceKind, Simulated, Term, Traits, Words,
+};
 use crate::kinematics::link_origin;
 use crate::{Data, Model, forward_kinematics, link_jacobian};
+
+/// A stronger force is none that pushes a robot \[N\]: it hardly acts on the joints that would feel a weaker one elsewhere.
+/// Physical: several times what collaborative robots may exert on a person (ISO/TS 15066, annex A).
+const STRONGEST_N: f64 = 1000.0;
 
 /// A constant force on the origin of a link, along the world's axes: effort -Jᵀ F while it lasts.
 pub(super) static EFFECT: Effect = Effect {
     name: "external_push",
+    words: Words {
+        without_numbers: Some(
+            "Something pushed link {place} or one further out: how hard, and where on it, a force at the link's frame cannot say.",
+        ),
+        ..Words::new(
+            "External push",
+            "a push from outside",
+            "Something or somebody pushed the arm for a while.",
+            "Something pushed link {place} with ({force_x_n}, {force_y_n}, {force_z_n}).",
+        )
+    },
+    family: Family::Contact,
     place: PlaceKind::Link,
     layer: Layer::Body,
     parameters: &[
@@ -34,6 +53,25 @@ pub(super) static EFFECT: Effect = Effect {
     ],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
+    simpler: None,
+    limit: Some(|_, x| x[..3].iter().map(|f| f * f).sum::<f64>().sqrt() < STRONGEST_N),
+    excitation: Excitation::Poses,
+    simulated: Simulated::Load,
+    concealed: Some(|draw| {
+        let shortest_s = draw.shortest_s;
+        let start = draw.start_session_s + shortest_s * draw.chance.between(0.15, 0.6);
+        let end = start + shortest_s * draw.chance.between(0.12, 0.25);
+        let force = draw.along(["force_x_n", "force_y_n", "force_z_n"]);
+        Drawn::new([0.1, 100.0], move |size| {
+            let mut all = force(size);
+            all.extend([("t_start_s", start), ("t_end_s", end)]);
+            all
+        })
+    }),
+    traits: Traits {
+        most_at_one_place: 8,
+        ..Traits::NONE
+    },
     build: |site, values| {
         Box::new(ExternalPush {
             values: array(values),

@@ -1,11 +1,28 @@
 //! Coulomb friction that jumps once.
 
 use super::law::joint_law;
-use super::{Coordinate, CoordinateKind, Effect, Layer, Parameter, PlaceKind, sign};
+use super::{
+    Against, Coordinate, CoordinateKind, Drawn, Effect, Excitation, Family, Layer, Parameter,
+    PlaceKind, Simpler, Simulated, Traits, Words, sign,
+};
+
+/// A change of friction smaller than this share of it is what friction does from day to day.
+/// Tuned: not swept.
+const LEAST_STEP: f64 = 0.3;
+/// Friction that changes leaves at least this share of what it was: none comes from nothing or goes for good.
+/// Tuned: not swept.
+const LEAST_LEFT: f64 = 0.1;
 
 /// Effort F sgn(qd), F being one value before a time of the session and another from then on.
 pub(super) static EFFECT: Effect = Effect {
     name: "friction_step",
+    words: Words::new(
+        "Friction step",
+        "Coulomb friction that changed once",
+        "Friction that changed once and stayed: a brake that drags, a bearing that failed, grease that was renewed.",
+        "The Coulomb friction of joint {place} jumped from {coulomb_before_nm} to {coulomb_after_nm}, {change_time_session_s} into the session.",
+    ),
+    family: Family::Friction,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
     parameters: &[
@@ -23,6 +40,31 @@ pub(super) static EFFECT: Effect = Effect {
     ],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
+    simpler: Some(Simpler {
+        effect: &super::coulomb_friction::EFFECT,
+        numbers: &["coulomb_after_nm", "coulomb_before_nm"],
+    }),
+    limit: Some(|_, x| {
+        let (less, more) = (x[0].min(x[1]), x[0].max(x[1]));
+        more - less > LEAST_STEP * more && less >= LEAST_LEFT * more
+    }),
+    excitation: Excitation::Speeds,
+    simulated: Simulated::Joint,
+    concealed: Some(|draw| {
+        let before = 0.2 + 0.3 * draw.share;
+        let change_s = draw.start_session_s + draw.shortest_s * draw.chance.between(0.3, 0.7);
+        Drawn::new(draw.efforts_nm(), move |f| {
+            vec![
+                ("coulomb_before_nm", f * before),
+                ("coulomb_after_nm", f),
+                ("change_time_session_s", change_s),
+            ]
+        })
+    }),
+    traits: Traits {
+        drawn_over: Some(Against::Velocity),
+        ..Traits::NONE
+    },
     build: |site, values| {
         joint_law(&EFFECT, site, values, |[before, after, time_s], j, at| {
             let coulomb = if at.session_s < *time_s {

@@ -1,21 +1,33 @@
 //! A joint whose transmission gives way like a spring.
 
-use std::sync::Arc;
-
 use super::law::array;
-use super::two_masses::{Deviation, Oscillator, Transmission, TwoMasses};
+use super::split_joint::split_joint;
+use super::two_masses::{Deviation, Oscillator, Transmission};
 use super::{
-    Coordinate, Effect, Expansion, Layer, MotionSample, Parameter, PlaceKind, Scale, Term,
+    Compliance, Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Scale,
+    Simpler, Simulated, Traits, Words,
 };
 
 /// Share of the critical damping that the link has against a rotor that stands still. It is none of the
 /// parameters: motions of robots do not show it.
+/// Tuned: a lightly damped gear; not swept.
 const DAMPING_RATIO: f64 = 0.05;
+
+/// A rotor on the spring of its gear resonates at least this fast against a link that stands still.
+/// Tuned: 3 Hz, not swept.
+const SOFTEST_RAD_S: f64 = 3.0 * std::f64::consts::TAU;
 
 /// A spring between rotor and link, T = -K δ - D δ̇ with the damping D = 2 ζ √(K M), ζ = 0.05, and a rotor of
 /// inertia J. The encoder is on the rotor; the link starts at rest against it.
 pub(super) static EFFECT: Effect = Effect {
     name: "joint_elasticity",
+    words: Words::new(
+        "Joint elasticity",
+        "joint elasticity",
+        "The gear or its flexspline twists under load, so that the link follows behind the motor.",
+        "Joint {place} is elastic, {stiffness_nm_per_rad}, behind a rotor of {rotor_inertia_kgm2}.",
+    ),
+    family: Family::Transmission,
     place: PlaceKind::Joint,
     layer: Layer::Body,
     parameters: &[
@@ -28,14 +40,35 @@ pub(super) static EFFECT: Effect = Effect {
     ],
     to_parameters: |c| vec![c[1], c[0]],
     to_coordinates: |p| vec![p[1], p[0]],
-    build: |site, values| {
-        let values: [f64; 2] = array(values);
-        Box::new(JointElasticity {
-            joint: site.joint,
-            values,
-            spring: Spring(values[1].max(1.0)),
-            masses: TwoMasses::new(site),
+    simpler: Some(Simpler {
+        effect: &super::rotor_inertia::EFFECT,
+        numbers: &["rotor_inertia_kgm2"],
+    }),
+    limit: Some(|_, x| (x[1] / x[0].max(1e-12)).sqrt() >= SOFTEST_RAD_S),
+    excitation: Excitation::Fast,
+    simulated: Simulated::Transmission(|x, inertia| Compliance {
+        stiffness: x[1],
+        damping: 2.0 * DAMPING_RATIO * (x[1] * inertia).sqrt(),
+        half_gap: None,
+    }),
+    concealed: Some(|draw| {
+        let rotor = draw.moved_kgm2()? * draw.chance.between(0.02, 0.1);
+        // Not so soft that it sags by more than a twentieth of a radian.
+        let softest = 20.0 * draw.largest_nm.max(0.1);
+        Drawn::new([1e-5, 1.0 / softest], move |give| {
+            vec![
+                ("stiffness_nm_per_rad", 1.0 / give),
+                ("rotor_inertia_kgm2", rotor),
+            ]
         })
+    }),
+    traits: Traits {
+        is_fast: true,
+        ..Traits::NONE
+    },
+    build: |site, values| {
+        let between = Spring(array::<2>(values)[1].max(1.0));
+        split_joint(&EFFECT, site, values, between)
     },
 };
 
@@ -59,37 +92,6 @@ impl Transmission for Spring {
     fn acceleration(&self, inertia: f64, at: Deviation) -> f64 {
         let frequency = (self.0 / inertia).sqrt();
         -frequency * (frequency * at.angle + 2.0 * DAMPING_RATIO * at.rate)
-    }
-}
-
-#[derive(Debug)]
-struct JointElasticity {
-    joint: usize,
-    values: [f64; 2],
-    spring: Spring,
-    masses: TwoMasses,
-}
-
-impl Term for JointElasticity {
-    fn effect(&self) -> &'static Effect {
-        &EFFECT
-    }
-
-    fn coordinates(&self) -> &[f64] {
-        &self.values
-    }
-
-    fn expand(&mut self, along: &Arc<Expansion>) {
-        self.masses.expand(along);
-    }
-
-    fn reset(&mut self) {
-        self.masses.reset();
-    }
-
-    fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
-        self.masses.act(at, &self.spring, effort);
-        effort[self.joint] += self.values[0] * at.acceleration[self.joint];
     }
 }
 

@@ -1,13 +1,35 @@
 //! A link whose centre of mass is not where its URDF says.
 
 use super::ghost::Ghost;
-use super::{Coordinate, CoordinateKind, Effect, Layer, Parameter, PlaceKind};
+use super::{
+    Coordinate, CoordinateKind, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind,
+    Simulated, Traits, Words,
+};
 use crate::Inertia;
+
+/// A link's centre of mass is not off by more than this many times its radius of gyration, or by this \[m\] if that is more.
+/// Physical: a body has its centre of mass within its extent, which is about its radius of gyration.
+const MOST_GYRATIONS: f64 = 1.0;
+/// Tuned: not swept.
+const FAR_OFF_M: f64 = 0.1;
+/// How far it may be off in a URDF, in radii of gyration.
+/// Tuned: a guess at how exact URDFs are; not swept.
+const CENTRE_OFF: f64 = 0.2;
+/// The same where one is drawn, at most \[m\].
+/// Tuned: for simulated cells only; not swept.
+const MOST_DRAWN_M: f64 = 0.06;
 
 /// A shift of a link's centre of mass, in the link's frame; its mass and the inertia about the centre
 /// stay. To first order linear in the shift.
 pub(super) static EFFECT: Effect = Effect {
     name: "link_com",
+    words: Words::new(
+        "Link centre of mass",
+        "another centre of mass",
+        "A link's mass is distributed otherwise than its model says.",
+        "The centre of mass of link {place} is off by ({delta_com_x_m}, {delta_com_y_m}, {delta_com_z_m}) in its frame.",
+    ),
+    family: Family::Body,
     place: PlaceKind::Link,
     layer: Layer::Body,
     parameters: &[
@@ -22,6 +44,22 @@ pub(super) static EFFECT: Effect = Effect {
     ],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
+    simpler: None,
+    limit: Some(|site, x| {
+        let shift_m = x.iter().map(|d| d * d).sum::<f64>().sqrt();
+        let gyration_m = site.model.links()[site.link].gyration_radius_m();
+        shift_m < FAR_OFF_M.max(MOST_GYRATIONS * gyration_m)
+    }),
+    excitation: Excitation::Poses,
+    simulated: Simulated::Model,
+    concealed: Some(|draw| {
+        let names = ["delta_com_x_m", "delta_com_y_m", "delta_com_z_m"];
+        Drawn::new([1e-4, MOST_DRAWN_M], draw.along(names))
+    }),
+    traits: Traits {
+        off_in_urdf: Some(|link| CENTRE_OFF * link.gyration_radius_m()),
+        ..Traits::NONE
+    },
     build: |site, values| {
         let link = &site.model.links()[site.link];
         let (mass_kg, com_m) = (link.mass_kg(), link.com_m());

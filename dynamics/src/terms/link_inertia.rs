@@ -2,13 +2,22 @@
 
 use super::ghost::Ghost;
 use super::law::array;
-use super::{Coordinate, Effect, Layer, Parameter, PlaceKind};
+use super::{
+    Coordinate, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated, Traits, Words,
+};
 use crate::Inertia;
 
 /// A change of all ten inertial parameters of a link about the origin of its frame, in the order of [`Inertia::parameters`]:
 /// what describes a body that neither another mass nor another centre of mass makes.
 pub(super) static EFFECT: Effect = Effect {
     name: "link_inertia",
+    words: Words::new(
+        "Link inertia",
+        "link inertia",
+        "A link is another body than its model says: mass, centre and inertia together.",
+        "Link {place} is another body than its URDF says, and no one name fits that: its mass is off by {delta_mass_kg}, its first moment (mass times centre) by ({delta_first_moment_x_kgm:number}, {delta_first_moment_y_kgm:number}, {delta_first_moment_z_kgm:number}) kg m, and so is its inertia; what is left depends on the motion of all joints that carry it.",
+    ),
+    family: Family::Body,
     place: PlaceKind::Link,
     layer: Layer::Body,
     parameters: &[
@@ -37,6 +46,15 @@ pub(super) static EFFECT: Effect = Effect {
     ],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
+    simpler: None,
+    limit: None,
+    excitation: Excitation::Poses,
+    simulated: Simulated::Model,
+    concealed: None,
+    traits: Traits {
+        describes_only: true,
+        ..Traits::NONE
+    },
     build: |site, values| {
         let inertia = Inertia::from_parameters(array(values));
         Ghost::boxed(&EFFECT, site, values, inertia, None)

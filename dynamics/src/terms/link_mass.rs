@@ -1,19 +1,48 @@
 //! A link that is heavier or lighter than its URDF says.
 
 use super::ghost::Ghost;
-use super::{Coordinate, Effect, Layer, Parameter, PlaceKind};
+use super::{
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated, Traits,
+    Words,
+};
 use crate::Inertia;
+
+/// How far a link's mass may be off in a URDF, as a share of it.
+/// Tuned: a guess at how exact URDFs are; not swept.
+const MASS_OFF: f64 = 0.1;
+/// The same where one is drawn, at most.
+/// Tuned: for simulated cells only; not swept.
+const MOST_DRAWN: f64 = 0.6;
 
 /// A change of a link's mass; its centre of mass and the inertia about that stay, so it is a point mass
 /// at the centre of mass.
 pub(super) static EFFECT: Effect = Effect {
     name: "link_mass",
+    words: Words::new(
+        "Link mass",
+        "another mass",
+        "A link is heavier or lighter than its model says.",
+        "Link {place} is heavier than in the URDF by {delta_mass_kg}.",
+    ),
+    family: Family::Body,
     place: PlaceKind::Link,
     layer: Layer::Body,
     parameters: &[Parameter::any("delta_mass_kg")],
     coordinates: &[Coordinate::factor("delta_mass_kg")],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
+    simpler: None,
+    limit: Some(|site, x| x[0].abs() < site.model.links()[site.link].mass_kg()),
+    excitation: Excitation::Poses,
+    simulated: Simulated::Model,
+    concealed: Some(|draw| {
+        let most = MOST_DRAWN * draw.site.model.links()[draw.site.link].mass_kg();
+        Drawn::new([1e-3 * most, most], |mass| vec![("delta_mass_kg", mass)])
+    }),
+    traits: Traits {
+        off_in_urdf: Some(|link| MASS_OFF * link.mass_kg()),
+        ..Traits::NONE
+    },
     build: |site, values| {
         let com_m = site.model.links()[site.link].com_m();
         let inertia = Inertia::new(values[0], com_m, [0.0; 6]);

@@ -2,25 +2,73 @@
 
 use super::ghost::Ghost;
 use super::law::array;
-use super::{Coordinate, Effect, Layer, Parameter, PlaceKind};
+use super::{
+    Coordinate, Draw, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated,
+    Traits, Words,
+};
 use crate::Inertia;
 
 /// A rigid body on the tool link: the robot's dynamics are linear in its ten parameters about the link's
 /// origin, so these are searched. Files hold the mass, its centre and the inertia about that. The inertia
 /// is not held to be one: a motion that hardly shows it may leave it with any sign.
-pub(super) static EFFECT: Effect = Effect {
+pub static EFFECT: Effect = Effect {
     name: "payload",
+    words: Words::new(
+        "Payload",
+        "a payload",
+        "Something is mounted on or held by the tool that the twin does not know of.",
+        "The arm carries {mass_kg} that nobody told the twin of.",
+    ),
+    family: Family::Body,
     place: PlaceKind::Tool,
     layer: Layer::Body,
     parameters: &BODY_PARAMETERS,
     coordinates: &BODY_COORDINATES,
     to_parameters: |c| parameters(&array(c)).to_vec(),
     to_coordinates: |p| inertia(&array(p)).parameters().to_vec(),
+    simpler: None,
+    limit: None,
+    excitation: Excitation::Poses,
+    simulated: Simulated::Model,
+    concealed: Some(|draw| drawn(draw, None)),
+    traits: Traits {
+        smallest_told_as: Some("mass_kg"),
+        ..Traits::NONE
+    },
     build: |site, values| {
         let inertia = Inertia::from_parameters(array(values));
         Ghost::boxed(&EFFECT, site, values, inertia, None)
     },
 };
+
+/// Radius of gyration of a body that is drawn \[m\].
+/// Tuned: for simulated cells only; not swept.
+const DRAWN_RADIUS_M: f64 = 0.04;
+
+/// A body at random; if it is there for a while, from and to shares of the shortest recording between these.
+pub(super) fn drawn(draw: &mut Draw<'_>, window: Option<[[f64; 2]; 2]>) -> Option<Drawn> {
+    let com_m = [[-0.04, 0.04], [-0.04, 0.04], [0.03, 0.12]]
+        .map(|[least, most]| draw.chance.between(least, most));
+    let shortest_s = draw.shortest_s;
+    let window = window
+        .map(|shares| shares.map(|[least, most]| shortest_s * draw.chance.between(least, most)));
+    Drawn::new([1e-3, 10.0], move |mass| {
+        let inertia = mass * DRAWN_RADIUS_M * DRAWN_RADIUS_M;
+        let mut all = vec![
+            ("mass_kg", mass),
+            ("com_x_m", com_m[0]),
+            ("com_y_m", com_m[1]),
+            ("com_z_m", com_m[2]),
+            ("ixx_kgm2", inertia),
+            ("iyy_kgm2", inertia),
+            ("izz_kgm2", inertia),
+        ];
+        if let Some([start, end]) = window {
+            all.extend([("t_start_s", start), ("t_end_s", end)]);
+        }
+        all
+    })
+}
 
 pub(super) const BODY_PARAMETERS: [Parameter; 10] = [
     Parameter::at_least("mass_kg", 0.0),

@@ -2,13 +2,23 @@
 
 use super::ghost::Ghost;
 use super::law::array;
-use super::payload::{BODY_COORDINATES, BODY_PARAMETERS, inertia, parameters};
-use super::{Coordinate, CoordinateKind, Effect, Layer, Parameter, PlaceKind};
+use super::payload::{BODY_COORDINATES, BODY_PARAMETERS, drawn, inertia, parameters};
+use super::{
+    Coordinate, CoordinateKind, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated,
+    Traits, Words,
+};
 use crate::Inertia;
 
 /// As a payload, between two times of each recording.
 pub(super) static EFFECT: Effect = Effect {
     name: "payload_pickup",
+    words: Words::new(
+        "Payload for a while",
+        "a payload for a while",
+        "Something was picked up and put down again that the twin does not know of.",
+        "The arm carries {mass_kg} for a while in each recording, from {t_start_s} to {t_end_s}.",
+    ),
+    family: Family::Body,
     place: PlaceKind::Tool,
     layer: Layer::Body,
     parameters: &{
@@ -33,6 +43,12 @@ pub(super) static EFFECT: Effect = Effect {
     },
     to_parameters: |c| [&parameters(&array(c))[..], &c[10..]].concat(),
     to_coordinates: |p| [&inertia(&array(p)).parameters()[..], &p[10..]].concat(),
+    simpler: None,
+    limit: None,
+    excitation: Excitation::Poses,
+    simulated: Simulated::CarriedForAWhile,
+    concealed: Some(|draw| drawn(draw, Some([[0.2, 0.4], [0.6, 0.85]]))),
+    traits: Traits::NONE,
     build: |site, values| {
         let inertia = Inertia::from_parameters(array(values));
         let window_s = Some(array(&values[10..]));

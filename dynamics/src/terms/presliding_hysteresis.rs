@@ -1,7 +1,14 @@
 //! Friction that stretches bristles before it slides: `LuGre`.
 
 use super::law::array;
-use super::{Coordinate, Effect, Layer, MotionSample, Parameter, PlaceKind, Scale, Site, Term};
+use super::{
+    Against, Coordinate, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter,
+    PlaceKind, Scale, Simpler, Simulated, Site, Term, Traits, Words,
+};
+
+/// A joint breaks away within this: bristles that give more are a spring \[rad or m\].
+/// Tuned: not swept.
+const MOST_PRESLIDING_RAD: f64 = 0.1;
 
 /// The `LuGre` model with a static friction that equals the kinetic one (Canudas de Wit, Olsson, Åström
 /// and Lischinsky, "A New Model for Control of Systems with Friction", 1995, equations 1 to 3), written
@@ -10,6 +17,13 @@ use super::{Coordinate, Effect, Layer, MotionSample, Parameter, PlaceKind, Scale
 /// effort = Fc u + σ1 (qd - |qd| u),   du/dt = κ (qd - |qd| u)
 pub(super) static EFFECT: Effect = Effect {
     name: "presliding_hysteresis",
+    words: Words::new(
+        "Pre-sliding hysteresis",
+        "presliding hysteresis",
+        "The joint gives like a spring before it slips, so that friction lags behind each reversal.",
+        "The friction of joint {place}, {coulomb_nm}, builds up over its bristles after each reversal, with {bristle_stiffness_nm_per_rad}.",
+    ),
+    family: Family::Friction,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
     parameters: &[
@@ -24,6 +38,29 @@ pub(super) static EFFECT: Effect = Effect {
     ],
     to_parameters: |c| vec![c[0], c[2] * c[0], c[1]],
     to_coordinates: |p| vec![p[0], p[2], p[1] / p[0].max(1e-9)],
+    simpler: Some(Simpler {
+        effect: &super::coulomb_friction::EFFECT,
+        numbers: &["coulomb_nm"],
+    }),
+    limit: Some(|_, x| x[2] >= 1.0 / MOST_PRESLIDING_RAD),
+    excitation: Excitation::Speeds,
+    simulated: Simulated::Joint,
+    concealed: Some(|draw| {
+        let (yields_rad, damping_s) = (draw.chance.between(0.01, 0.03), 0.01);
+        Drawn::new(draw.efforts_nm(), move |f| {
+            let stiffness = f / yields_rad;
+            vec![
+                ("coulomb_nm", f),
+                ("bristle_stiffness_nm_per_rad", stiffness),
+                ("bristle_damping_nms_per_rad", stiffness * damping_s),
+            ]
+        })
+    }),
+    traits: Traits {
+        drawn_over: Some(Against::Velocity),
+        is_fast: true,
+        ..Traits::NONE
+    },
     build: |site, values| Box::new(PreslidingHysteresis::new(site, array(values))),
 };
 

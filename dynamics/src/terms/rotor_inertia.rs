@@ -1,18 +1,40 @@
 //! The rotor's inertia, felt through the gear.
 
 use super::law::joint_law;
-use super::{Coordinate, Effect, Layer, Parameter, PlaceKind};
+use super::{
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated, Traits,
+    Words,
+};
 
 /// Effort J qdd, J on the joint side of the gear (Siciliano et al., *Robotics*, 2009, equation 7.77, its
 /// gyroscopic part left out).
 pub(super) static EFFECT: Effect = Effect {
     name: "rotor_inertia",
+    words: Words::new(
+        "Rotor inertia",
+        "rotor inertia",
+        "Inertia of motor and gear, seen through the gear, that only acceleration shows.",
+        "Joint {place} turns a rotor of {inertia_kgm2} (armature) that the twin leaves out.",
+    ),
+    family: Family::Transmission,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
     parameters: &[Parameter::at_least("inertia_kgm2", 0.0)],
     coordinates: &[Coordinate::positive_factor("inertia_kgm2")],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
+    simpler: None,
+    limit: None,
+    excitation: Excitation::Fast,
+    simulated: Simulated::Joint,
+    concealed: Some(|draw| {
+        let most = draw.largest_acceleration_rad_s2;
+        Drawn::new(draw.efforts_nm(), move |f| vec![("inertia_kgm2", f / most)])
+    }),
+    traits: Traits {
+        smallest_told_as: Some("inertia_kgm2"),
+        ..Traits::NONE
+    },
     build: |site, values| {
         joint_law(&EFFECT, site, values, |[inertia], j, at| {
             inertia * at.acceleration[j]

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::table::{self, TableSpec};
-use super::{EFFECTS, Effect, PlaceKind, Site, Term, effect};
+use super::{EFFECTS, Effect, PlaceKind, Site, Term, Time, effect};
 use crate::Model;
 
 mod error;
@@ -99,6 +99,23 @@ impl TermSpec {
         let values = values.collect::<Result<Vec<_>, _>>()?;
         let coordinates = (effect.to_coordinates)(&values);
         Ok((effect.build)(&site, &coordinates))
+    }
+
+    /// What is left of it in a session that begins now: of a step, the simpler effect as it was afterwards.
+    #[must_use]
+    pub fn from_now_on(&self) -> Self {
+        let known = self.effect().ok().filter(|e| e.time() == Time::Step);
+        let afterwards = known.and_then(|effect| {
+            let simpler = effect.simpler?;
+            let value = *self.parameters.get(*simpler.numbers.first()?)?;
+            let number = simpler.effect.parameters.first()?.name;
+            Some(Self {
+                effect: simpler.effect.name.to_owned(),
+                parameters: BTreeMap::from([(number.to_owned(), value)]),
+                ..self.clone()
+            })
+        });
+        afterwards.unwrap_or_else(|| self.clone())
     }
 
     /// The effect it names.

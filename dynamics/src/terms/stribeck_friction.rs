@@ -1,13 +1,27 @@
 //! Friction that falls from a static to a kinetic value as the joint starts to move.
 
 use super::law::joint_law;
-use super::{Coordinate, Effect, Layer, Parameter, PlaceKind, Scale, sign};
+use super::{
+    Against, Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Scale,
+    Simpler, Simulated, Traits, Words, sign,
+};
+
+/// Friction that falls with speed keeps at least this share of what it is when a joint breaks away: none falls to nothing.
+/// Tuned: not swept.
+const LEAST_SLIDING: f64 = 0.2;
 
 /// Effort (Fc + (Fs - Fc) exp(-(qd/vs)²)) sgn(qd) (Armstrong-Hélouvry, Dupont and Canudas de Wit, "A
 /// survey of models, analysis tools and compensation methods for the control of machines with
 /// friction", 1994, equation 2, with the exponent 2).
 pub(super) static EFFECT: Effect = Effect {
     name: "stribeck_friction",
+    words: Words::new(
+        "Stribeck friction",
+        "Stribeck friction",
+        "Friction that is highest when motion begins and falls with speed: the joint sticks before it slips.",
+        "Joint {place} has friction that falls from {static_nm} at standstill to {coulomb_nm} in motion, over {stribeck_velocity_rad_s} that the twin leaves out.",
+    ),
+    family: Family::Friction,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
     parameters: &[
@@ -22,6 +36,29 @@ pub(super) static EFFECT: Effect = Effect {
     ],
     to_parameters: |c| vec![c[0], c[0] + c[1], c[2]],
     to_coordinates: |p| vec![p[0], p[1] - p[0], p[2]],
+    simpler: Some(Simpler {
+        effect: &super::coulomb_friction::EFFECT,
+        numbers: &["coulomb_nm", "static_nm"],
+    }),
+    limit: Some(|_, x| x[0] >= LEAST_SLIDING * (x[0] + x[1])),
+    excitation: Excitation::Speeds,
+    simulated: Simulated::Joint,
+    concealed: Some(|draw| {
+        let more = 1.5 + draw.share;
+        let speed = draw.fastest_rad_s * draw.chance.between(0.04, 0.12);
+        Drawn::new(draw.efforts_nm(), move |f| {
+            vec![
+                ("coulomb_nm", f),
+                ("static_nm", f * more),
+                ("stribeck_velocity_rad_s", speed),
+            ]
+        })
+    }),
+    traits: Traits {
+        drawn_over: Some(Against::Velocity),
+        is_fast: true,
+        ..Traits::NONE
+    },
     build: |site, values| {
         joint_law(&EFFECT, site, values, |[fc, excess, vs], j, at| {
             let ratio = at.velocity[j] / vs;

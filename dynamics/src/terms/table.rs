@@ -3,17 +3,38 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Effect, Layer, MotionSample, PlaceKind, Site, Term, TermError, sign};
+use super::words::number;
+use super::{
+    Effect, Excitation, Family, Layer, MotionSample, PlaceKind, Simulated, Site, Term, TermError,
+    Traits, Words, sign,
+};
 use crate::Model;
 
-pub(super) static EFFECT: Effect = Effect {
+/// What has no name: a [`Table`] is all there is to it.
+pub static EFFECT: Effect = Effect {
     name: "unknown",
+    words: Words::new(
+        "Unknown",
+        "something that no name fits",
+        "Something that no name of the library fits; the correction only describes it.",
+        "Something in joint {place} has no name.",
+    ),
+    family: Family::Unnamed,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
     parameters: &[],
     coordinates: &[],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
+    simpler: None,
+    limit: None,
+    excitation: Excitation::Speeds,
+    simulated: Simulated::Joint,
+    concealed: None,
+    traits: Traits {
+        describes_only: true,
+        ..Traits::NONE
+    },
     // Without a table there is nothing to describe.
     build: |site, _| {
         Box::new(Curve {
@@ -98,6 +119,57 @@ pub struct TableSpec {
     pub knots: Vec<f64>,
     /// Effort at the knots \[N m or N\].
     pub values: Vec<f64>,
+}
+
+impl Table {
+    /// Whether it is a curve over the velocity of the joint that it is in: friction, whatever bends it.
+    pub fn is_friction_of(&self, joint: usize) -> bool {
+        self.against == Against::Velocity && self.of_joint == joint
+    }
+
+    /// A finding of it in the joint of index `joint`, called `place`; `joints` are the names of all. `peak` is its largest
+    /// effort \[N m or N\], and where it is.
+    pub fn sentence(
+        &self,
+        joint: usize,
+        place: &str,
+        joints: &[String],
+        peak: Option<(f64, f64)>,
+    ) -> String {
+        let peak = peak.map_or_else(String::new, |(most, at)| {
+            format!("; it is largest, {} N m, at {}", number(most), number(at))
+        });
+        if self.is_friction_of(joint) {
+            return format!(
+                "The friction of joint {place} is more than a constant and a share of its velocity, and no effect of the library bends it so{peak} rad/s."
+            );
+        }
+        let of = if self.of_joint == joint {
+            "its own".to_owned()
+        } else {
+            format!("joint {}'s", joints[self.of_joint])
+        };
+        let against = match self.against {
+            Against::Position => format!("{of} position"),
+            Against::Velocity => format!("{of} velocity"),
+            Against::Acceleration => format!("{of} acceleration"),
+            Against::Load => "its load".to_owned(),
+            Against::RecordingTime => "the time since the start of the recording".to_owned(),
+            Against::SessionTime => "the time since the start of the session".to_owned(),
+        };
+        let direction = if self.by_direction {
+            ", and turns its sign with the direction of motion, as friction does"
+        } else {
+            ""
+        };
+        let repeated = self.period.map_or_else(String::new, |period_s| {
+            let (period, rate) = (number(period_s), number(1.0 / period_s));
+            format!(", and repeats every {period} s ({rate} Hz)")
+        });
+        format!(
+            "Joint {place} has an effort that no effect of the library explains: it depends on {against}{direction}{repeated}{peak}."
+        )
+    }
 }
 
 impl TableSpec {

@@ -1,12 +1,29 @@
 //! Viscous friction that falls as the joint warms up.
 
 use super::law::joint_law;
-use super::{Coordinate, Effect, Layer, Parameter, PlaceKind, Scale};
+use super::{
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Scale, Simpler,
+    Simulated, Traits, Words,
+};
+
+/// Friction leaves at least this share of what it was when cold: none goes for good.
+/// Tuned: not swept.
+const LEAST_LEFT: f64 = 0.1;
+/// No joint warms up faster where one is drawn \[s\].
+/// Tuned: for simulated cells only, whose recordings are short; not swept.
+const FASTEST_DRAWN_S: f64 = 3.2;
 
 /// Effort (Fw + Fx exp(-t/T)) qd, t since the start of the recording: the joint is cold then. No gearbox warms up at
 /// once: T is searched from 3 s on.
 pub(super) static EFFECT: Effect = Effect {
     name: "temperature_viscous",
+    words: Words::new(
+        "Warm-up friction",
+        "viscous friction that falls as the joint warms up",
+        "Viscous friction that fades while the joint gets warm.",
+        "The viscous friction of joint {place} falls as it warms up: {viscous_warm_nms_per_rad} warm and {viscous_extra_cold_nms_per_rad} more when cold, within {time_constant_s}.",
+    ),
+    family: Family::Friction,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
     parameters: &[
@@ -21,6 +38,27 @@ pub(super) static EFFECT: Effect = Effect {
     ],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
+    simpler: Some(Simpler {
+        effect: &super::viscous_friction::EFFECT,
+        numbers: &["viscous_warm_nms_per_rad"],
+    }),
+    limit: Some(|_, x| x[0] >= LEAST_LEFT * (x[0] + x[1])),
+    excitation: Excitation::Speeds,
+    simulated: Simulated::Joint,
+    concealed: Some(|draw| {
+        let warm = 0.3 + 0.5 * draw.share;
+        let time_s = draw.shortest_s * draw.chance.between(0.4, 0.8);
+        let time_s = time_s.max(FASTEST_DRAWN_S);
+        let fastest = draw.fastest_rad_s;
+        Drawn::new(draw.efforts_nm(), move |f| {
+            vec![
+                ("viscous_warm_nms_per_rad", warm * f / fastest),
+                ("viscous_extra_cold_nms_per_rad", f / fastest),
+                ("time_constant_s", time_s),
+            ]
+        })
+    }),
+    traits: Traits::NONE,
     build: |site, values| {
         joint_law(&EFFECT, site, values, |[warm, extra, time_s], j, at| {
             (warm + extra * (-at.recording_s / time_s).exp()) * at.velocity[j]

@@ -231,9 +231,6 @@ fn a_term_survives_its_file() {
     }
 }
 
-/// Effects that act with all factors 0.
-const SHAPE_ALONE: [&str; 2] = ["joint_elasticity", "backlash"];
-
 #[test]
 fn factors_are_factors_and_without_them_nothing_happens() {
     let robot = TwoJoints::new();
@@ -246,7 +243,7 @@ fn factors_are_factors_and_without_them_nothing_happens() {
             none[i] = 0.0;
         }
         let without = at(&none);
-        if !factors(effect).is_empty() && !SHAPE_ALONE.contains(&effect.name) {
+        if !factors(effect).is_empty() && !effect.splits_joint() {
             assert!(
                 difference(&without, &vec![[0.0; 2]; 150]) == 0.0,
                 "{}",
@@ -298,17 +295,13 @@ fn a_reset_forgets() {
 fn friction_only_takes() {
     let robot = TwoJoints::new();
     let motion = motion(&robot.model, 300);
-    for name in [
-        "viscous_friction",
-        "coulomb_friction",
-        "stribeck_friction",
-        "asymmetric_coulomb",
-        "load_dependent_friction",
-        "quadratic_drag",
-        "temperature_viscous",
-        "friction_step",
-    ] {
-        let effect = effect(name).unwrap();
+    let friction = EFFECTS.iter().filter(|effect| {
+        let family = matches!(effect.family, Family::PlainFriction | Family::Friction);
+        // What yields before it slides gives some of it back.
+        family && effect.name != "presliding_hysteresis"
+    });
+    for effect in friction {
+        let name = effect.name;
         let mut term = (effect.build)(&robot.site(), &plausible(effect));
         for (at, effort) in motion.iter().zip(run(&mut *term, &motion)) {
             assert!(effort[0] * at.velocity[0] >= 0.0, "{name}");

@@ -1,16 +1,39 @@
 //! A drive whose effort is reported with a constant added.
 
 use super::law::joint_law;
-use super::{Coordinate, Effect, Layer, Parameter, PlaceKind};
+use super::{
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated, Traits,
+    Words,
+};
 
 /// Recorded effort: the true one plus a constant.
-pub(super) static EFFECT: Effect = Effect {
+pub static EFFECT: Effect = Effect {
     name: "torque_bias",
+    words: Words::new(
+        "Torque offset",
+        "torque bias",
+        "The torque is reported with a constant offset: a sensor that was not zeroed.",
+        "The effort of joint {place} is recorded with an offset of {bias_nm}.",
+    ),
+    family: Family::Recording,
     place: PlaceKind::Joint,
     layer: Layer::Record,
     parameters: &[Parameter::any("bias_nm")],
     coordinates: &[Coordinate::factor("bias_nm")],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
+    simpler: None,
+    limit: None,
+    excitation: Excitation::WholeRange,
+    simulated: Simulated::Record,
+    concealed: Some(|draw| {
+        let sign = draw.sign;
+        Drawn::new(draw.efforts_nm(), move |f| vec![("bias_nm", sign * f)])
+    }),
+    traits: Traits {
+        only_adds: true,
+        smallest_told_as: Some("bias_nm"),
+        ..Traits::NONE
+    },
     build: |site, values| joint_law(&EFFECT, site, values, |[bias], _, _| *bias),
 };

@@ -1,21 +1,38 @@
 //! Effort that is reported late.
 
 use super::law::array;
-use super::{Coordinate, Effect, Layer, MotionSample, Parameter, PlaceKind, Scale, Site, Term};
+use super::{
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind,
+    Scale, Simulated, Site, Term, Traits, Words,
+};
 
 /// How many samples are remembered: enough for a second at 1 kHz.
+/// Tuned: from the longest delay and the usual rates; not swept.
 const CAPACITY: usize = 1024;
 
 /// Recorded effort: the true one as it was a while ago, straight between samples, the same for all
 /// joints. Before that the first sample is held.
 pub(super) static EFFECT: Effect = Effect {
     name: "torque_delay",
+    words: Words::new(
+        "Torque delay",
+        "torque delay",
+        "The torque is reported late against the position.",
+        "The effort is recorded {delay_s} late.",
+    ),
+    family: Family::Recording,
     place: PlaceKind::All,
     layer: Layer::Record,
     parameters: &[Parameter::at_least("delay_s", 0.0)],
     coordinates: &[Coordinate::shape("delay_s", 0.002, 1.0, 12, Scale::Log)],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
+    simpler: None,
+    limit: None,
+    excitation: Excitation::Fast,
+    simulated: Simulated::Record,
+    concealed: Some(|_| Drawn::new([1e-3, 0.2], |delay| vec![("delay_s", delay)])),
+    traits: Traits::NONE,
     build: |site, values| Box::new(TorqueDelay::new(site, array(values))),
 };
 

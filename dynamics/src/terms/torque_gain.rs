@@ -1,17 +1,40 @@
 //! A drive whose effort is reported too large or too small by a factor.
 
 use super::law::array;
-use super::{Coordinate, Effect, Layer, MotionSample, Parameter, PlaceKind, Term};
+use super::{
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind,
+    Simulated, Term, Traits, Words,
+};
 
 /// Recorded effort: gain times the true one.
-pub(super) static EFFECT: Effect = Effect {
+pub static EFFECT: Effect = Effect {
     name: "torque_gain",
+    words: Words::new(
+        "Torque gain",
+        "torque gain",
+        "The torque is reported too large or too small by a factor: sensor gain, torque constant, gear efficiency.",
+        "The effort of joint {place} is recorded {gain} times too large.",
+    ),
+    family: Family::Recording,
     place: PlaceKind::Joint,
     layer: Layer::Record,
-    parameters: &[Parameter::any("gain")],
+    parameters: &[Parameter::ratio("gain", f64::NEG_INFINITY)],
     coordinates: &[Coordinate::factor("gain_excess")],
     to_parameters: |c| vec![1.0 + c[0]],
     to_coordinates: |p| vec![p[0] - 1.0],
+    simpler: None,
+    limit: None,
+    excitation: Excitation::Poses,
+    simulated: Simulated::Record,
+    concealed: Some(|draw| {
+        let sign = draw.sign;
+        Drawn::new([1e-4, 0.5], move |more| vec![("gain", 1.0 + sign * more)])
+    }),
+    traits: Traits {
+        is_scale: true,
+        smallest_told_as: Some("gain_minus_one"),
+        ..Traits::NONE
+    },
     build: |site, values| {
         Box::new(TorqueGain {
             joint: site.joint,

@@ -3,18 +3,38 @@
 use std::f64::consts::TAU;
 
 use super::law::array;
-use super::{Coordinate, Effect, Layer, MotionSample, Parameter, PlaceKind, Scale, Site, Term};
+use super::{
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind,
+    Scale, Simulated, Site, Term, Traits, Words,
+};
 
 /// Recorded effort: the true one through a first-order low-pass, H(s) = ω / (s + ω), the same for all
 /// joints. Solved exactly for an input that runs straight from one sample to the next.
 pub(super) static EFFECT: Effect = Effect {
     name: "torque_lowpass",
+    words: Words::new(
+        "Torque low-pass filter",
+        "torque lowpass",
+        "The reported torque is smoothed, so that fast changes are missing.",
+        "The effort is recorded through a low-pass of {cutoff_hz}.",
+    ),
+    family: Family::Recording,
     place: PlaceKind::All,
     layer: Layer::Record,
     parameters: &[Parameter::at_least("cutoff_hz", 1e-3)],
     coordinates: &[Coordinate::shape("cutoff_hz", 0.3, 40.0, 24, Scale::Log)],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
+    simpler: None,
+    limit: None,
+    excitation: Excitation::Fast,
+    simulated: Simulated::Record,
+    concealed: Some(|_| {
+        Drawn::new([1e-3, 0.3], |time_s| {
+            vec![("cutoff_hz", 1.0 / (TAU * time_s))]
+        })
+    }),
+    traits: Traits::NONE,
     build: |site, values| Box::new(TorqueLowpass::new(site, array(values))),
 };
 

@@ -1,11 +1,30 @@
 //! Effort that goes up and down with the joint's angle: cogging, gear teeth, eccentric gears.
 
+use std::f64::consts::PI;
+
 use super::law::joint_law;
-use super::{Coordinate, Effect, Layer, Parameter, PlaceKind, Scale};
+use super::{
+    Against, Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Scale,
+    Simulated, Traits, Words,
+};
+
+/// What is behind a gear comes back after a revolution: slower waves are whole numbers of cycles in it, within what is
+/// known of them.
+/// Tuned: not swept.
+const MOST_WHOLE_CYCLES: f64 = 30.0;
+/// How far from a whole number that is. Tuned: not swept.
+const NEARLY_WHOLE: f64 = 0.15;
 
 /// Effort -A sin(n q + φ), searched as the factors of sin n q and cos n q. Of several waves each is a term.
 pub(super) static EFFECT: Effect = Effect {
     name: "torque_ripple",
+    words: Words::new(
+        "Torque ripple",
+        "torque ripple",
+        "A wave in the torque that repeats with each turn of motor or gear.",
+        "The effort of joint {place} ripples by {amplitude_nm}, {cycles_per_rev:ratio} times a revolution.",
+    ),
+    family: Family::Spring,
     place: PlaceKind::Joint,
     layer: Layer::Joint,
     parameters: &[
@@ -25,6 +44,30 @@ pub(super) static EFFECT: Effect = Effect {
     to_coordinates: |p| {
         let (sin, cos) = p[2].sin_cos();
         vec![-p[0] * cos, -p[0] * sin, p[1]]
+    },
+    simpler: None,
+    limit: None,
+    excitation: Excitation::WholeRange,
+    simulated: Simulated::Joint,
+    concealed: Some(|draw| {
+        let cycles = f64::from(draw.chance.whole(4, 24));
+        let phase = draw.chance.between(-PI, PI);
+        Drawn::new(draw.efforts_nm(), move |f| {
+            vec![
+                ("amplitude_nm", f),
+                ("cycles_per_rev", cycles),
+                ("phase_rad", phase),
+            ]
+        })
+    }),
+    traits: Traits {
+        drawn_over: Some(Against::Position),
+        most_at_one_place: 2,
+        second: &["amplitude2_nm", "cycles_per_rev2", "phase2_rad"],
+        is_made_by_gears: |x| {
+            x[2] >= MOST_WHOLE_CYCLES || (x[2] - x[2].round()).abs() <= NEARLY_WHOLE
+        },
+        ..Traits::NONE
     },
     build: |site, values| {
         joint_law(&EFFECT, site, values, |[sine, cosine, cycles], j, at| {

@@ -1,17 +1,41 @@
 //! A sensor that cannot report more than so much.
 
 use super::law::array;
-use super::{Coordinate, Effect, Layer, MotionSample, Parameter, PlaceKind, Scale, Term};
+use super::{
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind,
+    Scale, Simulated, Term, Traits, Words,
+};
 
 /// Recorded effort: the true one, cut off at ± the limit.
 pub(super) static EFFECT: Effect = Effect {
     name: "torque_saturation",
+    words: Words::new(
+        "Torque saturation",
+        "torque saturation",
+        "The torque stops at a limit: of the sensor's range, or of the drive.",
+        "The recorded effort of joint {place} saturates at {limit_nm}.",
+    ),
+    family: Family::Recording,
     place: PlaceKind::Joint,
     layer: Layer::Record,
     parameters: &[Parameter::at_least("limit_nm", 0.0)],
     coordinates: &[Coordinate::shape("limit_nm", 0.3, 1.0, 15, Scale::OfEffort)],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
+    simpler: None,
+    limit: None,
+    excitation: Excitation::Poses,
+    simulated: Simulated::Record,
+    concealed: Some(|draw| {
+        let largest = draw.largest_nm;
+        Drawn::new([0.05, 0.7], move |cut| {
+            vec![("limit_nm", largest * (1.0 - cut))]
+        })
+    }),
+    traits: Traits {
+        cuts_off: true,
+        ..Traits::NONE
+    },
     build: |site, values| {
         Box::new(TorqueSaturation {
             joint: site.joint,

@@ -1,17 +1,37 @@
 //! A joint whose transmission also feels another joint's effort, as in wrists.
 
 use super::law::array;
-use super::{Coordinate, Effect, Layer, MotionSample, Parameter, PlaceKind, Term};
+use super::{
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind,
+    Simulated, Term, Traits, Words,
+};
 
 /// Recorded effort: τ + c τ of the driving joint, as it is before this term.
 pub(super) static EFFECT: Effect = Effect {
     name: "transmission_coupling",
+    words: Words::new(
+        "Transmission coupling",
+        "transmission coupling",
+        "Torque of one joint shows in another: coupled gears or belts, as in a wrist.",
+        "Joint {place} carries {coefficient} times the effort of joint {source}.",
+    ),
+    family: Family::Transmission,
     place: PlaceKind::TwoJoints,
     layer: Layer::Record,
-    parameters: &[Parameter::any("coefficient")],
+    parameters: &[Parameter::ratio("coefficient", f64::NEG_INFINITY)],
     coordinates: &[Coordinate::factor("coefficient")],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
+    simpler: None,
+    limit: None,
+    excitation: Excitation::Poses,
+    simulated: Simulated::Record,
+    concealed: Some(|draw| {
+        let sign = draw.sign;
+        let two = draw.site.source != draw.site.joint;
+        two.then(|| Drawn::new([1e-4, 0.4], move |c| vec![("coefficient", sign * c)]))?
+    }),
+    traits: Traits::NONE,
     build: |site, values| {
         Box::new(TransmissionCoupling {
             joint: site.joint,

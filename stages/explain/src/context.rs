@@ -34,7 +34,7 @@ impl Context<'_> {
         let mut all = library::hypotheses(&input.model, input.bodies, &input.without);
         // The scale of such a joint is free as it is.
         let unscaled = |joint: usize| self.unscaled.iter().any(|(other, _)| *other == joint);
-        all.retain(|h| h.effect.name != "torque_gain" || !unscaled(h.place.joint));
+        all.retain(|h| !h.effect.traits.is_scale || !unscaled(h.place.joint));
         all
     }
 
@@ -100,7 +100,7 @@ impl Context<'_> {
             problem.known_friction = start.friction(&self.input.model);
             if self.input.torque_constants_nm_per_a.is_none() {
                 for (known, unit) in problem.known_friction.iter_mut().zip(self.unit_nm) {
-                    *known = known.map(|value| value * unit);
+                    known.values_mut().for_each(|value| *value *= unit);
                 }
             }
         }

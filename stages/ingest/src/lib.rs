@@ -4,6 +4,38 @@
 //! order by name, and each sample takes with it what belongs to its instant. That part is pure; the
 //! sources around it do the input, and [`Paced`] holds recorded and simulated samples back until
 //! their time has come.
+//!
+//! The simulated cell needs no robot:
+//!
+//! ```
+//! use tauscope_dynamics::Model;
+//! use tauscope_ingest::simulated::{Scenario, Simulation};
+//!
+//! let pendulum = r#"<robot name="pendulum">
+//!   <link name="base"/>
+//!   <link name="rod"><inertial>
+//!     <origin xyz="0 0 -0.5"/><mass value="2"/>
+//!     <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/>
+//!   </inertial></link>
+//!   <joint name="hinge" type="revolute">
+//!     <parent link="base"/><child link="rod"/><axis xyz="1 0 0"/>
+//!     <limit lower="-2" upper="2" velocity="2" effort="50"/>
+//!   </joint>
+//! </robot>"#;
+//! let scenario: Scenario = serde_json::from_str(
+//!     r#"{"version": 1, "robot": "pendulum.urdf", "seed": 1, "rate_hz": 100,
+//!         "physics": [{"effect": "coulomb_friction", "joint": "hinge", "parameters": {"coulomb_nm": 1.5}}],
+//!         "recordings": [{"name": "swing", "duration_s": 2, "motion": {"fourier": {"period_s": 2}}}]}"#,
+//! )?;
+//! let mut simulation = Simulation::new(&scenario, &Model::from_urdf(pendulum)?, 0)?;
+//! let mut readings = 0;
+//! while let Some(reading) = simulation.next_reading()? {
+//!     assert!(reading.effort[0].is_finite());
+//!     readings += 1;
+//! }
+//! assert_eq!(readings, 201);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod archived_twin;
 mod config;

@@ -1,6 +1,7 @@
 //! What a detection says in words, the same in the archive and in the picture.
 
 use tauscope_bus::{Detection, Name, flags};
+use tauscope_dynamics::terms::UNKNOWN;
 
 /// How serious it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,7 +39,7 @@ pub(crate) fn loaded_joints<'a>(detection: &Detection, joints: &'a [String]) -> 
 /// A detection's state in a few words, e.g. `contact at link5`.
 pub(crate) fn headline(detection: &Detection) -> String {
     let state = detection.state.as_str().replace('_', " ");
-    if detection.header.has(flags::CHANGE) && detection.state.as_str() == "unknown" {
+    if detection.header.has(flags::CHANGE) && detection.state.as_str() == UNKNOWN.name {
         return "changed, no name fits".to_owned();
     }
     let state = if detection.header.has(flags::CHANGE) {

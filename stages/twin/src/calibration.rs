@@ -7,11 +7,14 @@
 use tauscope_bus::{TwinState, flags};
 
 /// A joint faster than this moves: no encoder's noise is as much \[rad/s, m/s\].
+/// Physical: above the velocity noise of encoders.
 const MOVES: f64 = 0.03;
 /// The arm must move in so large a share of the samples if they are to tell a gain.
+/// Tuned: not swept.
 const LEAST_MOVING: f64 = 0.01;
 
 /// A line that explains less of the measured effort's variance tells no gain: friction outweighs what the model knows.
+/// Tuned: not swept.
 const LEAST_EXPLAINED: f64 = 0.05;
 
 /// One joint's fit.

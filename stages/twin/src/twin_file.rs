@@ -93,8 +93,10 @@ pub struct JointCorrection {
 }
 
 /// A line's slope is a drive's gain where the line explains more than this share of the effort's variance,
+/// Statistical: from there on the model explains more of the effort than all else together.
 const EXPLAINED: f64 = 0.5;
 /// and a fitted gain is one where it is this many times its standard deviation.
+/// Statistical: five standard deviations exclude 0 with odds of a million to one.
 const KNOWN: f64 = 5.0;
 
 impl JointCorrection {

@@ -1,6 +1,9 @@
 //! What the watching stage says.
 
 use tauscope_bus::Detection;
+use tauscope_dynamics::terms::{
+    COULOMB_FRICTION, Effect, PAYLOAD, TORQUE_BIAS, TORQUE_GAIN, UNKNOWN, VISCOUS_FRICTION,
+};
 
 /// What is behind a residual that changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,19 +25,27 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// Canonical name: that of the effect, where it is one.
-    pub fn name(self) -> &'static str {
+    /// The effect, where it is one.
+    pub fn effect(self) -> Option<&'static Effect> {
         match self {
-            Self::Contact => "contact",
-            Self::TorqueBias => "torque_bias",
-            Self::TorqueGain => "torque_gain",
-            Self::CoulombFriction => "coulomb_friction",
-            Self::ViscousFriction => "viscous_friction",
-            Self::Payload => "payload",
-            Self::Unknown => "unknown",
+            Self::Contact => None,
+            Self::TorqueBias => Some(&TORQUE_BIAS),
+            Self::TorqueGain => Some(&TORQUE_GAIN),
+            Self::CoulombFriction => Some(&COULOMB_FRICTION),
+            Self::ViscousFriction => Some(&VISCOUS_FRICTION),
+            Self::Payload => Some(&PAYLOAD),
+            Self::Unknown => Some(&UNKNOWN),
         }
     }
+
+    /// Canonical name: that of the effect, where it is one.
+    pub fn name(self) -> &'static str {
+        self.effect().map_or(CONTACT, |effect| effect.name)
+    }
 }
+
+/// What a contact is called.
+const CONTACT: &str = "contact";
 
 /// A change that was noticed.
 #[derive(Debug, Clone, Copy, PartialEq)]

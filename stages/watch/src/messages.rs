@@ -1,16 +1,19 @@
 //! What the watching stage says, in words.
 
 use tauscope_bus::{Detection, flags};
+use tauscope_dynamics::terms::{UNKNOWN, effect};
 
 /// A change or contact in words: `payload +0.99 kg at tool, seen in joint2 and joint4`. `joints` are the cell's
 /// joint names, `effort_unit` is `Nm` or `A`.
 pub fn in_words(detection: &Detection, joints: &[String], effort_unit: &str) -> String {
     let state = detection.state.as_str();
-    let mut text = match state {
-        "unknown" => "something that no name fits".to_owned(),
-        state => state.replace('_', " "),
+    let is_unknown = state == UNKNOWN.name;
+    let mut text = if is_unknown {
+        UNKNOWN.words.noun.to_owned()
+    } else {
+        state.replace('_', " ")
     };
-    if detection.header.has(flags::CHANGE) && state != "unknown" {
+    if detection.header.has(flags::CHANGE) && !is_unknown {
         text += &format!(" {}", amount(state, detection.size, effort_unit));
     }
     let named = joints.iter().enumerate();
@@ -27,18 +30,23 @@ pub fn in_words(detection: &Detection, joints: &[String], effort_unit: &str) -> 
     text
 }
 
-/// The size of a change by its name, e.g. `+1.02 N m` or `x 1.08`.
+/// The size of a change by its name, e.g. `+1.02 N m` or `x 1.08`: in the unit of the effect's first parameter, if `effort_unit`
+/// is the unit of effort.
 pub fn amount(state: &str, size: f64, effort_unit: &str) -> String {
-    let unit = if effort_unit == "Nm" {
-        "N m"
-    } else {
-        effort_unit
+    let of_effort = |unit: &str| {
+        unit.replace(
+            "N m",
+            if effort_unit == "Nm" {
+                "N m"
+            } else {
+                effort_unit
+            },
+        )
     };
-    match state {
-        "payload" => format!("{size:+.2} kg"),
-        "torque_gain" => format!("x {size:.3}"),
-        "viscous_friction" => format!("{size:+.2} {unit} s/rad"),
-        _ => format!("{size:+.2} {unit}"),
+    let first = effect(state).and_then(|effect| effect.parameters.first());
+    match first.map_or("N m", |parameter| parameter.unit) {
+        "" => format!("x {size:.3}"),
+        unit => format!("{size:+.2} {}", of_effort(unit)),
     }
 }
 

@@ -1,5 +1,6 @@
 //! From recordings to the data of a fit.
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
 use tauscope_dynamics::Model;
@@ -59,7 +60,7 @@ impl Problem {
             largest_effort: vec![0.0; n],
             cutoff_hz,
             effective_samples: Vec::new(),
-            known_friction: vec![[0.0; 2]; n],
+            known_friction: vec![BTreeMap::new(); n],
             cache: Arc::default(),
             units: Arc::default(),
             bare: OnceLock::new(),

@@ -1,5 +1,6 @@
 //! The data of a fit: smoothed motion, rigid-body effort and filtered measured effort of the recordings.
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
 use tauscope_dynamics::terms::Expansion;
@@ -36,7 +37,7 @@ pub struct Problem {
     /// Effective (independent) samples per row of noise, by joint: 0 to 1.
     pub effective_samples: Vec<f64>,
     /// Coulomb and viscous friction by joint that the twin has already: by so much they may be less.
-    pub known_friction: Vec<[f64; 2]>,
+    pub known_friction: Vec<BTreeMap<&'static str, f64>>,
     /// Columns that were computed before.
     pub cache: Arc<ColumnCache>,
     /// What unit bodies cost.

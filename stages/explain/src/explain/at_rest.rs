@@ -1,6 +1,7 @@
 //! The search where no joint moves: what comes and goes can be told, what lasts cannot.
 
 use tauscope_dynamics::terms::TermError;
+use tauscope_dynamics::terms::words::number;
 
 use crate::context::Context;
 use crate::data::problem::Problem;
@@ -11,7 +12,7 @@ use crate::physics::active::{Hypothesis, TimeKind};
 use crate::physics::kinematic_tree::bearing;
 use crate::read::audit;
 use crate::read::recording::Recording;
-use crate::report::{findings, sentences};
+use crate::report::findings;
 use crate::select::explanation::Explanation;
 use crate::select::plausible::plausible;
 use crate::select::propose::Base;
@@ -213,9 +214,8 @@ impl Context<'_> {
              each recording is taken for what it always bears there."
         ));
         if !self.unscaled.is_empty() {
-            let of = |&(j, _): &(usize, f64)| {
-                format!("{} {} N m/A", joints[j], sentences::number(self.unit_nm[j]))
-            };
+            let of =
+                |&(j, _): &(usize, f64)| format!("{} {} N m/A", joints[j], number(self.unit_nm[j]));
             let taken: Vec<String> = self.unscaled.iter().map(of).collect();
             named.notes.push(format!(
                 "Nobody knows the scales of these drives, and forces hang on what they were taken for: {}.",

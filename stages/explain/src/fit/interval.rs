@@ -141,7 +141,7 @@ pub fn parameter_deviations(
         }
     }
     let spread = &slopes * own * slopes.transpose();
-    let share = if is_fast(active.hypothesis.effect.name) {
+    let share = if active.hypothesis.effect.traits.is_fast {
         SYSTEMATIC_WHEN_FAST
     } else {
         SYSTEMATIC
@@ -157,13 +157,6 @@ pub fn parameter_deviations(
             (spread[(row, row)].max(0.0) + systematic * systematic).sqrt()
         })
         .collect()
-}
-
-fn is_fast(effect: &str) -> bool {
-    matches!(
-        effect,
-        "stribeck_friction" | "presliding_hysteresis" | "joint_elasticity" | "backlash"
-    )
 }
 
 fn is_time(kind: CoordinateKind) -> bool {

@@ -3,17 +3,13 @@
 use std::sync::Arc;
 
 use nalgebra::DVector;
-use tauscope_dynamics::terms::effect;
+use tauscope_dynamics::terms::EFFECTS;
 
 use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::fit::least_squares::{Products, solved};
 use crate::physics::active::{Hypothesis, Whereabouts};
-
-/// How far a link's mass, as a share of it, and its centre of mass, in radii of gyration, may be off in a URDF.
-const MASS_OFF: f64 = 0.1;
-const CENTRE_OFF: f64 = 0.2;
 
 /// By coordinate of a fit, how far it is off if the URDF's masses and centres of mass are: the root of the sum of squares over all
 /// links. A drive whose joint carries next to nothing has no scale of its own, however small its interval.
@@ -29,13 +25,9 @@ pub fn off_with_the_links(problem: &Problem, fit: &Fit) -> Vec<f64> {
                 ..Whereabouts::default()
             },
         );
-        let sizes = [
-            ("link_mass", MASS_OFF * link.mass_kg()),
-            ("link_com", CENTRE_OFF * link.gyration_radius_m()),
-        ];
-        for (effect, off) in sizes
-            .into_iter()
-            .filter_map(|(n, off)| Some((effect(n)?, off)))
+        for (effect, off) in EFFECTS
+            .iter()
+            .filter_map(|effect| Some((*effect, effect.traits.off_in_urdf?(link))))
         {
             let shape = vec![0.0; effect.coordinates.len()];
             let all = fit.columns(problem, Hypothesis { effect, place }, &shape);

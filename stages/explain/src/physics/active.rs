@@ -1,10 +1,11 @@
 //! A piece of physics that is part of an explanation: what, where, and its numbers.
 
 use tauscope_dynamics::terms::{
-    Against, Coordinate, CoordinateKind, Effect, Layer, MotionSample, PlaceKind, Site, Table, Term,
-    table,
+    Against, Coordinate, CoordinateKind, Effect, Family, Layer, MotionSample, PlaceKind, Site,
+    Table, Term, table,
 };
 
+pub use tauscope_dynamics::terms::Time as TimeKind;
 use tauscope_dynamics::{Inertia, Model};
 
 /// Where an effect is: indices into the model's joints and links; what its kind of place does not ask for is 0.
@@ -18,30 +19,31 @@ pub struct Whereabouts {
     pub link: usize,
 }
 
+impl Whereabouts {
+    /// The same in a robot.
+    pub fn site(self, model: &Model) -> Site<'_> {
+        let Self {
+            joint,
+            source,
+            link,
+        } = self;
+        Site {
+            model,
+            joint,
+            source,
+            link,
+        }
+    }
+}
+
 /// Inertial parameters of a body.
 pub const BODY: usize = 10;
-
-/// What describes a link's body: a change of all its inertial parameters.
-pub const UNNAMED_BODY: &str = "link_inertia";
 
 /// The scale between a joint's torque and its recorded effort, see `torque_scale.rs`.
 pub const TORQUE_SCALE: &str = "torque_scale";
 
 /// Slow, but fast enough for a sign.
 const SLOW_RAD_S: f64 = 0.02;
-
-/// What kind of time an effect has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TimeKind {
-    /// None.
-    Always,
-    /// It changes once in a session.
-    Step,
-    /// It lasts for an interval of every recording.
-    EveryRecording,
-    /// It lasts for an interval of the session.
-    Once,
-}
 
 /// An effect at a place, without its numbers.
 #[derive(Debug, Clone, Copy)]
@@ -54,7 +56,7 @@ pub struct Hypothesis {
 
 impl PartialEq for Hypothesis {
     fn eq(&self, other: &Self) -> bool {
-        self.effect.name == other.effect.name && self.place == other.place
+        self.effect == other.effect && self.place == other.place
     }
 }
 
@@ -80,13 +82,7 @@ impl Hypothesis {
         let Some(joint) = self.only_joint() else {
             return false;
         };
-        let Whereabouts { source, link, .. } = self.place;
-        let site = Site {
-            model,
-            joint,
-            source,
-            link,
-        };
+        let site = self.place.site(model);
         let middle = |c: &Coordinate| match c.kind {
             CoordinateKind::Factor { .. } => 1.0,
             CoordinateKind::Shape { lower, upper, .. } => (lower * upper).abs().sqrt(),
@@ -118,7 +114,7 @@ impl Hypothesis {
 
     /// Whether it depends on what the gear transmits.
     pub fn needs_load(&self) -> bool {
-        self.effect.name == "load_dependent_friction"
+        self.effect.traits.needs_load
     }
 
     /// Whether its first ten coordinates are those of a body, see [`Inertia::parameters`].
@@ -133,20 +129,17 @@ impl Hypothesis {
 
     /// Whether it splits a joint in rotor and link: such effects are costly to try.
     pub fn has_rotor(&self) -> bool {
-        matches!(self.effect.name, "joint_elasticity" | "backlash")
+        self.effect.splits_joint()
     }
 
     /// Whether it is Coulomb or viscous friction, which a curve of friction goes with.
     pub fn is_plain_friction(&self) -> bool {
-        matches!(self.effect.name, "coulomb_friction" | "viscous_friction")
+        self.effect.is_plain_friction()
     }
 
     /// Whether it is a function of its joint's position alone.
     pub fn is_of_position(&self) -> bool {
-        matches!(
-            self.effect.name,
-            "cable_spring" | "counterbalance_spring" | "torque_ripple"
-        )
+        self.effect.traits.drawn_over == Some(Against::Position)
     }
 
     /// Whether it multiplies all effort of a joint.
@@ -156,39 +149,22 @@ impl Hypothesis {
 
     /// How it depends on time.
     pub fn time_kind(&self) -> TimeKind {
-        let count = |kind: CoordinateKind| {
-            let all = self.effect.coordinates.iter();
-            all.filter(|c| c.kind == kind).count()
-        };
-        match (
-            count(CoordinateKind::RecordingTime),
-            count(CoordinateKind::SessionTime),
-        ) {
-            (0, 0) => TimeKind::Always,
-            (0, 1) => TimeKind::Step,
-            (_, 0) => TimeKind::EveryRecording,
-            _ => TimeKind::Once,
-        }
+        self.effect.time()
     }
 
     /// Whether it is part of the arm, not something that came and went.
     pub fn lasts(&self) -> bool {
-        matches!(self.time_kind(), TimeKind::Always | TimeKind::Step)
-            && self.effect.name != "contact_wall"
+        self.effect.lasts()
     }
 
     /// What it is called in reports: what only describes is `unknown`.
     pub fn said(&self) -> &'static str {
-        if self.is_unnamed_body() {
-            "unknown"
-        } else {
-            self.effect.name
-        }
+        self.effect.said()
     }
 
     /// Whether it describes a link's body without a name for what is wrong with it.
     pub fn is_unnamed_body(&self) -> bool {
-        self.effect.name == UNNAMED_BODY
+        self.effect.traits.describes_only && self.effect.family == Family::Body
     }
 
     /// Whether all its coordinates are factors.
@@ -221,17 +197,7 @@ pub struct Active {
 impl Active {
     /// The term for a robot.
     pub fn term(&self, model: &Model) -> Box<dyn Term> {
-        let Whereabouts {
-            joint,
-            source,
-            link,
-        } = self.hypothesis.place;
-        let site = Site {
-            model,
-            joint,
-            source,
-            link,
-        };
+        let site = self.hypothesis.place.site(model);
         let curve = self.curve.as_ref().and_then(|curve| {
             let values = self.values_at_knots(curve);
             table(
@@ -260,7 +226,7 @@ impl Active {
     /// Whether it is a curve over its joint's own velocity: friction, whatever bends it.
     pub fn is_friction_curve(&self) -> bool {
         let curve = self.curve.as_ref();
-        curve.is_some_and(|curve| is_of_friction(curve, self.hypothesis.place.joint))
+        curve.is_some_and(|curve| curve.is_friction_of(self.hypothesis.place.joint))
     }
 
     /// Whether its effort jumps where its joint reverses.
@@ -340,14 +306,10 @@ pub fn in_order(actives: &[Active]) -> Vec<&Active> {
     all
 }
 
-fn is_of_friction(curve: &Table, joint: usize) -> bool {
-    curve.against == Against::Velocity && curve.of_joint == joint
-}
-
 /// The knots of a curve in a joint that are held at zero. A curve over the joint's own velocity is what Coulomb and viscous
 /// friction leave: these are the straight line between its slowest and its fastest knot in each direction.
 pub fn held_knots(curve: &Table, joint: usize) -> Vec<usize> {
-    if !is_of_friction(curve, joint) {
+    if !curve.is_friction_of(joint) {
         return Vec::new();
     }
     let middle = curve.knots.partition_point(|knot| *knot < 0.0);

@@ -1,77 +1,45 @@
 //! Friction that is more or less than a twin says: told beside it, kept with it.
 
 use tauscope_dynamics::Model;
-use tauscope_dynamics::terms::{Against, Layer, PlaceKind, TermSpec};
+use tauscope_dynamics::terms::{Against, Effect, Layer, PlaceKind, TermSpec};
 
 use crate::data::problem::Problem;
 use crate::physics::active::Hypothesis;
 use crate::physics::parameter_units::is_of_effort;
 
-/// A plain friction, and which effects hold it.
-struct Plain {
-    effect: &'static str,
-    number: &'static str,
-    /// Effects with the numbers of theirs that are more by as much as it is.
-    held_by: &'static [(&'static str, &'static [&'static str])],
+/// The plain friction that an effect is or contains, with the parameters of it that grow as that does.
+fn contained(effect: &'static Effect) -> Option<(&'static Effect, Vec<&'static str>)> {
+    if effect.is_plain_friction() {
+        return Some((effect, effect.parameters.iter().map(|p| p.name).collect()));
+    }
+    let simpler = effect.simpler?;
+    let plain = simpler.effect.is_plain_friction();
+    plain.then(|| (simpler.effect, simpler.numbers.to_vec()))
 }
 
-/// Coulomb and viscous friction.
-const PLAIN: [Plain; 2] = [
-    Plain {
-        effect: "coulomb_friction",
-        number: "coulomb_nm",
-        held_by: &[
-            ("coulomb_friction", &["coulomb_nm"]),
-            ("stribeck_friction", &["coulomb_nm", "static_nm"]),
-            (
-                "asymmetric_coulomb",
-                &["coulomb_positive_nm", "coulomb_negative_nm"],
-            ),
-            ("presliding_hysteresis", &["coulomb_nm"]),
-            ("friction_step", &["coulomb_after_nm", "coulomb_before_nm"]),
-        ],
-    },
-    Plain {
-        effect: "viscous_friction",
-        number: "viscous_nms_per_rad",
-        held_by: &[
-            ("viscous_friction", &["viscous_nms_per_rad"]),
-            ("temperature_viscous", &["viscous_warm_nms_per_rad"]),
-        ],
-    },
-];
-
-/// Which of the plain frictions an effect is, Coulomb 0 and viscous 1.
-pub fn plain(effect: &str) -> Option<usize> {
-    PLAIN.iter().position(|plain| plain.effect == effect)
-}
-
-/// Coulomb and viscous friction that a term holds.
-pub fn of(term: &TermSpec) -> [f64; 2] {
-    PLAIN.map(|plain| {
-        let own = plain
-            .held_by
-            .iter()
-            .find(|(effect, _)| *effect == term.effect);
-        let values = own.into_iter().flat_map(|(_, names)| *names);
-        let values = values.filter_map(|name| term.parameters.get(*name).copied());
-        values.reduce(f64::min).unwrap_or(0.0)
-    })
+/// The plain friction that a term holds, by its name, and how much of it.
+pub fn of(term: &TermSpec) -> Option<(&'static str, f64)> {
+    let (plain, numbers) = contained(term.effect().ok()?)?;
+    let values = numbers
+        .into_iter()
+        .filter_map(|name| term.parameters.get(name).copied());
+    Some((plain.name, values.reduce(f64::min)?))
 }
 
 /// Adds a new term to those of a twin: more or less of a friction that one of them holds to that one, else as one more.
 pub fn add(term: TermSpec, to: &mut Vec<TermSpec>) {
-    if let Some(plain) = plain(&term.effect).map(|which| &PLAIN[which])
-        && let Some(more) = term.parameters.get(plain.number)
+    if let Ok(plain) = term.effect()
+        && plain.is_plain_friction()
+        && let Some(more) = plain
+            .parameters
+            .first()
+            .and_then(|p| term.parameters.get(p.name))
     {
         for old in to.iter_mut().filter(|old| old.joint == term.joint) {
-            if let Some((_, names)) = plain
-                .held_by
-                .iter()
-                .find(|(effect, _)| *effect == old.effect)
-            {
-                for name in *names {
-                    let value = old.parameters.entry((*name).to_owned()).or_default();
+            let held = old.effect().ok().and_then(contained);
+            if let Some((_, numbers)) = held.filter(|(held, _)| *held == plain) {
+                for name in numbers {
+                    let value = old.parameters.entry(name.to_owned()).or_default();
                     *value = (*value + more).max(0.0);
                 }
                 return;
@@ -118,7 +86,6 @@ pub fn in_recorded_units(term: &TermSpec, model: &Model, units_nm: &[f64]) -> Te
 
 /// The least that a factor of a hypothesis may be: a friction that the twin has already may be less.
 pub fn least(problem: &Problem, hypothesis: Hypothesis, minimum: f64) -> f64 {
-    plain(hypothesis.effect.name).map_or(minimum, |which| {
-        minimum - problem.known_friction[hypothesis.place.joint][which]
-    })
+    let known = &problem.known_friction[hypothesis.place.joint];
+    minimum - known.get(hypothesis.effect.name).copied().unwrap_or(0.0)
 }

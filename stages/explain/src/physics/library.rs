@@ -3,14 +3,17 @@
 use std::collections::BTreeSet;
 
 use tauscope_dynamics::Model;
-use tauscope_dynamics::terms::{EFFECTS, PlaceKind, effect};
+use tauscope_dynamics::terms::{EFFECTS, Effect, PlaceKind};
 
-use crate::physics::active::{Hypothesis, UNNAMED_BODY, Whereabouts};
+use crate::physics::active::{Hypothesis, Whereabouts};
 
 /// The links whose bodies may be described where no name fits: those that move and have a body in the URDF, but for that at
 /// the end, where any body is a payload.
 pub fn unnamed_bodies(model: &Model, without: &BTreeSet<String>) -> Vec<Hypothesis> {
-    let Some(effect) = effect(UNNAMED_BODY).filter(|effect| !without.contains(effect.name)) else {
+    let describes =
+        |effect: &&&Effect| effect.traits.describes_only && effect.place == PlaceKind::Link;
+    let effect = EFFECTS.iter().find(describes);
+    let Some(&effect) = effect.filter(|effect| !without.contains(effect.name)) else {
         return Vec::new();
     };
     let tool = model.links()[model.tool_link()].joint;
@@ -37,7 +40,7 @@ pub fn hypotheses(model: &Model, bodies: bool, without: &BTreeSet<String>) -> Ve
     let joints = 0..model.dof();
     let mut all = Vec::new();
     for &effect in EFFECTS {
-        if ["unknown", UNNAMED_BODY].contains(&effect.name) || without.contains(effect.name) {
+        if effect.traits.describes_only || without.contains(effect.name) {
             continue;
         }
         let mut add = |place: Whereabouts| all.push(Hypothesis { effect, place });

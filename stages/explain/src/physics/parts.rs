@@ -80,7 +80,7 @@ impl Parts {
 
     /// Whether a piece would only add, to joints that nothing transforms and no other joint feels.
     pub fn is_plain(&self, hypothesis: &Hypothesis) -> bool {
-        let of_record = hypothesis.effect.layer == Layer::Record && !is_bias(hypothesis);
+        let of_record = hypothesis.effect.layer == Layer::Record && !only_adds(hypothesis);
         !of_record
             && !hypothesis.is_torque_scale()
             && match hypothesis.only_joint() {
@@ -208,8 +208,8 @@ fn add(into: &mut [f64], what: &[f64]) {
     }
 }
 
-fn is_bias(hypothesis: &Hypothesis) -> bool {
-    hypothesis.effect.name == "torque_bias"
+fn only_adds(hypothesis: &Hypothesis) -> bool {
+    hypothesis.effect.traits.only_adds
 }
 
 /// The joints whose recording something transforms; an offset alone does not.
@@ -217,7 +217,7 @@ fn transformed(actives: &[Active], joints: usize) -> Vec<bool> {
     let mut transformed = vec![false; joints];
     for active in actives
         .iter()
-        .filter(|a| a.is_of_record() && !is_bias(&a.hypothesis))
+        .filter(|a| a.is_of_record() && !only_adds(&a.hypothesis))
     {
         if active.hypothesis.effect.place == PlaceKind::All {
             return vec![true; joints];

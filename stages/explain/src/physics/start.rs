@@ -1,5 +1,7 @@
 //! Physics of a corrected twin that is started from: what is new is told beside what it knows already.
 
+use std::collections::BTreeMap;
+
 use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::{Layer, Physics, TermError, TermSpec};
 
@@ -29,15 +31,13 @@ impl Start {
         dry
     }
 
-    /// Coulomb and viscous friction by joint, in units of its terms: by so much they may have fallen since.
-    pub fn friction(&self, model: &Model) -> Vec<[f64; 2]> {
-        let mut all = vec![[0.0; 2]; model.dof()];
+    /// Coulomb and viscous friction by joint and name, in units of its terms: by so much they may have fallen since.
+    pub fn friction(&self, model: &Model) -> Vec<BTreeMap<&'static str, f64>> {
+        let mut all = vec![BTreeMap::new(); model.dof()];
         for spec in &self.terms {
             let joint = (spec.joint.as_ref()).and_then(|name| model.joint_index(name));
-            if let Some(joint) = joint {
-                for (sum, own) in all[joint].iter_mut().zip(friction::of(spec)) {
-                    *sum += own;
-                }
+            if let (Some(joint), Some((name, own))) = (joint, friction::of(spec)) {
+                *all[joint].entry(name).or_insert(0.0) += own;
             }
         }
         all

@@ -1,7 +1,8 @@
 //! The scale between N m and a recorded current, where nobody knows the torque constants.
 
 use tauscope_dynamics::terms::{
-    Coordinate, Effect, Layer, MotionSample, Parameter, PlaceKind, Term,
+    Coordinate, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind, Simulated,
+    Term, Traits, Words,
 };
 
 use crate::physics::active::{Active, Hypothesis, TORQUE_SCALE, Whereabouts};
@@ -10,12 +11,25 @@ use crate::physics::active::{Active, Hypothesis, TORQUE_SCALE, Whereabouts};
 /// [`Layer::Body`] terms.
 pub static EFFECT: Effect = Effect {
     name: TORQUE_SCALE,
+    words: Words::new(
+        "Torque scale",
+        "torque scale",
+        "What a recorded effort of 1 is in N m.",
+        "The effort of joint {place} is recorded {gain} times the model's.",
+    ),
+    family: Family::Recording,
     place: PlaceKind::Joint,
     layer: Layer::Body,
-    parameters: &[Parameter::any("gain")],
+    parameters: &[Parameter::ratio("gain", f64::NEG_INFINITY)],
     coordinates: &[Coordinate::factor("gain_minus_one")],
     to_parameters: |c| vec![1.0 + c[0]],
     to_coordinates: |p| vec![p[0] - 1.0],
+    simpler: None,
+    limit: None,
+    excitation: Excitation::Poses,
+    simulated: Simulated::Record,
+    concealed: None,
+    traits: Traits::NONE,
     build: |site, values| {
         Box::new(TorqueScale {
             joint: site.joint,

@@ -28,7 +28,8 @@ impl Start {
     pub fn needs_load(&self) -> bool {
         let needs = |term: &TermSpec| {
             let against = term.table.as_ref().map(|table| table.against);
-            term.effect == "load_dependent_friction" || against == Some(Against::Load)
+            let by_load = term.effect().is_ok_and(|effect| effect.traits.needs_load);
+            by_load || against == Some(Against::Load)
         };
         self.terms.iter().any(needs)
     }

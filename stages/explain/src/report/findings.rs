@@ -137,7 +137,7 @@ pub fn of(
             let source = joints[active.hypothesis.place.source].clone();
             parameters.insert("source_joint".to_owned(), Value::from(source));
         }
-        if effect.name == "torque_saturation" {
+        if effect.traits.cuts_off {
             parameters.insert("mode".to_owned(), Value::from("sensor"));
         }
         describe_curve(active, &mut parameters);

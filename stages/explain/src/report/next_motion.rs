@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
-use tauscope_dynamics::terms::PlaceKind;
+use tauscope_dynamics::terms::{Effect, Excitation, PlaceKind};
 use tauscope_dynamics::{JointKind, Model};
 
 use crate::physics::active::Hypothesis;
@@ -46,40 +46,13 @@ enum Excite {
 }
 
 impl Excite {
-    /// What tells `winner` from `rival`.
-    fn of(winner: &str, rival: &str) -> &'static [Self] {
-        let either = |names: &[&str]| names.contains(&winner) && names.contains(&rival);
-        let any = |names: &[&str]| names.contains(&winner) || names.contains(&rival);
-        if any(&[
-            "torque_delay",
-            "torque_lowpass",
-            "rotor_inertia",
-            "joint_elasticity",
-            "backlash",
-        ]) {
-            &[Self::Fast]
-        } else if any(&[
-            "torque_gain",
-            "torque_saturation",
-            "transmission_coupling",
-            "payload",
-            "link_mass",
-            "link_com",
-            "base_tilt",
-            "payload_pickup",
-            "external_push",
-            "contact_wall",
-        ]) {
-            &[Self::AllPoses]
-        } else if either(&[
-            "counterbalance_spring",
-            "cable_spring",
-            "torque_bias",
-            "torque_ripple",
-        ]) {
-            &[Self::WholeRange]
-        } else {
-            &[Self::Creep, Self::AllSpeeds]
+    /// What tells an effect from another.
+    fn of(winner: &Effect, rival: &Effect) -> &'static [Self] {
+        match winner.excitation.between(rival.excitation) {
+            Excitation::Fast => &[Self::Fast],
+            Excitation::Poses => &[Self::AllPoses],
+            Excitation::WholeRange => &[Self::WholeRange],
+            Excitation::Speeds => &[Self::Creep, Self::AllSpeeds],
         }
     }
 
@@ -87,7 +60,7 @@ impl Excite {
     fn of_class(winner: &Hypothesis, ties: &[Hypothesis]) -> Vec<Self> {
         let mut parts = Vec::new();
         for rival in ties {
-            for part in Self::of(winner.effect.name, rival.effect.name) {
+            for part in Self::of(winner.effect, rival.effect) {
                 if !parts.contains(part) {
                     parts.push(*part);
                 }
@@ -256,6 +229,8 @@ fn position(model: &Model, excite: Excite, joint: usize, centre: &[f64], j: usiz
 
 #[cfg(test)]
 mod tests {
+    use tauscope_dynamics::terms::effect;
+
     use super::*;
 
     #[test]
@@ -297,6 +272,7 @@ mod tests {
             ("torque_gain", "torque_bias", Excite::AllPoses),
             ("stribeck_friction", "coulomb_friction", Excite::Creep),
         ] {
+            let [a, b] = [a, b].map(|name| effect(name).unwrap());
             assert_eq!(Excite::of(a, b)[0], expected);
         }
     }

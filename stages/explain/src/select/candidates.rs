@@ -4,9 +4,7 @@ use tauscope_dynamics::terms::{Layer, PlaceKind};
 
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis};
-use crate::select::evidence::{
-    LEAST_EVIDENCE, ROTOR, is_drawn_already, most_at_one_place, worse_joints,
-};
+use crate::select::evidence::{LEAST_EVIDENCE, is_drawn_already, worse_joints};
 use crate::select::parallel;
 use crate::select::propose::{Base, Proposal};
 use crate::select::search::Search;
@@ -27,8 +25,8 @@ impl Search<'_> {
     pub fn rivals(&self, without: &Fit, best: &Fit, active: &Active) -> Vec<Proposal> {
         let worse = worse_joints(without, best);
         let own = active.hypothesis.only_joint();
-        let friction = active.is_set_valued(&self.problem.model)
-            || active.hypothesis.effect.name == "viscous_friction";
+        let friction =
+            active.is_set_valued(&self.problem.model) || active.hypothesis.is_plain_friction();
         self.proposals_for(without, |h| match h.only_joint() {
             Some(joint) => worse.contains(&joint),
             None => !(friction && own.is_some()),
@@ -43,16 +41,20 @@ impl Search<'_> {
             .filter(|h| touches(h) && self.is_candidate(fit, **h))
             .copied()
             .collect();
-        // An elastic joint or one with play has a rotor: where a rotor's inertia is no help, they are not tried.
-        let rotor = |joint: usize| {
-            let is = |h: &&Hypothesis| h.effect.name == ROTOR && h.place.joint == joint;
+        // A joint split in rotor and link is costly to try: where the rotor alone is no help, it is not.
+        let simpler_helps = |split: &Hypothesis| {
+            let Some(simpler) = split.effect.simpler else {
+                return true;
+            };
+            let is =
+                |h: &&Hypothesis| h.effect == simpler.effect && h.place.joint == split.place.joint;
             let hypothesis = self.hypotheses.iter().find(is);
             hypothesis.is_none_or(|h| base.propose(*h).is_some_and(|p| p.gain > LEAST_EVIDENCE))
                 || fit.actives.iter().any(|a| is(&&a.hypothesis))
         };
         let wanted: Vec<Hypothesis> = wanted
             .into_iter()
-            .filter(|h| !h.has_rotor() || rotor(h.place.joint))
+            .filter(|h| !h.has_rotor() || simpler_helps(h))
             .collect();
         let mut all: Vec<Proposal> = parallel::map(&wanted, |h| base.propose_in_time(*h))
             .into_iter()
@@ -73,7 +75,7 @@ impl Search<'_> {
             .iter()
             .filter(|active| active.hypothesis == hypothesis)
             .count();
-        if same >= most_at_one_place(hypothesis) || is_drawn_already(fit, hypothesis) {
+        if same >= hypothesis.effect.traits.most_at_one_place || is_drawn_already(fit, hypothesis) {
             return false;
         }
         let excess = |j: usize| {

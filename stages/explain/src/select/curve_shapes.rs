@@ -1,6 +1,6 @@
 //! What no name fits: how it depends on the motion or on time, as a curve, so that the fit improves all the same.
 
-use tauscope_dynamics::terms::{Against, MotionSample, Table, effect};
+use tauscope_dynamics::terms::{Against, MotionSample, Table, UNKNOWN};
 
 use crate::data::column::Column;
 use crate::data::problem::Problem;
@@ -66,7 +66,7 @@ impl Base<'_> {
 
     fn try_curve(&self, joint: usize, curve: &Table) -> Option<CurveProposal> {
         let hypothesis = Hypothesis {
-            effect: effect("unknown")?,
+            effect: &UNKNOWN,
             place: Whereabouts {
                 joint,
                 ..Whereabouts::default()

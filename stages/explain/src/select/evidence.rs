@@ -111,8 +111,6 @@ pub fn wald(problem: &Problem, fit: &Fit) -> Vec<f64> {
         .collect()
 }
 
-pub const ROTOR: &str = "rotor_inertia";
-
 /// Evidence and size that a piece of physics needs beside what `fit` holds.
 pub fn needs(hypothesis: Hypothesis, fit: &Fit) -> (f64, f64) {
     let joint = hypothesis.only_joint();
@@ -154,25 +152,9 @@ pub fn worse_joints(fit: &Fit, better: &Fit) -> Vec<usize> {
     (0..fit.variance.len()).filter(worse).collect()
 }
 
-/// How many of one effect there may be at one place.
-pub fn most_at_one_place(hypothesis: Hypothesis) -> usize {
-    match hypothesis.effect.name {
-        "external_push" => 8,
-        "torque_ripple" => 2,
-        _ => 1,
-    }
-}
-
 /// Whether a curve in the joint says already what a hypothesis would: friction that is not plain, or a function of position. Beside the curve it could take any size that the curve takes back.
 pub fn is_drawn_already(fit: &Fit, hypothesis: Hypothesis) -> bool {
-    let bends = matches!(
-        hypothesis.effect.name,
-        "asymmetric_coulomb"
-            | "friction_step"
-            | "stribeck_friction"
-            | "presliding_hysteresis"
-            | "quadratic_drag"
-    );
+    let bends = hypothesis.effect.traits.drawn_over == Some(Against::Velocity);
     let joint = hypothesis.only_joint();
     let draws = |active: &Active| {
         active.curve.as_ref().is_some_and(|curve| {

@@ -82,7 +82,7 @@ impl Search<'_> {
     /// The better explanation that a wall makes in the place of all pushes, if it does: where it is, only a search tells, so that what
     /// it gains at first is no measure.
     fn with_wall(&self, best: &Explanation, without: &Explanation) -> Option<Explanation> {
-        let wall = |h: &&Hypothesis| h.effect.name == "contact_wall";
+        let wall = |h: &&Hypothesis| h.effect.is_surface();
         let hypothesis = self.hypotheses.iter().find(wall)?;
         let base = Base::new(self.problem, &without.fit, self.hypotheses.len());
         let proposal = base.propose_in_time(*hypothesis)?;

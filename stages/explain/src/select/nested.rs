@@ -1,7 +1,5 @@
 //! Effects that contain a simpler one, which is said unless the other is much likelier.
 
-use tauscope_dynamics::terms::effect;
-
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis};
 use crate::select::evidence::{LEAST_EVIDENCE, overwhelming, tie};
@@ -11,17 +9,6 @@ use crate::select::plausible::at_bound;
 use crate::select::propose::penalty;
 
 use crate::select::search::Search;
-
-/// Effects that contain a simpler one, whose only number is their first.
-const SIMPLER: [(&str, &str); 7] = [
-    ("friction_step", "coulomb_friction"),
-    ("stribeck_friction", "coulomb_friction"),
-    ("asymmetric_coulomb", "coulomb_friction"),
-    ("presliding_hysteresis", "coulomb_friction"),
-    ("temperature_viscous", "viscous_friction"),
-    ("joint_elasticity", "rotor_inertia"),
-    ("backlash", "rotor_inertia"),
-];
 
 impl Search<'_> {
     /// Puts the simpler effect that a piece contains in its place, where it is not ahead by `enough` for the evidence for it
@@ -62,11 +49,8 @@ impl Search<'_> {
             coordinates,
             ..
         } = &best.fit.actives[index];
-        let (_, name) = SIMPLER
-            .iter()
-            .find(|(of, _)| *of == hypothesis.effect.name)?;
         let simple = Hypothesis {
-            effect: effect(name)?,
+            effect: hypothesis.effect.simpler?.effect,
             place: hypothesis.place,
         };
         let there = |a: &Active| a.hypothesis == simple;

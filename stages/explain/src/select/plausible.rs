@@ -1,59 +1,20 @@
 //! Numbers that a robot may have, and times that tell something.
 
+use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::{CoordinateKind, Scale};
-use tauscope_dynamics::{Limits, Model};
 
 use crate::data::problem::Problem;
 use crate::physics::active::{Active, TimeKind};
 
-/// Friction that changes, once or as the joint warms up, leaves at least this share of what it was: none comes from nothing or
-/// goes for good.
-const LEAST_LEFT: f64 = 0.1;
 /// What lasts for an interval of one recording lasts at most for this share of it; what lasts longer is not told from an offset.
 const LONGEST_SHARE: f64 = 0.75;
-/// Friction of one direction is at least this share of the other's; what looks more lopsided is friction and an offset.
-const LEAST_SYMMETRY: f64 = 0.2;
-/// Friction that falls with speed keeps at least this share of what it is when a joint breaks away: none falls to nothing.
-const LEAST_SLIDING: f64 = 0.2;
-/// A link's centre of mass is not off by more than this many times its radius of gyration, or by this \[m\] if that is more.
-const MOST_GYRATIONS: f64 = 1.0;
-const FAR_OFF_M: f64 = 0.1;
-/// What is behind a gear comes back after a revolution: slower waves are whole numbers of cycles in it, within what is known of them.
-const MOST_WHOLE_CYCLES: f64 = 30.0;
-const NEARLY_WHOLE: f64 = 0.15;
-/// A wall gives way by no more than this, and is within reach: what is softer or farther is a force that is always there.
-const SOFTEST_WALL_N_PER_M: f64 = 5.0;
-const FARTHEST_WALL_M: f64 = 1.49;
-/// A spring hangs loose within the range of its joint or this many times its width beside it: farther off it is a constant effort. Where the
-/// URDF knows no range it is taken to be a turn either way.
-const LOOSE_BESIDE: f64 = 1.0;
-/// A stronger force is none that pushes a robot \[N\]: it hardly acts on the joints that would feel a weaker one elsewhere.
-const STRONGEST_N: f64 = 1000.0;
-/// A rotor on the spring of its gear resonates at least this fast against a link that stands still.
-const SOFTEST_RAD_S: f64 = 3.0 * std::f64::consts::TAU;
-/// A joint breaks away within this: bristles that give more are a spring \[rad or m\].
-const MOST_PRESLIDING_RAD: f64 = 0.1;
 /// What began or ended so much beside a recording began or ended with it \[s\].
 const BESIDE_S: f64 = 0.5;
-/// A change of friction smaller than this share of it is what friction does from day to day.
-const LEAST_STEP: f64 = 0.3;
-
-fn hangs_loose_near(limits: &Limits, rest: f64) -> bool {
-    let turn = std::f64::consts::TAU;
-    let (lower, upper) = (limits.lower.unwrap_or(-turn), limits.upper.unwrap_or(turn));
-    let beside = LOOSE_BESIDE * (upper - lower);
-    (lower - beside..=upper + beside).contains(&rest)
-}
-
-/// Whether the times of a piece of physics are ones that tell something: friction that changes once changes by more than friction
-/// does from day to day and does not vanish, and what comes and goes does both within a recording.
+/// Whether the times of a piece of physics are ones that tell something: what comes and goes does both within a
+/// recording.
 pub fn is_timely(problem: &Problem, active: &Active) -> bool {
     let x = &active.coordinates;
     match active.hypothesis.time_kind() {
-        TimeKind::Step => {
-            let (less, more) = (x[0].min(x[1]), x[0].max(x[1]));
-            more - less > LEAST_STEP * more && less >= LEAST_LEFT * more
-        }
         TimeKind::Once => {
             let [.., start_s, end_s] = x[..] else {
                 return true;
@@ -65,18 +26,14 @@ pub fn is_timely(problem: &Problem, active: &Active) -> bool {
                 within && end_s - start_s <= LONGEST_SHARE * length_s
             })
         }
-        TimeKind::Always | TimeKind::EveryRecording => true,
+        TimeKind::Always | TimeKind::Step | TimeKind::EveryRecording => true,
     }
 }
 
-/// Whether a wave over a joint's position does not close after a revolution.
+/// Whether it is a wave over a joint's position that no gear makes: it does not close after a revolution.
 pub fn is_open_wave(active: &Active) -> bool {
-    let [_, _, cycles] = active.coordinates[..] else {
-        return false;
-    };
-    active.hypothesis.effect.name == "torque_ripple"
-        && cycles < MOST_WHOLE_CYCLES
-        && (cycles - cycles.round()).abs() > NEARLY_WHOLE
+    let is_made_by_gears = active.hypothesis.effect.traits.is_made_by_gears;
+    !is_made_by_gears(&active.coordinates)
 }
 
 /// Nearer than this to the end of its range, as a share of it, a shape is there.
@@ -98,34 +55,9 @@ pub fn at_bound(active: &Active) -> bool {
     })
 }
 
-/// Whether the numbers are ones that a robot may have: a link's mass stays above nothing and within twice what its URDF says,
-/// its centre within the link, a push is not beyond all strength, a wall is neither soft nor out of reach, a spring hangs loose somewhere, a gear is no soft spring nor are its bristles, and friction is neither of one direction
-/// alone nor falls to nothing with speed or warmth.
+/// Whether the numbers are ones that a robot may have, as the effect itself knows them.
 pub fn plausible(active: &Active, model: &Model) -> bool {
-    let x = &active.coordinates;
-    let link = &model.links()[active.hypothesis.place.link];
-    match active.hypothesis.effect.name {
-        "link_mass" => x[0].abs() < link.mass_kg(),
-        "link_com" => {
-            let shift_m = active
-                .parameters()
-                .iter()
-                .map(|d| d * d)
-                .sum::<f64>()
-                .sqrt();
-            shift_m < FAR_OFF_M.max(MOST_GYRATIONS * link.gyration_radius_m())
-        }
-        "contact_wall" => x[0] >= SOFTEST_WALL_N_PER_M && x[3].abs() < FARTHEST_WALL_M,
-        "external_push" => x[..3].iter().map(|f| f * f).sum::<f64>().sqrt() < STRONGEST_N,
-        "cable_spring" => {
-            let joint = &model.joints()[active.hypothesis.place.joint];
-            hangs_loose_near(&joint.limits, active.parameters()[1])
-        }
-        "joint_elasticity" => (x[1] / x[0].max(1e-12)).sqrt() >= SOFTEST_RAD_S,
-        "presliding_hysteresis" => x[2] >= 1.0 / MOST_PRESLIDING_RAD,
-        "temperature_viscous" => x[0] >= LEAST_LEFT * (x[0] + x[1]),
-        "stribeck_friction" => x[0] >= LEAST_SLIDING * (x[0] + x[1]),
-        "asymmetric_coulomb" => x[0].min(x[1]) >= LEAST_SYMMETRY * x[0].max(x[1]),
-        _ => true,
-    }
+    let hypothesis = active.hypothesis;
+    let site = hypothesis.place.site(model);
+    hypothesis.effect.is_plausible(&site, &active.coordinates)
 }

@@ -26,9 +26,7 @@ impl Base<'_> {
     /// The best of a hypothesis whose effect has a time.
     pub fn propose_in_time(&self, hypothesis: Hypothesis) -> Option<Proposal> {
         match hypothesis.time_kind() {
-            TimeKind::Always if hypothesis.effect.name == "contact_wall" => {
-                self.propose_wall(hypothesis)
-            }
+            TimeKind::Always if hypothesis.effect.is_surface() => self.propose_wall(hypothesis),
             TimeKind::Always => self.propose(hypothesis),
             TimeKind::Step => self.propose_step(hypothesis),
             TimeKind::EveryRecording => self.propose_interval(hypothesis, None),

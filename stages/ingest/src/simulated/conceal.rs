@@ -11,11 +11,11 @@ use rand_chacha::ChaCha8Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tauscope_dynamics::Model;
-use tauscope_dynamics::terms::{Layer, TermSpec};
+use tauscope_dynamics::terms::{Effect, Family, Layer, TermSpec};
 
 use super::error::ScenarioError;
 use super::scenario::Scenario;
-use draw::{Candidate, DRAWN, candidate};
+use draw::{Candidate, candidate, drawn};
 use plan::Plan;
 
 /// What is drawn changes the effort of some joint by so many times its noise, root mean square over the
@@ -88,48 +88,51 @@ pub(super) fn add<'a>(
     Ok((Cow::Owned(open), Some(concealed)))
 }
 
-/// What bodies weigh, for good: one of these at most.
-const MASSES: [&str; 3] = ["payload", "link_mass", "link_com"];
+/// Whether it is what bodies weigh, for good: one of these at most.
+fn is_mass(effect: &Effect) -> bool {
+    effect.family == Family::Body && effect.lasts()
+}
 
 fn draw(
     spec: &ConcealSpec,
     scenario: &Scenario,
     model: &Model,
 ) -> Result<Concealed, ScenarioError> {
-    let mut names = names(spec)?;
+    let mut from = to_draw_from(spec)?;
     let mut effects: Vec<ConcealedEffect> = Vec::new();
     if spec.count == 0 {
         return Ok(Concealed { effects });
     }
     let mut rng = ChaCha8Rng::seed_from_u64(spec.seed);
-    names.shuffle(&mut rng);
+    from.shuffle(&mut rng);
     let mut plan = Plan::new(scenario, model)?;
-    let is_mass = |name: &str| MASSES.contains(&name);
-    for name in names {
+    let mut has_mass = false;
+    for effect in from {
         if effects.len() == spec.count as usize {
             break;
         }
         // What a link weighs more and what the tool carries may be one body.
-        if is_mass(name) && effects.iter().any(|other| is_mass(&other.term.effect)) {
+        if is_mass(effect) && has_mass {
             continue;
         }
         for _ in 0..PLACES {
-            let candidate = candidate(name, &plan, &mut rng);
+            let candidate = candidate(effect, &plan, &mut rng);
             let target = log_between(VISIBLE, &mut rng);
             let Some(candidate) = candidate else {
                 continue;
             };
             // Two effects in a joint are another riddle, and two transmissions are none.
-            let joint = candidate.term(candidate.sizes[0]).joint;
+            let joint = candidate.term(candidate.sizes()[0]).joint;
             let taken = |term: &TermSpec| term.joint.is_some() && term.joint == joint;
             if effects.iter().any(|other| taken(&other.term)) {
                 continue;
             }
-            let Some(effect) = sized(&candidate, target, &plan)? else {
+            let Some(concealed) = sized(&candidate, target, &plan)? else {
                 continue;
             };
-            plan.add(effect.term.clone())?;
-            effects.push(effect);
+            plan.add(concealed.term.clone())?;
+            effects.push(concealed);
+            has_mass |= is_mass(effect);
             break;
         }
     }
@@ -146,32 +149,33 @@ fn draw(
 }
 
 /// The effects to draw from.
-fn names(spec: &ConcealSpec) -> Result<Vec<&'static str>, ScenarioError> {
+fn to_draw_from(spec: &ConcealSpec) -> Result<Vec<&'static Effect>, ScenarioError> {
     let refuse = |reason| Err(ScenarioError::Conceal { reason });
-    let mut names = Vec::new();
+    let mut effects: Vec<&'static Effect> = Vec::new();
     for name in &spec.effects {
-        let Some(known) = DRAWN.iter().find(|known| *known == name) else {
-            let known = DRAWN.join(", ");
+        let Some(known) = drawn().find(|known| known.name == name) else {
+            let known: Vec<&str> = drawn().map(|effect| effect.name).collect();
+            let known = known.join(", ");
             return refuse(format!(
                 "there is no effect `{name}` to be drawn; there are: {known}"
             ));
         };
-        if names.contains(known) {
+        if effects.contains(&known) {
             return refuse(format!("`{name}` is there twice"));
         }
-        names.push(*known);
+        effects.push(known);
     }
-    if names.is_empty() {
-        names = DRAWN.to_vec();
+    if effects.is_empty() {
+        effects = drawn().collect();
     }
-    if spec.count as usize > names.len() {
+    if spec.count as usize > effects.len() {
         return refuse(format!(
             "`count` is {}, but there are only {} effects to draw from",
             spec.count,
-            names.len()
+            effects.len()
         ));
     }
-    Ok(names)
+    Ok(effects)
 }
 
 /// The candidate at the size that is seen as well as `target` asks, if there is one.
@@ -180,7 +184,7 @@ fn sized(
     target: f64,
     plan: &Plan,
 ) -> Result<Option<ConcealedEffect>, ScenarioError> {
-    let [mut least, mut most] = candidate.sizes;
+    let [mut least, mut most] = candidate.sizes();
     for _ in 0..HALVINGS {
         let middle = (least * most).sqrt();
         if plan.times_noise(&candidate.term(middle))? < target {

@@ -160,10 +160,12 @@ pub enum ScenarioError {
         reason: String,
     },
     /// An effect that the simulated arm cannot have.
-    #[error("the physics' `{effect}` is not simulated")]
+    #[error("the physics' `{effect}` is not simulated: {reason}")]
     NotSimulated {
         /// The effect.
         effect: &'static str,
+        /// Why not.
+        reason: &'static str,
     },
     /// The arm ran away: the controller is unstable with this physics.
     #[error(

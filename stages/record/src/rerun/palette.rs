@@ -1,6 +1,9 @@
 //! Colours: one meaning each, the same in every plot.
 
 use rerun::Rgba32;
+use tauscope_dynamics::terms::{
+    COULOMB_FRICTION, Effect, PAYLOAD, TORQUE_BIAS, TORQUE_GAIN, UNKNOWN, VISCOUS_FRICTION,
+};
 
 /// The measured effort.
 pub(super) const MEASURED: Rgba32 = Rgba32::from_rgb(86, 156, 238);
@@ -41,16 +44,20 @@ pub(super) const BACKGROUND: Rgba32 = Rgba32::from_rgb(22, 25, 30);
 pub(super) const GRID: Rgba32 = Rgba32::from_unmultiplied_rgba(150, 160, 175, 40);
 
 /// How a detector's states look: state, words, colour.
-pub(super) const STATES: [(&str, &str, Rgba32); 11] = [
+pub(super) static STATES: [(&str, &str, Rgba32); 11] = [
     ("not_ready", "not ready", Rgba32::from_rgb(96, 100, 108)),
     ("free", "free", Rgba32::from_rgb(58, 132, 84)),
     ("contact", "contact", CONTACT),
     ("cooperation", "cooperation", Rgba32::from_rgb(78, 118, 196)),
     ("collision", "collision", Rgba32::from_rgb(176, 30, 96)),
-    ("coulomb_friction", "Coulomb friction", CHANGE),
-    ("viscous_friction", "viscous friction", CHANGE),
-    ("torque_gain", "torque gain", CHANGE),
-    ("torque_bias", "torque bias", CHANGE),
-    ("payload", "payload", CHANGE),
-    ("unknown", "no name fits", CHANGE),
+    change(&COULOMB_FRICTION, COULOMB_FRICTION.words.noun),
+    change(&VISCOUS_FRICTION, VISCOUS_FRICTION.words.noun),
+    change(&TORQUE_GAIN, TORQUE_GAIN.words.noun),
+    change(&TORQUE_BIAS, TORQUE_BIAS.words.noun),
+    change(&PAYLOAD, PAYLOAD.name),
+    change(&UNKNOWN, "no name fits"),
 ];
+
+const fn change(effect: &Effect, label: &'static str) -> (&'static str, &'static str, Rgba32) {
+    (effect.name, label, CHANGE)
+}

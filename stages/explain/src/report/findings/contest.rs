@@ -50,7 +50,7 @@ pub fn contest(
         .clamp(0.0, 1.0);
         let reason = format!(
             "in the place of {} it takes away {:.0} % of the mismatch that this takes away; the recordings are {} times less likely with it",
-            sentences::name(active.hypothesis.effect.name),
+            active.hypothesis.effect.words.noun,
             100.0 * share,
             sentences::odds(behind)
         );

@@ -50,8 +50,7 @@ pub fn doubt_patches(findings: &mut [Finding]) {
 /// Whether a body, or how gravity acts on it, is named beside a curve that a joint which carries it has without a name: what weighs
 /// there weighs here too, and the name could be part of it.
 fn is_shadowed(model: &Model, actives: &[Active], hypothesis: Hypothesis) -> bool {
-    let lasts =
-        hypothesis.time_kind() == TimeKind::Always && hypothesis.effect.name != "contact_wall";
+    let lasts = hypothesis.time_kind() == TimeKind::Always && hypothesis.lasts();
     let carriers = match hypothesis.effect.place {
         PlaceKind::Link | PlaceKind::Tool if lasts => bearing(model, hypothesis.place.link),
         PlaceKind::Base => (0..model.dof()).collect(),

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::DMatrix;
 use serde_json::Value;
 use tauscope_dynamics::terms::Layer;
+use tauscope_dynamics::terms::words::number;
 
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
@@ -14,7 +15,6 @@ use crate::physics::active::Hypothesis;
 use crate::physics::parameter_units::{grows_with_effort, is_of_effort};
 use crate::read::input::Input;
 use crate::read::start::KNOWN;
-use crate::report::sentences;
 
 /// The torque scale of one joint \[A per N m\].
 #[derive(Debug, Clone, Copy)]
@@ -169,15 +169,15 @@ fn note(scale: &Scale, joints: &[String]) -> String {
         return format!(
             "The gain of joint {joint} is not identifiable: hardly any gravity or inertia acts on it in these recordings, and what \
              does hangs on how exact the URDF's masses are ({} A per N m, 95 % interval {} to {}). The numbers of its effects are in A.",
-            sentences::number(gain),
-            sentences::number(gain - half),
-            sentences::number(gain + half)
+            number(gain),
+            number(gain - half),
+            number(gain + half)
         );
     }
     format!(
         "The drive of joint {joint} has {} N m/A (95 % interval {} to {}).",
-        sentences::number(1.0 / gain),
-        sentences::number(1.0 / (gain + half)),
-        sentences::number(1.0 / (gain - half))
+        number(1.0 / gain),
+        number(1.0 / (gain + half)),
+        number(1.0 / (gain - half))
     )
 }

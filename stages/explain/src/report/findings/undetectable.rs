@@ -21,16 +21,15 @@ pub fn undetectable(
     let base = Base::new(search.problem, &found.fit, search.hypotheses.len());
     let mut all = Vec::new();
     for hypothesis in search.hypotheses {
-        let factors = hypothesis.factors();
-        let simple = factors.len() == hypothesis.effect.coordinates.len()
-            && (factors.len() == 1 || hypothesis.effect.name == "payload")
-            && hypothesis.effect.place != PlaceKind::TwoJoints;
+        let Some(told_as) = hypothesis.effect.traits.smallest_told_as else {
+            continue;
+        };
         let there = found
             .fit
             .actives
             .iter()
             .any(|a| a.hypothesis == *hypothesis);
-        if !simple || there || hypothesis.effect.name == "link_mass" {
+        if there {
             continue;
         }
         let Some(shape) = shapes(search.problem, *hypothesis).into_iter().next() else {
@@ -56,18 +55,11 @@ pub fn undetectable(
                     .name
                     .clone()
             });
-        let parameter = hypothesis.effect.parameters[0].name.to_owned();
-        // A gain of 1 does nothing: what counts is how far from it.
-        let name = if parameter == "gain" {
-            "gain_minus_one".to_owned()
-        } else {
-            parameter
-        };
         all.push(Undetectable {
             effect: hypothesis.effect.name.to_owned(),
             joint,
             link,
-            smallest_findable: BTreeMap::from([(name, smallest)]),
+            smallest_findable: BTreeMap::from([(told_as.to_owned(), smallest)]),
         });
     }
     all

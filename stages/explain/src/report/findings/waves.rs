@@ -1,42 +1,41 @@
-//! Ripple of two waves is one finding.
+//! Two of one effect at a joint are one finding, e.g. ripple of two waves.
 
 use serde_json::Value;
+use tauscope_dynamics::terms::{Effect, effect};
 
 use crate::report::schema::Finding;
 
-/// Two waves of ripple at one joint are told as one finding, the larger first.
+/// The effect of a finding, if two of it at one place are said as one.
+fn said_as_one(finding: &Finding) -> Option<&'static Effect> {
+    effect(&finding.effect).filter(|effect| !effect.traits.second.is_empty())
+}
+
+/// Two of an effect at one joint are told as one finding, the larger first.
 pub fn merge_waves(findings: &mut Vec<Finding>) {
-    const WAVE: [&str; 3] = ["amplitude_nm", "cycles_per_rev", "phase_rad"];
-    let amplitude = |f: &Finding| {
-        f.parameters
-            .get(WAVE[0])
-            .and_then(Value::as_f64)
-            .unwrap_or(0.0)
-    };
     let mut index = 0;
     while index < findings.len() {
+        let known = said_as_one(&findings[index]);
         let twin = (index + 1..findings.len()).find(|&other| {
-            findings[index].effect == "torque_ripple"
-                && findings[other].effect == "torque_ripple"
+            known.is_some()
+                && said_as_one(&findings[other]) == known
                 && findings[index].joint == findings[other].joint
         });
-        if let Some(other) = twin {
+        if let (Some(other), Some(effect)) = (twin, known) {
             let mut second = findings.remove(other);
-            if amplitude(&second) > amplitude(&findings[index]) {
+            let size = |finding: &Finding| {
+                let first = finding.parameters.get(effect.parameters[0].name);
+                first.and_then(Value::as_f64).unwrap_or(0.0)
+            };
+            if size(&second) > size(&findings[index]) {
                 std::mem::swap(&mut second, &mut findings[index]);
             }
             let first = &mut findings[index];
-            for name in WAVE {
-                let (stem, unit) = name.split_once('_').unwrap_or((name, ""));
-                let renamed = match name {
-                    "cycles_per_rev" => "cycles_per_rev2".to_owned(),
-                    _ => format!("{stem}2_{unit}"),
-                };
-                if let Some(value) = second.parameters.remove(name) {
-                    first.parameters.insert(renamed.clone(), value);
+            for (parameter, renamed) in effect.parameters.iter().zip(effect.traits.second) {
+                if let Some(value) = second.parameters.remove(parameter.name) {
+                    first.parameters.insert((*renamed).to_owned(), value);
                 }
-                if let Some(interval) = second.intervals_95.remove(name) {
-                    first.intervals_95.insert(renamed, interval);
+                if let Some(interval) = second.intervals_95.remove(parameter.name) {
+                    first.intervals_95.insert((*renamed).to_owned(), interval);
                 }
             }
             first.explains = (first.explains + second.explains).min(1.0);

@@ -1,6 +1,7 @@
 //! The findings, a card each.
 
 use maud::{Markup, html};
+use tauscope_dynamics::terms::UNKNOWN;
 
 use super::chart::{Axis, r};
 use super::effects::{effect_at, effect_meaning, effect_title, place};
@@ -31,7 +32,7 @@ pub(super) fn cards(report: &Report) -> Option<Markup> {
 }
 
 fn card(number: usize, finding: &Finding) -> Markup {
-    let kind = if finding.effect == "unknown" {
+    let kind = if finding.effect == UNKNOWN.name {
         "card unknown"
     } else {
         "card"

@@ -1,6 +1,7 @@
 //! Names of parameters, units and numbers in the words of whoever runs the cell.
 
 use serde_json::Value;
+use tauscope_dynamics::terms::words::unit;
 
 /// `some_name` as `Some name`.
 pub(super) fn sentence_case(name: &str) -> String {
@@ -11,31 +12,6 @@ pub(super) fn sentence_case(name: &str) -> String {
         None => words,
     }
 }
-
-/// Endings of canonical names and the units they stand for, longer ones before those they end in.
-const UNITS: [(&str, &str); 21] = [
-    ("_nms2_per_rad2", "N m s²/rad²"),
-    ("_nms_per_rad", "N m s/rad"),
-    ("_nm_per_rad", "N m/rad"),
-    ("_as2_per_rad2", "A s²/rad²"),
-    ("_as_per_rad", "A s/rad"),
-    ("_a_per_rad", "A/rad"),
-    ("_n_per_m", "N/m"),
-    ("_per_rad", "1/rad"),
-    ("_per_rev", "per turn"),
-    ("_rad_s2", "rad/s²"),
-    ("_rad_s", "rad/s"),
-    ("_kgm2", "kg m²"),
-    ("_kgm", "kg m"),
-    ("_nm", "N m"),
-    ("_hz", "Hz"),
-    ("_kg", "kg"),
-    ("_rad", "rad"),
-    ("_n", "N"),
-    ("_m", "m"),
-    ("_s", "s"),
-    ("_a", "A"),
-];
 
 /// Parameters whose names say too little by themselves.
 const USUAL: [(&str, &str); 12] = [
@@ -55,11 +31,7 @@ const USUAL: [(&str, &str); 12] = [
 
 /// A parameter's name in words and its unit (empty for a pure number), from its canonical name.
 pub(super) fn parameter(name: &str) -> (String, &'static str) {
-    let found = |name: &str| {
-        UNITS
-            .iter()
-            .find_map(|(ending, unit)| Some((name.strip_suffix(ending)?.to_owned(), *unit)))
-    };
+    let found = |name: &str| unit(name).map(|(stem, unit)| (stem.to_owned(), unit));
     let second = || {
         let (stem, unit) = found(name.strip_suffix('2')?)?;
         Some((stem + "2", unit))

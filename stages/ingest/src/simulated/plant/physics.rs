@@ -1,11 +1,11 @@
 //! What the URDF does not tell of, sorted by how the plant suffers it.
 
 use nalgebra::DMatrix;
-use tauscope_dynamics::terms::{Layer, MotionSample, Term, TermSpec};
+use tauscope_dynamics::terms::{MotionSample, Simulated, Term, TermSpec};
 use tauscope_dynamics::{Inertia, Model};
 
 use super::super::error::ScenarioError;
-use super::transmission::{Kind, Rotor};
+use super::transmission::Rotor;
 
 /// A body that is carried for a while.
 #[derive(Debug)]
@@ -40,12 +40,11 @@ impl Physics {
             }
             let site = spec.site(nominal)?;
             let effect = term.effect();
-            let values = (effect.to_parameters)(term.coordinates());
-            match (effect.layer, effect.name) {
-                (Layer::Record, _) => {}
-                (Layer::Joint, _) => joints.push(term),
-                (Layer::Body, "external_push" | "contact_wall") => loads.push(term),
-                (Layer::Body, "payload_pickup") => {
+            match effect.simulated {
+                Simulated::Model | Simulated::Record => {}
+                Simulated::Joint => joints.push(term),
+                Simulated::Load => loads.push(term),
+                Simulated::CarriedForAWhile => {
                     let (body, window) = term.coordinates().split_at(10);
                     carried.push(Carried {
                         link: site.link,
@@ -53,27 +52,17 @@ impl Physics {
                         window_s: [window[0], window[1]],
                     });
                 }
-                (Layer::Body, name @ ("joint_elasticity" | "backlash")) => {
+                Simulated::Transmission(compliance) => {
                     if rotors.iter().any(|rotor| rotor.joint == site.joint) {
                         let joint = model.joints()[site.joint].name.clone();
                         return Err(ScenarioError::TwoTransmissions { joint });
                     }
-                    rotors.push(Rotor {
-                        joint: site.joint,
-                        kind: match name {
-                            "backlash" => Kind::Play {
-                                half: 0.5 * values[0],
-                            },
-                            _ => Kind::Spring {
-                                stiffness: values[0],
-                            },
-                        },
-                        inertia: values[1],
-                        position: 0.0,
-                        velocity: 0.0,
-                    });
+                    rotors.push(Rotor::new(&*term, compliance, site.joint));
                 }
-                (Layer::Body, effect) => return Err(ScenarioError::NotSimulated { effect }),
+                Simulated::No(reason) => {
+                    let effect = effect.name;
+                    return Err(ScenarioError::NotSimulated { effect, reason });
+                }
             }
         }
         let n = nominal.dof();

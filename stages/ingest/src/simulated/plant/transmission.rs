@@ -1,30 +1,18 @@
 //! A joint whose rotor and link are two masses, with a spring or play in between.
 
-/// Share of the critical damping that the link has against a rotor that stands still, as in the term
-/// `joint_elasticity`.
-const SPRING_DAMPING: f64 = 0.05;
-/// Natural frequency \[rad/s\] and damping ratio of the contact on either side of the play, as in the term
-/// `backlash`.
-const CONTACT_FREQUENCY: f64 = 300.0;
-const CONTACT_DAMPING: f64 = 0.7;
+use tauscope_dynamics::terms::{Compliance, Term};
+
 /// A spring is taken where it is as a step begins, which takes no energy off it, unless the lighter mass
 /// would swing through more than this in a step \[rad²\]; then it is taken where the step ends.
 const SLOW: f64 = 0.1;
 
-/// What is between rotor and link.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Kind {
-    /// Gives way \[N m/rad\].
-    Spring { stiffness: f64 },
-    /// Comes through only on either side of it: half its width \[rad\].
-    Play { half: f64 },
-}
-
 /// The rotor of a joint. Its encoder is what is recorded; the link moves as it likes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone)]
 pub(super) struct Rotor {
     pub joint: usize,
-    pub kind: Kind,
+    /// Coordinates of the term, and what is between rotor and link by them and the inertia that the joint moves.
+    coordinates: Vec<f64>,
+    compliance: fn(&[f64], f64) -> Compliance,
     /// \[kg m²\]
     pub inertia: f64,
     /// \[rad\]
@@ -48,39 +36,43 @@ impl Coupling {
 }
 
 impl Rotor {
+    /// The rotor of a term that splits its joint.
+    pub fn new(term: &dyn Term, compliance: fn(&[f64], f64) -> Compliance, joint: usize) -> Self {
+        let coordinates = term.coordinates().to_vec();
+        Self {
+            joint,
+            inertia: (term.effect().to_parameters)(&coordinates)[1],
+            coordinates,
+            compliance,
+            position: 0.0,
+            velocity: 0.0,
+        }
+    }
+
     /// How far the link hangs behind a rotor at rest that holds `load` \[rad\]. `inertia` is what the
     /// joint moves \[kg m²\].
     pub fn sag(&self, load: f64, inertia: f64) -> f64 {
-        match self.kind {
-            Kind::Spring { stiffness } => -load / stiffness,
-            Kind::Play { half } => {
-                let stiffness = inertia * CONTACT_FREQUENCY * CONTACT_FREQUENCY;
-                -load / stiffness - half.copysign(load)
-            }
-        }
+        let between = (self.compliance)(&self.coordinates, inertia);
+        let half = between.half_gap.unwrap_or(0.0);
+        -load / between.stiffness - half.copysign(load)
     }
 
     /// What comes through in a step of `dt_s` that begins with the link at `position` and `velocity`.
     pub fn coupling(&self, position: f64, velocity: f64, inertia: f64, dt_s: f64) -> Coupling {
-        let twist = self.position - position;
-        let (stiffness, damping, twist) = match self.kind {
-            Kind::Spring { stiffness } => (
-                stiffness,
-                2.0 * SPRING_DAMPING * (stiffness * inertia).sqrt(),
-                twist,
-            ),
-            Kind::Play { half } => {
-                let depth = twist - twist.clamp(-half, half);
-                let stiffness = inertia * CONTACT_FREQUENCY * CONTACT_FREQUENCY;
-                let damping = 2.0 * CONTACT_DAMPING * CONTACT_FREQUENCY * inertia;
-                let push = stiffness * depth + damping * (self.velocity - velocity);
-                // A contact pushes and never pulls.
-                if depth * push <= 0.0 {
-                    return Coupling::default();
-                }
-                (stiffness, damping, depth)
+        let Compliance {
+            stiffness,
+            damping,
+            half_gap,
+        } = (self.compliance)(&self.coordinates, inertia);
+        let mut twist = self.position - position;
+        if let Some(half) = half_gap {
+            twist -= twist.clamp(-half, half);
+            let push = stiffness * twist + damping * (self.velocity - velocity);
+            // A contact pushes and never pulls.
+            if twist * push <= 0.0 {
+                return Coupling::default();
             }
-        };
+        }
         let lighter = self.inertia.min(inertia);
         let implicit = stiffness * dt_s * dt_s > SLOW * lighter;
         Coupling {

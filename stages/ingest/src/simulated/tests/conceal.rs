@@ -39,8 +39,7 @@ fn a_seed_draws_the_same_and_another_another() {
 #[test]
 fn every_effect_can_be_drawn_and_simulated() {
     for (seed, effect) in tauscope_dynamics::terms::EFFECTS.iter().enumerate() {
-        // These only describe what has no name.
-        if ["unknown", "link_inertia"].contains(&effect.name) {
+        if effect.traits.describes_only {
             continue;
         }
         let drawn = format!("seed: {seed}, effects: [{}]", effect.name);

@@ -1,20 +1,22 @@
 //! Every layer of physics: what is recorded is RNEA and the terms on the recorded motion.
 
-use tauscope_dynamics::terms::{MotionSample, Physics, TermSpec};
+use tauscope_dynamics::terms::{
+    EFFECTS, Effect, MotionSample, Physics, PlaceKind, Simulated, TermSpec,
+};
 use tauscope_dynamics::{Data, rnea};
 
 use super::*;
 
+const MOTION: &str = "duration_s: 6, motion: {fourier: {period_s: 3}}";
+
 /// Root mean square over joints and instants of what `terms` change, and of what the record differs from
 /// RNEA and the terms, which get the mean position and velocity of two readings and the acceleration
 /// between them.
-fn suffered(physics: &str) -> (f64, f64) {
-    let motion = "duration_s: 6, motion: {fourier: {period_s: 3}}";
-    let scenario = ideal(motion, &format!("physics: [{physics}],"));
+fn suffered(scenario: &Scenario) -> (f64, f64) {
     let specs: Vec<TermSpec> = scenario.physics.clone();
     let (model, mut data) = (arm(), Data::new(&arm()));
     let mut physics = Physics::build(&specs, &model).unwrap();
-    let readings = readings(&scenario);
+    let readings = readings(scenario);
     let (mut changed, mut wrong, mut count) = (0.0, 0.0, 0.0);
     for (k, pair) in readings.windows(2).enumerate() {
         let [now, next] = [&pair[0], &pair[1]];
@@ -56,7 +58,7 @@ const DISCRETE_NM: f64 = 0.015;
 
 /// The term is felt, and all but this share of what is felt is what the term says.
 fn agrees(physics: &str, share: f64) {
-    let (changed, wrong) = suffered(physics);
+    let (changed, wrong) = suffered(&ideal(MOTION, &format!("physics: [{physics}],")));
     assert!(changed > 0.05, "{physics} is not felt: {changed}");
     assert!(
         wrong < share * changed + DISCRETE_NM,
@@ -66,6 +68,56 @@ fn agrees(physics: &str, share: f64) {
 
 const PAYLOAD: &str = "mass_kg: 1.2, com_x_m: 0.02, com_y_m: -0.03, com_z_m: 0.08, ixx_kgm2: 0.002, \
                        iyy_kgm2: 0.003, izz_kgm2: 0.001";
+
+/// What a drawn effect makes of the record that its term does not: of a joint split in two, and of any other.
+const SHARE_SPLIT: f64 = 0.6;
+const SHARE: f64 = 0.1;
+
+/// A scenario with a term that only describes, which none draws.
+fn describing(effect: &Effect) -> Scenario {
+    let physics = match effect.place {
+        PlaceKind::Link => {
+            "{effect: link_inertia, link: link4, parameters: {delta_mass_kg: 0.3, delta_first_moment_x_kgm: 0.02, \
+              delta_first_moment_y_kgm: 0, delta_first_moment_z_kgm: 0.01, delta_origin_ixx_kgm2: 0.002, \
+              delta_origin_ixy_kgm2: 0, delta_origin_ixz_kgm2: 0, delta_origin_iyy_kgm2: 0.002, \
+              delta_origin_iyz_kgm2: 0, delta_origin_izz_kgm2: 0.002}}"
+        }
+        _ => {
+            "{effect: unknown, joint: joint3, table: {against: position, knots: [-1, 0, 1], values: [2, -1, 2]}}"
+        }
+    };
+    ideal(MOTION, &format!("physics: [{physics}],"))
+}
+
+#[test]
+fn every_effect_is_suffered_as_its_term_says_or_says_why_it_cannot_be() {
+    for effect in EFFECTS {
+        if let Simulated::No(reason) = effect.simulated {
+            assert!(!reason.is_empty(), "{}", effect.name);
+            continue;
+        }
+        let scenario = if effect.concealed.is_some() {
+            let conceal = format!("conceal: {{seed: 7, effects: [{}]}},", effect.name);
+            let scenario = ideal(MOTION, &conceal);
+            let (open, _) = super::super::conceal::add(&scenario, &arm()).unwrap();
+            open.into_owned()
+        } else {
+            describing(effect)
+        };
+        let (changed, wrong) = suffered(&scenario);
+        let share = if effect.splits_joint() {
+            SHARE_SPLIT
+        } else {
+            SHARE
+        };
+        assert!(changed > 0.0, "{:?} is not felt", scenario.physics);
+        assert!(
+            wrong < share * changed + DISCRETE_NM,
+            "{:?}: {wrong} of {changed}",
+            scenario.physics
+        );
+    }
+}
 
 #[test]
 fn bodies_that_last() {

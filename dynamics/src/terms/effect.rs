@@ -1,0 +1,425 @@
+//! What there is to know of a term without its numbers.
+
+use super::concealed::{Draw, Drawn};
+use super::words::{Words, unit};
+use super::{Against, Site, Term, UNKNOWN};
+use crate::Link;
+
+#[cfg(test)]
+mod tests;
+
+/// What there is to know of a term without its numbers. Nobody else asks what is true of an effect of a certain name: what is
+/// known of it stands here, in the term's own file.
+#[derive(Debug)]
+pub struct Effect {
+    /// Canonical name.
+    pub name: &'static str,
+    /// What a report says of it.
+    pub words: Words,
+    /// What kind of physics it is.
+    pub family: Family,
+    /// What kind of place it is in.
+    pub place: PlaceKind,
+    /// Where in the chain from motion to recorded effort it acts.
+    pub layer: Layer,
+    /// Its parameters as files and reports hold them.
+    pub parameters: &'static [Parameter],
+    /// What a fit searches in; the order of the values that `build` takes.
+    pub coordinates: &'static [Coordinate],
+    /// Parameters, in their order, from coordinates.
+    pub to_parameters: fn(&[f64]) -> Vec<f64>,
+    /// Coordinates, in their order, from parameters.
+    pub to_coordinates: fn(&[f64]) -> Vec<f64>,
+    /// The simpler effect that it contains; `None` if it contains none.
+    pub simpler: Option<Simpler>,
+    /// Whether a robot may have it at a site with these coordinates; `None` if the minima of its parameters are all there is to it.
+    pub limit: Option<fn(&Site<'_>, &[f64]) -> bool>,
+    /// The motion that shows it.
+    pub excitation: Excitation,
+    /// How a simulated arm suffers it.
+    pub simulated: Simulated,
+    /// Draws one at random, to be concealed; `None` for what only describes. Its `sizes` change some effort the more the larger.
+    pub concealed: Option<fn(&mut Draw<'_>) -> Option<Drawn>>,
+    /// What is true of a few effects only.
+    pub traits: Traits,
+    /// Makes the term at a site from its coordinates.
+    pub build: fn(&Site<'_>, &[f64]) -> Box<dyn Term>,
+}
+
+/// There is but one effect of a name.
+impl PartialEq for Effect {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl Effect {
+    /// When it acts.
+    pub fn time(&self) -> Time {
+        let count = |kind| self.coordinates.iter().filter(|c| c.kind == kind).count();
+        match (
+            count(CoordinateKind::RecordingTime),
+            count(CoordinateKind::SessionTime),
+        ) {
+            (0, 0) => Time::Always,
+            (0, 1) => Time::Step,
+            (_, 0) => Time::EveryRecording,
+            _ => Time::Once,
+        }
+    }
+
+    /// Whether a robot may have it at a site with these coordinates, as far as its `limit` goes.
+    pub fn is_plausible(&self, site: &Site<'_>, coordinates: &[f64]) -> bool {
+        self.limit.is_none_or(|limit| limit(site, coordinates))
+    }
+
+    /// Whether it is something stiff in space that the arm meets.
+    pub fn is_surface(&self) -> bool {
+        self.family == Family::Contact && self.time() == Time::Always
+    }
+
+    /// Whether it is part of the arm, not something that comes and goes.
+    pub fn lasts(&self) -> bool {
+        matches!(self.time(), Time::Always | Time::Step) && self.family != Family::Contact
+    }
+
+    /// Whether it is Coulomb or viscous friction.
+    pub fn is_plain_friction(&self) -> bool {
+        self.family == Family::PlainFriction
+    }
+
+    /// Whether it splits its joint in rotor and link.
+    pub fn splits_joint(&self) -> bool {
+        matches!(self.simulated, Simulated::Transmission(_))
+    }
+
+    /// What it is called in reports: what only describes is `unknown`.
+    pub fn said(&self) -> &'static str {
+        if self.traits.describes_only {
+            UNKNOWN.name
+        } else {
+            self.name
+        }
+    }
+}
+
+/// What kind of physics an effect is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Family {
+    /// Coulomb and viscous friction: a curve of friction goes with them, and there may be less of them than a twin says.
+    PlainFriction,
+    /// Other friction.
+    Friction,
+    /// A function of the joint's position.
+    Spring,
+    /// Rotor and gear.
+    Transmission,
+    /// Inertia of links and of what they carry.
+    Body,
+    /// How the arm stands.
+    Mounting,
+    /// Forces from outside.
+    Contact,
+    /// What the drive or its sensor reports.
+    Recording,
+    /// No name fits.
+    Unnamed,
+}
+
+/// When an effect acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Time {
+    /// All the time.
+    Always,
+    /// It changes once in a session.
+    Step,
+    /// For an interval of every recording.
+    EveryRecording,
+    /// For an interval of the session.
+    Once,
+}
+
+/// The motion that shows an effect, those that tell it from the most others last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Excitation {
+    /// Every speed in both directions, from creeping on.
+    Speeds,
+    /// The whole range of the joint, slowly.
+    WholeRange,
+    /// Gravity from all sides, and effort of all sizes.
+    Poses,
+    /// Fast reversals.
+    Fast,
+}
+
+impl Excitation {
+    /// The motion that tells an effect from another.
+    #[must_use]
+    pub fn between(self, other: Self) -> Self {
+        // What every pose or fast reversals show is told from all else by them; a function of position is told from friction by speeds.
+        match self.max(other) {
+            most @ (Self::Poses | Self::Fast) => most,
+            _ => self.min(other),
+        }
+    }
+}
+
+/// A simpler effect that one contains: it has a single number.
+#[derive(Debug, Clone, Copy)]
+pub struct Simpler {
+    /// The simpler one.
+    pub effect: &'static Effect,
+    /// The parameters that grow as its number does. Of one that changes once, what it is afterwards comes first.
+    pub numbers: &'static [&'static str],
+}
+
+/// How a simulated arm suffers an effect.
+#[derive(Debug, Clone, Copy)]
+pub enum Simulated {
+    /// Its bodies or gravity are others: [`Term::alter`].
+    Model,
+    /// It carries the body of the first ten coordinates between the times of the last two.
+    CarriedForAWhile,
+    /// A force from outside, where the links are.
+    Load,
+    /// Beside the effort in the joint, on the motor's side.
+    Joint,
+    /// What comes through between rotor and link, given coordinates and the inertia that the joint moves \[kg m²\]; the
+    /// second parameter is the rotor's inertia.
+    Transmission(fn(&[f64], f64) -> Compliance),
+    /// In what is recorded.
+    Record,
+    /// Not at all, and why.
+    No(&'static str),
+}
+
+/// What is between the rotor and the link of a joint.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Compliance {
+    /// \[N m/rad\]
+    pub stiffness: f64,
+    /// \[N m s/rad\]
+    pub damping: f64,
+    /// Half the width of the play between them \[rad\]. With play a contact pushes and never pulls.
+    pub half_gap: Option<f64>,
+}
+
+/// What is true of a few effects only.
+#[derive(Debug, Clone, Copy)]
+pub struct Traits {
+    /// A curve without a name over this of its own joint draws it, too.
+    pub drawn_over: Option<Against>,
+    /// How many of it there may be at one place.
+    pub most_at_one_place: usize,
+    /// Where two at one place are said as one finding: the names of the second one's parameters.
+    pub second: &'static [&'static str],
+    /// It depends on what the gear transmits.
+    pub needs_load: bool,
+    /// It happens within the fastest of the motion, around reversals or in the spring of a gear, which smoothing blurs.
+    pub is_fast: bool,
+    /// A term of [`Layer::Record`] that only adds.
+    pub only_adds: bool,
+    /// It cuts the effort off at a limit, of a sensor or of a drive: a finding says of which.
+    pub cuts_off: bool,
+    /// It multiplies all effort of a joint: where nobody knows the joint's scale, it says nothing.
+    pub is_scale: bool,
+    /// It describes what has no name.
+    pub describes_only: bool,
+    /// Whether some gear makes it with these coordinates; what none makes only draws a curve.
+    pub is_made_by_gears: fn(&[f64]) -> bool,
+    /// By how much each of its coordinates may be off in a URDF that nobody has measured, of this link.
+    pub off_in_urdf: Option<fn(&Link) -> f64>,
+    /// What the smallest size that would have been found is told as: its first factor. `None` if that does not make it.
+    pub smallest_told_as: Option<&'static str>,
+}
+
+impl Traits {
+    /// Nothing of all that.
+    pub const NONE: Self = Self {
+        drawn_over: None,
+        most_at_one_place: 1,
+        second: &[],
+        needs_load: false,
+        is_fast: false,
+        only_adds: false,
+        cuts_off: false,
+        is_scale: false,
+        describes_only: false,
+        is_made_by_gears: |_| true,
+        off_in_urdf: None,
+        smallest_told_as: None,
+    };
+}
+
+/// What kind of place an effect is in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PlaceKind {
+    /// One joint.
+    Joint,
+    /// One joint, and another that it is driven by ([`Site::source`]).
+    TwoJoints,
+    /// A moving link.
+    Link,
+    /// What is held or touched at the end of the arm: the tool link.
+    Tool,
+    /// The base link.
+    Base,
+    /// All joints alike.
+    All,
+}
+
+/// Where in the chain from motion to recorded effort a term acts. Within a layer the order is that of
+/// the list of terms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Layer {
+    /// It changes what the bodies cost: payload, tilt, elasticity, external forces. Adds to the effort.
+    Body,
+    /// It acts at a joint beside the transmitted effort: friction, springs, rotor inertia. Adds.
+    Joint,
+    /// It changes what is recorded: gain, bias, delay. Transforms all that came before it.
+    Record,
+}
+
+/// A parameter of an effect, as files hold it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameter {
+    /// Canonical name, with its unit.
+    pub name: &'static str,
+    /// Its unit; empty for a pure number.
+    pub unit: &'static str,
+    /// The least value that is physically possible.
+    pub minimum: f64,
+    /// What it is where a file does not give it; `None` if it must be given.
+    pub default: Option<f64>,
+}
+
+/// A number that a fit searches.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coordinate {
+    /// For messages and tests.
+    pub name: &'static str,
+    /// How it enters the effort.
+    pub kind: CoordinateKind,
+}
+
+impl Parameter {
+    /// A parameter that a file must give. Its name must end in its unit: what does not is a [`Parameter::ratio`].
+    pub const fn at_least(name: &'static str, minimum: f64) -> Self {
+        let Some((_, unit)) = unit(name) else {
+            panic!("the name of a parameter ends in its unit");
+        };
+        Self {
+            name,
+            unit,
+            minimum,
+            default: None,
+        }
+    }
+
+    /// A pure number that a file must give.
+    pub const fn ratio(name: &'static str, minimum: f64) -> Self {
+        Self {
+            name,
+            unit: "",
+            minimum,
+            default: None,
+        }
+    }
+
+    /// A parameter of any value that a file must give.
+    pub const fn any(name: &'static str) -> Self {
+        Self::at_least(name, f64::NEG_INFINITY)
+    }
+
+    /// The same, but a file may leave it out.
+    #[must_use]
+    pub const fn or(self, default: f64) -> Self {
+        Self {
+            default: Some(default),
+            ..self
+        }
+    }
+}
+
+impl Coordinate {
+    /// A factor of either sign.
+    pub const fn factor(name: &'static str) -> Self {
+        Self {
+            name,
+            kind: CoordinateKind::Factor {
+                step: 1.0,
+                minimum: f64::NEG_INFINITY,
+            },
+        }
+    }
+
+    /// A factor that is not negative.
+    pub const fn positive_factor(name: &'static str) -> Self {
+        Self {
+            name,
+            kind: CoordinateKind::Factor {
+                step: 1.0,
+                minimum: 0.0,
+            },
+        }
+    }
+
+    /// A shape that is first tried at `steps` values.
+    pub const fn shape(
+        name: &'static str,
+        lower: f64,
+        upper: f64,
+        steps: usize,
+        scale: Scale,
+    ) -> Self {
+        Self {
+            name,
+            kind: CoordinateKind::Shape {
+                lower,
+                upper,
+                steps,
+                scale,
+            },
+        }
+    }
+}
+
+/// How a coordinate enters the effort.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum CoordinateKind {
+    /// As a factor, exactly or to first order about 0: with all factors 0 (and some shape) the term does
+    /// nothing, or what its shape alone does. `step` is small enough for a difference quotient (1 where
+    /// it is exact); the fitted value may not be below `minimum`.
+    Factor {
+        /// Step of the difference quotient.
+        step: f64,
+        /// The least value that is physically possible.
+        minimum: f64,
+    },
+    /// In any other way: searched between `lower` and `upper`.
+    Shape {
+        /// Lowest value worth a try.
+        lower: f64,
+        /// Highest value worth a try.
+        upper: f64,
+        /// How many values to try first.
+        steps: usize,
+        /// How they are spread.
+        scale: Scale,
+    },
+    /// A time within each recording \[s from its start\].
+    RecordingTime,
+    /// A time within the session \[s from the start of its first recording\].
+    SessionTime,
+}
+
+/// How values of a shape are spread.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scale {
+    /// Evenly.
+    Linear,
+    /// By a constant ratio.
+    Log,
+    /// As shares of the largest effort of the joint.
+    OfEffort,
+}

@@ -1,0 +1,203 @@
+//! What a report calls an effect, and what it says of one that was found.
+
+/// The words for an effect. Sentences are templates: in `{}` stands `place`, `source` (the joint that drives it),
+/// or the name of a parameter, for its value with unit and interval; `{name:ratio}` leaves the unit out, and
+/// `{name:number}` the interval, too.
+#[derive(Debug, Clone, Copy)]
+pub struct Words {
+    /// As a heading: `Coulomb friction`.
+    pub title: &'static str,
+    /// Within a sentence: `a payload`.
+    pub noun: &'static str,
+    /// What it means at the arm: what a mechanic looks for.
+    pub meaning: &'static str,
+    /// A finding.
+    pub finding: &'static str,
+    /// A finding of less of it than a corrected twin says, `{less}` of it; for an effect that may fall below what is known.
+    pub less: Option<&'static str>,
+    /// A finding of which the data does not tell the numbers, for an effect that there may be such a finding of.
+    pub without_numbers: Option<&'static str>,
+}
+
+impl Words {
+    /// Only a heading, a noun and a finding.
+    pub const fn new(
+        title: &'static str,
+        noun: &'static str,
+        meaning: &'static str,
+        finding: &'static str,
+    ) -> Self {
+        Self {
+            title,
+            noun,
+            meaning,
+            finding,
+            less: None,
+            without_numbers: None,
+        }
+    }
+}
+
+/// How a value is told in a template.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Told {
+    /// With unit and interval.
+    Whole,
+    /// With its interval.
+    Ratio,
+    /// By itself.
+    Number,
+}
+
+/// The places of a template, in order: a name, and how its value is told.
+pub fn places(template: &str) -> impl Iterator<Item = (&str, Told)> {
+    let after_brace = template.split('{').skip(1);
+    after_brace.filter_map(|rest| Some(place(rest.split_once('}')?.0)))
+}
+
+/// A template with its places filled.
+pub fn fill(template: &str, value: impl Fn(&str, Told) -> String) -> String {
+    let mut text = String::with_capacity(2 * template.len());
+    let mut rest = template;
+    while let Some((before, from)) = rest.split_once('{') {
+        let (inner, after) = from.split_once('}').unwrap_or((from, ""));
+        let (name, told) = place(inner);
+        text.push_str(before);
+        text.push_str(&value(name, told));
+        rest = after;
+    }
+    text.push_str(rest);
+    text
+}
+
+fn place(inner: &str) -> (&str, Told) {
+    match inner.split_once(':') {
+        Some((name, "ratio")) => (name, Told::Ratio),
+        Some((name, _)) => (name, Told::Number),
+        None => (inner, Told::Whole),
+    }
+}
+
+/// Endings of canonical names and the units they stand for, longer ones before those they end in.
+const UNITS: [(&str, &str); 21] = [
+    ("_nms2_per_rad2", "N m s²/rad²"),
+    ("_nms_per_rad", "N m s/rad"),
+    ("_nm_per_rad", "N m/rad"),
+    ("_as2_per_rad2", "A s²/rad²"),
+    ("_as_per_rad", "A s/rad"),
+    ("_a_per_rad", "A/rad"),
+    ("_n_per_m", "N/m"),
+    ("_per_rad", "1/rad"),
+    ("_per_rev", "per turn"),
+    ("_rad_s2", "rad/s²"),
+    ("_rad_s", "rad/s"),
+    ("_kgm2", "kg m²"),
+    ("_kgm", "kg m"),
+    ("_nm", "N m"),
+    ("_hz", "Hz"),
+    ("_kg", "kg"),
+    ("_rad", "rad"),
+    ("_n", "N"),
+    ("_m", "m"),
+    ("_s", "s"),
+    ("_a", "A"),
+];
+
+/// Unit of a parameter and the rest of its name, from its canonical name; without a unit it is a pure number.
+pub const fn unit(name: &str) -> Option<(&str, &'static str)> {
+    let mut i = 0;
+    while i < UNITS.len() {
+        let (ending, unit) = UNITS[i];
+        if let Some((stem, end)) = name
+            .as_bytes()
+            .split_at_checked(name.len().saturating_sub(ending.len()))
+            && is_same(end, ending.as_bytes())
+            && let Ok(stem) = std::str::from_utf8(stem)
+        {
+            return Some((stem, unit));
+        }
+        i += 1;
+    }
+    None
+}
+
+const fn is_same(a: &[u8], b: &[u8]) -> bool {
+    if a.len() != b.len() {
+        return false;
+    }
+    let mut i = 0;
+    while i < a.len() {
+        if a[i] != b[i] {
+            return false;
+        }
+        i += 1;
+    }
+    true
+}
+
+/// `value` with three significant digits and no trailing zeros, e.g. `4.1`, `0.0235`, `21`.
+pub fn number(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return value.to_string();
+    }
+    let magnitude = value.abs().log10().floor() as i32;
+    let decimals = usize::try_from(2 - magnitude).unwrap_or(0);
+    let text = format!("{value:.decimals$}");
+    if !text.contains('.') {
+        return text;
+    }
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_template_is_filled_in_order() {
+        let template = "Joint {place} has {coulomb_nm} and {gain:ratio} of {mass_kg:number}.";
+        let named: Vec<_> = places(template).collect();
+        let expected = [
+            ("place", Told::Whole),
+            ("coulomb_nm", Told::Whole),
+            ("gain", Told::Ratio),
+            ("mass_kg", Told::Number),
+        ];
+        assert_eq!(named, expected);
+        let text = fill(template, |name, _| name.to_uppercase());
+        assert_eq!(text, "Joint PLACE has COULOMB_NM and GAIN of MASS_KG.");
+    }
+
+    #[test]
+    fn units_come_from_names() {
+        for (name, expected) in [
+            ("coulomb_nm", Some(("coulomb", "N m"))),
+            ("viscous_nms_per_rad", Some(("viscous", "N m s/rad"))),
+            ("delta_com_x_m", Some(("delta_com_x", "m"))),
+            (
+                "stribeck_velocity_rad_s",
+                Some(("stribeck_velocity", "rad/s")),
+            ),
+            ("force_x_n", Some(("force_x", "N"))),
+            ("cycles_per_rev", Some(("cycles", "per turn"))),
+            ("gain", None),
+        ] {
+            assert_eq!(unit(name), expected, "{name}");
+        }
+    }
+
+    #[test]
+    fn three_digits_are_enough() {
+        for (value, text) in [
+            (4.1, "4.1"),
+            (0.023_46, "0.0235"),
+            (21.0, "21"),
+            (1234.5, "1234"),
+            (-0.5, "-0.5"),
+            (0.0, "0"),
+            (100.0, "100"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+    }
+}
