@@ -174,7 +174,7 @@ def main():
     for name in filter(None, listed.split("\0")):
         if os.path.isfile(os.path.join(ROOT, name)):
             os.makedirs(os.path.dirname(os.path.join(tree, name)), exist_ok=True)
-            shutil.copy2(os.path.join(ROOT, name), os.path.join(tree, name))
+            shutil.copy(os.path.join(ROOT, name), os.path.join(tree, name))
     subprocess.run("git init -q && git add -A", cwd=tree, shell=True, check=True)
     os.makedirs(os.path.join(tree, "out"))
     examples = {name: section(text, EXAMPLES[name]) for name in asked.only or EXAMPLES}
