@@ -106,3 +106,37 @@ fn every_link_to_a_file_or_a_heading_leads_there() {
     }
     assert!(broken.is_empty(), "{}", broken.join("\n"));
 }
+
+/// The names of files in backticks.
+fn named_files(text: &str) -> impl Iterator<Item = &str> {
+    text.split('`')
+        .skip(1)
+        .step_by(2)
+        .filter(|name| name.ends_with(".rs") && !name.contains(['{', '<', ' ']))
+}
+
+#[test]
+fn every_source_file_that_the_architecture_names_is_there() {
+    let text = std::fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap();
+    let sources = std::process::Command::new("git")
+        .args([
+            "ls-files",
+            "--cached",
+            "--others",
+            "--exclude-standard",
+            "*.rs",
+        ])
+        .current_dir(root())
+        .output()
+        .unwrap();
+    let sources = String::from_utf8(sources.stdout).unwrap();
+    let missing: Vec<&str> = named_files(&text)
+        .filter(|name| {
+            let ending = format!("/{name}");
+            !sources
+                .lines()
+                .any(|path| path == *name || path.ends_with(&ending))
+        })
+        .collect();
+    assert!(!sources.is_empty() && missing.is_empty(), "{missing:?}");
+}

@@ -5,14 +5,16 @@
 #   tests/slow.sh            all of it, release build: an hour and more on 2 cores
 #   tests/slow.sh --short    dev build, each test for at most LIMIT seconds (60), two cases of the proof
 #   tests/slow.sh --only RE  only what matches the regular expression
+#   tests/slow.sh --package P  only the ignored tests of one package
 set -uo pipefail
 cd "$(dirname "$0")/.."
 
-short=false only=.
+short=false only=. packages=(--workspace)
 while [ $# -gt 0 ]; do
     case $1 in
     --short) short=true ;;
     --only) only=$2 && shift ;;
+    --package) packages=(--package "$2") && shift ;;
     *) echo "unknown argument $1" >&2 && exit 2 ;;
     esac
     shift
@@ -51,7 +53,7 @@ proof() { tests/proof/prove.sh "$1" "$logs/proof" "$2" | tee /dev/stderr | grep 
 
 # Each test program as: package and target, folder, executable.
 programs() {
-    cargo test --workspace --no-run --message-format=json "${profile[@]}" 2>"$logs/build" | python3 -c '
+    cargo test "${packages[@]}" --no-run --message-format=json "${profile[@]}" 2>"$logs/build" | python3 -c '
 import json, os, sys
 for line in sys.stdin:
     made = json.loads(line) if line.startswith("{") else {}
@@ -71,7 +73,9 @@ while IFS=$'\t' read -r target folder program; do
     done
 done <<<"$found"
 
-if $short; then
+if [ "${packages[0]}" = --package ]; then
+    : # Neither the proof nor CONTRIBUTING.md.
+elif $short; then
     some=$logs/set
     mkdir -p "$some/cases" && cp -r tests/proof/set/answers.json tests/proof/set/robots "$some/"
     for case in m00 m11; do cp -r "tests/proof/set/cases/$case" "$some/cases/"; done
@@ -84,7 +88,7 @@ json.dump(held, open(sys.argv[1], "w"))' "$some/answers.json"
 else
     run "proof" proof tests/proof/set target/release/tauscope
 fi
-run "CONTRIBUTING.md" tests/contributing.sh
+[ "${packages[0]}" = --package ] || run "CONTRIBUTING.md" tests/contributing.py
 
 printf '\n| what | seconds | result |\n| --- | ---: | --- |\n'
 printf '%s\n' "${rows[@]}"

@@ -1,12 +1,13 @@
 """What a confidence is worth: of the findings said with 0.9, how many are right?
 
-    python reliability.py TAUSCOPE OUT [--first 1] [--cases 1000] [--table] [--svg FILE]
+    python reliability.py TAUSCOPE OUT [--first 6001] [--cases 1000] [--table] [--half even|odd] [--fit] [--svg FILE]
 
 Case by case, from its seed: a small arm (small_arm.py), recordings of it by `make.py`'s generator with an effect of the library, two to four
 at once, nothing (all under white noise or partly slow noise), something off the library (`make.py`'s and off_list.py's), or an arm as real ones
 are (friction everywhere, its bodies off, and in half of the cases something off the library besides). MuJoCo integrates a quarter of them; of the
 others, and of whole arms, the motion is as commanded (`make.py --followed`), which is faster. Then `explain`, and each finding judged
-by name and place (judge.py). What is there already is not made again; `--table` makes nothing at all.
+by name and place (judge.py). What is there already is not made again; `--table` makes nothing at all. `--fit` prints the numbers of
+stages/explain/src/report/findings/confidence.rs as a logistic regression of right or wrong on these findings gives them.
 """
 import argparse
 import collections
@@ -29,6 +30,8 @@ from robot import Robot
 
 EDGES = [0., 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0001]
 KINDS = {"single": 0.34, "combo": 0.24, "null": 0.1, "unknown": 0.2, "arm": 0.12}
+OF_POSITION = {"cable_spring", "counterbalance_spring", "torque_ripple"}
+IMITATED = OF_POSITION | {"torque_gain"}
 LIMIT_S = 240.                       # an explanation that takes longer is left out
 
 
@@ -36,10 +39,12 @@ def options():
     a = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     a.add_argument("tauscope")
     a.add_argument("out", type=pathlib.Path)
-    a.add_argument("--first", type=int, default=1, help="seed of the first case")
+    a.add_argument("--first", type=int, default=6001, help="seed of the first case")
     a.add_argument("--cases", type=int, default=1000)
     a.add_argument("--keep", action="store_true", help="keep the recordings")
     a.add_argument("--table", action="store_true", help="only print the table of what is there")
+    a.add_argument("--half", choices=["even", "odd"], help="tables and fit of these seeds only")
+    a.add_argument("--fit", action="store_true")
     a.add_argument("--svg", type=pathlib.Path, help="draw the reliability diagram there")
     return a.parse_args()
 
@@ -148,23 +153,41 @@ def svg(pairs):
     for tick in (0., 0.25, 0.5, 0.75, 1.):
         x, y = at(tick, tick)
         parts += [f'<text x="{x:.0f}" y="460" text-anchor="middle">{tick}</text>', f'<text x="52" y="{y + 4:.0f}" text-anchor="end">{tick}</text>']
-    for low, high in zip(EDGES, EDGES[1:]):
+    for k, (low, high) in enumerate(zip(EDGES, EDGES[1:])):
         own = [(c, r) for c, r in pairs if low <= c < high]
         if own:
             mean, right = sum(c for c, _ in own) / len(own), sum(r for _, r in own)
             (x, y), ends = at(mean, right / len(own)), [at(mean, e)[1] for e in wilson(right, len(own))]
             parts += [f'<path d="M{x:.1f} {ends[0]:.1f} V{ends[1]:.1f}" stroke="#1f6feb" stroke-width="2"/>',
                       f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="#1f6feb"/>',
-                      f'<text x="{x - 8:.1f}" y="{y - 8:.1f}" text-anchor="end" fill="#555">{len(own)}</text>']
+                      f'<text x="{x:.1f}" y="{max(ends) + 15 + 13 * (k % 3):.1f}" text-anchor="middle" fill="#555">{len(own)}</text>']
     parts += ['<text x="260" y="485" text-anchor="middle">mean confidence of the findings in a bin</text>',
               '<text x="18" y="240" text-anchor="middle" transform="rotate(-90 18 240)">share of them that is right</text>', "</svg>"]
     return "\n".join(parts) + "\n"
 
 
+def grounds(finding, findings):
+    """The row of a finding in the regression: as in confidence.rs."""
+    imitated = finding["effect"] in IMITATED
+    of_position = lambda f: f["effect"] in OF_POSITION and f["joint"] == finding["joint"]
+    another = of_position(finding) and sum(map(of_position, findings)) > 1
+    return [1., math.log(max(finding["over_rest"], 0.01)), min(finding["evidence_nats"], 0.), float(imitated), float(another)]
+
+
+def regression(rows, right, spread=2.):
+    """Logistic regression by Newton's method; what few findings tell of stays within a `spread` or so of nothing."""
+    a, y = np.array(rows), np.array(right, float)
+    held, b = np.eye(a.shape[1]) / spread**2, np.zeros(a.shape[1])
+    for _ in range(50):
+        p = 1. / (1. + np.exp(-a @ b))
+        b += np.linalg.solve((a * (p * (1. - p))[:, None]).T @ a + held, a.T @ (y - p) - held @ b)
+    return b
+
+
 def show(o):
-    pairs, by_kind, neither, cases = [], collections.defaultdict(list), 0, collections.Counter()
+    pairs, by_kind, neither, cases, rows = [], collections.defaultdict(list), 0, collections.Counter(), []
     for seed in range(o.first, o.first + o.cases):
-        case = judged(o, seed)
+        case = judged(o, seed) if o.half is None or seed % 2 == (o.half == "odd") else None
         if case is None:
             continue
         kind, findings, _, _ = case
@@ -175,6 +198,8 @@ def show(o):
                 continue
             pairs.append((finding["confidence"], verdict == "right"))
             by_kind[kind].append(pairs[-1])
+            if o.fit:
+                rows.append(grounds(finding, [f for f, _ in findings]))
     print(f"{sum(cases.values())} cases ({', '.join(f'{n} {k}' for k, n in sorted(cases.items()))}), {len(pairs)} findings judged, {neither} neither right nor wrong\n")
     print(table(pairs))
     print("\n| kind | findings | mean confidence | right | said with 0.9 or more | of them right |\n| --- | --- | --- | --- | --- | --- |")
@@ -182,6 +207,9 @@ def show(o):
         own, sure = by_kind[kind], [r for c, r in by_kind[kind] if c >= 0.9]
         mean = lambda x: f"{sum(x) / len(x):.3f}" if x else ""
         print(f"| {kind} | {len(own)} | {mean([c for c, _ in own])} | {mean([r for _, r in own])} | {len(sure)} | {mean(sure)} |")
+    if o.fit:
+        names = ["BASE", "PER_LOG_OVER_REST", "PER_NAT_BELOW", "IMITATED", "BESIDE_ANOTHER"]
+        print("\n" + ", ".join(f"{n} {x:.3f}" for n, x in zip(names, regression(rows, [r for _, r in pairs]))))
     if o.svg:
         o.svg.write_text(svg(pairs))
 

@@ -13,7 +13,7 @@ import re
 import shutil
 import subprocess
 
-CRATES = ["stages/explain", "stages/watch", "stages/detect", "dynamics"]
+CRATES = ["stages/explain", "stages/detect", "dynamics"]
 CONST = re.compile(r"^\s*(?:pub(?:\([^)]*\))?\s+)?const\s+([A-Z][A-Z0-9_]*)\s*:\s*([^=]+?)\s*=\s*(.*)$")
 TEXT = re.compile(r'"(?:\\.|[^"\\])*"')
 MODULE = """//! Scales constants; made by tests/proof/vary.py in a copy of the tree.
@@ -92,19 +92,13 @@ def find(tree, pattern="", crates=CRATES):
 
 def code_lines(text):
     """Yields (index, line) of those in which a use may stand: no comments, imports or declarations of constants."""
-    skip = None
+    imported = False
     for i, line in enumerate(text.splitlines()):
         bare = line.strip()
-        if skip is None and not bare.startswith("//"):
-            if re.match(r"(pub(\([^)]*\))?\s+)?use\s", bare) or re.match(r"(pub(\([^)]*\))?\s+)?(const|static)\s+[A-Z_]", bare):
-                skip = bare
-            else:
-                yield i, line
-        elif skip is not None:
-            skip += " " + bare
-        # Semicolons within brackets are lengths of arrays.
-        if skip is not None and skip.endswith(";") and skip.count("[") == skip.count("]"):
-            skip = None
+        imported = imported or bool(re.match(r"(pub(\([^)]*\))?\s+)?use\s", bare))
+        if not imported and not bare.startswith("//") and not re.match(r"(pub(\([^)]*\))?\s+)?(const|static)\s+[A-Z_]", bare):
+            yield i, line
+        imported = imported and not bare.endswith(";")
 
 
 def replaced(line, name, ident):

@@ -2,6 +2,44 @@
 //! turns a twin's sample into a score, and the frame around all of them ([`Detect`]) does what they
 //! share: the threshold, the beginning and end of an alarm, which joints and which link.
 //!
+//! ```
+//! use tauscope_bus::{Detection, Emit, LinkError, Stage as _, TwinState, flags};
+//! use tauscope_detect::tajiri::twin_regression;
+//! use tauscope_detect::{Config, JointSetup, Setup, Threshold};
+//!
+//! /// Prints where an alarm begins.
+//! struct Onsets;
+//! impl Emit<Detection> for Onsets {
+//!     fn emit(&mut self, write: &mut dyn FnMut(&mut Detection)) -> Result<(), LinkError> {
+//!         let mut detection = Detection::default();
+//!         write(&mut detection);
+//!         if detection.event == Detection::ONSET {
+//!             println!("contact at {} ns, score {}", detection.contact_ns, detection.score);
+//!         }
+//!         Ok(())
+//!     }
+//! }
+//!
+//! let joint = JointSetup { gain: 1.0, offset: 0.0, noise: Some(0.1), effort_per_nm: 1.0 };
+//! let cell = Setup { joints: vec![joint; 2], ..Setup::default() };
+//! // An alarm where the squared length of the residual reaches 4 (N m)².
+//! let config = Config {
+//!     threshold: Threshold { score: Some(4.0), sigmas: None },
+//!     ..Config::of(twin_regression::Settings::default())
+//! };
+//! let mut stage = config.stage(cell)?;
+//! let mut sample = TwinState::default();
+//! sample.header.joint_count = 2;
+//! sample.header.flags = flags::READY;
+//! for step in 0..100 {
+//!     sample.header.stamp_ns = step * 10_000_000;
+//!     // Something pushes joint 1 from the 50th sample on.
+//!     sample.residual[0] = if step < 50 { 0.0 } else { -3.0 };
+//!     stage.accept(&sample, &mut Onsets)?;
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! A new detector is a file with a type that implements [`DetectorSettings`] and one that implements
 //! [`Detector`], and one line in the table [`DETECTORS`].
 

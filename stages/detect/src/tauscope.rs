@@ -27,6 +27,7 @@
 mod alarm;
 mod kinds;
 mod late;
+mod learning;
 mod learnt;
 mod means;
 mod noise;
@@ -36,6 +37,7 @@ mod points;
 mod rest;
 mod ring;
 mod smallest;
+mod spans;
 mod stand;
 mod sums;
 mod tail;
@@ -52,16 +54,13 @@ use crate::frame::{
     Trained, Training, Verdict,
 };
 use alarm::Watch;
-pub use kinds::{KindContacts, Kinds};
 use late::{Late, LateIn};
 use learnt::ENOUGH_S;
-pub use learnt::{Learnt, LearntJoint, LearntWindow};
-use means::Follow;
+pub use learnt::{KindContacts, Kinds, Learnt, LearntJoint, LearntRest, LearntWindow, Smallest};
 use nalgebra::Vector6;
 use place::Place;
-pub use rest::LearntRest;
 use ring::Ring;
-pub use smallest::Smallest;
+use spans::Follow;
 pub use tail::Tail;
 pub use usual::LearntUsual;
 use windows::Windows;

@@ -54,6 +54,9 @@ fn robot(joints: &[[&str; 5]], turn: &[usize]) -> Model {
     let mut urdf = format!(r#"<robot name="r"><link name="{root}"/>"#);
     for &at in turn {
         let [name, parent, child, axis, origin] = joints[at];
+        // What is added to the arm weighs next to nothing: else it would change the effort that the motion requires.
+        let mass_kg = if UNTOLD.contains(&name) { 1e-6 } else { 1.0 };
+        let inertia_kgm2 = 0.01 * mass_kg;
         let kind = if SLIDES.contains(&name) {
             "prismatic"
         } else {
@@ -61,7 +64,7 @@ fn robot(joints: &[[&str; 5]], turn: &[usize]) -> Model {
         };
         urdf += &format!(
             r#"<joint name="{name}" type="{kind}"><origin xyz="{origin}"/><parent link="{parent}"/><child link="{child}"/><axis xyz="{axis}"/><limit lower="-3" upper="3" effort="100" velocity="3"/></joint>
-            <link name="{child}"><inertial><origin xyz="0.02 0 0.1"/><mass value="1"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>"#
+            <link name="{child}"><inertial><origin xyz="0.02 0 0.1"/><mass value="{mass_kg}"/><inertia ixx="{inertia_kgm2}" ixy="0" ixz="0" iyy="{inertia_kgm2}" iyz="0" izz="{inertia_kgm2}"/></inertial></link>"#
         );
     }
     Model::from_urdf(&(urdf + "</robot>")).unwrap()
@@ -89,7 +92,8 @@ fn quiet(model: &Model, scene: &Scene, seed: u64, samples: usize) -> Vec<TwinSta
         sample.header.flags = flags::READY;
         for (arm, j) in place.into_iter().enumerate() {
             let (sin, cos) = (0.01 * k as f64 + arm as f64).sin_cos();
-            (sample.position[j], sample.velocity[j]) = (scene.posture[arm] + 0.1 * sin, 0.1 * cos);
+            sample.position[j] = scene.posture[arm] + 0.1 * sin;
+            (sample.velocity[j], sample.acceleration[j]) = (0.1 * cos, -0.1 * sin);
             let sum: f64 = (0..12).map(|_| random.random_range(-0.5..0.5)).sum();
             sample.effort[j] = 0.1 * sum;
             sample.residual[j] = sample.effort[j];
@@ -156,7 +160,7 @@ fn answers(joints: &[[&str; 5]], turn: &[usize], scene: &Scene) -> Vec<(Answer, 
     let learnt = tauscope::learn(&tauscope::Settings::default(), &setup, &lessons).unwrap();
     let regression = Config {
         threshold: Threshold {
-            score: Some(2.0),
+            score: Some(0.5),
             sigmas: None,
         },
         ..Config::of(twin_regression::Settings::default())
@@ -188,7 +192,7 @@ fn scenes() -> impl Strategy<Value = Scene> {
     let posture = [-1.0..1.0, 0.3..1.2, 0.3..1.2, -1.0..1.0];
     let sized = |range: std::ops::Range<f64>| prop_oneof![range.clone(), range.prop_map(|x| -x)];
     let force = [sized(15.0..30.0), sized(15.0..30.0), sized(15.0..30.0)];
-    (posture, 1_usize..4, 0.05..0.3, force).prop_map(|(posture, touched, along_m, force_n)| Scene {
+    (posture, 1_usize..4, 0.15..0.3, force).prop_map(|(posture, touched, along_m, force_n)| Scene {
         posture,
         touched,
         along_m,
@@ -222,7 +226,7 @@ proptest! {
         for ((answer, scores), (other, others)) in plain.iter().zip(&other) {
             prop_assert_eq!(answer, other);
             for (score, other) in scores.iter().zip(others) {
-                let close = (score - other).abs() <= 1e-6 * score.abs().max(1e-3);
+                let close = (score - other).abs() <= 1e-4 * score.abs().max(1e-3);
                 prop_assert!(close, "{} {}", score, other);
             }
         }

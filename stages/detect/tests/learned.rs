@@ -11,8 +11,8 @@ use tauscope_detect::tajiri::{
     lstm_momentum_observer, point_autoencoder, point_ocsvm, window_autoencoder, window_ocsvm,
 };
 use tauscope_detect::{
-    Config, ConfigError, ContactKind, Detector, JointSetup, LabelledContact, LearnError, Lesson,
-    Lessons, Setup, Trained, TrainedError,
+    AnySettings, ConfigError, ContactKind, Detector, JointSetup, LabelledContact, LearnError,
+    Lesson, Lessons, Setup, Task, Trained, TrainedError,
 };
 use tauscope_dynamics::Model;
 
@@ -91,8 +91,6 @@ fn lessons() -> (Vec<Lesson>, Vec<Lesson>) {
     (vec![free(0.0), free(1.0)], vec![free(0.5)])
 }
 
-type Train = fn(&Setup, &Lessons<'_>, u64) -> Result<Trained, LearnError>;
-
 fn quick(epochs: usize, batch: usize) -> TrainingSettings {
     TrainingSettings {
         epochs,
@@ -102,83 +100,70 @@ fn quick(epochs: usize, batch: usize) -> TrainingSettings {
     }
 }
 
-/// Every detector: its name, how many samples a score rests on, a quick training, and its part of a
-/// pipeline file.
-fn detectors() -> [(&'static str, usize, Train, Config); 5] {
+/// Every detector that is trained, to be trained quickly, with how many samples a score rests on.
+fn detectors() -> [(usize, Box<dyn AnySettings>); 5] {
     [
+        (1, Box::new(point_ocsvm::Settings::default())),
+        (16, Box::new(window_ocsvm::Settings::default())),
         (
-            "point_ocsvm",
             1,
-            |setup, lessons, seed| {
-                let settings = point_ocsvm::Settings::default();
-                point_ocsvm::train(&settings, setup, lessons, seed)
-            },
-            Config::of(point_ocsvm::Settings::default()),
+            Box::new(point_autoencoder::Settings {
+                layers: vec![6, 1, 6],
+                training: quick(20, 100),
+                ..point_autoencoder::Settings::default()
+            }),
         ),
         (
-            "window_ocsvm",
             16,
-            |setup, lessons, seed| {
-                let settings = window_ocsvm::Settings::default();
-                window_ocsvm::train(&settings, setup, lessons, seed)
-            },
-            Config::of(window_ocsvm::Settings::default()),
+            Box::new(window_autoencoder::Settings {
+                stride: 4,
+                training: quick(20, 20),
+                ..window_autoencoder::Settings::default()
+            }),
         ),
         (
-            "point_autoencoder",
-            1,
-            |setup, lessons, seed| {
-                let settings = point_autoencoder::Settings {
-                    layers: vec![6, 1, 6],
-                    training: quick(20, 100),
-                    ..point_autoencoder::Settings::default()
-                };
-                point_autoencoder::train(&settings, setup, lessons, seed)
-            },
-            Config::of(point_autoencoder::Settings::default()),
-        ),
-        (
-            "window_autoencoder",
-            16,
-            |setup, lessons, seed| {
-                let settings = window_autoencoder::Settings {
-                    stride: 4,
-                    training: quick(20, 20),
-                    ..window_autoencoder::Settings::default()
-                };
-                window_autoencoder::train(&settings, setup, lessons, seed)
-            },
-            Config::of(window_autoencoder::Settings::default()),
-        ),
-        (
-            "lstm_momentum_observer",
             20,
-            |setup, lessons, seed| {
-                let settings = lstm_momentum_observer::Settings {
-                    sequence: 20,
-                    hidden: 12,
-                    training: quick(15, 200),
-                    ..lstm_momentum_observer::Settings::default()
-                };
-                lstm_momentum_observer::train(&settings, setup, lessons, seed)
-            },
-            Config::of(lstm_momentum_observer::Settings::default()),
+            Box::new(lstm_momentum_observer::Settings {
+                sequence: 20,
+                hidden: 12,
+                training: quick(15, 200),
+                ..lstm_momentum_observer::Settings::default()
+            }),
         ),
     ]
+}
+
+/// What a training gives.
+fn train(
+    settings: &dyn AnySettings,
+    setup: &Setup,
+    lessons: &Lessons<'_>,
+    seed: u64,
+) -> Result<Trained, LearnError> {
+    let task = Task {
+        setup,
+        lessons: *lessons,
+        free_first_s: 0.0,
+        seed,
+    };
+    Ok(settings.learn(&task)?.1.unwrap())
 }
 
 /// Every detector of [`detectors`], trained with seed 1.
 fn trained() -> &'static BTreeMap<&'static str, Trained> {
     static TRAINED: OnceLock<BTreeMap<&'static str, Trained>> = OnceLock::new();
     TRAINED.get_or_init(|| {
-        let (train, validation) = lessons();
+        let (training, validation) = lessons();
         let lessons = Lessons {
-            train: &train,
+            train: &training,
             validation: &validation,
         };
         let all = detectors().into_iter();
-        all.map(|(name, _, learn, _)| (name, learn(&setup(), &lessons, 1).unwrap()))
-            .collect()
+        all.map(|(_, settings)| {
+            let trained = train(&*settings, &setup(), &lessons, 1).unwrap();
+            (settings.name(), trained)
+        })
+        .collect()
     })
 }
 
@@ -199,10 +184,11 @@ fn scores(detector: &mut dyn Detector, samples: &[TwinState]) -> Vec<Option<f64>
 
 #[test]
 fn a_push_stands_out_from_what_was_learnt() {
-    for (name, _, _, config) in detectors() {
+    for (_, settings) in detectors() {
+        let name = settings.name();
         let trained = trained()[name].clone();
         let free = trained.score();
-        let mut detector = config.detector(&with(name, trained)).unwrap();
+        let mut detector = settings.build(&with(name, trained), 0.1).unwrap();
         let scores = scores(detector.as_mut(), &swing(1200, 0.2, 4.0));
         let during = scores[900..=940].iter().flatten();
         let pushed = during.fold(f64::MIN, |most, &score| most.max(score));
@@ -217,7 +203,8 @@ fn a_push_stands_out_from_what_was_learnt() {
 #[test]
 fn a_detector_that_was_kept_scores_as_before_bit_for_bit() {
     let samples = swing(1000, 0.2, 4.0);
-    for (name, _, _, config) in detectors() {
+    for (_, settings) in detectors() {
+        let name = settings.name();
         let mut trained = trained()[name].clone();
         let provenance = trained.provenance_mut();
         provenance.insert("recording".to_owned(), "swing".to_owned());
@@ -225,7 +212,7 @@ fn a_detector_that_was_kept_scores_as_before_bit_for_bit() {
         assert!(kept == trained, "{name}");
         assert!(kept.to_bytes() == trained.to_bytes(), "{name}");
         let run = |trained| {
-            let mut detector = config.detector(&with(name, trained)).unwrap();
+            let mut detector = settings.build(&with(name, trained), 0.1).unwrap();
             scores(detector.as_mut(), &samples)
         };
         let (before, after) = (run(trained), run(kept));
@@ -239,13 +226,15 @@ fn a_detector_that_was_kept_scores_as_before_bit_for_bit() {
 
 #[test]
 fn the_same_seed_trains_the_same_detector() {
-    let (train, validation) = lessons();
+    let (training, validation) = lessons();
     let lessons = Lessons {
-        train: &train,
+        train: &training,
         validation: &validation,
     };
-    for (name, _, learn, _) in detectors() {
-        let bytes = |seed| learn(&setup(), &lessons, seed).unwrap().to_bytes().unwrap();
+    for (_, settings) in detectors() {
+        let name = settings.name();
+        let trained_with = |seed| train(&*settings, &setup(), &lessons, seed).unwrap();
+        let bytes = |seed| trained_with(seed).to_bytes().unwrap();
         let first = trained()[name].to_bytes().unwrap();
         assert!(first == bytes(1), "{name}");
         assert!(first != bytes(2), "{name}");
@@ -254,9 +243,10 @@ fn the_same_seed_trains_the_same_detector() {
 
 #[test]
 fn a_score_waits_for_its_window_and_a_reset_empties_it() {
-    for (name, window, _, config) in detectors() {
+    for (window, settings) in detectors() {
+        let name = settings.name();
         let trained = trained()[name].clone();
-        let mut detector = config.detector(&with(name, trained)).unwrap();
+        let mut detector = settings.build(&with(name, trained), 0.1).unwrap();
         let mut samples = swing(400, 0.2, 0.0);
         samples[200].header.flags |= flags::RESET;
         let scores = scores(detector.as_mut(), &samples);
@@ -272,13 +262,13 @@ fn a_score_waits_for_its_window_and_a_reset_empties_it() {
 fn what_was_touched_is_not_learnt() {
     let contacts = [(900, 930)];
     let pushed = |push| {
-        let train = [lesson(swing(1200, 0.0, push), &contacts)];
+        let training = [lesson(swing(1200, 0.0, push), &contacts)];
         let lessons = Lessons {
-            train: &train,
+            train: &training,
             validation: &[],
         };
         let settings = window_ocsvm::Settings::default();
-        window_ocsvm::train(&settings, &setup(), &lessons, 1).unwrap()
+        train(&settings, &setup(), &lessons, 1).unwrap()
     };
     assert!(pushed(4.0).facts().samples < 1160);
     assert_eq!(pushed(4.0).facts().samples, pushed(0.0).facts().samples);
@@ -286,15 +276,15 @@ fn what_was_touched_is_not_learnt() {
 
 #[test]
 fn another_robots_detector_is_refused_and_both_robots_joints_are_named() {
-    let (train, validation) = lessons();
+    let (training, validation) = lessons();
     let lessons = Lessons {
-        train: &train,
+        train: &training,
         validation: &validation,
     };
-    let (name, _, learn, config) = detectors().into_iter().nth(1).unwrap();
+    let settings = window_ocsvm::Settings::default();
     let other = setup_of(&ARM.replace("name=\"b\"", "name=\"elbow\""));
-    let trained = learn(&other, &lessons, 1).unwrap();
-    let Err(error) = config.stage(with(name, trained)) else {
+    let trained = train(&settings, &other, &lessons, 1).unwrap();
+    let Err(error) = settings.build(&with("window_ocsvm", trained), 0.1) else {
         panic!("a detector for other joints was taken");
     };
     let text = error.to_string();
@@ -303,9 +293,10 @@ fn another_robots_detector_is_refused_and_both_robots_joints_are_named() {
 
 #[test]
 fn a_detector_without_its_training_says_so() {
-    for (name, _, _, config) in detectors() {
+    for (_, settings) in detectors() {
+        let name = settings.name();
         assert_eq!(
-            config.stage(setup()).err(),
+            settings.build(&setup(), 0.1).err(),
             Some(ConfigError::NotTrained { detector: name })
         );
     }
@@ -317,13 +308,14 @@ fn a_file_that_is_no_trained_detector_is_told_from_a_damaged_one() {
         Trained::from_bytes(b"joints: [a, b]"),
         Err(TrainedError::Format { .. })
     ));
-    let (train, _) = lessons();
+    let (training, _) = lessons();
     let lessons = Lessons {
-        train: &train,
+        train: &training,
         validation: &[],
     };
-    let (_, _, learn, _) = detectors().into_iter().nth(1).unwrap();
-    let bytes = learn(&setup(), &lessons, 1).unwrap().to_bytes().unwrap();
+    let settings = window_ocsvm::Settings::default();
+    let trained = train(&settings, &setup(), &lessons, 1).unwrap();
+    let bytes = trained.to_bytes().unwrap();
     assert!(Trained::from_bytes(&bytes[..bytes.len() - 8]).is_err());
     let at = bytes
         .windows(8)
@@ -339,13 +331,14 @@ fn a_file_that_is_no_trained_detector_is_told_from_a_damaged_one() {
 
 #[test]
 fn too_little_to_learn_from_is_an_error_that_says_how_much_is_wanted() {
-    let train = [lesson(swing(10, 0.0, 0.0), &[])];
+    let training = [lesson(swing(10, 0.0, 0.0), &[])];
     let lessons = Lessons {
-        train: &train,
+        train: &training,
         validation: &[],
     };
-    for (name, _, learn, _) in detectors() {
-        let error = learn(&setup(), &lessons, 1).unwrap_err();
+    for (_, settings) in detectors() {
+        let name = settings.name();
+        let error = train(&*settings, &setup(), &lessons, 1).unwrap_err();
         assert!(
             matches!(error, LearnError::TooLittle { .. }),
             "{name}: {error}"
@@ -355,21 +348,21 @@ fn too_little_to_learn_from_is_an_error_that_says_how_much_is_wanted() {
 
 #[test]
 fn settings_out_of_range_are_refused_by_name() {
-    let (train, _) = lessons();
+    let (training, _) = lessons();
     let lessons = Lessons {
-        train: &train,
+        train: &training,
         validation: &[],
     };
     let settings = window_ocsvm::Settings {
         stride: 0,
         ..window_ocsvm::Settings::default()
     };
-    let error = window_ocsvm::train(&settings, &setup(), &lessons, 1).unwrap_err();
+    let error = train(&settings, &setup(), &lessons, 1).unwrap_err();
     assert!(error.to_string().contains("`stride`"), "{error}");
     let settings = point_autoencoder::Settings {
         layers: vec![5, 0, 5],
         ..point_autoencoder::Settings::default()
     };
-    let error = point_autoencoder::train(&settings, &setup(), &lessons, 1).unwrap_err();
+    let error = train(&settings, &setup(), &lessons, 1).unwrap_err();
     assert!(error.to_string().contains("`layers`"), "{error}");
 }

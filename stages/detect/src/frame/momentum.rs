@@ -20,16 +20,15 @@
 //! Sign: the measured effort is the motors'. It exceeds the twin's by friction and the like less Jᵀ F,
 //! with F the force on the robot; at rest the result is minus the residual.
 
+pub(crate) mod gain;
+
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState, flags};
 use tauscope_dynamics::{Data, InertialEffort, Model};
 
 use super::error::ConfigError;
 use super::setup::{JointSetup, Setup};
 use super::shared::Tap;
-
-/// The papers' gain \[1/s\].
-/// Tuned: by Tajiri and Iwamoto (section IV-B), on their robot.
-pub const DEFAULT_GAIN_PER_S: f64 = 100.0;
+pub use gain::DEFAULT_GAIN_PER_S;
 
 /// The observer counts as settled after so many of its time constants: 1 % of a step is missing still.
 /// Statistical: ln 100.

@@ -1,8 +1,8 @@
 //! The detector as a stage: twin states in, a verdict for each out.
 
-use tauscope_bus::{Detection, Emit, Name, Stage, StageError, TwinState, flags};
+use tauscope_bus::{Detection, Emit, MAX_JOINTS, Name, Stage, StageError, TwinState, flags};
 
-use super::detector::{Detector, State};
+use super::detector::{Detector, Judgement, State};
 use super::error::ConfigError;
 use super::events::{Alarm, OwnEvents, Step};
 use super::isolation::Isolation;
@@ -37,6 +37,8 @@ pub struct Detect {
     name: Name,
     rule: Rule,
     isolation: Isolation,
+    /// [`flags::RESET`] of a sample that the detector was not shown.
+    begins: u32,
 }
 
 impl Detect {
@@ -76,7 +78,30 @@ impl Detect {
             detector,
             rule,
             isolation: Isolation::new(setup),
+            begins: 0,
         })
+    }
+
+    /// What the detector makes of a sample. One with a value that is no number is not shown to it, for it would stay in filters and
+    /// means; the detector is not ready for that sample then, and a new beginning that it should have been is one at the next.
+    fn judge(&mut self, sample: &TwinState) -> Judgement {
+        let begins = sample.header.flags & flags::RESET;
+        if !is_sound(sample) {
+            self.begins |= begins;
+            return Judgement {
+                score: 0.0,
+                ready: false,
+                verdict: None,
+            };
+        }
+        match std::mem::take(&mut self.begins) & !begins {
+            0 => self.detector.judge(sample),
+            begins => {
+                let mut sample = *sample;
+                sample.header.flags |= begins;
+                self.detector.judge(&sample)
+            }
+        }
     }
 
     /// What the detector has learnt while running, to be given to its next life; `None` if it learns
@@ -86,13 +111,30 @@ impl Detect {
     }
 }
 
+/// Whether every value of every joint is a number.
+fn is_sound(sample: &TwinState) -> bool {
+    let joints = (sample.header.joint_count as usize).min(MAX_JOINTS);
+    let values = [
+        &sample.position,
+        &sample.velocity,
+        &sample.acceleration,
+        &sample.effort,
+        &sample.expected_effort,
+        &sample.filtered_effort,
+        &sample.filtered_expected_effort,
+        &sample.residual,
+    ];
+    let mut values = values.into_iter().flat_map(|values| &values[..joints]);
+    values.all(|value| value.is_finite())
+}
+
 impl Stage<TwinState, Detection> for Detect {
     fn accept(
         &mut self,
         sample: &TwinState,
         out: &mut dyn Emit<Detection>,
     ) -> Result<(), StageError> {
-        let judgement = self.detector.judge(sample);
+        let judgement = self.judge(sample);
         if let Some(fault) = self.detector.fault() {
             let detector = self.detector.name();
             return Err(StageError::Unfit(format!("{detector}: {fault}")));

@@ -62,7 +62,7 @@ pub struct SignalSettings {
 impl Default for SignalSettings {
     fn default() -> Self {
         Self {
-            observer_gain_per_s: crate::frame::momentum::DEFAULT_GAIN_PER_S,
+            observer_gain_per_s: super::momentum::gain::DEFAULT_GAIN_PER_S,
             // About that of the twin on efforts; the paper does not give its own.
             cutoff_hz: 4.0,
         }

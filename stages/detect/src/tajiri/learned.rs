@@ -15,15 +15,94 @@ mod signals;
 mod training;
 mod vectors;
 
-use crate::frame::LearnError;
+use std::fmt::Debug;
+use std::path::PathBuf;
+
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Deserializer, Serialize};
+
+use crate::frame::{
+    ConfigError, Detector, DetectorSettings, LearnError, Setup, Suits, Task, Trained, Training,
+};
 
 pub(crate) use autoencoder::Autoencoder;
-pub(crate) use lstm::{Lstm, LstmScorer};
+pub(crate) use lstm::Lstm;
 pub(crate) use one_class::OneClass;
-pub(crate) use runner::{Course, Scorer, build};
-pub(crate) use vectors::{VectorScorer, Vectors};
+pub(crate) use runner::Load;
+
+/// Settings of a detector that runs as it was trained: all but the file of its weights are those of its training.
+pub(crate) trait TrainedSettings: Clone + Default {
+    /// Canonical name.
+    const NAME: &'static str;
+    /// What it is, in a sentence.
+    const ABOUT: &'static str;
+    /// Whether chance has a part in its training.
+    const RANDOM: bool;
+    /// Reads what scores from the file.
+    const LOAD: Load;
+
+    /// The file, one that `tauscope evaluate` wrote.
+    fn model(&mut self) -> &mut Option<PathBuf>;
+
+    /// Trains it on the contact-free part of the training recordings.
+    ///
+    /// # Errors
+    /// If there is no robot's model, too little data, or the training diverges.
+    fn train(&self, task: &Task<'_>) -> Result<Trained, LearnError>;
+
+    /// Samples that it judges at once, if it judges windows.
+    fn window(&self) -> Option<usize> {
+        None
+    }
+
+    /// What its score stays below whatever is seen, where there is such a bound.
+    fn largest_score(_trained: &Trained) -> Option<f64> {
+        None
+    }
+
+    /// How a net is trained where the file does not say.
+    fn training(&self) -> Option<TrainingSettings> {
+        None
+    }
+}
+
+impl<S> DetectorSettings for S
+where
+    S: TrainedSettings + Debug + PartialEq + Serialize + DeserializeOwned + JsonSchema,
+    S: Send + Sync + 'static,
+{
+    const NAME: &'static str = <S as TrainedSettings>::NAME;
+    const ABOUT: &'static str = <S as TrainedSettings>::ABOUT;
+    const TRAINING: Training = Training::Own;
+    const RANDOM: bool = <S as TrainedSettings>::RANDOM;
+    const SUITS: Suits = Suits::NewPaths;
+
+    fn build(&self, setup: &Setup, _hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {
+        runner::build(<S as TrainedSettings>::NAME, setup, S::LOAD)
+    }
+
+    fn learn(&self, task: &Task<'_>) -> Result<(Self, Option<Trained>), LearnError> {
+        Ok((self.clone(), Some(self.train(task)?)))
+    }
+
+    fn window(&self) -> Option<usize> {
+        TrainedSettings::window(self)
+    }
+
+    fn largest_score(trained: &Trained) -> Option<f64> {
+        <S as TrainedSettings>::largest_score(trained)
+    }
+
+    fn found_by_evaluation(&self) -> Vec<&'static str> {
+        let mut settings = self.clone();
+        settings.model().iter().map(|_| "model").collect()
+    }
+
+    fn trained_file(&mut self) -> Option<&mut Option<PathBuf>> {
+        Some(self.model())
+    }
+}
 
 /// How a net is trained: Adam on the mean squared error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -57,16 +136,19 @@ pub(crate) struct GivenTraining {
     learning_rate: Option<f64>,
 }
 
-impl GivenTraining {
-    /// What is given, and `own` in the place of what is not.
-    pub fn or(self, own: TrainingSettings) -> TrainingSettings {
-        TrainingSettings {
-            epochs: self.epochs.unwrap_or(own.epochs),
-            batch: self.batch.unwrap_or(own.batch),
-            dropout: self.dropout.unwrap_or(own.dropout),
-            learning_rate: self.learning_rate.unwrap_or(own.learning_rate),
-        }
-    }
+/// What a file says of the training, and the detector's own in the place of what it leaves out.
+pub(crate) fn training<'de, S: TrainedSettings, D: Deserializer<'de>>(
+    file: D,
+) -> Result<TrainingSettings, D::Error> {
+    let given = GivenTraining::deserialize(file)?;
+    let own = S::default().training();
+    let own = own.ok_or_else(|| serde::de::Error::custom("this detector trains no net"))?;
+    Ok(TrainingSettings {
+        epochs: given.epochs.unwrap_or(own.epochs),
+        batch: given.batch.unwrap_or(own.batch),
+        dropout: given.dropout.unwrap_or(own.dropout),
+        learning_rate: given.learning_rate.unwrap_or(own.learning_rate),
+    })
 }
 
 impl TrainingSettings {

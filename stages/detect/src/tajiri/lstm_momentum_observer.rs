@@ -7,21 +7,11 @@
 
 use std::path::PathBuf;
 
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use schemars::JsonSchema;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 
-use crate::frame::{
-    ConfigError, Detector, DetectorSettings, LearnError, Lessons, Setup, SignalSettings, Suits,
-    Task, Trained, TrainedError, Training,
-};
-use crate::tajiri::learned::{
-    self, Course, GivenTraining, Lstm, LstmScorer, Scorer, TrainingSettings,
-};
-
-/// Canonical name.
-pub(crate) const NAME: &str = "lstm_momentum_observer";
+use crate::frame::{LearnError, SignalSettings, Task, Trained};
+use crate::tajiri::learned::{self, GivenTraining, Load, Lstm, TrainedSettings, TrainingSettings};
 
 /// Settings of `lstm_momentum_observer`. All but `model` are those of its training.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -39,13 +29,9 @@ pub struct Settings {
     #[schemars(range(min = 1, max = 10_000))]
     pub hidden: usize,
     /// How it is trained. `batch` counts samples: 1000 are ten sequences of 100.
-    #[serde(deserialize_with = "training")]
+    #[serde(deserialize_with = "learned::training::<Settings, _>")]
     #[schemars(with = "GivenTraining")]
     pub training: TrainingSettings,
-}
-
-fn training<'de, D: Deserializer<'de>>(file: D) -> Result<TrainingSettings, D::Error> {
-    Ok(GivenTraining::deserialize(file)?.or(Settings::default().training))
 }
 
 impl Default for Settings {
@@ -65,53 +51,28 @@ impl Default for Settings {
     }
 }
 
-impl DetectorSettings for Settings {
-    const NAME: &'static str = NAME;
+impl TrainedSettings for Settings {
+    const NAME: &'static str = "lstm_momentum_observer";
     const ABOUT: &'static str =
         "Momentum observer less what an LSTM expects of it (Tajiri and Iwamoto, after Lim et al.).";
-    const TRAINING: Training = Training::Own;
     const RANDOM: bool = true;
-    const SUITS: Suits = Suits::NewPaths;
+    const LOAD: Load = Lstm::scorer;
 
-    fn build(&self, setup: &Setup, _hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {
-        learned::build(NAME, setup, load)
+    fn model(&mut self) -> &mut Option<PathBuf> {
+        &mut self.model
     }
 
-    fn learn(&self, task: &Task<'_>) -> Result<(Self, Option<Trained>), LearnError> {
-        let trained = train(self, task.setup, &task.lessons, task.seed)?;
-        Ok((self.clone(), Some(trained)))
+    fn train(&self, task: &Task<'_>) -> Result<Trained, LearnError> {
+        Lstm::train(
+            Self::NAME,
+            &self.signals,
+            [self.hidden, self.sequence],
+            &self.training,
+            task,
+        )
     }
 
-    fn found_by_evaluation(&self) -> Vec<&'static str> {
-        self.model.iter().map(|_| "model").collect()
+    fn training(&self) -> Option<TrainingSettings> {
+        Some(self.training)
     }
-
-    fn trained_file(&mut self) -> Option<&mut Option<PathBuf>> {
-        Some(&mut self.model)
-    }
-}
-
-fn load(trained: &Trained) -> Result<Box<dyn Scorer>, TrainedError> {
-    Ok(Box::new(LstmScorer::load(trained)?))
-}
-
-/// Trains it on the contact-free part of the training recordings.
-///
-/// # Errors
-/// If there is no robot's model, too little data, or the training diverges.
-pub fn train(
-    settings: &Settings,
-    setup: &Setup,
-    lessons: &Lessons<'_>,
-    seed: u64,
-) -> Result<Trained, LearnError> {
-    learned::demand(NAME, settings.hidden > 0, "`hidden` must be at least 1")?;
-    settings.training.check(NAME)?;
-    let length = settings.sequence;
-    let course = Course::new(NAME, &settings.signals, length, setup, lessons, seed)?;
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let training = &settings.training;
-    let net = Lstm::fit(&course, settings.hidden, length, training, &mut rng)
-        .map_err(|error| course.failed(error))?;
-    course.end(|trained| net.save(trained), load)
 }

@@ -10,14 +10,8 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::frame::{
-    ConfigError, Detector, DetectorSettings, LearnError, Lessons, Setup, SignalSettings, Suits,
-    Task, Trained, TrainedError, Training,
-};
-use crate::tajiri::learned::{self, Course, OneClass, Scorer, VectorScorer, Vectors};
-
-/// Canonical name.
-pub(crate) const NAME: &str = "point_ocsvm";
+use crate::frame::{LearnError, SignalSettings, Task, Trained};
+use crate::tajiri::learned::{Load, OneClass, TrainedSettings};
 
 /// Samples that a score rests on.
 const WINDOW: usize = 1;
@@ -50,54 +44,27 @@ impl Default for Settings {
     }
 }
 
-impl DetectorSettings for Settings {
-    const NAME: &'static str = NAME;
+impl TrainedSettings for Settings {
+    const NAME: &'static str = "point_ocsvm";
     const ABOUT: &'static str = "One-class support vector machine over the external torques of one sample (Tajiri and Iwamoto).";
-    const TRAINING: Training = Training::Own;
-    const SUITS: Suits = Suits::NewPaths;
+    const RANDOM: bool = false;
+    const LOAD: Load = OneClass::scorer;
 
-    fn build(&self, setup: &Setup, _hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {
-        learned::build(NAME, setup, load)
+    fn model(&mut self) -> &mut Option<PathBuf> {
+        &mut self.model
     }
 
-    fn learn(&self, task: &Task<'_>) -> Result<(Self, Option<Trained>), LearnError> {
-        let trained = train(self, task.setup, &task.lessons, task.seed)?;
-        Ok((self.clone(), Some(trained)))
+    fn train(&self, task: &Task<'_>) -> Result<Trained, LearnError> {
+        OneClass::train(
+            Self::NAME,
+            &self.signals,
+            [WINDOW, self.stride],
+            self.nu,
+            task,
+        )
     }
 
     fn largest_score(trained: &Trained) -> Option<f64> {
         OneClass::largest_score(trained)
     }
-
-    fn found_by_evaluation(&self) -> Vec<&'static str> {
-        self.model.iter().map(|_| "model").collect()
-    }
-
-    fn trained_file(&mut self) -> Option<&mut Option<PathBuf>> {
-        Some(&mut self.model)
-    }
-}
-
-fn load(trained: &Trained) -> Result<Box<dyn Scorer>, TrainedError> {
-    Ok(Box::new(VectorScorer::load(trained, OneClass::load)?))
-}
-
-/// Trains it on the contact-free part of the training recordings. Nothing in it is
-/// random: `seed` is only noted.
-///
-/// # Errors
-/// If there is no robot's model or too little data.
-pub fn train(
-    settings: &Settings,
-    setup: &Setup,
-    lessons: &Lessons<'_>,
-    seed: u64,
-) -> Result<Trained, LearnError> {
-    let share = settings.nu > 0.0 && settings.nu <= 1.0;
-    learned::demand(NAME, share, "`nu` must be above 0 and at most 1")?;
-    learned::demand(NAME, settings.stride > 0, "`stride` must be at least 1")?;
-    let course = Course::new(NAME, &settings.signals, WINDOW, setup, lessons, seed)?;
-    let vectors = Vectors::new(&course, WINDOW, settings.stride);
-    let machine = OneClass::fit(vectors.rows(), vectors.dimensions(), settings.nu);
-    course.end(|trained| vectors.save(&machine, trained), load)
 }

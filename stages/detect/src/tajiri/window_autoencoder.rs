@@ -7,21 +7,13 @@
 
 use std::path::PathBuf;
 
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use schemars::JsonSchema;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 
-use crate::frame::{
-    ConfigError, Detector, DetectorSettings, LearnError, Lessons, Setup, SignalSettings, Suits,
-    Task, Trained, TrainedError, Training,
-};
+use crate::frame::{LearnError, SignalSettings, Task, Trained};
 use crate::tajiri::learned::{
-    self, Autoencoder, Course, GivenTraining, Scorer, TrainingSettings, VectorScorer, Vectors,
+    self, Autoencoder, GivenTraining, Load, TrainedSettings, TrainingSettings,
 };
-
-/// Canonical name.
-pub(crate) const NAME: &str = "window_autoencoder";
 
 /// Settings of `window_autoencoder`. All but `model` are those of its training.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -41,13 +33,9 @@ pub struct Settings {
     /// Units of the middle layers.
     pub layers: Vec<usize>,
     /// How it is trained.
-    #[serde(deserialize_with = "training")]
+    #[serde(deserialize_with = "learned::training::<Settings, _>")]
     #[schemars(with = "GivenTraining")]
     pub training: TrainingSettings,
-}
-
-fn training<'de, D: Deserializer<'de>>(file: D) -> Result<TrainingSettings, D::Error> {
-    Ok(GivenTraining::deserialize(file)?.or(Settings::default().training))
 }
 
 impl Default for Settings {
@@ -69,64 +57,32 @@ impl Default for Settings {
     }
 }
 
-impl DetectorSettings for Settings {
-    const NAME: &'static str = NAME;
+impl TrainedSettings for Settings {
+    const NAME: &'static str = "window_autoencoder";
     const ABOUT: &'static str = "`point_autoencoder` over windows (after Park et al.).";
-    const TRAINING: Training = Training::Own;
     const RANDOM: bool = true;
-    const SUITS: Suits = Suits::NewPaths;
+    const LOAD: Load = Autoencoder::scorer;
 
-    fn build(&self, setup: &Setup, _hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {
-        learned::build(NAME, setup, load)
+    fn model(&mut self) -> &mut Option<PathBuf> {
+        &mut self.model
     }
 
-    fn learn(&self, task: &Task<'_>) -> Result<(Self, Option<Trained>), LearnError> {
-        let trained = train(self, task.setup, &task.lessons, task.seed)?;
-        Ok((self.clone(), Some(trained)))
+    fn train(&self, task: &Task<'_>) -> Result<Trained, LearnError> {
+        let windows = [self.window, self.stride];
+        Autoencoder::train(
+            Self::NAME,
+            &self.signals,
+            windows,
+            (&self.layers, &self.training),
+            task,
+        )
     }
 
     fn window(&self) -> Option<usize> {
         Some(self.window)
     }
 
-    fn found_by_evaluation(&self) -> Vec<&'static str> {
-        self.model.iter().map(|_| "model").collect()
+    fn training(&self) -> Option<TrainingSettings> {
+        Some(self.training)
     }
-
-    fn trained_file(&mut self) -> Option<&mut Option<PathBuf>> {
-        Some(&mut self.model)
-    }
-}
-
-fn load(trained: &Trained) -> Result<Box<dyn Scorer>, TrainedError> {
-    Ok(Box::new(VectorScorer::load(trained, Autoencoder::load)?))
-}
-
-/// Trains it on the contact-free part of the training recordings.
-///
-/// # Errors
-/// If there is no robot's model, too little data, or the training diverges.
-pub fn train(
-    settings: &Settings,
-    setup: &Setup,
-    lessons: &Lessons<'_>,
-    seed: u64,
-) -> Result<Trained, LearnError> {
-    learned::demand(NAME, settings.stride > 0, "`stride` must be at least 1")?;
-    let units = !settings.layers.contains(&0);
-    learned::demand(NAME, units, "every one of `layers` must be at least 1")?;
-    settings.training.check(NAME)?;
-    let course = Course::new(
-        NAME,
-        &settings.signals,
-        settings.window,
-        setup,
-        lessons,
-        seed,
-    )?;
-    let vectors = Vectors::new(&course, settings.window, settings.stride);
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let net = Autoencoder::fit(&vectors, &settings.layers, &settings.training, &mut rng)
-        .map_err(|error| course.failed(error))?;
-    course.end(|trained| vectors.save(&net, trained), load)
 }

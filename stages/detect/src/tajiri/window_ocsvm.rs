@@ -11,14 +11,8 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::frame::{
-    ConfigError, Detector, DetectorSettings, LearnError, Lessons, Setup, SignalSettings, Suits,
-    Task, Trained, TrainedError, Training,
-};
-use crate::tajiri::learned::{self, Course, OneClass, Scorer, VectorScorer, Vectors};
-
-/// Canonical name.
-pub(crate) const NAME: &str = "window_ocsvm";
+use crate::frame::{LearnError, SignalSettings, Task, Trained};
+use crate::tajiri::learned::{Load, OneClass, TrainedSettings};
 
 /// Settings of `window_ocsvm`. All but `model` are those of its training.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -53,19 +47,24 @@ impl Default for Settings {
     }
 }
 
-impl DetectorSettings for Settings {
-    const NAME: &'static str = NAME;
+impl TrainedSettings for Settings {
+    const NAME: &'static str = "window_ocsvm";
     const ABOUT: &'static str = "`point_ocsvm` over windows (after Park et al.).";
-    const TRAINING: Training = Training::Own;
-    const SUITS: Suits = Suits::NewPaths;
+    const RANDOM: bool = false;
+    const LOAD: Load = OneClass::scorer;
 
-    fn build(&self, setup: &Setup, _hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {
-        learned::build(NAME, setup, load)
+    fn model(&mut self) -> &mut Option<PathBuf> {
+        &mut self.model
     }
 
-    fn learn(&self, task: &Task<'_>) -> Result<(Self, Option<Trained>), LearnError> {
-        let trained = train(self, task.setup, &task.lessons, task.seed)?;
-        Ok((self.clone(), Some(trained)))
+    fn train(&self, task: &Task<'_>) -> Result<Trained, LearnError> {
+        OneClass::train(
+            Self::NAME,
+            &self.signals,
+            [self.window, self.stride],
+            self.nu,
+            task,
+        )
     }
 
     fn window(&self) -> Option<usize> {
@@ -75,43 +74,4 @@ impl DetectorSettings for Settings {
     fn largest_score(trained: &Trained) -> Option<f64> {
         OneClass::largest_score(trained)
     }
-
-    fn found_by_evaluation(&self) -> Vec<&'static str> {
-        self.model.iter().map(|_| "model").collect()
-    }
-
-    fn trained_file(&mut self) -> Option<&mut Option<PathBuf>> {
-        Some(&mut self.model)
-    }
-}
-
-fn load(trained: &Trained) -> Result<Box<dyn Scorer>, TrainedError> {
-    Ok(Box::new(VectorScorer::load(trained, OneClass::load)?))
-}
-
-/// Trains it on the contact-free part of the training recordings. Nothing in it is
-/// random: `seed` is only noted.
-///
-/// # Errors
-/// If there is no robot's model or too little data.
-pub fn train(
-    settings: &Settings,
-    setup: &Setup,
-    lessons: &Lessons<'_>,
-    seed: u64,
-) -> Result<Trained, LearnError> {
-    let share = settings.nu > 0.0 && settings.nu <= 1.0;
-    learned::demand(NAME, share, "`nu` must be above 0 and at most 1")?;
-    learned::demand(NAME, settings.stride > 0, "`stride` must be at least 1")?;
-    let course = Course::new(
-        NAME,
-        &settings.signals,
-        settings.window,
-        setup,
-        lessons,
-        seed,
-    )?;
-    let vectors = Vectors::new(&course, settings.window, settings.stride);
-    let machine = OneClass::fit(vectors.rows(), vectors.dimensions(), settings.nu);
-    course.end(|trained| vectors.save(&machine, trained), load)
 }

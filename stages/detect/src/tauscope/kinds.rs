@@ -5,18 +5,12 @@
 //! side, and a tool at rest. And what is stiff pushes back at once, a hand takes its time. Fisher's linear discriminant weighs that.
 
 use nalgebra::{Matrix6, Vector6};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-use super::learnt::Learnt;
+use super::learnt::{KindContacts, Kinds, Learnt, MEASURED};
 use super::place::ToolTouch;
 use super::{NAME, Tauscope};
 use crate::frame::{ContactKind, Detector, Discriminant, Lessons, Moments, Setup};
 
-pub use crate::frame::Discriminant as Kinds;
-
-/// How many measurements tell the kinds.
-const MEASURED: usize = 3;
 /// A tool slower than this has no direction of motion \[m/s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const STANDSTILL_M_PER_S: f64 = 0.005;
@@ -115,18 +109,6 @@ pub(crate) fn learn(
     enough.then(|| (own.and(&prior()).discriminant(), KindContacts::of(&own)))
 }
 
-/// The contacts that the kinds were learnt from, without the prior. Measurements are those of [`measurements`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct KindContacts {
-    /// How many collisions and cooperations there were.
-    pub counts: [f64; 2],
-    /// Mean measurements of either.
-    pub means: [[f64; MEASURED]; 2],
-    /// Covariance of the measurements within a kind.
-    pub covariance: [[f64; MEASURED]; MEASURED],
-}
-
 impl KindContacts {
     fn of(moments: &Moments) -> Self {
         let all = moments.counts[0] + moments.counts[1];
@@ -155,7 +137,8 @@ impl KindContacts {
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope), where kinds are told; not swept.
 const PRIOR_CONTACTS: f64 = 40.0;
 /// Mean measurements of collisions and cooperations.
-/// Statistical: over the contacts that `tests/contacts/kinds_prior.py` simulates and measures.
+/// Statistical: over 892 contacts of simulated arms under impedance control, whose seeds are not known any more;
+/// `tests/contacts/kinds_prior.py` measures such contacts anew.
 const PRIOR_MEANS: [[f64; MEASURED]; 2] = [[0.83, -1.95, 2.18], [-0.04, -3.11, 0.35]];
 /// Covariance of the measurements within a kind.
 /// Statistical: over the same contacts.

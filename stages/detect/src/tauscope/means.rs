@@ -3,18 +3,10 @@
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 
 use super::learnt::LearntJoint;
+use super::spans::{Follow, LONG, MIDDLE, SHORTEST, WINDOWS_S};
 use super::sums::Sums;
 use super::usual::{Step, Usual};
 
-/// Lengths of the windows \[s\]; the last one is used where it pays.
-/// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
-pub(crate) const WINDOWS_S: [f64; 4] = [0.01, 0.03, 0.1, 0.2];
-/// The window that tells how a contact begins.
-pub(crate) const SHORTEST: usize = 0;
-/// The window that a contact is followed by.
-pub(crate) const MIDDLE: usize = 1;
-/// The window that tells what is usual just now.
-pub(super) const LONG: usize = 2;
 /// So much of the usual noise of the next shorter window's mean a longer one's may be away from it: what has gone is not told any longer.
 /// Statistical: two standard deviations hold 95 % of Gaussian noise.
 const BORNE_OUT: f64 = 2.0;
@@ -46,15 +38,6 @@ pub(super) fn borne_out(
 /// Whichever is closer to 0; the first where the second is not known.
 fn smaller(a: f64, b: f64) -> f64 {
     if b.abs() < a.abs() { b } else { a }
-}
-
-/// How the slow part of a residual is had.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Follow {
-    /// Time constant \[s\].
-    pub drift_s: f64,
-    /// The mean of so much at the beginning \[s\]; 0 for none.
-    pub offset_from_first_s: f64,
 }
 
 /// Running means of the residual over each window.

@@ -4,8 +4,9 @@ use nalgebra::DMatrix;
 use tauscope_bus::{TwinState, flags};
 
 use super::learnt::{BINS, ENOUGH_S, LearntJoint, LearntWindow, bin};
-use super::means::{Follow, Means, WINDOWS_S};
+use super::means::Means;
 use super::pieces::{Piece, free, marked};
+use super::spans::{Follow, WINDOWS_S};
 
 /// The noise of a class of speed is taken for the joint's where it has not lasted longer than this \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.

@@ -3,7 +3,7 @@
 use tauscope_bus::{JointArray, TwinState, flags};
 
 use super::late::LateIn;
-use super::means::Follow;
+use super::spans::Follow;
 use crate::frame::{Lesson, Lessons};
 
 /// So much before a labelled contact is left out \[ns\].

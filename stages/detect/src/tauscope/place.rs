@@ -9,8 +9,8 @@
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 
-use super::means::SHORTEST;
 use super::points::{POINTS, Points};
+use super::spans::SHORTEST;
 use super::windows::Windows;
 use crate::frame::{Contact, Setup};
 

@@ -7,13 +7,12 @@
 //! of what it had along the contact, whatever else has stayed. What it is then is the new rest, and for a while so much of the contact's size
 //! is needed for another one as may be creep.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState, flags};
 
-use super::learnt::ENOUGH_S;
-use super::means::{LONG, MIDDLE, SHORTEST, WINDOWS_S, borne_out};
+use super::learnt::{ENOUGH_S, LearntRest};
+use super::means::borne_out;
 use super::pieces::{Piece, marked, quantile};
+use super::spans::{LONG, MIDDLE, SHORTEST, WINDOWS_S};
 use super::stand::{End, Stand};
 use super::sums::Sums;
 use super::tail::{Peaks, Tail};
@@ -52,24 +51,7 @@ const STEADY: JointArray = [0.0; MAX_JOINTS];
 /// By window and joint.
 type Changes = [JointArray; WINDOWS_S.len()];
 
-/// How the mean effort of a standing arm changes while nothing touches it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct LearntRest {
-    /// By window and joint, what two of three changes stay below \[effort unit\].
-    pub noise: Vec<Vec<f64>>,
-    /// Squared length in units of that noise that one of a hundred contact-free samples exceeds.
-    pub usual: f64,
-    /// How often the score exceeds what by chance.
-    pub tail: Tail,
-}
-
 impl LearntRest {
-    /// Whether it holds what `joints` need.
-    pub(super) fn is_whole(&self, joints: usize) -> bool {
-        self.noise.len() == WINDOWS_S.len() && self.noise.iter().all(|noise| noise.len() == joints)
-    }
-
     /// Root of the largest squared length of the windows' changes, in units of the usual.
     fn size(&self, changes: &Changes) -> f64 {
         let joints = self.noise[SHORTEST].len();

@@ -1,34 +1,18 @@
 //! The smallest force that would be found, link by link.
 
 use nalgebra::Vector3;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use tauscope_bus::MAX_JOINTS;
 
 use super::late::LateIn;
-use super::learnt::Learnt;
-use super::means::Follow;
+use super::learnt::{Learnt, Smallest};
 use super::pieces::pieces;
 use super::place::Place;
+use super::spans::Follow;
 use crate::frame::{Lessons, Setup};
 
 /// Of the contact-free samples every so many is a posture that is asked about.
 /// Tuned: for what it costs in time; not swept.
 const EVERY: usize = 50;
-
-/// The force on a link that reaches a score of 1 once it has lasted as long as the longest window; it grows with the root of the score.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Smallest {
-    /// The link.
-    pub link: String,
-    /// In half of the postures and directions no more is needed \[N\]; none where they are not felt.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub half_n: Option<f64>,
-    /// In nine of ten of them \[N\].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub most_n: Option<f64>,
-}
 
 /// By link, over the postures and speeds of contact-free recordings, the points of the link and the directions of the
 /// world's axes; empty without a model.

@@ -2,8 +2,8 @@
 
 use tauscope_bus::{JointArray, MAX_JOINTS};
 
-use super::means::WINDOWS_S;
 use super::ring::Ring;
+use super::spans::WINDOWS_S;
 
 /// Most samples of a window.
 /// Physical: holds the longest window, 0.2 s, up to 5 kHz; arms are read at 1 kHz and less.

@@ -3,8 +3,9 @@
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 
 use super::learnt::{Learnt, bin};
-use super::means::{Follow, LONG, MIDDLE, Means, SHORTEST, WINDOWS_S, borne_out};
+use super::means::{Means, borne_out};
 use super::rest::Rest;
+use super::spans::{Follow, LONG, MIDDLE, SHORTEST, WINDOWS_S};
 use super::stand::{End, Stand};
 
 /// A standing arm that is pushed gives way no faster than this \[rad/s, m/s\].

@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "each test file uses its own part")]
 
+pub mod counting;
+
 use tauscope_bus::{Detection, Emit, LinkError};
 use tauscope_detect::{JointSetup, Setup};
 

@@ -142,11 +142,6 @@ impl Hypothesis {
         self.effect.traits.drawn_over == Some(Against::Position)
     }
 
-    /// Whether it multiplies all effort of a joint.
-    pub fn is_gain(&self) -> bool {
-        self.effect.traits.is_scale
-    }
-
     /// How it depends on time.
     pub fn time_kind(&self) -> TimeKind {
         self.effect.time()

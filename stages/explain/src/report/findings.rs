@@ -174,6 +174,7 @@ pub fn of(
             }
             named.next_motions.push(next);
         }
+        let grounds = Grounds::of(fit, &less.fit, active, evidence);
         named.findings.push(Finding {
             effect: active.hypothesis.said().to_owned(),
             joint,
@@ -181,11 +182,13 @@ pub fn of(
             parameters,
             intervals_95: intervals,
             in_amperes,
-            confidence: confidence(Grounds::of(fit, &less.fit, active, evidence)),
+            confidence: confidence(grounds),
             recording: when.recording,
             t_start: when.start,
             t_end: when.end,
             explains: (mismatch(&less.fit, fit, before) / total).clamp(0.0, 1.0),
+            over_rest: grounds.over_rest,
+            evidence_nats: evidence,
             equivalent_to,
             sentence,
         });

@@ -83,6 +83,12 @@ pub struct Finding {
     pub t_end: Option<f64>,
     /// Share of the mismatch's variance, over all joints in units of their noise, that needs it.
     pub explains: f64,
+    /// What it explains over what is left beside it: squares, at the joint where that is most.
+    #[serde(default)]
+    pub over_rest: f64,
+    /// Evidence for it rather than for leaving it out, each row counted as a fraction of an independent sample \[nats\].
+    #[serde(default)]
+    pub evidence_nats: f64,
     /// Rivals that this data cannot tell apart, most probable first.
     pub equivalent_to: Vec<Rival>,
     /// In words.

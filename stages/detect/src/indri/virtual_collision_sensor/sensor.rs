@@ -1,12 +1,12 @@
 //! The whole sensor: the joints' blocks one by one (section 5), the request for learning, and the
 //! alarm over all of them.
 
-use tauscope_bus::{TwinState, flags};
+use tauscope_bus::{MAX_JOINTS, TwinState, flags};
 use tauscope_dynamics::lowpass::Butterworth2;
 
 use super::bias::{Bias, LearningState, Service};
 use super::blocks::Blocks;
-use super::joint::{Joint, Reading, Tuning};
+use super::joint::{Currents, Joint, Reading, Tuning};
 use super::learnt::Learnt;
 use super::validity::Validity;
 use crate::frame::{Detector, Judgement, Seen, Shared, State, Tap, Verdict};
@@ -65,6 +65,19 @@ pub(crate) struct Sensor {
     newest_low_ns: Option<i64>,
     alarm: Option<Alarm>,
     newest_alarm_ns: Option<i64>,
+}
+
+/// What all joints say of a sample.
+#[derive(Default)]
+struct Readings {
+    /// The largest ratio of residue and threshold, of all joints and of those that are tested.
+    ratio: f64,
+    score: f64,
+    /// Joints that see a collision, and whose model is wrong: bit j for joint j.
+    colliding: u32,
+    wrong: u32,
+    /// Whether the model of one may be wrong.
+    doubtful: bool,
 }
 
 impl Sensor {
@@ -130,6 +143,36 @@ impl Sensor {
         self.newest_low_ns = None;
         self.alarm = None;
         self.newest_alarm_ns = None;
+    }
+
+    /// Reads every joint. Where the sensor is ready, its model is judged, and its bias learnt if what it does is `usual`.
+    fn read(
+        &mut self,
+        dt_s: f64,
+        currents: &[Currents; MAX_JOINTS],
+        usual: Option<bool>,
+    ) -> Readings {
+        let mut all = Readings::default();
+        for (j, joint) in self.joints.iter_mut().enumerate() {
+            let reading: Reading = joint.read(dt_s, &currents[j]);
+            let of_joint = reading.ratio();
+            all.ratio = all.ratio.max(of_joint);
+            if reading.phase.is_tested() {
+                all.score = all.score.max(of_joint);
+            }
+            let Some(usual) = usual else {
+                continue;
+            };
+            let validity = &mut self.validity[j];
+            validity.update(dt_s, reading.residue);
+            all.doubtful |= validity.is_doubtful();
+            all.wrong |= u32::from(validity.is_wrong()) << j;
+            all.colliding |= u32::from(reading.collides()) << j;
+            if usual {
+                joint.estimate_bias(&reading);
+            }
+        }
+        all
     }
 
     /// The step of the learning machine.
@@ -222,26 +265,8 @@ impl Detector for Sensor {
         let usual = self
             .newest_alarm_ns
             .is_none_or(|newest| stamp_ns - newest > AFTER_ALARM_NS);
-        let (mut score, mut ratio) = (0.0_f64, 0.0_f64);
-        let (mut colliding, mut wrong, mut doubtful) = (0, 0, false);
-        for (j, joint) in self.joints.iter_mut().enumerate() {
-            let reading: Reading = joint.read(dt_s, &step.currents[j]);
-            let of_joint = reading.ratio();
-            ratio = ratio.max(of_joint);
-            if reading.phase.is_tested() {
-                score = score.max(of_joint);
-            }
-            if ready {
-                let validity = &mut self.validity[j];
-                validity.update(dt_s, reading.residue);
-                doubtful |= validity.is_doubtful();
-                wrong |= u32::from(validity.is_wrong()) << j;
-                colliding |= u32::from(reading.collides()) << j;
-                if usual {
-                    joint.estimate_bias(&reading);
-                }
-            }
-        }
+        let all = self.read(dt_s, &step.currents, ready.then_some(usual));
+        let score = all.score;
         if !ready {
             self.alarm = None;
             self.newest_low_ns = None;
@@ -251,8 +276,8 @@ impl Detector for Sensor {
                 verdict: None,
             };
         }
-        let alarm = self.alarm(stamp_ns, colliding, wrong, doubtful);
-        if ratio < LOW_RATIO || self.newest_low_ns.is_none() {
+        let alarm = self.alarm(stamp_ns, all.colliding, all.wrong, all.doubtful);
+        if all.ratio < LOW_RATIO || self.newest_low_ns.is_none() {
             self.newest_low_ns = Some(stamp_ns);
             for joint in &mut self.joints {
                 joint.trust_bias();

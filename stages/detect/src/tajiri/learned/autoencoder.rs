@@ -2,12 +2,14 @@
 //! output as it is. It learns to give back its input; what it cannot give back is unlike its training.
 
 use candle_core::{Device, Tensor, Var};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::TrainingSettings;
+use super::runner::{Course, Scorer};
 use super::training::{drop_out, fit, numbers, start};
-use super::vectors::{VectorModel, Vectors};
-use crate::frame::{Trained, TrainedError};
+use super::vectors::{VectorModel, VectorScorer, Vectors};
+use super::{TrainingSettings, demand};
+use crate::frame::{LearnError, SignalSettings, Task, Trained, TrainedError};
 
 /// A trained autoencoder.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +29,37 @@ struct Dense {
 }
 
 impl Autoencoder {
+    /// The detector `name` over windows of so many samples, one every so many, with so many units in the middle layers.
+    ///
+    /// # Errors
+    /// If a setting is out of range, there is no robot's model, too little data, or the training diverges.
+    pub fn train(
+        name: &'static str,
+        signals: &SignalSettings,
+        [window, stride]: [usize; 2],
+        (layers, training): (&[usize], &TrainingSettings),
+        task: &Task<'_>,
+    ) -> Result<Trained, LearnError> {
+        demand(name, stride > 0, "`stride` must be at least 1")?;
+        let units = !layers.contains(&0);
+        demand(name, units, "every one of `layers` must be at least 1")?;
+        training.check(name)?;
+        let course = Course::new(name, signals, window, task)?;
+        let vectors = Vectors::new(&course, window, stride);
+        let mut rng = ChaCha8Rng::seed_from_u64(task.seed);
+        let net = Self::fit(&vectors, layers, training, &mut rng);
+        let net = net.map_err(|error| course.failed(error))?;
+        course.end(|trained| vectors.save(&net, trained), Self::scorer)
+    }
+
+    /// What scores, from a trained detector.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub fn scorer(trained: &Trained) -> Result<Box<dyn Scorer>, TrainedError> {
+        Ok(Box::new(VectorScorer::load(trained, Self::load)?))
+    }
+
     /// Trains with middle layers of `middle` units.
     ///
     /// # Errors
@@ -157,7 +190,7 @@ fn forward(
 
 #[cfg(test)]
 mod tests {
-    use rand::{Rng, SeedableRng};
+    use rand::Rng;
 
     use super::*;
 

@@ -3,15 +3,15 @@
 
 use candle_core::{D, DType, Device, Tensor, Var};
 use candle_nn::ops::sigmoid;
-use rand::Rng;
+use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::TrainingSettings;
 use super::runner::{Course, Scorer};
 use super::scaling::Scaling;
 use super::signals::Signal;
 use super::training::{drop_out, fit, numbers, start};
-use crate::frame::{Trained, TrainedError};
+use super::{TrainingSettings, demand};
+use crate::frame::{LearnError, SignalSettings, Task, Trained, TrainedError};
 
 /// Input numbers a joint: q(t), q̇(t), q̇(t-1).
 const INPUTS: usize = 3;
@@ -43,6 +43,34 @@ struct Sequence {
 }
 
 impl Lstm {
+    /// The detector `name` with so many hidden units, on sequences of so many samples.
+    ///
+    /// # Errors
+    /// If a setting is out of range, there is no robot's model, too little data, or the training diverges.
+    pub fn train(
+        name: &'static str,
+        signals: &SignalSettings,
+        [hidden, length]: [usize; 2],
+        training: &TrainingSettings,
+        task: &Task<'_>,
+    ) -> Result<Trained, LearnError> {
+        demand(name, hidden > 0, "`hidden` must be at least 1")?;
+        training.check(name)?;
+        let course = Course::new(name, signals, length, task)?;
+        let mut rng = ChaCha8Rng::seed_from_u64(task.seed);
+        let net = Self::fit(&course, hidden, length, training, &mut rng);
+        let net = net.map_err(|error| course.failed(error))?;
+        course.end(|trained| net.save(trained), Self::scorer)
+    }
+
+    /// What scores, from a trained detector.
+    ///
+    /// # Errors
+    /// If an array is not there or has another shape.
+    pub fn scorer(trained: &Trained) -> Result<Box<dyn Scorer>, TrainedError> {
+        Ok(Box::new(LstmScorer::load(trained)?))
+    }
+
     /// Trains on sequences of `length` samples, with `hidden` units.
     ///
     /// # Errors
@@ -56,7 +84,12 @@ impl Lstm {
     ) -> candle_core::Result<Self> {
         let joints = course.joint_count();
         let (inputs, outputs): (Vec<_>, Vec<_>) = (course.stretches().iter().flatten())
-            .map(|signal| (input(signal, joints), signal.torque[..joints].to_vec()))
+            .map(|signal| {
+                (
+                    input(signal, joints).collect::<Vec<_>>(),
+                    signal.torque[..joints].to_vec(),
+                )
+            })
             .unzip();
         let input_scaling = Scaling::fit(INPUTS * joints, inputs.iter().map(Vec::as_slice));
         let output_scaling = Scaling::fit(joints, outputs.iter().map(Vec::as_slice));
@@ -194,17 +227,15 @@ impl Lstm {
 }
 
 /// q(t), q̇(t), q̇(t-1) of all joints.
-fn input(signal: &Signal, joints: usize) -> Vec<f64> {
+fn input(signal: &Signal, joints: usize) -> impl Iterator<Item = f64> + '_ {
     let parts = [
         &signal.position,
         &signal.velocity,
         &signal.previous_velocity,
     ];
     parts
-        .iter()
-        .flat_map(|part| &part[..joints])
-        .copied()
-        .collect()
+        .into_iter()
+        .flat_map(move |part| part[..joints].iter().copied())
 }
 
 fn sequence(stretch: &[Signal], joints: usize, inputs: &Scaling, outputs: &Scaling) -> Sequence {
@@ -214,7 +245,7 @@ fn sequence(stretch: &[Signal], joints: usize, inputs: &Scaling, outputs: &Scali
         len: stretch.len(),
     };
     for signal in stretch {
-        let mut row = input(signal, joints);
+        let mut row: Vec<f64> = input(signal, joints).collect();
         inputs.apply(&mut row);
         sequence.inputs.extend(row.iter().map(|&x| x as f32));
         let mut row = signal.torque[..joints].to_vec();
@@ -258,6 +289,7 @@ pub(crate) struct LstmScorer {
     /// Samples until the net has seen as many as in training.
     window: usize,
     seen: usize,
+    input: Vec<f64>,
     hidden: Vec<f32>,
     cell: Vec<f32>,
     gates: Vec<f32>,
@@ -276,6 +308,7 @@ impl LstmScorer {
         Self {
             window,
             seen: 0,
+            input: Vec::with_capacity(INPUTS * net.joints),
             hidden: vec![0.0; net.hidden],
             cell: vec![0.0; net.hidden],
             gates: vec![0.0; 4 * net.hidden],
@@ -287,10 +320,15 @@ impl LstmScorer {
 impl Scorer for LstmScorer {
     /// `|τ_ext - τ̂_ext|²` \[(N m)²\].
     fn score(&mut self, signal: &Signal) -> Option<f64> {
-        let mut input = input(signal, self.net.joints);
-        self.net.input_scaling.apply(&mut input);
-        self.net
-            .step(&input, &mut self.hidden, &mut self.cell, &mut self.gates);
+        self.input.clear();
+        self.input.extend(input(signal, self.net.joints));
+        self.net.input_scaling.apply(&mut self.input);
+        self.net.step(
+            &self.input,
+            &mut self.hidden,
+            &mut self.cell,
+            &mut self.gates,
+        );
         self.seen += 1;
         if self.seen < self.window {
             return None;
@@ -311,7 +349,6 @@ impl Scorer for LstmScorer {
 
 #[cfg(test)]
 mod tests {
-    use rand::SeedableRng;
 
     use super::*;
 

@@ -4,8 +4,10 @@
 use libsvm_rs::train::svm_train;
 use libsvm_rs::{KernelType, SvmNode, SvmParameter, SvmProblem, SvmType};
 
-use super::vectors::VectorModel;
-use crate::frame::{Trained, TrainedError};
+use super::demand;
+use super::runner::{Course, Scorer};
+use super::vectors::{VectorModel, VectorScorer, Vectors};
+use crate::frame::{LearnError, SignalSettings, Task, Trained, TrainedError};
 
 /// Memory for kernel values while training \[MB\].
 /// Tuned: for what it costs in time; not swept.
@@ -70,6 +72,39 @@ impl OneClass {
         }
     }
 
+    /// The detector `name` over windows of so many samples, one every so many; nothing in its training is random.
+    ///
+    /// # Errors
+    /// If a setting is out of range, there is no robot's model, or too little data.
+    pub fn train(
+        name: &'static str,
+        signals: &SignalSettings,
+        [window, stride]: [usize; 2],
+        nu: f64,
+        task: &Task<'_>,
+    ) -> Result<Trained, LearnError> {
+        let share = nu > 0.0 && nu <= 1.0;
+        demand(name, share, "`nu` must be above 0 and at most 1")?;
+        demand(name, stride > 0, "`stride` must be at least 1")?;
+        let course = Course::new(name, signals, window, task)?;
+        let vectors = Vectors::new(&course, window, stride);
+        let machine = Self::fit(vectors.rows(), vectors.dimensions(), nu);
+        course.end(|trained| vectors.save(&machine, trained), Self::scorer)
+    }
+
+    /// What scores, from a trained detector.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub fn scorer(trained: &Trained) -> Result<Box<dyn Scorer>, TrainedError> {
+        Ok(Box::new(VectorScorer::load(trained, Self::load)?))
+    }
+
+    /// ρ, which no score exceeds.
+    pub fn largest_score(trained: &Trained) -> Option<f64> {
+        Some(trained.get_f64("svm.rho", &[1]).ok()?[0])
+    }
+
     /// What [`VectorModel::save`] kept.
     ///
     /// # Errors
@@ -83,13 +118,6 @@ impl OneClass {
             alpha: from.get_f64("svm.alpha", &[count])?,
             vectors: from.get_f64("svm.vectors", &[count, dimensions])?,
         })
-    }
-}
-
-impl OneClass {
-    /// ρ, which no score exceeds.
-    pub fn largest_score(trained: &Trained) -> Option<f64> {
-        Some(trained.get_f64("svm.rho", &[1]).ok()?[0])
     }
 }
 

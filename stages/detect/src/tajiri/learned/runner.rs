@@ -8,8 +8,8 @@ use super::demand;
 use super::signals::{Signal, Signals};
 use crate::frame::rate::Rate;
 use crate::frame::{
-    ConfigError, Detector, Facts, Judgement, LearnError, Lessons, ScoreStatistics, Setup,
-    SignalSettings, Trained, TrainedError,
+    ConfigError, Detector, Facts, Judgement, LearnError, ScoreStatistics, Setup, SignalSettings,
+    Task, Trained, TrainedError,
 };
 
 /// What a detector makes of the signals, sample by sample.
@@ -22,7 +22,7 @@ pub(crate) trait Scorer: Send {
 }
 
 /// Reads a scorer from a trained detector.
-type Load = fn(&Trained) -> Result<Box<dyn Scorer>, TrainedError>;
+pub(crate) type Load = fn(&Trained) -> Result<Box<dyn Scorer>, TrainedError>;
 
 /// The detector `name`, as `setup` has it trained.
 ///
@@ -120,9 +120,7 @@ impl Detector for Learned {
 pub(crate) struct Course<'a> {
     name: &'static str,
     settings: SignalSettings,
-    setup: &'a Setup,
-    lessons: &'a Lessons<'a>,
-    seed: u64,
+    task: &'a Task<'a>,
     window: usize,
     joints: Vec<String>,
     stretches: Vec<Vec<Signal>>,
@@ -138,9 +136,7 @@ impl<'a> Course<'a> {
         name: &'static str,
         settings: &SignalSettings,
         window: usize,
-        setup: &'a Setup,
-        lessons: &'a Lessons<'a>,
-        seed: u64,
+        task: &'a Task<'a>,
     ) -> Result<Self, LearnError> {
         if let Some(what) = settings.fault() {
             return Err(LearnError::Setting {
@@ -149,8 +145,9 @@ impl<'a> Course<'a> {
             });
         }
         demand(name, window > 0, "a window must hold at least one sample")?;
-        let joints = joint_names(name, setup)?;
-        let mut stretches = Signals::new(settings, setup, name)?.stretches(lessons.train);
+        let joints = joint_names(name, task.setup)?;
+        let mut signals = Signals::new(settings, task.setup, name)?;
+        let mut stretches = signals.stretches(task.lessons.train);
         let longest = stretches.iter().map(Vec::len).max().unwrap_or(0);
         let wanted = window.max(2);
         if longest < wanted {
@@ -164,9 +161,7 @@ impl<'a> Course<'a> {
         Ok(Self {
             name,
             settings: *settings,
-            setup,
-            lessons,
-            seed,
+            task,
             window,
             joints,
             stretches,
@@ -210,18 +205,18 @@ impl<'a> Course<'a> {
             // Three decimals, which every reader of JSON gives back unchanged.
             rate_hz: (1e3 * (samples - self.stretches.len()) as f64 / seconds).round() / 1e3,
             samples: samples as u64,
-            seed: self.seed,
+            seed: self.task.seed,
             signals: self.settings,
             window: self.window,
             provenance: std::collections::BTreeMap::new(),
         });
         save(&mut trained);
-        let mut setup = self.setup.clone();
+        let mut setup = self.task.setup.clone();
         let key = self.name.to_owned();
         setup.trained.insert(key, Arc::new(trained.clone()));
         let mut detector = build(self.name, &setup, load)?;
-        let lessons = match self.lessons.validation {
-            [] => self.lessons.train,
+        let lessons = match self.task.lessons.validation {
+            [] => self.task.lessons.train,
             validation => validation,
         };
         let mut scores = Vec::new();

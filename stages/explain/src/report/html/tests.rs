@@ -39,6 +39,8 @@ fn finding(effect: &str, sentence: &str) -> Finding {
         t_start: None,
         t_end: None,
         explains: 0.63,
+        over_rest: 9.0,
+        evidence_nats: 40.0,
         equivalent_to: Vec::new(),
         sentence: sentence.to_owned(),
     }
