@@ -35,13 +35,12 @@ fn texts() -> Vec<(PathBuf, String)> {
 fn anchors(text: &str) -> Vec<String> {
     headings(text)
         .map(|heading| {
-            let kept = heading
+            heading
                 .to_lowercase()
                 .replace(' ', "-")
                 .chars()
                 .filter(|c| c.is_alphanumeric() || *c == '-' || *c == '_')
-                .collect();
-            kept
+                .collect()
         })
         .collect()
 }

@@ -272,7 +272,12 @@ fn learn(
                 // What its random siblings say, too, is said once.
                 let warning = runner.config.warning(&setup);
                 notes.extend(warning.filter(|warning| !notes.contains(warning)));
-                notes.extend(runner.config.all().filter_map(|settings| settings.note()));
+                notes.extend(
+                    runner
+                        .config
+                        .all()
+                        .filter_map(tauscope_detect::AnySettings::note),
+                );
                 runners.push(runner);
             }
             Err(EvaluateError::Learn { detector, source }) if !request.explicit => {

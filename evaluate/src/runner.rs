@@ -120,7 +120,9 @@ impl Runner {
 
     /// How many samples it judges at once, if it judges windows.
     pub fn window(&self) -> Option<usize> {
-        self.config.all().find_map(|settings| settings.window())
+        self.config
+            .all()
+            .find_map(tauscope_detect::AnySettings::window)
     }
 
     /// Lets the next recording of the session pass through.

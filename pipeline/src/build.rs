@@ -51,6 +51,9 @@ pub fn ingest_setup(cell: &Cell) -> tauscope_ingest::Setup {
 
 /// A source of `cell`. One that is started again goes on behind the sample with the stamp
 /// `after_ns`.
+///
+/// # Errors
+/// If the source cannot be opened; [`IngestError::is_input`] tells whose fault that is.
 pub fn ingest(
     config: &tauscope_ingest::Config,
     robot: Option<&SimulatedRobot>,
@@ -116,6 +119,9 @@ impl Source<JointState> for After {
 }
 
 /// What `model` corrects in `cell`; nothing without one.
+///
+/// # Errors
+/// If the model does not fit the cell.
 pub fn correction(model: Option<&TwinFile>, cell: &Cell) -> Result<Correction, BuildError> {
     let joints = &cell.facts.joint_names;
     Ok(match model {
@@ -125,6 +131,9 @@ pub fn correction(model: Option<&TwinFile>, cell: &Cell) -> Result<Correction, B
 }
 
 /// A twin of `cell`.
+///
+/// # Errors
+/// If the model does not fit the cell, or the twin cannot be built from its configuration.
 pub fn twin(
     config: &tauscope_twin::Config,
     model: Option<&TwinFile>,
@@ -143,6 +152,9 @@ pub fn twin(
 }
 
 /// A detector behind a twin of `cell` with this `model`, and what it shares with others.
+///
+/// # Errors
+/// If the model does not fit the cell, a trained file cannot be read, or the configuration is none.
 pub fn detect(
     config: &tauscope_detect::Config,
     model: Option<&TwinFile>,
@@ -156,6 +168,9 @@ pub fn detect(
 }
 
 /// What a detector behind a twin of `cell` with this `model` must know.
+///
+/// # Errors
+/// If the model does not fit the cell.
 pub fn detect_setup(
     model: Option<&TwinFile>,
     cell: &Cell,
@@ -201,6 +216,9 @@ pub fn detect_setup(
 }
 
 /// A watch over a twin of `cell` with this `model` and low-pass on efforts.
+///
+/// # Errors
+/// If the model does not fit the cell.
 pub fn watch(
     config: &watch::Config,
     model: Option<&TwinFile>,
@@ -230,6 +248,9 @@ pub struct StreamFacts {
 }
 
 /// A recorder of `streams`, which belong to `cells`.
+///
+/// # Errors
+/// If cells, streams and file names do not fit together, or a file cannot be made.
 pub fn recorder(
     config: &tauscope_record::Config,
     cells: &[&Cell],

@@ -8,6 +8,9 @@ use std::path::Path;
 use sha2::{Digest, Sha256};
 
 /// SHA-256 of a file, or of all files of a bag's folder in the order of their names, in hexadecimal.
+///
+/// # Errors
+/// If the file cannot be read.
 pub fn sha256_of_file(path: &Path) -> std::io::Result<String> {
     let mut files = vec![path.to_owned()];
     if path.is_dir() {

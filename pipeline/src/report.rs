@@ -78,6 +78,7 @@ impl Problem {
     }
 
     /// Says `text` at the place itself.
+    #[must_use]
     pub fn label(mut self, text: impl Into<String>) -> Self {
         if let Some(label) = self.labels.first_mut() {
             label.text = text.into();
@@ -86,6 +87,7 @@ impl Problem {
     }
 
     /// Points at a second place of the same text.
+    #[must_use]
     pub fn also(mut self, span: Range<usize>, text: impl Into<String>) -> Self {
         self.labels.push(Label {
             span,
@@ -95,12 +97,14 @@ impl Problem {
     }
 
     /// Says what would mend it.
+    #[must_use]
     pub fn help(mut self, text: impl Into<String>) -> Self {
         self.help = Some(text.into());
         self
     }
 
     /// As [`Problem::help`], if there is something to say.
+    #[must_use]
     pub fn maybe_help(mut self, text: Option<String>) -> Self {
         self.help = text.or(self.help);
         self

@@ -34,6 +34,9 @@ pub enum TableError {
 }
 
 /// Writes `summary.parquet`: a row per recording, twin stage and joint.
+///
+/// # Errors
+/// If the table cannot be written.
 pub fn write_summary(dir: &Path, outcomes: &[Outcome]) -> Result<(), TableError> {
     let mut text: [Vec<String>; 5] = Default::default();
     let mut counts: [Vec<u64>; 4] = Default::default();
@@ -91,6 +94,9 @@ pub fn write_summary(dir: &Path, outcomes: &[Outcome]) -> Result<(), TableError>
 }
 
 /// Writes `events.parquet`: a row per event.
+///
+/// # Errors
+/// If the table cannot be written.
 pub fn write_events(dir: &Path, outcomes: &[Outcome]) -> Result<(), TableError> {
     let mut text: [Vec<String>; 7] = Default::default();
     let mut numbers: [Vec<f64>; 8] = Default::default();
@@ -164,6 +170,9 @@ pub fn floats(column: Vec<f64>) -> ArrayRef {
 }
 
 /// Writes the columns beside `path` and moves them there once they are whole.
+///
+/// # Errors
+/// If the table cannot be written.
 pub fn write_table(
     path: &Path,
     columns: impl Iterator<Item = (&'static str, ArrayRef)>,

@@ -206,6 +206,10 @@ pub struct Compliance {
 
 /// What is true of a few effects only.
 #[derive(Debug, Clone, Copy)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a fact of its own, told by name in the few files that give it"
+)]
 pub struct Traits {
     /// A curve without a name over this of its own joint draws it, too.
     pub drawn_over: Option<Against>,
@@ -304,6 +308,9 @@ pub struct Coordinate {
 
 impl Parameter {
     /// A parameter that a file must give. Its name must end in its unit: what does not is a [`Parameter::ratio`].
+    ///
+    /// # Panics
+    /// If the name does not end in a unit: when a constant is compiled, not later.
     pub const fn at_least(name: &'static str, minimum: f64) -> Self {
         let Some((_, unit)) = unit(name) else {
             panic!("the name of a parameter ends in its unit");

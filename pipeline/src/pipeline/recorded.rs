@@ -53,6 +53,9 @@ impl Pipeline {
     }
 
     /// A recorder of the streams that these stages put out.
+    ///
+    /// # Errors
+    /// If streams and file names do not fit together, or a file cannot be made.
     pub fn recorder(
         &self,
         config: &tauscope_record::Config,

@@ -15,6 +15,7 @@ impl Place {
     }
 
     /// The value under `key` of the mapping at this place.
+    #[must_use]
     pub fn key(&self, key: &str) -> Self {
         Self(format!(
             "{}/{}",
@@ -24,6 +25,7 @@ impl Place {
     }
 
     /// Item `index` of the sequence at this place.
+    #[must_use]
     pub fn index(&self, index: usize) -> Self {
         Self(format!("{}/{index}", self.0))
     }

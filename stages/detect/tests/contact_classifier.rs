@@ -282,7 +282,7 @@ fn tuning_finds_all_and_nothing_false_and_parts_the_kinds() {
     };
     let config = classifier();
     let settings = config.settings::<contact_classifier::Settings>().unwrap();
-    let learnt = contact_classifier::learn(&settings, &setup(), &lessons).unwrap();
+    let learnt = contact_classifier::learn(settings, &setup(), &lessons).unwrap();
     let threshold = learnt.detection.force_threshold_n;
     assert!((0.005..0.2).contains(&threshold), "{threshold}");
     // Parallel vectors have a ratio of √3; nothing limits γ above.
@@ -320,7 +320,7 @@ fn tuning_without_both_kinds_or_labels_says_so() {
             train,
             validation: &[],
         };
-        contact_classifier::learn(&settings, &setup(), &lessons).unwrap_err()
+        contact_classifier::learn(settings, &setup(), &lessons).unwrap_err()
     };
     let error = learn(&[lesson(-1.0, COLLISION)]);
     assert!(matches!(error, LearnError::NoLabels { .. }), "{error}");

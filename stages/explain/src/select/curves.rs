@@ -247,7 +247,7 @@ mod tests {
     #[test]
     fn beside_a_curve_of_position_other_functions_of_position_are_not_tried() {
         let problem = problem_with(2, |q, _, effort| {
-            effort[1] += 2.0 * (3.0 * q[1]).sin().powi(3)
+            effort[1] += 2.0 * (3.0 * q[1]).sin().powi(3);
         });
         let nothing = Fit::new(&problem, Vec::new());
         let curve = Base::new(&problem, &nothing, 40).propose_curve(1).unwrap();
