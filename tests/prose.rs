@@ -21,7 +21,10 @@ fn texts() -> Vec<(PathBuf, String)> {
             let name = path.file_name().unwrap().to_string_lossy().into_owned();
             if path.is_dir() && !["target", "out", ".git"].contains(&name.as_str()) {
                 folders.push(path);
-            } else if name.ends_with(".md") {
+            } else if Path::new(&name)
+                .extension()
+                .is_some_and(|kind| kind == "md")
+            {
                 let text = std::fs::read_to_string(&path).unwrap();
                 found.push((path, text));
             }
@@ -108,10 +111,10 @@ fn every_link_to_a_file_or_a_heading_leads_there() {
 
 /// The names of files in backticks.
 fn named_files(text: &str) -> impl Iterator<Item = &str> {
-    text.split('`')
-        .skip(1)
-        .step_by(2)
-        .filter(|name| name.ends_with(".rs") && !name.contains(['{', '<', ' ']))
+    text.split('`').skip(1).step_by(2).filter(|name| {
+        Path::new(name).extension().is_some_and(|kind| kind == "rs")
+            && !name.contains(['{', '<', ' '])
+    })
 }
 
 #[test]

@@ -15,7 +15,7 @@ fn sources(folder: &Path, into: &mut Vec<PathBuf>) {
         return;
     };
     for path in entries.filter_map(|entry| Some(entry.ok()?.path())) {
-        let name = path.file_name().unwrap().to_string_lossy();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
         if path.is_dir() && name != "tests" && name != "target" {
             sources(&path, into);
         } else if name.ends_with(".rs") && name != "tests.rs" {

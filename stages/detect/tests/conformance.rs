@@ -141,9 +141,9 @@ struct Pupil {
 
 impl Pupil {
     /// Lets a detector learn in a setup, quickly.
-    fn of(entry: &'static Entry, setup: Setup) -> Self {
+    fn of(entry: &'static Entry, setup: &Setup) -> Self {
         let lesson = |name: &str, from: i64, touched: bool| {
-            let samples = swing(&setup, from, 24 * RATE_HZ, touched);
+            let samples = swing(setup, from, 24 * RATE_HZ, touched);
             let contacts = Some(if touched {
                 labels(&samples)
             } else {
@@ -157,7 +157,7 @@ impl Pupil {
         };
         let (train, validation) = ([lesson("touched", 0, true)], [lesson("free", 77, false)]);
         let task = Task {
-            setup: &setup,
+            setup,
             lessons: Lessons {
                 train: &train,
                 validation: &validation,
@@ -225,7 +225,7 @@ fn pupils() -> &'static [Pupil] {
     static PUPILS: OnceLock<Vec<Pupil>> = OnceLock::new();
     PUPILS.get_or_init(|| {
         let all = DETECTORS.iter();
-        all.map(|entry| Pupil::of(entry, setup(false))).collect()
+        all.map(|entry| Pupil::of(entry, &setup(false))).collect()
     })
 }
 
@@ -378,7 +378,7 @@ fn joints_in_another_order_give_the_same_scores() {
             // Which weight belongs to which joint is drawn by chance.
             continue;
         }
-        let other = Pupil::of(pupil.entry, turned.clone());
+        let other = Pupil::of(pupil.entry, &turned);
         let (one, other) = (pupil.run(&samples).unwrap(), other.run(&others).unwrap());
         for (k, (one, other)) in one.iter().zip(&other).enumerate() {
             let close = (one.score - other.score).abs() <= 1e-3 * one.score.abs().max(1.0);

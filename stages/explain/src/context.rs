@@ -100,7 +100,9 @@ impl Context<'_> {
             problem.known_friction = start.friction(&self.input.model);
             if self.input.torque_constants_nm_per_a.is_none() {
                 for (known, unit) in problem.known_friction.iter_mut().zip(self.unit_nm) {
-                    known.values_mut().for_each(|value| *value *= unit);
+                    for value in known.values_mut() {
+                        *value *= unit;
+                    }
                 }
             }
         }

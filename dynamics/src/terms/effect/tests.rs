@@ -59,7 +59,9 @@ fn every_limit_admits_something_and_refuses_something() {
             |i: &usize| matches!(effect.coordinates[*i].kind, CoordinateKind::Factor { .. });
         let factors: Vec<usize> = (0..likely.len()).filter(is_factor).collect();
         let mut large = likely.clone();
-        factors.iter().for_each(|i| large[*i] *= 20.0);
+        for &i in &factors {
+            large[i] *= 20.0;
+        }
         tried.push(large);
         for kept in &factors {
             let mut alone = likely.clone();
