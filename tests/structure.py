@@ -29,7 +29,7 @@ from collections import defaultdict
 LINES_OF_A_FILE = 400
 LINES_OF_A_FUNCTION = 80
 # No more than this; the aim is none.
-LIMITS = {"arrows_up": 9, "circles": 8, "long_files": 4, "long_functions": 9, "quoted_effects": 6}
+LIMITS = {"arrows_up": 2, "circles": 5, "long_files": 0, "long_functions": 0, "quoted_effects": 1}
 
 
 def strip(text):

@@ -194,20 +194,7 @@ impl<'a> Replay<'a> {
         // The observer is no stage of the pipeline.
         stages.pop();
         drop(graph);
-        let observed = observer.observed;
-        let (first_ns, last_ns) = observed.stamps_ns.unwrap_or_default();
-        Ok(Outcome {
-            recording: stem,
-            cell: cell.facts.name.clone(),
-            effort_unit: cell.facts.effort_unit.as_str().to_owned(),
-            joint_names: cell.facts.joint_names.clone(),
-            duration_s: (last_ns - first_ns) as f64 * 1e-9,
-            lost: stages.iter().map(|stage| stage.dropped).sum(),
-            twins: observed.twins.into_values().collect(),
-            detectors: observed.detectors.into_values().collect(),
-            stages,
-            files,
-        })
+        Ok(observer.observed.into_outcome(cell, stem, stages, files))
     }
 
     fn cell(&self) -> &'a Cell {

@@ -1,9 +1,13 @@
 //! A sink that listens to all twins and detectors of a replay and tallies what they say.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use tauscope_bus::{SampleRef, Sink, StageError};
 
+use super::Outcome;
+use crate::cell::Cell;
+use crate::graph::StageCounts;
 use crate::tally::{DetectionTally, TwinTally};
 
 /// What was observed.
@@ -15,6 +19,31 @@ pub struct Observed {
     pub detectors: BTreeMap<String, DetectionTally>,
     /// First and newest stamp of all \[ns\].
     pub stamps_ns: Option<(i64, i64)>,
+}
+
+impl Observed {
+    /// What came of the replay of one recording.
+    pub fn into_outcome(
+        self,
+        cell: &Cell,
+        recording: String,
+        stages: Vec<StageCounts>,
+        files: Vec<PathBuf>,
+    ) -> Outcome {
+        let (first_ns, last_ns) = self.stamps_ns.unwrap_or_default();
+        Outcome {
+            recording,
+            cell: cell.facts.name.clone(),
+            effort_unit: cell.facts.effort_unit.as_str().to_owned(),
+            joint_names: cell.facts.joint_names.clone(),
+            duration_s: (last_ns - first_ns) as f64 * 1e-9,
+            lost: stages.iter().map(|stage| stage.dropped).sum(),
+            twins: self.twins.into_values().collect(),
+            detectors: self.detectors.into_values().collect(),
+            stages,
+            files,
+        }
+    }
 }
 
 /// The sink.

@@ -26,7 +26,7 @@ use crate::select::search::Search;
 
 use clipping::is_clipped;
 use confidence::{Grounds, confidence};
-use contest::contest;
+use contest::{Contest, contest};
 pub use doubt::doubt_patches;
 use scales::{Scales, StartScales};
 pub use undetectable::undetectable;
@@ -132,29 +132,7 @@ pub fn of(
         if in_amperes {
             sentence = sentences::in_amperes(&sentence);
         }
-        let equivalent_to: Vec<Rival> = contest
-            .ties
-            .iter()
-            .map(|h| rival(input, joints, h))
-            .collect();
-        for (hypothesis, reason) in contest.rejected {
-            let (joint, link) = place_of(input, joints, &hypothesis);
-            let effect = hypothesis.effect.name.to_owned();
-            named.rejected.push(Rejected {
-                effect,
-                joint,
-                link,
-                reason,
-            });
-        }
-        if let Some((next, trajectory)) =
-            next_motion::of(&active.hypothesis, &contest.ties, input, joints)
-        {
-            if let Some(file) = &next.trajectory {
-                named.trajectories.push((file.clone(), trajectory));
-            }
-            named.next_motions.push(next);
-        }
+        let equivalent_to = named.keep_rivals(active, contest, input, joints);
         let grounds = Grounds::of(fit, &less.fit, active, evidence);
         named.findings.push(Finding {
             effect: active.hypothesis.said().to_owned(),
@@ -180,6 +158,37 @@ pub fn of(
         .findings
         .sort_by(|a, b| b.explains.total_cmp(&a.explains));
     named
+}
+
+impl Named {
+    /// Keeps the rivals of a finding that were rejected, and the motion that would split those that tie with
+    /// it. Gives the latter.
+    fn keep_rivals(
+        &mut self,
+        active: &Active,
+        contest: Contest,
+        input: &Input,
+        joints: &[String],
+    ) -> Vec<Rival> {
+        for (hypothesis, reason) in contest.rejected {
+            let (joint, link) = place_of(input, joints, &hypothesis);
+            self.rejected.push(Rejected {
+                effect: hypothesis.effect.name.to_owned(),
+                joint,
+                link,
+                reason,
+            });
+        }
+        let next = next_motion::of(&active.hypothesis, &contest.ties, input, joints);
+        if let Some((next, trajectory)) = next {
+            if let Some(file) = &next.trajectory {
+                self.trajectories.push((file.clone(), trajectory));
+            }
+            self.next_motions.push(next);
+        }
+        let ties = contest.ties.iter();
+        ties.map(|tie| rival(input, joints, tie)).collect()
+    }
 }
 
 /// The numbers of a piece of physics by name, and their 95 % intervals.

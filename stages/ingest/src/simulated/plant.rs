@@ -78,6 +78,30 @@ struct Work {
 }
 
 impl Work {
+    /// Adds what passes between the rotors and their links, which follow the `links` joints of the arm.
+    fn add_couplings(
+        &mut self,
+        rotors: &[Rotor],
+        dt_s: f64,
+        links: usize,
+        system: &mut DMatrix<f64>,
+    ) {
+        for (k, (rotor, coupling)) in rotors.iter().zip(&self.couplings).enumerate() {
+            let (link, motor) = (rotor.joint, links + k);
+            let through = dt_s * coupling.at(self.velocity[motor], self.velocity[link]);
+            self.missing[link] += through;
+            self.missing[motor] =
+                -through - rotor.inertia * (self.velocity[motor] - rotor.velocity);
+            let slope = dt_s * coupling.slope;
+            system[(link, link)] += slope;
+            system[(motor, motor)] = rotor.inertia + slope;
+            system[(link, motor)] = -slope;
+            system[(motor, link)] = -slope;
+        }
+    }
+}
+
+impl Work {
     fn new(n: usize, rotors: &[Rotor]) -> Self {
         let zero = || vec![0.0; n];
         let all = n + rotors.len();
@@ -319,18 +343,7 @@ impl Plant {
             }
             work.missing[j] = missing;
         }
-        for (k, (rotor, coupling)) in self.rotors.iter().zip(&work.couplings).enumerate() {
-            let (link, motor) = (rotor.joint, n + k);
-            let through = dt_s * coupling.at(work.velocity[motor], work.velocity[link]);
-            work.missing[link] += through;
-            work.missing[motor] =
-                -through - rotor.inertia * (work.velocity[motor] - rotor.velocity);
-            let slope = dt_s * coupling.slope;
-            system[(link, link)] += slope;
-            system[(motor, motor)] = rotor.inertia + slope;
-            system[(link, motor)] = -slope;
-            system[(motor, link)] = -slope;
-        }
+        work.add_couplings(&self.rotors, dt_s, n, &mut system);
         let mut one_sided = false;
         for (j, &motor) in work.motor.iter().enumerate() {
             let velocity = work.velocity[motor];
