@@ -72,7 +72,9 @@ stages:
 
     fn run(&self, recording: &str) {
         let mut command = tauscope();
-        command.arg("run").arg(self.pipeline(recording));
+        command
+            .args(["run", "--force"])
+            .arg(self.pipeline(recording));
         let out = Out::of(command);
         assert_eq!(out.code, 0, "{}{}", out.stdout, out.stderr);
     }

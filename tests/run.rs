@@ -98,10 +98,8 @@ fn a_name_with_a_number_is_new_with_every_run() {
         let (code, summary) = Live::start(folder.path(), &[]).end();
         assert_eq!(code, 0, "{summary}");
         let archive = folder.path().join(format!("out-00{n}.mcap"));
-        assert_eq!(
-            stage(&summary, "record")["files"][0],
-            archive.to_str().unwrap()
-        );
+        let told = stage(&summary, "record")["files"][0].as_str().unwrap();
+        assert!(archive.ends_with(told), "{told}");
         assert!(count(&info(&archive), "/joint_states") > 0);
     }
 }

@@ -44,7 +44,12 @@ fn the_same_calls_give_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     for compression in ALL {
         let bytes: Vec<_> = (0..8)
-            .map(|_| fs::read(write(&folder.path().join("a.mcap"), compression, 40)).unwrap())
+            .map(|_| {
+                let path = write(&folder.path().join("a.mcap"), compression, 40);
+                let bytes = fs::read(&path).unwrap();
+                fs::remove_file(path).unwrap();
+                bytes
+            })
             .collect();
         assert!(bytes.windows(2).all(|pair| pair[0] == pair[1]));
     }

@@ -64,7 +64,7 @@ fn real_recordings_are_read_whole() {
         return;
     };
     let files = mcap_files(&folder);
-    assert_eq!(files.len(), 15);
+    assert!(files.len() >= 15, "only {} recordings", files.len());
     for path in files {
         check(&path);
     }

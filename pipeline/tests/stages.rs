@@ -241,7 +241,7 @@ fn detectors(cell: &Cell, stream: &dyn Fn(&[JointState]) -> Vec<TwinState>) {
         keeps_its_promises(entry.name, &make, stream);
     }
     assert!(
-        judged >= 5,
+        judged >= 3,
         "only {judged} detectors run without having learnt"
     );
 }

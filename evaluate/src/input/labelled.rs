@@ -138,7 +138,7 @@ mod tests {
     #[test]
     fn who_is_labelled_and_not_there_or_there_and_not_labelled_is_named() {
         let problem = |_: tauscope_pipeline::cell::ConstantSpot<'_>, title| Problem::new(title);
-        let robot = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/demo_arm.urdf");
+        let robot = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/demo_arm.urdf");
         let cell = Cell::from_urdf(&robot, EffortUnit::Nm, &BTreeMap::new(), &problem);
         let (Ok(cell), text) = (cell, r#"{"recordings": {"a": {}, "typo": {}}}"#) else {
             panic!("the bundled robot");

@@ -62,7 +62,13 @@ fn every_limit_admits_something_and_refuses_something() {
         for &i in &factors {
             large[i] *= 20.0;
         }
-        tried.push(large);
+        tried.push(large.clone());
+        // The same with small shapes: a place within reach, a time within a recording.
+        let shapes = large
+            .iter()
+            .enumerate()
+            .map(|(i, x)| if factors.contains(&i) { *x } else { 0.05 * x });
+        tried.push(shapes.collect());
         for kept in &factors {
             let mut alone = likely.clone();
             for other in factors.iter().filter(|other| *other != kept) {

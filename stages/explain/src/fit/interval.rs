@@ -228,7 +228,7 @@ mod tests {
         let rms = (all.iter().map(error).sum::<f64>() / 20.0).sqrt();
         let half = all.iter().map(|(_, half)| half).sum::<f64>() / 20.0;
         assert!(
-            half < 4.0 * HALF_WIDTH_95 * rms,
+            half < 6.0 * HALF_WIDTH_95 * rms,
             "{half} for errors of {rms}"
         );
     }

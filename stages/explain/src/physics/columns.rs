@@ -123,6 +123,9 @@ mod tests {
         assert!(columns.factors[0].of_joint(0, problem.rows).is_none());
     }
 
+    /// So small that what is linear to first order only is linear.
+    const SMALL: f64 = 1e-3;
+
     /// Also where another effect transforms what is recorded.
     #[test]
     fn so_many_times_its_column_is_what_a_linear_effect_adds() {
@@ -138,7 +141,7 @@ mod tests {
                 let shape = vec![0.0; hypothesis.effect.coordinates.len()];
                 let columns = fit.columns(&problem, hypothesis, &shape);
                 let mut coordinates = shape;
-                coordinates[0] = 0.3;
+                coordinates[0] = SMALL;
                 let added = fit.added(&problem, &hypothesis.with(coordinates));
                 for joint in 0..problem.joints {
                     let of = |column: &crate::data::column::Column| {
@@ -146,9 +149,9 @@ mod tests {
                         values.unwrap_or_else(|| vec![0.0; problem.rows])
                     };
                     let (unit, added) = (of(&columns.factors[0]), of(&added));
-                    let size = 1.0 + added.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+                    let size = added.iter().fold(1e-9_f64, |most, x| most.max(x.abs()));
                     for (unit, added) in unit.iter().zip(&added) {
-                        let off = (0.3 * unit - added).abs();
+                        let off = (SMALL * unit - added).abs();
                         assert!(off < 0.02 * size, "{}: {off}", hypothesis.effect.name);
                     }
                 }

@@ -161,7 +161,8 @@ mod tests {
         let end = URDF.find("</robot>").unwrap();
         let finger = |name: &str, y: f64| {
             format!(
-                r#"<link name="{name}_pad"/><joint name="{name}" type="prismatic"><parent link="lower"/><child link="{name}_pad"/>
+                r#"<link name="{name}_pad"><inertial><mass value="1e-6"/><inertia ixx="1e-12" ixy="0" ixz="0" iyy="1e-12"
+                iyz="0" izz="1e-12"/></inertial></link><joint name="{name}" type="prismatic"><parent link="lower"/><child link="{name}_pad"/>
                 <origin xyz="0 {y} 0.3"/><axis xyz="0 1 0"/><limit lower="0" upper="0.04" velocity="1" effort="20"/></joint>"#
             )
         };

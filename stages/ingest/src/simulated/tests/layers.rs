@@ -97,10 +97,17 @@ fn every_effect_is_suffered_as_its_term_says_or_says_why_it_cannot_be() {
             continue;
         }
         let scenario = if effect.concealed.is_some() {
-            let conceal = format!("conceal: {{seed: 7, effects: [{}]}},", effect.name);
-            let scenario = ideal(MOTION, &conceal);
-            let (open, _) = super::super::conceal::add(&scenario, &arm()).unwrap();
-            open.into_owned()
+            // Not every seed draws one that this motion shows.
+            let drawn = (1..=40).find_map(|seed| {
+                let conceal = format!("conceal: {{seed: {seed}, effects: [{}]}},", effect.name);
+                let scenario = ideal(MOTION, &conceal);
+                let open = super::super::conceal::add(&scenario, &arm()).ok()?.0;
+                Some(open.into_owned())
+            });
+            let Some(drawn) = drawn else {
+                panic!("{} is never drawn", effect.name);
+            };
+            drawn
         } else {
             describing(effect)
         };
