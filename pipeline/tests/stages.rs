@@ -49,6 +49,8 @@ static ALLOCATOR: Counting = Counting;
 const RATE_HZ: i64 = 500;
 /// Long enough for every filter to settle and every window to fill \[samples\].
 const WARM: usize = 2500;
+/// Long enough for the watch to learn what is usual, too \[samples\].
+const WARM_WATCH: usize = 15_000;
 
 /// Keeps what comes out, up to what was reserved.
 struct Kept<O>(Vec<O>);
@@ -98,16 +100,17 @@ fn motion(count: usize, rate_hz: i64) -> Vec<JointState> {
 /// The suite. `stream` turns a motion into what the stage takes.
 fn keeps_its_promises<I: Sample, O: Sample>(
     name: &str,
+    warm: usize,
     make: Make<'_, I, O>,
     stream: &dyn Fn(&[JointState]) -> Vec<I>,
 ) {
-    let usual = motion(2 * WARM, RATE_HZ);
+    let usual = motion(2 * warm, RATE_HZ);
     let input = stream(&usual);
     is_deterministic(name, make, &input);
-    allocates_nothing(name, make, &input);
+    allocates_nothing(name, warm, make, &input);
 
     let mut with_gap = usual.clone();
-    for state in &mut with_gap[WARM..] {
+    for state in &mut with_gap[warm..] {
         state.header.stamp_ns += 3_000_000_000;
     }
     ends_ready(name, "a gap of 3 s", make, &stream(&with_gap));
@@ -118,10 +121,10 @@ fn keeps_its_promises<I: Sample, O: Sample>(
     }
     ends_ready(name, "ten samples of NaN", make, &with_nan);
 
-    ends_ready(name, "100 Hz", make, &stream(&motion(2 * WARM, 100)));
+    ends_ready(name, "100 Hz", make, &stream(&motion(2 * warm, 100)));
 
     let mut reset = input.clone();
-    reset[WARM].header_mut().flags |= flags::RESET;
+    reset[warm].header_mut().flags |= flags::RESET;
     ends_ready(name, "a reset", make, &reset);
 }
 
@@ -143,11 +146,16 @@ fn bytes<T: Sample>(sample: &T) -> &[u8] {
     bytemuck::bytes_of(sample)
 }
 
-fn allocates_nothing<I: Sample, O: Sample>(name: &str, make: Make<'_, I, O>, input: &[I]) {
+fn allocates_nothing<I: Sample, O: Sample>(
+    name: &str,
+    warm: usize,
+    make: Make<'_, I, O>,
+    input: &[I],
+) {
     let (mut stage, mut out) = (make(), Kept(Vec::with_capacity(input.len())));
     let mut before = 0;
     for (i, sample) in input.iter().enumerate() {
-        if i == WARM {
+        if i == warm {
             before = ALLOCATIONS.with(std::cell::Cell::get);
         }
         stage.accept(sample, &mut out).unwrap();
@@ -157,7 +165,7 @@ fn allocates_nothing<I: Sample, O: Sample>(name: &str, make: Make<'_, I, O>, inp
         after,
         before,
         "{name}: allocations in {} samples",
-        input.len() - WARM
+        input.len() - warm
     );
 }
 
@@ -203,14 +211,14 @@ fn every_stage_is_deterministic_allocates_nothing_and_gets_over_gaps_nan_rates_a
     let behind_twin = |states: &[JointState]| run(&|| twin(&cell), states);
     for role in ROLE_KEYS {
         match role {
-            "twin" => keeps_its_promises(role, &|| twin(&cell), &<[JointState]>::to_vec),
+            "twin" => keeps_its_promises(role, WARM, &|| twin(&cell), &<[JointState]>::to_vec),
             "detect" => detectors(&cell, &behind_twin),
             "explain" => {
                 let config = tauscope_watch::Config::default();
                 let make = || -> Box<dyn Stage<_, _>> {
                     Box::new(build::watch(&config, None, 20.0, &cell).unwrap())
                 };
-                keeps_its_promises(role, &make, &behind_twin);
+                keeps_its_promises(role, WARM_WATCH, &make, &behind_twin);
             }
             // A source, a sink, and a program that is not ours.
             "ingest" | "record" | "outside" => {}
@@ -238,7 +246,7 @@ fn detectors(cell: &Cell, stream: &dyn Fn(&[JointState]) -> Vec<TwinState>) {
         let make = || -> Box<dyn Stage<_, _>> {
             Box::new(build::detect(&config, None, cell, None).unwrap())
         };
-        keeps_its_promises(entry.name, &make, stream);
+        keeps_its_promises(entry.name, WARM, &make, stream);
     }
     assert!(
         judged >= 3,

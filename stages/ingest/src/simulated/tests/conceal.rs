@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::*;
 
-fn concealing(conceal: &str) -> Scenario {
+pub(super) fn concealing(conceal: &str) -> Scenario {
     scenario(&format!(
         "{{version: 1, robot: demo_arm.urdf, seed: 3, rate_hz: 100, conceal: {{{conceal}}}, \
           sensors: {{effort_noise_of_limit: 0.002}}, recordings: [\
