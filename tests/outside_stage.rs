@@ -62,7 +62,7 @@ fn a_stage_from_another_crate_takes_part_and_is_looked_after() {
     );
 
     pipeline(folder.path(), &program, "4");
-    let mut live = Live::start(folder.path(), &[]);
+    let mut live = Live::start(folder.path(), &["--force"]);
     let peaks = live.wait_for_stage("peaks");
     live.wait_for_stage("ingest");
     signal(peaks, "KILL");
