@@ -1,6 +1,6 @@
 //! What the five learned methods of Tajiri and Iwamoto (section IV-B, 3 to 7) share: the signals they
 //! see, equation 8's scaling, the support vector machine, the nets and how they are trained, and the
-//! file that a trained detector is kept in ([`Trained`](crate::Trained)).
+//! file that a trained detector is kept in ([`crate::Trained`]).
 //!
 //! Training uses libsvm-rs and candle. A trained net is run by hand-written loops over its weights: for
 //! nets this small a framework's bookkeeping costs many times the arithmetic. Tests hold the two against
