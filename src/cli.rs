@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    calibrate, check, evaluate, explain, info, repair, replay, run, schema, simulate, stage,
+    calibrate, check, evaluate, explain, info, repair, replay, run, schema, send, simulate, stage,
 };
 
 /// A robot's measured effort beside its digital twin's: stream, detect, record.
@@ -28,6 +28,7 @@ pub enum Command {
     Calibrate(calibrate::Args),
     Explain(explain::Args),
     Evaluate(evaluate::Args),
+    Send(send::Args),
     Simulate(simulate::Args),
     Info(info::Args),
     Repair(repair::Args),

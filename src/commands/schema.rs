@@ -7,17 +7,24 @@ use crate::exit::{Exit, Failure};
 use crate::output::Output;
 
 /// Print the JSON Schema of the pipeline file, or of another kind of file, for editors that complete
-/// and check it.
+/// and check it; or of the JSON messages.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Which kind of file.
     #[arg(value_enum, default_value_t)]
     kind: FileKind,
+    /// Instead, of the JSON messages that a publisher publishes and a source takes.
+    #[arg(long, conflicts_with = "kind")]
+    messages: bool,
 }
 
 /// Prints it.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
-    let mut schema = args.kind.schema().to_value();
+    let mut schema = if args.messages {
+        schemars::schema_for!(tauscope_publish::message::Messages).to_value()
+    } else {
+        args.kind.schema().to_value()
+    };
     plain_descriptions(&mut schema);
     let text = serde_json::to_string_pretty(&schema).map_err(anyhow::Error::from)?;
     out.print(&text)?;
