@@ -9,7 +9,6 @@ use tauscope_pipeline::report::Problem;
 use tauscope_twin::TwinFile;
 
 use super::write;
-use crate::commands::schema;
 use crate::exit::Failure;
 
 /// The folder and the names in it.
@@ -136,7 +135,7 @@ impl Folder {
         state_topic: &str,
         recording: &Path,
     ) -> Result<(), Failure> {
-        let schema = schema::text(FileKind::Pipeline)?;
+        let schema = FileKind::Pipeline.schema_text();
         write(&self.path.join("pipeline.schema.json"), schema.as_bytes())?;
         let absolute = std::path::absolute(recording);
         let recording = absolute.as_deref().unwrap_or(recording);
