@@ -169,7 +169,7 @@ impl Search<'_> {
     }
 
     /// Removes the effects of a joint that together only imitate a curve, and puts a curve in their place. Such are
-    /// more than [`MOST_OF_POSITION`] effects of position, waves that no gear makes, and effects that leave much more
+    /// more than `MOST_OF_POSITION` effects of position, waves that no gear makes, and effects that leave much more
     /// of the variance on recordings left out than on fitted ones.
     pub fn with_names_that_hold(&self, found: Explanation) -> Explanation {
         let pieces = found.fit.actives.len();

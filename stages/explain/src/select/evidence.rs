@@ -75,7 +75,7 @@ pub fn tie(evidence: f64) -> f64 {
     TIE.max(TIE_SHARE * evidence)
 }
 
-/// Whether an explanation is better than another, however correlated the noise is: it has [`OVERWHELMING`] evidence if
+/// Whether an explanation is better than another, however correlated the noise is: it has `OVERWHELMING` evidence if
 /// each row counts as one independent sample, and takes a fair share of the variance at some joint.
 pub fn overwhelming(explanation: &Explanation, other: &Explanation) -> bool {
     let white = vec![1.0; other.fit.variance.len()];

@@ -96,7 +96,7 @@ impl Search<'_> {
         }
     }
 
-    /// Removes named effects that explain less than [`NAMED_SIZE`] of the residual at their joints, where that is far
+    /// Removes named effects that explain less than `NAMED_SIZE` of the residual at their joints, where that is far
     /// above the noise: an effect that the library lacks may imitate them. The smallest are removed first.
     pub fn without_small(&self, mut best: Explanation) -> Explanation {
         loop {
