@@ -91,14 +91,14 @@ pub(super) struct JointBlock {
     /// Sums over the rows in which the joint moves.
     pub own: Moments,
     pub payload: Outer<PAYLOAD>,
-    /// By the joint whose child link is touched.
+    /// Sums for a force, by the joint on whose child link it acts.
     pub force: Vec<Outer<FORCE>>,
     pub ranges: Ranges,
     /// Whether its motion is outside the known ranges.
     pub novel: bool,
 }
 
-/// Half a second of motion.
+/// Sums over half a second of motion.
 #[derive(Debug, Clone)]
 pub(super) struct Block {
     /// First and last stamp \[ns since the epoch\].

@@ -1,4 +1,4 @@
-//! The watching stage's part of the pipeline file.
+//! The stage's part of the pipeline file.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -245,7 +245,7 @@ mod tests {
                 assert_eq!((drawn.against, drawn.of_joint), (against, 1));
                 assert!(curve.evidence() > CURVE_EVIDENCE);
             } else {
-                // Nothing is there to be drawn.
+                // There is no effort that a curve could describe.
                 assert!(curve.evidence() < CURVE_EVIDENCE);
             }
         }
@@ -262,7 +262,7 @@ mod tests {
         assert!(is_drawn_already(&with, at_joint("cable_spring", 1)));
         assert!(!is_drawn_already(&with, at_joint("cable_spring", 0)));
         assert!(!is_drawn_already(&with, at_joint("viscous_friction", 1)));
-        // What has a name beside a curve must explain much more.
+        // An effect of the library must explain much more beside a curve.
         let beside = needs(at_joint("viscous_friction", 1), &with).1;
         assert!(beside > needs(at_joint("viscous_friction", 1), &nothing).1);
     }

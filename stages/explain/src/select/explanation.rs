@@ -1,4 +1,4 @@
-//! A fit and the evidence for it.
+//! Explanations: a fit, the penalties of its effects, and the evidence for one explanation over another.
 
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis};

@@ -28,7 +28,7 @@ pub enum Act {
     Push(usize, [f64; 3]),
 }
 
-/// An act and when it begins and ends \[s\].
+/// A change or contact, and when it begins and ends \[s\].
 #[derive(Debug, Clone, Copy)]
 pub struct Episode {
     pub act: Act,
@@ -36,7 +36,7 @@ pub struct Episode {
     pub until_s: f64,
 }
 
-/// A stream.
+/// A stream of twin states.
 pub struct Stream {
     pub nominal: Model,
     data: Data,
@@ -148,7 +148,7 @@ impl Stream {
             result[0][j] = centre;
             for k in 1..=4 {
                 let w = std::f64::consts::TAU * f64::from(k) / period_s;
-                // Sines and cosines less their value at the ends, so that velocities vanish there.
+                // Sines and cosines minus their value at the ends, so that velocities vanish there.
                 let a = reach * 0.5 * random.normal() / f64::from(k * k);
                 let b = reach * 0.15 * random.normal() / f64::from(k * k);
                 let (s, c) = (w * local).sin_cos();
