@@ -17,11 +17,18 @@ pub struct Args {
 
 /// Prints it.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
-    let mut schema = args.kind.schema().to_value();
-    plain_descriptions(&mut schema);
-    let text = serde_json::to_string_pretty(&schema).map_err(anyhow::Error::from)?;
-    out.print(&text)?;
+    out.print(&text(args.kind)?)?;
     Ok(Exit::Done)
+}
+
+/// The schema of a kind of file.
+///
+/// # Errors
+/// None that is known.
+pub fn text(kind: FileKind) -> anyhow::Result<String> {
+    let mut schema = kind.schema().to_value();
+    plain_descriptions(&mut schema);
+    Ok(serde_json::to_string_pretty(&schema)?)
 }
 
 /// Descriptions come from Rust documentation, where brackets are escaped.
