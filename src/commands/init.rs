@@ -59,6 +59,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         progress.say(sentence);
     }
 
+    let (fit, holdout) = looked.parted();
     let arguments = Arguments {
         robot: Some(&args.robot),
         effort_unit: looked.cell.facts.effort_unit,
@@ -66,8 +67,8 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         twin: None,
         twin_topic: None,
         state_topic: &looked.state_topic,
-        fit: &args.recordings,
-        holdout: &[],
+        fit: &fit,
+        holdout: &holdout,
     };
     let request = explain::from_arguments(&arguments, std::collections::BTreeSet::new())?;
     let input = explain::read(&request, &|share, what| {
@@ -80,20 +81,6 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         .map_err(|error| Failure::rejected(error.to_string()))?;
     explain::write(&folder.explained(), &request, &kept, &mut outcome)?;
 
-    let held = |path: &PathBuf| {
-        let name = request.fit.iter().find(|recording| recording.path == *path);
-        name.is_some_and(|recording| {
-            outcome
-                .report
-                .holdout_predictions
-                .contains_key(&recording.name)
-        })
-    };
-    let (mut holdout, mut fit): (Vec<PathBuf>, Vec<PathBuf>) =
-        args.recordings.iter().cloned().partition(held);
-    if holdout.is_empty() && fit.len() > 1 {
-        holdout.extend(fit.pop());
-    }
     let urdf = looked.cell.facts.urdf.as_deref().unwrap_or_default();
     init::write(&folder.robot(), urdf.as_bytes())?;
     folder.write_set(&looked.cell, &looked.state_topic, &fit, &holdout)?;

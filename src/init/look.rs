@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use tauscope_archive::Recording;
 use tauscope_archive::ros::{JointState, Message as _};
+use tauscope_archive::{Info, Recording};
 use tauscope_dynamics::effort_scale::{EffortScale, Slope, TELLING};
 use tauscope_ingest::Topics;
 use tauscope_pipeline::calibrate::Job;
@@ -23,6 +23,29 @@ pub struct Looked {
     pub state_topic: String,
     /// What was found, a sentence each.
     pub sentences: Vec<String>,
+    /// By recording, how far its joints move in all \[rad or m\].
+    travel: Vec<(PathBuf, f64)>,
+}
+
+impl Looked {
+    /// The recordings to fit, and those that nothing is fitted on: of every four or less one, those in the middle by how
+    /// far the joints move, so that neither a standing arm nor the liveliest motion is kept from the fit.
+    pub fn parted(&self) -> (Vec<PathBuf>, Vec<PathBuf>) {
+        const FOR_ONE_HELD_OUT: usize = 4;
+        let mut sorted: Vec<_> = self.travel.iter().collect();
+        sorted.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let count = sorted.len();
+        let held = if count < 2 {
+            0
+        } else {
+            count.div_ceil(FOR_ONE_HELD_OUT).min(count / 2)
+        };
+        let from = (count - held) / 2;
+        let is_held = |path: &&PathBuf| sorted[from..from + held].iter().any(|one| one.0 == **path);
+        let all = || self.travel.iter().map(|one| &one.0);
+        let fit = all().filter(|path| !is_held(path)).cloned().collect();
+        (fit, all().filter(is_held).cloned().collect())
+    }
 }
 
 /// What is told on the command line.
@@ -56,6 +79,17 @@ impl Told<'_> {
             cell.facts.name,
             self.recordings.len()
         )];
+        let mut travel = Vec::new();
+        for path in self.recordings {
+            let (far, remarks) = oddities(path, &state_topic)?;
+            travel.push((path.clone(), far));
+            let name = path.display();
+            sentences.extend(
+                remarks
+                    .into_iter()
+                    .map(|remark| format!("{name}: {remark}.")),
+            );
+        }
         let scale = self.scale(&cell, &state_topic)?;
         let (unit, sentence) = self.unit(&scale)?;
         sentences.push(sentence);
@@ -63,6 +97,7 @@ impl Told<'_> {
             cell: self.cell(unit)?,
             state_topic,
             sentences,
+            travel,
         })
     }
 
@@ -188,6 +223,22 @@ impl Told<'_> {
             other => Err(Failure::Rejected(undecided(other).into())),
         }
     }
+}
+
+/// How far the joints move in a recording, and what is odd about its joint states.
+fn oddities(path: &Path, topic: &str) -> Result<(f64, Vec<String>), Report> {
+    let failed =
+        |error: tauscope_archive::ArchiveError| Report::from(Problem::new(error.to_string()));
+    let info = Info::read(&Recording::open(path).map_err(failed)?).map_err(failed)?;
+    let mut topics = info.topics.into_iter();
+    let joints = topics
+        .find(|info| info.topic.name == topic)
+        .and_then(|info| info.joints);
+    let joints = joints.unwrap_or_default();
+    Ok((
+        joints.joints.iter().map(|joint| joint.travel).sum(),
+        joints.remarks(),
+    ))
 }
 
 /// Why the recordings do not tell the unit, and what to do.

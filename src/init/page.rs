@@ -1,5 +1,6 @@
 //! What was found, on one page.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use tauscope_explain::report::{Report, Verdict};
@@ -21,14 +22,17 @@ pub fn page(folder: &Folder, looked: &Looked, report: &Report, learnt: &Learnt) 
     section(&mut text, "Twin", &twin);
     let findings = report.findings.iter();
     let findings: Vec<String> = findings.map(|finding| finding.sentence.clone()).collect();
-    list(&mut text, &findings);
+    let page = folder.explained().join("report.html");
+    list(&mut text, &first(findings, &page.display().to_string()));
 
     section(&mut text, "Detector", &[]);
     list(&mut text, &learnt.sentences);
 
     let next = report.next_motions.iter();
     let mut next: Vec<String> = next.map(|motion| motion.sentence.clone()).collect();
-    next.dedup();
+    let mut seen = BTreeSet::new();
+    next.retain(|sentence| seen.insert(sentence.clone()));
+    let next = first(next, &page.display().to_string());
     if !next.is_empty() {
         section(&mut text, "Record next", &[]);
         list(&mut text, &next);
@@ -70,6 +74,17 @@ fn proof(report: &Report) -> String {
         report.effort_unit,
         parts.join(", ")
     )
+}
+
+/// The first few of many sentences, and where the others are.
+fn first(mut sentences: Vec<String>, others: &str) -> Vec<String> {
+    const SHOWN: usize = 6;
+    if sentences.len() > SHOWN {
+        let more = sentences.len() - SHOWN;
+        sentences.truncate(SHOWN);
+        sentences.push(format!("{more} more: {others}."));
+    }
+    sentences
 }
 
 fn section(text: &mut String, title: &str, sentences: &[String]) {
