@@ -8,6 +8,7 @@ mod cli;
 mod commands;
 mod exit;
 mod explain;
+mod init;
 mod output;
 mod plan;
 mod progress;
@@ -93,6 +94,7 @@ fn run(command: &Command, out: &mut Output) -> u8 {
         Command::Evaluate(args) => commands::evaluate::run(args, out),
         Command::Send(args) => commands::send::run(args, out),
         Command::Simulate(args) => commands::simulate::run(args, out),
+        Command::Init(args) => commands::init::run(args, out),
         Command::Info(args) => commands::info::run(args, out),
         Command::Repair(args) => commands::repair::run(args, out),
         Command::Stage(_) | Command::Exec(_) => Err(exit::Failure::rejected(

@@ -8,6 +8,7 @@ use std::path::Path;
 
 use schemars::{JsonSchema, Schema};
 use serde::de::DeserializeOwned;
+use serde_json::Value;
 
 use crate::pipeline::PipelineFile;
 use crate::report::Report;
@@ -44,6 +45,11 @@ impl FileKind {
         }
     }
 
+    /// The schema as a text for editors.
+    pub fn schema_text(self) -> String {
+        text_of_schema(&self.schema())
+    }
+
     /// Checks the shape of the file at `path`.
     ///
     /// # Errors
@@ -59,5 +65,28 @@ impl FileKind {
             Self::Case => of::<CaseFile>(path),
             Self::Set => of::<SetFile>(path),
         }
+    }
+}
+
+/// A schema as a text for editors and people.
+pub fn text_of_schema(schema: &Schema) -> String {
+    let mut schema = schema.clone().to_value();
+    plain_descriptions(&mut schema);
+    format!("{schema:#}")
+}
+
+/// Descriptions come from Rust documentation, where brackets are escaped.
+fn plain_descriptions(schema: &mut Value) {
+    match schema {
+        Value::Object(map) => {
+            for (key, value) in map {
+                match value {
+                    Value::String(text) if key == "description" => *text = text.replace('\\', ""),
+                    other => plain_descriptions(other),
+                }
+            }
+        }
+        Value::Array(items) => items.iter_mut().for_each(plain_descriptions),
+        _ => {}
     }
 }

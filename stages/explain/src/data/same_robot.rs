@@ -1,6 +1,7 @@
 //! Whether measured and computed efforts are those of one robot, in one unit.
 
 use nalgebra::{DMatrix, DVector};
+use tauscope_dynamics::effort_scale::{EffortScale, Slope};
 
 use crate::data::problem::Problem;
 use crate::read::audit::MOVES;
@@ -8,8 +9,6 @@ use crate::read::input::Input;
 
 /// A joint's twin effort varies enough to compare with the measured one from this many times the noise.
 const STRONG: f64 = 5.0;
-/// A slope of measured effort over the twin's beyond this, either way, is a wrong unit rather than physics.
-const WRONG_SCALE: f64 = 3.0;
 /// A joint follows the twin if scaled it explains this share of what friction does not.
 const FOLLOWS: f64 = 0.15;
 
@@ -27,7 +26,13 @@ pub fn reason_against(input: &Input, problem: &Problem) -> Option<String> {
         strong += 1;
         if share > FOLLOWS && slope > 0.0 {
             following += 1;
-            slopes.push(slope);
+            let joint = input
+                .model
+                .joint_names()
+                .nth(j)
+                .unwrap_or_default()
+                .to_owned();
+            slopes.push(Slope { joint, slope });
         }
     }
     if strong == 0 {
@@ -40,16 +45,11 @@ pub fn reason_against(input: &Input, problem: &Problem) -> Option<String> {
             strong - following
         ));
     }
-    slopes.sort_by(f64::total_cmp);
-    let middle = slopes[slopes.len() / 2];
     let known_scale = input.effort_unit == "Nm" || input.torque_constants_nm_per_a.is_some();
-    if known_scale && !(1.0 / WRONG_SCALE..=WRONG_SCALE).contains(&middle) {
-        return Some(format!(
-            "the measured effort is {middle:.2} times what this robot's motion costs: the unit or the torque \
-             constants are wrong"
-        ));
-    }
-    None
+    let fault = EffortScale::of(&slopes)
+        .fault_in_nm()
+        .filter(|_| known_scale);
+    fault.map(|fault| fault.to_string())
 }
 
 /// Share of a joint's measured variance that the twin's effort explains beside direction and speed, the slope, and
