@@ -51,6 +51,17 @@ fn send(folder: &Path, arguments: &[&str]) -> Out {
     Out::answer(["send"].iter().chain(arguments).chain(&file))
 }
 
+/// Sends once the pipeline is there: a slow machine takes its time to start it.
+fn send_at_last(folder: &Path, arguments: &[&str]) -> Out {
+    let deadline = Instant::now() + Duration::from_mins(1);
+    loop {
+        let out = send(folder, arguments);
+        if out.code != 1 || Instant::now() > deadline {
+            return out;
+        }
+    }
+}
+
 /// The stamp from which a command holds.
 fn stamp(out: &Out) -> i64 {
     assert_eq!(out.code, 0, "{}", out.stderr);
@@ -142,6 +153,7 @@ fn a_command_holds_from_the_stamp_that_was_answered_live_and_in_a_replay() {
     let twin = messages(&live, "/twin/joint_states");
     assert_eq!(messages(&first, "/twin/joint_states"), twin);
     assert_eq!(messages(&first, "/residual"), messages(&live, "/residual"));
+    assert_eq!(onsets(&first), onsets(&live));
 
     // From the sample with the answered stamp on the twin carries the payload, and not before.
     let plain = replay_without_commands(folder);
@@ -210,6 +222,76 @@ fn what_cannot_be_told_is_refused_with_the_reason() {
         "{}",
         out.stderr
     );
+}
+
+#[test]
+fn a_publisher_that_cannot_work_is_refused_before_anything_starts() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for (publish, why) in [
+        (
+            "inputs: [ingest, detect], publish: {}",
+            "a publisher that tells nobody",
+        ),
+        (
+            "inputs: [ingest, twin], publish: {modbus: {}}",
+            "listens to at least one detector",
+        ),
+        (
+            "inputs: [detect], publish: {modbus: {}}",
+            "does not listen to it",
+        ),
+        (
+            "inputs: [ingest, detect], publish: {zenoh: {ros2: {}}}",
+            "at least one endpoint",
+        ),
+        (
+            "inputs: [ingest, detect], publish: {modbus: {listen: here}}",
+            "publish",
+        ),
+    ] {
+        pipeline(
+            folder,
+            7448,
+            &format!("- {{name: publish, {publish}}}\n"),
+            "",
+        );
+        let out = Out::answer(["check", folder.join("pipeline.yaml").to_str().unwrap()]);
+        assert_eq!(out.code, 2, "{publish}");
+        assert!(out.stderr.contains(why), "{publish}: {}", out.stderr);
+    }
+}
+
+#[test]
+fn a_detector_in_python_finds_contacts_too() {
+    let test = "a_detector_in_python_finds_contacts_too";
+    let python = match python::python("python-ros-side", &ROS_SIDE, "zenoh, rosbags.typesys") {
+        Ok(python) => python,
+        Err(why) => return skipped(test, &why),
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let endpoint = format!("tcp/127.0.0.1:{}", port());
+    let script = root().join("examples/python-detector/detector.py");
+    let arguments = ["--listen", &endpoint, "--band", "5"];
+    let mut detector = Helper::start(&python, script.to_str().unwrap(), &arguments);
+    let lines = BufReader::new(detector.0.stdout.take().unwrap()).lines();
+    let publish = format!(
+        "- {{name: publish, inputs: [ingest, twin, detect], publish: {{zenoh: {{connect: ['{endpoint}']}}}}}}\n"
+    );
+    pipeline(folder, port(), &publish, "");
+    let run = Live::start(folder, &[]);
+    let onsets = lines
+        .map_while(Result::ok)
+        .filter(|line| line.contains("onset"));
+    // It prints one line for each onset; three are enough to see that it judges what it hears.
+    let stamps: Vec<i64> = onsets
+        .take(3)
+        .map(|line| line.split(' ').next().unwrap().parse().unwrap())
+        .collect();
+    assert!(stamps.is_sorted() && stamps.len() == 3, "{stamps:?}");
+    live::signal(run.id(), "INT");
+    run.end();
 }
 
 const ROS_SIDE: [&str; 2] = ["eclipse-zenoh==1.10.2", "rosbags==0.11.9"];

@@ -69,7 +69,16 @@ pub struct Commands {
 /// A server that runs as long as this lives.
 pub struct Modbus {
     address: SocketAddr,
-    _runtime: Runtime,
+    runtime: Option<Runtime>,
+}
+
+/// A command that waits for its answer is not waited for.
+impl Drop for Modbus {
+    fn drop(&mut self) {
+        if let Some(runtime) = self.runtime.take() {
+            runtime.shutdown_background();
+        }
+    }
 }
 
 impl Modbus {
@@ -89,10 +98,13 @@ impl Modbus {
             .enable_all()
             .build()
             .map_err(failed)?;
-        let listener = runtime
-            .block_on(TcpListener::bind(address))
-            .map_err(failed)?;
+        let listener = std::net::TcpListener::bind(address).map_err(failed)?;
+        listener.set_nonblocking(true).map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
+        let listener = {
+            let _entered = runtime.enter();
+            TcpListener::from_std(listener).map_err(failed)?
+        };
         let (board, room) = (board.clone(), Arc::new(Semaphore::new(MAX_CLIENTS)));
         runtime.spawn(async move {
             let connected = |stream: tokio::net::TcpStream, from: SocketAddr| {
@@ -106,9 +118,9 @@ impl Modbus {
                         "Modbus client {from} is turned away: {MAX_CLIENTS} are served already"
                     );
                 }
-                // Answers are small and must not wait for more.
-                let plain = stream.set_nodelay(true);
-                async move { plain.map(|()| client.map(|client| (client, stream))) }
+                // Answers are small and must not wait for more; where that cannot be, they do.
+                let _ = stream.set_nodelay(true);
+                async move { Ok(client.map(|client| (client, stream))) }
             };
             let server = Server::new(listener);
             loop {
@@ -122,7 +134,7 @@ impl Modbus {
         });
         Ok(Self {
             address,
-            _runtime: runtime,
+            runtime: Some(runtime),
         })
     }
 
