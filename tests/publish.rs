@@ -104,7 +104,7 @@ fn a_command_holds_from_the_stamp_that_was_answered_live_and_in_a_replay() {
     let run = Live::start(folder, &[]);
     let expected = [
         (
-            stamp(&send(folder, &["label", "new", "gripper"])),
+            stamp(&send_at_last(folder, &["label", "new", "gripper"])),
             "label",
             vec!["new gripper"],
         ),
@@ -204,6 +204,7 @@ fn what_cannot_be_told_is_refused_with_the_reason() {
         assert!(out.stderr.contains(reason), "{arguments:?}: {}", out.stderr);
     }
     let _run = Live::start(folder, &[]);
+    assert_eq!(send_at_last(folder, &["label", "it runs"]).code, 0);
     // By the endpoint instead of the file; the source itself refuses.
     let endpoint = format!("tcp/127.0.0.1:{at}");
     let arguments = [

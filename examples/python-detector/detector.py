@@ -4,9 +4,9 @@
     pip install eclipse-zenoh
     python3 detector.py --cell demo --connect tcp/127.0.0.1:7447 --band 3.0
 
-A contact begins where a joint's residual leaves the band [N m], and ends once all have been back for 0.1 s. The verdict
-goes to `<cell>/python/detection`, as JSON of the same shape as `<cell>/detections/<detector>` (docs/publish.md), for each
-residual that came. Not a safety function.
+A contact begins where a joint's residual leaves the band [N m], and ends once all have been back for 0.1 s. For each
+residual that comes, the verdict goes to `<cell>/python/detection`, as JSON of the same shape as
+`<cell>/detections/<detector>` (docs/publish.md). Not a safety function.
 """
 
 import argparse
