@@ -14,8 +14,8 @@
 //!
 //! - A collision is latched: it never ends by itself.
 //! - A collision that begins after the acknowledgement is a new one.
-//! - While muted, contacts and collisions raise no stop and none is latched. A collision that was latched before stays. One
-//!   that still lasts when the lease ends is latched then.
+//! - While muted, contacts and collisions raise no stop and none is latched. A collision that was latched before stays.
+//!   One that still lasts when the lease ends is latched then.
 //! - Before every detector has judged a sample, and while one cannot judge, nothing is free.
 
 use tauscope_bus::{Command, Detection, Verb, flags};

@@ -1,7 +1,7 @@
 //! A Modbus TCP server for a PLC. Not a safety function.
 //!
-//! What is read is worked out when it is read: the age of the newest sample counts, so a pipeline that hangs reads as stop, and
-//! one that is dead breaks the connection.
+//! What is read is worked out when it is read: the age of the newest sample counts, so a pipeline that hangs reads as
+//! stop, and one that is dead breaks the connection.
 
 pub mod registers;
 

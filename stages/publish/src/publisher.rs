@@ -1,8 +1,8 @@
 //! The publisher as a stage: samples go in, and the cell is told.
 //!
 //! It waits for nobody. Zenoh drops what a listener does not take; a Modbus client reads the newest. What the publisher
-//! itself has no time for gives way in its link, which counts it. The alarm's time is that of the samples; only the watch
-//! over silence has a clock.
+//! itself has no time for gives way in its link, which counts it. The alarm's time is that of the samples; only the
+//! watch over silence has a clock.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};

@@ -1,9 +1,9 @@
 //! ROS 2 messages over Zenoh, as `rmw_zenoh` publishes them.
 //!
 //! A message goes to the key `<domain>/<topic>/<DDS type>/<type hash>`: CDR, with an attachment of number, time and
-//! publisher. A liveliness token tells `rmw_zenoh` of the node and of each publisher, so that `ros2 topic list` shows them:
-//! `@ros2_lv/<domain>/<session>/<node>/<entity>/<kind>/<enclave>/<namespace>/<node name>[/<topic>/<type>/<hash>/<QoS>]`, with
-//! `%` for each `/` within a part (`rmw_zenoh`, `docs/design.md`).
+//! publisher. A liveliness token tells `rmw_zenoh` of the node and of each publisher, so that `ros2 topic list` shows
+//! them: `@ros2_lv/<domain>/<session>/<node>/<entity>/<kind>/<enclave>/<namespace>/<node name>`, and for a publisher
+//! `/<topic>/<type>/<hash>/<QoS>` behind it, with `%` for each `/` within a part (`rmw_zenoh`, `docs/design.md`).
 
 use std::collections::BTreeMap;
 use std::time::SystemTime;

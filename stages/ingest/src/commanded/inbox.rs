@@ -1,7 +1,7 @@
 //! Commands that come in over Zenoh, at most so many at a time.
 //!
-//! A question (`get`) is answered, once a sample has taken the command or it is refused. A message (`put`) is taken all the
-//! same, without an answer.
+//! A question (`get`) is answered, once a sample has taken the command or it is refused. A message (`put`) is taken all
+//! the same, without an answer.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{self, SyncSender};

@@ -57,7 +57,8 @@ impl CommandTopics {
         }
     }
 
-    /// What must be read before the state itself: a request for learning, or a command, holds from the state behind it on.
+    /// What must be read before the state itself: a request for learning, or a command, holds from the state behind it
+    /// on.
     pub fn write_ahead(&mut self, file: &mut File, sample: &JointState) -> Result<(), WriteError> {
         if let Some(verb) = sample.command.verb() {
             let arguments = sample.command.arguments();
