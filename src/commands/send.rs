@@ -13,7 +13,7 @@ use tauscope_pipeline::yaml;
 use crate::exit::{Exit, Failure};
 use crate::output::Output;
 
-/// How long the pipeline has to answer. A command that no sample takes is refused within 2 s.
+/// How long the pipeline has to answer. A command that no sample takes is refused within 1 s.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Tell a running pipeline something: acknowledge an alarm, mute it, name the payload, label the archive.

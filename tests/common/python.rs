@@ -6,8 +6,8 @@ use std::process::Command;
 
 use crate::common::root;
 
-/// A Python that can `import` these modules from these packages; without Python, or where the packages cannot be had, says
-/// what is missing.
+/// A Python that can `import` these modules from these packages; without Python, or where the packages cannot be had,
+/// says what is missing.
 pub fn python(venv: &str, packages: &[&str], modules: &str) -> Result<PathBuf, String> {
     let venv = root().join("target").join(venv);
     let python = venv.join("bin/python");

@@ -30,7 +30,7 @@ class Plc:
         """The bits by name; `None` where there is no answer, which is a stop."""
         try:
             if self.client is None:
-                self.client = ModbusTcpClient("127.0.0.1", port=self.port, timeout=2, retries=0)
+                self.client = ModbusTcpClient("127.0.0.1", port=self.port, timeout=4, retries=0)
                 if not self.client.connect():
                     raise ConnectionError
             answer = self.client.read_discrete_inputs(0, count=len(BITS))

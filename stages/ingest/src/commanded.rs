@@ -50,25 +50,43 @@ impl Commanded {
 /// What commands have changed about all samples from some sample on. Pure.
 #[derive(Debug, Default)]
 struct Effects {
-    /// The tool that was told of; mass 0 for none.
-    tool: Option<Tool>,
+    told: Option<Told>,
+}
+
+/// A tool that was told of by a command.
+#[derive(Debug, Clone, Copy)]
+struct Told {
+    /// Mass 0 for none.
+    tool: Tool,
+    /// What the source itself said of the tool then. When it says something else, the command is out of date.
+    instead_of: Tool,
 }
 
 impl Effects {
     fn apply(&mut self, sample: &mut JointState) {
         let Command { value, com_m, .. } = sample.command;
+        let own = tool_of(sample);
+        self.told = self
+            .told
+            .filter(|told| told.instead_of == own || told.tool == own);
         match sample.command.verb() {
             Some(Verb::Payload) => {
-                self.tool = Some(Tool {
+                let tool = Tool {
                     mass_kg: value,
                     com_m,
                     inertia_kgm2: [0.0; 6],
+                };
+                self.told = Some(Told {
+                    tool,
+                    instead_of: own,
                 });
             }
             Some(Verb::Learn) => sample.header.flags |= flags::LEARN,
             Some(Verb::Acknowledge | Verb::Mute | Verb::Label) | None => {}
         }
-        let Some(tool) = self.tool else { return };
+        let Some(Told { tool, .. }) = self.told else {
+            return;
+        };
         sample.header.flags &= !flags::TOOL;
         let tool = if tool.mass_kg > 0.0 {
             sample.header.flags |= flags::TOOL;
@@ -79,6 +97,18 @@ impl Effects {
         sample.tool_mass_kg = tool.mass_kg;
         sample.tool_com_m = tool.com_m;
         sample.tool_inertia_kgm2 = tool.inertia_kgm2;
+    }
+}
+
+/// The tool that a sample tells of; all zeros for none.
+fn tool_of(sample: &JointState) -> Tool {
+    if !sample.header.has(flags::TOOL) {
+        return Tool::default();
+    }
+    Tool {
+        mass_kg: sample.tool_mass_kg,
+        com_m: sample.tool_com_m,
+        inertia_kgm2: sample.tool_inertia_kgm2,
     }
 }
 
@@ -167,6 +197,27 @@ mod tests {
         assert_eq!(after(None), (true, 2.5));
         assert_eq!(after(told(0.0)), (false, 0.0));
         assert_eq!(after(None), (false, 0.0));
+    }
+
+    #[test]
+    fn a_payload_gives_way_to_a_tool_that_the_robot_tells_of_later() {
+        let mut effects = Effects::default();
+        let mut told = sample(Some(Request::Payload {
+            mass_kg: 2.5,
+            com_m: [0.0; 3],
+        }));
+        effects.apply(&mut told);
+        let mut other = sample(None);
+        other.tool_mass_kg = 4.0;
+        effects.apply(&mut other);
+        assert_eq!(other.tool_mass_kg.to_bits(), 4.0_f64.to_bits());
+        let mut again = sample(None);
+        effects.apply(&mut again);
+        assert_eq!(
+            again.tool_mass_kg.to_bits(),
+            9.0_f64.to_bits(),
+            "the command is over"
+        );
     }
 
     #[test]

@@ -93,8 +93,8 @@ impl Alarm {
         }
     }
 
-    /// Takes a command that holds from `stamp_ns` on: from the first detection with that stamp or a later one, whichever
-    /// of the two streams was faster.
+    /// Takes a command that holds from `stamp_ns` on: from the first detection with that stamp or a later one,
+    /// whichever of the two streams was faster.
     pub fn command(&mut self, stamp_ns: i64, command: Command) {
         if self.waiting.len() == MAX_WAITING {
             self.waiting.remove(0);

@@ -25,8 +25,9 @@ use registers::{Registers, Write};
 
 /// Clients at a time; a further one is turned away.
 const MAX_CLIENTS: usize = 8;
-/// How long a write waits for the pipeline's answer.
-const PATIENCE: Duration = Duration::from_secs(1);
+/// How long a write waits for the pipeline's answer: longer than a command waits for a sample, so that none holds after it
+/// was said to have failed.
+const PATIENCE: Duration = Duration::from_secs(2);
 /// A listener that failed is tried again after so long.
 const AGAIN_AFTER: Duration = Duration::from_millis(100);
 

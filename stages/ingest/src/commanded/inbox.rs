@@ -19,7 +19,7 @@ use crate::setup::Setup;
 /// Commands that wait for a sample at most.
 const CAPACITY: usize = 64;
 /// A command that no sample has taken for so long is refused: it must not hold when nobody expects it any more.
-const LONGEST_WAIT: Duration = Duration::from_secs(2);
+const LONGEST_WAIT: Duration = Duration::from_secs(1);
 /// No request is longer \[bytes\].
 const MAX_PAYLOAD_BYTES: usize = 4096;
 

@@ -1,6 +1,6 @@
-//! What a joint state carries besides the measurement, the commanded motion, the tool, requests for learning and what
-//! somebody told the pipeline, so that the archive replays as the recording did. Written when they change; a command that stays is told again now
-//! and then, because a source takes none that is old.
+//! What a joint state carries besides the measurement, so that the archive replays as the recording did: the commanded
+//! motion, the tool, requests for learning, and what somebody told the pipeline. Written when they change; a commanded
+//! motion that stays is told again now and then, because a source takes none that is old.
 
 use tauscope_archive::ros::{self, DiagnosticArray, Inertia, InertiaStamped, Level};
 use tauscope_archive::{TopicWriter, WriteError};
