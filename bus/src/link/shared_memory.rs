@@ -58,7 +58,7 @@ const OPEN_WITHIN: Duration = Duration::from_secs(2);
 /// Event of the back channel: the end was taken.
 const END_TAKEN: EventId = EventId::new(0);
 /// Most events of the back channel.
-/// Resolution: shared memory; receivers whose identities are equal modulo this share an event.
+/// Resolution: shared memory; publishers whose ids are equal modulo this share an event.
 const MAX_EVENT: usize = 255;
 
 /// What travels beside each sample.

@@ -44,8 +44,8 @@ pub fn reason_against(input: &Input, problem: &Problem) -> Option<String> {
     }
     if 2 * following < strong || (strong >= 2 && following == 0) {
         return Some(format!(
-            "the effort of {} of {strong} joints has nothing to do with what this robot's motion costs: it is the \
-             recording of another robot, its joints have other signs, or gravity is taken off the effort",
+            "the effort of {} of {strong} joints does not follow the effort that this robot's motion requires: the \
+             recording is of another robot, joints have other signs, or gravity is subtracted from the effort",
             strong - following
         ));
     }
@@ -54,8 +54,8 @@ pub fn reason_against(input: &Input, problem: &Problem) -> Option<String> {
     let known_scale = input.effort_unit == "Nm" || input.torque_constants_nm_per_a.is_some();
     if known_scale && !(1.0 / WRONG_SCALE..=WRONG_SCALE).contains(&middle) {
         return Some(format!(
-            "the measured effort is {middle:.2} times what this robot's motion costs: the unit or the torque \
-             constants are wrong"
+            "the measured effort is {middle:.2} times the effort that this robot's motion requires: the unit or the \
+             torque constants are wrong"
         ));
     }
     None

@@ -213,19 +213,20 @@ impl Context<'_> {
         }
         if named.findings.is_empty() {
             return Ok(Err(
-                "no joint moves for as long as a second: standstill does not tell friction from load".to_owned(),
+                "no joint moves long or far enough: at rest, friction cannot be told from load"
+                    .to_owned(),
             ));
         }
         named.notes.push(format!(
-            "No joint moves: what lasts cannot be told from the load at rest, and what the arm bears in the first {BEGINNING_S} s of \
-             each recording is taken for what it always bears there."
+            "No joint moves, so lasting effects cannot be told from the load at rest. The effort in the first {BEGINNING_S} s of each \
+             recording is taken as the usual load of that pose."
         ));
         if !self.unscaled.is_empty() {
             let of =
                 |&(j, _): &(usize, f64)| format!("{} {} N m/A", joints[j], number(self.unit_nm[j]));
             let taken: Vec<String> = self.unscaled.iter().map(of).collect();
             named.notes.push(format!(
-                "Nobody knows the scales of these drives, and forces hang on what they were taken for: {}.",
+                "The torque constants of these drives are not known. Forces are only as right as these assumed values: {}.",
                 taken.join(", ")
             ));
         }

@@ -29,7 +29,7 @@ pub fn before(input: &Input) -> Option<String> {
         return Some(format!("recording {} holds no effort", recording.name));
     }
     if !input.bodies && input.fit.iter().any(|r| r.reference.is_empty()) {
-        return Some("the twin is a topic, and a recording does not hold it".to_owned());
+        return Some("the twin's effort is a topic, and a recording does not have it".to_owned());
     }
     if input.fit.iter().all(|r| r.effort.iter().all(|x| *x == 0.0)) {
         return Some("the effort is zero throughout: the driver does not publish it".to_owned());
@@ -48,8 +48,8 @@ pub fn before(input: &Input) -> Option<String> {
     }
     if input.fit.len() + input.holdout.len() < 2 && input.start.is_none() && !at_rest(input) {
         return Some(
-            "there is one recording only: what is fitted on it cannot be proved on another. Record the same arm \
-             once more, with another motion, or start from a corrected twin"
+            "there is only one recording, and a fit must be tested on another one. Record the same arm once more, \
+             with another motion, or start from a corrected twin"
                 .to_owned(),
         );
     }

@@ -363,11 +363,11 @@ pub fn summary(verdict: Verdict, findings: &[Finding], before: &[f64], after: &[
     };
     match verdict {
         Verdict::NothingMissing => {
-            "Nothing is missing: what the twin leaves is the noise of the measurement.".to_owned()
+            "Nothing is missing: the twin's error is no larger than the measurement noise.".to_owned()
         }
         Verdict::NotEvaluated => "Nothing was evaluated.".to_owned(),
         Verdict::UnknownRemains if findings.is_empty() => {
-            "The fitted recordings show nothing that is missing; those held out do, and no name is given to it.".to_owned()
+            "Nothing is missing on the fitted recordings. The held-out recordings show a mismatch without a named cause.".to_owned()
         }
         Verdict::Explained | Verdict::UnknownRemains => {
             let first = findings.first().map_or("", |f| f.sentence.as_str());

@@ -111,22 +111,23 @@ impl Excite {
     fn words(self, joint: &str) -> String {
         match self {
             Self::WholeRange => format!(
-                "Move joint {joint} slowly over its whole range, there and back, the other joints at rest: over a \
-                 range of more than 60 degrees a spring, a counterbalance and a gain part."
+                "Move joint {joint} slowly over its whole range, there and back, with the other joints at rest. A spring, a \
+                 counterbalance and a gain differ clearly over more than 60 degrees."
             ),
-            Self::Fast => "Move all joints fast, with reversals at rising frequency: a delay grows with frequency, a \
-                           low-pass takes amplitude, an elastic joint resonates."
+            Self::Fast => "Move all joints fast, with reversals at rising frequency. The phase of a delay grows with frequency, a \
+                           low-pass lowers the amplitude, and an elastic joint resonates."
                 .to_owned(),
             Self::Creep => format!(
-                "Move joint {joint} at constant speeds from creeping on, there and back: some kinds of friction \
-                 differ below a few degrees a second only."
+                "Move joint {joint} there and back at constant speeds, starting very slowly. Some kinds of friction differ only \
+                 below a few degrees per second."
             ),
             Self::AllSpeeds => format!(
-                "Move joint {joint} at every speed up to fast, in both directions, with many reversals, in several \
-                 poses of the arm: kinds of friction differ in what they depend on."
+                "Move joint {joint} at all speeds, in both directions, with many reversals and in several poses of the arm. \
+                 Kinds of friction depend differently on speed, direction and load."
             ),
-            Self::AllPoses => "Turn the last joints through their whole ranges, in several poses of the arm and with \
-                               accelerations: a payload, a link's mass and its centre weigh differently in each, and a factor shows where there is effort."
+            Self::AllPoses => "Turn the last joints through their whole ranges, with accelerations and in several poses of the arm. A \
+                               payload, a link's mass and its centre of mass load the joints differently in each pose, and a gain \
+                               shows where the effort is large."
                 .to_owned(),
         }
     }

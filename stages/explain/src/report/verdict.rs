@@ -44,8 +44,8 @@ pub fn note(proof: &Proof, joints: &[usize], names: &[String], unit: &str) -> Op
     let each: Vec<String> = each.collect();
     (!each.is_empty()).then(|| {
         format!(
-            "On the recordings held out more is left than where it was fitted: {}. Something acts there that the fitted recordings do not \
-             show, or what was found does not carry over.",
+            "The error on the held-out recordings is larger than on the fitted ones: {}. Either something acts on the held-out \
+             recordings only, or the correction does not carry over to them.",
             each.join(", ")
         )
     })

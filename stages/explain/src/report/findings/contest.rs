@@ -50,7 +50,7 @@ pub fn contest(
             / (found.fit.likelihood() - less.fit.likelihood()).max(1e-9))
         .clamp(0.0, 1.0);
         let reason = format!(
-            "in the place of {} it takes away {:.0} % of the mismatch that this takes away; the recordings are {} times less likely with it",
+            "in place of {} it explains {:.0} % of what that explains; the recordings are {} times less likely with it",
             active.hypothesis.effect.words.noun,
             100.0 * share,
             sentences::odds(behind)

@@ -103,8 +103,8 @@ fn doubt_pushes(findings: &mut [Finding], recordings: usize) -> Vec<String> {
         let from = findings[same[0]].t_start.unwrap_or(f64::NAN);
         let to = findings[same[0]].t_end.unwrap_or(f64::NAN);
         notes.push(format!(
-            "Link {link} is pushed in every recording from {from:.1} to {to:.1} s: that belongs to the programme, e.g. something that is \
-             carried or pressed on, and is no push from outside. What it does in other recordings is not predicted."
+            "Link {link} is pushed in every recording from {from:.1} to {to:.1} s. This is probably part of the robot's programme, \
+             e.g. carrying or pressing something, and not a push from outside. Other recordings are predicted without it."
         ));
         for i in same {
             doubt_it(&mut findings[i]);

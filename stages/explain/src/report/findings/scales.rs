@@ -167,8 +167,9 @@ fn note(scale: &Scale, joints: &[String]) -> String {
     let half = HALF_WIDTH_95 * deviation;
     if !scale.is_known() {
         return format!(
-            "The gain of joint {joint} is not identifiable: hardly any gravity or inertia acts on it in these recordings, and what \
-             does hangs on how exact the URDF's masses are ({} A per N m, 95 % interval {} to {}). The numbers of its effects are in A.",
+            "The gain of joint {joint} is not identifiable: gravity and inertia hardly load it in these recordings, and this small \
+             load is uncertain because the URDF's masses are ({} A per N m, 95 % interval {} to {}). The numbers of its effects \
+             are in A.",
             number(gain),
             number(gain - half),
             number(gain + half)
