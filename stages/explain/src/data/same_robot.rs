@@ -1,6 +1,7 @@
 //! Whether measured and computed efforts are those of one robot, in one unit.
 
 use nalgebra::{DMatrix, DVector};
+use tauscope_dynamics::effort_scale::{EffortScale, Slope};
 
 use crate::data::problem::Problem;
 use crate::read::audit::MOVES;
@@ -9,9 +10,6 @@ use crate::read::input::Input;
 /// A joint is compared if the standard deviation of its twin's effort is at least this many times the noise.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const STRONG: f64 = 5.0;
-/// A slope of measured over twin's effort above this, or below its inverse, is a wrong unit and not physics.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const WRONG_SCALE: f64 = 3.0;
 /// A joint follows the twin if the scaled effort explains at least this share of the variance that friction leaves.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const FOLLOWS: f64 = 0.15;
@@ -36,7 +34,13 @@ pub fn reason_against(input: &Input, problem: &Problem) -> Option<String> {
         strong += 1;
         if share > FOLLOWS && slope > 0.0 {
             following += 1;
-            slopes.push(slope);
+            let joint = input
+                .model
+                .joint_names()
+                .nth(j)
+                .unwrap_or_default()
+                .to_owned();
+            slopes.push(Slope { joint, slope });
         }
     }
     if strong == 0 {
@@ -49,16 +53,11 @@ pub fn reason_against(input: &Input, problem: &Problem) -> Option<String> {
             strong - following
         ));
     }
-    slopes.sort_by(f64::total_cmp);
-    let middle = slopes[slopes.len() / 2];
     let known_scale = input.effort_unit == "Nm" || input.torque_constants_nm_per_a.is_some();
-    if known_scale && !(1.0 / WRONG_SCALE..=WRONG_SCALE).contains(&middle) {
-        return Some(format!(
-            "the measured effort is {middle:.2} times the effort that this robot's motion requires: the unit or the \
-             torque constants are wrong"
-        ));
-    }
-    None
+    let fault = EffortScale::of(&slopes)
+        .fault_in_nm()
+        .filter(|_| known_scale);
+    fault.map(|fault| fault.to_string())
 }
 
 /// Share of a joint's measured variance that the twin's effort explains beside direction and speed, the slope, and

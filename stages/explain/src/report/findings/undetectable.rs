@@ -9,7 +9,8 @@ use crate::fit::fitted::Fit;
 use crate::report::schema::Undetectable;
 use crate::select::evidence::{LEAST_EVIDENCE, LEAST_SIZE};
 use crate::select::explanation::Explanation;
-use crate::select::propose::{Base, shapes};
+use crate::select::grid::shapes;
+use crate::select::propose::Base;
 use crate::select::search::Search;
 
 /// The smallest effects with one factor that would have been found, for each joint and the tool.
