@@ -14,8 +14,10 @@ use crate::ros::{JointState, Message as _};
 use crate::topic::Topic;
 
 /// A pause counts as a gap if it is this many times as long as the topic's mean period.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const GAP_PERIODS: i64 = 5;
 /// The longest gaps of a topic that are listed.
+/// Tuned: by eye, for the length of the list.
 const GAPS_LISTED: usize = 5;
 
 /// What is in a recording: found by reading all of it.

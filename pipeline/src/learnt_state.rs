@@ -13,6 +13,7 @@ use tauscope_archive::whole_file::{self, Existing};
 
 /// Time between two writes, in time of the stream \[ns\]. What was learnt since is lost if the process
 /// dies.
+/// Resolution: writes to disk, against what a killed process forgets.
 const WRITE_EVERY_NS: i64 = 60_000_000_000;
 
 /// Lets the detector go on from what the file that `config` names holds, if there is one yet. Gives the
