@@ -137,7 +137,7 @@ fn a_message_is_a_command_too_and_each_sample_carries_one_at_most() {
     session.put(key("demo"), "no JSON").wait().unwrap();
     let mut out = Collect(Vec::new());
     let begin = Instant::now();
-    let taken = |out: &Collect| -> Vec<f64> {
+    let taken = |out: &Collect<JointState>| -> Vec<f64> {
         let commands = out.0.iter().map(|sample| sample.command);
         let mutes = commands.filter(|command| command.verb() == Some(Verb::Mute));
         mutes.map(|command| command.value).collect()
