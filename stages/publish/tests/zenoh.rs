@@ -1,5 +1,9 @@
 //! What a listener on Zenoh is told: ROS 2 messages as `rmw_zenoh` has them, and JSON.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::float_cmp,
+    reason = "what is copied comes out as it went in"
+)]
 
 mod common;
 
