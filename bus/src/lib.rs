@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+pub mod command;
 mod effort_unit;
 pub mod link;
 pub mod sample;
@@ -13,8 +14,8 @@ pub use link::{
     Sender, SenderCounts, SharedMemory, Transport, Zenoh, ZenohEndpoints, ZenohRouter,
 };
 pub use sample::{
-    Detection, EventKind, Header, Health, JointArray, JointState, MAX_JOINTS, Name, Sample,
-    SampleKind, SampleRef, TwinState, flags,
+    Command, Detection, EventKind, Header, Health, JointArray, JointState, MAX_JOINTS, Name,
+    Sample, SampleKind, SampleRef, TwinState, Verb, flags,
 };
 pub use seat::Seat;
 pub use stage::{Emit, Progress, Sink, Source, Stage, StageError};

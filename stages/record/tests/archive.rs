@@ -272,7 +272,7 @@ fn what_was_not_announced_is_an_error_that_names_it() {
     assert!(
         error
             .to_string()
-            .contains("stage `twin` sent a tauscope/JointState/1"),
+            .contains("stage `twin` sent a tauscope/JointState/2"),
         "{error}"
     );
 }
