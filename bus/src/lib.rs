@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod contact;
 mod effort_unit;
 pub mod link;
 pub mod sample;
@@ -7,6 +8,7 @@ pub mod seat;
 pub mod shell;
 pub mod stage;
 
+pub use contact::{Contact, ContactFollower, Force};
 pub use effort_unit::EffortUnit;
 pub use link::{
     Audience, Domain, InProcess, Keep, LinkError, Position, Received, Receiver, ReceiverCounts,
