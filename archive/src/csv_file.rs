@@ -23,12 +23,16 @@ use rows::{Row, Rows};
 /// Beyond these a number in a table is taken for garbage.
 pub mod limits {
     /// Of a position \[rad or m\].
+    /// Tuned: by hand, on no recorded seeds; not swept.
     pub const POSITION: f64 = 1e6;
     /// Of a velocity \[rad/s or m/s\].
+    /// Tuned: by hand, on no recorded seeds; not swept.
     pub const VELOCITY: f64 = 1e6;
     /// Of an effort \[N m, N or A\].
+    /// Tuned: by hand, on no recorded seeds; not swept.
     pub const EFFORT: f64 = 1e6;
     /// Of a time: from zero to what a ROS stamp can hold \[s\].
+    /// Physical: `builtin_interfaces/Time` holds seconds as an `int32`.
     pub const TIME_S: f64 = i32::MAX as f64;
 }
 

@@ -6,6 +6,7 @@ mod cursor;
 mod damage;
 mod error;
 mod info;
+mod joint_facts;
 mod mcap_file;
 mod mcap_write;
 mod recording;
@@ -19,6 +20,7 @@ pub use csv_file::{Column, Columns, CsvError, CsvMapping, CsvProblem, limits as 
 pub use damage::{Damage, DamageKind};
 pub use error::ArchiveError;
 pub use info::{Gap, Info, JointsInfo, TopicInfo};
+pub use joint_facts::JointFacts;
 pub use mcap_write::{
     CHUNK_SPAN_NS, Compression, McapWriter, PROVENANCE, TopicWriter, WriteError, Written,
 };

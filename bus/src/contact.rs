@@ -8,9 +8,11 @@ use std::fmt;
 use crate::sample::{Detection, EventKind, MAX_JOINTS, Name, flags};
 
 /// The links that are told apart while a contact lasts.
+/// Physical: a joint moves a link, and there are no more joints.
 const MAX_LINKS: usize = MAX_JOINTS;
 
 /// A force counts where the score is at least this share of that of the force before.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const STRONG: f64 = 0.5;
 
 /// A contact, or a change of the arm, as a detector tells it.

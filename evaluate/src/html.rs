@@ -22,6 +22,7 @@ use crate::tables::Table;
 const OWN_STYLE: &str = include_str!("html/style.css");
 
 /// Colours of the style sheet; further detectors take them again with a dashed line.
+/// Physical: the number of colours in the style sheet.
 const COLOURS: usize = 7;
 
 /// The page.

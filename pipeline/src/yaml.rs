@@ -22,6 +22,7 @@ use place::Spans;
 use crate::report::{Problem, Report, Source};
 
 /// More than anybody writes by hand; what is larger is some other file.
+/// Resolution: bounds memory.
 const LARGEST_FILE_BYTES: u64 = 4 << 20;
 
 /// A value, and where in its file each part of it stands.

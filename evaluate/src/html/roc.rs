@@ -7,10 +7,14 @@ use super::line_class;
 use crate::judged::Judged;
 use crate::metrics::samples::Labelled;
 
-/// About so many points a curve, over its whole length and within what is enlarged.
+/// About so many points a curve over its whole length.
+/// Resolution: about one per pixel; changes the page's size.
 const POINTS: usize = 400;
+/// About so many points a curve within what is enlarged.
+/// Resolution: as above, over a twentieth of the range.
 const FINE: usize = 8000;
 /// Who lives with more false positives than this does not use the detector.
+/// Tuned: by eye, for the picture; no number depends on it.
 const ZOOM: f64 = 0.05;
 
 /// One picture with a curve a detector, of the first seed; none if no test recording has both contact and

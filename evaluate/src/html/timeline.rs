@@ -7,12 +7,17 @@ use super::{line_class, recommendation};
 use crate::judged::Judged;
 use crate::metrics::Scored;
 
-/// How many recordings are drawn, and how many of them without a click.
+/// How many recordings are drawn.
+/// Tuned: by eye, for the layout of the page.
 const RECORDINGS: usize = 24;
+/// How many of them without a click.
+/// Tuned: by eye, for the layout of the page.
 const OPEN: usize = 3;
 /// How many points a line has.
+/// Resolution: about one per pixel; changes the page's size.
 const POINTS: usize = 700;
 /// What is beyond so many thresholds stands at the upper end.
+/// Tuned: by eye, for the picture; no number depends on it.
 const HIGHEST: f64 = 6.0;
 
 /// A plot a recording, of the recommended detector; none if nothing was scored.

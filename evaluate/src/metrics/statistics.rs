@@ -61,7 +61,9 @@ pub fn quantile(sorted: &[f64], share: f64) -> f64 {
 /// The largest mean of a Poisson distribution under which so few or fewer events still come in one of 20 cases: an upper
 /// bound at 95 %, one-sided (Garwood, "Fiducial limits for the Poisson distribution", 1936).
 pub fn poisson_bound_95(count: usize) -> f64 {
+    /// Statistical: one of 20.
     const RARE: f64 = 0.05;
+    /// Resolution: a float has 53 bits.
     const HALVINGS: usize = 60;
     // Of so few or fewer events, by its logarithm, for e^-mean may be too small for a float.
     let so_few = |mean: f64| {

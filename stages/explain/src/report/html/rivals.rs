@@ -11,6 +11,7 @@ use super::proof;
 use crate::report::schema::{NextMotion, Rejected, Report, Undetectable, Verdict};
 
 /// How many rejected rivals the line names.
+/// Tuned: by eye, for the layout of the page.
 const NAMES: usize = 4;
 
 /// The rivals that were considered in one line; what spoke against each is folded away.

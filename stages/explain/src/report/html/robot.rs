@@ -10,17 +10,26 @@ use super::groups::{self, Group};
 use super::number_format::{effort_unit, number_text};
 use crate::report::schema::{RecordingPicture, Report};
 
-/// The picture's size, and the part of it that the arm has \[px\].
+/// The picture's width and height \[px\].
+/// Tuned: by eye, for the layout of the page.
 const SIZE: [f64; 2] = [460.0, 330.0];
+/// The part of it that the arm has \[px\].
+/// Tuned: by eye, for the layout of the page.
 const ARM: [f64; 2] = [210.0, 280.0];
 /// Room around the arm \[px\].
+/// Tuned: by eye, for the layout of the page.
 const MARGIN: f64 = 24.0;
-/// Radius of a joint's disc, and the least distance of two of them \[px\].
+/// Radius of a joint's disc \[px\].
+/// Tuned: by eye, for the layout of the page.
 const DISC: f64 = 9.0;
+/// The least distance of two discs \[px\].
+/// Tuned: by eye, for the layout of the page.
 const APART: f64 = 21.0;
 /// How far from above the arm is looked at \[rad\].
+/// Tuned: by eye, for the layout of the page.
 const ELEVATION: f64 = 0.25;
 /// How many places get a label.
+/// Tuned: by eye, for the layout of the page.
 const LABELS: usize = 6;
 
 /// A point of the picture \[px\].
@@ -187,6 +196,7 @@ fn fitted(points: &[Point]) -> Option<Vec<Point>> {
 
 /// Moves discs apart that would cover each other, e.g. those of a wrist.
 fn spread(points: &mut [Point]) {
+    /// Resolution: more rounds move no disc by a pixel.
     const ROUNDS: usize = 60;
     for _ in 0..ROUNDS {
         for a in 0..points.len() {
@@ -249,6 +259,8 @@ fn heat(group: &Group<'_>, largest: f64) -> String {
 }
 
 fn label(group: &Group<'_>, y: f64, unit: &str) -> Markup {
+    /// Longest text that is shown whole.
+    /// Tuned: by eye, for the layout of the page.
     const LETTERS: usize = 27;
     let x = r(ARM[0] + 2.0 * MARGIN + 8.0);
     let what: Vec<String> = group

@@ -13,6 +13,7 @@ use crate::report::schema::{Finding, NextMotion, Report, Rival, Verdict};
 use crate::report::sentences::{UNCHANGED, error_left};
 
 /// How many parts a mechanic is sent to.
+/// Tuned: by eye, for the layout of the page.
 const PARTS: usize = 4;
 
 /// The box.
