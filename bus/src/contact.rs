@@ -5,21 +5,12 @@
 
 use std::fmt;
 
-use crate::sample::{Detection, EventKind, MAX_JOINTS, Name, flags};
-
-/// The links that are told apart while a contact lasts.
-/// Physical: a joint moves a link, and there are no more joints.
-const MAX_LINKS: usize = MAX_JOINTS;
-
-/// A force counts where the score is at least this share of that of the force before.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const STRONG: f64 = 0.5;
+use crate::sample::{Detection, EventKind, Name, flags};
 
 /// A contact, or a change of the arm, as a detector tells it.
 ///
-/// The link and the kind are those of the sample with the largest score, for there the contact is told best. The
-/// force is the largest one that was estimated at that link while the score was at least half its largest there: what
-/// swings back after a contact may be a larger force.
+/// Kind, link and force are those of the sample with the largest score, for there the contact is told best: the largest
+/// of many estimates of a force would be too large.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
     /// Its kind: the detector's state, e.g. `contact`, `collision`.
@@ -40,15 +31,13 @@ pub struct Contact {
     pub peak_score: f64,
     /// Size of a change of the arm ([`flags::CHANGE`]), as it was told at its onset.
     pub size: Option<f64>,
-    /// The largest force at each link, in the order in which they were touched.
-    forces: [Option<Force>; MAX_LINKS],
+    /// Where the score is largest, as far as a force was estimated.
+    force: Option<Force>,
 }
 
 /// A force on the robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Force {
-    link: Name,
-    score: f64,
     /// World frame \[N\].
     pub force_n: [f64; 3],
     /// Where it is taken to act, world frame \[m\].
@@ -84,7 +73,7 @@ impl Contact {
                 .header
                 .has(flags::CHANGE)
                 .then_some(detection.size),
-            forces: [None; MAX_LINKS],
+            force: None,
         };
         contact.goes_on(detection);
         contact
@@ -94,14 +83,6 @@ impl Contact {
         self.end_ns = detection.header.stamp_ns;
         if detection.score >= detection.threshold {
             self.last_high_ns = Some(self.end_ns);
-        }
-        if detection.header.has(flags::FORCE) {
-            self.add_force(Force {
-                link: detection.link,
-                score: detection.score,
-                force_n: detection.force_n,
-                point_m: detection.point_m,
-            });
         }
         let is_known = !self.link.as_str().is_empty();
         if is_known && detection.score < self.peak_score {
@@ -113,28 +94,17 @@ impl Contact {
         if !detection.link.as_str().is_empty() {
             self.link = detection.link;
         }
-    }
-
-    fn add_force(&mut self, force: Force) {
-        let is_place =
-            |slot: &&mut Option<Force>| slot.is_none_or(|known| known.link == force.link);
-        let Some(slot) = self.forces.iter_mut().find(is_place) else {
-            return;
-        };
-        let is_better = |known: Force| {
-            let larger = force.norm_n() > known.norm_n();
-            let as_sure = force.score >= STRONG * known.score;
-            (larger && as_sure) || STRONG * force.score > known.score
-        };
-        if slot.is_none_or(is_better) {
-            *slot = Some(force);
+        if detection.header.has(flags::FORCE) {
+            self.force = Some(Force {
+                force_n: detection.force_n,
+                point_m: detection.point_m,
+            });
         }
     }
 
-    /// The largest force at the touched link, as far as one was estimated.
+    /// The force at the peak of the contact, as far as one was estimated.
     pub fn peak(&self) -> Option<&Force> {
-        let mut forces = self.forces.iter().flatten();
-        forces.find(|force| force.link == self.link)
+        self.force.as_ref()
     }
 
     /// From the sample that raised the alarm to the last one whose score reached the threshold \[s\]. Both come late by
@@ -210,12 +180,12 @@ mod tests {
     }
 
     #[test]
-    fn the_end_tells_link_and_largest_force_of_the_whole_contact_not_the_onsets_guess() {
+    fn the_end_tells_link_and_force_at_the_peak_of_the_contact_not_the_onsets_guess() {
         let mut contacts = ContactFollower::default();
         assert!(contacts.push(&Detection::default()).is_none());
         contacts.push(&sample(10, Detection::ONSET, 9.0, "link2", 4.0));
         assert_eq!(contacts.open().unwrap().to_string(), "4 N at link2");
-        // A wild guess at another link is no force of this contact.
+        // A wild guess at another link is none of the peak.
         contacts.push(&sample(20, 0, 20.0, "link1", 300.0));
         contacts.push(&sample(30, 0, 80.0, "link5", 24.0));
         contacts.push(&sample(40, 0, 70.0, "link5", 25.0));
@@ -223,7 +193,7 @@ mod tests {
         contacts.push(&sample(45, 0, 12.0, "link5", -60.0));
         let end = sample(50, Detection::OFFSET, 1.0, "", 0.0);
         let ended = contacts.push(&end).unwrap();
-        assert_eq!(ended.to_string(), "25 N at link5");
+        assert_eq!(ended.to_string(), "24 N at link5");
         assert!((ended.peak().unwrap().direction()[1] - 1.0).abs() < 1e-12);
         assert_eq!(
             (ended.contact_ns, ended.onset_ns, ended.end_ns),

@@ -96,7 +96,7 @@ pub struct Event {
     pub link: Option<String>,
     /// The joints that detected.
     pub joints: Vec<String>,
-    /// Force on the robot in the world frame \[N\], where estimated; the largest of the event at that link.
+    /// Force on the robot in the world frame \[N\], where estimated; that of the sample with the largest score.
     pub force: Option<[f64; 3]>,
     /// The largest score.
     pub peak_score: f64,

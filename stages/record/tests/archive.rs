@@ -144,7 +144,7 @@ fn a_detection_is_told_once_when_it_begins_and_once_when_it_ends() {
     assert_eq!((values["estimate"], values["kind"]), ("final", "contact"));
     assert_eq!(values["link"], "link5");
     let number = |key: &str| values[key].parse::<f64>().unwrap();
-    let strongest = |i: &&Instant| (i.detection.force_n[1] * 1e6) as i64;
+    let strongest = |i: &&Instant| (i.detection.score * 1e6) as i64;
     let strongest = instants.iter().max_by_key(strongest).unwrap().detection;
     let force_n = strongest.force_n;
     let peak_n = force_n.iter().map(|f| f * f).sum::<f64>().sqrt();

@@ -1,6 +1,7 @@
 //! What a detector's stream draws: score and threshold, its state as a band, events in words, the
-//! touched link's colour and the force. Arrow and colour show the contact as far as it is known by then: the largest
-//! force so far, at the link that is most likely so far; so they come to what the words say at its end. And where the detector tells of them the force's frequency content, with
+//! touched link's colour and the force. Arrow and colour show the contact as far as it is known by then: force and link
+//! of the sample with the largest score so far; so they come to what the words say at its end. And where the detector
+//! tells of them the force's frequency content, with
 //! the state behind it, and the directions of force and motion (figures 1 and 2 of Salt Ducaju et al., "Fast
 //! Contact Detection and Classification for Kinesthetic Teaching in Robots using only Embedded Sensors", 2022).
 
