@@ -131,11 +131,12 @@ fn another_robot_is_refused_with_the_joints_that_are_there() {
     let urdf = std::fs::read_to_string(bundled().join("demo_arm.urdf")).unwrap();
     let other = folder.path().join("other.urdf");
     std::fs::write(&other, urdf.replace("\"joint4\"", "\"elbow\"")).unwrap();
-    let free = bundled().join(FREE[0]);
+    let free = [FREE[0], FREE[1]].map(|name| bundled().join(name));
     let out = Out::answer(
         [
             "init".as_ref(),
-            free.as_os_str(),
+            free[0].as_os_str(),
+            free[1].as_os_str(),
             "--robot".as_ref(),
             other.as_os_str(),
         ]

@@ -5,6 +5,7 @@
 //! does is taken for garbage: see [`limits`].
 
 mod error;
+mod known;
 mod lines;
 mod mapping;
 mod rows;
@@ -12,6 +13,7 @@ mod rows;
 use std::path::{Path, PathBuf};
 
 pub use error::{CsvError, CsvProblem};
+pub(crate) use known::mapping_of;
 pub use mapping::{Column, Columns, CsvMapping};
 
 use crate::cursor::{Cursor, RawMessage};

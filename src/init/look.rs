@@ -67,6 +67,13 @@ impl Told<'_> {
     /// # Errors
     /// If they are not those of the robot, or nobody can tell the unit.
     pub fn look(&self) -> Result<Looked, Failure> {
+        let [_, _, ..] = self.recordings else {
+            let problem = Problem::new(
+                "one recording is too few: one is fitted and another shows whether the fit holds",
+            );
+            let help = "record the arm at least twice, better five times, with different motions and nothing touching it";
+            return Err(Failure::Rejected(problem.help(help).into()));
+        };
         let cell = self.cell(EffortUnit::A)?;
         let state_topic = match self.state_topic {
             Some(topic) => topic.to_owned(),

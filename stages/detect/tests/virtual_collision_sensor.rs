@@ -12,8 +12,8 @@ use tauscope_detect::indri::{
     virtual_collision_sensor as adaptive, virtual_collision_sensor_basic as basic,
 };
 use tauscope_detect::{
-    Config, ConfigError, ContactKind, Detect, JointSetup, LabelledContact, LearnError, Lesson,
-    Lessons, Setup,
+    Config, ConfigError, ContactKind, Detect, HereOrFile, JointSetup, LabelledContact, LearnError,
+    Lesson, Lessons, Setup,
 };
 
 /// Samples a second.
@@ -442,7 +442,7 @@ fn the_bias_is_learnt_from_what_is_free_of_contact() {
         let learnt = basic::learn(&basic::Settings::default(), &setup(), &lessons).unwrap();
         let full = adaptive::learn(&adaptive::Settings::default(), &setup(), &lessons).unwrap();
         assert_eq!(full.bias, learnt.bias);
-        let joints = full.learnt.as_ref().unwrap().joints.clone();
+        let joints = full.learnt.as_ref().unwrap().here().unwrap().joints.clone();
         assert!(joints.values().all(|joint| joint.adapt_s == Some(0.0)));
         // Neither says anything of another run of the same cycle.
         for config in [basic_with(learnt.clone()), adaptive_with(full)] {
