@@ -262,7 +262,7 @@ stages:
         "error: no torque constant for `joint2`",
         "error: the robot has no joint `jiont2`",
         "error: the robot has no link `tol`",
-        "error: cannot read the URDF: No such file",
+        "error: cannot read the URDF: there is no file",
         "error: cannot use the URDF: ",
         "error: there is no recording nowhere.mcap",
         "no topic \"/nothing\"",

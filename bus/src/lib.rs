@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 pub mod command;
+mod contact;
 mod effort_unit;
 pub mod link;
 pub mod sample;
@@ -8,6 +9,7 @@ pub mod seat;
 pub mod shell;
 pub mod stage;
 
+pub use contact::{Contact, ContactFollower, Force};
 pub use effort_unit::EffortUnit;
 pub use link::{
     Audience, Domain, InProcess, Keep, LinkError, Position, Received, Receiver, ReceiverCounts,
