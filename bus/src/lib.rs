@@ -6,6 +6,7 @@ pub mod sample;
 pub mod seat;
 pub mod shell;
 pub mod stage;
+mod trouble;
 
 pub use effort_unit::EffortUnit;
 pub use link::{
@@ -18,3 +19,4 @@ pub use sample::{
 };
 pub use seat::Seat;
 pub use stage::{Emit, Progress, Sink, Source, Stage, StageError};
+pub use trouble::Trouble;
