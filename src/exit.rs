@@ -1,10 +1,9 @@
 //! How a command ends.
 
-use std::io::IsTerminal;
-
 use tauscope_pipeline::report::{Problem, Report};
 
 use crate::output::Output;
+use crate::terminal;
 
 /// How a command ended that did what was asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -85,7 +84,7 @@ pub fn code(outcome: Result<Exit, Failure>, out: &mut Output) -> u8 {
             1
         }
         Err(Failure::Rejected(report)) => {
-            let styled = matches!(out, Output::Terminal) && std::io::stderr().is_terminal();
+            let styled = matches!(out, Output::Terminal) && terminal::has_colour();
             out.say(&report.render(styled));
             2
         }

@@ -12,9 +12,9 @@ mod output;
 mod plan;
 mod progress;
 mod supervisor;
+mod terminal;
 
 use std::ffi::OsString;
-use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -32,7 +32,7 @@ pub fn main() -> ExitCode {
         .with_target("tauscope", LevelFilter::WARN);
     let lines = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
+        .with_ansi(terminal::has_colour())
         .without_time()
         .with_target(false);
     tracing_subscriber::registry()

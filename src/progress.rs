@@ -4,6 +4,8 @@ use std::sync::{Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use crate::terminal;
+
 /// Steps of the bar; a recording's part is at least one of them.
 const STEPS: f64 = 10_000.0;
 
@@ -15,11 +17,19 @@ pub struct Progress {
     done: Mutex<Vec<f64>>,
 }
 
+/// Standard error, where it can redraw.
+pub fn draw_target() -> ProgressDrawTarget {
+    if terminal::can_redraw() {
+        ProgressDrawTarget::stderr()
+    } else {
+        ProgressDrawTarget::hidden()
+    }
+}
+
 impl Progress {
     /// A bar over `count` recordings.
     pub fn new(count: usize) -> Self {
-        // Hides itself where standard error is no terminal.
-        let bar = ProgressBar::with_draw_target(Some(STEPS as u64), ProgressDrawTarget::stderr());
+        let bar = ProgressBar::with_draw_target(Some(STEPS as u64), draw_target());
         let style = ProgressStyle::with_template("{bar:40} {percent:>3} % {elapsed} (left: {eta})");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         Self {
@@ -63,11 +73,6 @@ impl Progress {
         *own = fraction;
         let mean = done.iter().sum::<f64>() / done.len() as f64;
         self.bar.set_position((mean * STEPS) as u64);
-    }
-
-    /// Writes a line to standard error, above the bar.
-    pub fn say(&self, line: &str) {
-        self.bar.suspend(|| eprintln!("{line}"));
     }
 }
 

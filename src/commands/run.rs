@@ -1,6 +1,7 @@
 //! `tauscope run`.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use anyhow::Context;
 use tauscope_pipeline::pipeline::{Pipeline, Stage};
@@ -12,7 +13,7 @@ use tauscope_record::Existing;
 use crate::exit::{Exit, Failure};
 use crate::output::Output;
 use crate::plan;
-use crate::supervisor::{self, Summary};
+use crate::supervisor::{self, Care, Summary, Verbosity};
 
 /// Run a pipeline: check the file, start this host's stages, look after them until the source ends
 /// or Ctrl-C.
@@ -27,9 +28,42 @@ pub struct Args {
     /// Let recorders replace files that have the names of theirs.
     #[arg(long)]
     force: bool,
+    /// Fail if a source gives no usable sample within this time, from the start or since the last one.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    expect_data: Option<Duration>,
+    #[command(flatten)]
+    telling: Telling,
     /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
+}
+
+/// How much is told.
+#[derive(Debug, Default, clap::Args)]
+struct Telling {
+    /// Say only what must not be missed: warnings, errors, and the summary at the end.
+    #[arg(short, long, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Say more: each step of the start, and every other second how it goes.
+    #[arg(short, long)]
+    verbose: bool,
+}
+
+impl Telling {
+    fn verbosity(&self) -> Verbosity {
+        match (self.quiet, self.verbose) {
+            (true, _) => Verbosity::Quiet,
+            (false, true) => Verbosity::Verbose,
+            (false, false) => Verbosity::Normal,
+        }
+    }
+}
+
+fn seconds(text: &str) -> Result<Duration, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.1..=1e6).contains(&seconds) => Ok(Duration::from_secs_f64(seconds)),
+        _ => Err("it is a number of seconds from 0.1 to 1000000".to_owned()),
+    }
 }
 
 const DEFAULT: &str = "pipeline.yaml";
@@ -40,6 +74,8 @@ impl Default for Args {
             pipeline: DEFAULT.into(),
             host: None,
             force: false,
+            expect_data: None,
+            telling: Telling::default(),
             json: false,
         }
     }
@@ -66,7 +102,11 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         keep_files(&pipeline, host)?;
     }
     let links = plan::links(&pipeline);
-    let summary = supervisor::run(&pipeline, &links, host)?;
+    let care = Care {
+        expect_data: args.expect_data,
+        verbosity: args.telling.verbosity(),
+    };
+    let summary = supervisor::run(&pipeline, &links, host, care)?;
     let text = if args.json {
         serde_json::to_string_pretty(&summary).context("cannot encode the summary")?
     } else {

@@ -225,8 +225,10 @@ mod tests {
         seen.announce(&format!(
             "@ros2_lv/3/abc/0/11/MS/%/%/viewer/%arm%joint_states/{dds_type}/RIHS01_x/::,7:,:,:,,"
         ));
-        let mut state = ros::JointState::default();
-        state.name = vec!["a".to_owned(), "b".to_owned()];
+        let state = ros::JointState {
+            name: vec!["a".to_owned(), "b".to_owned()],
+            ..ros::JointState::default()
+        };
         let mut body = Vec::new();
         ros::encode(&state, &mut body).unwrap();
         seen.hear(

@@ -17,7 +17,7 @@ use super::publication::Publications;
 /// How long it hears everything.
 const LOOK_FOR: Duration = Duration::from_millis(1500);
 /// From one look to the next.
-const LOOK_EVERY: Duration = Duration::from_secs(15);
+const LOOK_EVERY: Duration = Duration::from_secs(10);
 /// How long an endpoint may take to answer.
 const ANSWER_WITHIN: Duration = Duration::from_millis(1500);
 /// Everything but what Zenoh and ROS 2 say of themselves.
@@ -80,7 +80,10 @@ impl Scout {
             seen.connected = connected(session);
             self.newest = Some(seen);
         }
-        let is_due = |began: Instant| now.duration_since(began) >= LOOK_EVERY;
+        // Once a router answers, other things are seen than before.
+        let had_connection = self.newest.as_ref().map(|seen| seen.connected > 0);
+        let changed = had_connection.is_some_and(|had| had != (connected(session) > 0));
+        let is_due = |began: Instant| changed || now.duration_since(began) >= LOOK_EVERY;
         if self.look.is_none() && self.began.is_none_or(is_due) {
             self.began = Some(now);
             self.look = Some(self.begin(session, now));
