@@ -6,8 +6,10 @@
 mod announce;
 mod cli;
 mod commands;
+mod existing;
 mod exit;
 mod explain;
+mod interrupt;
 mod output;
 mod plan;
 mod progress;
@@ -41,7 +43,16 @@ pub fn main() -> ExitCode {
     match Cli::parse().command.unwrap_or_default() {
         Command::Stage(args) => commands::stage::run(&args),
         Command::Exec(args) => commands::stage::exec(&args),
-        command => ExitCode::from(run(&command, &mut Output::Terminal)),
+        command => {
+            // A run ends its stages in order itself.
+            if !matches!(command, Command::Run(_))
+                && let Err(error) = interrupt::listen()
+            {
+                eprintln!("error: cannot listen to signals: {error}");
+                return ExitCode::FAILURE;
+            }
+            ExitCode::from(run(&command, &mut Output::Terminal))
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::terminal;
+use crate::{interrupt, terminal};
 
 /// Steps of the bar; a recording's part is at least one of them.
 const STEPS: f64 = 10_000.0;
@@ -62,6 +62,8 @@ impl Progress {
         };
         self.bar.set_position((shown * STEPS) as u64);
         self.bar.set_message(what.to_owned());
+        interrupt::far(shown);
+        interrupt::doing(what);
     }
 
     /// Recording `index` has come to `fraction`.
@@ -72,6 +74,7 @@ impl Progress {
         };
         *own = fraction;
         let mean = done.iter().sum::<f64>() / done.len() as f64;
+        interrupt::far(mean);
         self.bar.set_position((mean * STEPS) as u64);
     }
 }

@@ -12,6 +12,7 @@ pub use effort_unit::EffortUnit;
 pub use link::{
     Audience, Domain, InProcess, Keep, LinkError, Position, Received, Receiver, ReceiverCounts,
     Sender, SenderCounts, SharedMemory, Transport, Zenoh, ZenohEndpoints, ZenohRouter,
+    zenoh_reason,
 };
 pub use sample::{
     Detection, EventKind, Header, Health, JointArray, JointState, MAX_JOINTS, Name, Sample,

@@ -17,11 +17,14 @@ use crate::supervisor::{self, Care, Summary, Verbosity};
 
 /// Run a pipeline: check the file, start this host's stages, look after them until the source ends
 /// or Ctrl-C.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Default, clap::Args)]
 pub struct Args {
-    /// The pipeline file.
-    #[arg(default_value = DEFAULT)]
-    pipeline: PathBuf,
+    /// The pipeline file; by default `pipeline.yaml`.
+    #[arg(conflicts_with = "pipeline")]
+    file: Option<PathBuf>,
+    /// The same, as `replay` takes it.
+    #[arg(long, value_name = "FILE")]
+    pipeline: Option<PathBuf>,
     /// Which of the file's hosts this is, where it names several.
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
@@ -66,24 +69,12 @@ fn seconds(text: &str) -> Result<Duration, String> {
     }
 }
 
-const DEFAULT: &str = "pipeline.yaml";
-
-impl Default for Args {
-    fn default() -> Self {
-        Self {
-            pipeline: DEFAULT.into(),
-            host: None,
-            force: false,
-            expect_data: None,
-            telling: Telling::default(),
-            json: false,
-        }
-    }
-}
-
 /// Runs it.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
-    let mut pipeline = Pipeline::load(&args.pipeline, args.host.as_deref())?;
+    let mut pipeline = Pipeline::load(
+        super::pipeline_file(args.file.as_ref(), args.pipeline.as_ref()),
+        args.host.as_deref(),
+    )?;
     let names = || pipeline.hosts.keys().map(String::as_str);
     let host = match (&args.host, pipeline.hosts.len()) {
         (None, 2..) => {

@@ -36,10 +36,17 @@ pub struct Summary {
 }
 
 /// One stage.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a key of the JSON, or known beside them"
+)]
 #[derive(Debug, Clone, Serialize)]
 pub struct StageSummary {
     /// Its name.
     pub stage: String,
+    /// Whether it listens to nobody.
+    #[serde(skip)]
+    is_source: bool,
     /// Whether it ever said what it has done: a program that is not ours may not.
     pub reported: bool,
     /// Samples that came in; for a source, those it read.
@@ -213,15 +220,19 @@ impl Summary {
         let mut text = format!("{}\n\n{}", stages.trim_fmt(), links.trim_fmt());
         for stage in &self.stages {
             let name = &stage.stage;
-            if stage.reported && stage.received == 0 && !stage.failed {
-                text += &format!("\n\nwarning: stage `{name}` got no sample");
-            } else if stage.trouble.is_some() {
-                text += &format!("\n\nwarning: stage `{name}` got no sample at the end");
+            let when = if stage.received == 0 {
+                ""
             } else {
-                continue;
-            }
-            if let Some(trouble) = &stage.trouble {
-                text += &format!(": {trouble}");
+                " at the end"
+            };
+            match &stage.trouble {
+                Some(trouble) => {
+                    text += &format!("\n\nwarning: stage `{name}` got no sample{when}: {trouble}");
+                }
+                None if stage.is_source && stage.reported && stage.received == 0 => {
+                    text += &format!("\n\nwarning: stage `{name}` got no sample");
+                }
+                None => {}
             }
         }
         text
@@ -244,6 +255,7 @@ impl StageSummary {
         }
         Self {
             stage: stage.seat.stage.clone(),
+            is_source: stage.is_source(),
             reported: stage.tally.is_known(),
             received,
             emitted: sums.emitted,

@@ -153,7 +153,7 @@ impl Supervisor<'_> {
             " after the last one"
         };
         let why = match stage.silence.trouble() {
-            Some(trouble) => format!(": {trouble}"),
+            Some(trouble) => format!(": {}", trouble.what),
             None => String::new(),
         };
         self.view.warn(&format!(

@@ -17,7 +17,7 @@ use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
 use tauscope_archive::ros::{self, Message};
-use tauscope_bus::{Emit, JointState, Progress, Source, StageError, Trouble};
+use tauscope_bus::{Emit, JointState, Progress, Source, StageError, Trouble, zenoh_reason};
 use zenoh::{Session, Wait};
 
 use crate::config::{Config, ConfigError, ZenohConfig};
@@ -84,7 +84,7 @@ impl ZenohSource {
     pub fn open(zenoh: &ZenohConfig, config: &Config, setup: &Setup) -> Result<Self, IngestError> {
         let session = zenoh::open(session_config(zenoh)?)
             .wait()
-            .map_err(|error| IngestError::Zenoh(error.to_string()))?;
+            .map_err(|error| IngestError::Zenoh(zenoh_reason(&error)))?;
         let queue = Arc::new(Queue::new(zenoh.queue));
         let scheme = KeyScheme::new(zenoh, &setup.cell);
         let topics = &zenoh.topics;
@@ -274,7 +274,7 @@ fn subscribe(
             ConfigError::Zenoh {
                 what: "key",
                 text: key.to_owned(),
-                reason: error.to_string(),
+                reason: zenoh_reason(&error),
             }
             .into()
         })
@@ -313,7 +313,7 @@ fn session_config(zenoh: &ZenohConfig) -> Result<zenoh::Config, ConfigError> {
                     "setting"
                 },
                 text: format!("{key}: {value}"),
-                reason: error.to_string(),
+                reason: zenoh_reason(&error),
             })?;
     }
     Ok(config)
