@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    calibrate, check, evaluate, explain, info, repair, replay, run, schema, simulate, stage,
+    calibrate, check, evaluate, explain, info, init, repair, replay, run, schema, simulate, stage,
 };
 
 /// A robot's measured effort beside its digital twin's: stream, detect, record.
@@ -29,6 +29,7 @@ pub enum Command {
     Explain(explain::Args),
     Evaluate(evaluate::Args),
     Simulate(simulate::Args),
+    Init(init::Args),
     Info(info::Args),
     Repair(repair::Args),
     #[command(hide = true)]

@@ -5,6 +5,7 @@ pub mod check;
 pub mod evaluate;
 pub mod explain;
 pub mod info;
+pub mod init;
 pub mod repair;
 pub mod replay;
 pub mod run;

@@ -22,12 +22,15 @@ static PERCENT: AtomicU32 = AtomicU32::new(u32::MAX);
 /// Who holds, and what is being done. Locked while the program leaves, so that nothing begins then.
 static STATE: Mutex<State> = Mutex::new(State {
     holds: 0,
+    held: false,
     doing: String::new(),
 });
 
 #[derive(Debug)]
 struct State {
     holds: usize,
+    /// Somebody has brought something to its end before.
+    held: bool,
     doing: String,
 }
 
@@ -87,7 +90,9 @@ pub fn hold() -> Hold {
 
 impl Drop for Hold {
     fn drop(&mut self) {
-        state().holds -= 1;
+        let mut state = state();
+        state.holds -= 1;
+        state.held = true;
     }
 }
 
@@ -107,8 +112,8 @@ fn ask() {
     if !state.doing.is_empty() {
         far += &format!(" ({})", state.doing);
     }
-    let left = if state.holds > 0 {
-        "; what is unfinished was removed"
+    let left = if state.holds > 0 || state.held {
+        "; what is there is whole, what was unfinished is removed"
     } else {
         "; no result was written"
     };

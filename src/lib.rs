@@ -9,6 +9,7 @@ mod commands;
 mod existing;
 mod exit;
 mod explain;
+mod init;
 mod interrupt;
 mod output;
 mod plan;
@@ -103,6 +104,7 @@ fn run(command: &Command, out: &mut Output) -> u8 {
         Command::Explain(args) => commands::explain::run(args, out),
         Command::Evaluate(args) => commands::evaluate::run(args, out),
         Command::Simulate(args) => commands::simulate::run(args, out),
+        Command::Init(args) => commands::init::run(args, out),
         Command::Info(args) => commands::info::run(args, out),
         Command::Repair(args) => commands::repair::run(args, out),
         Command::Stage(_) | Command::Exec(_) => Err(exit::Failure::rejected(

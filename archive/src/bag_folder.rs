@@ -35,6 +35,7 @@ struct BagInformation {
 
 const METADATA: &str = "metadata.yaml";
 /// Longest `metadata.yaml` \[bytes\]: some 100 000 files.
+/// Resolution: bounds memory.
 const MAX_METADATA_BYTES: u64 = 16 << 20;
 
 impl BagFolder {

@@ -10,7 +10,7 @@ use crate::ros::{DecodeError, EncodeError};
 #[derive(Debug, thiserror::Error)]
 pub enum ArchiveError {
     /// The operating system refuses.
-    #[error("{}: {source}", path.display())]
+    #[error("{}", of_io(path, source))]
     Io {
         /// The file.
         path: PathBuf,
@@ -157,5 +157,17 @@ fn topics_hint(known: &[String]) -> String {
         "; it has no topics".to_owned()
     } else {
         format!("; it has {}", known.join(", "))
+    }
+}
+
+/// What the operating system says, in words where there are better ones.
+fn of_io(path: &Path, source: &std::io::Error) -> String {
+    let path = path.display();
+    match source.kind() {
+        std::io::ErrorKind::NotFound => format!("there is no file or folder {path}"),
+        std::io::ErrorKind::PermissionDenied => {
+            format!("{path} may not be read or written by this user")
+        }
+        _ => format!("{path}: {source}"),
     }
 }

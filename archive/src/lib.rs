@@ -5,7 +5,9 @@ mod csv_file;
 mod cursor;
 mod damage;
 mod error;
+mod file_kind;
 mod info;
+mod joint_facts;
 mod mcap_file;
 mod mcap_write;
 mod recording;
@@ -18,7 +20,9 @@ pub mod whole_file;
 pub use csv_file::{Column, Columns, CsvError, CsvMapping, CsvProblem, limits as csv_limits};
 pub use damage::{Damage, DamageKind};
 pub use error::ArchiveError;
+pub use file_kind::file_kind;
 pub use info::{Gap, Info, JointsInfo, TopicInfo};
+pub use joint_facts::JointFacts;
 pub use mcap_write::{
     CHUNK_SPAN_NS, Compression, McapWriter, PROVENANCE, TopicWriter, WriteError, Written,
 };

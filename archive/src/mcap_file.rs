@@ -20,10 +20,14 @@ pub(crate) use index::{CRC_FROM_END_BYTES, read_footer, summary_crc};
 pub(crate) use layout::Layout;
 
 /// Longest record other than a chunk or an attachment that is read \[bytes\].
+/// Resolution: bounds memory.
 const MAX_RECORD_BYTES: u64 = 64 << 20;
 /// Longest chunk, packed or unpacked, and most unpacked chunks held at a time \[bytes\].
+/// Resolution: bounds memory.
 const MAX_LOADED_BYTES: usize = 1 << 30;
 /// Opcode and length before each record \[bytes\].
+/// Physical: the MCAP format: an opcode of 1 byte and a length of 8.
 const RECORD_PREFIX_BYTES: u64 = 9;
 /// Channel, sequence, log and publish time before a message's body \[bytes\].
+/// Physical: the MCAP format: 2 + 4 + 8 + 8 bytes.
 const MESSAGE_HEADER_BYTES: usize = 22;

@@ -22,8 +22,10 @@ pub(crate) use error::{io, mcap};
 
 /// A chunk is closed, and handed to the operating system, when the next message would make it span
 /// this much log time: what a kill can cost at most \[ns\].
+/// Resolution: the file's size, against what a kill costs.
 pub const CHUNK_SPAN_NS: i64 = 100_000_000;
 /// A chunk is also closed at this size \[bytes\].
+/// Resolution: memory, against the file's size.
 const CHUNK_BYTES: usize = 1 << 20;
 /// Says who wrote the file; without a version, which stands in the provenance.
 const LIBRARY: &str = "tauscope";

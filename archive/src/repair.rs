@@ -19,6 +19,7 @@ use crate::whole_file::{self, Existing};
 /// Name of the metadata record that says what was repaired.
 const REPAIR: &str = "tauscope_repair";
 /// Chunks of a repaired file have at least this size, but for the last \[bytes\].
+/// Resolution: the file's size, against memory and what a damaged chunk costs.
 const CHUNK_BYTES: usize = 1 << 20;
 
 /// Why a recording cannot be repaired.

@@ -13,8 +13,10 @@ use crate::topic::Topic;
 /// How every SQLite database begins.
 pub(crate) const MAGIC: &[u8] = b"SQLite format 3\0";
 /// Messages are read in pages of about this size \[bytes\]; a page holds at least one.
+/// Resolution: memory against the number of reads.
 const PAGE_BYTES: usize = 4 << 20;
 /// Longest message once unpacked \[bytes\].
+/// Resolution: bounds memory.
 const MAX_MESSAGE_BYTES: usize = 64 << 20;
 
 /// A database that has been looked through.

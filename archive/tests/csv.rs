@@ -30,6 +30,7 @@ fn first(first: usize) -> Columns {
 fn mapping(joints: usize) -> CsvMapping {
     CsvMapping {
         time: number(1),
+        time_unit_ns: 1_000_000_000,
         position: first(2),
         velocity: Some(first(2 + joints)),
         effort: Some(first(2 + 2 * joints)),
@@ -94,6 +95,7 @@ fn columns_are_found_by_name() {
             number: None,
             name: Some("t".to_owned()),
         },
+        time_unit_ns: 1_000_000_000,
         position: names(&["q2", "q1"]),
         velocity: None,
         effort: Some(names(&["i2", "i1"])),

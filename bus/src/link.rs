@@ -27,9 +27,11 @@ pub use zenoh::{Zenoh, ZenohEndpoints, ZenohRouter, zenoh_reason};
 /// How long a sender waits for one keep-all receiver that takes nothing, before it counts the
 /// sample as undelivered and goes on. A receiver that has used this up is not waited for again until
 /// it has taken something.
+/// Tuned: by hand, on no recorded seeds; not swept.
 pub const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Most samples that a keep-all receiver may leave unread.
+/// Resolution: memory.
 pub const MAX_DEPTH: usize = 1024;
 
 /// What becomes of a sample that a receiver has no room for.

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 pub use name::Name;
 
 /// The most joints one cell may have. Fixed, because a sample's size is.
+/// Resolution: size of a sample; arms have 6 or 7 joints, two arms 14.
 pub const MAX_JOINTS: usize = 16;
 
 /// One number per joint, in URDF order.

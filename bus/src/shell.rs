@@ -25,8 +25,10 @@ pub use source::run_source;
 pub use stage::run_stage;
 
 /// How long a shell waits for a sample before it looks whether it is to stop.
+/// Resolution: how soon a stop is noticed, against how often the stage wakes up.
 const TICK: Duration = Duration::from_millis(100);
 /// How long a stage that has ended stays for receivers that have not read all of its stream yet.
+/// Resolution: how long the end of a run may take.
 const TAKEN_WITHIN: Duration = Duration::from_secs(10);
 
 /// Tells a shell to stop. Clones are one.

@@ -39,6 +39,7 @@ mod aba;
 mod crba;
 mod data;
 pub mod derivative;
+pub mod effort_scale;
 mod inertia;
 mod inertial_effort;
 pub mod kinematic_tree;

@@ -78,7 +78,11 @@ impl Evaluation {
         out: &Path,
         progress: &Progress<'_>,
     ) -> Result<(), EvaluateError> {
+        /// Share of the progress once the twins are fitted.
+        /// Tuned: by hand, for the progress that is shown; no number depends on it.
         const FITTED: f64 = 0.1;
+        /// Share of the progress once the detectors have learnt.
+        /// Tuned: by hand, for the progress that is shown; no number depends on it.
         const LEARNT: f64 = 0.6;
         let request = &self.request;
         let name = &request.twins[index].name;

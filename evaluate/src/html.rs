@@ -21,9 +21,11 @@ use crate::tables::Table;
 const OWN_STYLE: &str = include_str!("html/style.css");
 
 /// Colours of the style sheet; further detectors take them again with a dashed line.
+/// Physical: the number of colours in the style sheet.
 const COLOURS: usize = 7;
 
 /// Of detectors that lead together, so many are named.
+/// Tuned: by eye, for the picture; no number depends on it.
 const MOST_NAMED: usize = 3;
 
 /// The page.

@@ -24,4 +24,6 @@ pub use files::{WriteError, prepare, results, write};
 pub use input::{Options, Request, load};
 pub use judged::Judged;
 pub use metrics::Numbers;
+pub use recording::Role;
+pub use runner::Output;
 pub use tables::{Table, all as tables, text};

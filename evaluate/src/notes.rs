@@ -16,6 +16,7 @@ use crate::runner::Runner;
 use crate::session::Played;
 
 /// Recordings with an oddity are named one by one up to so many.
+/// Tuned: by eye, for the length of the notes.
 const MOST_SINGLY: usize = 4;
 
 /// What was odd, over all recordings behind one twin.

@@ -10,6 +10,7 @@ use tauscope_pipeline::trained;
 use crate::recording::{Named, Role};
 
 /// How many seeds a detector is trained with in whose training chance has a part.
+/// Statistical: the mean over five seeds has a standard error of 0.45 standard deviations.
 pub const SEEDS: u64 = 5;
 
 /// What there is to learn from.

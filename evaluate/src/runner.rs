@@ -35,6 +35,16 @@ pub struct Output {
     pub took_s: f64,
 }
 
+impl Output {
+    /// From the first to the last sample \[s\].
+    pub fn duration_s(&self) -> f64 {
+        match (self.t.first(), self.t.last()) {
+            (Some(first), Some(last)) => last - first,
+            _ => 0.0,
+        }
+    }
+}
+
 /// A detector that has learnt, on its way through the session: started anew with each recording, as a pipeline starts it, and told what it
 /// kept of its life before.
 pub struct Runner {

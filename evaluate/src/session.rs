@@ -49,6 +49,8 @@ impl<'a> Session<'a> {
         recording: &Named,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Played, ReplayError> {
+        /// Samples between two reports of progress.
+        /// Resolution: the cost of reporting.
         const STEP: u64 = 1024;
         let file = FileConfig {
             path: recording.path.clone(),

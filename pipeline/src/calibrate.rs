@@ -5,8 +5,11 @@ use std::path::{Path, PathBuf};
 
 use tauscope_bus::{SampleRef, Sink, StageError, TwinState, flags};
 use tauscope_detect::Detector;
+use tauscope_dynamics::effort_scale::{EffortScale, ScaleFault};
 use tauscope_ingest::{FileConfig, RecordedSource, Topics};
-use tauscope_twin::{Calibration, Expected, JointCorrection, Robot, ScoreStatistics, TwinFile};
+use tauscope_twin::{
+    Calibration, Expected, JointCorrection, Robot, ScoreStatistics, TwinFile, telling_slopes,
+};
 
 use crate::build;
 use crate::cell::{Cell, EffortUnit};
@@ -46,6 +49,9 @@ pub enum CalibrateError {
         "no sample to calibrate on: the recordings hold no effort, or end before the twin's filters have settled"
     )]
     TooShort,
+    /// The recordings are not of this robot in this unit.
+    #[error(transparent)]
+    WrongScale(#[from] ScaleFault),
 }
 
 impl CalibrateError {
@@ -53,7 +59,7 @@ impl CalibrateError {
     pub fn is_input(&self) -> bool {
         match self {
             Self::Recording { source, .. } => source.is_input(),
-            Self::TooShort => true,
+            Self::TooShort | Self::WrongScale(_) => true,
         }
     }
 }
@@ -112,6 +118,12 @@ impl Job<'_> {
         let Some(fits) = calibration.fit() else {
             return Err(CalibrateError::TooShort);
         };
+        if in_nm && !from_topic {
+            let slopes = telling_slopes(&facts.joint_names, &fits);
+            if let Some(fault) = EffortScale::of(&slopes).fault_in_nm() {
+                return Err(fault.into());
+            }
+        }
         let mut file = self.file();
         for (name, fit) in self.cell.facts.joint_names.iter().zip(&fits) {
             let joint = JointCorrection {

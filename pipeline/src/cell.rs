@@ -16,6 +16,7 @@ pub use constants::{ConstantSpot, torque_constants};
 pub use joints::first_joint_names;
 
 use crate::report::{Problem, Report};
+use crate::urdf;
 
 /// A cell, its names looked up.
 #[derive(Debug, Clone)]
@@ -66,10 +67,8 @@ impl Cell {
         constants: &BTreeMap<String, f64>,
         problem: &dyn Fn(ConstantSpot<'_>, String) -> Problem,
     ) -> Result<Self, Report> {
-        let urdf = std::fs::read_to_string(path)
-            .map_err(|error| Problem::of_file(path, format!("cannot read the URDF: {error}")))?;
-        let model = Model::from_urdf(&urdf)
-            .map_err(|error| Problem::of_file(path, format!("cannot use the URDF: {error}")))?;
+        let (urdf, model) =
+            urdf::read(path).map_err(|error| Problem::of_file(path, error.to_string()))?;
         let joint_names = model.joint_names().map(str::to_owned).collect();
         let name = model.name().to_owned();
         let mut cell = Self::from_joints(name, joint_names, effort_unit, constants, problem)?;

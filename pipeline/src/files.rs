@@ -8,6 +8,7 @@ use std::path::Path;
 
 use schemars::{JsonSchema, Schema};
 use serde::de::DeserializeOwned;
+use serde_json::Value;
 
 use crate::pipeline::PipelineFile;
 use crate::report::Report;
@@ -44,6 +45,13 @@ impl FileKind {
         }
     }
 
+    /// The schema as a text for editors.
+    pub fn schema_text(self) -> String {
+        let mut schema = self.schema().to_value();
+        plain_descriptions(&mut schema);
+        format!("{schema:#}")
+    }
+
     /// Checks the shape of the file at `path`.
     ///
     /// # Errors
@@ -59,5 +67,21 @@ impl FileKind {
             Self::Case => of::<CaseFile>(path),
             Self::Set => of::<SetFile>(path),
         }
+    }
+}
+
+/// Descriptions come from Rust documentation, where brackets are escaped.
+fn plain_descriptions(schema: &mut Value) {
+    match schema {
+        Value::Object(map) => {
+            for (key, value) in map {
+                match value {
+                    Value::String(text) if key == "description" => *text = text.replace('\\', ""),
+                    other => plain_descriptions(other),
+                }
+            }
+        }
+        Value::Array(items) => items.iter_mut().for_each(plain_descriptions),
+        _ => {}
     }
 }

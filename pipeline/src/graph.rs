@@ -21,6 +21,7 @@ use self::sink::SinkNode;
 
 /// Samples a stage may leave unread. A source gives out at most a few in a step, and they are all
 /// taken before its next one.
+/// Resolution: memory.
 const DEPTH: usize = 1024;
 
 /// Where a stage's output goes, and the header of what went out last.

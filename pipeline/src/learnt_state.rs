@@ -1,16 +1,19 @@
-//! What a detector learns, kept in a file from one run to the next.
+//! What a detector has learnt: read from the file that its settings name, and kept from one run to the next.
 
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use tauscope_bus::{Detection, Emit, Stage, StageError, TwinState};
 use tauscope_detect::{Config, Detect, StateFile};
 
 use crate::report::Report;
+use crate::suggest;
 use crate::yaml::{self, Place};
 use tauscope_archive::whole_file::{self, Existing};
 
 /// Time between two writes, in time of the stream \[ns\]. What was learnt since is lost if the process
 /// dies.
+/// Resolution: writes to disk, against what a killed process forgets.
 const WRITE_EVERY_NS: i64 = 60_000_000_000;
 
 /// Lets the detector go on from what the file that `config` names holds, if there is one yet. Gives the
@@ -26,6 +29,33 @@ pub fn resume(config: &mut Config) -> Result<Option<PathBuf>, Report> {
         resumed.map_err(|error| state.at(&Place::root(), error.to_string()))?;
     }
     Ok(path)
+}
+
+/// Replaces the file of what was learnt that `config` names, if it names one, by its content. Such a file is
+/// `learnt.yaml` as `init` and `evaluate` write it: by detector, its part of a pipeline file.
+///
+/// # Errors
+/// Everything that is wrong with the file.
+pub fn read_learnt(config: &mut Config, resolve: &dyn Fn(&Path) -> PathBuf) -> Result<(), Report> {
+    let named = config.learnt_files().next();
+    let Some((name, path)) = named.map(|(name, path)| (name, resolve(path))) else {
+        return Ok(());
+    };
+    let file = yaml::load::<BTreeMap<String, Config>>(&path)?;
+    let place = Place::root().key(name);
+    let learnt = file.value.get(name).and_then(|config| config.learnt(name));
+    let Some(learnt) = learnt else {
+        let learned = file.value.iter();
+        let learned = learned.filter(|(name, config)| config.learnt(name).is_some());
+        let problem = file.at(&place, format!("nothing that {name} has learnt"));
+        let help = format!(
+            "in this file have learnt: {}",
+            suggest::list(learned.map(|(name, _)| name.as_str()))
+        );
+        return Err(problem.help(help).into());
+    };
+    let place = place.key(name).key("learnt");
+    (config.resume(&learnt)).map_err(|error| file.at(&place, error.to_string()).into())
 }
 
 /// A detector whose learnt state is written to a file, once a minute and at the end. Its stream is
@@ -88,8 +118,6 @@ impl Stage<TwinState, Detection> for Kept {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
-
-    use std::path::Path;
 
     use tauscope_bus::{Header, LinkError, flags};
     use tauscope_detect::indri::virtual_collision_sensor::{FirstBias, Settings};

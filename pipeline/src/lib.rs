@@ -21,4 +21,5 @@ pub mod suggest;
 pub mod tables;
 pub mod tally;
 pub mod trained;
+pub mod urdf;
 pub mod yaml;

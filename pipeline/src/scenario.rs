@@ -8,6 +8,7 @@ use tauscope_ingest::SimulatedRobot;
 use tauscope_ingest::simulated::Scenario;
 
 use crate::report::Report;
+use crate::urdf;
 use crate::yaml::{self, Place};
 
 /// A scenario and its robot, as they can be handed to another process.
@@ -28,10 +29,7 @@ impl ScenarioFacts {
         let file = yaml::load::<Scenario>(path)?;
         let place = Place::root().key("robot");
         let robot = file.resolve(&file.value.robot);
-        let urdf = std::fs::read_to_string(&robot)
-            .map_err(|error| file.at(&place, format!("cannot read the URDF: {error}")))?;
-        Model::from_urdf(&urdf)
-            .map_err(|error| file.at(&place, format!("cannot use the URDF: {error}")))?;
+        let (urdf, _) = urdf::read(&robot).map_err(|error| file.at(&place, error.to_string()))?;
         let mut scenario = file.value.clone();
         for path in scenario.paths_mut() {
             *path = file.resolve(path);

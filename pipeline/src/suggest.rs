@@ -1,6 +1,7 @@
 //! "Did you mean": the known word nearest to one that is not known.
 
 /// Words less alike than this (Jaro-Winkler, 0 to 1) are not worth suggesting.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_SIMILARITY: f64 = 0.85;
 
 /// The known word that `word` was probably meant to be.
@@ -19,6 +20,8 @@ pub fn help<'a>(
     what: &str,
     known: impl IntoIterator<Item = &'a str>,
 ) -> Option<String> {
+    /// More known words than this are not listed.
+    /// Tuned: by eye, for the length of the message.
     const MOST_LISTED: usize = 16;
     let known: Vec<&str> = known.into_iter().collect();
     if let Some(candidate) = nearest(word, known.iter().copied()) {
@@ -37,6 +40,8 @@ pub fn list<'a>(words: impl IntoIterator<Item = &'a str>) -> String {
 
 /// The first few of many words.
 pub fn some(words: &[&str]) -> String {
+    /// How many words are named.
+    /// Tuned: by eye, for the length of the message.
     const MOST_NAMED: usize = 8;
     let first = words[..words.len().min(MOST_NAMED)].join(", ");
     match words.len().saturating_sub(MOST_NAMED) {

@@ -22,6 +22,7 @@ use place::Spans;
 use crate::report::{Problem, Report, Source};
 
 /// More than anybody writes by hand; what is larger is some other file.
+/// Resolution: bounds memory.
 const LARGEST_FILE_BYTES: u64 = 4 << 20;
 
 /// A value, and where in its file each part of it stands.
@@ -167,6 +168,13 @@ pub fn parse<T: DeserializeOwned + JsonSchema>(
 }
 
 fn read(path: &Path) -> Result<String, Report> {
+    if let Some(kind) = tauscope_archive::file_kind(path)
+        && kind != "empty"
+    {
+        let title = format!("this is {kind}, not a file that people write");
+        let help = "give a pipeline, case, set, scenario or twin file (YAML) here";
+        return Err(Problem::of_file(path, title).help(help).into());
+    }
     let unreadable = |error: std::io::Error| match error.kind() {
         std::io::ErrorKind::NotFound => Problem::of_file(path, "there is no such file"),
         _ => Problem::of_file(path, format!("cannot read the file: {error}")),

@@ -1,6 +1,5 @@
 //! `tauscope schema`.
 
-use serde_json::Value;
 use tauscope_pipeline::files::FileKind;
 
 use crate::exit::{Exit, Failure};
@@ -17,25 +16,6 @@ pub struct Args {
 
 /// Prints it.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
-    let mut schema = args.kind.schema().to_value();
-    plain_descriptions(&mut schema);
-    let text = serde_json::to_string_pretty(&schema).map_err(anyhow::Error::from)?;
-    out.print(&text)?;
+    out.print(&args.kind.schema_text())?;
     Ok(Exit::Done)
-}
-
-/// Descriptions come from Rust documentation, where brackets are escaped.
-fn plain_descriptions(schema: &mut Value) {
-    match schema {
-        Value::Object(map) => {
-            for (key, value) in map {
-                match value {
-                    Value::String(text) if key == "description" => *text = text.replace('\\', ""),
-                    other => plain_descriptions(other),
-                }
-            }
-        }
-        Value::Array(items) => items.iter_mut().for_each(plain_descriptions),
-        _ => {}
-    }
 }

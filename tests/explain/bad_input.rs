@@ -35,7 +35,7 @@ fn one_recording_proves_nothing() {
             recording.to_str().unwrap(),
         ],
     );
-    not_evaluated(&out, &done, "one recording only");
+    not_evaluated(&out, &done, "only one recording");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 /// Longest piece of a table that is shown in an error \[characters\].
+/// Tuned: by eye, for the length of the message.
 const SHOWN_CHARS: usize = 40;
 
 /// What is wrong in a table, and where.

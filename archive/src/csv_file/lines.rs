@@ -3,6 +3,7 @@
 use std::io::{self, BufRead, BufReader, Read};
 
 /// Longest line: more than 50 000 numbers \[bytes\].
+/// Resolution: bounds memory.
 pub(super) const MAX_LINE_BYTES: usize = 1 << 20;
 
 pub(super) struct Lines<R> {

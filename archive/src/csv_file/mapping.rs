@@ -19,8 +19,12 @@ use crate::error::ArchiveError;
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CsvMapping {
-    /// The time in seconds: since the epoch, or since any beginning.
+    /// The time: since the epoch, or since any beginning.
     pub time: Column,
+    /// Its unit \[ns\]: 1000000 for milliseconds; seconds if absent.
+    #[serde(default = "second", skip_serializing_if = "is_second")]
+    #[schemars(range(min = 1, max = 1_000_000_000_000_i64))]
+    pub time_unit_ns: u64,
     /// Positions \[rad, m\].
     pub position: Columns,
     /// Velocities \[rad/s, m/s\]; differentiated from the positions if absent.
@@ -41,6 +45,15 @@ pub struct CsvMapping {
     /// What stands between two columns: one ASCII character.
     #[serde(default = "comma")]
     pub delimiter: char,
+}
+
+fn second() -> u64 {
+    1_000_000_000
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
+fn is_second(unit_ns: &u64) -> bool {
+    *unit_ns == second()
 }
 
 fn comma() -> char {

@@ -36,6 +36,7 @@ pub(super) struct Rows {
     found: Found,
     /// `fields` hold the first row, read to learn the width.
     first_is_read: bool,
+    time_unit_s: f64,
     before_s: f64,
     state: JointState,
 }
@@ -73,6 +74,7 @@ impl Rows {
             width: 0,
             found: Found::default(),
             first_is_read: false,
+            time_unit_s: mapping.time_unit_ns as f64 / NS_PER_S,
             before_s: f64::NEG_INFINITY,
             state: JointState {
                 name: joints.to_vec(),
@@ -125,6 +127,7 @@ impl Rows {
         let column = self.found.time;
         let field = &self.fields[column];
         let time_s = number(field)
+            .map(|time| time * self.time_unit_s)
             .filter(|time_s| (0.0..=limits::TIME_S).contains(time_s))
             .ok_or_else(|| CsvProblem::Time {
                 column: column + 1,

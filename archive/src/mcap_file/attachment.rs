@@ -7,7 +7,10 @@ use mcap::records::AttachmentHeader;
 use super::chunk::Fields;
 
 /// Longest header: times, name and media type \[bytes\].
+/// Resolution: bounds memory.
 const MAX_HEADER_BYTES: u64 = 64 << 10;
+/// Checksum behind an attachment's data \[bytes\].
+/// Physical: the MCAP format: a CRC-32.
 const CRC_BYTES: u64 = 4;
 
 /// The header at the front of an attachment record's body of `len` bytes, where its data begin and

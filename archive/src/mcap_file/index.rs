@@ -10,11 +10,15 @@ use super::scan::{PlainRun, note_plain};
 use super::walk::{Step, Walk};
 use super::{MAX_RECORD_BYTES, RECORD_PREFIX_BYTES};
 
-/// Footer record and the magic behind it.
+/// Body of the footer record \[bytes\].
+/// Physical: the MCAP format: two offsets of 8 bytes and a CRC of 4.
 const FOOTER_BODY_BYTES: u64 = 20;
+/// Footer record and the magic behind it \[bytes\].
+/// Physical: the MCAP format.
 const FILE_END_BYTES: u64 = RECORD_PREFIX_BYTES + FOOTER_BODY_BYTES + mcap::MAGIC.len() as u64;
 
 /// The summary's CRC is the last field of the footer.
+/// Physical: the MCAP format.
 pub(crate) const CRC_FROM_END_BYTES: u64 = 4 + mcap::MAGIC.len() as u64;
 
 pub(super) enum Outcome {

@@ -13,6 +13,7 @@ use super::{MAX_LOADED_BYTES, MAX_RECORD_BYTES, MESSAGE_HEADER_BYTES, RECORD_PRE
 use crate::damage::DamageKind;
 
 /// Messages without a chunk are read in runs of about this length \[bytes\].
+/// Resolution: memory against the number of reads.
 const PLAIN_RUN_BYTES: u64 = 1 << 20;
 
 /// Fills `layout` from all of `file`, up to where it is torn or makes no sense.

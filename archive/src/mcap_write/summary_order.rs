@@ -11,6 +11,8 @@ use mcap::records::op;
 
 use crate::mcap_file::{CRC_FROM_END_BYTES, read_footer, summary_crc};
 
+/// Opcode and length before each record \[bytes\].
+/// Physical: the MCAP format: an opcode of 1 byte and a length of 8.
 const PREFIX_BYTES: usize = 9;
 
 pub(super) fn sort(mut file: &File) -> io::Result<()> {

@@ -12,6 +12,7 @@ use crate::bag_folder::BagFolder;
 use crate::csv_file::{self, CsvMapping, CsvTable};
 use crate::damage::{Damage, DamageKind};
 use crate::error::ArchiveError;
+use crate::file_kind::file_kind;
 use crate::mcap_file::Layout;
 use crate::ros::{JointState, Message as _};
 use crate::sqlite_file::{self, SqliteFile};
@@ -19,7 +20,8 @@ use crate::topic::{Topic, Topics};
 
 impl Recording {
     /// Opens the recording at `path`: an MCAP file (also an unfinished `.part`), the folder of a
-    /// rosbag2 bag with MCAP or SQLite files, or one such SQLite file.
+    /// rosbag2 bag with MCAP or SQLite files, one such SQLite file, or a table (`.csv`) whose columns its header or a
+    /// file beside it tells.
     ///
     /// Of an MCAP file, only the index is read if it has a sound one; else all of it, once. A
     /// database is counted through once.
@@ -32,6 +34,13 @@ impl Recording {
         let path = path.as_ref();
         if path.is_dir() {
             return Self::open_folder(path);
+        }
+        if path
+            .extension()
+            .is_some_and(|extension| extension.eq_ignore_ascii_case("csv"))
+            && path.exists()
+        {
+            return Self::open_csv(path, &csv_file::mapping_of(path)?, &[]);
         }
         Self::open_file(path, false)
     }
@@ -50,18 +59,17 @@ impl Recording {
                 SqliteFile::read(path, packed_messages)?,
             ));
         }
-        let reason = if beginning.is_empty() {
-            "the file is empty"
-        } else if beginning.starts_with(b"#ROSBAG V") {
-            "a bag of ROS 1: convert it first, for example with `rosbags-convert`"
-        } else if path.extension().is_some_and(|extension| extension == "csv") {
-            "a CSV table needs a column mapping"
-        } else {
-            "it begins as neither an MCAP file nor a SQLite database does"
+        let reason = match file_kind(path) {
+            Some("empty") => "the file is empty".to_owned(),
+            Some(kind) if beginning.starts_with(b"#ROSBAG V") => {
+                format!("it is {kind}: convert it first, for example with `rosbags-convert`")
+            }
+            Some(kind) => format!("it is {kind}"),
+            None => "it begins as neither an MCAP file nor a SQLite database does".to_owned(),
         };
         Err(ArchiveError::UnknownFormat {
             path: path.to_owned(),
-            reason: reason.to_owned(),
+            reason,
         })
     }
 

@@ -9,6 +9,7 @@ use super::Message;
 
 const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
 /// Middlewares pad a payload to four or eight bytes.
+/// Physical: one byte less than the largest alignment.
 const MAX_PADDING: usize = 7;
 
 /// Why the bytes are not the message they should be.

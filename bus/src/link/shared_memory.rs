@@ -46,15 +46,19 @@ pub use domain::{Domain, DomainError};
 const TRANSPORT: &str = "iceoryx2";
 /// Most receivers of a stream per [`Keep`]. Shared memory is laid out for all of them, but only
 /// touched where it is used.
+/// Resolution: shared memory.
 const MAX_RECEIVERS: usize = 16;
 /// One sender, and those of its former lives that nobody has cleaned up yet.
+/// Resolution: shared memory.
 const MAX_SENDERS: usize = 4;
 /// A service's state is in flux while another process creates or removes it.
+/// Resolution: how long a start may take.
 const OPEN_WITHIN: Duration = Duration::from_secs(2);
 
 /// Event of the back channel: the end was taken.
 const END_TAKEN: EventId = EventId::new(0);
 /// Most events of the back channel.
+/// Resolution: shared memory; publishers whose ids are equal modulo this share an event.
 const MAX_EVENT: usize = 255;
 
 /// What travels beside each sample.

@@ -12,6 +12,7 @@ pub struct Name {
 
 impl Name {
     /// Longest text in bytes.
+    /// Resolution: size of a sample; longer names are cut.
     pub const CAPACITY: usize = 48;
 
     /// `text`, cut at the last character that fits.

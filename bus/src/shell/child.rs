@@ -31,8 +31,10 @@ use crate::seat::{Links, Output, Seat};
 use crate::stage::{Sink, Source, Stage};
 
 /// How often a running stage reports: what a killed stage did since then is not known.
+/// Resolution: the cost of reporting.
 const REPORT_EVERY: Duration = Duration::from_millis(100);
 /// How often the wait for receivers looks whether the stage is to stop.
+/// Resolution: how soon a stop is noticed.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 
 /// What a stage's process says on standard output.

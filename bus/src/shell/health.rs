@@ -4,6 +4,8 @@ use super::report::Report;
 use crate::link::{LinkError, Sender};
 use crate::sample::{Header, Health, Name};
 
+/// Stream time between two reports.
+/// Resolution: size of the archive, against how soon a loss is seen.
 const SECOND_NS: i64 = 1_000_000_000;
 
 /// Sends a [`Health`] sample once a second of stream time and at the end.

@@ -145,6 +145,8 @@ pub(super) struct Poster {
 }
 
 impl Poster {
+    /// Time between two reports.
+    /// Resolution: the cost of reporting.
     const EVERY: Duration = Duration::from_millis(100);
 
     pub(super) fn new(board: Board) -> Self {

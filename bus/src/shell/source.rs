@@ -11,6 +11,7 @@ use crate::sample::{Health, Sample};
 use crate::stage::{Progress, Source, StageError};
 
 /// How long a source that has nothing now is left alone.
+/// Resolution: the delay of a sample, against how often the process wakes up.
 const IDLE: Duration = Duration::from_millis(1);
 /// How often a source is asked whether it is in trouble.
 const ASK_EVERY: Duration = Duration::from_millis(500);

@@ -9,6 +9,7 @@ use crate::metrics::Matched;
 use crate::metrics::statistics::{Distribution, quantile};
 
 /// How many bars a picture has.
+/// Tuned: by eye, for the picture; no number depends on it.
 const BARS: usize = 24;
 
 /// A picture a detector, all to one scale; none if nobody has found anything.

@@ -8,6 +8,7 @@ use crate::judged::Judged;
 use crate::metrics::samples::Labelled;
 
 /// About so many points a curve.
+/// Resolution: about one per pixel; changes the page's size.
 const POINTS: usize = 400;
 
 /// One picture with a curve a detector, of the first seed; none if no test recording has both contact and

@@ -7,10 +7,17 @@ use tauscope_explain::html::chart::{Axis, Panel, r};
 
 use crate::judged::Judged;
 
-/// The bounds of a picture \[px\]: left, right, bottom, top.
+/// Left end of a picture's plot \[px\].
+/// Tuned: by eye, for the picture; no number depends on it.
 const LEFT: f64 = 52.0;
+/// Right end of a picture's plot \[px\].
+/// Tuned: by eye, for the picture; no number depends on it.
 const RIGHT: f64 = 388.0;
+/// Lower end of a picture's plot \[px\].
+/// Tuned: by eye, for the picture; no number depends on it.
 const BOTTOM: f64 = 240.0;
+/// Upper end of a picture's plot \[px\].
+/// Tuned: by eye, for the picture; no number depends on it.
 const TOP: f64 = 26.0;
 
 /// The curves of every detector that was tuned by some; none if there is none.

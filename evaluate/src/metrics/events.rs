@@ -5,14 +5,19 @@ use tauscope_pipeline::tally::Event;
 use crate::labels::{TrueEvent, Truth};
 
 /// A detection this much before an event may still be of it: labels are not more exact \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 pub const TOLERANCE_S: f64 = 0.02;
 /// A detection this long after an event's end may still be of it: filters are slow \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 pub const AFTER_S: f64 = 0.15;
 /// A false alarm within this time of the last counted one counts no more \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 pub const MERGE_S: f64 = 0.25;
 /// A labelled length may exceed the last stamp by so much: a period, or a rounding \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 pub const LAST_S: f64 = 0.5;
 /// Grid on which the time in alarm is counted \[s\].
+/// Resolution: a time in alarm is told to 10 ms an alarm.
 const GRID_S: f64 = 0.01;
 
 /// A true event and the detection that found it.

@@ -10,12 +10,16 @@ use crate::recording::{Named, Role};
 use crate::twin::is_free;
 
 /// What is learnt from less contact-free time than this is a guess \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LITTLE_S: f64 = 5.0;
 /// A joint that goes less far than this within a recording stands still \[rad or m\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const STILL: f64 = 0.002;
 /// One that goes farther than this moves \[rad or m\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const MOVES: f64 = 0.1;
 /// A rate may differ from the nominal one, and the train recordings' length from that of their cycles, by this share.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const DIFFERS: f64 = 0.05;
 
 /// Sums and extremes over the recordings of a role.

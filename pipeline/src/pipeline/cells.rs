@@ -9,6 +9,7 @@ use super::file::{CellEntry, PipelineFile};
 use crate::cell::{Cell, CellFacts, ConstantSpot, too_many, torque_constants};
 use crate::report::{Problem, Report};
 use crate::suggest;
+use crate::urdf;
 use crate::yaml::{Located, Place};
 
 /// Looks up every cell; those in which something is wrong are left out and reported.
@@ -61,15 +62,10 @@ impl Resolver<'_> {
         };
         let place = self.place.key("robot");
         let path = self.file.resolve(robot);
-        let text = std::fs::read_to_string(&path).map_err(|error| {
-            self.file
-                .at(&place, format!("cannot read the URDF: {error}"))
-        })?;
-        let model = Model::from_urdf(&text).map_err(|error| {
-            self.file
-                .at(&place, format!("cannot use the URDF: {error}"))
-        })?;
-        Ok(Some((text, model)))
+        let robot = urdf::read(&path);
+        robot
+            .map(Some)
+            .map_err(|error| self.file.at(&place, error.to_string()))
     }
 
     fn joint_names(&self, model: Option<&Model>, report: &mut Report) -> Vec<String> {

@@ -16,8 +16,10 @@ use super::place::{Place, Spans};
 use crate::report::{Problem, Report, Source};
 
 /// Deeper than any file of ours.
+/// Resolution: bounds the stack.
 const DEEPEST: usize = 64;
 /// Nodes that aliases may add.
+/// Resolution: bounds memory and time.
 const MOST_ALIASED_NODES: usize = 10_000;
 
 /// Parses the one document in `source`.

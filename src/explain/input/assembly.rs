@@ -8,7 +8,7 @@ use tauscope_pipeline::cell::{
     Cell, CellFacts, ConstantSpot, EffortUnit, first_joint_names, torque_constants,
 };
 use tauscope_pipeline::report::{Problem, Report};
-use tauscope_pipeline::yaml;
+use tauscope_pipeline::{urdf, yaml};
 use tauscope_twin::TwinFile;
 
 use super::{Named, Request, StartFile};
@@ -144,16 +144,10 @@ impl Assembly<'_> {
 
     fn robot(&self, report: &mut Report) -> Option<(String, Model)> {
         let path = self.robot.as_ref()?;
-        let read = std::fs::read_to_string(path)
-            .map_err(|error| format!("cannot read the URDF {}: {error}", path.display()))
-            .and_then(|text| {
-                let model = Model::from_urdf(&text)
-                    .map_err(|error| format!("cannot use the URDF {}: {error}", path.display()))?;
-                Ok((text, model))
-            });
-        match read {
+        match urdf::read(path) {
             Ok(robot) => Some(robot),
-            Err(title) => {
+            Err(error) => {
+                let title = format!("{}: {error}", path.display());
                 report.push((self.problem)(Spot::Robot, title));
                 None
             }

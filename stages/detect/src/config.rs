@@ -3,7 +3,7 @@
 mod file;
 
 use std::any::Any;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 pub use file::StateFile;
 
@@ -11,6 +11,9 @@ use crate::detectors::{DETECTORS, Entry};
 use crate::frame::{
     AnySettings, ConfigError, Detect, Detector, DetectorSettings, Setup, State, Threshold,
 };
+
+/// The key under which a detector's settings hold what it has learnt.
+const LEARNT: &str = "learnt";
 
 /// A detector, and what all of them share.
 ///
@@ -153,6 +156,20 @@ impl Config {
     pub fn resume(&mut self, state: &State) -> Result<(), serde_json::Error> {
         let mut all = self.detectors.0.iter_mut();
         all.try_for_each(|settings| settings.resume(state.clone()))
+    }
+
+    /// The files that hold what detectors have learnt, by detector, where they are named and have not been read.
+    pub fn learnt_files(&self) -> impl Iterator<Item = (&'static str, &Path)> {
+        self.all()
+            .filter_map(|settings| Some((settings.name(), settings.learnt_file()?)))
+    }
+
+    /// What the detector `name` has learnt, as [`resume`](Self::resume) takes it.
+    pub fn learnt(&self, name: &str) -> Option<State> {
+        let settings = self.all().find(|settings| settings.name() == name)?;
+        let mut settings = serde_json::to_value(settings).ok()?;
+        let learnt = settings.get_mut(LEARNT)?.take();
+        learnt.is_object().then_some(learnt)
     }
 
     /// The files of trained detectors that are to be read into [`Setup::trained`], by detector.

@@ -4,6 +4,7 @@
 //! - [`settings`]: what a detector tells of itself: name, settings, how it is built and how it learns.
 //! - [`stage`]: a detector as a stage of the pipeline, with its [`threshold`], the beginning and end of an
 //!   alarm ([`events`]), and which joints and which link were touched ([`isolation`]).
+//! - [`here_or_file`]: a setting that may stand in a file of its own.
 //! - [`setup`]: what a detector must know of its cell; [`lesson`]: what it learns from; [`trained`]: the file of
 //!   trained weights; [`sweep`]: what the thresholds of a tuned detector trade against each other.
 //! - [`momentum`] and [`discriminant`]: methods that detectors of several papers use; [`shared`]: what detectors of
@@ -16,6 +17,7 @@ mod detector;
 mod discriminant;
 mod error;
 mod events;
+mod here_or_file;
 mod isolation;
 pub(crate) mod joints;
 mod lesson;
@@ -33,6 +35,7 @@ pub use detector::{Details, Detector, Judgement, Seen, State, Verdict};
 pub use discriminant::Discriminant;
 pub(crate) use discriminant::Moments;
 pub use error::ConfigError;
+pub use here_or_file::HereOrFile;
 pub use isolation::{Contact, Isolation};
 pub use lesson::{ContactKind, LabelledContact, LearnError, Lesson, Lessons, Task};
 pub use settings::{AnySettings, DetectorSettings, Suits, Training};

@@ -55,7 +55,7 @@ pub use config::{Config, StateFile};
 pub use detectors::{DETECTORS, Entry};
 pub use frame::{
     AnySettings, ConfigError, Contact, ContactKind, Details, Detect, Detector, DetectorSettings,
-    Impedance, Isolation, JointSetup, Judgement, LabelledContact, LearnError, Lesson, Lessons,
-    ScoreStatistics, Seen, Setup, Shared, State, Suits, Sweeps, Task, Threshold, Trained,
+    HereOrFile, Impedance, Isolation, JointSetup, Judgement, LabelledContact, LearnError, Lesson,
+    Lessons, ScoreStatistics, Seen, Setup, Shared, State, Suits, Sweeps, Task, Threshold, Trained,
     TrainedError, Training, Verdict,
 };

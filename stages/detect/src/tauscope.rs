@@ -44,14 +44,16 @@ mod tail;
 mod usual;
 mod windows;
 
+use std::path::Path;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tauscope_bus::{TwinState, flags};
 
 use crate::frame::rate::Rate;
 use crate::frame::{
-    ConfigError, Detector, DetectorSettings, Judgement, LearnError, Lessons, Seen, Setup, Task,
-    Trained, Training, Verdict,
+    ConfigError, Detector, DetectorSettings, HereOrFile, Judgement, LearnError, Lessons, Seen,
+    Setup, State, Task, Trained, Training, Verdict,
 };
 use alarm::Watch;
 use late::{Late, LateIn};
@@ -97,9 +99,10 @@ pub struct Settings {
     /// the robot \[s\]; 0 for none.
     #[schemars(range(min = 0.0, max = 60.0))]
     pub offset_from_first_s: f64,
-    /// What contact-free recordings have taught; `tauscope evaluate` writes it.
+    /// What contact-free recordings have taught, or the file that holds it: `learnt.yaml` as `tauscope init` and
+    /// `tauscope evaluate` write it.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub learnt: Option<Learnt>,
+    pub learnt: Option<HereOrFile<Learnt>>,
 }
 
 impl Default for Settings {
@@ -119,7 +122,7 @@ impl DetectorSettings for Settings {
     const TRAINING: Training = Training::Own;
 
     fn build(&self, setup: &Setup, _hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {
-        let Some(learnt) = &self.learnt else {
+        let Some(learnt) = self.learnt() else {
             return Err(ConfigError::NotLearnt { detector: NAME });
         };
         if let Some(reason) = learnt.fault(&setup.joint_names) {
@@ -141,7 +144,7 @@ impl DetectorSettings for Settings {
     }
 
     fn warning(&self, _: &Setup) -> Option<String> {
-        let free_s = self.learnt.as_ref()?.free_s?;
+        let free_s = self.learnt()?.free_s?;
         (free_s < ENOUGH_S).then(|| {
             format!(
                 "{NAME} has learnt what is usual from {free_s:.1} s in which nothing touched the arm, and that is too little: its threshold is a guess, how often it is exceeded by chance is not known, and all joints are taken for more alike than they are; let it learn from at least {ENOUGH_S} s, better some minutes"
@@ -150,11 +153,20 @@ impl DetectorSettings for Settings {
     }
 
     fn note(&self) -> Option<String> {
-        self.learnt.as_ref()?.kind_contacts.as_ref()?.note()
+        self.learnt()?.kind_contacts.as_ref()?.note()
     }
 
     fn found_by_evaluation(&self) -> Vec<&'static str> {
         self.learnt.iter().map(|_| "learnt").collect()
+    }
+
+    fn learnt_file(&self) -> Option<&Path> {
+        self.learnt.as_ref()?.file()
+    }
+
+    fn resume(&mut self, state: State) -> Result<(), serde_json::Error> {
+        self.learnt = Some(HereOrFile::Here(serde_json::from_value(state)?));
+        Ok(())
     }
 }
 
@@ -172,12 +184,17 @@ pub fn learn(
     learnt.smallest = smallest::smallest(&learnt, lessons, &late, setup, settings.follow());
     (learnt.kinds, learnt.kind_contacts) = kinds::learn(&learnt, settings, setup, lessons).unzip();
     Ok(Settings {
-        learnt: Some(learnt),
+        learnt: Some(HereOrFile::Here(learnt)),
         ..settings.clone()
     })
 }
 
 impl Settings {
+    /// What contact-free recordings have taught, once it has been read.
+    pub fn learnt(&self) -> Option<&Learnt> {
+        self.learnt.as_ref()?.here()
+    }
+
     fn follow(&self) -> Follow {
         Follow {
             drift_s: self.drift_s,
@@ -187,7 +204,7 @@ impl Settings {
 
     /// By link, the smallest force that is found at `false_alarms_per_hour`; empty before anything is learnt.
     pub fn smallest_forces(&self, false_alarms_per_hour: f64) -> Vec<Smallest> {
-        let Some(learnt) = &self.learnt else {
+        let Some(learnt) = self.learnt() else {
             return Vec::new();
         };
         let factor = learnt.tail.threshold(false_alarms_per_hour).sqrt();

@@ -156,7 +156,7 @@ fn labelled_contacts_teach_nothing() {
         validation: &[],
     };
     let learnt = tauscope::learn(&tauscope::Settings::default(), &setup(JOINTS), &lessons).unwrap();
-    let noise = &learnt.learnt.unwrap().windows[0].noise[0];
+    let noise = &learnt.learnt().unwrap().windows[0].noise[0];
     assert!(noise.iter().all(|noise| *noise < 0.3), "{noise:?}");
 }
 
@@ -195,11 +195,17 @@ fn nothing_learnt_and_another_robot_are_refused() {
         );
     }
     let mut torn = learnt;
-    let windows = &mut torn.learnt.as_mut().unwrap().windows;
+    let windows = &mut torn.learnt.as_mut().unwrap().here_mut().unwrap().windows;
     windows[1].noise[0].pop();
     let text = refused(&config(torn.clone()), setup(JOINTS)).to_string();
     assert!(text.contains("is not whole"), "{text}");
-    torn.learnt.as_mut().unwrap().windows.clear();
+    torn.learnt
+        .as_mut()
+        .unwrap()
+        .here_mut()
+        .unwrap()
+        .windows
+        .clear();
     let text = refused(&config(torn), setup(JOINTS)).to_string();
     assert!(text.contains("is not whole"), "{text}");
 }
@@ -426,7 +432,7 @@ fn a_joint_that_never_stirred_while_it_learnt_is_not_believed_to_be_without_nois
         validation: &[],
     };
     let learnt = tauscope::learn(&tauscope::Settings::default(), &setup(JOINTS), &lessons).unwrap();
-    let noise = &learnt.learnt.unwrap().windows[0].noise;
+    let noise = &learnt.learnt().unwrap().windows[0].noise;
     let (moved, still) = (noise[0][4], noise[2][4]);
     assert!(still > 0.01 * moved, "{still} {moved}");
 }

@@ -99,8 +99,15 @@ fn what_does_not_come_back_in_other_recordings_is_not_learnt() {
         let sign = if seed % 2 == 0 { 1.0 } else { -1.0 };
         swinging(seed, 30, move |velocity, _| sign * friction(velocity))
     });
-    let learnt = learnt(all).learnt.unwrap();
-    assert!(learnt.joints.iter().all(|joint| joint.usual.is_none()));
+    let settings = learnt(all);
+    assert!(
+        settings
+            .learnt()
+            .unwrap()
+            .joints
+            .iter()
+            .all(|joint| joint.usual.is_none())
+    );
 }
 
 /// Lets the twin know an effort, `late` samples late.

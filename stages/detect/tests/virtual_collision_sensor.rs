@@ -12,8 +12,8 @@ use tauscope_detect::indri::{
     virtual_collision_sensor as adaptive, virtual_collision_sensor_basic as basic,
 };
 use tauscope_detect::{
-    Config, ConfigError, ContactKind, Detect, JointSetup, LabelledContact, LearnError, Lesson,
-    Lessons, Setup,
+    Config, ConfigError, ContactKind, Detect, HereOrFile, JointSetup, LabelledContact, LearnError,
+    Lesson, Lessons, Setup,
 };
 
 /// Samples a second.
@@ -259,7 +259,7 @@ fn remark_4_at_worst_alpha_less_one_is_lost() {
     let learnt = learnt_on(JOINTS);
     let samples = arm(0.0, 20.0, World::default());
     let worst = adaptive::Settings {
-        learnt: Some(learnt),
+        learnt: Some(HereOrFile::Here(learnt)),
         ..settings()
     };
     let without = run(&mut detect(&basic()), &samples);
@@ -308,7 +308,7 @@ fn learning_at_the_start_is_asked_for_once_in_a_sensors_life() {
     let verdicts = run(&mut first, &arm(0.0, 20.0, World::default()));
     assert_eq!(verdicts[500].state.as_str(), "learning");
     let again = adaptive::Settings {
-        learnt: Some(state(&first)),
+        learnt: Some(HereOrFile::Here(state(&first))),
         ..at_start
     };
     let verdicts = run(
@@ -322,7 +322,7 @@ fn learning_at_the_start_is_asked_for_once_in_a_sensors_life() {
 fn a_collision_teaches_nothing_not_even_the_way_up_to_its_alarm() {
     let learnt_beside = |collision: Option<(f64, f64, f64)>| {
         let mut sensor = detect(&adaptive_with(adaptive::Settings {
-            learnt: Some(learnt_on(JOINTS)),
+            learnt: Some(HereOrFile::Here(learnt_on(JOINTS))),
             ..settings()
         }));
         let mut found = 0;
@@ -359,7 +359,7 @@ fn what_was_learnt_goes_on_in_the_next_life_as_if_there_had_been_one() {
     let mut one_life = detect(&adaptive_with(learning.clone()));
     run(&mut one_life, &before);
     let next = adaptive::Settings {
-        learnt: Some(state(&one_life)),
+        learnt: Some(HereOrFile::Here(state(&one_life))),
         ..learning
     };
     let whole = run(&mut one_life, &after);
@@ -374,7 +374,7 @@ fn what_was_learnt_goes_to_the_joint_of_its_name_in_whatever_order_joints_come()
     learnt.joints.get_mut("elbow").unwrap().ident = 0.25;
     learnt.joints.get_mut("elbow").unwrap().start = 0.25;
     let config = adaptive_with(adaptive::Settings {
-        learnt: Some(learnt.clone()),
+        learnt: Some(HereOrFile::Here(learnt.clone())),
         ..settings()
     });
     let mut turned = setup();
@@ -442,7 +442,7 @@ fn the_bias_is_learnt_from_what_is_free_of_contact() {
         let learnt = basic::learn(&basic::Settings::default(), &setup(), &lessons).unwrap();
         let full = adaptive::learn(&adaptive::Settings::default(), &setup(), &lessons).unwrap();
         assert_eq!(full.bias, learnt.bias);
-        let joints = full.learnt.as_ref().unwrap().joints.clone();
+        let joints = full.learnt.as_ref().unwrap().here().unwrap().joints.clone();
         assert!(joints.values().all(|joint| joint.adapt_s == Some(0.0)));
         // Neither says anything of another run of the same cycle.
         for config in [basic_with(learnt.clone()), adaptive_with(full)] {
@@ -495,7 +495,7 @@ fn what_does_not_fit_is_refused_in_words() {
         (unsound, "of the joint elbow holds a number"),
     ] {
         let other = adaptive::Settings {
-            learnt: Some(learnt),
+            learnt: Some(HereOrFile::Here(learnt)),
             ..settings()
         };
         let text = refused(&adaptive_with(other)).to_string();

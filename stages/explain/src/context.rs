@@ -9,17 +9,17 @@ use crate::physics::library;
 use crate::read::input::Input;
 use crate::read::recording::Recording;
 
-/// What every step of an explanation shares.
+/// The data that every step of an explanation shares.
 pub struct Context<'a> {
-    /// What is to be explained.
+    /// The input.
     pub input: &'a Input,
     /// Torque constants by joint \[N m/A\]; 1 where there are none.
     pub constants: &'a [f64],
-    /// N m per recorded unit by joint; 1 where nobody knows it.
+    /// N m per recorded unit by joint; 1 where it is not known.
     pub unit_nm: &'a [f64],
-    /// Joints of which nobody knows the scale between the recordings' unit and N m, and the gain of their bodies at first.
+    /// Joints whose scale between the recordings' unit and N m is not known, with the gain that the fit starts from.
     pub unscaled: Vec<(usize, f64)>,
-    /// New bodies that were found and that the start's physics has to bear.
+    /// New bodies that were found. They load the terms of the start, too.
     pub loads: Vec<TermSpec>,
     /// Stamp of the first sample of all recordings \[ns since the epoch\].
     pub session_start_ns: i64,
@@ -32,13 +32,13 @@ impl Context<'_> {
     pub fn hypotheses(&self) -> Vec<Hypothesis> {
         let input = self.input;
         let mut all = library::hypotheses(&input.model, input.bodies, &input.without);
-        // The scale of such a joint is free as it is.
+        // The fit already has a free scale for such a joint.
         let unscaled = |joint: usize| self.unscaled.iter().any(|(other, _)| *other == joint);
         all.retain(|h| !h.effect.traits.is_scale || !unscaled(h.place.joint));
         all
     }
 
-    /// The motion of a recording and what the twin says of it.
+    /// The motion of a recording and the twin's effort for it.
     ///
     /// # Errors
     /// If a term of the start cannot be built for the robot.
@@ -61,7 +61,7 @@ impl Context<'_> {
                 &self.first_gains(),
             )?;
         }
-        // Not of recordings held out: what is predicted for them comes from the motion alone.
+        // Not for held-out recordings: their prediction comes from the motion alone.
         let fitted = self
             .input
             .fit
@@ -73,7 +73,7 @@ impl Context<'_> {
         Ok(track)
     }
 
-    /// What there is of some recordings, compared as those are that are fitted.
+    /// The data of some recordings, filtered as those that are fitted.
     ///
     /// # Errors
     /// If a term of the start cannot be built for the robot.
@@ -109,7 +109,7 @@ impl Context<'_> {
         Ok(problem)
     }
 
-    /// What the bodies of each joint are taken by at first, from the model's unit into the recording's.
+    /// The gain of each joint's bodies that the fit starts from, from the model's unit into the recording's.
     fn first_gains(&self) -> Vec<f64> {
         let mut gains: Vec<f64> = self.unit_nm.iter().map(|unit| 1.0 / unit).collect();
         if !self.at_rest {

@@ -26,8 +26,10 @@ use side::Side;
 
 /// A stamp this far behind the one before is a clock that was set back; anything less is a message
 /// that came too late.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const JUMP_BACK_NS: i64 = 500_000_000;
 /// Samples that wait for their command at most.
+/// Resolution: memory; about 1 s at 1 kHz.
 const MAX_PENDING: usize = 1024;
 
 /// How samples are packed.

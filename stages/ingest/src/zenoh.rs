@@ -31,13 +31,19 @@ use queue::{Queue, Role, Waiting};
 use watch::Watch;
 
 /// How long a sample waits for the command of its instant \[ns\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const WAIT_NS: i64 = 10_000_000;
-/// A step waits this long for a message, or this long while a sample waits for its command.
+/// Longest time that a step waits for a message.
+/// Resolution: how soon a stop is noticed, against how often the stage wakes up.
 const LONGEST_WAIT: Duration = Duration::from_millis(50);
+/// How long a step waits for a message while a sample waits for its command.
+/// Resolution: the delay of a sample without a command, against how often the stage wakes up.
 const SHORTEST_WAIT: Duration = Duration::from_millis(2);
 /// Bounds the time of a step.
+/// Resolution: how soon a stop is noticed, against the cost of a step.
 const MESSAGES_PER_STEP: usize = 64;
 /// A joint state of sixteen joints has 1 kB.
+/// Resolution: memory; 64 times the largest joint state.
 const MAX_PAYLOAD_BYTES: usize = 65_536;
 
 /// What a [`ZenohSource`] has counted.

@@ -5,6 +5,7 @@
 //! memory does not grow with the recordings.
 
 use tauscope_bus::{TwinState, flags};
+use tauscope_dynamics::effort_scale::{self, Slope};
 
 /// A joint faster than this moves: no encoder's noise is as much \[rad/s, m/s\].
 /// Physical: above the velocity noise of encoders.
@@ -127,6 +128,20 @@ impl Calibration {
         };
         Some(self.joints.iter().map(fit).collect())
     }
+}
+
+/// The slopes that tell the unit of the effort: those of joints whose line explains most of it. `fits` are by
+/// joint in the order of `names`.
+pub fn telling_slopes(names: &[String], fits: &[JointFit]) -> Vec<Slope> {
+    let telling = |fit: &JointFit| fit.explained >= effort_scale::TELLING;
+    let named = names.iter().zip(fits);
+    let slopes = named
+        .filter(|(_, fit)| telling(fit))
+        .map(|(joint, fit)| Slope {
+            joint: joint.clone(),
+            slope: fit.gain,
+        });
+    slopes.collect()
 }
 
 #[cfg(test)]

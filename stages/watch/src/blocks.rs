@@ -1,13 +1,16 @@
-//! Half seconds of motion, and the newest of them in a ring.
+//! Blocks of half a second of motion, and a ring of the newest ones.
 
 use super::moments::{Moments, Outer};
 use super::rows::{FORCE, PAYLOAD, Row};
 
-/// Rows in a block: half a second of motion.
+/// Rows in a block: half a second at 20 rows a second.
+/// Tuned: by hand, on no recorded seeds; not swept.
 pub(super) const BLOCK_ROWS: u32 = 10;
-/// How long a block is in motion \[s\].
+/// Duration of motion in a block \[s\].
+/// Physical: [`BLOCK_ROWS`] over 20 rows a second.
 pub(super) const BLOCK_S: f64 = 0.5;
-/// Features in which a motion may be unlike what was seen: position, velocity, expected effort.
+/// Features in which a motion may be novel.
+/// Physical: position, velocity and expected effort.
 pub(super) const FEATURES: usize = 3;
 
 /// The range of a joint's features.
@@ -35,7 +38,7 @@ impl Ranges {
         self.take(other.high);
     }
 
-    /// Whether `other` lies outside by more than a share `slack` of this range, in any feature.
+    /// Whether `other` exceeds this range in any feature by more than the share `slack` of it.
     fn is_left_by(&self, other: &Self, slack: f64) -> bool {
         (0..FEATURES).any(|f| {
             let slack = slack * (self.high[f] - self.low[f]);
@@ -44,11 +47,11 @@ impl Ranges {
     }
 }
 
-/// The ranges that a joint moved in lately. What was seen long ago the reference has forgotten, and so do they:
-/// a program that comes back after many others is new again.
+/// The ranges in which a joint moved lately. Old motion is forgotten, as in the reference: a program that returns after
+/// many others is novel again.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Known {
-    /// Of the blocks since a multiple of [`Known::GENERATION`], and of as many before.
+    /// Ranges of the current generation of blocks, and of the one before.
     current: Ranges,
     previous: Ranges,
     blocks: usize,
@@ -60,7 +63,8 @@ impl Known {
         previous: Ranges::NONE,
         blocks: 0,
     };
-    /// As long as the reference remembers: 150 s of motion.
+    /// Blocks in a generation: 150 s of motion.
+    /// Tuned: equal to the time constant of the reference, `MEMORY_S`.
     const GENERATION: usize = 300;
 
     pub fn take(&mut self, ranges: &Ranges) {
@@ -73,7 +77,7 @@ impl Known {
         self.blocks += 1;
     }
 
-    /// See [`Ranges::is_left_by`].
+    /// Whether `other` exceeds the ranges of both generations; see [`Ranges::is_left_by`].
     pub fn is_left_by(&self, other: &Ranges, slack: f64) -> bool {
         let mut all = self.current;
         all.join(&self.previous);
@@ -81,20 +85,20 @@ impl Known {
     }
 }
 
-/// A joint in a block.
+/// Sums of one joint over a block.
 #[derive(Debug, Clone)]
 pub(super) struct JointBlock {
-    /// Of the rows in which it moves.
+    /// Sums over the rows in which the joint moves.
     pub own: Moments,
     pub payload: Outer<PAYLOAD>,
-    /// By the joint whose child link is touched.
+    /// Sums for a force, by the joint on whose child link it acts.
     pub force: Vec<Outer<FORCE>>,
     pub ranges: Ranges,
-    /// Whether its motion is unlike what the reference has seen.
+    /// Whether its motion is outside the known ranges.
     pub novel: bool,
 }
 
-/// Half a second of motion.
+/// Sums over half a second of motion.
 #[derive(Debug, Clone)]
 pub(super) struct Block {
     /// First and last stamp \[ns since the epoch\].
@@ -102,9 +106,9 @@ pub(super) struct Block {
     pub last_ns: i64,
     pub rows: u32,
     pub joints: Vec<JointBlock>,
-    /// The joints whose residual is far beyond what is usual.
+    /// Joints whose residual is far above the usual: bit j for joint j.
     pub loud: u32,
-    /// It belongs to a contact, and nothing is learned or judged from it.
+    /// Whether it belongs to a contact or is an outlier: nothing is learned or judged from it.
     pub excluded: bool,
 }
 
@@ -164,17 +168,17 @@ impl Block {
     }
 }
 
-/// The newest blocks, and one in the making. Nothing is allocated after it was made.
+/// The newest complete blocks, and the open one. Nothing is allocated after it is made.
 #[derive(Debug)]
 pub(super) struct Ring {
     blocks: Vec<Block>,
-    /// Place of the block in the making, and how many complete ones stand before it.
+    /// Index of the open block, and number of complete ones before it.
     at: usize,
     len: usize,
 }
 
 impl Ring {
-    /// Room for so many complete blocks.
+    /// A ring for `capacity` complete blocks.
     pub fn new(capacity: usize, joints: usize) -> Self {
         Self {
             blocks: vec![Block::new(joints); capacity + 1],
@@ -187,12 +191,12 @@ impl Ring {
         self.len
     }
 
-    /// The block in the making.
+    /// The open block.
     pub fn open(&mut self) -> &mut Block {
         &mut self.blocks[self.at]
     }
 
-    /// Completes it; the oldest gives way if there is no more room.
+    /// Completes the open block. The oldest one is dropped if the ring is full.
     pub fn close(&mut self) {
         self.at = (self.at + 1) % self.blocks.len();
         self.len = (self.len + 1).min(self.blocks.len() - 1);
@@ -213,7 +217,7 @@ impl Ring {
         &mut self.blocks[place]
     }
 
-    /// Keeps the newest so many.
+    /// Keeps only the `newest` complete blocks.
     pub fn keep(&mut self, newest: usize) {
         self.len = self.len.min(newest);
     }

@@ -1,31 +1,31 @@
-//! What the watching stage says.
+//! What the stage reports.
 
 use tauscope_bus::Detection;
 use tauscope_dynamics::terms::{
     COULOMB_FRICTION, Effect, PAYLOAD, TORQUE_BIAS, TORQUE_GAIN, UNKNOWN, VISCOUS_FRICTION,
 };
 
-/// What is behind a residual that changed.
+/// Cause of a changed residual.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cause {
-    /// Something touched the arm, and let go again.
+    /// A contact that began and ended.
     Contact,
-    /// The effort at a joint is another by a constant.
+    /// A constant offset of the effort at a joint.
     TorqueBias,
-    /// The effort at a joint is reported by another factor.
+    /// A factor on the measured effort of a joint.
     TorqueGain,
-    /// The friction of a joint that does not depend on its speed.
+    /// Coulomb friction of a joint.
     CoulombFriction,
-    /// The friction of a joint that grows with its speed.
+    /// Viscous friction of a joint.
     ViscousFriction,
-    /// The arm carries more, or less.
+    /// Another mass carried by the tool.
     Payload,
-    /// Something that no name fits.
+    /// A change that none of the others explains.
     Unknown,
 }
 
 impl Cause {
-    /// The effect, where it is one.
+    /// The effect of the library; `None` for a contact.
     pub fn effect(self) -> Option<&'static Effect> {
         match self {
             Self::Contact => None,
@@ -38,29 +38,29 @@ impl Cause {
         }
     }
 
-    /// Canonical name: that of the effect, where it is one.
+    /// Canonical name: that of the effect, or `contact`.
     pub fn name(self) -> &'static str {
         self.effect().map_or(CONTACT, |effect| effect.name)
     }
 }
 
-/// What a contact is called.
+/// Name of a contact.
 const CONTACT: &str = "contact";
 
-/// A change that was noticed.
+/// A change or a contact that was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Finding {
-    /// The best name so far.
+    /// The most likely cause.
     pub cause: Cause,
     /// The joints that show it: bit j for joint j in URDF order.
     pub joints: u32,
-    /// The link, of a payload and of a contact, where there is a robot.
+    /// The joint whose child link was touched; `None` for a change, or where that is not known.
     pub link: Option<usize>,
-    /// Since when \[ns since the epoch\].
+    /// Begin \[ns since the epoch\].
     pub since_ns: i64,
-    /// How large, in the unit of [`Detection::size`]; 0 where that has no meaning.
+    /// Size in the unit of [`Detection::size`]; 0 where it has none.
     pub size: f64,
-    /// How far beyond what is usual: 1 is just enough to be told.
+    /// Likelihood ratio over its threshold: 1 is just enough to be reported.
     pub score: f64,
 }
 

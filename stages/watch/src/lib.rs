@@ -25,38 +25,38 @@ pub use messages::{amount, in_words};
 use monitor::{Monitor, News};
 use rows::Rows;
 
-/// The stage's canonical name in archives, where detectors have theirs.
+/// The stage's name in archives, in the place of a detector's name.
 pub const NAME: &str = "residual_watch";
 
-/// What the stage must know of its cell and its twin.
+/// Facts about the cell and its twin.
 #[derive(Debug, Clone)]
 pub struct Setup {
-    /// The robot; without it payloads and links are not told.
+    /// The robot. Without it neither payloads nor links are reported.
     pub model: Option<Model>,
-    /// By joint in URDF order, how much the measured effort changes by 1 N m at the joint \[effort unit per
-    /// N m\]; NaN where that is not known, and the joint tells nothing of a payload.
+    /// Measured effort per torque at the joint, by joint in URDF order \[effort unit per N m\]. NaN where it is not
+    /// known: such a joint is not used for payloads and forces.
     pub effort_per_nm: Vec<f64>,
-    /// The twin's low-pass on efforts \[Hz\].
+    /// Cutoff of the twin's low-pass on efforts \[Hz\].
     pub effort_cutoff_hz: f64,
 }
 
-/// The watching stage: twin states in, a detection for each out.
+/// The stage: takes twin states and emits one detection for each.
 #[derive(Debug)]
 pub struct Watch {
     name: Name,
     rows: Rows,
     monitor: Monitor,
-    /// Names of the links: of the tool, and by joint of the link that it moves.
+    /// Names of the links: that of the tool, and by joint that of its child link.
     tool: Name,
     links: Vec<Name>,
-    /// The change that was told and is being learned.
+    /// The change that was reported and is being learned.
     changed: Option<Finding>,
-    /// A contact was told with the sample before.
+    /// Whether a contact was reported with the previous sample.
     ends: bool,
 }
 
 impl Watch {
-    /// A watch over a twin.
+    /// A watch over the residual of a twin.
     pub fn new(config: &Config, setup: &Setup) -> Self {
         let model = setup.model.as_ref();
         let name = |model: &Model, link: usize| Name::new(&model.links()[link].name);
@@ -75,7 +75,7 @@ impl Watch {
         }
     }
 
-    /// Where it is, in words of the robot.
+    /// Name of the link of a finding; empty if there is none.
     fn link(&self, finding: &Finding) -> Name {
         match finding.cause {
             Cause::Payload => self.tool,

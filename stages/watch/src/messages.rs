@@ -1,4 +1,4 @@
-//! What the watching stage says, in words.
+//! The stage's detections in words.
 
 use tauscope_bus::{Detection, flags};
 use tauscope_dynamics::terms::{UNKNOWN, effect};
@@ -30,8 +30,8 @@ pub fn in_words(detection: &Detection, joints: &[String], effort_unit: &str) -> 
     text
 }
 
-/// The size of a change by its name, e.g. `+1.02 N m` or `x 1.08`: in the unit of the effect's first parameter, if `effort_unit`
-/// is the unit of effort.
+/// The size of a change with its unit, e.g. `+1.02 N m` or `x 1.08`. The unit is that of the effect's first parameter,
+/// with `effort_unit` in place of N m.
 pub fn amount(state: &str, size: f64, effort_unit: &str) -> String {
     let of_effort = |unit: &str| {
         unit.replace(

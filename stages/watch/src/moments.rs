@@ -1,31 +1,42 @@
-//! Normal equations of one joint's residual, and what a window of them says of a change against a
-//! reference.
+//! Normal equations of one joint's residual, and the score of a change in a window of them against a reference.
 
 use nalgebra::{ArrayStorage, Cholesky, Const, SMatrix, SVector};
 
 /// Columns of a joint's own regression: 1, expected effort, direction, velocity, and direction times the
-/// size of the expected effort.
+/// magnitude of the expected effort.
+/// Physical: offset, gain, Coulomb, viscous and load-dependent friction.
 pub(super) const COLUMNS: usize = 5;
+/// Index of the column of the expected effort.
 const EXPECTED: usize = 1;
 
-/// What may change at a joint, by place in [`JointScore`]: those that are a column stand at its place.
+/// Index of an offset in [`JointScore`], and of its column.
 pub(super) const BIAS: usize = 0;
+/// Index of a gain in [`JointScore`].
 pub(super) const GAIN: usize = 1;
+/// Index of Coulomb friction in [`JointScore`], and of its column.
 pub(super) const COULOMB: usize = 2;
-/// With viscous friction as the last.
+/// Kinds of change at a joint; viscous friction is the last.
+/// Physical: offset, gain, Coulomb and viscous friction.
 pub(super) const JOINT_KINDS: usize = 4;
 
-/// A direction keeps at least this share of its information beside a reference that is itself uncertain,
-/// or the reference knows too little of it.
+/// A change is scored only if it keeps this share of its information beside the uncertainty of the reference.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_INFORMATION: f64 = 0.05;
+
+/// Added to each diagonal element before a Cholesky factorisation, as a share of it.
+/// Resolution: guards the factorisation of dependent columns.
+const RIDGE: f64 = 1e-7;
+/// The same as a share of the largest diagonal element.
+/// Resolution: guards the factorisation where a column is zero.
+const RIDGE_OF_LARGEST: f64 = 1e-12;
 
 pub(super) type Coefficients = SVector<f64, COLUMNS>;
 type Gram = SMatrix<f64, COLUMNS, COLUMNS>;
 
-/// One instant of one joint.
+/// One row of one joint.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct JointRow {
-    /// The regression's columns, behind the twin's low-pass.
+    /// The regression's columns, through the twin's low-pass.
     pub columns: [f64; COLUMNS],
     /// Filtered residual \[effort unit\].
     pub residual: f64,
@@ -37,7 +48,7 @@ pub(super) struct Moments {
     gram: Gram,
     with_residual: Coefficients,
     residual: f64,
-    /// How many rows.
+    /// Number of rows.
     pub rows: f64,
 }
 
@@ -57,7 +68,7 @@ impl Moments {
         self.rows += 1.0;
     }
 
-    /// Adds `weight` times `other`; -1 takes it away.
+    /// Adds `weight` times `other`; -1 subtracts it.
     pub fn add(&mut self, other: &Self, weight: f64) {
         self.gram += other.gram * weight;
         self.with_residual += other.with_residual * weight;
@@ -72,7 +83,7 @@ impl Moments {
         self.rows *= factor;
     }
 
-    /// Sum of the squared residual that `coefficients` leave.
+    /// Sum of squares of the residual that `coefficients` leave.
     fn energy(&self, coefficients: &Coefficients) -> f64 {
         let fitted = self.gram * coefficients;
         let explained = 2.0 * coefficients.dot(&self.with_residual) - coefficients.dot(&fitted);
@@ -80,7 +91,7 @@ impl Moments {
     }
 }
 
-/// Cholesky factor, the diagonal raised so slightly that only what holds no information is touched.
+/// Cholesky factor. The diagonal is raised slightly, which only matters in directions without information.
 fn factor<const N: usize>(gram: &SMatrix<f64, N, N>) -> Option<Cholesky<f64, Const<N>>> {
     let largest = (0..N).fold(0.0, |largest: f64, i| largest.max(gram[(i, i)]));
     if largest <= 0.0 {
@@ -88,12 +99,12 @@ fn factor<const N: usize>(gram: &SMatrix<f64, N, N>) -> Option<Cholesky<f64, Con
     }
     let mut raised = *gram;
     for i in 0..N {
-        raised[(i, i)] += 1e-7 * gram[(i, i)] + 1e-12 * largest;
+        raised[(i, i)] += RIDGE * gram[(i, i)] + RIDGE_OF_LARGEST * largest;
     }
     Cholesky::new(raised)
 }
 
-/// How a joint's residual is as a rule: its regression and what that rests on.
+/// The usual residual of a joint: its regression and the sums behind it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Reference {
     pub moments: Moments,
@@ -116,19 +127,19 @@ impl Reference {
         }
     }
 
-    /// Mean square of the residual that it leaves in `window`.
+    /// Mean square of the residual that the reference leaves in `window` \[effort unit²\].
     pub fn energy_per_row(&self, window: &Moments) -> f64 {
         window.energy(&self.coefficients) / window.rows.max(1.0)
     }
 
-    /// Mean square of the measured effort, as far as twin and reference explain it.
+    /// Mean square of the effort that twin and reference together give \[effort unit²\].
     pub fn effort_square(&self) -> f64 {
         let c = self.direction(GAIN);
         c.dot(&(self.moments.gram * c)) / self.moments.rows.max(1.0)
     }
 
-    /// A kind of change as a direction in the columns. A gain multiplies all that is recorded, so its
-    /// column is the expected effort with what the reference adds.
+    /// A kind of change as a direction in the columns. A gain multiplies the measured effort, so its direction is the
+    /// expected effort plus the reference's residual.
     fn direction(&self, kind: usize) -> Coefficients {
         let mut c = Coefficients::zeros();
         if kind == GAIN {
@@ -141,18 +152,18 @@ impl Reference {
     }
 }
 
-/// What a window of one joint explains by each kind of change.
+/// How much each kind of change explains in a window of one joint.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct JointScore {
-    /// Sum of squares that it explains \[effort unit²\].
+    /// Sum of squares that the change explains \[effort unit²\].
     pub gain: [f64; JOINT_KINDS],
-    /// Its size by least squares.
+    /// Size of the change by least squares.
     pub size: [f64; JOINT_KINDS],
 }
 
-/// A window of one joint beside its reference, whose coefficients are marginalised: with A the window's
-/// Gram matrix, v the scores of its innovation and R the reference's Gram matrix, the information on a
-/// change along the columns is A - A (A + R)⁻¹ A and the score v - A (A + R)⁻¹ v.
+/// A window of one joint beside its reference, whose coefficients are marginalised. With A the window's Gram matrix, v
+/// the scores of its innovation and R the reference's Gram matrix, the information on a change along the columns is A -
+/// A (A + R)⁻¹ A, and the score is v - A (A + R)⁻¹ v.
 pub(super) struct Compared<'a> {
     window: &'a Moments,
     reference: &'a Reference,
@@ -163,7 +174,7 @@ pub(super) struct Compared<'a> {
 }
 
 impl<'a> Compared<'a> {
-    /// `None` where both say nothing.
+    /// `None` if the window is empty, or if both have no information.
     pub fn new(window: &'a Moments, reference: &'a Reference) -> Option<Self> {
         if window.rows < 1.0 {
             return None;
@@ -181,7 +192,7 @@ impl<'a> Compared<'a> {
         })
     }
 
-    /// What each kind of change explains: (c·score)² / (c·information c) for one along c.
+    /// Gain of each kind of change: (c·score)² / (c·information c) for a change along c.
     pub fn joint(&self) -> JointScore {
         let mut result = JointScore::default();
         for kind in 0..JOINT_KINDS {
@@ -197,7 +208,7 @@ impl<'a> Compared<'a> {
         result
     }
 
-    /// The same for a change whose columns are no joint's own.
+    /// Information and score of a change of the whole arm.
     pub fn outer<const D: usize>(&self, outer: &Outer<D>) -> OuterScore<D> {
         let known = outer.cross * self.reference.coefficients;
         OuterScore {
@@ -206,7 +217,7 @@ impl<'a> Compared<'a> {
         }
     }
 
-    /// Share of a change of this kind and size that the window holds, and the information on that share.
+    /// Estimated share of a change of this kind and size in the window, and the information on that share.
     pub fn share(&self, kind: usize, size: f64) -> (f64, f64) {
         let c = self.reference.direction(kind) * size;
         let information = c.dot(&(self.information * c));
@@ -214,8 +225,8 @@ impl<'a> Compared<'a> {
     }
 }
 
-/// Sums of products of the columns that a change of the whole arm has at one joint (a payload's mass and
-/// first moments; a force), with those of the joint's own regression.
+/// Sums of products for a change of the whole arm at one joint: its columns (a payload's mass and first moments, or a
+/// force) with those of the joint's own regression.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Outer<const D: usize> {
     cross: SMatrix<f64, D, COLUMNS>,
@@ -247,7 +258,7 @@ impl<const D: usize> Outer<D> {
     }
 }
 
-/// What a window says of a change of the whole arm, summed over joints.
+/// Information and score of a change of the whole arm in a window, summed over joints.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct OuterScore<const D: usize> {
     information: SMatrix<f64, D, D>,
@@ -267,13 +278,13 @@ impl<const D: usize> OuterScore<D> {
         self.score += other.score * weight;
     }
 
-    /// The change by least squares, and what it explains.
+    /// The change by least squares, and its gain.
     pub fn solve(&self) -> Option<([f64; D], f64)> {
         let change = factor(&self.information)?.solve(&self.score);
         Some((change.into(), change.dot(&self.score)))
     }
 
-    /// Share of `change` that the window holds, and the information on that share.
+    /// Estimated share of `change` in the window, and the information on that share.
     pub fn share(&self, change: &[f64; D]) -> (f64, f64) {
         let change = SVector::<f64, D>::from(*change);
         let information = change.dot(&(self.information * change));

@@ -1,4 +1,4 @@
-//! Learns how the twin is off as a rule, then watches for what is not the rule.
+//! The monitor: learns the usual residual of the twin, then looks for changes of it.
 
 mod contact;
 mod learning;
@@ -13,39 +13,49 @@ use super::usual::Usual;
 use super::window::Window;
 use contact::{Run, Told};
 
-/// The newest blocks that are judged and not yet learned from.
+/// Blocks that are judged before they are learned from: 16 s of motion.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const FRESH: usize = 32;
-/// A deviation below this share of a joint's usual effort is never told.
+/// A deviation below this share of a joint's usual effort is not reported.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_SHARE: f64 = 0.01;
-/// A motion is novel where it leaves the known range of a joint by this share of it.
+/// A motion is novel if it exceeds the known range of a joint by this share of the range.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const SLACK: f64 = 0.1;
-/// Of so many blocks, and when this share of joints moves unlike ever before, the reference is learned anew.
+/// Newest blocks that tell whether the robot runs another program.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const PROGRAM: usize = 20;
+/// The reference is learned again if the motion is novel in more than this share of those blocks, over all joints.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const UNLIKE: f64 = 0.4;
-/// The share is remembered over so many blocks.
+/// Time constant of the share of joints whose motion is novel \[blocks\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const UNLIKE_BLOCKS: f64 = 60.0;
-/// After a change what was usual weighs no more than so many windows.
+/// Windows and blocks that the usual gains and energies weigh as much as after a change.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const AFTER_CHANGE: f64 = 64.0;
 
-/// What a row brought.
+/// Result of a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum News {
-    /// A contact that is over, or a change of the arm.
+    /// A contact that ended, or a change of the arm.
     Found(Finding),
-    /// A changed arm was learned: from here on it is the rule.
+    /// The changed arm was learned: it is the reference from here on.
     Learned,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Phase {
-    /// From motion of the arm as it is; after a change that was told, or in silence.
+    /// The reference is learned.
     Learning {
+        /// Whether a change was reported before.
         told: bool,
     },
+    /// Changes are looked for.
     Watching,
 }
 
-/// The state machine behind the stage. Its memory is fixed.
+/// The state machine of the stage. Its memory is fixed.
 #[derive(Debug)]
 pub(super) struct Monitor {
     learn: usize,
@@ -61,12 +71,12 @@ pub(super) struct Monitor {
     noise: Vec<Option<f64>>,
     judge: Judge,
     run: Option<Run>,
-    /// Blocks since it watches.
+    /// Blocks since it began to watch.
     watched: usize,
-    /// Share of joints that lately moved unlike ever before.
+    /// Share of joints whose motion was novel lately.
     unlike: f64,
     score: f64,
-    /// Room to work in.
+    /// Work space.
     window: Window,
     scores: Vec<Option<JointScore>>,
     aside: Vec<Reference>,
@@ -101,17 +111,17 @@ impl Monitor {
         }
     }
 
-    /// How far the strongest sign of a change is beyond what is usual.
+    /// Likelihood ratio of the most likely change over its threshold.
     pub fn score(&self) -> f64 {
         self.score
     }
 
-    /// Whether it watches, rather than learns.
+    /// Whether it looks for changes; otherwise it learns.
     pub fn watches(&self) -> bool {
         self.phase == Phase::Watching
     }
 
-    /// Takes a row.
+    /// Takes a row. Rows without motion are ignored.
     pub fn take(&mut self, row: &Row) -> Option<News> {
         if row.moving == 0 {
             return None;
@@ -133,7 +143,7 @@ impl Monitor {
         if watches { self.watch() } else { self.learn() }
     }
 
-    /// Marks in the block that is complete what is novel in its motion and which joints are loud.
+    /// Marks in the newly completed block which joints move in a novel way and which are loud.
     fn listen(&mut self) {
         let block = self.ring.open();
         let (mut novel, mut all) = (0.0, 0.0);
@@ -191,7 +201,7 @@ impl Monitor {
         let drifted = verdict == Verdict::Drifted && self.ring.len() == FRESH;
         let unseen = matches!(run, Some(Told::Unseen));
         if self.is_unlike() || lasts || unseen || drifted {
-            // Another program, or the arm crept away, or it was not known in the first place: nothing can be said before it is.
+            // Another program, drift, or an unknown deviation from the start: the reference must be learned first.
             self.phase = Phase::Learning { told: false };
             self.ring.keep(PROGRAM);
             self.judge.forget();
@@ -200,7 +210,7 @@ impl Monitor {
         None
     }
 
-    /// A change was found: what follows it is the rule from now on.
+    /// Begins to learn a new reference from the newest `blocks`, which follow the change.
     fn changed(&mut self, finding: Finding, blocks: usize) -> News {
         self.references.fill(Reference::EMPTY);
         self.judge.forget();
@@ -218,7 +228,7 @@ impl Monitor {
         News::Found(finding)
     }
 
-    /// Whether most of the newest motion is unlike what the reference has seen.
+    /// Whether much of the newest motion is novel; see `UNLIKE`.
     fn is_unlike(&self) -> bool {
         if self.ring.len() < PROGRAM {
             return false;

@@ -1,4 +1,4 @@
-//! From a stream at any rate to rows at 20 Hz: columns and residual of each joint behind the same low-pass.
+//! Rows at 20 Hz from a stream at any rate: columns and residual of each joint, through the same low-pass.
 
 use nalgebra::Vector3;
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState, flags};
@@ -12,23 +12,30 @@ use tauscope_dynamics::{
 use super::Setup;
 use super::moments::JointRow;
 
-/// A row is the mean over so long \[ns\].
+/// A row is the mean over this time \[ns\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const ROW_NS: i64 = 50_000_000;
-/// Longer than this between two rows and the low-passes hold nothing \[s\].
+/// After a longer gap between two rows the low-passes start anew \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LONGEST_GAP_S: f64 = 1.0;
-/// A slower joint stands: its friction may have any value within its limits \[rad/s\], \[m/s\].
+/// A slower joint stands still: its friction may have any value within its limits \[rad/s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const STANDSTILL_RAD_S: f64 = 0.02;
+/// The same for a sliding joint \[m/s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const STANDSTILL_M_S: f64 = 0.005;
 
-/// Columns of a payload: its mass and its first moments about the frame of the body that carries it.
+/// Columns of a payload.
+/// Physical: its mass and its three first moments about the frame of the body that carries it.
 pub(super) const PAYLOAD: usize = 4;
-/// Columns of a force on a link, along the world's axes.
+/// Columns of a force on a link.
+/// Physical: one for each of the world's axes.
 pub(super) const FORCE: usize = 3;
 
 /// One instant of the whole arm.
 #[derive(Debug, Clone)]
 pub(super) struct Row {
-    /// When \[ns since the epoch\].
+    /// Stamp of the last sample in it \[ns since the epoch\].
     pub stamp_ns: i64,
     /// The joints that move: bit j for joint j.
     pub moving: u32,
@@ -36,15 +43,16 @@ pub(super) struct Row {
     pub position: JointArray,
     /// \[rad/s\]
     pub velocity: JointArray,
-    /// By joint.
+    /// Columns and residual, by joint.
     pub joints: Vec<JointRow>,
-    /// By joint \[effort unit per kg, per kg m\], behind the twin's low-pass.
+    /// Columns of a payload, by joint \[effort unit per kg, per kg m\], through the twin's low-pass.
     pub payload: Vec<[f64; PAYLOAD]>,
-    /// By joint, and by the joint whose child link is touched at its centre of mass \[effort unit per N\].
+    /// Columns of a force at the centre of mass of a link, by joint and by the joint whose child link it is \[effort
+    /// unit per N\].
     pub force: Vec<Vec<[f64; FORCE]>>,
 }
 
-/// Sums over the row in the making.
+/// Sums over the samples of the next row.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     count: f64,
@@ -59,7 +67,7 @@ struct Sums {
     residual: JointArray,
 }
 
-/// Makes rows of samples.
+/// Makes rows from samples.
 #[derive(Debug)]
 pub(super) struct Rows {
     joints: usize,
@@ -70,7 +78,7 @@ pub(super) struct Rows {
     sums: Sums,
     previous_s: Option<f64>,
     start_ns: i64,
-    /// By joint: direction, velocity, payload.
+    /// Low-passes by joint: of direction, velocity and payload columns.
     filters: Vec<[Butterworth2; 2 + PAYLOAD]>,
     settling_s: f64,
     reset_s: f64,
@@ -121,13 +129,13 @@ impl Rows {
         }
     }
 
-    /// Forgets what the low-passes hold.
+    /// Drops the samples of the next row and restarts the low-passes.
     pub fn reset(&mut self) {
         self.sums = Sums::default();
         self.previous_s = None;
     }
 
-    /// Takes a sample; a row if one is complete with it and can be trusted.
+    /// Takes a sample. Returns the row before it if that is now complete and valid.
     pub fn take(&mut self, sample: &TwinState) -> Option<&Row> {
         let stamp_ns = sample.header.stamp_ns;
         if sample.header.has(flags::RESET) || stamp_ns < self.sums.stamp_ns {
@@ -173,7 +181,7 @@ impl Rows {
         }
     }
 
-    /// Makes the row of the sums; whether it can be trusted.
+    /// Makes the row from the sums. Returns whether it is valid: the twin was ready and the low-passes have settled.
     fn finish(&mut self) -> bool {
         let n = self.joints;
         let sums = &mut self.sums;
@@ -255,8 +263,8 @@ impl Rows {
         sound
     }
 
-    /// What a force on each link costs: the arm holds against Jᵀ F. The Jacobian turns so slowly that the
-    /// low-pass is left out.
+    /// Columns of a force F on each link: the joints exert -Jᵀ F against it. They are not filtered, because the
+    /// Jacobian changes slowly.
     fn forces(&mut self) {
         let Some((model, data, _)) = &mut self.robot else {
             return;

@@ -1,9 +1,16 @@
-//! What is usual: how much a change explains by chance, learned from the stream itself.
+//! Usual gains: how much a change explains by chance, learned from the stream itself.
 
-/// What was learned weighs as much as so many windows at most: 20 minutes of motion.
+/// Most windows that a running mean weighs as much as; one window ends with each block, so 20 minutes of motion.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const MEMORY: f64 = 2400.0;
+/// Short windows before there is a usual gain.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const LEAST_SHORT: f64 = 4.0;
+/// Long windows before there is a usual gain.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const LEAST_LONG: f64 = 1.0;
 
-/// A running mean that becomes an exponential one.
+/// A running mean that becomes an exponential one after [`MEMORY`] values.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Mean {
     pub value: f64,
@@ -16,28 +23,31 @@ impl Mean {
         self.value += (value - self.value) / self.count;
     }
 
-    /// Lets the past weigh as much as `count` values at most.
+    /// Limits the weight of the past to that of `count` values.
     pub fn weigh(&mut self, count: f64) {
         self.count = self.count.min(count);
     }
 }
 
-/// What a change explains in windows without one. Where the residual is coloured or the twin off in ways that
-/// the reference does not hold, that is more than the noise says, and the more the longer the window is.
+/// The gain of a change in windows without one. It is larger than white noise gives, and grows with the length of the
+/// window, if the residual is correlated or if the twin has errors that the reference does not contain.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Scale {
     short: Mean,
     long: Mean,
-    /// The most that it explained since any instant of change.
+    /// The largest gain without a change, over all instants of change.
     largest: f64,
 }
 
 impl Scale {
-    /// Windows in blocks.
+    /// Length of a short window \[blocks\]: 2 s of motion.
+    /// Tuned: by hand, on no recorded seeds; not swept.
     pub const SHORT: usize = 4;
+    /// Length of a long window \[blocks\]: 8 s of motion.
+    /// Tuned: by hand, on no recorded seeds; not swept.
     pub const LONG: usize = 16;
 
-    /// Takes what the change explains in a window of so many blocks.
+    /// Takes the gain of the change in a window of this length.
     pub fn take(&mut self, blocks: usize, gain: f64) {
         if blocks == Self::SHORT {
             self.short.take(gain);
@@ -46,46 +56,54 @@ impl Scale {
         }
     }
 
-    /// Takes the most that the change explains since any instant: a twin that is off in some phases of a
-    /// motion, or an arm that creeps, is no change when it comes back a little stronger.
+    /// Takes the largest gain of the change over all instants, without a change. Twin errors in some phases of a motion
+    /// and slow drift return, and then may be a little larger.
     pub fn take_largest(&mut self, gain: f64) {
         self.largest = (self.largest * (1.0 - PEAK_DECAY)).max(gain);
     }
 
-    /// See [`Scale::take_largest`].
+    /// The largest gain without a change; see [`Scale::take_largest`].
     pub fn largest(&self) -> f64 {
         self.largest
     }
 
+    /// Limits the weight of the past to that of `windows` windows.
     pub fn weigh(&mut self, windows: f64) {
         self.short.weigh(windows);
         self.long.weigh(windows);
     }
 
-    /// What is usual; `None` before enough was seen.
+    /// The usual gain: the larger of the means over short and long windows. `None` before enough windows were seen.
     pub fn usual(&self) -> Option<f64> {
-        (self.short.count >= 4.0 && self.long.count >= 1.0)
+        (self.short.count >= LEAST_SHORT && self.long.count >= LEAST_LONG)
             .then(|| self.short.value.max(self.long.value))
     }
 
-    /// How many long windows it rests on that hold nothing in common.
+    /// Number of long windows without overlap that the usual gain is the mean of.
     pub fn independent(&self) -> f64 {
         (self.long.count + Self::LONG as f64 - 1.0) / Self::LONG as f64
     }
 }
 
-/// The energy that is left of a joint's residual in a block: its mean and its largest.
+/// Energy per row of a joint's residual in a block, beside the reference: its mean and its largest value.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Loudness {
     mean: Mean,
     peak: f64,
 }
 
-/// A block is loud from so many times the usual energy on, and so many times the largest.
+/// A block is loud if its energy is above this many times the mean.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const OVER_MEAN: f64 = 40.0;
+/// It must also be above this many times the largest energy so far.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const OVER_PEAK: f64 = 4.0;
-/// The largest is forgotten at this share a block: half in an hour.
+/// Share of the largest value that is forgotten with each block: half of it in an hour of 7200 blocks.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const PEAK_DECAY: f64 = 1e-4;
+/// Blocks before any block can be loud.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const LEAST_BLOCKS: f64 = 8.0;
 
 impl Loudness {
     pub fn take(&mut self, energy_per_row: f64) {
@@ -93,18 +111,19 @@ impl Loudness {
         self.grow_used_to(energy_per_row);
     }
 
-    /// What came once does not startle again.
+    /// Raises the largest energy: a block as loud as this one is not loud again.
     pub fn grow_used_to(&mut self, energy_per_row: f64) {
         self.peak = (self.peak * (1.0 - PEAK_DECAY)).max(energy_per_row);
     }
 
+    /// Limits the weight of the past to that of `blocks` blocks.
     pub fn weigh(&mut self, blocks: f64) {
         self.mean.weigh(blocks);
     }
 
-    /// Whether so much is far beyond what is usual, which is at least `floor`.
+    /// Whether a block with this energy is loud; the mean counts as at least `floor`.
     pub fn is_beyond(&self, energy_per_row: f64, floor: f64) -> bool {
-        self.mean.count >= 8.0
+        self.mean.count >= LEAST_BLOCKS
             && energy_per_row > OVER_MEAN * self.mean.value.max(floor)
             && energy_per_row > OVER_PEAK * self.peak
     }

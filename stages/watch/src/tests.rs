@@ -1,4 +1,4 @@
-//! Streams in which something happens, and streams in which nothing does.
+//! Streams with and without changes and contacts, and what the stage reports of them.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 #![allow(
@@ -13,7 +13,7 @@ use tauscope_bus::{Detection, Emit, LinkError, Stage};
 use super::{Config, Setup, Watch};
 use stream::{Act, Stream};
 
-/// What the stage said: when \[s\], what, where.
+/// What the stage reported: when \[s\], what, where.
 #[derive(Debug, Clone)]
 struct Said {
     t_s: f64,
@@ -58,7 +58,8 @@ impl Emit<Detection> for Listen<'_> {
     }
 }
 
-/// What is said of a stream, and how long the arm was in motion since a time when each word came \[s\].
+/// What is reported of a stream. With each report, how long the arm was in motion between `since_s` and the report
+/// \[s\].
 fn watch_since(stream: &mut Stream, duration_s: f64, since_s: f64) -> Vec<(Said, f64)> {
     let setup = Setup {
         model: Some(stream.nominal.clone()),
@@ -90,9 +91,10 @@ fn texts(said: &[Said]) -> String {
     said.iter().map(Said::text).collect::<Vec<_>>().join(" | ")
 }
 
+/// End of a change that lasts.
 const FOR_GOOD: f64 = f64::INFINITY;
 
-/// A change, and what it is to be called.
+/// A change, and the name, joints and size that are to be reported.
 const CHANGES: [(Act, &str, u32, f64); 7] = [
     (Act::Viscous(3, 4.0), "viscous_friction", 0b1000, 4.0),
     (Act::Coulomb(2, 1.0), "coulomb_friction", 0b100, 1.0),
@@ -152,11 +154,12 @@ fn a_contact_is_not_taken_for_a_change() {
     }
 }
 
-/// A good twin or a rigid one, and how often the motion becomes another \[s\].
+/// Whether the twin is calibrated, and after how long the motion changes \[s\]: never.
 const ONE_PROGRAM: [(bool, f64); 1] = [(true, f64::INFINITY)];
+/// The same for a rigid twin and new motions.
 const NEW_PROGRAMS: [(bool, f64); 2] = [(false, 12.0), (false, 300.0)];
 
-/// Words over hours of an arm that warms up.
+/// Reports over hours of an arm that warms up, as lines of text.
 fn clean(seed: u64, hours: f64, programs: &[(bool, f64)]) -> String {
     let mut all = String::new();
     for &(calibrated, program_s) in programs {
@@ -181,7 +184,7 @@ fn twenty_clean_minutes_raise_nothing() {
     assert_eq!(clean(1, 1.0 / 3.0, &NEW_PROGRAMS), "");
 }
 
-/// Of eight arms with a good twin.
+/// Eight arms with a calibrated twin.
 #[test]
 #[ignore = "takes minutes"]
 fn eight_clean_hours_of_one_program_raise_nothing() {
@@ -236,7 +239,7 @@ fn standstill_and_nonsense_say_nothing() {
     assert!(said.is_empty(), "{}", texts(&said));
 }
 
-/// Delay, names and cost, to be read: `cargo test --release -p tauscope-watch -- --ignored
+/// Prints delay, names and cost: `cargo test --release -p tauscope-watch -- --ignored
 /// --nocapture figures`.
 #[test]
 #[ignore = "prints"]
@@ -312,7 +315,7 @@ fn figures() {
     println!("500 Hz: {mean:?} a sample on average, 99.9 % within {slow:?}");
 }
 
-/// Words of the same arms where the motion becomes another now and then, which does not pass in silence.
+/// Prints the reports of the same arms with new motions now and then. There are some.
 #[test]
 #[ignore = "prints"]
 fn new_programs() {
@@ -322,7 +325,7 @@ fn new_programs() {
     println!("{all}");
 }
 
-/// Words over many hours of streams in which nothing happens, most of them much cleaner than real ones.
+/// Prints the reports over many hours of streams without changes, most of them with much less noise than real ones.
 #[test]
 #[ignore = "prints"]
 fn quiet() {
@@ -355,5 +358,5 @@ fn quiet() {
             println!("{calibrated} {program_s} {noise} {seed}: {}", texts(&said));
         }
     }
-    println!("{total} words in {} h", 36.0 * hours);
+    println!("{total} reports in {} h", 36.0 * hours);
 }

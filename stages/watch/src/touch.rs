@@ -1,12 +1,12 @@
-//! What a constant force on one of the links explains.
+//! How much of the residual a constant force on one of the links explains.
 
 use super::blocks::Ring;
 use super::moments::{Compared, Moments, Outer, OuterScore};
 use super::rows::FORCE;
 use super::usual::Usual;
 
-/// The joint whose child link a constant force between two blocks (counted from the newest) explains best, and
-/// what it explains in units of noise; 0 where no force explains anything.
+/// The joint on whose child link a constant force explains the most between two blocks (counted from the newest), and
+/// the gain in units of noise; 0 if no force explains anything.
 pub(super) fn strongest(
     ring: &Ring,
     usual: &Usual<'_>,

@@ -1,4 +1,4 @@
-//! Sums over a run of blocks, and what they explain.
+//! Sums over consecutive blocks, and how much each change explains in them.
 
 use super::blocks::Block;
 use super::moments::{Compared, JointScore, Moments, Outer, OuterScore, Reference};
@@ -9,7 +9,7 @@ use super::rows::PAYLOAD;
 pub(super) struct Window {
     pub own: Vec<Moments>,
     payload: Vec<Outer<PAYLOAD>>,
-    /// Blocks in it, and of them by joint those whose motion is novel there.
+    /// Blocks in it, and by joint the number of them in which its motion is novel.
     pub blocks: usize,
     pub novel: Vec<usize>,
 }
@@ -40,8 +40,8 @@ impl Window {
         }
     }
 
-    /// What each change explains at each joint, into `joints`; and what a payload does, in units of the
-    /// joints' `noise` (squared; a joint without says nothing of it).
+    /// Writes the score of each change at each joint into `joints`. Returns the score of a payload, in units of the
+    /// joints' `noise` \[effort unit²\]; a joint without noise does not count for it.
     pub fn scores(
         &self,
         references: &[Reference],

@@ -7,11 +7,17 @@ use std::time::Duration;
 
 use iceoryx2::port::{BackpressureAction, BackpressureInfo};
 
-/// Waits of the first tries, which iceoryx2 spends yielding.
+/// Number of first tries, which iceoryx2 spends yielding.
+/// Resolution: the delay of a sample, against computing time.
 const YIELDS: u64 = 20;
+/// Wait after each further try.
+/// Resolution: the delay of a sample, against computing time.
 const SHORT: Duration = Duration::from_micros(50);
+/// Wait after each try from [`LONG_FROM`] on.
+/// Resolution: the delay of a sample, against computing time.
 const LONG: Duration = Duration::from_millis(1);
-/// From here on the long wait.
+/// The long wait begins this long after the first try.
+/// Resolution: the delay of a sample, against computing time.
 const LONG_FROM: Duration = Duration::from_millis(100);
 
 /// Shared by a sender and the handler that iceoryx2 calls while it waits within a send.

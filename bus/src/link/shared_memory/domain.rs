@@ -27,6 +27,7 @@ pub struct DomainError(String);
 
 impl Domain {
     /// Longest name in bytes: sockets below it must have paths of less than 104.
+    /// Physical: `sockaddr_un` of Linux holds a path of 108 bytes, that of macOS 104.
     pub const CAPACITY: usize = 16;
 
     /// The domain of that name.

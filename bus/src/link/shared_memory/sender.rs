@@ -16,8 +16,10 @@ use crate::link::{Keep, LinkError, Sender, SenderCounts};
 use crate::sample::{Sample, flags};
 
 /// While a receiver takes nothing: how often the sender looks whether it is dead.
+/// Resolution: how soon a dead receiver is noticed, against the cost of looking.
 const CLEAN_EVERY: Duration = Duration::from_secs(1);
 /// A receiver that leaves says nothing: while the sender waits for it, it looks this often.
+/// Resolution: how soon a receiver that left is noticed, against the cost of looking.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 pub(super) struct SharedMemorySender<T: Sample> {

@@ -1,5 +1,7 @@
 //! A detector: whether it can be made, behind its twin and with what it has learnt before.
 
+use std::path::Path;
+
 use super::Resolver;
 use crate::build;
 use crate::learnt_state;
@@ -23,6 +25,11 @@ impl Resolver<'_> {
             return None;
         }
         let mut config = config.clone();
+        let resolve = |path: &Path| self.file.resolve(path);
+        if let Err(problems) = learnt_state::read_learnt(&mut config, &resolve) {
+            self.report.append(problems);
+            return None;
+        }
         if let Some(path) = config.state_mut() {
             *path = self.file.resolve(path);
         }

@@ -2,7 +2,7 @@
 
 use std::any::Any;
 use std::fmt::Debug;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Serialize;
@@ -108,7 +108,12 @@ pub trait DetectorSettings:
         None
     }
 
-    /// What that file holds.
+    /// The file that holds what it has learnt, if its settings name one in place of it.
+    fn learnt_file(&self) -> Option<&Path> {
+        None
+    }
+
+    /// What the file of its state holds.
     fn state_schema(_generator: &mut SchemaGenerator) -> Option<Schema> {
         None
     }
@@ -178,6 +183,8 @@ pub trait AnySettings: Any + Debug + Send + Sync + erased_serde::Serialize {
     fn trained_file(&mut self) -> Option<&mut Option<PathBuf>>;
     /// [`DetectorSettings::state_file`].
     fn state_file(&mut self) -> Option<&mut Option<PathBuf>>;
+    /// [`DetectorSettings::learnt_file`].
+    fn learnt_file(&self) -> Option<&Path>;
     /// [`DetectorSettings::resume`].
     ///
     /// # Errors
@@ -232,6 +239,10 @@ impl<S: DetectorSettings> AnySettings for S {
 
     fn state_file(&mut self) -> Option<&mut Option<PathBuf>> {
         DetectorSettings::state_file(self)
+    }
+
+    fn learnt_file(&self) -> Option<&Path> {
+        DetectorSettings::learnt_file(self)
     }
 
     fn resume(&mut self, state: State) -> Result<(), serde_json::Error> {

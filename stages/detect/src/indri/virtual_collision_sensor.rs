@@ -29,14 +29,14 @@ mod sensor;
 mod trend;
 mod validity;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 
 use crate::frame::{
-    ConfigError, Detector, DetectorSettings, LearnError, Lessons, Setup, State, Suits, Task,
-    Trained, Training,
+    ConfigError, Detector, DetectorSettings, HereOrFile, LearnError, Lessons, Setup, State, Suits,
+    Task, Trained, Training,
 };
 pub use bias::LearningState;
 pub use first_bias::FirstBias;
@@ -78,9 +78,9 @@ pub struct Settings {
     /// Low-pass on both efforts \[Hz\].
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub cutoff_hz: f64,
-    /// What was learnt so far, by joint.
+    /// What was learnt so far, by joint, or the file that holds it: `learnt.yaml` as `tauscope evaluate` writes it.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub learnt: Option<Learnt>,
+    pub learnt: Option<HereOrFile<Learnt>>,
     /// A file that keeps what is learnt from one run to the next; it need not exist yet, and goes
     /// before `learnt`.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -112,7 +112,7 @@ impl DetectorSettings for Settings {
 
     fn build(&self, setup: &Setup, hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {
         let bias = first_bias(NAME, self.bias.as_ref(), setup)?;
-        let learnt = self.learnt.as_ref();
+        let learnt = self.learnt.as_ref().and_then(HereOrFile::here);
         if let Some(reason) = learnt.and_then(|learnt| learnt.fault(&setup.joint_names)) {
             return Err(ConfigError::LearntState {
                 detector: NAME,
@@ -141,12 +141,16 @@ impl DetectorSettings for Settings {
         Some(&mut self.state)
     }
 
+    fn learnt_file(&self) -> Option<&Path> {
+        self.learnt.as_ref()?.file()
+    }
+
     fn state_schema(generator: &mut SchemaGenerator) -> Option<Schema> {
         Some(generator.subschema_for::<Learnt>())
     }
 
     fn resume(&mut self, state: State) -> Result<(), serde_json::Error> {
-        self.learnt = Some(serde_json::from_value(state)?);
+        self.learnt = Some(HereOrFile::Here(serde_json::from_value(state)?));
         Ok(())
     }
 }
@@ -225,8 +229,8 @@ pub fn learn(
         adapt_s: Some(0.0),
     });
     let joints = setup.joint_names.iter().cloned().zip(joints);
-    learnt.learnt = Some(Learnt {
+    learnt.learnt = Some(HereOrFile::Here(Learnt {
         joints: joints.collect(),
-    });
+    }));
     Ok(learnt)
 }

@@ -1,27 +1,40 @@
 //! Effective sample size: neighbouring rows of correlated noise count as less than one independent sample each. The
-//! correlation is measured on what even a rich regression leaves.
+//! correlation is estimated on the residual of a rich regression.
 
 use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::{MotionSample, sign};
 
 use crate::data::problem::Problem;
 
-/// Rows of a stretch whose correlation is told by itself.
+/// Rows of a stretch for which one correlation is estimated.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const STRETCH_ROWS: usize = 20;
-/// Which of the stretches counts, and how far below the middle it is expected: what is left of a push or of a worn
-/// place does not make noise of the rest.
+/// Quantile of the stretches' correlations that is used. A low one, because the remains of a push or of a worn place
+/// in some stretches are not noise.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const CALM: f64 = 0.3;
+/// How far that quantile lies below the true correlation by chance.
+/// Statistical: the correlation of 20 rows of white noise has a standard deviation of 1/√20 = 0.22, and the 30 %
+/// quantile of a normal variable lies 0.52 standard deviations below its mean.
 const CALM_BIAS: f64 = 0.12;
 /// A row counts as at least this share of an independent sample.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST: f64 = 0.03;
-/// Speeds over which friction may fall \[rad/s\].
+/// Stribeck velocities of the rich regression \[rad/s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const STRIBECK_RAD_S: [f64; 2] = [0.05, 0.3];
+/// The rich regression needs this many rows per column.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const ROWS_PER_COLUMN: usize = 3;
+/// Added to the diagonal of the scaled normal equations, whose elements are 1.
+/// Resolution: far above the rounding of f64, far below what the noise hides.
+const RIDGE: f64 = 1e-8;
 
 /// Effective samples per row, by joint, 0 to 1: `(1 - r) / (1 + r)` with r the correlation of neighbouring rows, as for
 /// a first-order autoregression.
 ///
-/// The noise is what a regression on many functions of the joint's motion and of all efforts leaves: it names nothing,
-/// but takes out most of what any effect in the joint does.
+/// The noise is the residual of a regression on many functions of the joint's motion and of all efforts. The regression
+/// names nothing, but removes most of any effect in the joint.
 pub fn per_row(problem: &Problem) -> Vec<f64> {
     (0..problem.joints)
         .map(|joint| {
@@ -31,7 +44,7 @@ pub fn per_row(problem: &Problem) -> Vec<f64> {
         .collect()
 }
 
-/// The same, or what `residual` a fit leaves if that is whiter: the noise is no more correlated than that.
+/// The same, or that of the `residual` of a fit if it is whiter: the noise is no more correlated than the residual.
 pub fn at_least(problem: &Problem, residual: &[f64]) -> Vec<f64> {
     let of_joint = |(joint, known): (usize, &f64)| {
         known.max(of_left(
@@ -53,7 +66,7 @@ fn of_left(problem: &Problem, joint: usize, left: &[f64]) -> f64 {
     ((1.0 - r) / (1.0 + r)).clamp(LEAST, 1.0)
 }
 
-/// Functions of an instant that an effort of joint `j` may be made of.
+/// The columns of the rich regression of joint `j` at one instant.
 fn functions(j: usize, at: &MotionSample<'_>, into: &mut Vec<f64>) {
     let (q, qd, s) = (at.position[j], at.velocity[j], sign(at.velocity[j]));
     let load = at.transmitted[j];
@@ -83,7 +96,7 @@ fn left_by_rich_model(problem: &Problem, joint: usize) -> Vec<f64> {
         track.track.each(|_, at| {
             let first = values.len();
             functions(joint, at, &mut values);
-            // What comes late.
+            // A delay adds the rate of change of the load.
             let load = at.transmitted[joint];
             let rate = before.map_or(0.0, |b| {
                 if at.dt_s > 0.0 {
@@ -118,7 +131,7 @@ fn left_by_rich_model(problem: &Problem, joint: usize) -> Vec<f64> {
     for (left, measured) in left.iter_mut().zip(&problem.measured[rows]) {
         *left = measured - *left;
     }
-    if used.len() < 3 * (p + n) {
+    if used.len() < ROWS_PER_COLUMN * (p + n) {
         return left;
     }
     let scale: Vec<f64> = columns
@@ -135,7 +148,7 @@ fn left_by_rich_model(problem: &Problem, joint: usize) -> Vec<f64> {
     let y = DVector::from_iterator(used.len(), used.iter().map(|&row| left[row]));
     let mut normal = x.transpose() * &x;
     for a in 0..p {
-        normal[(a, a)] += 1e-8;
+        normal[(a, a)] += RIDGE;
     }
     if let Some(factor) = normal.cholesky() {
         let rest = &y - &x * factor.solve(&(x.transpose() * &y));
@@ -146,7 +159,7 @@ fn left_by_rich_model(problem: &Problem, joint: usize) -> Vec<f64> {
     left
 }
 
-/// Correlation of neighbouring rows in the calmer stretches.
+/// Correlation of neighbouring rows: the [`CALM`] quantile over all stretches.
 fn calm_correlation(problem: &Problem, joint: usize, left: &[f64]) -> f64 {
     let first = joint * problem.rows;
     let mut stretches: Vec<f64> = Vec::new();

@@ -1,4 +1,4 @@
-//! What was computed before for a problem, so that it is computed once.
+//! Memo of a problem: columns and efforts that were computed before.
 
 use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -7,8 +7,10 @@ use crate::data::column::Columns;
 use crate::data::efforts::TrackEfforts;
 
 /// Problems with more rows than this do without the memo.
+/// Resolution: larger problems compute the same numbers again, which takes time instead of memory.
 pub const MOST_ROWS: usize = 12_000;
-/// No more numbers than these are kept of each kind: 400 MB.
+/// At most this many numbers are kept of each kind: 400 MB.
+/// Resolution: memory against computing time.
 const KEPT_NUMBERS: usize = 50_000_000;
 
 /// An effect, its place (joint, source joint, link), and the bits of its shape parameters.

@@ -1,6 +1,13 @@
-//! White noise of a signal, told from its fourth differences.
+//! White noise of a signal, estimated from its fourth differences.
 
 use crate::read::recording::Recording;
+
+/// Median of the absolute value of a normal variable, in standard deviations.
+/// Statistical: the 75 % quantile of the standard normal distribution.
+const MEDIAN_OF_ABS_NORMAL: f64 = 0.6745;
+/// Variance of the fourth difference of white noise with variance 1.
+/// Statistical: the sum of the squared coefficients, 1 + 16 + 36 + 16 + 1.
+const FOURTH_DIFFERENCE_VARIANCE: f64 = 70.0;
 
 /// Variance of the white noise on a smooth signal, from its fourth differences, robust against jumps.
 pub fn white_variance(signal: &[f64]) -> f64 {
@@ -12,9 +19,8 @@ pub fn white_variance(signal: &[f64]) -> f64 {
         return 0.0;
     }
     squares.sort_by(f64::total_cmp);
-    // The median of |normal| is 0.6745 standard deviations; 70 = 1 + 16 + 36 + 16 + 1.
-    let deviation = squares[squares.len() / 2] / 0.6745;
-    deviation * deviation / 70.0
+    let deviation = squares[squares.len() / 2] / MEDIAN_OF_ABS_NORMAL;
+    deviation * deviation / FOURTH_DIFFERENCE_VARIANCE
 }
 
 /// White noise of the measured effort of a joint \[effort unit\].

@@ -12,18 +12,27 @@ use crate::data::smoother::LowPass;
 use crate::data::track::{FitTrack, Track, moving_joints, spaced, thinned};
 use crate::read::recording::Recording;
 
-/// What is compared lies below this frequency, unless the recordings are too slow for it \[Hz\].
+/// Efforts are compared below this frequency, or below [`CUTOFF_OF_RATE`] where recordings are slow \[Hz\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const CUTOFF_HZ: f64 = 8.0;
 /// The cutoff is at most this share of the sample rate.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const CUTOFF_OF_RATE: f64 = 0.1;
-/// Motion is smoothed this many times higher, so that its filter does not show below the cutoff.
+/// The cutoff of the motion's smoother over that of the comparison.
+/// Physical: a smoother with the response `1 / (1 + (f / fc)^6)` still passes 98 % at half its cutoff.
 const MOTION_CUTOFF_RATIO: f64 = 2.0;
-/// Recordings faster than this are thinned for the fit \[Hz\]; where there are many samples down to the lower.
+/// Recordings are thinned for the fit to a rate between these two \[Hz\].
+/// Tuned: for what it costs in time, on no recorded seeds; not swept.
 const FIT_RATE_HZ: [f64; 2] = [50.0, 130.0];
-/// From how many samples on.
+/// Sessions with more samples per joint than this are thinned below the higher rate.
+/// Tuned: for what it costs in time, on no recorded seeds; not swept.
 const FIT_SAMPLES: f64 = 8000.0;
-/// Fast recordings are filtered this many times higher than what is compared before they are thinned.
+/// The cutoff of the filter against aliasing, before thinning, over that of the comparison.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const ALIASING_RATIO: f64 = 5.0;
+/// Noise bandwidth of the comparison's filter over its cutoff.
+/// Tuned: by hand, on no recorded seeds; not swept. The response `1 / (1 + (f / fc)^6)` alone has 0.873.
+const NOISE_BANDWIDTH: f64 = 0.95;
 
 impl Problem {
     /// The frequency below which these recordings are compared \[Hz\].
@@ -77,7 +86,8 @@ impl Problem {
                     .map(|at| (recording.effort[at] - full.beside[at]) * unit_nm[j])
                     .collect();
                 let rate = (full.len() - 1) as f64 / recording.duration_s();
-                variances[j].push(white_variance(&signal) * cutoff_hz * 0.95 / (0.5 * rate));
+                variances[j]
+                    .push(white_variance(&signal) * cutoff_hz * NOISE_BANDWIDTH / (0.5 * rate));
                 if kept.len() < full.len() {
                     // Against aliasing.
                     LowPass::new(&full.time_s, ALIASING_RATIO * cutoff_hz).apply(&mut signal);

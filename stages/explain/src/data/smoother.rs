@@ -9,8 +9,12 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Weight of a sample that is passed over: enough to keep a long stretch of them from floating away.
+/// Weight of a sample that is passed over, where others have 1. It is not 0, so that a long gap stays determined.
+/// Resolution: far below 1, so that nothing leaks, and far above the rounding of f64.
 const PASSED_OVER: f64 = 1e-6;
+/// Prior variance of the first state, over that of the measurement noise.
+/// Resolution: the prior then weighs 1e-4 of one sample.
+const DIFFUSE: f64 = 1e4;
 
 /// A low-pass with the response `1 / (1 + (f / fc)^6)`, prepared for one clock: solves
 /// `(W + λ Dᵀ D) y = W x` with D the third divided difference and W a weight per sample, 1 or next to 0. No phase
@@ -138,8 +142,11 @@ impl MotionSmoother {
         // With measurement noise of variance 1 every `mean` seconds, a jerk of this spectral density puts
         // the half-amplitude point at the cutoff.
         let density = omega.powi(6) * mean;
-        let mut covariance =
-            Matrix3::from_diagonal(&Vector3::new(1e4, 1e4 * omega * omega, 1e4 * omega.powi(4)));
+        let mut covariance = Matrix3::from_diagonal(&Vector3::new(
+            DIFFUSE,
+            DIFFUSE * omega * omega,
+            DIFFUSE * omega.powi(4),
+        ));
         let (mut gains, mut backward) = (Vec::with_capacity(n), Vec::with_capacity(n));
         for (i, &step_s) in steps_s.iter().enumerate() {
             if i > 0 {

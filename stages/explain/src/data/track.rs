@@ -1,4 +1,4 @@
-//! One recording as a fit sees it: smoothed motion, what the twin says of it, and what counts.
+//! One recording in a fit: smoothed motion, the twin's effort for it, and the samples that are compared.
 
 use nalgebra::Vector3;
 use tauscope_dynamics::terms::{MotionSample, Physics};
@@ -8,19 +8,27 @@ use crate::data::smoother::{LowPass, MotionSmoother};
 use crate::data::standstill;
 use crate::read::recording::{MAX_GAP_S, Recording};
 
-/// Below this speed a joint stands: its friction is any value up to breakaway \[rad/s\].
+/// A joint slower than this is at rest: its friction takes any value up to breakaway \[rad/s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 pub const STANDSTILL_RAD_S: f64 = 0.01;
-/// Samples nearer than this to an end of the recording are left out, in periods of the cutoff.
+/// Samples nearer than this to an end of the recording or to a gap are left out, in periods of the cutoff.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const END_PERIODS: f64 = 0.8;
-/// And nearer than this to a standstill or reversal of the joint: what friction does there, the motion does not tell.
+/// Samples nearer than this to a standstill or reversal of the joint are left out, in periods of the cutoff. The
+/// motion does not determine the friction there.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const REVERSAL_PERIODS: f64 = 0.4;
-/// A joint that moves in less than this share of the time is judged at rest, too.
+/// A joint that moves in less than this share of the time is compared at rest, too.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_MOVING_SHARE: f64 = 0.2;
-
-/// What the arm bears at the beginning of a recording is what it bears without anything that comes and goes \[s\].
+/// The effort over this first part of a recording of an arm at rest is taken as free of temporary effects \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 pub const BEGINNING_S: f64 = 1.0;
+/// Thinned samples may be this much closer than the step, as a share of it, on an uneven clock.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const LEAST_OF_STEP: f64 = 0.9;
 
-/// One recording as a fit sees it. Matrices are row-major: one number per joint and sample.
+/// One recording in a fit. Matrices are row-major: one number per joint and sample.
 #[derive(Debug, Clone)]
 pub struct Track {
     /// The recording's name.
@@ -35,15 +43,15 @@ pub struct Track {
     pub velocity: Vec<f64>,
     /// Smoothed acceleration \[rad/s² or m/s²\].
     pub acceleration: Vec<f64>,
-    /// What the twin says \[N m or N\].
+    /// The twin's effort \[N m or N\].
     pub rigid: Vec<f64>,
-    /// What a corrected twin says beside its bodies \[the recording's unit\].
+    /// Effort of a corrected twin's terms that are not bodies \[the recording's unit\].
     pub beside: Vec<f64>,
 }
 
 impl Track {
-    /// The motion of a recording, at all its samples, and what the twin says of it. Motion is smoothed with half
-    /// amplitude at `motion_cutoff_hz`; `constants` turn the recording's unit into the model's, by joint.
+    /// The motion of a recording at all its samples, and the twin's effort for it. The smoother has half amplitude at
+    /// `motion_cutoff_hz`. `constants` convert the recording's unit into the model's, by joint.
     pub fn new(
         recording: &Recording,
         session_s: f64,
@@ -95,8 +103,8 @@ impl Track {
         track
     }
 
-    /// Takes the velocity from positions smoothed with another half amplitude \[Hz\] or, without one, as it was recorded, but for
-    /// standstills; what the twin says stays.
+    /// Replaces the velocity: by that of positions smoothed with another cutoff \[Hz\] or, without one, by the recorded
+    /// velocity. Standstills are smoothed by themselves. The twin's effort stays as it is.
     pub(crate) fn sharpen_velocity(&mut self, recording: &Recording, cutoff_hz: Option<f64>) {
         let n = self.velocity.len() / self.len().max(1);
         let smoother = cutoff_hz.map(|hz| MotionSmoother::new(&recording.time_s, hz));
@@ -116,8 +124,8 @@ impl Track {
         }
     }
 
-    /// Shifts what the twin says of an arm at rest so that it begins with what is measured: load, friction and offset cannot be told
-    /// apart there.
+    /// Shifts the twin's effort for an arm at rest so that it begins at the measured effort. Load, friction and offset
+    /// cannot be told apart there.
     pub fn start_at_measured(&mut self, recording: &Recording, unit_nm: &[f64]) {
         let n = unit_nm.len();
         let samples = self.time_s.partition_point(|t| *t < BEGINNING_S);
@@ -165,7 +173,7 @@ impl Track {
         }
     }
 
-    /// Runs `physics` over the track, from `start` efforts (row-major) to what is recorded.
+    /// Runs `physics` over the track: from `start` efforts (row-major) to recorded efforts.
     pub fn run(&self, physics: &mut Physics, start: &[f64]) -> Vec<f64> {
         let mut effort = start.to_vec();
         physics.reset();
@@ -200,8 +208,8 @@ impl Track {
 }
 
 impl Track {
-    /// Which samples of a joint are compared: not the ends, not beside a gap and, where the joint `moves`
-    /// at all, not its standstills and reversals.
+    /// Which samples of a joint are compared. Left out are the ends, the neighbourhood of gaps and, if the joint `moves`,
+    /// its standstills and reversals.
     pub(crate) fn counts(&self, joint: usize, moves: bool, cutoff_hz: f64) -> Vec<bool> {
         let n = self.position.len() / self.len();
         let time = &self.time_s;
@@ -239,7 +247,7 @@ impl Track {
 pub struct FitTrack {
     /// The motion, thinned.
     pub track: Track,
-    /// By joint, passing over what does not count there.
+    /// By joint. Each passes over the samples that are not compared there.
     pub(crate) filters: Vec<LowPass>,
     /// Samples at which filtered signals are compared.
     pub compared: Vec<usize>,
@@ -262,7 +270,7 @@ impl FitTrack {
     }
 }
 
-/// Which joints move in a fair share of the time; the others are judged at rest, too.
+/// Which joints move in at least [`LEAST_MOVING_SHARE`] of the time. The others are compared at rest, too.
 pub(crate) fn moving_joints<'a>(tracks: impl Iterator<Item = &'a Track>, n: usize) -> Vec<bool> {
     let (mut moving, mut samples) = (vec![0_usize; n], 0);
     for track in tracks {
@@ -275,14 +283,14 @@ pub(crate) fn moving_joints<'a>(tracks: impl Iterator<Item = &'a Track>, n: usiz
     moving.iter().map(share).collect()
 }
 
-/// Indices of samples at least `step_s` apart (but for a tenth of it, for uneven clocks).
+/// Indices of samples at least [`LEAST_OF_STEP`] times `step_s` apart.
 pub(crate) fn thinned(time_s: &[f64], step_s: f64) -> Vec<usize> {
     let mut kept = Vec::new();
     let mut next = f64::NEG_INFINITY;
     for (k, &t) in time_s.iter().enumerate() {
         if t >= next {
             kept.push(k);
-            next = t + 0.9 * step_s;
+            next = t + LEAST_OF_STEP * step_s;
         }
     }
     kept

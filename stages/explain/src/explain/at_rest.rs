@@ -1,4 +1,4 @@
-//! The search where no joint moves: what comes and goes can be told, what lasts cannot.
+//! The search for an arm at rest: temporary effects can be found, lasting ones cannot.
 
 use tauscope_dynamics::terms::TermError;
 use tauscope_dynamics::terms::words::number;
@@ -18,23 +18,30 @@ use crate::select::propose::Base;
 use crate::select::search::Search;
 use tauscope_dynamics::kinematic_tree::bearing;
 
-/// What is left stands out where it is so many times its deviation in the beginning, over all joints,
+/// The residual stands out where it is this many times its standard deviation at the beginning, over all joints.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const STANDS_OUT: f64 = 8.0;
-/// and this share of the most within some time on either side \[s\]: after a push friction holds some of it for long.
+/// It must also be this share of its peak within [`NEAR_S`], because friction holds part of a push for long.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const SHARE_OF_PEAK: f64 = 0.3;
+/// The peak is searched within this time on either side \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const NEAR_S: f64 = 1.0;
-/// What is shorter than this is no push, and what is nearer together is one \[s\].
+/// A push lasts at least this long, and two that are nearer together are one \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const SHORTEST_S: f64 = 0.15;
-/// A joint feels a push if it bears so many times its deviation in the beginning, and this share of what the joint does that
-/// bears most.
+/// A push loads a joint if its mean residual is this many times the standard deviation at the beginning.
+/// Statistical: Gaussian noise goes beyond four standard deviations once in 16 000 samples.
 const FELT: f64 = 4.0;
+/// It must also be this share of the residual of the most loaded joint.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const FELT_SHARE: f64 = 0.015;
-
-/// What stands out for more than this share of the time is no push: the effort changes while the positions do not, as where a
-/// driver does not publish them.
+/// A residual that stands out for more than this share of the time is no push. The effort then changes while the
+/// positions do not, as when a driver does not publish them.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const MOST_OF_TIME: f64 = 0.7;
 
-/// Deviation of what is left at each joint as the only recording of a problem begins \[N m or N\].
+/// Standard deviation of the residual at each joint over the beginning of a problem's only recording \[N m or N\].
 fn deviations(problem: &Problem, fit: &Fit) -> Vec<f64> {
     let track = &problem.tracks[0];
     let begins = |k: &usize| track.track.time_s[*k] < BEGINNING_S;
@@ -52,13 +59,13 @@ fn deviations(problem: &Problem, fit: &Fit) -> Vec<f64> {
     (0..problem.joints).map(of).collect()
 }
 
-/// When something stands out of what is left, in the only recording of a problem \[s of recording time\].
+/// The intervals in which the residual stands out, in a problem's only recording \[s of recording time\].
 fn stands_out(problem: &Problem, fit: &Fit, deviations: &[f64]) -> Vec<(f64, f64)> {
     let track = &problem.tracks[0];
     let times: Vec<f64> = (track.compared.iter())
         .map(|&k| track.track.time_s[k])
         .collect();
-    // In N m: whitened, the joint with the finest sensor would decide, and what friction holds there.
+    // In N m. If it were divided by the noise, friction at the joint with the finest sensor would decide.
     let norm: Vec<f64> = (0..times.len())
         .map(|row| {
             let of = |j: usize| {
@@ -69,7 +76,7 @@ fn stands_out(problem: &Problem, fit: &Fit, deviations: &[f64]) -> Vec<(f64, f64
         })
         .collect();
     let noise = deviations.iter().map(|d| d * d).sum::<f64>().sqrt();
-    // The most since it last was back where it began: what friction holds of a push is no other push, however long it does.
+    // The peak since the residual was last small: what friction holds of a push is not another push.
     let held = norm.iter().scan(0.0_f64, |most, x| {
         *most = if *x > STANDS_OUT * noise {
             most.max(*x)
@@ -99,7 +106,7 @@ fn stands_out(problem: &Problem, fit: &Fit, deviations: &[f64]) -> Vec<(f64, f64
     found
 }
 
-/// The joint furthest from the base that bears something in an interval: what is beyond a touch does not feel it.
+/// The joint furthest from the base that is loaded in an interval. A push does not load the joints beyond it.
 fn last_to_feel(
     problem: &Problem,
     fit: &Fit,
@@ -123,14 +130,14 @@ fn last_to_feel(
         .max_by_key(|j| order(problem, *j))
 }
 
-/// How many joints there are from the base to one.
+/// The number of joints from the base to one, itself included.
 fn order(problem: &Problem, joint: usize) -> usize {
     let model = &problem.model;
     bearing(model, model.joints()[joint].child_link).len()
 }
 
-/// A push for each time that something stands out, at the link where a constant force explains most of it: one that is next to
-/// the last joint that feels it.
+/// One push for each interval in which the residual stands out. Its link is the one where a constant force explains most
+/// of the residual, among the links next to the last joint that is loaded.
 fn pushes(search: &Search<'_>) -> Explanation {
     let problem = search.problem;
     let mut best = Explanation {
@@ -160,7 +167,7 @@ fn pushes(search: &Search<'_>) -> Explanation {
         let possible = proposals.filter(|p| plausible(&p.active, &problem.model));
         let push = possible.max_by(|a, b| a.gain.total_cmp(&b.gain));
         if let Some(push) = push {
-            // When it was is told by what stood out: a force that grows and fades has no sharper times.
+            // Its times are those of the interval: a force that grows and fades has no sharper ones.
             best.fit = best.fit.with(problem, push.active);
             best.penalties.push(push.penalty);
         }
@@ -169,7 +176,7 @@ fn pushes(search: &Search<'_>) -> Explanation {
 }
 
 impl Context<'_> {
-    /// Searches each recording by itself for what comes and goes in it; the reason why nothing can be said, if there is one.
+    /// Searches each recording by itself for temporary effects. Returns the reason if there is no verdict.
     pub fn at_rest(
         &self,
         progress: &(dyn Fn(f64, &str) + Sync),
@@ -195,7 +202,7 @@ impl Context<'_> {
             let before = Fit::new(&problem, Vec::new());
             let found = pushes(&search);
             let mut own = findings::of(&search, &found, &before, input, &joints);
-            // No motion tells more of a push that is over.
+            // No further motion tells more about a push that is over.
             own.next_motions.clear();
             own.trajectories.clear();
             named.extend(own);
@@ -206,19 +213,20 @@ impl Context<'_> {
         }
         if named.findings.is_empty() {
             return Ok(Err(
-                "no joint moves for as long as a second: standstill does not tell friction from load".to_owned(),
+                "no joint moves long or far enough: at rest, friction cannot be told from load"
+                    .to_owned(),
             ));
         }
         named.notes.push(format!(
-            "No joint moves: what lasts cannot be told from the load at rest, and what the arm bears in the first {BEGINNING_S} s of \
-             each recording is taken for what it always bears there."
+            "No joint moves, so lasting effects cannot be told from the load at rest. The effort in the first {BEGINNING_S} s of each \
+             recording is taken as the usual load of that pose."
         ));
         if !self.unscaled.is_empty() {
             let of =
                 |&(j, _): &(usize, f64)| format!("{} {} N m/A", joints[j], number(self.unit_nm[j]));
             let taken: Vec<String> = self.unscaled.iter().map(of).collect();
             named.notes.push(format!(
-                "Nobody knows the scales of these drives, and forces hang on what they were taken for: {}.",
+                "The torque constants of these drives are not known. Forces are only as right as these assumed values: {}.",
                 taken.join(", ")
             ));
         }

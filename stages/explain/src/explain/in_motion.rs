@@ -1,4 +1,4 @@
-//! The search where joints move.
+//! The search for an arm that moves.
 
 use tauscope_dynamics::terms::TermError;
 
@@ -12,8 +12,8 @@ use crate::report::findings;
 use crate::select::search::Search;
 
 impl Context<'_> {
-    /// Searches, first in motion alone, then with the standstills of the joints that have no dry friction; the reason why
-    /// nothing can be said, if there is one.
+    /// Searches in motion alone, then with the standstills of the joints that have no set-valued friction. Returns the
+    /// reason if there is no verdict.
     pub fn in_motion(
         &self,
         progress: &(dyn Fn(f64, &str) + Sync),
@@ -30,10 +30,10 @@ impl Context<'_> {
         } else {
             Vec::new()
         };
-        // Where nobody knows the scale of the drives, the twin is only one once they are fitted.
+        // Unknown torque scales are fitted before the twin is compared.
         let scales = || torque_scale::unknown_scales(&self.unscaled);
         let say = |text: &str| {
-            // Nobody knows how many rounds there will be: each takes a share of what is left.
+            // The number of rounds is not known, so the share stays.
             progress(0.1, text);
         };
         let search = Search {
@@ -44,7 +44,7 @@ impl Context<'_> {
         };
         let penalties = vec![0.0; scales().len()];
         let moving = search.first_guess(scales(), penalties);
-        // Where friction is not set-valued, standstills tell as much as motion.
+        // Without set-valued friction, standstills are as informative as motion.
         progress(0.3, "standstills");
         let dry = (input.start.as_ref()).map_or_else(
             || vec![false; joints.len()],

@@ -1,22 +1,22 @@
-//! What a search came to, and what is said of it.
+//! The result of a search, and the findings in it.
 
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::report::findings::Named;
 use crate::report::schema::Undetectable;
 
-/// What a search came to.
+/// The result of a search.
 pub struct Judged {
     /// The recordings that were fitted.
     pub problem: Problem,
-    /// The twin as it was, its scales fitted where nobody knows them.
+    /// The twin as it was, with its unknown torque scales fitted.
     pub before: Fit,
-    /// The twin as it should be.
+    /// The twin with the effects that were found.
     pub found: Fit,
-    /// What is said of it.
+    /// The findings.
     pub named: Named,
     /// The smallest effects that would have been found.
     pub undetectable: Vec<Undetectable>,
-    /// By joint, whether its standstills count.
+    /// By joint, whether its standstills are compared.
     pub rests_count: Vec<bool>,
 }

@@ -1,4 +1,4 @@
-//! A step of least squares that leaves every body one.
+//! A step of least squares that keeps every body physically consistent.
 
 use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::{Inertia, Model};
@@ -7,19 +7,27 @@ use crate::fit::body_prior::{Body, about, bodies, density_of, of_body};
 use crate::fit::least_squares::solved;
 use crate::physics::active::{Active, BODY};
 
-/// The prior weighs this much less from one round to the next, until it weighs 1.
+/// The prior's weight is multiplied by this from one round to the next, until it is 1.
+/// Resolution: rounds against steps within a round.
 const ROUND: f64 = 0.1;
-/// Steps within a round, and how little is still to be gained when it is over \[nats\].
+/// Most steps within a round.
+/// Resolution: bounds the computing time of a round that does not converge.
 const MOST_STEPS: usize = 20;
+/// A round ends when its next step promises less than this, times the prior's weight \[nats\].
+/// Resolution: far below any difference that evidence is decided by.
 const CONVERGED: f64 = 1e-6;
-/// So often a step within is halved.
+/// How often a step is halved at most.
+/// Resolution: 2⁻³⁰ of a step changes nothing.
 const MOST_HALVINGS: usize = 30;
+/// Added to the diagonal, as a share of it, to find the weight of the first round.
+/// Resolution: the weight only decides how many rounds there are.
+const RIDGE: f64 = 1e-9;
 
 /// The step from normal equations with the prior of bodies, for the coordinates in `used`, the others stay at 0.
 ///
-/// The equations are linear, the prior is not: it ends where a body does. Newton's method on both together, first with a heavy
-/// prior that keeps well within (Boyd and Vandenberghe, *Convex Optimization*, 2004, section 11.3). All coordinates but those
-/// of bodies follow from these.
+/// The equations are linear. The prior is not: its density is zero where a body is not physically consistent. Newton's
+/// method solves both together, first with a heavy prior that stays far from that edge (Boyd and Vandenberghe, *Convex
+/// Optimization*, 2004, section 11.3). The other coordinates follow from those of the bodies.
 pub fn body_step(
     model: &Model,
     actives: &[Active],
@@ -93,8 +101,9 @@ struct Within<'a> {
 impl Within<'_> {
     fn solve(&self) -> Option<DVector<f64>> {
         let mut step = DVector::zeros(self.side.len());
-        // What is to be gained at most says how heavy the prior must be to matter.
-        let ridge = DMatrix::from_diagonal(&(self.complement.diagonal() * 1e-9).add_scalar(1e-300));
+        // The first weight is the largest possible gain: with it the prior matters.
+        let ridge =
+            DMatrix::from_diagonal(&(self.complement.diagonal() * RIDGE).add_scalar(1e-300));
         let free = (&self.complement + ridge).cholesky()?.solve(&self.side);
         let mut weight = (0.5 * self.side.dot(&free)).max(1.0);
         loop {

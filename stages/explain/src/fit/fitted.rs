@@ -1,4 +1,4 @@
-//! An explanation with its numbers: what it says of the recordings, and what it leaves.
+//! An explanation with its numbers: the effort that it computes for the recordings, and the residual.
 
 use std::sync::Arc;
 
@@ -11,30 +11,34 @@ use crate::physics::columns::columns;
 use crate::physics::efforts::change;
 use crate::physics::parts::Parts;
 
-/// An explanation with its numbers, and what it leaves.
+/// A variance below this is taken for this, so that its inverse and its logarithm are finite \[squared effort\].
+/// Physical: 1e-8 N m is far below what any sensor resolves.
+pub(crate) const LEAST_VARIANCE: f64 = 1e-16;
+
+/// An explanation with its numbers, and the residual.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// The physics.
+    /// The effects with their numbers.
     pub actives: Vec<Active>,
-    /// What each piece adds to the recordings.
+    /// The effort that each effect adds.
     pub parts: Parts,
     /// Measured minus explained, a signal \[N m or N\].
     pub residual: Vec<f64>,
-    /// Variance of what is left, by joint; not below the white noise.
+    /// Variance of the residual by joint, not below that of the white noise.
     pub variance: Vec<f64>,
-    /// Sum of squares of what is left, by joint.
+    /// Sum of squares of the residual, by joint.
     pub squares: Vec<f64>,
-    /// Rows that count, by joint.
+    /// Number of compared rows, by joint.
     pub count: Vec<f64>,
 }
 
 impl Fit {
-    /// Evaluates an explanation as it is.
+    /// Evaluates an explanation without changing its numbers.
     pub fn new(problem: &Problem, actives: Vec<Active>) -> Self {
         Self::beside(problem, actives, None)
     }
 
-    /// The same, where much is as in the fit `before`.
+    /// The same. Efforts that are unchanged since the fit `before` are taken from there.
     pub(crate) fn beside(problem: &Problem, actives: Vec<Active>, before: Option<&Self>) -> Self {
         let known = before.map(|before| (&before.actives[..], &before.parts));
         let parts = Parts::new(problem, &actives, known);
@@ -70,17 +74,17 @@ impl Fit {
         fit
     }
 
-    /// What it says of the recordings, unfiltered.
+    /// The computed efforts, unfiltered.
     pub fn efforts(&self, problem: &Problem) -> &Efforts {
         self.parts.efforts(problem, &self.actives)
     }
 
-    /// What the gears transmit, unfiltered.
+    /// The effort that the gears transmit, unfiltered.
     pub fn load(&self, problem: &Problem) -> Arc<TrackEfforts> {
         self.parts.load(problem, &self.actives)
     }
 
-    /// The columns of a hypothesis at some shape, beside what the fit holds.
+    /// The columns of a hypothesis at some shape, in addition to the effects of the fit.
     pub fn columns(
         &self,
         problem: &Problem,
@@ -90,19 +94,19 @@ impl Fit {
         columns(problem, (&self.actives, &self.parts), hypothesis, shape)
     }
 
-    /// Log-likelihood of what is left as if it were white, but for a constant: `-n/2 ln(variance)` summed over joints.
+    /// Log-likelihood of the residual as white noise, up to a constant: `-n/2 ln(variance)` summed over joints.
     pub fn likelihood(&self) -> f64 {
         likelihood(&self.variance, &self.count)
     }
 
-    /// The joints whose effort a piece of physics changes: one, or all.
+    /// The joints whose effort a hypothesis changes: one, or all.
     pub fn joints_of(hypothesis: &Hypothesis, joints: usize) -> Vec<usize> {
         hypothesis
             .only_joint()
             .map_or_else(|| (0..joints).collect(), |joint| vec![joint])
     }
 
-    /// Gain of log-likelihood from another fit to this, samples weighted by their `effective`.
+    /// Gain in log-likelihood over another fit. `effective` holds the effective samples per row, by joint.
     pub fn gain_over(&self, other: &Self, effective: &[f64]) -> f64 {
         (0..self.variance.len())
             .map(|j| {
@@ -111,7 +115,7 @@ impl Fit {
             .sum()
     }
 
-    /// What a piece of physics would add.
+    /// The effort that another effect would add.
     pub fn added(&self, problem: &Problem, active: &Active) -> Column {
         let gains = &self.parts.gains;
         let joint = active.hypothesis.only_joint();
@@ -128,7 +132,7 @@ impl Fit {
         problem.column(&changed, joint)
     }
 
-    /// The fit with one of its pieces of physics taken out, not refined.
+    /// The fit without one of its effects, not refined.
     #[must_use]
     pub fn without(&self, problem: &Problem, index: usize) -> Self {
         let mut actives = self.actives.clone();
@@ -136,7 +140,7 @@ impl Fit {
         Self::beside(problem, actives, Some(self))
     }
 
-    /// The fit with one more, not refined.
+    /// The fit with one more effect, not refined.
     #[must_use]
     pub fn with(&self, problem: &Problem, active: Active) -> Self {
         let mut actives = self.actives.clone();
@@ -157,6 +161,6 @@ pub fn likelihood(variance: &[f64], count: &[f64]) -> f64 {
 /// Variances by joint from sums of squares, not below the white noise.
 pub fn variances(problem: &Problem, squares: &[f64], count: &[f64]) -> Vec<f64> {
     let all = squares.iter().zip(count).zip(&problem.white_noise);
-    all.map(|((s, n), noise)| (s / n.max(1.0)).max(noise * noise).max(1e-16))
+    all.map(|((s, n), noise)| (s / n.max(1.0)).max(noise * noise).max(LEAST_VARIANCE))
         .collect()
 }

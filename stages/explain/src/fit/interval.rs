@@ -1,31 +1,51 @@
-//! How well the numbers of an explanation are known.
+//! Covariance and 95 % intervals of the numbers of an explanation.
 
 use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::CoordinateKind;
 
 use crate::data::problem::Problem;
 use crate::fit::body_prior;
-use crate::fit::fitted::Fit;
+use crate::fit::fitted::{Fit, LEAST_VARIANCE};
 use crate::physics::active::Active;
 
-/// Lags over which what is left is taken to be correlated, in compared samples.
+/// Lags over which the residual is taken to be correlated, in compared samples.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LAGS: usize = 6;
-/// What smoothing and differentiation leave of a number, as a share of it: measured on arms simulated by another engine.
+/// Standard deviation of a number from smoothing and differentiation, as a share of the number.
+/// Tuned: on arms simulated by another engine, on no recorded seeds; not swept.
 const SYSTEMATIC: f64 = 0.003;
-/// The same of what happens within the fastest of the motion, around reversals and in the spring of a gear.
+/// The same for effects in the fastest part of the motion: around reversals and in the spring of a gear.
+/// Tuned: on arms simulated by another engine, on no recorded seeds; not swept.
 const SYSTEMATIC_WHEN_FAST: f64 = 0.02;
-/// Rows nearer than this to a gap tell of a change within the gap, in periods of the cutoff.
+/// A change this near to a gap may lie within the gap, in periods of the cutoff.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const NEAR_GAP_PERIODS: f64 = 0.5;
 /// Half width of a 95 % interval of a normal variable, in standard deviations.
+/// Statistical: the 97.5 % quantile of the standard normal distribution.
 pub const HALF_WIDTH_95: f64 = 1.96;
+/// Coefficients of b, b² and b³ in the 97.5 % critical value with Bartlett's weights.
+/// Statistical: Kiefer and Vogelsang, "A New Asymptotic Theory for Heteroskedasticity-Autocorrelation Robust Tests",
+/// 2005, table 1.
+const BARTLETT_97_5: [f64; 3] = [2.9694, 0.4160, -0.5324];
+/// Added to the diagonal of the normal matrix, scaled to 1.
+/// Resolution: far above the rounding of f64, far below what the noise hides.
+const RIDGE: f64 = 1e-9;
+/// Step of the difference quotient of a parameter, as a share of its coordinate's standard deviation.
+/// Resolution: between the curvature over a long step and the rounding over a short one.
+const STEP_OF_DEVIATION: f64 = 1e-3;
+/// The same as a share of the coordinate, where its standard deviation is tiny.
+/// Resolution: above the rounding of f64.
+const LEAST_RELATIVE_STEP: f64 = 1e-9;
 
-/// Half width of a 95 % interval of a number with a deviation by [`covariance`], in these: that is itself an estimate, from as many rows
-/// as there are, and too small on average by what its lags are of them. Of Bartlett's weights at 97.5 % (Kiefer and Vogelsang, "A New
-/// Asymptotic Theory for Heteroskedasticity-Autocorrelation Robust Tests", 2005, table 1).
+/// Half width of a 95 % interval of a number, in its standard deviations by [`covariance`].
+///
+/// The covariance is itself an estimate from a limited number of rows. On average it is too small, the more so the
+/// larger the share b of its lags in the rows is.
 pub fn half_width_95(problem: &Problem) -> f64 {
     let lags = (LAGS + 1) as f64 / f64::max(problem.rows as f64, 1.0);
     let b = lags.min(1.0);
-    HALF_WIDTH_95 + b * (2.9694 + b * (0.4160 - b * 0.5324))
+    let [first, second, third] = BARTLETT_97_5;
+    HALF_WIDTH_95 + b * (first + b * (second + b * third))
 }
 
 /// Covariance of all free coordinates of a fit, in the order of [`Fit::parameters`].
@@ -46,7 +66,7 @@ pub fn covariance(problem: &Problem, fit: &Fit) -> DMatrix<f64> {
             .filter_map(|(a, column)| Some((a, column.of_joint(j, problem.rows)?)))
             .collect();
         let variance = fit.squares[j] / (fit.count[j] - touching.len() as f64).max(1.0);
-        let variance = variance.max(1e-16);
+        let variance = variance.max(LEAST_VARIANCE);
         let rows = problem.joint_rows(j);
         for track in &problem.tracks {
             let mut past: Vec<DVector<f64>> = Vec::new();
@@ -74,14 +94,14 @@ pub fn covariance(problem: &Problem, fit: &Fit) -> DMatrix<f64> {
             }
         }
     }
-    // What is known before counts as if it had been measured, too.
+    // The prior counts as if it had been measured, too.
     let (known, _) = body_prior::normal(&problem.model, &fit.actives, &fit.parameters());
     normal += &known;
     scores += known;
     let scale: Vec<f64> = (0..p).map(|a| normal[(a, a)].max(1e-300).sqrt()).collect();
     let mut scaled = DMatrix::from_fn(p, p, |a, b| normal[(a, b)] / (scale[a] * scale[b]));
     for a in 0..p {
-        scaled[(a, a)] += 1e-9;
+        scaled[(a, a)] += RIDGE;
     }
     let Some(inverse) = scaled.try_inverse() else {
         return DMatrix::from_diagonal_element(p, p, f64::INFINITY);
@@ -101,8 +121,8 @@ pub fn covariance(problem: &Problem, fit: &Fit) -> DMatrix<f64> {
     covariance
 }
 
-/// Standard deviations of the parameters of one piece of physics from the covariance of its coordinates, with what is
-/// systematic: smoothing and differentiation, and that nothing tells when between two rows something changed.
+/// Standard deviations of the parameters of one effect, from the covariance of its coordinates. Systematic errors are
+/// added: of smoothing and differentiation, and of a time that lies anywhere between two rows.
 pub fn parameter_deviations(
     problem: &Problem,
     fit: &Fit,
@@ -118,13 +138,14 @@ pub fn parameter_deviations(
     let mut own = covariance.view((first, first), (count, count)).into_owned();
     let times: Vec<bool> = (0..count).map(|c| is_time(active.kind(c))).collect();
     for c in (0..count).filter(|c| times[*c]) {
+        // The variance of a time that is uniform over its interval.
         own[(c, c)] += between_rows(problem, active, c).powi(2) / 12.0;
     }
     let centre = active.parameters();
     let mut slopes = DMatrix::<f64>::zeros(centre.len(), count);
     for c in 0..count {
-        let step = (1e-3 * own[(c, c)].max(0.0).sqrt())
-            .max(1e-9 * active.coordinates[c].abs())
+        let step = (STEP_OF_DEVIATION * own[(c, c)].max(0.0).sqrt())
+            .max(LEAST_RELATIVE_STEP * active.coordinates[c].abs())
             .max(1e-12);
         if !step.is_finite() {
             return vec![f64::INFINITY; centre.len()];
@@ -166,8 +187,8 @@ fn is_time(kind: CoordinateKind) -> bool {
     )
 }
 
-/// How far apart the rows are between which a time lies that a piece of physics has: of its joint only those that count \[s\]. What
-/// lies beside a gap may lie within, because the filter bridges gaps.
+/// The time between the two rows that an effect's time lies between \[s\]. Only rows that are compared at its joint
+/// count. A time beside a gap may lie within the gap, because the filter bridges gaps.
 fn between_rows(problem: &Problem, active: &Active, c: usize) -> f64 {
     let of_session = active.kind(c) == CoordinateKind::SessionTime;
     let joint = active.hypothesis.only_joint();

@@ -11,9 +11,12 @@ use crate::physics::active::Active;
 use crate::physics::efforts::record;
 use crate::physics::parts::is_kept;
 
-/// Step of the difference quotient of a shape, as a share of its range: small, because a wall or a limit begins at a point.
+/// Step of the difference quotient of a shape, as a share of its range. Small, because a wall or a limit begins at a
+/// point.
+/// Resolution: between the curvature over a long step and the rounding over a short one.
 const SHAPE_STEP: f64 = 1e-5;
 /// Step of the difference quotient of a time \[s\].
+/// Tuned: by hand, one sample at 100 Hz, on no recorded seeds; not swept.
 const TIME_STEP_S: f64 = 0.01;
 
 impl Fit {
@@ -29,7 +32,7 @@ impl Fit {
         self.jacobian_at(problem, None)
     }
 
-    /// How the explained effort changes with each free coordinate of what touches these joints; all without them.
+    /// The same for the effects that act on these joints; for all effects if `joints` is `None`.
     pub fn jacobian_at(&self, problem: &Problem, joints: Option<&[usize]>) -> Vec<Arc<Column>> {
         let free = self.parameters_at(joints);
         let of = |i: usize| {
@@ -48,8 +51,8 @@ impl Fit {
         joints.is_none_or(|joints| only.is_none_or(|only| joints.contains(&only)))
     }
 
-    /// The coordinates that are free of what touches these joints: of what touches all joints but belongs to others, only
-    /// the factors. Its shape is dear and hardly moves.
+    /// The free coordinates of the effects that act on these joints. Of an effect that acts on all joints but belongs to
+    /// others, only the factors are free: its shape takes long to evaluate and hardly changes.
     pub fn parameters_at(&self, joints: Option<&[usize]>) -> Vec<(usize, usize)> {
         let mut all = self.parameters();
         all.retain(|&(i, c)| {

@@ -1,5 +1,5 @@
-//! All numbers of an explanation fitted at once: Gauss-Newton with Levenberg's damping on the filtered effort, what is at its
-//! bound held there (Nocedal and Wright, *Numerical Optimization*, 2006, sections 10.3 and 16.7).
+//! Fits all numbers of an explanation together: Gauss-Newton with Levenberg's damping on the filtered effort, with an
+//! active set of bounds (Nocedal and Wright, *Numerical Optimization*, 2006, sections 10.3 and 16.7).
 
 use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::{CoordinateKind, Scale};
@@ -13,15 +13,33 @@ use crate::fit::least_squares::Products;
 use crate::physics::active::Active;
 use crate::physics::friction::least;
 
+/// Most Gauss-Newton steps of a fit.
+/// Resolution: bounds the computing time of a fit that does not converge.
 const MAX_ITERATIONS: usize = 20;
-/// So often the damping is raised for one step.
+/// How often the damping is raised at most for one step.
+/// Resolution: bounds the computing time; 8⁶ times the damping leaves next to no step.
 const MOST_TRIES: usize = 6;
-/// A step that gains less log-likelihood than this is the last \[nats\], or less than this share of the distance from
-/// another explanation that it is compared with.
+/// A step that gains less log-likelihood than this is the last \[nats\].
+/// Statistical: a likelihood ratio of 1.01.
 const CONVERGED: f64 = 0.01;
+/// A step is also the last if it gains less than this share of the distance from the explanation that the fit is
+/// compared with.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const CONVERGED_SHARE: f64 = 0.01;
+/// Damping of the first step, as a share of the diagonal.
+/// Resolution: changes the number of steps.
+const FIRST_DAMPING: f64 = 1e-4;
+/// Factor on the damping where the equations cannot be solved, after a step that gains, and after one that does not.
+/// Resolution: changes the number of steps.
+const DAMPING_FACTORS: [f64; 3] = [10.0, 0.2, 8.0];
+/// Least damping.
+/// Resolution: below it a step is one of Gauss and Newton.
+const LEAST_DAMPING: f64 = 1e-9;
+/// A bound that is a share of the largest effort may be exceeded by this factor.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const OVER_LARGEST_EFFORT: f64 = 1.1;
 
-/// Numbers that a fit is held near, and how firmly.
+/// A Gaussian prior that holds a fit near the numbers of another one.
 #[derive(Debug)]
 pub(crate) struct Anchor {
     centre: DVector<f64>,
@@ -29,7 +47,7 @@ pub(crate) struct Anchor {
 }
 
 impl Anchor {
-    /// The numbers of a fit that touch these joints, with a share of what all recordings tell of them.
+    /// The numbers of the effects that act on these joints, with a share of the information of all recordings.
     pub fn new(problem: &Problem, fit: &Fit, joints: &[usize], share: f64) -> Self {
         let jacobian = fit.jacobian_at(problem, Some(joints));
         let columns: Vec<&Column> = jacobian.iter().map(AsRef::as_ref).collect();
@@ -41,7 +59,7 @@ impl Anchor {
         }
     }
 
-    /// Logarithm of its density, but for a constant.
+    /// Logarithm of its density, up to a constant.
     fn log_density(&self, numbers: &DVector<f64>) -> f64 {
         let off = numbers - &self.centre;
         -0.5 * off.component_mul(&off).dot(&self.weight)
@@ -60,9 +78,9 @@ impl Fit {
         self.refined_at(problem, None, f64::NAN)
     }
 
-    /// Improves the numbers of what touches these joints, all without them; as precisely as is needed to compare it with an
-    /// explanation of the likelihood `rival`, or wholly if that is NaN. Bodies become physically consistent and are fitted with
-    /// their prior.
+    /// Improves the numbers of the effects that act on these joints, or of all if `joints` is `None`. Stops when the fit is
+    /// precise enough to be compared with an explanation of the likelihood `rival`, or at convergence if that is NaN.
+    /// Bodies become physically consistent and are fitted with their prior.
     #[must_use]
     pub fn refined_at(self, problem: &Problem, joints: Option<&[usize]>, rival: f64) -> Self {
         self.improved(problem, joints, rival, None)
@@ -86,7 +104,8 @@ impl Fit {
             return self;
         }
         let mut fit = self.consistent(problem);
-        let mut damping = 1e-4;
+        let mut damping = FIRST_DAMPING;
+        let [unsolved, good, bad] = DAMPING_FACTORS;
         let objective = |fit: &Self| {
             let near = anchor.map_or(0.0, |anchor| anchor.log_density(&numbers(fit, &free)));
             fit.likelihood() + body_prior::log_density(&problem.model, &fit.actives) + near
@@ -127,7 +146,7 @@ impl Fit {
                     }
                 };
                 let Some(step) = step else {
-                    damping *= 10.0;
+                    damping *= unsolved;
                     continue;
                 };
                 let moved = fit.moved(problem, &free, &step);
@@ -137,10 +156,10 @@ impl Fit {
                     gained = Some(reached - best);
                     best = reached;
                     fit = next;
-                    damping = (damping * 0.2).max(1e-9);
+                    damping = (damping * good).max(LEAST_DAMPING);
                     break;
                 }
-                damping *= 8.0;
+                damping *= bad;
             }
             let enough = CONVERGED.max(CONVERGED_SHARE * (best - rival).abs());
             if gained.is_none_or(|gained| gained < enough) {
@@ -150,7 +169,7 @@ impl Fit {
         fit
     }
 
-    /// The same with bodies whose mass is nowhere negative.
+    /// The same with physically consistent bodies.
     fn consistent(self, problem: &Problem) -> Self {
         let mut actives = self.actives.clone();
         if body_prior::make_consistent(&problem.model, &mut actives) {
@@ -160,7 +179,7 @@ impl Fit {
         }
     }
 
-    /// Which coordinates a step would take out of their bounds from where they meet them already.
+    /// Which coordinates are at a bound that the step would cross.
     fn out(&self, problem: &Problem, free: &[(usize, usize)], step: &DVector<f64>) -> Vec<bool> {
         let one = |(&(i, c), step): (&(usize, usize), &f64)| {
             let active = &self.actives[i];
@@ -203,7 +222,7 @@ fn bounds(problem: &Problem, active: &Active, c: usize) -> (f64, f64) {
         } => match scale {
             Scale::OfEffort => {
                 let largest = problem.largest_effort[active.hypothesis.place.joint];
-                (lower * largest, 1.1 * upper * largest)
+                (lower * largest, OVER_LARGEST_EFFORT * upper * largest)
             }
             Scale::Log | Scale::Linear => (lower, upper),
         },

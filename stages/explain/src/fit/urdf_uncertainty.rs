@@ -1,4 +1,4 @@
-//! How far the numbers of a fit are off if the URDF's masses and centres of mass are.
+//! Error of a fit's numbers from errors of the URDF's masses and centres of mass.
 
 use std::sync::Arc;
 
@@ -11,8 +11,9 @@ use crate::fit::fitted::Fit;
 use crate::fit::least_squares::{Products, solved};
 use crate::physics::active::{Hypothesis, Whereabouts};
 
-/// By coordinate of a fit, how far it is off if the URDF's masses and centres of mass are: the root of the sum of squares over all
-/// links. A drive whose joint carries next to nothing has no scale of its own, however small its interval.
+/// Standard deviation of each coordinate of a fit from errors of the URDF's masses and centres of mass: the root of the
+/// sum of squares over all links. Without it, the torque scale of a joint that carries next to nothing would have too
+/// small an interval.
 pub fn off_with_the_links(problem: &Problem, fit: &Fit) -> Vec<f64> {
     let model = &problem.model;
     let mut nuisance: Vec<Arc<Column>> = Vec::new();

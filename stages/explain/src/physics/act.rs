@@ -1,11 +1,11 @@
-//! Terms run over the recordings.
+//! Runs terms over the recordings.
 
 use tauscope_dynamics::terms::{MotionSample, Physics, Term};
 
 use crate::data::efforts::TrackEfforts;
 use crate::data::problem::Problem;
 
-/// `start` efforts with what `terms` do to them.
+/// The efforts `start` after `terms` have acted on them.
 pub fn run(problem: &Problem, terms: Vec<Box<dyn Term>>, start: &[Vec<f64>]) -> TrackEfforts {
     if terms.is_empty() {
         return start.to_vec();
@@ -17,7 +17,7 @@ pub fn run(problem: &Problem, terms: Vec<Box<dyn Term>>, start: &[Vec<f64>]) -> 
         .collect()
 }
 
-/// What a term adds to `start` over all tracks, `transmitted` by the gears.
+/// The efforts `start` over all tracks after a term has acted on them, with the efforts that the gears transmit.
 pub fn act_over(
     problem: &Problem,
     term: &mut dyn Term,

@@ -1,4 +1,4 @@
-//! A piece of physics that is part of an explanation: what, where, and its numbers.
+//! One effect of an explanation: its kind, its place and its numbers.
 
 use tauscope_dynamics::terms::{
     Against, Coordinate, CoordinateKind, Effect, Family, Layer, MotionSample, PlaceKind, Site,
@@ -8,7 +8,7 @@ use tauscope_dynamics::terms::{
 pub use tauscope_dynamics::terms::Time as TimeKind;
 use tauscope_dynamics::{Inertia, Model};
 
-/// Where an effect is: indices into the model's joints and links; what its kind of place does not ask for is 0.
+/// Where an effect acts: indices into the model's joints and links. Indices that its kind of place does not use are 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 pub struct Whereabouts {
     /// The joint.
@@ -36,21 +36,30 @@ impl Whereabouts {
     }
 }
 
-/// Inertial parameters of a body.
+/// Number of inertial parameters of a body.
+/// Physical: a mass, three first moments of mass, and six elements of the inertia tensor.
 pub const BODY: usize = 10;
 
 /// The scale between a joint's torque and its recorded effort, see `torque_scale.rs`.
 pub const TORQUE_SCALE: &str = "torque_scale";
 
-/// Slow, but fast enough for a sign.
+/// A low speed at which friction already has its sign \[rad/s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const SLOW_RAD_S: f64 = 0.02;
+/// An effort jumps at a reversal if it changes between both directions of [`SLOW_RAD_S`] by more than this share of its
+/// effort at 1 rad/s.
+/// Physical: Coulomb friction changes by 2 times that effort, viscous friction by 0.04 times.
+const JUMP_SHARE: f64 = 0.5;
+/// A sample that lasts this long lets terms with a memory forget their state \[s\].
+/// Physical: far longer than the time constants of friction with a memory.
+const FORGET_S: f64 = 1e3;
 
 /// An effect at a place, without its numbers.
 #[derive(Debug, Clone, Copy)]
 pub struct Hypothesis {
-    /// What.
+    /// The kind of effect.
     pub effect: &'static Effect,
-    /// Where.
+    /// Its place.
     pub place: Whereabouts,
 }
 
@@ -61,7 +70,7 @@ impl PartialEq for Hypothesis {
 }
 
 impl Hypothesis {
-    /// With numbers.
+    /// The effect with these coordinates.
     pub fn with(self, coordinates: Vec<f64>) -> Active {
         Active {
             hypothesis: self,
@@ -77,7 +86,7 @@ impl Hypothesis {
             .then_some(self.place.joint)
     }
 
-    /// Whether its effort jumps where a joint reverses, so that at rest it may be anything in between.
+    /// Whether its effort jumps where a joint reverses. At rest it then takes any value in between.
     pub fn is_set_valued(&self, model: &Model) -> bool {
         let Some(joint) = self.only_joint() else {
             return false;
@@ -95,9 +104,8 @@ impl Hypothesis {
         let mut at = |velocity: f64| {
             let velocity = vec![velocity; n];
             let mut effort = vec![0.0; n];
-            // Long enough for what has a memory to forget.
             let at = MotionSample {
-                dt_s: 1e3,
+                dt_s: FORGET_S,
                 recording_s: 1.0,
                 session_s: 1.0,
                 position: &zero,
@@ -109,7 +117,7 @@ impl Hypothesis {
             effort[joint]
         };
         let jump = (at(SLOW_RAD_S) - at(-SLOW_RAD_S)).abs();
-        jump > 0.5 * at(1.0).abs().max(1e-12)
+        jump > JUMP_SHARE * at(1.0).abs().max(1e-12)
     }
 
     /// Whether it depends on what the gear transmits.
@@ -127,12 +135,12 @@ impl Hypothesis {
         self.effect.name == TORQUE_SCALE
     }
 
-    /// Whether it splits a joint in rotor and link: such effects are costly to try.
+    /// Whether it splits a joint into rotor and link. Such effects take long to evaluate.
     pub fn has_rotor(&self) -> bool {
         self.effect.splits_joint()
     }
 
-    /// Whether it is Coulomb or viscous friction, which a curve of friction goes with.
+    /// Whether it is Coulomb or viscous friction.
     pub fn is_plain_friction(&self) -> bool {
         self.effect.is_plain_friction()
     }
@@ -152,12 +160,12 @@ impl Hypothesis {
         self.effect.lasts()
     }
 
-    /// What it is called in reports: what only describes is `unknown`.
+    /// Its name in reports; `unknown` for an effect that only describes.
     pub fn said(&self) -> &'static str {
         self.effect.said()
     }
 
-    /// Whether it describes a link's body without a name for what is wrong with it.
+    /// Whether it describes an error of a link's inertial parameters without naming its cause.
     pub fn is_unnamed_body(&self) -> bool {
         self.effect.traits.describes_only && self.effect.family == Family::Body
     }
@@ -181,11 +189,11 @@ impl Hypothesis {
 /// An effect at a place with its numbers.
 #[derive(Debug, Clone)]
 pub struct Active {
-    /// What and where.
+    /// The effect and its place.
     pub hypothesis: Hypothesis,
-    /// In the effect's coordinates; the values at the knots for a curve, but for those that are held at zero.
+    /// Values of the effect's coordinates. For a curve: its values at the knots that are not held at zero.
     pub coordinates: Vec<f64>,
-    /// What an `unknown` effect is drawn against; its own values are passed over.
+    /// The curve of an `unknown` effect: its knots and what it is a function of. Its own values are not used.
     pub curve: Option<Table>,
 }
 
@@ -218,7 +226,7 @@ impl Active {
         (0..curve.knots.len()).map(&mut value).collect()
     }
 
-    /// Whether it is a curve over its joint's own velocity: friction, whatever bends it.
+    /// Whether it is a curve over its joint's own velocity, which is friction.
     pub fn is_friction_curve(&self) -> bool {
         let curve = self.curve.as_ref();
         curve.is_some_and(|curve| curve.is_friction_of(self.hypothesis.place.joint))
@@ -240,17 +248,17 @@ impl Active {
         }
     }
 
-    /// Whether it is a part of the recording that is changed, not only added to: see [`Layer::Record`].
+    /// Whether it acts on the recorded effort: see [`Layer::Record`].
     pub fn is_of_record(&self) -> bool {
         self.hypothesis.effect.layer == Layer::Record
     }
 
-    /// Whether through it one joint's recording feels another's.
+    /// Whether it couples the effort of one joint into another's recording.
     pub fn is_coupling(&self) -> bool {
         self.hypothesis.effect.place == PlaceKind::TwoJoints
     }
 
-    /// Its coordinates with the factors at zero.
+    /// Its coordinates with all factors at zero.
     pub fn shape(&self) -> Vec<f64> {
         let mut shape = self.coordinates.clone();
         for i in self.hypothesis.factors() {
@@ -265,7 +273,7 @@ impl Active {
         of_effect.map_or(Coordinate::factor("value_nm").kind, |c| c.kind)
     }
 
-    /// The body that it is or that it makes of a link, if it does, and what the URDF says of that link.
+    /// The body that it adds or changes, if any, and the URDF's body of that link.
     pub fn body(&self, model: &Model) -> Option<(Inertia, Option<Inertia>)> {
         let ten = Inertia::from_parameters(*self.coordinates.first_chunk::<BODY>()?);
         if self.hypothesis.is_unnamed_body() {
@@ -275,7 +283,7 @@ impl Active {
         self.hypothesis.is_body().then_some((ten, None))
     }
 
-    /// Whether it only describes what it does: a curve, or a body that no name fits.
+    /// Whether it only describes the mismatch: a curve, or a body without a named cause.
     pub fn is_unnamed(&self) -> bool {
         self.curve.is_some() || self.hypothesis.is_unnamed_body()
     }
@@ -286,7 +294,7 @@ impl Active {
     }
 }
 
-/// Whether another joint's recording feels a joint's.
+/// Whether a coupling adds a joint's effort to another joint's recording.
 pub fn feeds(actives: &[Active], joint: usize) -> bool {
     let couplings = actives.iter().filter(|active| active.is_coupling());
     couplings
@@ -301,8 +309,9 @@ pub fn in_order(actives: &[Active]) -> Vec<&Active> {
     all
 }
 
-/// The knots of a curve in a joint that are held at zero. A curve over the joint's own velocity is what Coulomb and viscous
-/// friction leave: these are the straight line between its slowest and its fastest knot in each direction.
+/// The knots of a joint's curve that are held at zero. A curve over the joint's own velocity is what remains beside Coulomb
+/// and viscous friction. These two make a straight line in each direction, so the slowest and the fastest knot of each
+/// direction are held at zero.
 pub fn held_knots(curve: &Table, joint: usize) -> Vec<usize> {
     if !curve.is_friction_of(joint) {
         return Vec::new();

@@ -1,4 +1,5 @@
-//! What bodies cost over the recordings of a problem, from that of unit inertias and unit gravity: computed once.
+//! Effort of bodies over the recordings: a linear combination of the efforts of unit inertias and unit gravity, which are
+//! computed once.
 
 use std::sync::Arc;
 
@@ -12,7 +13,7 @@ use crate::data::track::FitTrack;
 use crate::physics::act::act_over;
 use crate::physics::active::Active;
 
-/// Adds what a piece of physics of bodies costs to efforts over all tracks; `rigid` is what the twin says of the motion.
+/// Adds the effort of an effect on bodies to efforts over all tracks. `rigid` is the twin's effort.
 pub fn add(problem: &Problem, active: &Active, rigid: &[Vec<f64>], into: &mut [Vec<f64>]) {
     let hypothesis = active.hypothesis;
     let mut term = active.term(&problem.model);
@@ -27,7 +28,7 @@ pub fn add(problem: &Problem, active: &Active, rigid: &[Vec<f64>], into: &mut [V
     }
 }
 
-/// What a unit of rotor inertia costs at a joint with rotor and link: the first factor of what has both.
+/// Effort of 1 kg m² of rotor inertia at a joint: the first factor of effects that split a joint into rotor and link.
 pub fn rotor(problem: &Problem, joint: usize) -> TrackEfforts {
     let mut effort = zeros(&problem.bare().body);
     for (track, effort) in problem.tracks.iter().zip(&mut effort) {
@@ -38,7 +39,7 @@ pub fn rotor(problem: &Problem, joint: usize) -> TrackEfforts {
     effort
 }
 
-/// What a piece of physics of bodies costs as a signal, if it is so many times some units.
+/// Effort of an effect on bodies as a signal, if it is a linear combination of unit efforts.
 pub fn signal(problem: &Problem, active: &Active) -> Option<Vec<f64>> {
     let (unit, factors) = in_units(problem, &*active.term(&problem.model))?;
     let signals = problem.units.signals.get_or(unit, || {
@@ -54,7 +55,7 @@ pub fn signal(problem: &Problem, active: &Active) -> Option<Vec<f64>> {
     Some(sum)
 }
 
-/// How many times which units a term costs, if its effort is linear in some, and these may be kept.
+/// The units and their coefficients for a term, if its effort is linear in units that may be kept.
 fn in_units(problem: &Problem, term: &dyn Term) -> Option<(Unit, Vec<f64>)> {
     if problem.rows > MOST_ROWS {
         return None;
@@ -111,7 +112,7 @@ fn units(problem: &Problem, unit: Unit) -> Arc<Vec<TrackEfforts>> {
         .get_or(unit, || (0..count).map(one).collect())
 }
 
-/// What a model costs over the motion of all tracks, or what holds it still there.
+/// Effort of a model over the motion of all tracks or, if not `moving`, the effort against gravity alone.
 fn over_tracks(problem: &Problem, model: &Model, moving: bool) -> TrackEfforts {
     let mut data = Data::new(model);
     let mut of = |track: &FitTrack| {

@@ -1,4 +1,4 @@
-//! Columns of a hypothesis beside other effects, by factor.
+//! Regressor columns of a hypothesis in addition to other effects, one per factor.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use crate::physics::parts::Parts;
 use crate::physics::shaped_bodies::{bodies_of, in_time, steps};
 use crate::physics::unit_columns::{computed, units};
 
-/// The columns of a hypothesis at some shape, beside other effects and what those add.
+/// The columns of a hypothesis at some shape, in addition to the effects `actives` with their `parts`.
 pub fn columns(
     problem: &Problem,
     (actives, parts): (&[Active], &Parts),
@@ -54,7 +54,7 @@ pub fn columns(
     })
 }
 
-/// The columns of bodies where some joints' recordings are transformed: there what is recorded of them.
+/// The columns of an effect on bodies where effects of the recording transform some joints' efforts.
 fn recorded(
     problem: &Problem,
     (actives, parts): (&[Active], &Parts),

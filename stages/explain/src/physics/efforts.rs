@@ -1,4 +1,4 @@
-//! What physics does to the recordings, unfiltered: from the bodies to what is recorded.
+//! Efforts over the recordings, unfiltered, layer by layer: bodies, joints, recording.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::physics::shaped_bodies::add_shaped;
 use crate::physics::torque_scale::gains;
 
 fn terms_of(problem: &Problem, actives: &[Active], layer: Layer) -> Vec<Box<dyn Term>> {
-    // The scale of a drive is that of all bodies, and is put to them when they are summed.
+    // A torque scale multiplies the sum of all bodies' efforts, so it is applied to the sum.
     let of_layer = |active: &&Active| {
         active.hypothesis.effect.layer == layer && !active.hypothesis.is_torque_scale()
     };
@@ -21,7 +21,7 @@ fn terms_of(problem: &Problem, actives: &[Active], layer: Layer) -> Vec<Box<dyn 
     of_layer.map(|active| active.term(&problem.model)).collect()
 }
 
-/// What the gears transmit under the physics of `actives`.
+/// The effort that the gears transmit with the effects `actives`.
 pub fn transmitted(problem: &Problem, actives: &[Active]) -> TrackEfforts {
     let rigid = &problem.bare().body;
     let mut body = TrackEfforts::clone(rigid);
@@ -36,7 +36,7 @@ pub fn transmitted(problem: &Problem, actives: &[Active]) -> TrackEfforts {
     body
 }
 
-/// Under the physics of `actives`, of which the gears transmit `body`.
+/// The efforts of all layers with the effects `actives`, whose gears transmit `body`.
 pub fn evaluated(problem: &Problem, actives: &[Active], body: Arc<TrackEfforts>) -> Efforts {
     let mechanical = run(problem, terms_of(problem, actives, Layer::Joint), &body);
     let recorded = record(problem, actives, &mechanical);
@@ -47,7 +47,7 @@ pub fn evaluated(problem: &Problem, actives: &[Active], body: Arc<TrackEfforts>)
     }
 }
 
-/// What is recorded of mechanical efforts.
+/// The recorded effort of mechanical efforts.
 pub fn record(problem: &Problem, actives: &[Active], mechanical: &[Vec<f64>]) -> TrackEfforts {
     run(
         problem,
@@ -56,8 +56,8 @@ pub fn record(problem: &Problem, actives: &[Active], mechanical: &[Vec<f64>]) ->
     )
 }
 
-/// What `active` alone changes in what is recorded: added to the physics `others` that made `efforts`, what bodies cost
-/// scaled by `gains`.
+/// The change of the recorded effort when `active` is added to the effects `others` that made `efforts`. The effort of
+/// bodies is scaled by `gains`.
 ///
 /// [`Layer::Record`] terms of `others` are passed through; one that is itself of that layer acts after them.
 pub fn change(
@@ -94,7 +94,7 @@ pub fn change(
     recorded_on_top(problem, others, efforts, &added, 1.0)
 }
 
-/// What is recorded of `share` times something added to the mechanical efforts, less what is recorded without.
+/// The change of the recorded effort when `share` times `added` is added to the mechanical efforts.
 pub fn recorded_on_top(
     problem: &Problem,
     others: &[Active],

@@ -1,4 +1,4 @@
-//! Friction that is more or less than a twin says: told beside it, kept with it.
+//! Friction that differs from the twin's: reported as a difference, stored as a sum.
 
 use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::{Against, Effect, Layer, PlaceKind, TermSpec};
@@ -7,7 +7,7 @@ use crate::data::problem::Problem;
 use crate::physics::active::Hypothesis;
 use crate::physics::parameter_units::is_of_effort;
 
-/// The plain friction that an effect is or contains, with the parameters of it that grow as that does.
+/// The plain friction that an effect is or contains, and the effect's parameters that are proportional to it.
 fn contained(effect: &'static Effect) -> Option<(&'static Effect, Vec<&'static str>)> {
     if effect.is_plain_friction() {
         return Some((effect, effect.parameters.iter().map(|p| p.name).collect()));
@@ -17,7 +17,7 @@ fn contained(effect: &'static Effect) -> Option<(&'static Effect, Vec<&'static s
     plain.then(|| (simpler.effect, simpler.numbers.to_vec()))
 }
 
-/// The plain friction that a term holds, by its name, and how much of it.
+/// The plain friction that a term contains: its name and its value.
 pub fn of(term: &TermSpec) -> Option<(&'static str, f64)> {
     let (plain, numbers) = contained(term.effect().ok()?)?;
     let values = numbers
@@ -26,7 +26,8 @@ pub fn of(term: &TermSpec) -> Option<(&'static str, f64)> {
     Some((plain.name, values.reduce(f64::min)?))
 }
 
-/// Adds a new term to those of a twin: more or less of a friction that one of them holds to that one, else as one more.
+/// Adds a new term to those of a twin. Plain friction is added to the term of the same joint that contains it already, if
+/// there is one.
 pub fn add(term: TermSpec, to: &mut Vec<TermSpec>) {
     if let Ok(plain) = term.effect()
         && plain.is_plain_friction()
@@ -49,7 +50,7 @@ pub fn add(term: TermSpec, to: &mut Vec<TermSpec>) {
     to.push(term);
 }
 
-/// A term told in N m, in the units that the recordings are in, by joint \[N m per recorded unit\].
+/// Converts a term from N m into the recordings' units; `units_nm` are N m per recorded unit, by joint.
 pub fn in_recorded_units(term: &TermSpec, model: &Model, units_nm: &[f64]) -> TermSpec {
     let mut term = term.clone();
     let at = |name: &Option<String>| name.as_ref().and_then(|name| model.joint_index(name));
@@ -84,7 +85,7 @@ pub fn in_recorded_units(term: &TermSpec, model: &Model, units_nm: &[f64]) -> Te
     term
 }
 
-/// The least that a factor of a hypothesis may be: a friction that the twin has already may be less.
+/// Lowest value of a hypothesis' factor. Friction that the twin has already may be reduced to zero.
 pub fn least(problem: &Problem, hypothesis: Hypothesis, minimum: f64) -> f64 {
     let known = &problem.known_friction[hypothesis.place.joint];
     minimum - known.get(hypothesis.effect.name).copied().unwrap_or(0.0)

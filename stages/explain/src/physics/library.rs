@@ -1,4 +1,4 @@
-//! Which hypotheses there are for a robot.
+//! The hypotheses for a robot.
 
 use std::collections::BTreeSet;
 
@@ -7,8 +7,8 @@ use tauscope_dynamics::terms::{EFFECTS, Effect, PlaceKind};
 
 use crate::physics::active::{Hypothesis, Whereabouts};
 
-/// The links whose bodies may be described where no name fits: those that move and have a body in the URDF, but for that at
-/// the end, where any body is a payload.
+/// The hypotheses that describe a link's body without naming a cause. They exist for each moving link that has a body in
+/// the URDF, except for the last link, where every additional body is a payload.
 pub fn unnamed_bodies(model: &Model, without: &BTreeSet<String>) -> Vec<Hypothesis> {
     let describes =
         |effect: &&&Effect| effect.traits.describes_only && effect.place == PlaceKind::Link;
@@ -34,8 +34,8 @@ pub fn unnamed_bodies(model: &Model, without: &BTreeSet<String>) -> Vec<Hypothes
     links.map(at).collect()
 }
 
-/// Every hypothesis for a robot, but for the effects named in `without`. Where the twin is a topic, `bodies`
-/// is false: nothing is known of masses and links.
+/// Every hypothesis for a robot, except for the effects named in `without`. `bodies` is false where the twin is a topic,
+/// because masses and links are then not known.
 pub fn hypotheses(model: &Model, bodies: bool, without: &BTreeSet<String>) -> Vec<Hypothesis> {
     let joints = 0..model.dof();
     let mut all = Vec::new();

@@ -7,13 +7,13 @@ pub fn unit(parameter: &str) -> &'static str {
     words::unit(parameter).map_or("", |(_, unit)| unit)
 }
 
-/// Whether a parameter is so much effort, or so much of it by something.
+/// Whether a parameter is an effort, or an effort per something.
 pub fn is_of_effort(parameter: &str) -> bool {
     let unit = unit(parameter);
     unit.starts_with("N m") || unit == "kg m²"
 }
 
-/// Whether a parameter of a body or a force grows with the effort that it is read from.
+/// Whether a parameter of a body or a force is proportional to the effort that it is estimated from.
 pub fn grows_with_effort(parameter: &str) -> bool {
     let whole = ["mass_kg", "stiffness_n_per_m"].contains(&parameter);
     whole || parameter.starts_with("force_") || parameter.starts_with("delta_")

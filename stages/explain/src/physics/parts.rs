@@ -1,5 +1,6 @@
-//! An explanation's effort as a sum of what its pieces add, each filtered once: most pieces only add to what is recorded,
-//! and a change of one leaves the others as they are. What transforms a joint's recording is evaluated as a whole.
+//! An explanation's effort as a sum of parts, one per effect, each filtered once. Most effects only add to the recorded
+//! effort, so a change of one leaves the parts of the others as they are. A joint with an effect that transforms its
+//! recording is evaluated as a whole.
 
 use std::sync::{Arc, OnceLock};
 
@@ -15,25 +16,25 @@ use crate::physics::efforts::{change, evaluated, transmitted};
 use crate::physics::torque_scale::gains;
 use crate::physics::unit_columns::units;
 
-/// What the pieces of an explanation add.
+/// The effort that each effect of an explanation adds.
 #[derive(Debug, Clone)]
 pub struct Parts {
     /// Torque scale of each joint.
     pub gains: Vec<f64>,
-    /// Joints whose recording is more than a sum: something transforms it.
+    /// Joints whose recording an effect transforms, so that it is not a sum of parts.
     pub transformed: Vec<bool>,
-    /// By active, what it adds before torque scales; `None` if it does not simply add.
+    /// By effect, the effort that it adds before torque scales; `None` if it does not only add.
     columns: Vec<Option<Arc<Column>>>,
-    /// What the gears transmit, if a part depends on it.
+    /// The effort that the gears transmit, if a part depends on it.
     load: Option<Arc<TrackEfforts>>,
-    /// Joints whose recording another joint's feels.
+    /// Joints whose effort a coupling adds to another joint's recording.
     feeds: Vec<bool>,
-    /// What is recorded of the whole, unfiltered; where it was asked for.
+    /// The efforts of all layers, unfiltered, once they were asked for.
     efforts: OnceLock<Arc<Efforts>>,
 }
 
 impl Parts {
-    /// The parts of `actives`; what is the same in the fit `before` is taken from there.
+    /// The parts of `actives`. Parts that are unchanged since the fit `before` are taken from there.
     pub fn new(problem: &Problem, actives: &[Active], before: Option<(&[Active], &Self)>) -> Self {
         let mut parts = Self {
             gains: gains(actives, problem.joints),
@@ -66,7 +67,7 @@ impl Parts {
         parts
     }
 
-    /// Whether a piece only adds, as far as this is of interest: to a joint that nothing transforms.
+    /// Whether an effect only adds to efforts, at joints that no effect transforms.
     fn adds(&self, active: &Active) -> bool {
         let hypothesis = &active.hypothesis;
         if hypothesis.is_torque_scale() {
@@ -78,7 +79,7 @@ impl Parts {
         }
     }
 
-    /// Whether a piece would only add, to joints that nothing transforms and no other joint feels.
+    /// Whether an effect would only add, to joints that no effect transforms and no coupling reads.
     pub fn is_plain(&self, hypothesis: &Hypothesis) -> bool {
         let of_record = hypothesis.effect.layer == Layer::Record && !only_adds(hypothesis);
         !of_record
@@ -89,12 +90,12 @@ impl Parts {
             }
     }
 
-    /// Whether another joint's recording feels a joint's.
+    /// Whether a coupling adds a joint's effort to another joint's recording.
     pub fn feeds(&self, joint: usize) -> bool {
         self.feeds[joint]
     }
 
-    /// What the effects of the parts say of the recordings, unfiltered.
+    /// The efforts of all layers, unfiltered.
     pub fn efforts(&self, problem: &Problem, actives: &[Active]) -> &Efforts {
         self.efforts.get_or_init(|| {
             let body = match &self.load {
@@ -105,7 +106,7 @@ impl Parts {
         })
     }
 
-    /// What the gears transmit under the effects of the parts, unfiltered.
+    /// The effort that the gears transmit, unfiltered.
     pub fn load(&self, problem: &Problem, actives: &[Active]) -> Arc<TrackEfforts> {
         match &self.load {
             Some(load) => Arc::clone(load),
@@ -113,7 +114,7 @@ impl Parts {
         }
     }
 
-    /// What an active adds by itself, before torque scales.
+    /// The effort that an effect adds by itself, before torque scales.
     pub fn part(&self, problem: &Problem, active: &Active) -> Column {
         let hypothesis = active.hypothesis;
         let joint = hypothesis.only_joint();
@@ -152,12 +153,12 @@ impl Parts {
         problem.column(&added, joint)
     }
 
-    /// What an active adds, before torque scales, if it does.
+    /// The part of an effect before torque scales, if it only adds.
     pub fn of(&self, index: usize) -> Option<&Arc<Column>> {
         self.columns[index].as_ref()
     }
 
-    /// What bodies cost at a joint, before its torque scale.
+    /// The effort of bodies at a joint, before its torque scale.
     pub fn bodies(&self, problem: &Problem, actives: &[Active], joint: usize) -> Vec<f64> {
         let mut sum = problem.rigid()[problem.joint_rows(joint)].to_vec();
         for (active, part) in actives.iter().zip(&self.columns) {
@@ -171,7 +172,7 @@ impl Parts {
         sum
     }
 
-    /// What is recorded at a joint that nothing transforms.
+    /// The recorded effort at a joint that no effect transforms.
     pub fn recorded(&self, problem: &Problem, actives: &[Active], joint: usize) -> Vec<f64> {
         let mut sum = self.bodies(problem, actives, joint);
         for value in &mut sum {
@@ -189,7 +190,7 @@ impl Parts {
     }
 }
 
-/// Whether the columns of an active may be kept: not those of every interval of time.
+/// Whether the columns of an effect may be kept. Those with times are not: there are too many intervals.
 pub fn is_kept(problem: &Problem, active: &Active) -> bool {
     let timeless = |c: &Coordinate| {
         matches!(
@@ -212,7 +213,7 @@ fn only_adds(hypothesis: &Hypothesis) -> bool {
     hypothesis.effect.traits.only_adds
 }
 
-/// The joints whose recording something transforms; an offset alone does not.
+/// The joints whose recording an effect transforms; an offset alone does not.
 fn transformed(actives: &[Active], joints: usize) -> Vec<bool> {
     let mut transformed = vec![false; joints];
     for active in actives
@@ -227,7 +228,7 @@ fn transformed(actives: &[Active], joints: usize) -> Vec<bool> {
     transformed
 }
 
-/// Whether two are the same, numbers and all.
+/// Whether two effects are the same, numbers included.
 fn is_same(a: &Active, b: &Active) -> bool {
     let bits = |active: &Active| {
         active

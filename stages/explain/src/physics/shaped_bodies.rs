@@ -1,4 +1,4 @@
-//! Effects on bodies whose shape costs much to evaluate: what each factor adds per unit, computed once a shape.
+//! Effects on bodies whose shape takes long to evaluate: the effort per unit of each factor, computed once per shape.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use crate::data::problem::Problem;
 use crate::physics::active::{Active, Hypothesis, Whereabouts};
 use crate::physics::bodies;
 
-/// What columns of a hypothesis at a shape are kept under.
+/// The memo's key for the columns of a hypothesis at a shape.
 pub fn key(hypothesis: Hypothesis, shape: &[f64]) -> Key {
     let bits = shape.iter().map(|value| value.to_bits()).collect();
     let Whereabouts {
@@ -32,7 +32,7 @@ pub fn steps(hypothesis: Hypothesis) -> Vec<(usize, f64)> {
         .collect()
 }
 
-/// Whether a shape has a time in it, of which there are too many to be kept.
+/// Whether a shape contains a time. There are too many times to keep their columns.
 pub fn in_time(hypothesis: Hypothesis, shape: &[f64]) -> bool {
     let mut coordinates = hypothesis.effect.coordinates.iter().zip(shape);
     coordinates.any(|(c, value)| {
@@ -44,7 +44,7 @@ pub fn in_time(hypothesis: Hypothesis, shape: &[f64]) -> bool {
     })
 }
 
-/// What each factor of a hypothesis adds at a shape, unfiltered.
+/// The effort per unit of each factor of a hypothesis at a shape, unfiltered.
 pub fn bodies_of(problem: &Problem, hypothesis: Hypothesis, shape: &[f64]) -> Arc<BodyEfforts> {
     problem.cache.bodies.get_or(key(hypothesis, shape), || {
         let rigid = &problem.bare().body;
@@ -78,8 +78,8 @@ pub fn bodies_of(problem: &Problem, hypothesis: Hypothesis, shape: &[f64]) -> Ar
     })
 }
 
-/// Adds what an active of bodies costs, as a sum over its factors, if it has a shape that costs much to evaluate; whether
-/// it has.
+/// Adds the effort of an effect on bodies as a sum over its factors, if its shape takes long to evaluate. Returns whether
+/// it did.
 pub fn add_shaped(problem: &Problem, active: &Active, into: &mut [Vec<f64>]) -> bool {
     let hypothesis = active.hypothesis;
     let is_shape = |c: &Coordinate| matches!(c.kind, CoordinateKind::Shape { .. });

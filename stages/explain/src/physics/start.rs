@@ -1,4 +1,4 @@
-//! Physics of a corrected twin that is started from: what is new is told beside what it knows already.
+//! The physics of the corrected twin that an explanation starts from. New effects are reported in addition to it.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use crate::physics::friction;
 use crate::read::start::Start;
 
 impl Start {
-    /// By joint, whether it has friction that takes any value at rest.
+    /// By joint, whether it has set-valued friction, which takes any value at rest.
     pub fn is_dry(&self, model: &Model) -> Vec<bool> {
         let mut dry = vec![false; model.dof()];
         for spec in &self.terms {
@@ -31,7 +31,7 @@ impl Start {
         dry
     }
 
-    /// Coulomb and viscous friction by joint and name, in units of its terms: by so much they may have fallen since.
+    /// Coulomb and viscous friction by joint and name, in units of its terms. They may have decreased by up to this since.
     pub fn friction(&self, model: &Model) -> Vec<BTreeMap<&'static str, f64>> {
         let mut all = vec![BTreeMap::new(); model.dof()];
         for spec in &self.terms {
@@ -43,9 +43,9 @@ impl Start {
         all
     }
 
-    /// Puts the twin's bodies into what bodies cost along a track, and all else it says beside them: so that what a new body costs
-    /// is on the same scale as the old ones. `loads` are new bodies that the gears are known to bear, too. `constants` turn the
-    /// recording's unit into the model's, and `gain` is what the bodies of each joint are taken by, from the model's unit into the
+    /// Adds the twin's bodies to the rigid effort of a track, and its other terms to `beside`, so that a new body has the
+    /// same scale as the old ones. `loads` are new bodies that the gears bear, too. `constants` convert the recording's
+    /// unit into the model's. `gain` is each joint's factor on the effort of bodies, from the model's unit into the
     /// recording's.
     ///
     /// # Errors

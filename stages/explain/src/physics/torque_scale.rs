@@ -1,4 +1,4 @@
-//! The scale between N m and a recorded current, where nobody knows the torque constants.
+//! The scale between N m and a recorded current, where the torque constants are not known.
 
 use tauscope_dynamics::terms::{
     Coordinate, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind, Simulated,
@@ -7,7 +7,7 @@ use tauscope_dynamics::terms::{
 
 use crate::physics::active::{Active, Hypothesis, TORQUE_SCALE, Whereabouts};
 
-/// Effort of the bodies times 1 + x: not a finding, but a number that every fit needs. Acts after all other
+/// Multiplies the effort of the bodies by 1 + x. It is not a finding, but every fit needs it. It acts after all other
 /// [`Layer::Body`] terms.
 pub static EFFECT: Effect = Effect {
     name: TORQUE_SCALE,
@@ -58,7 +58,7 @@ impl Term for TorqueScale {
     }
 }
 
-/// The scales of joints that nobody knows, as they are at first.
+/// The unknown torque scales with the values that a fit starts from.
 pub fn unknown_scales(first: &[(usize, f64)]) -> Vec<Active> {
     let one = |&(joint, gain): &(usize, f64)| {
         let place = Whereabouts {
@@ -74,7 +74,7 @@ pub fn unknown_scales(first: &[(usize, f64)]) -> Vec<Active> {
     first.iter().map(one).collect()
 }
 
-/// The scale of each joint in an explanation; 1 where it is out of the question.
+/// The torque scale of each joint in an explanation; 1 where it is not fitted.
 pub fn gains(actives: &[Active], joints: usize) -> Vec<f64> {
     let mut gains = vec![1.0; joints];
     for active in actives

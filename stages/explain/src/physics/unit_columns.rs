@@ -1,4 +1,4 @@
-//! Columns that depend on the motion alone: what each factor of a hypothesis adds per unit, computed once a shape.
+//! Columns that depend on the motion alone: the effort per unit of each factor of a hypothesis, computed once per shape.
 
 use std::sync::Arc;
 
@@ -13,8 +13,8 @@ use crate::physics::bodies;
 use crate::physics::efforts::change;
 use crate::physics::shaped_bodies::{key, steps};
 
-/// The columns of a hypothesis that depends on the motion alone, where nothing transforms what is recorded: before the
-/// drives.
+/// The columns of a hypothesis that depends on the motion alone, before torque scales and where no effect transforms the
+/// recording.
 pub fn units(problem: &Problem, hypothesis: Hypothesis, shape: &[f64]) -> Arc<Columns> {
     let ones = vec![1.0; problem.joints];
     let compute = || {

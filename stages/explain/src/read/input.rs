@@ -1,4 +1,4 @@
-//! What is to be explained.
+//! The input of an explanation: robot, recordings and the twin to start from.
 
 use std::collections::BTreeSet;
 
@@ -7,22 +7,22 @@ use tauscope_dynamics::Model;
 use crate::read::recording::Recording;
 use crate::read::start::Start;
 
-/// What is to be explained.
+/// The input of an explanation.
 #[derive(Debug)]
 pub struct Input {
     /// Name of the case.
     pub case: String,
     /// The robot; massless joints where the twin is a topic.
     pub model: Model,
-    /// Whether the robot's bodies are known: not where the twin is a topic.
+    /// Whether the robot's bodies are known. They are not if the twin is a topic.
     pub bodies: bool,
     /// Unit of the recordings' effort: `Nm` or `A`.
     pub effort_unit: String,
-    /// By joint, where the unit is `A` and they are known \[N m/A\].
+    /// Torque constants by joint, if the unit is `A` and they are known \[N m/A\].
     pub torque_constants_nm_per_a: Option<Vec<f64>>,
     /// Recordings that may be fitted.
     pub fit: Vec<Recording>,
-    /// Recordings that nothing is fitted on.
+    /// Held-out recordings: nothing is fitted on them.
     pub holdout: Vec<Recording>,
     /// A corrected twin to start from, if there is one.
     pub start: Option<Start>,

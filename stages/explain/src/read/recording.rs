@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use tauscope_archive::{ArchiveError, Recording as Archive};
 
-/// A clock that stands still for longer than this is a gap \[s\].
+/// A longer time between two samples is a gap \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 pub const MAX_GAP_S: f64 = 0.25;
 
 /// One recording. Matrices are row-major: `joint_count` numbers per sample.
@@ -28,7 +29,7 @@ pub struct Recording {
     pub reference: Vec<f64>,
     /// For each recorded row, the sample that stands for it: repeated rows share one.
     pub sample_of_row: Vec<usize>,
-    /// What did not come through.
+    /// What was dropped on reading.
     pub losses: Losses,
 }
 

@@ -1,30 +1,31 @@
-//! A corrected twin to start from.
+//! The corrected twin that an explanation starts from.
 
 use tauscope_dynamics::terms::{Against, TermSpec};
 
-/// A known scale is at least this many times its own deviation.
+/// A torque scale counts as known if it is at least this many times its standard deviation.
+/// Statistical: its 95 % interval is then no wider than ±1.96 / 5 = ±39 %.
 pub const KNOWN: f64 = 5.0;
 
 /// A corrected twin.
 #[derive(Debug, Clone, Default)]
 pub struct Start {
-    /// Its physics.
+    /// Its physics terms.
     pub terms: Vec<TermSpec>,
     /// Gain of each joint's bodies \[effort unit per model unit\].
     pub gain: Vec<f64>,
-    /// Standard deviation of each gain that stands for a torque constant: 0 where it is exact, infinite where it tells nothing.
+    /// Standard deviation of each gain that stands for a torque constant: 0 if exact, infinite if not identifiable.
     pub gain_deviation: Vec<f64>,
     /// Offset of each joint \[effort unit\].
     pub offset: Vec<f64>,
 }
 
 impl Start {
-    /// Whether the gain of a joint tells how many N m its effort is.
+    /// Whether a joint's gain is known well enough to convert its effort into N m.
     pub fn is_scale_known(&self, joint: usize) -> bool {
         self.gain[joint] > KNOWN * self.gain_deviation[joint]
     }
 
-    /// Whether something of it depends on what the gears transmit.
+    /// Whether one of its terms depends on the torque that the gears transmit.
     pub fn needs_load(&self) -> bool {
         let needs = |term: &TermSpec| {
             let against = term.table.as_ref().map(|table| table.against);

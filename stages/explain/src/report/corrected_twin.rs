@@ -1,4 +1,4 @@
-//! The corrected twin: the physics and the gains that it has beside those that it started with.
+//! The corrected twin: its terms and gains, those of the start included.
 
 use tauscope_dynamics::terms::{Layer, Site, TermSpec};
 
@@ -8,7 +8,8 @@ use crate::physics::active::{Active, TimeKind};
 use crate::physics::{friction, torque_scale};
 
 impl Context<'_> {
-    /// Gain of each joint's bodies in the corrected twin, and its standard deviation, given those of the gains that were fitted.
+    /// Gain of each joint's bodies in the corrected twin, and its standard deviation. `fitted` are the standard deviations
+    /// of the gains that were fitted.
     pub fn final_gains(&self, found: &Fit, fitted: &[(usize, f64)]) -> (Vec<f64>, Vec<f64>) {
         let n = self.unit_nm.len();
         let start = self.input.start.as_ref();
@@ -22,7 +23,7 @@ impl Context<'_> {
         (gain, deviation)
     }
 
-    /// A piece of physics as files hold it.
+    /// An effect in the format of `twin.yaml`.
     fn spec(&self, active: &Active) -> TermSpec {
         let model = &self.input.model;
         let place = active.hypothesis.place;
@@ -35,7 +36,7 @@ impl Context<'_> {
         TermSpec::of(&*active.term(model), &site)
     }
 
-    /// The bodies of an explanation that its gears bear for long.
+    /// The bodies of an explanation that load the gears for more than a moment.
     pub fn bodies(&self, found: &Fit) -> Vec<TermSpec> {
         let of_bodies = |active: &&Active| {
             let hypothesis = active.hypothesis;
@@ -46,7 +47,7 @@ impl Context<'_> {
         bodies.map(|active| self.spec(active)).collect()
     }
 
-    /// What a corrected twin keeps: not what came and went.
+    /// The terms of the corrected twin: all but temporary effects.
     pub fn lasting_terms(&self, found: &Fit) -> Vec<TermSpec> {
         let mut terms = self
             .input

@@ -1,4 +1,4 @@
-//! From the winning explanation to what is said: findings with intervals, rivals, what could have hidden.
+//! From the chosen explanation to findings with intervals, rivals and smallest effects that could be found.
 
 mod clipping;
 mod confidence;
@@ -32,17 +32,18 @@ use scales::{Scales, StartScales};
 pub use undetectable::undetectable;
 use waves::merge_waves;
 
-/// A time that is known no better than this has no interval \[s\].
+/// A time with a larger standard deviation than this has no interval \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const VAGUE_S: f64 = 5.0;
 
-/// What is said of an explanation.
+/// The findings of an explanation, and what belongs to them.
 #[derive(Debug, Default)]
 pub struct Named {
-    /// That which explains most first.
+    /// The one that explains most first.
     pub findings: Vec<Finding>,
     /// Rivals.
     pub rejected: Vec<Rejected>,
-    /// For what cannot be told apart.
+    /// Motions that would separate rivals that tie.
     pub next_motions: Vec<NextMotion>,
     /// Their files: name and text.
     pub trajectories: Vec<(String, String)>,
@@ -53,7 +54,7 @@ pub struct Named {
 }
 
 impl Named {
-    /// Adds what is said of another.
+    /// Adds the findings of another explanation.
     pub fn extend(&mut self, other: Self) {
         self.findings.extend(other.findings);
         self.rejected.extend(other.rejected);
@@ -93,7 +94,7 @@ fn rival(input: &Input, joints: &[String], hypothesis: &Hypothesis) -> Rival {
     }
 }
 
-/// Names everything in `found`.
+/// The findings for every effect in `found`.
 pub fn of(
     search: &Search<'_>,
     found: &Explanation,
@@ -161,8 +162,8 @@ pub fn of(
 }
 
 impl Named {
-    /// Keeps the rivals of a finding that were rejected, and the motion that would split those that tie with
-    /// it. Gives the latter.
+    /// Keeps the rejected rivals of a finding, and the motion that would separate those that tie with it. Returns those
+    /// that tie.
     fn keep_rivals(
         &mut self,
         active: &Active,
@@ -191,7 +192,7 @@ impl Named {
     }
 }
 
-/// The numbers of a piece of physics by name, and their 95 % intervals.
+/// The numbers of an effect by name, and their 95 % intervals.
 fn numbers(
     problem: &Problem,
     fit: &Fit,
@@ -204,7 +205,7 @@ fn numbers(
     let values = active.parameters();
     for ((parameter, value), deviation) in effect.parameters.iter().zip(&values).zip(deviations) {
         parameters.insert(parameter.name.to_owned(), number(*value));
-        // A change between two recordings has no sharper time than that.
+        // The time of a change between two recordings is not known any better.
         let vague = parameter.name.contains("time") && *deviation > VAGUE_S;
         if deviation.is_finite() && !vague {
             let half = half_width_95(problem) * deviation;
@@ -224,7 +225,7 @@ fn numbers(
     (parameters, intervals)
 }
 
-/// What a curve is drawn against, and where it is largest.
+/// What a curve is a function of, and where it is largest.
 fn describe_curve(active: &Active, parameters: &mut BTreeMap<String, Value>) {
     let Some(curve) = &active.curve else {
         return;
@@ -243,11 +244,12 @@ fn describe_curve(active: &Active, parameters: &mut BTreeMap<String, Value>) {
     }
 }
 
-/// A weaker force at a link's frame is none \[N\].
+/// A force at a link's frame counts as zero if each component is weaker than this \[N\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_FORCE_N: f64 = 0.01;
 
-/// Takes out the force of a push where it is none, and how well its times are known, which hangs on it: the link's frame lies on
-/// the axes of all joints that feel the push, so that no force there does what was felt.
+/// Removes the force of a push where it is zero, and the intervals of its times, which depend on it. The force is zero if
+/// the link's frame lies on the axes of all joints that the push loads: no force at the frame loads them.
 fn drop_no_force(
     parameters: &mut BTreeMap<String, Value>,
     intervals: &mut BTreeMap<String, [f64; 2]>,
@@ -268,7 +270,7 @@ fn number(value: f64) -> Value {
     serde_json::Number::from_f64(value).map_or(Value::Null, Value::Number)
 }
 
-/// What `with` explains of what `without` leaves, in units of each joint's final noise.
+/// Squares of the residual of `without` that `with` explains, over the final variance of each joint.
 fn mismatch(without: &Fit, with: &Fit, count: &Fit) -> f64 {
     (0..with.variance.len())
         .map(|j| {
@@ -286,7 +288,7 @@ struct When {
     end: Option<f64>,
 }
 
-/// The times of a finding, taken out of its parameters where they hold for one recording.
+/// The times of a finding. Where they hold for one recording, its parameters are changed to that recording's time.
 fn when(
     search: &Search<'_>,
     active: &Active,
@@ -339,7 +341,8 @@ fn when(
     }
 }
 
-/// From this share of the error on, it is said to have stayed as it was.
+/// An error that falls to this share or more is reported as unchanged.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const UNCHANGED: f64 = 0.98;
 
 /// The verdict in a sentence.
@@ -360,11 +363,11 @@ pub fn summary(verdict: Verdict, findings: &[Finding], before: &[f64], after: &[
     };
     match verdict {
         Verdict::NothingMissing => {
-            "Nothing is missing: what the twin leaves is the noise of the measurement.".to_owned()
+            "Nothing is missing: the twin's error is no larger than the measurement noise.".to_owned()
         }
         Verdict::NotEvaluated => "Nothing was evaluated.".to_owned(),
         Verdict::UnknownRemains if findings.is_empty() => {
-            "The fitted recordings show nothing that is missing; those held out do, and no name is given to it.".to_owned()
+            "Nothing is missing on the fitted recordings. The held-out recordings show a mismatch without a named cause.".to_owned()
         }
         Verdict::Explained | Verdict::UnknownRemains => {
             let first = findings.first().map_or("", |f| f.sentence.as_str());

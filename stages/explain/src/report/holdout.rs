@@ -1,4 +1,4 @@
-//! The proof: the corrected twin on recordings that were never fitted.
+//! The error of the corrected twin on held-out recordings.
 
 use std::ops::RangeInclusive;
 
@@ -7,33 +7,40 @@ use tauscope_dynamics::terms::{Physics, TermError};
 use crate::context::Context;
 use crate::data::problem::Problem;
 use crate::data::track::Track;
-use crate::fit::fitted::Fit;
+use crate::fit::fitted::{Fit, LEAST_VARIANCE};
 use crate::physics::active::in_order;
 use crate::read::recording::Recording;
 use crate::report::schema::{JointPicture, RecordingPicture};
 
-/// Motion of a prediction is smoothed with the best of these, as shares of the fit's cutoff.
+/// Cutoffs that are tried for the motion of a prediction, as shares of the fit's cutoff. The best on the fitted
+/// recordings is used.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const PREDICTION_CUTOFFS: [f64; 5] = [0.75, 1.0, 1.4, 2.0, 3.0];
-/// And the velocity that friction turns on with these times that, or taken as it was recorded: friction of a few mrad/s has a sign.
+/// Cutoffs that are tried for the velocity of friction, as multiples of the motion's cutoff. The recorded velocity is
+/// tried, too: friction depends on the sign of velocities of a few mrad/s.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const VELOCITY_CUTOFFS: [f64; 3] = [2.0, 4.0, 8.0];
-/// No smoothing above this share of the rate of rows.
+/// Highest cutoff of the velocity, as a share of the sample rate.
+/// Physical: below half the sample rate, the Nyquist frequency.
 const MOST_OF_RATE: f64 = 0.4;
-/// So near to the end of a recording little is known of accelerations \[s\].
+/// Accelerations are uncertain within this time of either end of a recording \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const END_S: f64 = 0.25;
-/// Samples of a picture, at most.
+/// Most samples of a picture.
+/// Resolution: about two per pixel of a plot; changes the file's size.
 const PICTURE_SAMPLES: usize = 2000;
 
-/// The hold-out's errors and what is drawn of them.
+/// Errors on the held-out recordings, predictions and pictures.
 pub struct Proof {
     /// RMS error of the twin as it was, by joint \[effort unit\].
     pub before: Vec<f64>,
     /// The same of the corrected twin.
     pub after: Vec<f64>,
-    /// The same but for the ends of the recordings, where nothing tells accelerations: of those held out and of those fitted.
+    /// The same without the ends of the recordings, where accelerations are uncertain: on held-out and on fitted ones.
     pub within: [Vec<f64>; 2],
     /// The corrected twin's effort by hold-out recording.
     pub predictions: Vec<(String, Vec<f64>)>,
-    /// What is drawn, hold-out recordings first.
+    /// The series of the pictures, held-out recordings first.
     pub pictures: Vec<RecordingPicture>,
 }
 
@@ -44,7 +51,7 @@ struct Smoothing {
     velocity: Velocity,
 }
 
-/// Where the velocity comes from that friction turns on.
+/// The source of the velocity that friction depends on.
 #[derive(Debug, Clone, Copy)]
 enum Velocity {
     AsMotion,
@@ -68,7 +75,8 @@ impl Context<'_> {
         effort
     }
 
-    /// How unlikely the fitted recordings' unfiltered effort is if their motion is smoothed so.
+    /// Negative log-likelihood per sample of the fitted recordings' unfiltered effort with this smoothing, up to factor and
+    /// constant.
     fn unlikeliness(
         &self,
         problem: &Problem,
@@ -86,7 +94,10 @@ impl Context<'_> {
             }
             count += recording.len() as f64;
         }
-        Ok(sum.iter().map(|s| (s / count).max(1e-16).ln()).sum())
+        Ok(sum
+            .iter()
+            .map(|s| (s / count).max(LEAST_VARIANCE).ln())
+            .sum())
     }
 
     fn smoothed(&self, recording: &Recording, by: &Smoothing) -> Result<Track, TermError> {
@@ -181,7 +192,7 @@ impl Context<'_> {
     }
 }
 
-/// Squared errors of a twin by joint, and of how many samples.
+/// Sums of a twin's squared errors by joint, and the number of samples.
 struct Errors {
     squares: Vec<f64>,
     count: f64,
@@ -208,7 +219,7 @@ impl Errors {
         }
     }
 
-    /// By joint; not a number where there was nothing to compare with.
+    /// RMS error by joint; NaN where no effort was recorded.
     fn rms(&self) -> Vec<f64> {
         let each = self.squares.iter();
         each.map(|square| (square / self.count).sqrt()).collect()

@@ -26,7 +26,8 @@ pub const STYLE: &str = include_str!("html/style.css");
 /// Nothing may be loaded and nothing may run: also if a name in a file tries to.
 pub const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'";
 
-/// A verdict of more letters than this is set smaller.
+/// A verdict with more characters than this is set smaller.
+/// Tuned: by eye, for the layout of the page.
 const LONG: usize = 130;
 
 /// The page.

@@ -1,17 +1,38 @@
-//! Where the mismatch sits, without a hypothesis: by joint, by state, by time.
+//! Where the mismatch is, without a hypothesis: by joint, by state, by time.
 
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::report::schema::Located;
 
-/// A joint's mismatch is told from this many times its noise (RMS).
+/// A joint is listed if its mismatch is at least this many times its noise (RMS).
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_OVER_NOISE: f64 = 1.5;
-/// A state is told if its mean square is this many times that of the joint over all.
+/// A state is listed if its mean square is this many times the joint's over all states.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const CONCENTRATED: f64 = 1.4;
-/// Fewer rows than this are no state.
+/// A state with fewer rows than this is not listed.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_ROWS: usize = 12;
+/// Quantile below which a speed is slow.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const SLOWEST: f64 = 0.2;
+/// Quantile above which a speed, an acceleration or a load is high.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const HIGHEST: f64 = 0.8;
+/// Positions are divided into this many parts with equally many rows.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const POSITION_PARTS: i32 = 5;
+/// Share of the rows in such a part.
+/// Statistical: 1 over [`POSITION_PARTS`].
+const POSITION_PART: f64 = 0.2;
+/// Recordings are divided into this many parts of equal length.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const TIME_PARTS: i32 = 4;
+/// How many states of a joint are listed.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const MOST_STATES: usize = 3;
 
-/// The joints' mismatch over all, and for each the states in which it is concentrated; the largest first.
+/// The mismatch of each joint over all states, followed by the states in which it is concentrated; the largest first.
 pub fn located(problem: &Problem, before: &Fit, joints: &[String]) -> Vec<Located> {
     let mut all = Vec::new();
     for (j, name) in joints.iter().enumerate() {
@@ -37,7 +58,7 @@ pub fn located(problem: &Problem, before: &Fit, joints: &[String]) -> Vec<Locate
         .collect()
 }
 
-/// The rows of a joint that count.
+/// The compared rows of a joint.
 fn rows_of(problem: &Problem, before: &Fit, joint: usize) -> Vec<Row> {
     let rows = problem.joint_rows(joint);
     let mut all = Vec::new();
@@ -60,7 +81,7 @@ fn rows_of(problem: &Problem, before: &Fit, joint: usize) -> Vec<Row> {
     all
 }
 
-/// The states of a joint in which its mismatch is concentrated: the three with the most.
+/// The states of a joint in which its mismatch is concentrated: the [`MOST_STATES`] with the largest RMS.
 fn concentrated(problem: &Problem, rows: &[Row], name: &str, noise: f64) -> Vec<Located> {
     let total: f64 = rows.iter().map(|s| s.square).sum();
     let mean = total / rows.len().max(1) as f64;
@@ -80,8 +101,8 @@ fn concentrated(problem: &Problem, rows: &[Row], name: &str, noise: f64) -> Vec<
             });
         }
     };
-    let slow = quantile(rows, |s| s.velocity.abs(), 0.2);
-    let fast = quantile(rows, |s| s.velocity.abs(), 0.8);
+    let slow = quantile(rows, |s| s.velocity.abs(), SLOWEST);
+    let fast = quantile(rows, |s| s.velocity.abs(), HIGHEST);
     state(
         format!("slow and around reversals, |qd| < {slow:.3} rad/s"),
         &|s| s.velocity.abs() < slow,
@@ -91,19 +112,19 @@ fn concentrated(problem: &Problem, rows: &[Row], name: &str, noise: f64) -> Vec<
     });
     state("moving forward".to_owned(), &|s| s.velocity > 0.0);
     state("moving backward".to_owned(), &|s| s.velocity < 0.0);
-    let hard = quantile(rows, |s| s.acceleration.abs(), 0.8);
+    let hard = quantile(rows, |s| s.acceleration.abs(), HIGHEST);
     state(
         format!("accelerating hard, |qdd| > {hard:.2} rad/s²"),
         &|s| s.acceleration.abs() > hard,
     );
-    let loaded = quantile(rows, |s| s.load.abs(), 0.8);
+    let loaded = quantile(rows, |s| s.load.abs(), HIGHEST);
     state(
         format!("under high load, |effort| > {loaded:.1} N m"),
         &|s| s.load.abs() > loaded,
     );
-    for fifth in 0..5 {
-        let low = quantile(rows, |s| s.position, 0.2 * f64::from(fifth));
-        let high = quantile(rows, |s| s.position, 0.2 * f64::from(fifth + 1));
+    for part in 0..POSITION_PARTS {
+        let low = quantile(rows, |s| s.position, POSITION_PART * f64::from(part));
+        let high = quantile(rows, |s| s.position, POSITION_PART * f64::from(part + 1));
         state(format!("position {low:.2} to {high:.2} rad"), &|s| {
             s.position >= low && s.position < high
         });
@@ -112,8 +133,9 @@ fn concentrated(problem: &Problem, rows: &[Row], name: &str, noise: f64) -> Vec<
         let recording = &track.track.name;
         state(format!("recording {recording}"), &|s| s.recording == r);
         let end = track.track.time_s.last().copied().unwrap_or(0.0);
-        for part in 0..4 {
-            let (from, to) = (end * f64::from(part) / 4.0, end * f64::from(part + 1) / 4.0);
+        for part in 0..TIME_PARTS {
+            let at = |part: i32| end * f64::from(part) / f64::from(TIME_PARTS);
+            let (from, to) = (at(part), at(part + 1));
             state(
                 format!("recording {recording}, {from:.1} to {to:.1} s"),
                 &|s| s.recording == r && s.time_s >= from && s.time_s < to,
@@ -121,7 +143,7 @@ fn concentrated(problem: &Problem, rows: &[Row], name: &str, noise: f64) -> Vec<
         }
     }
     states.sort_by(|a, b| b.over_noise.total_cmp(&a.over_noise));
-    states.truncate(3);
+    states.truncate(MOST_STATES);
     states
 }
 

@@ -1,4 +1,5 @@
-//! The motion that would tell apart what this data cannot: in words, and as a trajectory within the URDF's limits.
+//! The motion that would separate effects that this data cannot tell apart: as text, and as a trajectory within the URDF's
+//! limits.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -10,43 +11,81 @@ use crate::physics::active::Hypothesis;
 use crate::read::input::Input;
 use crate::report::schema::{NextMotion, Rival};
 
-/// Share of a joint's range and of its speed limit that a trajectory keeps within.
+/// Share of a joint's range that a trajectory uses.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const RANGE: f64 = 0.8;
+/// Share of a joint's speed limit that a trajectory uses.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const SPEED: f64 = 0.7;
-/// Where the URDF gives no limits \[rad or m, and per second\].
+/// Half the range of a joint without position limits in the URDF \[rad or m\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const DEFAULT_HALF_RANGE: f64 = 1.5;
+/// Speed limit of a joint without one in the URDF \[rad/s or m/s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const DEFAULT_SPEED: f64 = 1.0;
 /// Highest acceleration \[rad/s² or m/s²\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const ACCELERATION: f64 = 4.0;
-/// How long a part of a trajectory lasts, and the step of its rows \[s\].
+/// How long a part of a trajectory lasts \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const PART_S: f64 = 20.0;
+/// Time between two rows of a trajectory \[s\].
+/// Resolution: 100 rows per second; changes the file's size.
 const STEP_S: f64 = 0.01;
-/// The slowest of the speeds that a joint creeps at \[rad/s or m/s\]: twice what counts as standstill, and well
-/// below the speeds at which Stribeck's friction falls. How many speeds there are, and each is so many times the
-/// one before.
+/// The slowest speed of a creeping joint \[rad/s or m/s\].
+/// Physical: twice what counts as standstill, and well below usual Stribeck velocities.
 const CREEP: f64 = 0.02;
+/// How many speeds a creeping joint has.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const SPEEDS: usize = 5;
+/// Each of these speeds over the one before.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const FASTER: f64 = 2.2;
-/// How long such a speed takes to come and to go \[s\].
+/// How long a creeping joint takes to reach its speed, and to stop \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const RAMP_S: f64 = 0.3;
+/// How long the other motions take to fade in, and to fade out \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
+const FADE_S: f64 = 2.0;
+/// Share of the largest possible swing that a wave has.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const SWING: f64 = 0.8;
+/// Highest frequency of a motion over the whole range \[Hz\].
+/// Tuned: by hand, on no recorded seeds; not swept.
+const WHOLE_RANGE_HZ: f64 = 0.1;
+/// Share of the swing, frequency \[Hz\], and how much more of it each further joint has \[Hz\], of fast reversals.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const FAST: [Wave; 3] = [[0.3, 0.4, 0.13], [0.3, 1.5, 0.29], [0.4, 4.3, 0.37]];
+/// The same for a joint at all speeds.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const ALL_SPEEDS: [Wave; 2] = [[0.6, 0.15, 0.0], [0.4, 1.1, 0.0]];
+/// The same for the other joints meanwhile.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const OTHER_JOINTS: [Wave; 1] = [[0.5, 0.11, 0.03]];
+/// The same for all poses.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const ALL_POSES: [Wave; 2] = [[0.7, 0.1, 0.037], [0.3, 0.6, 0.11]];
+
+/// A sine: share of the swing, frequency \[Hz\], and how much more of it each further joint has \[Hz\].
+type Wave = [f64; 3];
 
 /// What a motion must excite.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Excite {
     /// The whole range of one joint, slowly: springs and other functions of position.
     WholeRange,
-    /// Fast reversals: what comes late, and rotors.
+    /// Fast reversals: delays and rotors.
     Fast,
     /// One joint at constant speeds from creeping on, in both directions: kinds of friction near standstill.
     Creep,
     /// Every speed in both directions, with reversals: kinds of friction.
     AllSpeeds,
-    /// Gravity from all sides: masses and their places, and factors of efforts.
+    /// Gravity from all sides: masses, centres of mass and gains.
     AllPoses,
 }
 
 impl Excite {
-    /// What tells an effect from another.
+    /// The motions that tell two effects apart.
     fn of(winner: &Effect, rival: &Effect) -> &'static [Self] {
         match winner.excitation.between(rival.excitation) {
             Excitation::Fast => &[Self::Fast],
@@ -56,7 +95,7 @@ impl Excite {
         }
     }
 
-    /// What tells `winner` from each of its rivals, one after the other.
+    /// The motions that tell `winner` from each of its rivals.
     fn of_class(winner: &Hypothesis, ties: &[Hypothesis]) -> Vec<Self> {
         let mut parts = Vec::new();
         for rival in ties {
@@ -72,28 +111,29 @@ impl Excite {
     fn words(self, joint: &str) -> String {
         match self {
             Self::WholeRange => format!(
-                "Move joint {joint} slowly over its whole range, there and back, the other joints at rest: over a \
-                 range of more than 60 degrees a spring, a counterbalance and a gain part."
+                "Move joint {joint} slowly over its whole range, there and back, with the other joints at rest. A spring, a \
+                 counterbalance and a gain differ clearly over more than 60 degrees."
             ),
-            Self::Fast => "Move all joints fast, with reversals at rising frequency: a delay grows with frequency, a \
-                           low-pass takes amplitude, an elastic joint resonates."
+            Self::Fast => "Move all joints fast, with reversals at rising frequency. The phase of a delay grows with frequency, a \
+                           low-pass lowers the amplitude, and an elastic joint resonates."
                 .to_owned(),
             Self::Creep => format!(
-                "Move joint {joint} at constant speeds from creeping on, there and back: some kinds of friction \
-                 differ below a few degrees a second only."
+                "Move joint {joint} there and back at constant speeds, starting very slowly. Some kinds of friction differ only \
+                 below a few degrees per second."
             ),
             Self::AllSpeeds => format!(
-                "Move joint {joint} at every speed up to fast, in both directions, with many reversals, in several \
-                 poses of the arm: kinds of friction differ in what they depend on."
+                "Move joint {joint} at all speeds, in both directions, with many reversals and in several poses of the arm. \
+                 Kinds of friction depend differently on speed, direction and load."
             ),
-            Self::AllPoses => "Turn the last joints through their whole ranges, in several poses of the arm and with \
-                               accelerations: a payload, a link's mass and its centre weigh differently in each, and a factor shows where there is effort."
+            Self::AllPoses => "Turn the last joints through their whole ranges, with accelerations and in several poses of the arm. A \
+                               payload, a link's mass and its centre of mass load the joints differently in each pose, and a gain \
+                               shows where the effort is large."
                 .to_owned(),
         }
     }
 }
 
-/// What to record next, for a finding with rivals that tie, and the trajectory as CSV text.
+/// The motion to record next for a finding with rivals that tie, and its trajectory as CSV text.
 pub fn of(
     winner: &Hypothesis,
     ties: &[Hypothesis],
@@ -124,7 +164,7 @@ pub fn of(
     Some((motion, csv(&input.model, &parts, joint, &centre)))
 }
 
-/// The middle of what the recordings moved in, which is known to be free.
+/// The middle of each joint's recorded range, which is known to be free of obstacles.
 fn centre_of(input: &Input) -> Vec<f64> {
     let n = input.model.dof();
     (0..n)
@@ -162,15 +202,15 @@ fn csv(model: &Model, parts: &[Excite], joint: usize, centre: &[f64]) -> String 
     text
 }
 
-/// How far a joint that creeps at one speed after the other, there and back, is from where it began at time `t`,
-/// with speeds that need no more room than there is.
+/// Distance at time `t` from the start of a joint that creeps there and back at one speed after the other. Each speed is
+/// limited so that the joint stays within `room`.
 fn crept(room: f64, speed: f64, t: f64) -> f64 {
     let stroke_s = PART_S / (2 * SPEEDS) as f64;
     let stroke = (t / stroke_s) as i32;
     let speed = (CREEP * FASTER.powi(stroke / 2))
         .min(speed)
         .min(room / (stroke_s - RAMP_S));
-    // The way under a trapezoid of speed: comes within RAMP_S, stays, goes within RAMP_S.
+    // Distance of a trapezoidal speed profile with ramps of RAMP_S.
     let within = t - f64::from(stroke) * stroke_s;
     let coming = within.min(RAMP_S);
     let going = (within - (stroke_s - RAMP_S)).max(0.0);
@@ -199,30 +239,30 @@ fn position(model: &Model, excite: Excite, joint: usize, centre: &[f64], j: usiz
     let room = RANGE * (upper - middle).min(middle - lower).max(0.0);
     let speed = SPEED * limits.velocity.unwrap_or(DEFAULT_SPEED);
     // Fades in and out, so that it begins and ends at rest.
-    let fade = |t: f64| (t / 2.0).min((PART_S - t) / 2.0).clamp(0.0, 1.0);
+    let fade = |t: f64| (t / FADE_S).min((PART_S - t) / FADE_S).clamp(0.0, 1.0);
     let smooth = |x: f64| x * x * (3.0 - 2.0 * x);
     // The largest swing of this frequency that speed, acceleration and range allow.
     let swing = |hz: f64| {
         let omega = TAU * hz;
         room.min(speed / omega).min(ACCELERATION / (omega * omega))
     };
-    let wave = |hz: f64| 0.8 * swing(hz) * (TAU * hz * t).sin();
+    let wave = |hz: f64| SWING * swing(hz) * (TAU * hz * t).sin();
+    let sum = |waves: &[Wave]| -> f64 {
+        let one = |[share, hz, further]: &Wave| share * wave(hz + further * j as f64);
+        waves.iter().map(one).sum()
+    };
     let own = j == joint;
     let move_by = match excite {
         Excite::WholeRange if own => {
-            let hz = (speed / (TAU * room.max(1e-6))).min(0.1);
+            let hz = (speed / (TAU * room.max(1e-6))).min(WHOLE_RANGE_HZ);
             room.min(swing(hz)) * (TAU * hz * t).sin()
         }
         Excite::Creep if own => return middle + crept(room, speed, t),
         Excite::WholeRange | Excite::Creep => 0.0,
-        Excite::Fast => {
-            0.3 * wave(0.4 + 0.13 * j as f64)
-                + 0.3 * wave(1.5 + 0.29 * j as f64)
-                + 0.4 * wave(4.3 + 0.37 * j as f64)
-        }
-        Excite::AllSpeeds if own => 0.6 * wave(0.15) + 0.4 * wave(1.1),
-        Excite::AllSpeeds => 0.5 * wave(0.11 + 0.03 * j as f64),
-        Excite::AllPoses => 0.7 * wave(0.1 + 0.037 * j as f64) + 0.3 * wave(0.6 + 0.11 * j as f64),
+        Excite::Fast => sum(&FAST),
+        Excite::AllSpeeds if own => sum(&ALL_SPEEDS),
+        Excite::AllSpeeds => sum(&OTHER_JOINTS),
+        Excite::AllPoses => sum(&ALL_POSES),
     };
     middle + smooth(fade(t)) * move_by
 }

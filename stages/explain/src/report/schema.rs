@@ -1,11 +1,11 @@
-//! What an explanation says: `report.json`.
+//! The report of an explanation: `report.json`.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// Everything that was found, as files and people get it.
+/// The report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// Name of the case.
@@ -19,17 +19,17 @@ pub struct Report {
     pub summary: String,
     /// Unit of the recordings' effort: `Nm` or `A`.
     pub effort_unit: String,
-    /// The physics that was left out, that which explains most first.
+    /// The effects that the twin leaves out. The one that explains most comes first.
     pub findings: Vec<Finding>,
-    /// What was considered and not named, and why.
+    /// Hypotheses that were rejected, with the reason.
     pub rejected: Vec<Rejected>,
-    /// Where the mismatch sits, without a hypothesis; the largest first.
+    /// Where the mismatch is, without a hypothesis; the largest first.
     pub located: Vec<Located>,
-    /// What could have hidden: the smallest effect that would have been found.
+    /// The smallest effects that would have been found. Smaller ones may be present.
     pub undetectable: Vec<Undetectable>,
     /// Motions that would tell apart what this data cannot.
     pub next_motions: Vec<NextMotion>,
-    /// What else a reader should know: lost samples, gains that cannot be identified, standstill.
+    /// Notes: lost samples, gains that are not identifiable, standstill.
     pub notes: Vec<String>,
     /// The joints, in URDF order.
     pub joints: Vec<String>,
@@ -43,21 +43,21 @@ pub struct Report {
     pub holdout_predictions: BTreeMap<String, String>,
 }
 
-/// What an explanation comes to.
+/// The answer of an explanation in one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// What was left out has names, and nothing else is left.
+    /// All mismatch has named causes.
     Explained,
     /// The twin is right as it is.
     NothingMissing,
-    /// Something is left that no name fits.
+    /// Some mismatch is explained by no effect of the library.
     UnknownRemains,
     /// The data does not allow a verdict.
     NotEvaluated,
 }
 
-/// A piece of physics that the twin leaves out.
+/// An effect that the twin leaves out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
     /// Canonical name.
@@ -70,28 +70,29 @@ pub struct Finding {
     pub parameters: BTreeMap<String, Value>,
     /// 95 % intervals of the numbers.
     pub intervals_95: BTreeMap<String, [f64; 2]>,
-    /// Whether its efforts are in A and not in N m, whatever the names of its numbers say: nobody knows the scale of its joint.
+    /// Whether its efforts are in A, although the names of its parameters say N m: the torque scale of its joint is not
+    /// known.
     #[serde(default, skip_serializing_if = "is_false")]
     pub in_amperes: bool,
     /// Probability that effect and place are right, up to what no recording can tell apart.
     pub confidence: f64,
-    /// The recording that the times hold for; all if absent, or the session for a change that lasts.
+    /// The recording that the times refer to. If absent: each recording or, for a lasting change, the session.
     pub recording: Option<String>,
     /// When it begins \[s\].
     pub t_start: Option<f64>,
     /// When it ends \[s\].
     pub t_end: Option<f64>,
-    /// Share of the mismatch's variance, over all joints in units of their noise, that needs it.
+    /// Share of the mismatch's variance that it explains, over all joints in units of their noise.
     pub explains: f64,
-    /// What it explains over what is left beside it: squares, at the joint where that is most.
+    /// Explained over remaining sum of squares, at the joint where this ratio is largest.
     #[serde(default)]
     pub over_rest: f64,
-    /// Evidence for it rather than for leaving it out, each row counted as a fraction of an independent sample \[nats\].
+    /// Evidence for it against leaving it out, from the effective sample size \[nats\].
     #[serde(default)]
     pub evidence_nats: f64,
     /// Rivals that this data cannot tell apart, most probable first.
     pub equivalent_to: Vec<Rival>,
-    /// In words.
+    /// The finding as a sentence.
     pub sentence: String,
 }
 
@@ -113,7 +114,7 @@ pub struct Rival {
     pub link: Option<String>,
 }
 
-/// A hypothesis that was not taken.
+/// A hypothesis that was rejected.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Rejected {
     /// Canonical name.
@@ -126,15 +127,15 @@ pub struct Rejected {
     pub reason: String,
 }
 
-/// Where the mismatch sits.
+/// A state or time in which a joint's mismatch is concentrated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Located {
     /// The joint.
     pub joint: String,
-    /// In which state or at which time, in words.
+    /// The state or time as text.
     #[serde(rename = "where")]
     pub place: String,
-    /// Share of the joint's mismatch (sum of squares before correction) that is there.
+    /// Share of the joint's mismatch (sum of squares before correction) that lies there.
     pub share_of_residual: f64,
     /// RMS of the mismatch there over RMS of the noise.
     pub over_noise: f64,
@@ -153,12 +154,12 @@ pub struct Undetectable {
     pub smallest_findable: BTreeMap<String, f64>,
 }
 
-/// A motion that would tell a class apart.
+/// A motion that would separate rivals that tie.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NextMotion {
     /// The effects it separates.
     pub separates: Vec<Rival>,
-    /// What to do, in words.
+    /// The instruction as text.
     pub sentence: String,
     /// A file with the trajectory: header `t,` and joint names, positions in rad or m.
     pub trajectory: Option<String>,

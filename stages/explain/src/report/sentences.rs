@@ -8,9 +8,10 @@ use tauscope_dynamics::terms::words::{self, Told, number};
 use crate::physics::active::Active;
 use crate::physics::parameter_units::unit;
 
-/// How much likelier something is that is ahead by so many nats, e.g. `40`, `10^17`.
+/// The likelihood ratio of a lead in nats as text, e.g. `40`, `10^17`.
 pub fn odds(nats: f64) -> String {
     /// From here on powers of ten are easier to read.
+    /// Tuned: by eye.
     const MANY: f64 = 1000.0;
     let odds = nats.max(0.0).exp();
     if odds < MANY {
@@ -19,12 +20,12 @@ pub fn odds(nats: f64) -> String {
     format!("10^{:.0}", nats / std::f64::consts::LN_10)
 }
 
-/// A sentence on an effort whose numbers are in A.
+/// Changes the units of a sentence whose numbers are in A.
 pub fn in_amperes(sentence: &str) -> String {
     sentence.replace("N m", "A").replace("kg m²", "A s²/rad")
 }
 
-/// A finding in a sentence; `place` is what the joint or link is called.
+/// A finding as a sentence. `place` is the name of the joint or link.
 pub fn sentence(
     active: &Active,
     place: &str,

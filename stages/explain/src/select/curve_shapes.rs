@@ -1,4 +1,4 @@
-//! What no name fits: how it depends on the motion or on time, as a curve, so that the fit improves all the same.
+//! Curves over motion or time, for a residual that no effect of the library fits.
 
 use tauscope_dynamics::terms::{Against, MotionSample, Table, UNKNOWN};
 
@@ -9,29 +9,45 @@ use crate::physics::active::{Active, Hypothesis, Whereabouts, held_knots};
 use crate::select::propose::Base;
 
 /// Knots of a curve.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const KNOTS: usize = 10;
-/// And where the curve is local, as a worn or bumpy place of a gear is.
+/// Knots of a curve over position that resolves a local defect, such as a worn segment of a gear.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const MANY_KNOTS: usize = 28;
-/// Knots of a curve that repeats, and the least frequency that is looked for, in periods of the time there is.
+/// Knots that a curve must have at different places.
+/// Statistical: two knots are a straight line, which effects of the library already describe.
+const LEAST_KNOTS: usize = 3;
+/// Knots nearer than this share of their mean spacing are merged.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const LEAST_SPACING: f64 = 0.2;
+/// Knots of a periodic curve, per period.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const KNOTS_OF_PERIOD: usize = 8;
+/// Periods that must fit into the whole time span.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_PERIODS: f64 = 3.0;
-/// And so often within the longest recording.
+/// Periods that must fit into the longest recording.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_IN_RECORDING: f64 = 1.5;
-/// Steps of the frequency within which a sine of all the time there is stays in step.
+/// Frequency steps per inverse of the time span.
+/// Resolution: a finer grid costs time in proportion; a peak half a step away keeps 95 % of its power and is
+/// interpolated.
 const STEPS_OF_FREQUENCY: f64 = 4.0;
-/// Longer than this no clock is trusted to keep step \[s\].
+/// A periodic effect is not looked for over a longer time span, over which it would lose phase \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LONGEST_IN_STEP_S: f64 = 1200.0;
-/// A value of a curve below this share of its largest is taken for zero.
+/// Values of a curve below this share of the largest are set to zero.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const EVIDENT: f64 = 0.2;
 
-/// A curve in a joint, and what it gains.
+/// A curve in a joint, and its gain.
 #[derive(Debug, Clone)]
 pub struct CurveProposal {
     /// The `unknown` effect.
     pub active: Active,
     /// Gain of log-likelihood.
     pub gain: f64,
-    /// What so many numbers gain by chance.
+    /// Penalty for its free values and for the number of curves tried \[nats\].
     pub penalty: f64,
 }
 
@@ -43,7 +59,7 @@ impl CurveProposal {
 }
 
 impl Base<'_> {
-    /// The curve that explains most of what is left at a joint.
+    /// The curve with the most evidence at a joint.
     pub fn propose_curve(&self, joint: usize) -> Option<CurveProposal> {
         let mut candidates = curves(self.problem, joint);
         candidates.extend(self.repeated(joint));
@@ -98,8 +114,7 @@ impl Base<'_> {
     }
 }
 
-/// Sets the small values of a curve to zero: they are what is left of noise, and where the curve ends they would be held
-/// for ever.
+/// Sets the small values of a curve to zero: they are mostly noise, and beyond its ends a curve keeps its last value.
 pub fn keep_what_is_evident(curve: &mut Active) {
     let largest = curve
         .coordinates
@@ -112,7 +127,7 @@ pub fn keep_what_is_evident(curve: &mut Active) {
     }
 }
 
-/// Curves to try in a joint, their knots spread evenly over the samples.
+/// Curves to try in a joint, with knots at even quantiles of the samples.
 fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
     let mut all = Vec::new();
     let mut add = |against: Against, of_joint: usize, count: usize| {
@@ -125,12 +140,13 @@ fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
         values.sort_by(f64::total_cmp);
         let last = values.len() - 1;
         let mut knots: Vec<f64> = (0..count).map(|k| values[last * k / (count - 1)]).collect();
-        let least = 0.2 / count as f64 * (knots[count - 1] - knots[0]);
+        let least = LEAST_SPACING / count as f64 * (knots[count - 1] - knots[0]);
         knots.dedup_by(|later, earlier| *later - *earlier <= least);
-        if knots.len() < 3 {
+        if knots.len() < LEAST_KNOTS {
             return;
         }
-        // Through standstills the joint's own friction jumps, and nothing tells how: samples there are left out.
+        // Friction jumps at standstill, so over the joint's own velocity only curves that change sign with the
+        // direction of motion are tried.
         let own_velocity = against == Against::Velocity && of_joint == joint;
         let either: &[bool] = if own_velocity {
             &[true]
@@ -161,8 +177,8 @@ fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
 }
 
 impl Base<'_> {
-    /// The curves that repeat in time at the frequency that stands out most in what is left at a joint: in step over the whole
-    /// session, or from the start of each recording.
+    /// Periodic curves in time at the frequency with the most power in the residual of a joint: one in phase over the
+    /// whole session, one in phase from the start of each recording.
     fn repeated(&self, joint: usize) -> Vec<Table> {
         let of_session = self.problem.tracks.iter().map(|t| t.track.session_s);
         let start_s = of_session.clone().fold(f64::INFINITY, f64::min);
@@ -186,7 +202,7 @@ impl Base<'_> {
             if !(span_s > 0.0 && span_s < LONGEST_IN_STEP_S) {
                 return None;
             }
-            // What does not come back within a recording is not seen to repeat.
+            // An effect that does not repeat within a recording is not seen to be periodic.
             let length_s = |track: &FitTrack| track.track.time_s.last().copied().unwrap_or(0.0);
             let longest_s = self.problem.tracks.iter().map(length_s).fold(0.0, f64::max);
             let least_hz = (LEAST_PERIODS / span_s).max(LEAST_IN_RECORDING / longest_s);
@@ -207,8 +223,8 @@ impl Base<'_> {
     }
 }
 
-/// The frequency at which values at uneven times have the most power (Lomb and Scargle's periodogram, without its shift of
-/// time, which hardly matters with many periods) \[Hz\].
+/// Frequency at which values at uneven times have the most power \[Hz\]: the Lomb-Scargle periodogram without its time
+/// shift, which hardly matters with many periods.
 fn loudest(rows: &[(f64, f64)], [lowest_hz, highest_hz]: [f64; 2]) -> Option<f64> {
     let last_s = rows
         .iter()
@@ -233,7 +249,7 @@ fn loudest(rows: &[(f64, f64)], [lowest_hz, highest_hz]: [f64; 2]) -> Option<f64
     let grid = (0..=steps).map(|k| lowest_hz + step_hz * k as f64);
     let powers = grid.map(|hz| (hz, power(hz)));
     let (best, _) = powers.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
-    // Between the steps the peak is a parabola.
+    // Between the grid steps the peak is interpolated by a parabola.
     let [before, at, after] = [best - step_hz, best, best + step_hz].map(power);
     let bend = before - 2.0 * at + after;
     let shift = if bend < 0.0 {

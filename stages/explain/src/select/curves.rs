@@ -1,4 +1,4 @@
-//! What no name fits: a curve beside the names of a joint, or in their place.
+//! Curves for a residual that no effect of the library fits: beside the effects of a joint, or in their place.
 
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis, TimeKind};
@@ -12,20 +12,26 @@ use crate::select::propose::Base;
 use crate::select::search::Search;
 use tauscope_dynamics::kinematic_tree::bearing;
 
-/// A curve is not looked for at a joint whose variance is below this many times its white noise.
+/// A curve is not tried at a joint whose residual variance is below this many times the variance of the white noise.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const CURVE_EXCESS: f64 = 1.6;
-/// Names that leave less of the variance than this on recordings that they were not fitted on carry over, and so do those that
-/// leave at most so many times the share that they leave where they were.
+/// The effects of a joint hold if they leave at most this share of its variance on recordings that were left out.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const MOST_LEFT: f64 = 0.1;
+/// They also hold if that share is at most this many times the share that they leave on fitted recordings.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const MOST_WORSE: f64 = 10.0;
-/// More functions of one joint's position than this, each wave of a ripple counted, draw any curve.
+/// More effects of one joint's position than this, each wave of a torque ripple counted, can imitate any curve.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const MOST_OF_POSITION: usize = 3;
-/// That is asked where the variance without them is this many times the white noise.
+/// The effects of a joint are checked on recordings left out only where the variance without them is at least this many
+/// times that of the white noise.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LOUD: f64 = 4.0;
 
 impl Search<'_> {
-    /// The explanation with a curve in a joint, where names do not do: beside the names, if much is left, or in place
-    /// of them, if it does better than they.
+    /// The explanation with a curve in a joint: in place of the joint's effects if it does better than they, else
+    /// beside them if the residual is still large. `None` if neither has enough evidence.
     pub fn with_curve_at(&self, best: &Explanation, joint: usize) -> Option<Explanation> {
         let excess = |fit: &Fit| {
             fit.variance[joint]
@@ -40,12 +46,12 @@ impl Search<'_> {
         if own.iter().any(|&i| best.fit.actives[i].curve.is_some()) {
             return None;
         }
-        // What it explains must be much, so that its rows may count in full.
+        // A curve must explain so much that each row may count as an independent sample.
         let white = vec![1.0; self.problem.joints];
         if !own.is_empty() {
             let bare = self.stripped(best, &own, joint);
             let mut instead = self.with_curve(&bare, joint);
-            // Friction it is, whatever bends its curve.
+            // Plain friction stays beside a curve of friction.
             let shaped = |i: &usize| !best.fit.actives[*i].hypothesis.is_plain_friction();
             let shaped: Vec<usize> = own.iter().copied().filter(shaped).collect();
             let plain = self.with_plain_friction(&self.stripped(best, &shaped, joint), joint);
@@ -77,8 +83,8 @@ impl Search<'_> {
         (beside.ahead_of(best, &white) > CURVE_EVIDENCE && less > CURVE_SIZE).then_some(beside)
     }
 
-    /// The explanation with a curve in one joint in the place of all that lasted for an interval, if that does better: what comes
-    /// back at a place, or time and again, looks like many pushes. They are evident, so that it need only beat them.
+    /// The explanation with a curve in one joint in place of all effects that act once, if that does better. A residual
+    /// that returns at the same position, or periodically, looks like many pushes.
     pub fn with_curve_for_intervals(&self, best: &Explanation) -> Option<Explanation> {
         let once = |&i: &usize| best.fit.actives[i].hypothesis.time_kind() == TimeKind::Once;
         let intervals: Vec<usize> = (0..best.fit.actives.len()).filter(once).collect();
@@ -89,7 +95,7 @@ impl Search<'_> {
         let bare = intervals.iter().rev().fold(best.clone(), less);
         let white = vec![1.0; self.problem.joints];
         let joints = worse_joints(&bare.fit, &best.fit);
-        // A force that time and again acts on one joint alone of several that carry its link is none.
+        // A force on a link acts on all joints that carry it. If only one joint shows it, it is no force.
         let model = &self.problem.model;
         let is_borne =
             |&i: &usize| bearing(model, best.fit.actives[i].hypothesis.place.link).len() > 1;
@@ -103,19 +109,19 @@ impl Search<'_> {
         with.max_by(|a, b| a.ahead_of(b, &white).total_cmp(&0.0))
     }
 
-    /// The explanation with the curve that does best in a joint, if there is evidence for one and it carries over.
+    /// The explanation with the best curve in a joint, if there is evidence for it and it predicts recordings left out.
     fn with_curve(&self, from: &Explanation, joint: usize) -> Option<Explanation> {
         let with = self.curved(from, joint)?;
         self.is_evident(&with, from).then_some(with)
     }
 
-    /// Whether there is evidence for the curve in one explanation that the other lacks.
+    /// Whether there is evidence for the curve that `with` has and `without` lacks.
     fn is_evident(&self, with: &Explanation, without: &Explanation) -> bool {
         with.ahead_of(without, &self.problem.effective_samples) > CURVE_EVIDENCE
             || overwhelming(with, without)
     }
 
-    /// The explanation with the curve that does best in a joint, if it carries over.
+    /// The explanation with the best curve in a joint, if it predicts recordings left out.
     fn curved(&self, from: &Explanation, joint: usize) -> Option<Explanation> {
         let base = Base::new(self.problem, &from.fit, self.hypotheses.len());
         let curve = base.propose_curve(joint)?;
@@ -133,7 +139,7 @@ impl Search<'_> {
         carries_over(self.problem, &with.fit, &from.fit, &[joint]).then_some(with)
     }
 
-    /// The explanation with Coulomb and viscous friction in a joint, which a curve of friction goes with.
+    /// The explanation with Coulomb and viscous friction in a joint, to stand beside a curve of friction.
     fn with_plain_friction(&self, from: &Explanation, joint: usize) -> Explanation {
         let plain = self.hypotheses.iter().filter(|h| {
             let missing = from.fit.actives.iter().all(|a| a.hypothesis != **h);
@@ -150,7 +156,7 @@ impl Search<'_> {
         plain.fold(from.clone(), add)
     }
 
-    /// The explanation without some of its pieces, refined at the joint that they are in.
+    /// The explanation without some of its effects, refined at the joint that they act in.
     fn stripped(&self, best: &Explanation, pieces: &[usize], joint: usize) -> Explanation {
         let mut bare = best.clone();
         for &i in pieces.iter().rev() {
@@ -162,8 +168,9 @@ impl Search<'_> {
         bare
     }
 
-    /// Takes the names of a joint back that are too many functions of its position or waves that no gear makes, or that leave much more on recordings that they were not fitted on, each left out in
-    /// turn, than where they were: together they only draw a curve, which is said in their place.
+    /// Removes the effects of a joint that together only imitate a curve, and puts a curve in their place. Such are
+    /// more than `MOST_OF_POSITION` effects of position, waves that no gear makes, and effects that leave much more
+    /// of the variance on recordings left out than on fitted ones.
     pub fn with_names_that_hold(&self, found: Explanation) -> Explanation {
         let pieces = found.fit.actives.len();
         let mut best = found;
@@ -198,14 +205,14 @@ impl Search<'_> {
             let left_there = left_elsewhere(self.problem, &best.fit, joint)
                 / left_elsewhere(self.problem, &bare.fit, joint);
             (self.say)(&format!(
-                "! joint {joint}: {left_there:.3} left, {left_here:.3} where fitted"
+                "! joint {joint}: {left_there:.3} of the variance remains where left out, {left_here:.3} where fitted"
             ));
             if left_there > MOST_LEFT.max(MOST_WORSE * left_here) {
                 best = self.with_curve(&bare, joint).unwrap_or(bare);
             }
         }
         if best.fit.actives.len() < pieces {
-            // What patched those names is not needed beside what stands in their place.
+            // Effects that corrected the removed ones may not be needed any more.
             best = self.pruned(best);
         }
         best
@@ -238,7 +245,7 @@ mod tests {
                 assert_eq!((drawn.against, drawn.of_joint), (against, 1));
                 assert!(curve.evidence() > CURVE_EVIDENCE);
             } else {
-                // Nothing is there to be drawn.
+                // There is no effort that a curve could describe.
                 assert!(curve.evidence() < CURVE_EVIDENCE);
             }
         }
@@ -255,7 +262,7 @@ mod tests {
         assert!(is_drawn_already(&with, at_joint("cable_spring", 1)));
         assert!(!is_drawn_already(&with, at_joint("cable_spring", 0)));
         assert!(!is_drawn_already(&with, at_joint("viscous_friction", 1)));
-        // What has a name beside a curve must explain much more.
+        // An effect of the library must explain much more beside a curve.
         let beside = needs(at_joint("viscous_friction", 1), &with).1;
         assert!(beside > needs(at_joint("viscous_friction", 1), &nothing).1);
     }

@@ -1,4 +1,4 @@
-//! What counts as evidence for a piece of physics, and how much of it is asked for.
+//! How much evidence an effect needs, and how much of the residual it must explain.
 
 use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::{Against, CoordinateKind};
@@ -9,46 +9,74 @@ use crate::fit::fitted::Fit;
 use crate::fit::least_squares::Products;
 use crate::physics::active::{Active, Hypothesis, TimeKind};
 use crate::select::explanation::Explanation;
+use crate::select::trial::LEAST_DIAGONAL;
 
-/// Evidence that a piece of physics needs \[nats\].
+/// Evidence that an effect needs \[nats\]: odds of 3000 to 1.
+/// Tuned: by hand, on no recorded seeds; not swept.
 pub const LEAST_EVIDENCE: f64 = 8.0;
-/// Least share of what is then left at some joint that a piece of physics must explain: less is in reach of what
-/// differentiation and filters leave.
+/// Variance that an effect must explain at some joint, over the variance then left there: differentiation and filters
+/// may leave an error of less.
+/// Tuned: by hand, on no recorded seeds; not swept.
 pub const LEAST_SIZE: f64 = 0.12;
-/// The same for what lasts only for an interval, which must have this much more evidence.
+/// The same for an effect that acts once.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_SIZE_OF_INTERVAL: f64 = 0.03;
+/// Evidence that an effect that acts once needs \[nats\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const INTERVAL_EVIDENCE: f64 = 40.0;
-/// Least share beside a curve without a name in the same joint, or of an interval beside any: the name may only patch the curve.
+/// The same as [`LEAST_SIZE`] beside a curve in the same joint, or for an effect that acts once beside any curve: the
+/// effect may only correct the curve.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_SIZE_BESIDE_CURVE: f64 = 3.0;
-/// Evidence that needs no account of correlation, if rows counted in full \[nats\].
+/// Evidence beyond which the correlation of noise does not matter, each row counted as one independent sample \[nats\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const OVERWHELMING: f64 = 40.0;
-/// And what is left over what is then left: of what lasts, which may follow slow noise all the time; of what comes and goes; and of a
-/// curve, which bends to any slow noise and must do much more.
+/// An overwhelming explanation also divides the variance at some joint by this.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const FAIR_SHARE: f64 = 1.8;
+/// The same if it has more effects that act once: these cannot follow slow noise all the time.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const FAIR_SHARE_FOR_A_WHILE: f64 = 1.3;
+/// The same if it has more curves: these can follow any slow noise.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const FAIR_SHARE_OF_CURVE: f64 = 3.0;
-/// Nearer than this \[nats\], or than this share of the evidence for either, two rivals cannot be told apart.
+/// Rivals nearer than this cannot be told apart \[nats\]: odds of 150 to 1.
+/// Tuned: by hand, on no recorded seeds; not swept.
 pub const TIE: f64 = 5.0;
+/// The same as a share of the evidence.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const TIE_SHARE: f64 = 0.01;
-/// How many proposals of a round are refined before one is taken.
+/// Proposals of a round that are refined before one is taken.
+/// Tuned: by hand, for what it costs in time; not swept.
 pub const REFINED: usize = 3;
-/// An exchange must gain this \[nats\].
+/// Gain of evidence that an exchange needs \[nats\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 pub const LEAST_GAIN: f64 = 0.5;
 
-/// Evidence that a curve without a name needs \[nats\].
+/// Evidence that a curve needs \[nats\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 pub const CURVE_EVIDENCE: f64 = 25.0;
-/// A curve must divide the variance that is left at its joint by this.
+/// A curve must divide the variance at its joint by this.
+/// Tuned: by hand, on no recorded seeds; not swept.
 pub const CURVE_SIZE: f64 = 1.35;
-/// What contains a simpler effect must be ahead of it by this \[nats\], odds of twenty to one.
+/// An effect that contains a simpler one must be ahead of it by this \[nats\].
+/// Statistical: ln 20, odds of twenty to one.
 pub const MORE_THAN_SIMPLE: f64 = 3.0;
 
-/// By how much a rival may be behind \[nats\] and still not be told from what has so much evidence.
+/// Least variance that a division is made by \[N² m²\].
+/// Resolution: guards a division by zero; far below the noise of any effort.
+pub const LEAST_VARIANCE: f64 = 1e-16;
+/// Added to the diagonal of the scaled normal equations, which is 1.
+/// Resolution: guards the inverse of dependent columns.
+const RIDGE: f64 = 1e-9;
+
+/// How far a rival may be behind \[nats\] and still not be told from an effect with this evidence.
 pub fn tie(evidence: f64) -> f64 {
     TIE.max(TIE_SHARE * evidence)
 }
 
-/// Whether an explanation takes away a fair share of what another leaves at some joint, with much evidence if rows counted
-/// in full: however correlated the rest is, that much is no chance.
+/// Whether an explanation is better than another, however correlated the noise is: it has `OVERWHELMING` evidence if
+/// each row counts as one independent sample, and takes a fair share of the variance at some joint.
 pub fn overwhelming(explanation: &Explanation, other: &Explanation) -> bool {
     let white = vec![1.0; other.fit.variance.len()];
     let more = |is: &dyn Fn(&Active) -> bool| {
@@ -72,17 +100,19 @@ pub fn overwhelming(explanation: &Explanation, other: &Explanation) -> bool {
             .any(less)
 }
 
-/// By piece, the square of its factors in units of their covariance, as if what is left were white.
+/// By effect, Wald's statistic: the square of its factors in units of their covariance, as if the residual were white.
 pub fn wald(problem: &Problem, fit: &Fit) -> Vec<f64> {
     let jacobian = fit.jacobian(problem);
     let columns: Vec<&Column> = jacobian.iter().map(AsRef::as_ref).collect();
     let products = Products::new(problem, &columns, &fit.residual, None);
     let (normal, _) = products.normal(&fit.variance, &vec![0.0; columns.len()]);
     let p = columns.len();
-    let scale: Vec<f64> = (0..p).map(|a| normal[(a, a)].max(1e-300).sqrt()).collect();
+    let scale: Vec<f64> = (0..p)
+        .map(|a| normal[(a, a)].max(LEAST_DIAGONAL).sqrt())
+        .collect();
     let mut scaled = DMatrix::from_fn(p, p, |a, b| normal[(a, b)] / (scale[a] * scale[b]));
     for a in 0..p {
-        scaled[(a, a)] += 1e-9;
+        scaled[(a, a)] += RIDGE;
     }
     let Some(inverse) = scaled.try_inverse() else {
         return vec![0.0; fit.actives.len()];
@@ -111,7 +141,8 @@ pub fn wald(problem: &Problem, fit: &Fit) -> Vec<f64> {
         .collect()
 }
 
-/// Evidence and size that a piece of physics needs beside what `fit` holds.
+/// Evidence \[nats\] and size that an effect needs beside the effects of `fit`. The size is the variance that it
+/// explains at some joint over the variance then left there.
 pub fn needs(hypothesis: Hypothesis, fit: &Fit) -> (f64, f64) {
     let joint = hypothesis.only_joint();
     let once = hypothesis.time_kind() == TimeKind::Once;
@@ -131,28 +162,34 @@ pub fn needs(hypothesis: Hypothesis, fit: &Fit) -> (f64, f64) {
     (evidence, size)
 }
 
-/// The joint variances that are this many times the white noise are noise alone, or something that nobody has named.
+/// Up to this ratio of variance to white noise, the residual of a joint counts as noise alone.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const QUIET_RATIO: f64 = 1.5;
+/// From this ratio on, the residual counts as an effect that the library lacks.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LOUD_RATIO: f64 = 4.0;
 
-/// Whether at some joint the `with` fit leaves less than `without` by a share of what it still leaves: `least`, and up to
-/// `loud` where that is far above the white noise. What cannot be named there could do what a small piece seems to do.
+/// Whether `with` explains enough more than `without` at some joint, as a share of the variance that it leaves there.
+/// The share is `least` where that variance is white noise, and rises to `loud` where it is far above: an effect that
+/// the library lacks may then imitate a small one.
 pub fn matters(problem: &Problem, with: &Fit, without: &Fit, least: f64, loud: f64) -> bool {
     (0..problem.joints).any(|j| {
-        let ratio = with.variance[j] / (problem.white_noise[j] * problem.white_noise[j]).max(1e-16);
+        let ratio = with.variance[j]
+            / (problem.white_noise[j] * problem.white_noise[j]).max(LEAST_VARIANCE);
         let share = ((ratio - QUIET_RATIO) / (LOUD_RATIO - QUIET_RATIO)).clamp(0.0, 1.0);
         let needed = least.max(least + share * (loud - least));
         without.variance[j] - with.variance[j] >= needed * with.variance[j]
     })
 }
 
-/// The joints at which `fit` leaves clearly more than `better`.
+/// The joints at which `fit` leaves clearly more variance than `better`.
 pub fn worse_joints(fit: &Fit, better: &Fit) -> Vec<usize> {
     let worse = |&j: &usize| fit.variance[j] > (1.0 + LEAST_SIZE) * better.variance[j];
     (0..fit.variance.len()).filter(worse).collect()
 }
 
-/// Whether a curve in the joint says already what a hypothesis would: friction that is not plain, or a function of position. Beside the curve it could take any size that the curve takes back.
+/// Whether a curve in the joint already contains what a hypothesis would explain: friction that is not plain, or a
+/// function of position. Beside the curve the hypothesis could take any size, which the curve would cancel.
 pub fn is_drawn_already(fit: &Fit, hypothesis: Hypothesis) -> bool {
     let bends = hypothesis.effect.traits.drawn_over == Some(Against::Velocity);
     let joint = hypothesis.only_joint();
@@ -176,7 +213,7 @@ mod tests {
     use crate::fixture::{at_joint, problem_with};
     use crate::select::propose::Base;
 
-    /// The explanation with one effect beside nothing, on data with so much viscous friction in the first joint.
+    /// Explanations with one effect and with none, on data with this viscous friction in the first joint \[N m s/rad\].
     fn with(effect: &str, viscous: f64) -> (Problem, Explanation, Explanation) {
         let problem = problem_with(1, |_, qd, effort| effort[0] += viscous * qd[0]);
         let nothing = Fit::new(&problem, Vec::new());

@@ -1,4 +1,4 @@
-//! Each piece of physics is taken out in turn, and every rival tried in its place.
+//! Removes each effect in turn and tries every rival in its place.
 
 use crate::physics::active::{Hypothesis, TimeKind};
 use crate::select::evidence::LEAST_GAIN;
@@ -7,14 +7,16 @@ use crate::select::explanation::{Piece, pieces, place_of};
 use crate::select::propose::{Base, Proposal};
 use crate::select::search::Search;
 
-/// A rival may gain this much less to first order than what it is to replace.
+/// A rival is refined only if its first-order gain is above this share of the gain of the effect that it would replace.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const COULD_DO_BETTER: f64 = 0.85;
 
-/// Beyond so many pieces of physics they are no longer exchanged two at a time: that grows with the square of them.
+/// Explanations with more effects than this are not exchanged two effects at a time, which costs quadratic time.
+/// Tuned: by hand, for what it costs in time; not swept.
 const MOST_PAIRED: usize = 12;
 
 impl Search<'_> {
-    /// The best of the proposals that could be better than `best`, by what they gain to first order.
+    /// The best explanation with one of the proposals whose first-order gain suffices to compete with `best`.
     fn rival_of(
         &self,
         best: &Explanation,
@@ -30,8 +32,8 @@ impl Search<'_> {
         self.best_of(without, &able, best.fit.likelihood())
     }
 
-    /// Takes each piece out, all pushes together, and each two at one joint, and tries all rivals in their place: once over
-    /// all of them.
+    /// Removes each effect, then all pushes together, then each two effects at one joint, and tries all rivals in their
+    /// place. One pass.
     pub fn exchange(&self, mut best: Explanation) -> Explanation {
         for piece in pieces(&best) {
             let Some(index) = place_of(&best, piece) else {
@@ -43,7 +45,7 @@ impl Search<'_> {
                 best = better;
             }
         }
-        // Several pushes may be one wall.
+        // One wall can look like several pushes.
         let once = |&i: &usize| best.fit.actives[i].hypothesis.time_kind() == TimeKind::Once;
         let pushes: Vec<usize> = (0..best.fit.actives.len()).filter(once).collect();
         if pushes.len() > 1 {
@@ -79,15 +81,15 @@ impl Search<'_> {
         best
     }
 
-    /// The better explanation that a wall makes in the place of all pushes, if it does: where it is, only a search tells, so that what
-    /// it gains at first is no measure.
+    /// The explanation with a wall in place of all pushes, if it is better. Only a refinement finds the place of a
+    /// wall, so its first-order gain is not asked for.
     fn with_wall(&self, best: &Explanation, without: &Explanation) -> Option<Explanation> {
         let wall = |h: &&Hypothesis| h.effect.is_surface();
         let hypothesis = self.hypotheses.iter().find(wall)?;
         let base = Base::new(self.problem, &without.fit, self.hypotheses.len());
         let proposal = base.propose_in_time(*hypothesis)?;
         let walled = self.joined(without, &proposal, best.fit.likelihood());
-        // Pushes are evident by rows that count in full, whatever is left beside them.
+        // For pushes each row counts as one independent sample, so the wall must be better in this count, too.
         let white = vec![1.0; self.problem.joints];
         let is_better = |e: &Explanation| {
             let stands = e.fit.actives.iter().any(|a| wall(&&a.hypothesis));
@@ -99,8 +101,8 @@ impl Search<'_> {
         is_better(&walled).then_some(walled)
     }
 
-    /// The better explanation that a rival makes in place of what `without` lacks, if one does; one of the pieces taken
-    /// out is at `index`.
+    /// The best explanation with a rival in place of the effects that `without` lacks, if it is better than `best`.
+    /// `index` is the place in `best` of one of the removed effects.
     fn replaced(
         &self,
         best: &Explanation,

@@ -1,29 +1,30 @@
-//! A fit and the evidence for it.
+//! Explanations: a fit, the penalties of its effects, and the evidence for one explanation over another.
 
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis};
 
-/// A fit and the evidence for it, all penalties counted.
+/// A fit and the penalties of its effects.
 #[derive(Debug, Clone)]
 pub struct Explanation {
     /// The fit.
     pub fit: Fit,
-    /// Penalty by active.
+    /// Penalty by effect \[nats\].
     pub penalties: Vec<f64>,
 }
 
 impl Explanation {
-    /// Evidence for this rather than another \[nats\], rows weighted by `effective`, the independent samples per row of each joint.
+    /// Evidence for this explanation over another \[nats\], with rows weighted by `effective`, the independent samples
+    /// per row of each joint.
     pub fn ahead_of(&self, other: &Self, effective: &[f64]) -> f64 {
         let penalty = |e: &Self| e.penalties.iter().sum::<f64>();
         self.fit.gain_over(&other.fit, effective) - penalty(self) + penalty(other)
     }
 }
 
-/// A piece of physics: a hypothesis, and the how-manieth of its kind it is.
+/// An effect of an explanation: its hypothesis, and how many of the same hypothesis come before it.
 pub type Piece = (Hypothesis, usize);
 
-/// The pieces of an explanation, torque scales left out.
+/// The effects of an explanation without torque scales.
 pub fn pieces(explanation: &Explanation) -> Vec<Piece> {
     let all: Vec<Hypothesis> = explanation
         .fit
@@ -36,14 +37,14 @@ pub fn pieces(explanation: &Explanation) -> Vec<Piece> {
     numbered.filter(|(h, _)| !h.is_torque_scale()).collect()
 }
 
-/// Where a piece is in an explanation, if it still is.
+/// Index of a piece in an explanation, if it is still there.
 pub fn place_of(explanation: &Explanation, (hypothesis, alike_before): Piece) -> Option<usize> {
     let actives = explanation.fit.actives.iter().enumerate();
     let mut alike = actives.filter(|(_, a)| a.hypothesis == hypothesis);
     alike.nth(alike_before).map(|(index, _)| index)
 }
 
-/// An explanation in a line, for progress.
+/// An explanation in one line, for progress.
 pub fn describe(explanation: &Explanation) -> String {
     let one = |active: &Active| {
         let place = active.hypothesis.place;

@@ -1,4 +1,4 @@
-//! Forward selection: one piece of physics at a time, always the one with the most evidence.
+//! Forward selection: adds one effect at a time, always the one with the most evidence.
 
 use crate::data::effective_samples;
 use crate::fit::fitted::Fit;
@@ -11,13 +11,15 @@ use crate::select::plausible::{is_timely, plausible};
 use crate::select::propose::Proposal;
 use crate::select::search::Search;
 
-/// Where much is left that no name fits, what a name must explain of it while there is more to be found.
+/// Where the residual is far above the noise, share of it that an effect must explain to be added.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LOUD_SIZE: f64 = 0.25;
-/// More pieces of physics than this are not looked for.
+/// Most effects in an explanation, torque scales not counted.
+/// Tuned: by hand, for what it costs in time; not swept.
 const MOST_PIECES: usize = 48;
 
 impl Search<'_> {
-    /// Adds pieces of physics while there is evidence for more.
+    /// Adds effects while there is evidence for more.
     pub fn forward(&self, mut best: Explanation) -> Explanation {
         let pieces = |e: &Explanation| {
             e.fit
@@ -27,7 +29,7 @@ impl Search<'_> {
                 .count()
         };
         let all: Vec<usize> = (0..self.problem.joints).collect();
-        // What is added and taken out again would be added for ever.
+        // An effect that was added and removed again would be added without end.
         let mut barred: Vec<Hypothesis> = Vec::new();
         while pieces(&best) < MOST_PIECES {
             let mut proposals = self.proposals(&best.fit, &all);
@@ -39,7 +41,7 @@ impl Search<'_> {
             let new = next.fit.actives.last().map(|active| active.hypothesis);
             let next = self.pruned(next);
             let once = new.is_some_and(|new| new.time_kind() == TimeKind::Once);
-            // What lasts for a while makes noise look correlated as long as it is not explained.
+            // An unexplained interval makes the noise look more correlated than it is.
             let effective = if once {
                 effective_samples::at_least(self.problem, &next.fit.residual)
             } else {
@@ -55,8 +57,8 @@ impl Search<'_> {
         best
     }
 
-    /// The best explanation with one of the proposals, if there is evidence enough for any, refined to be compared with a
-    /// `rival` likelihood.
+    /// The best explanation with one of the proposals, if one has enough evidence. It is refined as far as the
+    /// comparison with the log-likelihood `rival` needs.
     pub fn best_of(
         &self,
         now: &Explanation,
@@ -70,7 +72,7 @@ impl Search<'_> {
             p.evidence() > evidence && p.size > size && possible
         });
         let mut promising: Vec<&Proposal> = promising.collect();
-        // Where those with the most promise do not keep it, as beside a piece that is stuck at its joint, those elsewhere may.
+        // If the most promising proposals fail when refined, those at other joints are tried.
         while !promising.is_empty() {
             let tried: Vec<&Proposal> = promising.iter().take(REFINED).copied().collect();
             if let Some(found) = self.best_refined(now, &tried, rival) {
@@ -83,7 +85,7 @@ impl Search<'_> {
         None
     }
 
-    /// The best explanation with one of these proposals, as they are once they are refined.
+    /// The best explanation with one of these proposals, compared after refinement.
     fn best_refined(
         &self,
         now: &Explanation,
@@ -110,7 +112,8 @@ impl Search<'_> {
         .map(|(next, _)| next)
     }
 
-    /// An explanation with a proposal, refined where it touches to be compared with a `rival` likelihood.
+    /// An explanation with a proposal, refined at the joints that it touches, as far as the comparison with the
+    /// log-likelihood `rival` needs.
     pub fn joined(&self, now: &Explanation, proposal: &Proposal, rival: f64) -> Explanation {
         let joints = Fit::joints_of(&proposal.active.hypothesis, self.problem.joints);
         let fit = now.fit.with(self.problem, proposal.active.clone());

@@ -1,4 +1,5 @@
-//! What no name fits, where it is a body's: a link that is another body than its URDF says.
+//! Free bodies for a residual that no effect of the library fits: a link with other inertial parameters than in its
+//! URDF.
 
 use crate::physics::active::Active;
 use crate::select::cross_validation::carries_over;
@@ -10,8 +11,8 @@ use crate::select::propose::{Base, Proposal};
 use crate::select::search::Search;
 
 impl Search<'_> {
-    /// The explanation with another body for one link, beside the names or in the place of those that only imitated it, if it does
-    /// clearly better than they: couplings, gains and masses together may look like one body at many joints.
+    /// The explanation with a free body for one link, if it is clearly better. Effects that only imitated the body are
+    /// removed: couplings, gains and masses at many joints may together look like one body.
     pub fn with_free_body(&self, best: &Explanation) -> Option<Explanation> {
         let base = Base::new(self.problem, &best.fit, self.hypotheses.len());
         let there = |p: &Proposal| {

@@ -1,4 +1,4 @@
-//! Effects that contain a simpler one, which is said unless the other is much likelier.
+//! Effects that contain a simpler one. The simpler one is reported unless the other is much likelier.
 
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis};
@@ -11,8 +11,8 @@ use crate::select::propose::penalty;
 use crate::select::search::Search;
 
 impl Search<'_> {
-    /// Puts the simpler effect that a piece contains in its place, where it is not ahead by `enough` for the evidence for it
-    /// \[nats\]; more is asked of a shape that ends its range.
+    /// Replaces an effect by the simpler one that it contains, unless it is ahead by `enough` \[nats\], a function of
+    /// the evidence for the effect. An effect with a shape at the end of its range must be ahead by [`tie`].
     pub fn simplified(&self, mut best: Explanation, enough: impl Fn(f64) -> f64) -> Explanation {
         for piece in pieces(&best) {
             let Some(index) = place_of(&best, piece) else {
@@ -36,8 +36,8 @@ impl Search<'_> {
         best
     }
 
-    /// The explanation `less` with the simpler effect that the piece taken out of `best` contains, if there is evidence for it: a
-    /// friction that does not step is still friction.
+    /// The explanation `less` plus the simpler effect that the effect at `index` in `best` contains, if there is
+    /// evidence for it: friction that does not change in a step is still friction.
     pub fn simpler(
         &self,
         best: &Explanation,

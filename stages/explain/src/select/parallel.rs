@@ -1,13 +1,13 @@
-//! Work shared among the machine's cores, its results in order.
+//! Work on all cores of the machine, with results in order.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// How many threads work at once.
+/// Number of threads that work at once.
 pub fn threads() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// What `work` makes of each item, in the items' order.
+/// Results of `work` on each item, in the order of the items.
 pub fn map<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let next = AtomicUsize::new(0);
     let share = || {

@@ -1,4 +1,4 @@
-//! Numbers that a robot may have, and times that tell something.
+//! Which parameters a robot may have, and which times can be told apart from an effect that always acts.
 
 use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::{CoordinateKind, Scale};
@@ -6,12 +6,14 @@ use tauscope_dynamics::terms::{CoordinateKind, Scale};
 use crate::data::problem::Problem;
 use crate::physics::active::{Active, TimeKind};
 
-/// What lasts for an interval of one recording lasts at most for this share of it; what lasts longer is not told from an offset.
+/// An interval covers at most this share of its recording: a longer one cannot be told from an offset.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LONGEST_SHARE: f64 = 0.75;
-/// What began or ended so much beside a recording began or ended with it \[s\].
+/// An interval may begin this much before its recording and end this much after it \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const BESIDE_S: f64 = 0.5;
-/// Whether the times of a piece of physics are ones that tell something: what comes and goes does both within a
-/// recording.
+
+/// Whether the times of an effect can be told: an effect that acts once begins and ends within one recording.
 pub fn is_timely(problem: &Problem, active: &Active) -> bool {
     let x = &active.coordinates;
     match active.hypothesis.time_kind() {
@@ -30,16 +32,18 @@ pub fn is_timely(problem: &Problem, active: &Active) -> bool {
     }
 }
 
-/// Whether it is a wave over a joint's position that no gear makes: it does not close after a revolution.
+/// Whether an effect is a wave over a joint's position that no gear makes, because it does not close after a
+/// revolution.
 pub fn is_open_wave(active: &Active) -> bool {
     let is_made_by_gears = active.hypothesis.effect.traits.is_made_by_gears;
     !is_made_by_gears(&active.coordinates)
 }
 
-/// Nearer than this to the end of its range, as a share of it, a shape is there.
+/// A shape counts as at the end of its range if it is nearer than this share of the range.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const AT_BOUND: f64 = 1e-3;
 
-/// Whether one of the shapes is where its range ends: then the effect may only be a way to say something else.
+/// Whether one of the shapes with a logarithmic range is at an end of it: then the effect may imitate another one.
 pub fn at_bound(active: &Active) -> bool {
     (0..active.coordinates.len()).any(|c| match active.kind(c) {
         CoordinateKind::Shape {
@@ -55,7 +59,7 @@ pub fn at_bound(active: &Active) -> bool {
     })
 }
 
-/// Whether the numbers are ones that a robot may have, as the effect itself knows them.
+/// Whether a robot may have these parameters, by the effect's own limits.
 pub fn plausible(active: &Active, model: &Model) -> bool {
     let hypothesis = active.hypothesis;
     let site = hypothesis.place.site(model);

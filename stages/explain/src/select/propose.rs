@@ -1,10 +1,10 @@
-//! What a hypothesis could add to an explanation: its best numbers to first order, and what they gain.
+//! The best parameters of a hypothesis to first order, and the log-likelihood that they gain.
 
 use std::borrow::Borrow;
 use std::sync::Arc;
 
 use nalgebra::DVector;
-use tauscope_dynamics::terms::{CoordinateKind, PlaceKind, Scale};
+use tauscope_dynamics::terms::{CoordinateKind, Scale};
 
 use crate::data::column::Column;
 use crate::data::problem::Problem;
@@ -12,54 +12,73 @@ use crate::fit::fitted::{Fit, likelihood, variances};
 use crate::fit::least_squares::Products;
 use crate::physics::active::{Active, Hypothesis};
 use crate::physics::friction::least;
+use crate::select::grid::shapes;
 use crate::select::trial::{Factored, Trial};
 
-/// Steps of a shape of all joints.
-const MOST_STEPS_OF_ALL: usize = 12;
-
-/// How often the step of a grid is halved about its best value.
+/// How often the grid step is halved around its best value.
+/// Resolution: a further halving costs at most two first-order scores; the fit refines the shape afterwards.
 const HALVINGS: usize = 4;
 
-/// A hypothesis with numbers, and how it compares with leaving it out.
+/// Rounds of solving for factors: each updates the variances, or drops the factors that are below their minimum.
+/// Tuned: by hand, for what it costs in time; not swept.
+const ROUNDS: usize = 3;
+
+/// Standard deviation of a shape's prior in the linear step, on a logarithmic range: this share of the value.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const DEVIATION_LOG: f64 = 0.5;
+/// The same on a linear range: this share of the range.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const DEVIATION_LINEAR: f64 = 0.1;
+/// The same for a shape that is an effort: this share of the value.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const DEVIATION_OF_EFFORT: f64 = 0.1;
+/// The same for a time \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
+const DEVIATION_TIME_S: f64 = 0.1;
+/// Least value of an effort that a deviation is a share of \[N m\].
+/// Resolution: keeps the ridge finite; far below any measured effort.
+const LEAST_EFFORT_NM: f64 = 1e-6;
+
+/// A hypothesis with parameters, and its gain over leaving it out.
 #[derive(Debug, Clone)]
 pub struct Proposal {
-    /// The physics.
+    /// The hypothesis with its parameters.
     pub active: Active,
-    /// Gain of log-likelihood over the fit it would join, as if what is left were white.
+    /// Gain of log-likelihood over the fit without it, as if the residual were white.
     pub gain: f64,
-    /// What that many free numbers gain by chance.
+    /// Penalty for its free parameters and for the size of the library \[nats\].
     pub penalty: f64,
-    /// Largest share over joints of the variance then left that it explains there.
+    /// Variance that it explains at a joint over the variance then left there; the largest over joints.
     pub size: f64,
 }
 
 impl Proposal {
-    /// Evidence for it, in nats.
+    /// Evidence for it \[nats\].
     pub fn evidence(&self) -> f64 {
         self.gain - self.penalty
     }
 }
 
-/// A fit prepared so that hypotheses can be tried beside all it already holds.
+/// A fit, prepared for trying further hypotheses beside its own effects.
 #[derive(Debug)]
 pub struct Base<'a> {
     /// The data.
     pub problem: &'a Problem,
-    /// What is explained already.
+    /// The fit so far.
     pub fit: &'a Fit,
-    /// How the fit changes with its own numbers.
+    /// Derivatives of the fit with respect to its own parameters.
     jacobian: Vec<Arc<Column>>,
     products: Products,
     factored: Factored,
-    /// Keeps shapes from running away in the linear step.
+    /// Precision of the shapes' priors, which bounds shapes in the linear step; 0 for factors.
     ridge: Vec<f64>,
 
-    /// Nats that a hypothesis must gain for being one of many.
+    /// Logarithm of the number of hypotheses \[nats\].
     pub library: f64,
 }
 
 impl<'a> Base<'a> {
-    /// Prepares `fit`; `hypotheses` is how many are in the contest.
+    /// Prepares `fit`; `hypotheses` is the number of hypotheses in the library.
     pub fn new(problem: &'a Problem, fit: &'a Fit, hypotheses: usize) -> Self {
         let jacobian = fit.jacobian(problem);
         let references: Vec<&Column> = jacobian.iter().map(AsRef::as_ref).collect();
@@ -77,11 +96,13 @@ impl<'a> Base<'a> {
                         scale,
                         ..
                     } => match scale {
-                        Scale::Log => 0.5 * active.coordinates[c].abs().max(lower),
-                        Scale::Linear => 0.1 * (upper - lower),
-                        Scale::OfEffort => 0.1 * active.coordinates[c].abs().max(1e-6),
+                        Scale::Log => DEVIATION_LOG * active.coordinates[c].abs().max(lower),
+                        Scale::Linear => DEVIATION_LINEAR * (upper - lower),
+                        Scale::OfEffort => {
+                            DEVIATION_OF_EFFORT * active.coordinates[c].abs().max(LEAST_EFFORT_NM)
+                        }
                     },
-                    CoordinateKind::RecordingTime | CoordinateKind::SessionTime => 0.1,
+                    CoordinateKind::RecordingTime | CoordinateKind::SessionTime => DEVIATION_TIME_S,
                 };
                 1.0 / (range * range)
             })
@@ -98,7 +119,7 @@ impl<'a> Base<'a> {
         }
     }
 
-    /// What `free` numbers at these joints gain by chance.
+    /// Penalty for `free` parameters at these joints \[nats\].
     pub fn penalty(&self, free: usize, only_joint: Option<usize>) -> f64 {
         penalty(self.fit, self.library, free, only_joint)
     }
@@ -108,7 +129,7 @@ impl<'a> Base<'a> {
         Trial::new(self.problem, self.fit, own, alone, columns)
     }
 
-    /// What a hypothesis with these columns would gain to first order, as the variances are: to tell the best of many.
+    /// First-order score of a hypothesis with these columns, at the fit's variances: it ranks many candidates quickly.
     pub fn first_order_score<C: Borrow<Column>>(
         &self,
         hypothesis: Hypothesis,
@@ -123,14 +144,14 @@ impl<'a> Base<'a> {
         )
     }
 
-    /// The same at one shape.
+    /// First-order score of a hypothesis at one shape.
     pub fn first_order_score_at(&self, hypothesis: Hypothesis, shape: &[f64]) -> Option<f64> {
         let columns = self.fit.columns(self.problem, hypothesis, shape);
         self.first_order_score(hypothesis, columns.alone.as_ref(), &columns.factors)
     }
 
-    /// Tries `columns` as additional factors, after `alone` is taken off the residual. Gives the factors, the
-    /// gain of log-likelihood and the size of it; `minimum` bounds the factors.
+    /// Solves for the factors of additional `columns`, after `alone` is subtracted from the residual. Returns the
+    /// factors, the gain of log-likelihood and the size as in [`Proposal::size`]. No factor is below its `minimum`.
     pub fn try_columns<C: Borrow<Column>>(
         &self,
         alone: Option<&Column>,
@@ -145,7 +166,7 @@ impl<'a> Base<'a> {
         let mut used = vec![true; p + q];
         let mut variance = self.fit.variance.clone();
         let mut solution = DVector::zeros(p + q);
-        for _ in 0..3 {
+        for _ in 0..ROUNDS {
             solution = products.solve(&variance, &ridge, &used)?;
             let below = (0..q).filter(|&a| used[p + a] && solution[p + a] < minimum[a]);
             let below: Vec<usize> = below.collect();
@@ -160,7 +181,7 @@ impl<'a> Base<'a> {
         if q > 0 && !used[p..].contains(&true) && alone.is_none() {
             return None;
         }
-        // Left over after the last bound was met.
+        // The last round may have left factors below their minimum.
         for a in 0..q {
             if solution[p + a] < minimum[a] {
                 return None;
@@ -177,7 +198,7 @@ impl<'a> Base<'a> {
         Some((solution.rows(p, q).iter().copied().collect(), gain, size))
     }
 
-    /// The best of a hypothesis over the grid of its shapes; effects in time have their own search.
+    /// The best proposal of a hypothesis over the grid of its shapes. Effects in time are searched in `windows`.
     pub fn propose(&self, hypothesis: Hypothesis) -> Option<Proposal> {
         let grid = shapes(self.problem, hypothesis);
         let (at, gain) = best_of(
@@ -192,8 +213,8 @@ impl<'a> Base<'a> {
         self.propose_at(hypothesis, &shape)
     }
 
-    /// Halves the step of a grid of the single shape `c` about its best value a few times, so that rivals are compared at
-    /// their best.
+    /// Refines the only shape, `c`, around the best grid value by halving the step a few times: so rivals are
+    /// compared near their optimum.
     fn sharpened(
         &self,
         hypothesis: Hypothesis,
@@ -223,13 +244,13 @@ impl<'a> Base<'a> {
         best
     }
 
-    /// The best factors of a hypothesis at one shape.
+    /// The proposal of a hypothesis at one shape, with the best factors.
     pub fn propose_at(&self, hypothesis: Hypothesis, shape: &[f64]) -> Option<Proposal> {
         let columns = self.fit.columns(self.problem, hypothesis, shape);
         self.propose_columns(hypothesis, shape, columns.alone.as_ref(), &columns.factors)
     }
 
-    /// The same with the columns given.
+    /// The same for given columns.
     pub fn propose_columns<C: Borrow<Column>>(
         &self,
         hypothesis: Hypothesis,
@@ -254,7 +275,8 @@ impl<'a> Base<'a> {
     }
 }
 
-/// What `free` numbers at these joints gain by chance, with a prior of `library` nats against any one hypothesis of the library.
+/// Penalty for `free` parameters \[nats\]: that of the Bayesian information criterion, with the rows of `only_joint` or
+/// of all joints, plus `library`, the logarithm of the number of hypotheses.
 pub fn penalty(fit: &Fit, library: f64, free: usize, only_joint: Option<usize>) -> f64 {
     let rows: f64 = match only_joint {
         Some(joint) => fit.count[joint],
@@ -263,7 +285,7 @@ pub fn penalty(fit: &Fit, library: f64, free: usize, only_joint: Option<usize>) 
     0.5 * free as f64 * rows.max(2.0).ln() + library
 }
 
-/// The least that the factors of a hypothesis may be.
+/// Least values of a hypothesis' factors.
 fn minimum(problem: &Problem, hypothesis: Hypothesis) -> Vec<f64> {
     let factors = hypothesis.factors();
     let of = factors
@@ -275,7 +297,7 @@ fn minimum(problem: &Problem, hypothesis: Hypothesis) -> Vec<f64> {
     of.collect()
 }
 
-/// The only shape of a hypothesis, if there is one.
+/// Index of a hypothesis' shape, if it has exactly one.
 fn shape_index(hypothesis: Hypothesis) -> Option<usize> {
     let coordinates = hypothesis.effect.coordinates.iter().enumerate();
     let mut shapes = coordinates.filter(|(_, c)| matches!(c.kind, CoordinateKind::Shape { .. }));
@@ -283,58 +305,10 @@ fn shape_index(hypothesis: Hypothesis) -> Option<usize> {
     shapes.next().is_none().then_some(first)
 }
 
-/// Where the largest of some gains is, and the gain.
+/// Index and value of the largest gain.
 pub fn best_of(gains: impl Iterator<Item = Option<f64>>) -> Option<(usize, f64)> {
     let known = gains.enumerate().filter_map(|(i, gain)| Some((i, gain?)));
     known.max_by(|(_, a), (_, b)| a.total_cmp(b))
-}
-
-/// The grid of a hypothesis' shapes; factors are 0 in it.
-pub fn shapes(problem: &Problem, hypothesis: Hypothesis) -> Vec<Vec<f64>> {
-    let mut grid = vec![Vec::new()];
-    for coordinate in hypothesis.effect.coordinates {
-        let values: Vec<f64> = match coordinate.kind {
-            CoordinateKind::Shape {
-                lower,
-                upper,
-                steps,
-                scale,
-            } => {
-                let of = |share: f64| match scale {
-                    Scale::Linear => lower + share * (upper - lower),
-                    Scale::Log => lower * (upper / lower).powf(share),
-                    Scale::OfEffort => {
-                        let largest = problem.largest_effort[hypothesis.place.joint];
-                        largest * (lower + share * (upper - lower))
-                    }
-                };
-                // What all joints share costs the most and is refined well from afar.
-                let all = hypothesis.effect.place == PlaceKind::All;
-                let steps = if all {
-                    steps.min(MOST_STEPS_OF_ALL)
-                } else {
-                    steps
-                };
-                (0..steps)
-                    .map(|k| of(k as f64 / (steps - 1).max(1) as f64))
-                    .collect()
-            }
-            _ => vec![0.0],
-        };
-        let longer = |start: &Vec<f64>| {
-            let start = start.clone();
-            values
-                .iter()
-                .map(move |&value| {
-                    let mut longer = start.clone();
-                    longer.push(value);
-                    longer
-                })
-                .collect::<Vec<_>>()
-        };
-        grid = grid.iter().flat_map(longer).collect();
-    }
-    grid
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
-//! The contest: which pieces of physics, together, explain what the twin leaves.
+//! The search for the effects that together explain the residual.
 //!
-//! Forward, one piece at a time, always the one with the most evidence; after each the earlier ones must prove
-//! themselves again; in the end each is taken out and every rival tried in its place.
+//! Effects are added one at a time, always the one with the most evidence. After each, the earlier ones are tested
+//! again. In the end each effect is removed and every rival tried in its place.
 
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
@@ -9,28 +9,29 @@ use crate::physics::active::{Active, Hypothesis};
 use crate::select::evidence::{LEAST_GAIN, MORE_THAN_SIMPLE, tie};
 use crate::select::explanation::{Explanation, describe};
 
-/// So often pieces are added and all exchanged again.
+/// Rounds of adding effects and exchanging all of them.
+/// Tuned: by hand, for what it costs in time; not swept.
 const MOST_ROUNDS: usize = 2;
 
-/// What can be tried, and on what.
+/// Data and hypotheses of a search.
 pub struct Search<'a> {
     /// The data.
     pub problem: &'a Problem,
-    /// The library.
+    /// The hypotheses of the library.
     pub hypotheses: &'a [Hypothesis],
-    /// Links whose bodies may be described where no name fits.
+    /// Free bodies, one per link, which describe a residual that no effect of the library fits.
     pub unnamed_bodies: &'a [Hypothesis],
-    /// Called now and then with a text.
+    /// Takes lines of progress.
     pub say: &'a (dyn Fn(&str) + Sync),
 }
 
 impl Search<'_> {
-    /// Adds names one at a time, without a second look at any: enough to tell which joints have dry friction.
+    /// Adds effects without exchanging any. That is enough to find the joints with dry friction.
     pub fn first_guess(&self, start: Vec<Active>, penalties: Vec<f64>) -> Explanation {
         self.simplified(self.forward(self.started(start, penalties)), tie)
     }
 
-    /// Finds the explanation, from pieces of physics with their penalties that are taken for true at first.
+    /// Finds the explanation, starting from the effects `start` with their penalties.
     pub fn run(&self, start: Vec<Active>, penalties: Vec<f64>) -> Explanation {
         let mut best = self.started(start, penalties);
         best = self.with_names(best);
@@ -38,7 +39,7 @@ impl Search<'_> {
             (self.say)(&format!("? {}", describe(&described)));
             best = self.with_names(self.pruned(described));
         }
-        // A body that the names take back might be described again for ever.
+        // Bounded: effects may replace a free body, which would then be proposed again without end.
         for _ in self.unnamed_bodies {
             let Some(described) = self.with_free_body(&best) else {
                 break;
@@ -52,7 +53,7 @@ impl Search<'_> {
                 best = self.with_names(self.pruned(described));
             }
         }
-        // What it was compared with until now is no measure of how precise its numbers are to be.
+        // So far it was refined only as far as comparisons needed. Now its parameters are refined fully.
         best.fit = best.fit.refined(self.problem);
         self.with_split_pushes(self.with_names_that_hold(best))
     }
@@ -62,7 +63,7 @@ impl Search<'_> {
         self.pruned(Explanation { fit, penalties })
     }
 
-    /// Adds and exchanges names until nothing is gained.
+    /// Adds and exchanges effects until nothing is gained.
     fn with_names(&self, mut best: Explanation) -> Explanation {
         for _ in 0..MOST_ROUNDS {
             best = self.forward(best);

@@ -1,4 +1,4 @@
-//! Columns tried beside those of a fit: from the products of the new ones alone, so that many can be looked at.
+//! Tries columns beside those of a fit. Only products with the new columns are computed, so that many can be tried.
 
 use std::borrow::Borrow;
 
@@ -8,6 +8,13 @@ use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::fit::fitted::{Fit, likelihood, variances};
 use crate::fit::least_squares::{Products, weighted_dot};
+
+/// Least diagonal element that a column is scaled by.
+/// Resolution: guards a division by zero where a column is zero.
+pub const LEAST_DIAGONAL: f64 = 1e-300;
+/// Added to the diagonal of the scaled normal equations, which is 1.
+/// Resolution: guards the factorisation of dependent columns.
+const RIDGE: f64 = 1e-10;
 
 /// Normal equations of a fit's own columns, factored once.
 #[derive(Debug)]
@@ -19,14 +26,14 @@ pub struct Factored {
 }
 
 impl Factored {
-    /// For these variances by joint, with `ridge` added to the diagonal.
+    /// Factors the equations for these variances by joint, with `ridge` added to the diagonal.
     pub fn new(products: &Products, variance: &[f64], ridge: &[f64]) -> Self {
         let (normal, right) = products.normal(variance, ridge);
         let p = right.len();
-        let scale = normal.diagonal().map(|d| d.max(1e-300).sqrt());
+        let scale = normal.diagonal().map(|d| d.max(LEAST_DIAGONAL).sqrt());
         let mut scaled = DMatrix::from_fn(p, p, |a, b| normal[(a, b)] / (scale[a] * scale[b]));
         for a in 0..p {
-            scaled[(a, a)] += 1e-10;
+            scaled[(a, a)] += RIDGE;
         }
         Self {
             scale,
@@ -35,7 +42,7 @@ impl Factored {
         }
     }
 
-    /// What solves the equations for each column of a right side.
+    /// Solution of the equations for each column of a right side.
     fn solve(&self, mut right: DMatrix<f64>) -> Option<DMatrix<f64>> {
         let factor = self.factor.as_ref()?;
         let scale = |right: &mut DMatrix<f64>| {
@@ -50,25 +57,26 @@ impl Factored {
     }
 }
 
-/// New columns, and their products with those of a fit and with what it leaves.
+/// New columns: their products with those of a fit and with its residual.
 #[derive(Debug)]
 pub struct Trial<'a> {
     fit: &'a Fit,
     own: &'a Products,
-    /// By joint: the fit's own columns with the new ones.
+    /// By joint: products of the fit's own columns with the new ones.
     cross: Vec<DMatrix<f64>>,
-    /// By joint: the new ones with each other.
+    /// By joint: products of the new columns with each other.
     gram: Vec<DMatrix<f64>>,
-    /// By joint: the new ones with the residual.
+    /// By joint: products of the new columns with the residual.
     right: Vec<DVector<f64>>,
-    /// By joint, where something is taken off the residual first: the fit's own columns with what is left.
+    /// By joint, where a column is subtracted from the residual first: products of the fit's own columns with the rest.
     own_right: Vec<Option<DVector<f64>>>,
-    /// By joint: the residual with itself.
+    /// By joint: square of the residual.
     square: Vec<f64>,
 }
 
 impl<'a> Trial<'a> {
-    /// Of columns beside the `jacobian` of a fit with its products `own`, once `alone` is taken off the residual.
+    /// A trial of columns beside the `jacobian` of a fit with its products `own`, after `alone` is subtracted from the
+    /// residual.
     pub fn new<C: Borrow<Column>, J: AsRef<Column>>(
         problem: &Problem,
         fit: &'a Fit,
@@ -127,7 +135,7 @@ impl<'a> Trial<'a> {
         trial
     }
 
-    /// The products of all columns, the fit's own first.
+    /// Products of all columns, the fit's own first.
     pub fn products(&self) -> Products {
         let (p, q) = (self.own.right[0].len(), self.right[0].len());
         let one = |j: usize| {
@@ -160,8 +168,8 @@ impl<'a> Trial<'a> {
             .unwrap_or(&self.own.right[joint])
     }
 
-    /// What the new columns gain of log-likelihood, their factors not below `minimum`, with the variances of the fit: less than
-    /// with those that they leave, but enough to tell which of many columns are best.
+    /// Gain of log-likelihood by the new columns, with factors not below `minimum`. The factors are solved for at the
+    /// variances of the fit, which is not the optimum, but shows which of many columns are best.
     pub fn gain(&self, problem: &Problem, own: &Factored, minimum: &[f64]) -> Option<f64> {
         let q = minimum.len();
         let p = own.right.len();
@@ -176,7 +184,7 @@ impl<'a> Trial<'a> {
                 own_right += (other - &self.own.right[j]) / *variance;
             }
         }
-        // Schur's complement of the fit's own columns.
+        // Schur complement of the fit's own columns.
         let mut sides = cross.clone().insert_columns(q, 1, 0.0);
         sides.set_column(q, &own_right);
         let solved = own.solve(sides)?;
@@ -213,7 +221,7 @@ impl<'a> Trial<'a> {
     }
 }
 
-/// Solves for the factors in `used`, the others are 0; `None` if they are not independent of the rest.
+/// Factors of the columns in `used`, 0 for the others; `None` if the columns are dependent.
 fn solved_where(
     used: &[bool],
     gram: &DMatrix<f64>,
@@ -221,14 +229,14 @@ fn solved_where(
     right: &DVector<f64>,
 ) -> Option<DVector<f64>> {
     let index: Vec<usize> = (0..used.len()).filter(|&a| used[a]).collect();
-    let scale = |a: usize| gram[(a, a)].max(1e-300).sqrt();
+    let scale = |a: usize| gram[(a, a)].max(LEAST_DIAGONAL).sqrt();
     let m = index.len();
     let mut scaled = DMatrix::from_fn(m, m, |a, b| {
         let (a, b) = (index[a], index[b]);
         schur[(a, b)] / (scale(a) * scale(b))
     });
     for a in 0..m {
-        scaled[(a, a)] += 1e-10;
+        scaled[(a, a)] += RIDGE;
     }
     let side = DVector::from_fn(m, |a, _| right[index[a]] / scale(index[a]));
     let solved = scaled.cholesky()?.solve(&side);

@@ -1,5 +1,5 @@
-//! Effects in time: a change point, an interval within every recording, an interval in one of them. Found by
-//! scanning all of them with running sums, then tried exactly.
+//! Proposals of effects with a time: a change point, an interval within every recording, an interval in one recording.
+//! Running sums scan all intervals; the best are tried exactly.
 
 use std::sync::Arc;
 
@@ -11,19 +11,37 @@ use crate::physics::active::Hypothesis;
 use crate::physics::active::TimeKind;
 use crate::select::propose::{Base, Proposal, best_of};
 
-/// Shortest interval that is looked for \[s\].
+/// Shortest interval that is searched \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const SHORTEST_S: f64 = 0.35;
 /// How many of the best intervals are tried exactly.
+/// Tuned: by hand, for what it costs in time; not swept.
 const TRIED: usize = 4;
-/// A change needs so many rows on either side of it.
+/// Rows that a change point needs on either side.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_ROWS: usize = 8;
-/// Steps per recording that change points and intervals are looked for on, at most.
+/// Steps per recording on which change points and intervals are searched. Its logarithm is the penalty for the choice
+/// of one time.
+/// Tuned: by hand, for what it costs in time; not swept.
 const STEPS: usize = 100;
-/// Factors beyond these are left out of the scan: inertias hardly show in it.
+/// Shortest step on which intervals are searched \[s\].
+/// Resolution: half the step costs four times the time; the fit refines the times afterwards.
+const LEAST_STEP_S: f64 = 0.05;
+/// Intervals whose two ends differ by at most this many steps in sum count as the same.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const SAME_STEPS: usize = 4;
+/// Factors that are scanned. The inertias of a payload come after them and hardly change the effort.
+/// Physical: a payload's mass and first moments of mass.
 const SCANNED_FACTORS: usize = 4;
+/// Added to the diagonal of an interval's normal equations, as a share of their trace.
+/// Resolution: guards the factorisation of dependent columns.
+const RIDGE: f64 = 1e-9;
+/// The same where all columns are zero.
+/// Resolution: guards the factorisation of a zero matrix.
+const LEAST_RIDGE: f64 = 1e-12;
 
 impl Base<'_> {
-    /// The best of a hypothesis whose effect has a time.
+    /// The best proposal of any hypothesis, in time or not.
     pub fn propose_in_time(&self, hypothesis: Hypothesis) -> Option<Proposal> {
         match hypothesis.time_kind() {
             TimeKind::Always if hypothesis.effect.is_surface() => self.propose_wall(hypothesis),
@@ -36,7 +54,7 @@ impl Base<'_> {
         }
     }
 
-    /// A factor before and another after the change.
+    /// The best change point, with one factor before it and another after it.
     fn propose_step(&self, hypothesis: Hypothesis) -> Option<Proposal> {
         let problem = self.problem;
         let mut shape = vec![0.0; hypothesis.effect.coordinates.len()];
@@ -48,7 +66,7 @@ impl Base<'_> {
         let joint = hypothesis.only_joint()?;
         let split = |first: usize| {
             let (mut before, mut after) = (Column::clone(whole), Column::clone(whole));
-            // Of each joint that the column goes over.
+            // One block per joint of the column.
             for block in before.values.chunks_mut(problem.rows) {
                 block[first..].fill(0.0);
             }
@@ -82,12 +100,12 @@ impl Base<'_> {
         let (first, time_s) = times[best];
         shape[time] = time_s;
         let mut proposal = self.propose_columns(hypothesis, &shape, None, &split(first))?;
-        // One of as many times as were tried.
+        // For the choice of one time among many.
         proposal.penalty += (STEPS as f64).ln();
         Some(proposal)
     }
 
-    /// Factors within an interval, of one track or of all.
+    /// The best interval of recording time, in one recording or in all.
     fn propose_interval(&self, hypothesis: Hypothesis, only: Option<usize>) -> Option<Proposal> {
         let problem = self.problem;
         let times = time_indices(hypothesis);
@@ -106,7 +124,7 @@ impl Base<'_> {
         self.propose_within(hypothesis, intervals[best], only)
     }
 
-    /// Factors within an interval of recording time \[s\], of one track or of all.
+    /// The best factors within an interval of recording time \[s\], in one recording or in all.
     pub fn propose_within(
         &self,
         hypothesis: Hypothesis,
@@ -122,7 +140,7 @@ impl Base<'_> {
         let session_s = only.map_or(0.0, |track| self.problem.tracks[track].track.session_s);
         (shape[start], shape[end]) = (session_s + from_s, session_s + to_s);
         let mut proposal = self.propose_columns(hypothesis, &shape, None, &masked)?;
-        // One of as many beginnings and ends as there are.
+        // For the choice of one beginning and one end among many.
         proposal.penalty += 2.0 * (STEPS as f64).ln();
         Some(proposal)
     }
@@ -159,7 +177,7 @@ impl Base<'_> {
         masked
     }
 
-    /// The most promising intervals \[s of recording time\], what the fit already holds left out of account.
+    /// The most promising intervals \[s of recording time\]. The fit's own parameters stay fixed.
     fn scan(&self, columns: &[Arc<Column>], only: Option<usize>) -> Vec<(f64, f64)> {
         let problem = self.problem;
         let q = columns.len();
@@ -171,7 +189,7 @@ impl Base<'_> {
             .iter()
             .filter_map(|&r| problem.tracks[r].track.time_s.last().copied())
             .fold(0.0, f64::max);
-        let bin_s = (duration / STEPS as f64).max(0.05);
+        let bin_s = (duration / STEPS as f64).max(LEAST_STEP_S);
         let bins = (duration / bin_s).ceil() as usize + 1;
         let mut gram = vec![DMatrix::<f64>::zeros(q, q); bins + 1];
         let mut right = vec![DVector::<f64>::zeros(q); bins + 1];
@@ -209,7 +227,7 @@ impl Base<'_> {
                 let rhs = &right[to] - &right[from];
                 let trace = normal.trace();
                 for a in 0..q {
-                    normal[(a, a)] += 1e-9 * trace + 1e-12;
+                    normal[(a, a)] += RIDGE * trace + LEAST_RIDGE;
                 }
                 if let Some(factor) = normal.cholesky() {
                     found.push((rhs.dot(&factor.solve(&rhs)), from, to));
@@ -217,10 +235,10 @@ impl Base<'_> {
             }
         }
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
-        // Not several of the same.
+        // Nearly equal intervals are kept once.
         let mut kept: Vec<(usize, usize)> = Vec::new();
         for (_, from, to) in found {
-            let near = |&(a, b): &(usize, usize)| a.abs_diff(from) + b.abs_diff(to) <= 4;
+            let near = |&(a, b): &(usize, usize)| a.abs_diff(from) + b.abs_diff(to) <= SAME_STEPS;
             if !kept.iter().any(near) {
                 kept.push((from, to));
             }

@@ -5,9 +5,11 @@ use tauscope_bus::{JointArray, MAX_JOINTS};
 use tauscope_dynamics::derivative::FilteredDerivative;
 
 /// A longer gap is not bridged.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const MAX_GAP_NS: i64 = 250_000_000;
 /// Rows that only repeat the row before are no standstill, unless they last this long: many drivers
 /// publish faster than they measure.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const MAX_REPEAT_NS: i64 = 50_000_000;
 
 /// Differentiates positions.

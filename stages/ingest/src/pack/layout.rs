@@ -1,8 +1,10 @@
 //! Where the joints of a message stand in the cell's order.
 
 /// Layouts that are remembered; a topic with more publishers than that is searched each time.
+/// Resolution: memory against searching.
 const MAX_KNOWN: usize = 16;
 /// Foreign names that an error tells of.
+/// Resolution: length of the message.
 const MAX_FOUND: usize = 32;
 
 /// The order of one publisher's joints.

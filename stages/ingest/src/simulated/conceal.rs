@@ -20,10 +20,13 @@ use plan::Plan;
 
 /// What is drawn changes the effort of some joint by so many times its noise, root mean square over the
 /// instants that it changes: it can be seen, and does not cry out.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const VISIBLE: [f64; 2] = [5.0, 30.0];
 /// Places that are tried for an effect.
+/// Resolution: bounds the computing time; an effect without a place is an error.
 const PLACES: usize = 30;
 /// Halvings of the range of sizes.
+/// Resolution: 2⁻²⁰ of the range.
 const HALVINGS: usize = 20;
 
 /// Effects that are drawn at random and added to the physics. Which, is written to `concealed.json`

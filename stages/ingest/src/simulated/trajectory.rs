@@ -91,8 +91,10 @@ fn quintic(u: f64) -> [f64; 3] {
 }
 
 /// Largest value of the quintic's first derivative, at its middle.
+/// Physical: 30 u² (1 - u)² at u = ½ is 15/8.
 const QUINTIC_PEAK_VELOCITY: f64 = 1.875;
 /// Largest value of its second, 10/√3.
+/// Physical: 60 u (1 - 3 u + 2 u²) at u = (3 - √3) / 6 is 10/√3.
 const QUINTIC_PEAK_ACCELERATION: f64 = 5.773_502_691_896_258;
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::queue::Role;
 
 /// Publishers that are remembered; a node that is started again comes with another id.
+/// Resolution: memory.
 const MAX_PUBLISHERS: usize = 256;
 
 /// Number, time and publisher of a message: little-endian i64 sequence, i64 source time \[ns\], the

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use crate::config::{Keys, ZenohConfig};
 
 /// Hashes that are warned of, each once.
+/// Resolution: memory; further hashes are not warned of.
 const MAX_WARNED: usize = 16;
 
 /// How a topic's name becomes a key.

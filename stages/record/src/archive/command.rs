@@ -25,6 +25,7 @@ pub(super) struct CommandTopics {
 }
 
 /// A command is told again after this time \[ns\].
+/// Resolution: size of the archive, against how soon a late reader sees the command.
 const REPEAT_NS: u64 = 100_000_000;
 
 /// Position, and velocity if it was given.

@@ -26,6 +26,7 @@ use crate::error::RecordError;
 use crate::streams::{Stream, Streams};
 
 /// How much of the past a live plot shows \[ns\].
+/// Tuned: by eye, for the picture; no number depends on it.
 const LIVE_WINDOW_NS: i64 = 30_000_000_000;
 
 /// What the layout is for.

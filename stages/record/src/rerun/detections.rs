@@ -16,11 +16,14 @@ use crate::streams::{Stream, Streams};
 use crate::words::{Severity, headline, loaded_joints, over};
 
 /// Length of a force's arrow: 100 N to the metre, so that a push by hand is as long as a forearm.
+/// Tuned: by eye, for the picture; no number depends on it.
 const M_PER_N: f64 = 0.01;
 /// Length of a unit vector's arrow \[m\].
+/// Tuned: by eye, for the picture; no number depends on it.
 const DIRECTION_M: f64 = 0.3;
 
 /// A state that stays is told again after this time \[ns\], for a viewer that came late.
+/// Resolution: size of the stream, against how long a late viewer waits.
 const STATE_PERIOD_NS: u64 = 1_000_000_000;
 
 /// The tracks of one detector.

@@ -12,12 +12,16 @@ use super::queue::{Counts, NewestQueue, Next};
 use crate::error::RecordError;
 
 /// Messages that wait for the viewer: some 10 s of one cell.
+/// Resolution: memory.
 const QUEUE_CAPACITY: usize = 1024;
 /// How often a connection is looked after while nothing comes.
+/// Resolution: how soon a lost connection is noticed.
 const LOOK: Duration = Duration::from_millis(50);
 /// How long to wait before connecting anew to a viewer that went away.
+/// Resolution: how soon a viewer is found again.
 const RECONNECT: Duration = Duration::from_millis(500);
 /// How long the end of a run waits for the viewer to take what is left.
+/// Resolution: how long the end of a run may take.
 const EXIT_PATIENCE: Duration = Duration::from_secs(2);
 
 /// A stream to a viewer. Never makes the pipeline wait: what the viewer does not take in time gives

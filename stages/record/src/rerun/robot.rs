@@ -19,8 +19,10 @@ use crate::error::RecordError;
 use crate::streams::{CellInfo, root};
 
 /// The robot moves at most so often \[ns\]: 50 pictures a second.
+/// Resolution: size of the stream.
 const POSE_PERIOD_NS: u64 = 20_000_000;
 /// Colours are told anew after this time \[ns\], for a viewer that came late.
+/// Resolution: size of the stream, against how long a late viewer waits.
 const COLOUR_PERIOD_NS: u64 = 1_000_000_000;
 
 /// A robot that is drawn.

@@ -170,6 +170,7 @@ pub(super) struct ArrowTrack {
 }
 
 /// A viewer shows no more than 50 pictures a second \[ns\].
+/// Resolution: size of the stream.
 const ARROW_PERIOD_NS: u64 = 20_000_000;
 
 impl ArrowTrack {
@@ -271,8 +272,10 @@ pub(super) struct BandTrack {
 
 impl BandTrack {
     /// Points.
+    /// Tuned: by eye, for the picture; no number depends on it.
     const THICKNESS: f32 = 14.0;
     /// A band that lasts is drawn on at least so often \[ns\].
+    /// Resolution: size of the stream.
     const PERIOD_NS: u64 = 20_000_000;
 
     /// Bands, and the message that gives them their looks.

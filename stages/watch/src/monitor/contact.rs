@@ -1,18 +1,25 @@
-//! Loud blocks, and what becomes of a run of them: a contact, a lasting change, or neither.
+//! Runs of loud blocks, and how they end: as a contact, as a lasting change, or as neither.
 
 use super::super::finding::{Cause, Finding};
 use super::super::moments::{Compared, JOINT_KINDS, Moments};
 use super::super::touch;
 use super::{FRESH, Monitor};
 
-/// A contact is over after so many quiet blocks that hold less than this share of it.
+/// Quiet blocks after which a contact may have ended.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const QUIET: usize = 3;
+/// A contact has ended if the quiet blocks contain less than this share of it.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const OVER: f64 = 0.3;
-/// What explains this share of what the best does may be behind a run, and so much information (in units of
-/// noise) tells whether it still is there.
+/// A change may be the cause of a run if its gain is above this share of the largest one.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LIKELY: f64 = 0.6;
+/// Information in the quiet blocks, in units of noise, that is enough to tell whether the cause is still there: the
+/// standard error of its share is then below 1/√10.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const TELLING: f64 = 10.0;
-/// A loud run that lasts longer is none \[blocks\].
+/// A longer run of loud blocks is no contact \[blocks\]: 10 s of motion.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LONGEST_CONTACT: usize = 20;
 
 /// A run of loud blocks.
@@ -20,24 +27,28 @@ const LONGEST_CONTACT: usize = 20;
 pub(super) struct Run {
     first_ns: i64,
     joints: u32,
-    /// Blocks from its first to its newest loud one, those of them that are loud, and quiet ones since.
+    /// Blocks from the first to the newest loud one.
     blocks: usize,
+    /// Loud blocks among them.
     loud: usize,
+    /// Quiet blocks since.
     quiet: usize,
-    /// Whether there was quiet before it since the arm is watched.
+    /// Whether quiet blocks came before it, so that its begin was seen.
     seen: bool,
 }
 
-/// What became of a run of loud blocks.
+/// How a run of loud blocks ended.
 pub(super) enum Told {
+    /// A contact that ended.
     Contact(Finding),
+    /// A lasting change, and its blocks.
     Lasting(Finding, usize),
-    /// It lasts since before anything was watched: nobody saw it begin.
+    /// A lasting deviation whose begin was not seen.
     Unseen,
 }
 
 impl Monitor {
-    /// Follows loud blocks to their end.
+    /// Adds the newest block to the run of loud blocks, if there is one, and says how the run ended.
     pub(super) fn follow_run(&mut self) -> Option<Told> {
         let newest = self.ring.back(0);
         let (loud, first_ns) = (newest.loud, newest.first_ns);
@@ -80,7 +91,7 @@ impl Monitor {
             let oldest = (run.quiet + run.blocks - 1).min(self.ring.len() - 1);
             let (link, explained) = touch::strongest(&self.ring, &self.usual(), run.quiet, oldest);
             finding.link = (explained > 0.0).then_some(link);
-            // One block around it: its beginning and its end.
+            // With one block on either side, which may contain its begin and its end.
             for back in run.quiet - 1..=(oldest + 1).min(self.ring.len() - 1) {
                 let block = self.ring.back_mut(back);
                 block.excluded = true;
@@ -101,13 +112,13 @@ impl Monitor {
             return Some(Told::Lasting(finding, run.blocks));
         }
         if run.quiet + run.blocks >= FRESH {
-            // Neither over nor lasting: loud now and then. It becomes part of the rule.
+            // Neither ended nor lasting: loud now and then. It becomes part of the reference.
             self.run = None;
         }
         None
     }
 
-    /// Whether the quiet blocks after a run hold nothing of what explains it at its joints.
+    /// Whether the quiet blocks after a run show that its likely causes have ended at all its joints.
     fn is_over(&self, run: &Run) -> bool {
         let oldest = (run.quiet + run.blocks - 1).min(self.ring.len() - 1);
         (0..self.references.len())
@@ -128,7 +139,7 @@ impl Monitor {
                 };
                 let score = loud.joint();
                 let most = score.gain.into_iter().fold(0.0, f64::max);
-                // All that may explain it: an effort that is off by a factor is quiet where there is none.
+                // Every likely cause is checked: a changed gain, for instance, is quiet where the effort is small.
                 let mut likely = (0..JOINT_KINDS).filter(|&kind| score.gain[kind] > LIKELY * most);
                 likely.all(|kind| {
                     let (share, information) = quiet.share(kind, score.size[kind]);

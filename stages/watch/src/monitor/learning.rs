@@ -1,17 +1,26 @@
-//! What the rule is and how far windows stray from it by chance: learned at once, then kept up.
+//! Learning: the reference and the usual gains, first from a stretch of motion, then updated with each block.
 
 use super::super::blocks::{BLOCK_ROWS, BLOCK_S, Ring};
 use super::super::moments::{Moments, Reference};
 use super::super::scale::Scale;
-use super::{FRESH, LEAST_SHARE, Monitor, News, Phase};
+use super::super::usual::BEYOND;
+use super::{LEAST_SHARE, Monitor, News, Phase};
 
-/// The reference forgets with this time constant of motion \[s\].
+/// Time constant of the reference \[s of motion\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const MEMORY_S: f64 = 150.0;
-/// A block whose energy is so many times the median is left out of what is learned.
+/// A block whose energy is above this many times the median is not learned from.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const OUTLIER: f64 = 25.0;
+/// Blocks that the median is taken from at least.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const LEAST_BLOCKS: usize = 8;
+/// Share of a window's rows in which a joint must move for the window to count for it.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const LEAST_MOVING: f64 = 0.3;
 
 impl Monitor {
-    /// Learns the reference once there are blocks enough.
+    /// Learns the reference once there are enough blocks.
     pub(super) fn learn(&mut self) -> Option<News> {
         if self.ring.len() < self.learn {
             return None;
@@ -31,7 +40,8 @@ impl Monitor {
         told.then_some(News::Learned)
     }
 
-    /// The references of what was learned now, and as much of what was known before, which stands aside.
+    /// Fits the references to the blocks in the ring, and to the earlier references in `aside` with at most the same
+    /// weight.
     fn fit(&mut self) {
         for j in 0..self.references.len() {
             let mut moments = Moments::ZERO;
@@ -49,6 +59,7 @@ impl Monitor {
         }
     }
 
+    /// Excludes blocks with far more energy than the median.
     fn leave_out_outliers(&mut self) {
         for j in 0..self.references.len() {
             self.energies.clear();
@@ -60,7 +71,7 @@ impl Monitor {
             for back in 0..self.ring.len() {
                 self.energies.extend(energy(&self.ring, back));
             }
-            if self.energies.len() < 8 {
+            if self.energies.len() < LEAST_BLOCKS {
                 continue;
             }
             self.energies.sort_unstable_by(f64::total_cmp);
@@ -74,20 +85,21 @@ impl Monitor {
         }
     }
 
-    /// What is usual, from windows beside a reference that has not seen them.
+    /// Learns the usual gains, each from a window and a reference without that window.
     fn learn_scales(&mut self) {
         self.settle();
         for blocks in [1, Scale::SHORT, Scale::LONG] {
             self.leave_out(blocks, true);
         }
         self.settle();
-        // In units of the noise, which is known only now.
+        // The payload's gain is in units of the noise, which is known only now.
         for blocks in [Scale::SHORT, Scale::LONG] {
             self.leave_out(blocks, false);
         }
     }
 
-    /// Leaves out each window of so many blocks in turn, and learns from it.
+    /// Leaves each window of this length out of the reference in turn, and learns from it: the usual gains of the
+    /// joints' own changes if `joints`, else that of a payload.
     fn leave_out(&mut self, blocks: usize, joints: bool) {
         for newest in 0..(self.ring.len() + 1).saturating_sub(blocks) {
             self.window.clear();
@@ -117,7 +129,7 @@ impl Monitor {
         }
     }
 
-    /// Learns from the oldest blocks what is usual, and lets the oldest of all become part of the reference.
+    /// Learns the usual gains from the oldest blocks, and adds the oldest of all to the reference.
     pub(super) fn learn_oldest(&mut self) {
         let oldest = self.ring.len() - 1;
         for blocks in [Scale::SHORT, Scale::LONG] {
@@ -157,13 +169,14 @@ impl Monitor {
         self.settle();
     }
 
-    /// Learns from the window what is usual beside the references set aside.
+    /// Learns the usual gains from the window, beside the references in `aside`.
     fn learn_window(&mut self, blocks: usize, joints: bool, payload: bool) {
         let body = self
             .window
             .scores(&self.aside, &self.noise, &mut self.scores);
         for (j, score) in self.scores.iter().enumerate() {
-            let moves = self.window.own[j].rows >= 0.3 * blocks as f64 * f64::from(BLOCK_ROWS);
+            let moves =
+                self.window.own[j].rows >= LEAST_MOVING * blocks as f64 * f64::from(BLOCK_ROWS);
             if let Some(score) = score.filter(|_| joints && moves) {
                 for (scale, gain) in self.scales[j].iter_mut().zip(score.gain) {
                     scale.take(blocks, gain);
@@ -175,13 +188,13 @@ impl Monitor {
         }
     }
 
-    /// Works out what follows from references and scales.
+    /// Derives floors and noise from references and scales.
     fn settle(&mut self) {
         for j in 0..self.references.len() {
-            let rows = FRESH as f64 / 2.0 * f64::from(BLOCK_ROWS);
+            let rows = Scale::LONG as f64 * f64::from(BLOCK_ROWS);
             let least = LEAST_SHARE * LEAST_SHARE * self.references[j].effort_square();
-            // What a deviation of that size explains in a long window is just enough to be told.
-            self.floors[j] = least * rows / 40.0;
+            // The gain of a deviation of that size in a long window is then just enough to be reported.
+            self.floors[j] = least * rows / BEYOND;
             let usual = self.scales[j].iter().filter_map(Scale::usual);
             let (count, sum) = usual.fold((0.0, 0.0), |(n, sum), value| (n + 1.0, sum + value));
             self.noise[j] = (count > 0.0).then(|| (sum / count).max(self.floors[j]));

@@ -1,16 +1,19 @@
-//! Twin states of the demonstration arm, made without a twin: a motion, what it really costs, what a twin
-//! that is a little wrong expects, and what changes on the way.
+//! Twin states of the demonstration arm, made without a twin: a motion, the measured effort of an arm that changes, and
+//! the expected effort of a twin with small errors.
 
 use tauscope_bus::{Header, TwinState, flags};
 use tauscope_dynamics::lowpass::Butterworth2;
 use tauscope_dynamics::terms::sign;
 use tauscope_dynamics::{Data, Inertia, Model, forward_kinematics, link_jacobian, link_pose, rnea};
 
-/// Coulomb and viscous friction of the arm.
+/// Coulomb friction of the arm, by joint \[N m\].
+/// Tuned: by hand, of the size usual for an arm of this kind; not swept.
 const COULOMB_NM: [f64; 7] = [0.9, 0.9, 0.6, 0.5, 0.25, 0.2, 0.1];
+/// Viscous friction of the arm, by joint \[N m s/rad\].
+/// Tuned: as [`COULOMB_NM`].
 const VISCOUS: [f64; 7] = [1.4, 1.5, 0.8, 0.7, 0.3, 0.25, 0.1];
 
-/// What happens to the arm.
+/// A change of the arm, or a contact.
 #[derive(Debug, Clone, Copy)]
 pub enum Act {
     /// \[N m\] more at a joint.
@@ -25,7 +28,7 @@ pub enum Act {
     Push(usize, [f64; 3]),
 }
 
-/// An act and when it begins and ends \[s\].
+/// A change or contact, and when it begins and ends \[s\].
 #[derive(Debug, Clone, Copy)]
 pub struct Episode {
     pub act: Act,
@@ -33,7 +36,7 @@ pub struct Episode {
     pub until_s: f64,
 }
 
-/// A stream.
+/// A stream of twin states.
 pub struct Stream {
     pub nominal: Model,
     data: Data,
@@ -42,15 +45,15 @@ pub struct Stream {
     loaded: Model,
     pub episodes: Vec<Episode>,
     pub rate_hz: f64,
-    /// Of the noise, white and coloured, as a share of each joint's effort limit.
+    /// Standard deviation of the white noise as a share of each joint's effort limit; half as much is correlated.
     pub noise: f64,
-    /// Whether the twin knows of friction at all.
+    /// Whether the twin has a friction model.
     pub calibrated: bool,
-    /// Share of the viscous friction that goes as the arm warms up, with 20 minutes' time constant.
+    /// Share by which the viscous friction falls as the arm warms up, with a time constant of 20 minutes.
     pub warm_up: f64,
-    /// Another motion after so long \[s\].
+    /// Time after which the motion changes \[s\].
     pub program_s: f64,
-    /// Rest at the end of every period of so long \[s\]; none if zero.
+    /// Duration of the rest at the end of each period \[s\].
     pub rest_s: f64,
     pub seed: u64,
     step: u64,
@@ -59,7 +62,7 @@ pub struct Stream {
     filters: Vec<[Butterworth2; 2]>,
 }
 
-/// xorshift64*, and the sum of four as a normal.
+/// xorshift64* random numbers; the sum of four uniform ones approximates a normal one.
 struct Random(u64);
 
 impl Random {
@@ -80,7 +83,7 @@ impl Stream {
         let urdf = include_str!("../../../../tests/data/demo_arm.urdf");
         let nominal = Model::from_urdf(urdf).unwrap();
         let mut real = nominal.clone();
-        // What a calibrated twin is still off by.
+        // Errors that a calibrated twin still has.
         for (link, mass, com) in [
             ("link2", 0.12, [0.02, 0.0, 0.1]),
             ("link4", 0.08, [0.0, 0.03, 0.05]),
@@ -127,7 +130,8 @@ impl Stream {
         self.step as f64 / self.rate_hz
     }
 
-    /// Position, velocity and acceleration: four harmonics, others for each program, at rest at its ends.
+    /// Position, velocity and acceleration: four harmonics that differ between programs, at rest at the ends of a
+    /// period.
     fn motion(&self, t: f64) -> [[f64; 7]; 3] {
         let program = (t / self.program_s).floor();
         let mut random =
@@ -136,7 +140,7 @@ impl Stream {
         let mut result = [[0.0; 7]; 3];
         let period_s = 8.0 + 8.0 * random.uniform();
         let reach = 0.5 + 0.5 * random.uniform();
-        // Of a period, the rest at its end stands still.
+        // The arm stands still at the end of a period.
         let local = t % (period_s + self.rest_s);
         let local = local.min(period_s);
         for j in 0..7 {
@@ -144,7 +148,7 @@ impl Stream {
             result[0][j] = centre;
             for k in 1..=4 {
                 let w = std::f64::consts::TAU * f64::from(k) / period_s;
-                // Sines and cosines less their value at the ends, so that velocities vanish there.
+                // Sines and cosines minus their value at the ends, so that velocities vanish there.
                 let a = reach * 0.5 * random.normal() / f64::from(k * k);
                 let b = reach * 0.15 * random.normal() / f64::from(k * k);
                 let (s, c) = (w * local).sin_cos();
@@ -171,7 +175,7 @@ impl Stream {
         self.episodes.iter().filter(now).map(|episode| episode.act)
     }
 
-    /// The effort that is measured.
+    /// The measured effort.
     fn effort(&mut self, t: f64, [q, qd, qdd]: &[[f64; 7]; 3]) -> [f64; 7] {
         let loaded = self.acts(t).any(|act| matches!(act, Act::Payload(..)));
         let model = if loaded { &self.loaded } else { &self.real };

@@ -1,4 +1,4 @@
-//! What a finding is doubted for beside the others.
+//! Lowers the confidence of findings that others make doubtful.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,20 +12,24 @@ use tauscope_dynamics::kinematic_tree::bearing;
 
 use super::Named;
 
-/// What is doubted is as likely as not, at most.
+/// Highest confidence of a doubted finding.
+/// Statistical: even odds.
 const DOUBTED: f64 = 0.5;
-/// What explains less than this share of what the largest finding does may patch it.
+/// A finding that explains less than this share of what the largest one does may only patch an error of that one.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const PATCH: f64 = 0.02;
-/// Pushes whose times differ by less than this from recording to recording come at the same time \[s\].
+/// Pushes in different recordings come at the same time if their times differ by less than this \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const SAME_TIME_S: f64 = 0.3;
-/// In at least so many recordings.
+/// Pushes are doubted if they come at the same time in at least this many recordings.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const TOO_OFTEN: usize = 3;
 
 fn doubt_it(finding: &mut Finding) {
     finding.confidence = finding.confidence.min(DOUBTED);
 }
 
-/// Doubts what is said of the physics that was found, and says why.
+/// Lowers the confidence of doubtful findings and adds notes with the reasons.
 pub fn doubt(named: &mut Named, problem: &Problem, actives: &[Active]) {
     let said = actives.iter().filter(|a| !a.hypothesis.is_torque_scale());
     for (finding, active) in named.findings.iter_mut().zip(said) {
@@ -37,8 +41,8 @@ pub fn doubt(named: &mut Named, problem: &Problem, actives: &[Active]) {
     named.notes.extend(pushed);
 }
 
-/// Doubts what explains next to nothing beside the largest finding, where what was found does not carry over: it may only patch what
-/// is wrong elsewhere.
+/// Doubts findings that explain next to nothing beside the largest one. Called where the explanation does not carry over
+/// to held-out recordings: such findings may only patch an error elsewhere.
 pub fn doubt_patches(findings: &mut [Finding]) {
     let largest = findings.iter().map(|f| f.explains).fold(0.0, f64::max);
     let small = |finding: &&mut Finding| finding.explains < PATCH * largest;
@@ -47,8 +51,8 @@ pub fn doubt_patches(findings: &mut [Finding]) {
     }
 }
 
-/// Whether a body, or how gravity acts on it, is named beside a curve that a joint which carries it has without a name: what weighs
-/// there weighs here too, and the name could be part of it.
+/// Whether a finding of a body or of gravity is doubtful because of an unnamed curve in a joint that carries the body. The
+/// curve may contain part of the body's weight, and the finding part of the curve's cause.
 fn is_shadowed(model: &Model, actives: &[Active], hypothesis: Hypothesis) -> bool {
     let lasts = hypothesis.time_kind() == TimeKind::Always && hypothesis.lasts();
     let carriers = match hypothesis.effect.place {
@@ -68,7 +72,8 @@ fn is_shadowed(model: &Model, actives: &[Active], hypothesis: Hypothesis) -> boo
     })
 }
 
-/// Doubts pushes on one link that come in each of `recordings` at the same time, and says so: they belong to the programme.
+/// Doubts pushes on one link that come at the same time in each of `recordings`, with a note: they belong to the robot's
+/// programme.
 fn doubt_pushes(findings: &mut [Finding], recordings: usize) -> Vec<String> {
     let mut by_link: BTreeMap<String, Vec<usize>> = BTreeMap::new();
     for (i, finding) in findings.iter().enumerate() {
@@ -98,8 +103,8 @@ fn doubt_pushes(findings: &mut [Finding], recordings: usize) -> Vec<String> {
         let from = findings[same[0]].t_start.unwrap_or(f64::NAN);
         let to = findings[same[0]].t_end.unwrap_or(f64::NAN);
         notes.push(format!(
-            "Link {link} is pushed in every recording from {from:.1} to {to:.1} s: that belongs to the programme, e.g. something that is \
-             carried or pressed on, and is no push from outside. What it does in other recordings is not predicted."
+            "Link {link} is pushed in every recording from {from:.1} to {to:.1} s. This is probably part of the robot's programme, \
+             e.g. carrying or pressing something, and not a push from outside. Other recordings are predicted without it."
         ));
         for i in same {
             doubt_it(&mut findings[i]);

@@ -1,4 +1,4 @@
-//! What a recorded current is in N m, where nobody knows the torque constants and the motion may tell.
+//! Torque scales that were fitted, where the torque constants are not known.
 
 use std::collections::BTreeMap;
 
@@ -35,7 +35,7 @@ impl Scale {
 pub struct Scales(Vec<Scale>);
 
 impl Scales {
-    /// As a fit has them; how far they are known counts that the URDF's masses are not exact.
+    /// Those of a fit. Their standard deviations include the errors of the URDF's masses.
     pub fn of(problem: &Problem, fit: &Fit, spread: &DMatrix<f64>) -> Self {
         let fitted: Vec<usize> = (0..fit.actives.len())
             .filter(|&index| fit.actives[index].hypothesis.is_torque_scale())
@@ -57,12 +57,12 @@ impl Scales {
         Self(fitted.into_iter().map(of).collect())
     }
 
-    /// What is known of each.
+    /// One note on each.
     pub fn notes(&self, joints: &[String]) -> Vec<String> {
         self.0.iter().map(|scale| note(scale, joints)).collect()
     }
 
-    /// Turns the numbers of an effect on the recorded effort into N m where the scale of its joint is known; tells whether
+    /// Converts the numbers of an effect on the recorded effort into N m if the scale of its joint is known. Returns whether
     /// they are still in A.
     pub fn to_nm(
         &self,
@@ -92,18 +92,18 @@ impl Scales {
         false
     }
 
-    /// Joints, and how well their scales are known \[A per N m\].
+    /// Joints and the standard deviations of their scales \[A per N m\].
     pub fn deviations(&self) -> impl Iterator<Item = (usize, f64)> {
         self.0.iter().map(|scale| (scale.joint, scale.deviation))
     }
 }
 
-/// An interval about a number that a scale goes into, known but for this share of it.
+/// Widens the interval of a number that is proportional to a scale. `share` is the scale's relative standard deviation.
 fn wider(interval: [f64; 2], number: f64, share: f64) -> [f64; 2] {
     interval.map(|end| {
         let own = end - number;
         let wide = number + own.signum() * own.hypot(HALF_WIDTH_95 * share * number);
-        // No scale turns a sign.
+        // A scale does not change the sign.
         if wide * end < 0.0 || end == 0.0 {
             0.0
         } else {
@@ -112,7 +112,7 @@ fn wider(interval: [f64; 2], number: f64, share: f64) -> [f64; 2] {
     })
 }
 
-/// How well the scales of a corrected twin are known that was started from, by joint, as shares of them.
+/// Relative standard deviations of the start's torque scales, by joint.
 #[derive(Debug)]
 pub struct StartScales(Vec<f64>);
 
@@ -129,8 +129,8 @@ impl StartScales {
         Self(start.map_or_else(Vec::new, share))
     }
 
-    /// Counts in the intervals of an effect that its numbers are no better known than the scale: of its own joint, or of the joint
-    /// whose is known best where all joints feel it.
+    /// Adds the uncertainty of the torque scale to the intervals of an effect. The scale is that of its joint or, for an
+    /// effect on all joints, the one that is known best.
     pub fn widen(
         &self,
         hypothesis: Hypothesis,
@@ -142,7 +142,7 @@ impl StartScales {
             Some(joint) => self.0.get(joint).copied().unwrap_or(0.0),
             None => best,
         };
-        // A scale that nobody knows is part of the fit.
+        // An unknown scale is part of the fit already.
         if !share.is_finite() || share * KNOWN >= 1.0 {
             return;
         }
@@ -167,8 +167,9 @@ fn note(scale: &Scale, joints: &[String]) -> String {
     let half = HALF_WIDTH_95 * deviation;
     if !scale.is_known() {
         return format!(
-            "The gain of joint {joint} is not identifiable: hardly any gravity or inertia acts on it in these recordings, and what \
-             does hangs on how exact the URDF's masses are ({} A per N m, 95 % interval {} to {}). The numbers of its effects are in A.",
+            "The gain of joint {joint} is not identifiable: gravity and inertia hardly load it in these recordings, and this small \
+             load is uncertain because the URDF's masses are ({} A per N m, 95 % interval {} to {}). The numbers of its effects \
+             are in A.",
             number(gain),
             number(gain - half),
             number(gain + half)

@@ -1,4 +1,4 @@
-//! The smallest effects that would have been found.
+//! The smallest effect of each kind that would have been found.
 
 use std::collections::BTreeMap;
 
@@ -9,10 +9,11 @@ use crate::fit::fitted::Fit;
 use crate::report::schema::Undetectable;
 use crate::select::evidence::{LEAST_EVIDENCE, LEAST_SIZE};
 use crate::select::explanation::Explanation;
-use crate::select::propose::{Base, shapes};
+use crate::select::grid::shapes;
+use crate::select::propose::Base;
 use crate::select::search::Search;
 
-/// The smallest effects of one factor that would have been named, for each joint and the tool.
+/// The smallest effects with one factor that would have been found, for each joint and the tool.
 pub fn undetectable(
     search: &Search<'_>,
     found: &Explanation,
@@ -65,7 +66,7 @@ pub fn undetectable(
     all
 }
 
-/// The factor of a column at which both evidence and size suffice.
+/// The smallest factor of a column at which both evidence and size are sufficient.
 fn smallest(search: &Search<'_>, fit: &Fit, column: &Column, penalty: f64) -> Option<f64> {
     let problem = search.problem;
     let (mut information, mut share) = (0.0, 0.0_f64);

@@ -1,16 +1,16 @@
-//! Two of one effect at a joint are one finding, e.g. ripple of two waves.
+//! Merges two findings of one effect at a joint, such as torque ripple with two waves.
 
 use serde_json::Value;
 use tauscope_dynamics::terms::{Effect, effect};
 
 use crate::report::schema::Finding;
 
-/// The effect of a finding, if two of it at one place are said as one.
+/// The effect of a finding, if two of this effect at one place are merged.
 fn said_as_one(finding: &Finding) -> Option<&'static Effect> {
     effect(&finding.effect).filter(|effect| !effect.traits.second.is_empty())
 }
 
-/// Two of an effect at one joint are told as one finding, the larger first.
+/// Merges two findings of one effect at one joint; the larger comes first.
 pub fn merge_waves(findings: &mut Vec<Finding>) {
     let mut index = 0;
     while index < findings.len() {

@@ -7,12 +7,15 @@ use super::number_format::{effort_unit, fixed, number_text, percent};
 use crate::report::schema::{Located, Report, Verdict};
 
 /// How many rows of a table are shown at once.
+/// Tuned: by eye, for the layout of the page.
 const ROWS: usize = 10;
 
-/// A joint at this many times its noise is as good as the noise.
+/// A joint with an error below this many times its noise is at the noise floor.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const QUIET: f64 = 1.3;
 
-/// A joint at more than this many times its noise has something left.
+/// A joint with an error above this many times its noise still has a mismatch.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const LEFT: f64 = 3.0;
 
 /// A joint's errors on held-out data \[effort unit\]; what is not known is not a number.
@@ -258,8 +261,14 @@ fn change(row: &Row<'_>) -> String {
 /// Two bars a joint. Where the joints are of very different strength each is drawn to its own scale, else the small
 /// ones could not be seen.
 fn bars(rows: &[Row<'_>], unit: &str) -> Markup {
+    /// Left end of the bars \[px\].
+    /// Tuned: by eye, for the layout of the page.
     const START: f64 = 130.0;
+    /// Length of the longest bar \[px\].
+    /// Tuned: by eye, for the layout of the page.
     const WIDTH: f64 = 640.0;
+    /// Height of a joint's row \[px\].
+    /// Tuned: by eye, for the layout of the page.
     const PITCH: f64 = 46.0;
     let largest = |row: &Row<'_>| {
         [row.before, row.after, row.noise]
@@ -309,6 +318,8 @@ fn bars(rows: &[Row<'_>], unit: &str) -> Markup {
 
 /// A name that fits beside a bar.
 fn short(name: &str) -> String {
+    /// Longest name that is shown whole \[characters\].
+    /// Tuned: by eye, for the layout of the page.
     const LETTERS: usize = 17;
     if name.chars().count() <= LETTERS {
         return name.to_owned();

@@ -11,6 +11,7 @@ use super::proof;
 use crate::report::schema::{NextMotion, Rejected, Report, Undetectable, Verdict};
 
 /// How many rejected rivals are shown at once.
+/// Tuned: by eye, for the layout of the page.
 const ROWS: usize = 12;
 
 /// The rivals that were considered, and what spoke against them.

@@ -9,12 +9,16 @@ use super::proof::{Row, rows};
 use crate::report::schema::{Finding, JointPicture, RecordingPicture, Report};
 
 /// How many joints are shown without a click.
+/// Tuned: by eye, for the layout of the page.
 const OPEN: usize = 5;
 /// How many dots a scatter shows of each kind.
+/// Tuned: by eye, for the layout of the page.
 const DOTS: usize = 900;
-/// Share of the dots at each end that the axis of a scatter need not hold.
+/// Share of the dots at each end that may lie outside the axis of a scatter.
+/// Tuned: by eye, for the layout of the page.
 const WILD: f64 = 0.004;
 /// Left and right end of the plots over time \[px\].
+/// Tuned: by eye, for the layout of the page.
 const TIME_PX: [f64; 2] = [66.0, 950.0];
 
 /// All joints: those with findings or a large change first, the others folded away.

@@ -13,6 +13,7 @@ use super::super::scenario::{Damps, ImpedanceSpec};
 use super::super::trajectory::{JointRange, Target};
 
 /// Keeps the projection into the null space smooth where the arm is stretched; squared \[m²\].
+/// Resolution: 1 mm squared, far below an arm's lever.
 const SMOOTH: f64 = 1e-6;
 
 /// Keeps the tool where it should be, as a spring and a damper would.

@@ -4,6 +4,7 @@ use tauscope_dynamics::terms::{Compliance, Term};
 
 /// A spring is taken where it is as a step begins, which takes no energy off it, unless the lighter mass
 /// would swing through more than this in a step \[rad²\]; then it is taken where the step ends.
+/// Resolution: the error of the explicit integration, against its energy being kept.
 const SLOW: f64 = 0.1;
 
 /// The rotor of a joint. Its encoder is what is recorded; the link moves as it likes.

@@ -9,8 +9,10 @@ use crate::simulated::error::ScenarioError;
 use crate::simulated::scenario::FourierSpec;
 
 /// Instants of a period at which limits are checked.
+/// Resolution: of a period; at most 50 harmonics leave 20 instants for the fastest.
 const STEPS_PER_PERIOD: f64 = 1000.0;
 /// The swing is blended in and out within this time, so that the arm begins and ends at rest \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
 const BLEND_S: f64 = 2.0;
 
 /// The motion `q0 + s(t) Σ a sin(k ω t) + b cos(k ω t)`, with s(t) the blend.

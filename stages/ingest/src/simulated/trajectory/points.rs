@@ -12,6 +12,7 @@ use crate::simulated::error::ScenarioError;
 use crate::simulated::scenario::PointsSpec;
 
 /// Time goes on even if the points are the same and there is no rest \[s\].
+/// Resolution: far below any motion; only keeps the time increasing.
 const STILL_S: f64 = 1e-3;
 
 /// The motion; points are drawn as they are needed, so it can go on for ever.

@@ -14,9 +14,11 @@ use crate::simulated::inverse::{Goal, Inverse};
 use crate::simulated::link_point::LinkPoint;
 use crate::simulated::scenario::{PointsSpec, ReachSpec, WithinSpec};
 
-/// Random points that are tried before it is given up: of the joints' ranges, and of places, each of
-/// which has to be sought.
+/// Random points of the joints' ranges that are tried before it is given up.
+/// Resolution: bounds the computing time; a motion that is not found by then is an error.
 const TRIES: usize = 1000;
+/// Random places that are tried before it is given up. Each needs an inverse kinematics.
+/// Resolution: bounds the computing time; a place that is not found by then is an error.
 const PLACE_TRIES: usize = 200;
 
 /// Says whether the arm may stand at a point.

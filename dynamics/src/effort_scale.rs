@@ -1,0 +1,181 @@
+//! What unit a measured effort is in, told by its slope over the effort that the robot's motion requires.
+//!
+//! A joint that bears weight measures its torque one to one where the unit is N m. A motor current is smaller by
+//! the torque constant at the joint, which is 3 to 100 N m/A for geared arms. So the slopes of the joints that
+//! bear weight tell the unit, and a slope below zero tells a joint whose sign is turned.
+
+use std::fmt;
+
+/// A slope beyond this, either way, is a wrong unit rather than physics.
+/// Physical: a payload or wrong masses change the torque of the joints that bear weight less than threefold, and
+/// torque constants at the joint begin at 3 N m/A.
+const WRONG_SCALE: f64 = 3.0;
+/// Within this factor of 1, either way, the unit is N m without doubt.
+/// Physical: as `WRONG_SCALE`, for an arm whose payload weighs no more than the arm.
+const SURE_SCALE: f64 = 2.0;
+/// A line from the modelled to the measured effort that explains at least this share of it tells a slope.
+/// Statistical: the model explains more than friction, noise and all else together.
+pub const TELLING: f64 = 0.5;
+
+/// Measured effort per modelled N m of a joint that bears weight.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Slope {
+    /// The joint.
+    pub joint: String,
+    /// The slope \[recorded unit per N m\].
+    pub slope: f64,
+}
+
+/// What the slopes of an arm tell of the unit of its effort.
+#[derive(Debug, Clone, PartialEq)]
+pub enum EffortScale {
+    /// No joint tells.
+    Untold,
+    /// These joints measure with the other sign than the robot's model has.
+    Turned(Vec<String>),
+    /// N m; `sure` if the slopes leave no doubt.
+    Torque {
+        /// The middle slope.
+        slope: f64,
+        /// Whether it is within a factor of two of 1.
+        sure: bool,
+    },
+    /// Less than a third of a N m by N m: a motor current, or a torque on the motor's side of the gear.
+    Current {
+        /// The middle factor from the recorded unit to N m at the joint.
+        nm_per_unit: f64,
+        /// How many joints tell so.
+        joints: usize,
+    },
+    /// More than threefold: neither N m nor A of this robot.
+    TooLarge {
+        /// The middle slope.
+        slope: f64,
+    },
+}
+
+impl EffortScale {
+    /// What `slopes` tell.
+    pub fn of(slopes: &[Slope]) -> Self {
+        let turned = slopes.iter().filter(|one| one.slope < 0.0);
+        let turned: Vec<String> = turned.map(|one| one.joint.clone()).collect();
+        let mut known: Vec<f64> = slopes.iter().map(|one| one.slope).collect();
+        known.retain(|slope| slope.is_finite() && *slope != 0.0);
+        known.sort_by(f64::total_cmp);
+        let Some(&slope) = known.get(known.len() / 2) else {
+            return Self::Untold;
+        };
+        if !turned.is_empty() {
+            Self::Turned(turned)
+        } else if slope < 1.0 / WRONG_SCALE {
+            Self::Current {
+                nm_per_unit: 1.0 / slope,
+                joints: known.len(),
+            }
+        } else if slope > WRONG_SCALE {
+            Self::TooLarge { slope }
+        } else {
+            let sure = (1.0 / SURE_SCALE..=SURE_SCALE).contains(&slope);
+            Self::Torque { slope, sure }
+        }
+    }
+
+    /// Why an effort that is said to be in N m cannot be.
+    pub fn fault_in_nm(&self) -> Option<ScaleFault> {
+        match self {
+            Self::Untold | Self::Torque { .. } => None,
+            Self::Turned(joints) => Some(ScaleFault::Turned(joints.clone())),
+            Self::Current { nm_per_unit, .. } => Some(ScaleFault::WrongUnit {
+                slope: 1.0 / nm_per_unit,
+            }),
+            Self::TooLarge { slope } => Some(ScaleFault::WrongUnit { slope: *slope }),
+        }
+    }
+}
+
+/// Why an effort cannot be this robot's in N m.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ScaleFault {
+    /// The efforts of these joints fall where the model's rise.
+    Turned(Vec<String>),
+    /// The measured effort is so many times what the motion requires.
+    WrongUnit {
+        /// The middle slope of the joints that bear weight.
+        slope: f64,
+    },
+}
+
+impl fmt::Display for ScaleFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Turned(joints) => write!(
+                f,
+                "the effort of {} has the other sign than this robot's motion requires: turn its sign in the driver, \
+                 or the joint's axis in the URDF",
+                joints.join(", ")
+            ),
+            Self::WrongUnit { slope } => {
+                write!(
+                    f,
+                    "the measured effort is {slope:.2} times what this robot's motion requires: the unit or the torque \
+                     constants are wrong"
+                )?;
+                if *slope < 1.0 {
+                    write!(
+                        f,
+                        " (a driver that publishes motor current needs --effort-unit A)"
+                    )?;
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+impl std::error::Error for ScaleFault {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(slopes: &[f64]) -> EffortScale {
+        let slopes = slopes.iter().enumerate().map(|(index, slope)| Slope {
+            joint: format!("joint{}", index + 1),
+            slope: *slope,
+        });
+        EffortScale::of(&slopes.collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn a_torque_a_current_and_a_turned_joint_are_told_apart() {
+        assert_eq!(of(&[]), EffortScale::Untold);
+        assert!(matches!(
+            of(&[0.9, 1.1, 1.0]),
+            EffortScale::Torque { sure: true, .. }
+        ));
+        assert!(matches!(
+            of(&[2.5]),
+            EffortScale::Torque { sure: false, .. }
+        ));
+        // The published constants of a UR10e's shoulder lift and elbow.
+        let current = of(&[1.0 / 10.7, 1.0 / 8.46]);
+        assert!(
+            matches!(current, EffortScale::Current { joints: 2, nm_per_unit } if (8.0..11.0).contains(&nm_per_unit))
+        );
+        assert_eq!(
+            of(&[1.0, -1.0, 1.0]),
+            EffortScale::Turned(vec!["joint2".to_owned()])
+        );
+        assert!(matches!(of(&[1000.0]), EffortScale::TooLarge { .. }));
+    }
+
+    #[test]
+    fn only_what_cannot_be_nm_is_a_fault_in_nm() {
+        assert_eq!(of(&[1.0]).fault_in_nm(), None);
+        assert_eq!(of(&[]).fault_in_nm(), None);
+        let fault = of(&[0.1, 0.1]).fault_in_nm().map(|fault| fault.to_string());
+        assert!(fault.is_some_and(|text| text.contains("0.10 times") && text.contains("--effort-unit A")));
+        let fault = of(&[-1.0]).fault_in_nm().map(|fault| fault.to_string());
+        assert!(fault.is_some_and(|text| text.contains("joint1") && text.contains("sign")));
+    }
+}

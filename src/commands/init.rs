@@ -1,0 +1,115 @@
+//! `tauscope init`.
+
+use std::path::PathBuf;
+
+use tauscope_explain::report::Verdict;
+use tauscope_pipeline::cell::EffortUnit;
+
+use super::effort_unit;
+use crate::existing::Force;
+use crate::exit::{Exit, Failure};
+use crate::explain::{self, Arguments, Kept};
+use crate::init::{self, Folder, Told};
+use crate::interrupt;
+use crate::output::Output;
+use crate::progress::Progress;
+
+/// Set up a cell from contact-free recordings: a pipeline with the explained twin and a detector that has learnt.
+///
+/// It tells the unit of the effort, explains what the robot's model leaves out, lets the detector learn what is usual
+/// and tries it on recordings that it holds out. Five recordings of different motions, a minute or more together, are
+/// a good start; nothing may touch the robot in them.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Recordings in which nothing touches the robot.
+    #[arg(required = true, value_name = "RECORDING")]
+    recordings: Vec<PathBuf>,
+    /// The robot's URDF.
+    #[arg(long, value_name = "URDF")]
+    robot: PathBuf,
+    /// The folder for pipeline.yaml, twin.yaml, learnt.yaml and the page of what was found.
+    #[arg(long, value_name = "DIR", default_value = "cell")]
+    out: PathBuf,
+    /// Unit of the measured effort; without it the recordings tell.
+    #[arg(long, value_parser = effort_unit())]
+    effort_unit: Option<EffortUnit>,
+    /// Topic of the measured joint states; without it the one that names most of the robot's joints.
+    #[arg(long, value_name = "TOPIC")]
+    state_topic: Option<String>,
+    #[command(flatten)]
+    force: Force,
+}
+
+/// Shares of the bar.
+const LOOKED: f64 = 0.05;
+const EXPLAINED: f64 = 0.75;
+
+/// Sets up the cell.
+pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
+    let folder = Folder::prepare(&args.out, args.force)?;
+    let progress = Progress::of_work();
+    progress.doing(0.0, "looking at the recordings");
+    let told = Told {
+        robot: &args.robot,
+        recordings: &args.recordings,
+        state_topic: args.state_topic.as_deref(),
+        effort_unit: args.effort_unit,
+    };
+    let looked = told.look()?;
+    for sentence in &looked.sentences {
+        progress.say(sentence);
+    }
+
+    let (fit, holdout) = looked.parted();
+    let arguments = Arguments {
+        robot: Some(&args.robot),
+        effort_unit: looked.cell.facts.effort_unit,
+        torque_constants_nm_per_a: std::collections::BTreeMap::new(),
+        twin: None,
+        twin_topic: None,
+        state_topic: &looked.state_topic,
+        fit: &fit,
+        holdout: &holdout,
+    };
+    let request = explain::from_arguments(&arguments, std::collections::BTreeSet::new())?;
+    let input = explain::read(&request, &|share, what| {
+        progress.doing(LOOKED * share, what)
+    })?;
+    explain::refuse_to_replace(&folder.explained(), &request, args.force)?;
+    explain::make(&folder.explained())?;
+    let kept = Kept::of(&input);
+    let step = |share: f64, what: &str| progress.doing(LOOKED + (EXPLAINED - LOOKED) * share, what);
+    let mut outcome = tauscope_explain::explain(input, &step)
+        .map_err(|error| Failure::rejected(error.to_string()))?;
+    let hold = interrupt::hold();
+    explain::write(&folder.explained(), &request, &kept, &mut outcome)?;
+
+    let urdf = looked.cell.facts.urdf.as_deref().unwrap_or_default();
+    init::write(&folder.robot(), urdf.as_bytes())?;
+    folder.write_set(&looked.cell, &looked.state_topic, &fit, &holdout)?;
+    drop(hold);
+    let explained = folder.explained().join("twin.yaml");
+    let explained = (outcome.report.verdict != Verdict::NotEvaluated).then_some(&*explained);
+    let learnt = init::learn(
+        &folder.set(),
+        explained,
+        &folder.learnt(),
+        &|share, what| {
+            progress.doing(EXPLAINED + (1.0 - EXPLAINED) * share, what);
+        },
+    )?;
+    let hold = interrupt::hold();
+    folder.write_twin(&learnt.twin)?;
+    let shown = holdout
+        .first()
+        .or(fit.first())
+        .unwrap_or(&args.recordings[0]);
+    folder.write_pipeline(&looked.cell, &looked.state_topic, shown)?;
+    let page = init::page(&folder, &looked, &outcome.report, &learnt);
+    init::write(&folder.page(), page.as_bytes())?;
+    drop(hold);
+    drop(progress);
+    out.print(&page)?;
+    out.print(&format!("wrote {}", args.out.display()))?;
+    Ok(Exit::from_loss(kept.lost > 0))
+}

@@ -1,0 +1,30 @@
+//! `tauscope init`: from contact-free recordings to a folder with a running pipeline.
+//!
+//! 1. [`look`]: the topic, the joints and the unit of the effort.
+//! 2. `explain` makes the twin, and holds some recordings out.
+//! 3. [`learn`]: the detector learns behind it, judged on the recordings held out.
+//! 4. [`folder`]: what is written.
+
+mod folder;
+mod learn;
+mod look;
+mod page;
+
+use std::path::Path;
+
+use tauscope_archive::whole_file::{self, Existing};
+use tauscope_pipeline::report::Problem;
+
+use crate::exit::Failure;
+
+pub use folder::Folder;
+pub use learn::learn;
+pub use look::Told;
+pub use page::page;
+
+/// Writes a file of the folder, whole or not at all. What must not be replaced was found before anything began.
+pub fn write(path: &Path, content: &[u8]) -> Result<(), Failure> {
+    whole_file::write(path, content, Existing::Replace).map_err(|error| {
+        Failure::Rejected(Problem::of_file(path, format!("cannot write: {error}")).into())
+    })
+}

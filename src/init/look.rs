@@ -1,0 +1,292 @@
+//! What the recordings are: which topic holds the joint states, whose joints they are, in which unit the effort is.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use tauscope_archive::ros::{JointState, Message as _};
+use tauscope_archive::{Info, Recording};
+use tauscope_dynamics::effort_scale::{EffortScale, Slope, TELLING};
+use tauscope_ingest::Topics;
+use tauscope_pipeline::calibrate::Job;
+use tauscope_pipeline::cell::{Cell, ConstantSpot, EffortUnit, first_joint_names};
+use tauscope_pipeline::report::{Problem, Report};
+use tauscope_pipeline::suggest;
+
+use crate::exit::Failure;
+
+/// The arm and its recordings, before anything is fitted.
+#[derive(Debug)]
+pub struct Looked {
+    /// The arm, with the unit that its effort is in.
+    pub cell: Cell,
+    /// Where the joint states are.
+    pub state_topic: String,
+    /// What was found, a sentence each.
+    pub sentences: Vec<String>,
+    /// By recording, how far its joints move in all \[rad or m\].
+    travel: Vec<(PathBuf, f64)>,
+}
+
+impl Looked {
+    /// The recordings to fit, and those that nothing is fitted on: of every four or less one, those in the middle by how
+    /// far the joints move, so that neither a standing arm nor the liveliest motion is kept from the fit.
+    pub fn parted(&self) -> (Vec<PathBuf>, Vec<PathBuf>) {
+        const FOR_ONE_HELD_OUT: usize = 4;
+        let mut sorted: Vec<_> = self.travel.iter().collect();
+        sorted.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let count = sorted.len();
+        let held = if count < 2 {
+            0
+        } else {
+            count.div_ceil(FOR_ONE_HELD_OUT).min(count / 2)
+        };
+        let from = (count - held) / 2;
+        let is_held = |path: &&PathBuf| sorted[from..from + held].iter().any(|one| one.0 == **path);
+        let all = || self.travel.iter().map(|one| &one.0);
+        let fit = all().filter(|path| !is_held(path)).cloned().collect();
+        (fit, all().filter(is_held).cloned().collect())
+    }
+}
+
+/// What is told on the command line.
+#[derive(Debug)]
+pub struct Told<'a> {
+    /// The URDF.
+    pub robot: &'a Path,
+    /// The recordings.
+    pub recordings: &'a [PathBuf],
+    /// The topic of the joint states, where it is told.
+    pub state_topic: Option<&'a str>,
+    /// The unit of the effort, where it is told.
+    pub effort_unit: Option<EffortUnit>,
+}
+
+impl Told<'_> {
+    /// Looks at the recordings.
+    ///
+    /// # Errors
+    /// If they are not those of the robot, or nobody can tell the unit.
+    pub fn look(&self) -> Result<Looked, Failure> {
+        let [_, _, ..] = self.recordings else {
+            let problem = Problem::new(
+                "one recording is too few: one is fitted and another shows whether the fit holds",
+            );
+            let help = "record the arm at least twice, better five times, with different motions and nothing touching it";
+            return Err(Failure::Rejected(problem.help(help).into()));
+        };
+        let cell = self.cell(EffortUnit::A)?;
+        let state_topic = match self.state_topic {
+            Some(topic) => topic.to_owned(),
+            None => self.find_topic(&cell)?,
+        };
+        self.check_joints(&cell, &state_topic)?;
+        let mut sentences = vec![format!(
+            "{} joints of {} on {state_topic} in {} recording(s).",
+            cell.facts.joint_names.len(),
+            cell.facts.name,
+            self.recordings.len()
+        )];
+        let mut travel = Vec::new();
+        for path in self.recordings {
+            let (far, remarks) = oddities(path, &state_topic)?;
+            travel.push((path.clone(), far));
+            let name = path.display();
+            sentences.extend(
+                remarks
+                    .into_iter()
+                    .map(|remark| format!("{name}: {remark}.")),
+            );
+        }
+        let scale = self.scale(&cell, &state_topic)?;
+        let (unit, sentence) = self.unit(&scale)?;
+        sentences.push(sentence);
+        Ok(Looked {
+            cell: self.cell(unit)?,
+            state_topic,
+            sentences,
+            travel,
+        })
+    }
+
+    fn cell(&self, unit: EffortUnit) -> Result<Cell, Report> {
+        let problem = |_: ConstantSpot<'_>, title| Problem::new(title);
+        Cell::from_urdf(self.robot, unit, &BTreeMap::new(), &problem)
+    }
+
+    /// The topic of joint states whose messages name most of the robot's joints.
+    fn find_topic(&self, cell: &Cell) -> Result<String, Report> {
+        let first = &self.recordings[0];
+        let recording = Recording::open(first).map_err(|error| Problem::new(error.to_string()))?;
+        let topics = recording.topics().iter();
+        let topics = topics.filter(|topic| topic.type_name == JointState::TYPE);
+        let named = topics.filter_map(|topic| {
+            let names = first_joint_names(first, &topic.name).ok()?;
+            let wanted = &cell.facts.joint_names;
+            let known = wanted.iter().filter(|name| names.contains(name)).count();
+            let has_effort = has_effort(&recording, &topic.name);
+            Some((has_effort, known, topic.message_count, topic.name.clone()))
+        });
+        let best = named.max();
+        best.map(|(.., name)| name).ok_or_else(|| {
+            let title = format!("{} holds no {}", first.display(), JointState::TYPE);
+            let topics = recording.topics().iter().map(|topic| topic.name.as_str());
+            let help = format!("its topics are {}", suggest::list(topics));
+            Problem::new(title).help(help).into()
+        })
+    }
+
+    /// Every recording must have every joint of the robot.
+    fn check_joints(&self, cell: &Cell, topic: &str) -> Result<(), Report> {
+        let mut report = Report::default();
+        for recording in self.recordings {
+            let names = match first_joint_names(recording, topic) {
+                Ok(names) => names,
+                Err(problems) => {
+                    report.append(problems);
+                    continue;
+                }
+            };
+            let joints = cell.facts.joint_names.iter();
+            let missing: Vec<&str> = joints
+                .filter(|joint| !names.contains(joint))
+                .map(String::as_str)
+                .collect();
+            if missing.is_empty() {
+                continue;
+            }
+            let title = format!(
+                "{}: {topic} does not name {} of the robot {}",
+                recording.display(),
+                suggest::some(&missing),
+                cell.facts.name
+            );
+            let recorded: Vec<&str> = names.iter().map(String::as_str).collect();
+            let help = format!(
+                "it names {}; give the URDF of the arm that was recorded, or --state-topic",
+                suggest::some(&recorded)
+            );
+            report.push(Problem::new(title).help(help));
+        }
+        report.into_result(())
+    }
+
+    /// What the slopes of measured over expected effort tell of the unit.
+    fn scale(&self, cell: &Cell, state_topic: &str) -> Result<EffortScale, Failure> {
+        let topics = Topics {
+            state: state_topic.to_owned(),
+            command: None,
+            twin: None,
+            tool: None,
+            learn: None,
+        };
+        let twin = tauscope_twin::Config::default();
+        let job = Job {
+            cell,
+            topics: &topics,
+            twin: &twin,
+            fit: self.recordings,
+            validation: &[],
+        };
+        let fitted = job.fit(&|_, _| true, &|_, _| {});
+        let fitted = fitted.map_err(|error| Failure::rejected(error.to_string()))?;
+        let joints = fitted.file.joints.iter();
+        let telling = joints.filter(|(_, joint)| joint.explained.unwrap_or(0.0) >= TELLING);
+        let slopes = telling.map(|(name, joint)| Slope {
+            joint: name.clone(),
+            slope: joint.gain,
+        });
+        Ok(EffortScale::of(&slopes.collect::<Vec<_>>()))
+    }
+
+    /// The unit and how it is known.
+    fn unit(&self, scale: &EffortScale) -> Result<(EffortUnit, String), Failure> {
+        if let Some(unit) = self.effort_unit {
+            if unit == EffortUnit::Nm
+                && let Some(fault) = scale.fault_in_nm()
+            {
+                return Err(Failure::rejected(fault.to_string()));
+            }
+            return Ok((unit, format!("Effort is in {}, as told.", words(unit))));
+        }
+        match scale {
+            EffortScale::Torque { slope, sure: true } => {
+                let sentence = format!(
+                    "Effort is in N m: the joints that bear weight measure {slope:.2} times what the robot's weight requires."
+                );
+                Ok((EffortUnit::Nm, sentence))
+            }
+            EffortScale::Current {
+                nm_per_unit,
+                joints,
+            } => {
+                let sentence = format!(
+                    "Effort is in A, motor current: {joints} joint(s) that bear weight measure {:.3} per N m that the \
+                     robot's weight requires, which is a torque constant of {nm_per_unit:.1} N m/A. --effort-unit Nm \
+                     says otherwise.",
+                    1.0 / nm_per_unit
+                );
+                Ok((EffortUnit::A, sentence))
+            }
+            other => Err(Failure::Rejected(undecided(other).into())),
+        }
+    }
+}
+
+/// How far the joints move in a recording, and what is odd about its joint states.
+fn oddities(path: &Path, topic: &str) -> Result<(f64, Vec<String>), Report> {
+    let failed =
+        |error: tauscope_archive::ArchiveError| Report::from(Problem::new(error.to_string()));
+    let info = Info::read(&Recording::open(path).map_err(failed)?).map_err(failed)?;
+    let mut topics = info.topics.into_iter();
+    let joints = topics
+        .find(|info| info.topic.name == topic)
+        .and_then(|info| info.joints);
+    let joints = joints.unwrap_or_default();
+    Ok((
+        joints.joints.iter().map(|joint| joint.travel).sum(),
+        joints.remarks(),
+    ))
+}
+
+/// Why the recordings do not tell the unit, and what to do.
+fn undecided(scale: &EffortScale) -> Problem {
+    let give = "give --effort-unit Nm or --effort-unit A";
+    match scale {
+        EffortScale::Torque { slope, .. } => Problem::new(format!(
+            "the unit of the effort is in doubt: the joints that bear weight measure {slope:.2} times what the robot's \
+             weight requires"
+        ))
+        .help(format!(
+            "a payload, or a URDF with other masses, would do that to N m; {give}"
+        )),
+        EffortScale::TooLarge { .. } | EffortScale::Turned(_) => {
+            let fault = scale.fault_in_nm();
+            Problem::new(fault.map_or_else(String::new, |fault| fault.to_string()))
+        }
+        EffortScale::Untold | EffortScale::Current { .. } => {
+            Problem::new("the unit of the effort cannot be told: no joint bears weight in these recordings").help(format!(
+                "{give}, or add a recording in which the arm moves through poses that its weight loads"
+            ))
+        }
+    }
+}
+
+/// Whether the first message on a topic has efforts.
+fn has_effort(recording: &Recording, topic: &str) -> bool {
+    let states = recording.joint_states(topic).ok();
+    let first = states.and_then(|mut states| {
+        states
+            .next_state()?
+            .ok()
+            .map(|state| !state.message.effort.is_empty())
+    });
+    first.unwrap_or(false)
+}
+
+/// The unit in words.
+pub fn words(unit: EffortUnit) -> &'static str {
+    match unit {
+        EffortUnit::Nm => "N m",
+        EffortUnit::A => "A",
+    }
+}

@@ -1,0 +1,107 @@
+//! What was found, on one page.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+
+use tauscope_explain::report::{Report, Verdict};
+
+use super::folder::Folder;
+use super::learn::Learnt;
+use super::look::Looked;
+
+/// The page as Markdown: what the recordings are, what the twin leaves out, what the detector has learnt, what to
+/// record next, and how to go on.
+pub fn page(folder: &Folder, looked: &Looked, report: &Report, learnt: &Learnt) -> String {
+    let mut text = format!("# {}\n", looked.cell.facts.name);
+    section(&mut text, "Recordings", &looked.sentences);
+
+    let mut twin = vec![report.summary.clone()];
+    if report.verdict != Verdict::NotEvaluated {
+        twin.push(proof(report));
+    }
+    section(&mut text, "Twin", &twin);
+    let findings = report.findings.iter();
+    let findings: Vec<String> = findings.map(|finding| finding.sentence.clone()).collect();
+    let page = folder.explained().join("report.html");
+    list(&mut text, &first(findings, &page.display().to_string()));
+
+    section(&mut text, "Detector", &[]);
+    list(&mut text, &learnt.sentences);
+
+    let next = report.next_motions.iter();
+    let mut next: Vec<String> = next.map(|motion| motion.sentence.clone()).collect();
+    let mut seen = BTreeSet::new();
+    next.retain(|sentence| seen.insert(sentence.clone()));
+    let next = first(next, &page.display().to_string());
+    if !next.is_empty() {
+        section(&mut text, "Record next", &[]);
+        list(&mut text, &next);
+    }
+
+    let pipeline = folder.pipeline();
+    let pipeline = pipeline.display();
+    section(&mut text, "Go on", &[]);
+    list(
+        &mut text,
+        &[
+            format!("Play a recording through the pipeline: `tauscope run {pipeline}`."),
+            format!(
+                "Search recordings for contacts: `tauscope replay RECORDING... --pipeline {pipeline} --out results`."
+            ),
+            format!("Listen to the robot: change `ingest` in {pipeline} as its comment says."),
+            format!(
+                "Read how the twin was corrected: {}.",
+                folder.explained().join("report.html").display()
+            ),
+        ],
+    );
+    text
+}
+
+/// How much smaller the error of the held-out recordings got, joint by joint.
+fn proof(report: &Report) -> String {
+    let joints = report.joints.iter();
+    let errors = report
+        .holdout_rms_before
+        .iter()
+        .zip(&report.holdout_rms_after);
+    let parts = joints
+        .zip(errors)
+        .map(|(joint, (before, after))| format!("{joint} {before:.3} to {after:.3}"));
+    let parts: Vec<String> = parts.collect();
+    format!(
+        "RMS error on recordings that were held out, in {}: {}.",
+        report.effort_unit,
+        parts.join(", ")
+    )
+}
+
+/// The first few of many sentences, and where the others are.
+fn first(mut sentences: Vec<String>, others: &str) -> Vec<String> {
+    const SHOWN: usize = 6;
+    if sentences.len() > SHOWN {
+        let more = sentences.len() - SHOWN;
+        sentences.truncate(SHOWN);
+        sentences.push(format!("{more} more: {others}."));
+    }
+    sentences
+}
+
+fn section(text: &mut String, title: &str, sentences: &[String]) {
+    let _ = write!(text, "\n## {title}\n\n");
+    for sentence in sentences {
+        let _ = writeln!(text, "{sentence}");
+    }
+}
+
+fn list(text: &mut String, sentences: &[String]) {
+    if sentences.is_empty() {
+        return;
+    }
+    if !text.ends_with("\n\n") {
+        text.push('\n');
+    }
+    for sentence in sentences {
+        let _ = writeln!(text, "- {sentence}");
+    }
+}
