@@ -1,5 +1,6 @@
-//! Says on the terminal what a detector or a watch finds, as it finds it.
+//! Tells the supervisor, and so people, what a detector or a watch finds, as it finds it.
 
+use tauscope_bus::shell;
 use tauscope_bus::{
     Contact, ContactFollower, Detection, Emit, EventKind, LinkError, Stage, StageError, TwinState,
     flags,
@@ -8,7 +9,7 @@ use tauscope_bus::{
 use tauscope_pipeline::cell::CellFacts;
 use tauscope_watch as watch;
 
-/// A detect or explain stage whose events are told on standard error. Its stream is untouched.
+/// A detect or explain stage whose events are told to the supervisor. Its stream is untouched.
 pub struct Announced<S> {
     stage: S,
     told: Told,
@@ -71,7 +72,7 @@ impl Emit<Detection> for Listener<'_> {
         self.out.emit(&mut |slot| {
             write(slot);
             if let Some(line) = told.line(slot) {
-                eprintln!("{line}");
+                shell::note(&line);
             }
         })
     }

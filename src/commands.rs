@@ -14,6 +14,8 @@ pub mod send;
 pub mod simulate;
 pub mod stage;
 
+use std::path::{Path, PathBuf};
+
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use tauscope_bus::EffortUnit;
 
@@ -21,4 +23,10 @@ use tauscope_bus::EffortUnit;
 fn effort_unit() -> impl TypedValueParser<Value = EffortUnit> {
     let names = EffortUnit::ALL.map(EffortUnit::as_str);
     PossibleValuesParser::new(names).try_map(|text| text.parse::<EffortUnit>())
+}
+
+/// The pipeline file, named as an argument or with `--pipeline`.
+fn pipeline_file<'a>(argument: Option<&'a PathBuf>, option: Option<&'a PathBuf>) -> &'a Path {
+    let named = argument.or(option).map(PathBuf::as_path);
+    named.unwrap_or(Path::new("pipeline.yaml"))
 }

@@ -1,10 +1,9 @@
 //! How a command ends.
 
-use std::io::IsTerminal;
-
 use tauscope_pipeline::report::{Problem, Report};
 
 use crate::output::Output;
+use crate::terminal;
 
 /// How a command ended that did what was asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,6 +14,8 @@ pub enum Exit {
     Failed,
     /// Done, but data was lost. The summary says which and how much.
     Lossy,
+    /// Wrong arguments or files: nothing was started, and the result says why.
+    Rejected,
 }
 
 impl Exit {
@@ -23,9 +24,10 @@ impl Exit {
         if lost { Self::Lossy } else { Self::Done }
     }
 
-    /// The worse of two: failed, then lossy, then done.
+    /// The worse of two: rejected, then failed, then lossy, then done.
     pub fn and(self, other: Self) -> Self {
         match (self, other) {
+            (Self::Rejected, _) | (_, Self::Rejected) => Self::Rejected,
             (Self::Failed, _) | (_, Self::Failed) => Self::Failed,
             (Self::Lossy, _) | (_, Self::Lossy) => Self::Lossy,
             (Self::Done, Self::Done) => Self::Done,
@@ -40,6 +42,8 @@ pub enum Failure {
     Rejected(Report),
     /// Something failed on the way.
     Failed(anyhow::Error),
+    /// Ctrl-C or SIGTERM; how far it got, and what is there of it.
+    Interrupted(String),
 }
 
 impl Failure {
@@ -80,12 +84,17 @@ pub fn code(outcome: Result<Exit, Failure>, out: &mut Output) -> u8 {
         Ok(Exit::Done) => 0,
         Ok(Exit::Failed) => 1,
         Ok(Exit::Lossy) => 3,
+        Ok(Exit::Rejected) => 2,
         Err(Failure::Failed(error)) => {
             out.say(&format!("error: {error:#}"));
             1
         }
+        Err(Failure::Interrupted(far)) => {
+            out.say(&format!("interrupted {far}"));
+            1
+        }
         Err(Failure::Rejected(report)) => {
-            let styled = matches!(out, Output::Terminal) && std::io::stderr().is_terminal();
+            let styled = matches!(out, Output::Terminal) && terminal::has_colour();
             out.say(&report.render(styled));
             2
         }

@@ -6,16 +6,18 @@
 mod announce;
 mod cli;
 mod commands;
+mod existing;
 mod exit;
 mod explain;
 mod init;
+mod interrupt;
 mod output;
 mod plan;
 mod progress;
 mod supervisor;
+mod terminal;
 
 use std::ffi::OsString;
-use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -33,7 +35,7 @@ pub fn main() -> ExitCode {
         .with_target("tauscope", LevelFilter::WARN);
     let lines = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
+        .with_ansi(terminal::has_colour())
         .without_time()
         .with_target(false);
     tracing_subscriber::registry()
@@ -42,7 +44,16 @@ pub fn main() -> ExitCode {
     match Cli::parse().command.unwrap_or_default() {
         Command::Stage(args) => commands::stage::run(&args),
         Command::Exec(args) => commands::stage::exec(&args),
-        command => ExitCode::from(run(&command, &mut Output::Terminal)),
+        command => {
+            // A run ends its stages in order itself.
+            if !matches!(command, Command::Run(_))
+                && let Err(error) = interrupt::listen()
+            {
+                eprintln!("error: cannot listen to signals: {error}");
+                return ExitCode::FAILURE;
+            }
+            ExitCode::from(run(&command, &mut Output::Terminal))
+        }
     }
 }
 

@@ -4,6 +4,8 @@ use std::sync::{Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use crate::{interrupt, terminal};
+
 /// Steps of the bar; a recording's part is at least one of them.
 const STEPS: f64 = 10_000.0;
 
@@ -15,11 +17,19 @@ pub struct Progress {
     done: Mutex<Vec<f64>>,
 }
 
+/// Standard error, where it can redraw.
+pub fn draw_target() -> ProgressDrawTarget {
+    if terminal::can_redraw() {
+        ProgressDrawTarget::stderr()
+    } else {
+        ProgressDrawTarget::hidden()
+    }
+}
+
 impl Progress {
     /// A bar over `count` recordings.
     pub fn new(count: usize) -> Self {
-        // Hides itself where standard error is no terminal.
-        let bar = ProgressBar::with_draw_target(Some(STEPS as u64), ProgressDrawTarget::stderr());
+        let bar = ProgressBar::with_draw_target(Some(STEPS as u64), draw_target());
         let style = ProgressStyle::with_template("{bar:40} {percent:>3} % {elapsed} (left: {eta})");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         Self {
@@ -52,6 +62,8 @@ impl Progress {
         };
         self.bar.set_position((shown * STEPS) as u64);
         self.bar.set_message(what.to_owned());
+        interrupt::far(shown);
+        interrupt::doing(what);
     }
 
     /// Recording `index` has come to `fraction`.
@@ -62,6 +74,7 @@ impl Progress {
         };
         *own = fraction;
         let mean = done.iter().sum::<f64>() / done.len() as f64;
+        interrupt::far(mean);
         self.bar.set_position((mean * STEPS) as u64);
     }
 

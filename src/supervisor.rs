@@ -2,18 +2,24 @@
 //!
 //! A stage that dies is started again, at once the first time and later the more often it dies; one
 //! that dies too often is given up, and with it the run. On Ctrl-C or SIGTERM the sources are ended
-//! and the rest finishes with what it has; a second time ends everything at once. Nothing outlives
-//! the supervisor: a stage ends when its standard input closes, and Linux kills it when its parent
-//! dies.
+//! and the rest finishes with what it has; a second time ends everything at once. A stage that does not
+//! end is named and then killed. Nothing outlives the supervisor: a stage ends when its standard input
+//! closes, and Linux kills it when its parent dies.
+//!
+//! Whoever gets nothing it can use is named within seconds, with what is there instead ([`watchman`]).
 
+mod flow;
 mod local;
+mod patience;
 mod process;
-
 mod restart;
 mod router;
 mod seats;
+mod silence;
 mod summary;
 mod tally;
+mod view;
+mod watchman;
 
 use std::path::Path;
 use std::time::Duration;
@@ -25,14 +31,14 @@ use tokio::sync::mpsc;
 use tokio::time::Instant;
 
 use crate::plan::{Link, Over};
-
-use crate::progress::Progress;
-use local::Local;
+use local::{Local, Reported};
 use process::{Event, Process};
 use router::Router;
 pub use seats::Instructions;
-pub use summary::Summary;
-use tauscope_pipeline::pipeline::Pipeline;
+pub use summary::{Ended, Summary};
+use tauscope_pipeline::pipeline::{Pipeline, Role};
+pub use view::Verbosity;
+use view::View;
 
 /// A stage whose inputs have all ended has this long to finish by itself before it is asked to.
 const GRACE: Duration = Duration::from_secs(2);
@@ -40,12 +46,31 @@ const GRACE: Duration = Duration::from_secs(2);
 const NEVER: Duration = Duration::from_hours(24);
 /// Events that are not handled yet; a stage that says more waits.
 const EVENTS: usize = 256;
+/// How often it is looked who is silent or does not end.
+const LOOK_EVERY: Duration = Duration::from_millis(250);
+
+/// How a run is looked after.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Care {
+    /// A run in which a source gives nothing for so long has failed.
+    pub expect_data: Option<Duration>,
+    /// How much is told.
+    pub verbosity: Verbosity,
+}
 
 /// Which life of which stage an event belongs to.
 type Mark = (usize, u64);
 
 /// Runs the stages on `host` (all without one) until they have ended.
-pub fn run(pipeline: &Pipeline, links: &[Link], host: Option<&str>) -> anyhow::Result<Summary> {
+///
+/// # Errors
+/// If the host's endpoints cannot be opened, or a process cannot be started.
+pub fn run(
+    pipeline: &Pipeline,
+    links: &[Link],
+    host: Option<&str>,
+    care: Care,
+) -> anyhow::Result<Summary> {
     let domain = Domain::unique();
     let router = Router::open(pipeline, links, host)?;
     let meeting_point = router.as_ref().map(Router::endpoint);
@@ -56,7 +81,7 @@ pub fn run(pipeline: &Pipeline, links: &[Link], host: Option<&str>) -> anyhow::R
         .enable_all()
         .build()
         .context("cannot wait for processes")?;
-    let outcome = runtime.block_on(supervise(pipeline, links, seats, &domain));
+    let outcome = runtime.block_on(supervise(pipeline, links, seats, &domain, care));
     // Best effort: what is left of it does no harm.
     let _ = domain.remove();
     outcome
@@ -67,6 +92,7 @@ async fn supervise(
     links: &[Link],
     seats: Vec<(usize, Seat)>,
     domain: &Domain,
+    care: Care,
 ) -> anyhow::Result<Summary> {
     let here = |at: usize| seats.iter().any(|(place, _)| *place == at);
     let shares = |link: &Link| link.over == Over::SharedMemory && here(link.to);
@@ -75,11 +101,8 @@ async fn supervise(
     } else {
         None
     };
-    let sources = seats
-        .iter()
-        .filter(|(_, seat)| seat.inputs.is_empty())
-        .count();
     let (sender, events) = mpsc::channel(EVENTS);
+    let now = Instant::now();
     let mut supervisor = Supervisor {
         pipeline,
         stages: seats
@@ -89,11 +112,16 @@ async fn supervise(
         shared_memory,
         sender,
         stopping: false,
-        progress: Progress::new(sources),
+        ended: Ended::Completed,
+        view: View::new(care.verbosity, now.into_std()),
+        care,
+        began: now,
+        told_unready: false,
     };
     supervisor.start_all()?;
     supervisor.watch(events).await?;
-    Ok(Summary::new(pipeline, links, &supervisor.stages))
+    let Supervisor { stages, ended, .. } = &supervisor;
+    Ok(Summary::new(pipeline, links, stages, *ended))
 }
 
 struct Supervisor<'a> {
@@ -102,7 +130,13 @@ struct Supervisor<'a> {
     shared_memory: Option<SharedMemory>,
     sender: mpsc::Sender<(Mark, Event)>,
     stopping: bool,
-    progress: Progress,
+    /// Why it ends.
+    ended: Ended,
+    view: View,
+    care: Care,
+    began: Instant,
+    /// It was told which stages do not begin.
+    told_unready: bool,
 }
 
 impl Supervisor<'_> {
@@ -122,7 +156,7 @@ impl Supervisor<'_> {
         let mark = (index, stage.seat.restarts);
         let process = Process::start(command, &stage.seat, mark, self.sender.clone())?;
         let id = process.id();
-        self.progress.say(&format!(
+        self.view.note(&format!(
             "stage `{}` runs as process {id}",
             stage.seat.stage
         ));
@@ -133,6 +167,7 @@ impl Supervisor<'_> {
     async fn watch(&mut self, mut events: mpsc::Receiver<(Mark, Event)>) -> anyhow::Result<()> {
         let mut interrupt = signal(SignalKind::interrupt()).context("cannot catch Ctrl-C")?;
         let mut terminate = signal(SignalKind::terminate()).context("cannot catch SIGTERM")?;
+        let mut look = tokio::time::interval(LOOK_EVERY);
         while !self.stages.iter().all(Local::is_over) {
             let due = self.stages.iter().filter_map(Local::due).min();
             let alarm = due.unwrap_or_else(|| Instant::now() + NEVER);
@@ -140,6 +175,7 @@ impl Supervisor<'_> {
                 Some((mark, event)) = events.recv() => self.take(mark, event),
                 () = any(&mut interrupt, &mut terminate) => self.interrupted(),
                 () = tokio::time::sleep_until(alarm) => self.alarm(),
+                now = look.tick() => self.look(now),
             }
         }
         Ok(())
@@ -150,39 +186,37 @@ impl Supervisor<'_> {
         // Each life's exit is its last event, so there are none of earlier ones.
         debug_assert_eq!(stage.seat.restarts, life, "an event of another life");
         match event {
-            Event::Said(line) => self.progress.say(&format!("[{}] {line}", stage.seat.stage)),
-            Event::Reported(line) => {
-                if stage.report(&line) {
-                    self.show_progress();
-                } else {
-                    self.progress.say(&format!("[{}] {line}", stage.seat.stage));
+            Event::Said(line) => self.view.warn(&format!("[{}] {line}", stage.seat.stage)),
+            Event::Reported(line) => match stage.report(&line) {
+                Reported::Counts => {}
+                Reported::Ready { missing } => {
+                    let missing = match missing {
+                        0 => String::new(),
+                        some => format!(", without {some} of its listeners"),
+                    };
+                    let line = format!("stage `{}` begins{missing}", stage.seat.stage);
+                    self.view.detail(&line);
                 }
-            }
+                Reported::Note(text) => {
+                    self.view.note(&format!("[{}] {text}", stage.seat.stage));
+                }
+                Reported::Other(line) => {
+                    self.view.note(&format!("[{}] {line}", stage.seat.stage));
+                }
+            },
             Event::Exited(status) => {
                 let name = stage.seat.stage.clone();
                 match stage.exited(status) {
                     local::End::InOrder => {}
                     local::End::Died { how, again } => {
                         self.clean();
-                        self.progress.say(&died(&name, &how, again));
+                        self.view.warn(&died(&name, &how, again));
                         if again.is_none() {
                             self.stop();
                         }
                     }
                 }
                 self.settle();
-            }
-        }
-    }
-
-    fn show_progress(&self) {
-        let sources = self
-            .stages
-            .iter()
-            .filter(|stage| stage.seat.inputs.is_empty());
-        for (index, source) in sources.enumerate() {
-            if let Some(fraction) = source.fraction_done() {
-                self.progress.set(index, fraction);
             }
         }
     }
@@ -197,14 +231,15 @@ impl Supervisor<'_> {
 
     fn interrupted(&mut self) {
         if self.stopping {
-            self.progress.say("ending everything at once");
+            self.view.note("ending everything at once");
             for stage in &mut self.stages {
                 stage.kill();
             }
             return;
         }
-        self.progress
-            .say("ending the sources; the other stages finish (again to end everything)");
+        self.ended = Ended::Interrupted;
+        self.view
+            .note("ending the sources; the other stages finish (again to end everything)");
         self.stop();
     }
 
@@ -225,13 +260,18 @@ impl Supervisor<'_> {
             let all_over = inputs.iter().filter_map(local).all(Local::is_over);
             let is_remote = inputs.iter().any(|at| local(at).is_none());
             let is_source = inputs.is_empty();
+            let recorder = self.is_recorder(index);
             let stage = &mut self.stages[index];
             if self.stopping && all_over && (is_source || is_remote) {
-                stage.stop();
+                stage.stop(recorder);
             } else if all_over && !is_source && !is_remote {
                 stage.finish_by(Instant::now() + GRACE);
             }
         }
+    }
+
+    fn is_recorder(&self, index: usize) -> bool {
+        self.pipeline.stages[self.stages[index].at].role == Role::Record
     }
 
     fn alarm(&mut self) {
@@ -241,11 +281,12 @@ impl Supervisor<'_> {
                 continue;
             }
             if !self.stages[index].is_waiting() {
-                self.stages[index].stop();
+                let recorder = self.is_recorder(index);
+                self.stages[index].stop(recorder);
                 continue;
             }
             if let Err(error) = self.start(index) {
-                self.progress.say(&format!("error: {error:#}"));
+                self.view.warn(&format!("error: {error:#}"));
                 self.stages[index].give_up();
                 self.stop();
             }
@@ -255,7 +296,7 @@ impl Supervisor<'_> {
 
 fn died(name: &str, how: &str, again: Option<Duration>) -> String {
     match again {
-        None => format!("error: stage `{name}` {how} and is not started again"),
+        None => format!("error: stage `{name}` {how}; it is not started again"),
         Some(Duration::ZERO) => format!("warning: stage `{name}` {how}: starting it again"),
         Some(wait) => {
             let wait = wait.as_millis();

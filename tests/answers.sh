@@ -35,6 +35,7 @@ for set in tests/proof/set "$shared/practice" "$shared/practice2"; do
         case $case in *"$only"*) ;; *) continue ;; esac
         name=$(basename "$set")/$(basename "$(dirname "$case")")
         [ ! -e "$out/explain/$name.code" ] || continue
+        rm -rf "$out/explain/$name"
         mkdir -p "$out/explain/$name"
         run "$out/explain/$name" explain "$case" --out "$out/explain/$name"
         rm -f "$out/explain/$name"/{report.html,explain.rrd}
@@ -54,6 +55,7 @@ for set in "$shared"/contacts/*/set.yaml; do
     for detectors in $plain $sensors $classifiers; do
         name=$(basename "$(dirname "$set")")/${detectors%%,*}
         [ ! -e "$out/evaluate/$name.code" ] || continue
+        rm -rf "$out/evaluate/$name"
         mkdir -p "$out/evaluate/$name"
         run "$out/evaluate/$name" evaluate "$set" --out "$out/evaluate/$name" --detectors "$detectors"
         # Pages and tables hold how long the computing took.
@@ -61,6 +63,7 @@ for set in "$shared"/contacts/*/set.yaml; do
     done
 done
 
+rm -rf "$out/replay"
 mkdir -p "$out/replay"
 run "$out/replay/demo" replay tests/data/demo.mcap --pipeline pipeline.yaml --out "$out/replay/demo"
 find "$out" -name '*.rrd' -delete

@@ -335,6 +335,35 @@ stages:
 }
 
 #[test]
+fn a_program_reads_the_errors_of_a_broken_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "version: 1
+cells: {demo: {robot: nowhere.urdf}}
+stages:
+- {name: ingest, ingest: {file: {pth: a.mcap}}}
+";
+    for more in [&["--json"][..], &["--format", "json"]] {
+        let out = check(folder.path(), text, more);
+        assert_eq!(out.code, 2, "{out:?}");
+        let said: serde_json::Value = serde_json::from_str(&out.stdout).unwrap();
+        let errors = said["errors"].as_array().unwrap();
+        let wrong = errors.iter().find(|error| error["line"] == 4).unwrap();
+        assert!(wrong["message"].as_str().unwrap().contains("pth"), "{said}");
+        assert!(wrong["column"].as_u64() > Some(1), "{said}");
+        let file = folder.path().join("pipeline.yaml");
+        assert_eq!(
+            wrong["file"].as_str().map(Path::new),
+            Some(&*file),
+            "{said}"
+        );
+        assert_eq!(out.stderr, "");
+    }
+    let torn = check(folder.path(), "version: [", &["--json"]);
+    let said: serde_json::Value = serde_json::from_str(&torn.stdout).unwrap();
+    assert!(said["errors"][0]["line"].is_u64(), "{said}");
+}
+
+#[test]
 fn a_recording_is_looked_for_on_the_host_that_reads_it() {
     let folder = tempfile::tempdir().unwrap();
     let text = "version: 1
@@ -355,6 +384,8 @@ fn wrong_arguments_and_files_end_with_2() {
     for arguments in [
         &["run", "nowhere.yaml"][..],
         &["check", "nowhere.yaml"],
+        &["check", "--pipeline", "nowhere.yaml"],
+        &["run", "--pipeline", "nowhere.yaml"],
         &["info", "nowhere.mcap"],
         &["repair", "nowhere.mcap"],
         &["simulate", "nowhere.yaml", "--out", "out"],

@@ -15,7 +15,8 @@ const DETECTORS: &str = "virtual_collision_sensor_basic,virtual_collision_sensor
 /// Runs `tauscope` and expects it to go well.
 fn done(more: &[&str], path: &Path, out: &Path) -> Out {
     let mut command = tauscope();
-    command.args(more).arg(path).arg("--out").arg(out);
+    command.args(more).arg(path).arg("--force");
+    command.arg("--out").arg(out);
     let done = Out::of(command);
     assert_eq!(done.code, 0, "{}", done.stderr);
     done

@@ -91,7 +91,7 @@ fn three_free_recordings_make_a_pipeline_that_finds_every_push() {
     let again = init(&cell, &[]);
     assert_eq!(again.code, 2, "{}", again.stdout);
     assert!(
-        again.stderr.contains("would replace") && again.stderr.contains("--force"),
+        again.stderr.contains("already") && again.stderr.contains("--force"),
         "{}",
         again.stderr
     );

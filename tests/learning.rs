@@ -134,7 +134,7 @@ fn the_archive_holds_the_request_and_replays_as_the_run_went() {
     // A replay begins with what the pipeline file says, whatever the state file holds.
     let mut command = tauscope();
     command
-        .args(["replay", "--json", "--pipeline"])
+        .args(["replay", "--force", "--json", "--pipeline"])
         .arg(cell.path("asked.yaml"));
     command
         .arg(cell.path("asked.mcap"))

@@ -22,7 +22,8 @@ fn simulate(folder: &Path, seed: u64, physics: &Value, recordings: &Value) {
         &scenario.to_string(),
     );
     let mut simulate = tauscope();
-    simulate.arg("simulate").arg(file).arg("--out").arg(folder);
+    simulate.arg("simulate").arg(file).arg("--force");
+    simulate.arg("--out").arg(folder);
     let out = Out::of(simulate);
     assert_eq!(out.code, 0, "{}", out.stderr);
 }

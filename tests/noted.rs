@@ -345,7 +345,7 @@ fn a_push_on_a_link_that_cannot_move_is_refused() {
     let scenario = write(&folder.path().join("scenario.yaml"), &text);
     let mut simulate = tauscope();
     simulate
-        .arg("simulate")
+        .args(["simulate", "--force"])
         .arg(scenario)
         .arg("--out")
         .arg(folder.path().join("out"));

@@ -31,6 +31,7 @@ fn replay(folder: &Path, pipeline: &str, recordings: &[&Path]) -> Out {
     let mut command = tauscope();
     command
         .arg("replay")
+        .arg("--force")
         .arg("--json")
         .arg("--pipeline")
         .arg(file)

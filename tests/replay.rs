@@ -43,6 +43,7 @@ fn events(out: &Out, detector: &str) -> Vec<serde_json::Value> {
 fn replay(pipeline: &Path, recording: &Path, out: &Path, more: &[&str]) -> Out {
     let pipeline = [
         "replay".as_ref(),
+        "--force".as_ref(),
         "--json".as_ref(),
         "--pipeline".as_ref(),
         pipeline.as_os_str(),

@@ -34,7 +34,7 @@ recordings:
     );
     let scenario = write(&folder.join("scenario.yaml"), &scenario);
     let mut simulate = tauscope();
-    simulate.arg("simulate").arg(scenario);
+    simulate.arg("simulate").arg(scenario).arg("--force");
     let out = Out::of({
         simulate.arg("--out").arg(folder);
         simulate

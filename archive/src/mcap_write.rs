@@ -130,6 +130,7 @@ impl McapWriter {
             .create_new(true)
             .open(&part)
             .map_err(io(&part))?;
+        whole_file::begin(&part);
         let writer = options(compression)
             .profile("ros2")
             .library(LIBRARY)

@@ -78,6 +78,7 @@ pub fn repair(from: &Path, to: &Path) -> Result<Repaired, RepairError> {
     }
     let layout = Arc::new(Layout::read(from)?);
     let part = whole_file::part_of(to);
+    whole_file::begin(&part);
     let file = OpenOptions::new()
         .read(true)
         .write(true)

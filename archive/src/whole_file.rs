@@ -2,12 +2,15 @@
 //!
 //! A file is written beside its name, with `.part` at the end, and gets its name when nothing is
 //! missing any more. So a file with its proper name is complete, and a writer that died leaves a
-//! `.part` and nothing else.
+//! `.part` and nothing else. A program that ends on purpose takes its own unfinished files with it
+//! ([`remove_unfinished`]).
 
+use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use rustix::fs::{CWD, RenameFlags, renameat_with};
 use rustix::io::Errno;
@@ -23,6 +26,30 @@ pub enum Existing {
     Keep,
     /// The new file takes its place.
     Replace,
+}
+
+/// The `.part` files that this process has begun and not finished.
+static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// This process begins to write `part`.
+pub fn begin(part: &Path) {
+    let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+    unfinished.insert(part.to_owned());
+}
+
+fn end(part: &Path) {
+    let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+    unfinished.remove(part);
+}
+
+/// Removes what this process has begun and not finished: what it would have held is made again by doing
+/// the same again. Not for recordings of a live robot.
+pub fn remove_unfinished() {
+    let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+    for part in std::mem::take(&mut *unfinished) {
+        // One that is not there any more need not be removed.
+        let _ = fs::remove_file(part);
+    }
 }
 
 /// What a file is called until it is whole: `a.mcap.part` for `a.mcap`.
@@ -42,6 +69,7 @@ pub fn write(path: &Path, contents: impl AsRef<[u8]>, existing: Existing) -> io:
         fs::create_dir_all(folder)?;
     }
     let part = part_of(path);
+    begin(&part);
     let written = File::create(&part).and_then(|mut file| {
         file.write_all(contents.as_ref())?;
         file.sync_all()
@@ -50,6 +78,7 @@ pub fn write(path: &Path, contents: impl AsRef<[u8]>, existing: Existing) -> io:
     if placed.is_err() {
         // Whatever it was that failed is what the caller is told.
         let _ = fs::remove_file(&part);
+        end(&part);
     }
     placed
 }
@@ -65,6 +94,7 @@ pub fn put_in_place(part: &Path, path: &Path, existing: Existing) -> io::Result<
         Existing::Replace => fs::rename(part, path)?,
         Existing::Keep => rename_to_new(part, path)?,
     }
+    end(part);
     match path.parent() {
         Some(folder) if folder != Path::new("") => File::open(folder)?.sync_all(),
         _ => File::open(".")?.sync_all(),
@@ -144,6 +174,20 @@ mod tests {
         write(&path, "new", Existing::Replace).unwrap();
         assert_eq!(fs::read_to_string(&path).unwrap(), "new");
         assert!(!part_of(&path).exists(), "nothing unfinished stays");
+    }
+
+    #[test]
+    fn what_is_unfinished_is_removed_and_what_is_whole_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let (whole, torn) = (
+            folder.path().join("a.json"),
+            folder.path().join("b.mcap.part"),
+        );
+        write(&whole, "all", Existing::Keep).unwrap();
+        begin(&torn);
+        fs::write(&torn, "hal").unwrap();
+        remove_unfinished();
+        assert!(whole.exists() && !torn.exists());
     }
 
     #[test]

@@ -8,12 +8,14 @@ pub mod sample;
 pub mod seat;
 pub mod shell;
 pub mod stage;
+mod trouble;
 
 pub use contact::{Contact, ContactFollower, Force};
 pub use effort_unit::EffortUnit;
 pub use link::{
     Audience, Domain, InProcess, Keep, LinkError, Position, Received, Receiver, ReceiverCounts,
     Sender, SenderCounts, SharedMemory, Transport, Zenoh, ZenohEndpoints, ZenohRouter,
+    zenoh_reason,
 };
 pub use sample::{
     Command, Detection, EventKind, Header, Health, JointArray, JointState, MAX_JOINTS, Name,
@@ -21,3 +23,4 @@ pub use sample::{
 };
 pub use seat::Seat;
 pub use stage::{Emit, Progress, Sink, Source, Stage, StageError};
+pub use trouble::Trouble;

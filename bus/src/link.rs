@@ -22,7 +22,7 @@ pub mod zenoh;
 pub use fan_out::FanOut;
 pub use in_process::InProcess;
 pub use shared_memory::{Domain, DomainError, SharedMemory};
-pub use zenoh::{Zenoh, ZenohEndpoints, ZenohRouter};
+pub use zenoh::{Zenoh, ZenohEndpoints, ZenohRouter, zenoh_reason};
 
 /// How long a sender waits for one keep-all receiver that takes nothing, before it counts the
 /// sample as undelivered and goes on. A receiver that has used this up is not waited for again until

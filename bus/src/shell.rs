@@ -17,7 +17,7 @@ mod sink;
 mod source;
 mod stage;
 
-pub use child::{Child, ChildError, Line, outside};
+pub use child::{Child, ChildError, Line, note, outside};
 pub use health::HealthClock;
 pub use report::{Board, InputReport, Outcome, Report};
 pub use sink::{SinkInput, run_sink};

@@ -4,9 +4,11 @@
 //! turns one into another, a [`Sink`] takes many and gives none.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use crate::link::LinkError;
 use crate::sample::{Sample, SampleRef};
+use crate::trouble::Trouble;
 
 /// Where a stage puts its output: a slot is loaned, written in place and sent.
 pub trait Emit<T: Sample> {
@@ -67,6 +69,12 @@ pub trait Source<T: Sample>: Send {
     fn fraction_done(&self) -> Option<f64> {
         None
     }
+
+    /// Why nothing that can be used comes, `silent_for` after the last sample (or the start); `None` while all is
+    /// well. Asked twice a second, and answers within a tenth of one.
+    fn trouble(&mut self, _silent_for: Duration) -> Option<Trouble> {
+        None
+    }
 }
 
 impl<T: Sample, S: Source<T> + ?Sized> Source<T> for Box<S> {
@@ -80,6 +88,10 @@ impl<T: Sample, S: Source<T> + ?Sized> Source<T> for Box<S> {
 
     fn fraction_done(&self) -> Option<f64> {
         (**self).fraction_done()
+    }
+
+    fn trouble(&mut self, silent_for: Duration) -> Option<Trouble> {
+        (**self).trouble(silent_for)
     }
 }
 

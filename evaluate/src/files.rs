@@ -14,10 +14,15 @@ use tauscope_twin::ScoreStatistics;
 use crate::evaluation::{Evaluation, Run};
 use crate::input::Request;
 use crate::judged::Judged;
+use crate::recording::Role;
 use crate::runner::{Output, Runner};
 use crate::tables::Table;
 use crate::twin::Prepared;
 use crate::{html, parquet};
+
+const PAGE: &str = "report.html";
+const RESULTS: &str = "results.parquet";
+const EVENTS: &str = "events.parquet";
 
 /// Why results are not written.
 #[derive(Debug, thiserror::Error)]
@@ -105,14 +110,11 @@ pub fn write(
         let text = yaml("what was learnt", &learnt)?;
         write_whole(&folder.join("learnt.yaml"), text.as_bytes())?;
     }
-    parquet::write_results(&out.join("results.parquet"), evaluation)
-        .map_err(|e| failed("the results", e))?;
-    parquet::write_events(&out.join("events.parquet"), judged)
-        .map_err(|e| failed("the events", e))?;
+    parquet::write_results(&out.join(RESULTS), evaluation).map_err(|e| failed("the results", e))?;
+    parquet::write_events(&out.join(EVENTS), judged).map_err(|e| failed("the events", e))?;
     let page = html::page(evaluation, judged, tables).map_err(|e| failed("the page", e))?;
-    write_whole(&out.join("report.html"), page.as_bytes())?;
-    let names = ["report.html", "results.parquet", "events.parquet"];
-    Ok(names.map(|name| out.join(name)).to_vec())
+    write_whole(&out.join(PAGE), page.as_bytes())?;
+    Ok([PAGE, RESULTS, EVENTS].map(|name| out.join(name)).to_vec())
 }
 
 /// The twin as a pipeline loads it, with the statistics that thresholds are made from.
@@ -132,6 +134,30 @@ fn write_twin<'a>(
     }
     let text = yaml("the twin", &file)?;
     write_whole(&folder.join("twin.yaml"), text.as_bytes())
+}
+
+/// The files that an evaluation into `out` writes.
+pub fn results(out: &Path, request: &Request) -> Vec<PathBuf> {
+    let mut files = [PAGE, RESULTS, EVENTS].map(|name| out.join(name)).to_vec();
+    for (index, twin) in request.twins.iter().enumerate() {
+        let folder = if index == 0 {
+            out.to_owned()
+        } else {
+            out.join(&twin.name)
+        };
+        files.extend(["twin.yaml", "learnt.yaml"].map(|name| folder.join(name)));
+        for recording in request
+            .recordings
+            .iter()
+            .filter(|one| one.role != Role::Train)
+        {
+            for detector in &request.detectors {
+                let stem = format!("{}.{}", recording.name, detector.name);
+                files.extend(["csv", "json"].map(|ending| folder.join(format!("{stem}.{ending}"))));
+            }
+        }
+    }
+    files
 }
 
 /// Makes the folder for results.

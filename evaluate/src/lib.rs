@@ -20,7 +20,7 @@ mod twin;
 
 pub use error::EvaluateError;
 pub use evaluation::{Evaluation, Progress, Run, run};
-pub use files::{WriteError, prepare, write};
+pub use files::{WriteError, prepare, results, write};
 pub use input::{Options, Request, load};
 pub use judged::Judged;
 pub use metrics::Numbers;

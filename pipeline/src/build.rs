@@ -2,10 +2,11 @@
 //! which builds every twin and detector to see whether it can be.
 
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use tauscope_bus::{
-    Emit, JointState, LinkError, Progress, SampleKind, Source, StageError, ZenohEndpoints,
+    Emit, JointState, LinkError, Progress, SampleKind, Source, StageError, Trouble, ZenohEndpoints,
 };
 use tauscope_detect::Detect;
 use tauscope_ingest::{Commanded, IngestError, Paced, Rate, SimulatedRobot};
@@ -80,7 +81,9 @@ pub fn ingest(
     after_ns: Option<i64>,
 ) -> Result<Box<dyn Source<JointState>>, IngestError> {
     let setup = ingest_setup(cell);
-    let Some(after_ns) = after_ns else {
+    // What is live does not come a second time.
+    let (_, source) = config.source()?;
+    let Some(after_ns) = after_ns.filter(|_| source.file().is_some()) else {
         return tauscope_ingest::open(config, &setup, robot);
     };
     // What was given out before is read again as fast as can be, and only then paced.
@@ -134,6 +137,10 @@ impl Source<JointState> for After {
 
     fn fraction_done(&self) -> Option<f64> {
         self.inner.fraction_done()
+    }
+
+    fn trouble(&mut self, silent_for: Duration) -> Option<Trouble> {
+        self.inner.trouble(silent_for)
     }
 }
 

@@ -16,6 +16,7 @@ use crate::cell::{Cell, EffortUnit};
 use crate::graph::Graph;
 use crate::provenance;
 use crate::replay::ReplayError;
+use crate::report::without_path;
 
 /// What to calibrate, and on what.
 #[derive(Debug)]
@@ -36,7 +37,7 @@ pub struct Job<'a> {
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrateError {
     /// A recording cannot be run through the stages.
-    #[error("{}: {source}", recording.display())]
+    #[error("{}: {}", recording.display(), without_path(recording, source.to_string()))]
     Recording {
         /// The recording.
         recording: PathBuf,
@@ -235,8 +236,11 @@ impl Job<'_> {
                 Box::new(Settled { take, reset: true }),
                 vec![input],
             );
-            let counts = graph.run(progress)?;
-            Ok(counts.iter().map(|stage| stage.dropped).sum())
+            let counts = graph.run(&mut |fraction| {
+                progress(fraction);
+                true
+            })?;
+            Ok(counts.iter().flatten().map(|stage| stage.dropped).sum())
         };
         run().map_err(failed)
     }

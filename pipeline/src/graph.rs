@@ -304,20 +304,27 @@ impl<'a> Graph<'a> {
     }
 
     /// Runs until every source has ended and everything has passed through. `progress` is told how
-    /// far the sources are, from 0 to 1, where they know.
+    /// far the sources are, from 0 to 1, where they know, and by returning `false` ends the work: nothing is
+    /// completed, and `None` comes back.
     ///
     /// # Errors
     /// The first that a stage gives.
-    pub fn run(&mut self, progress: &mut dyn FnMut(f64)) -> Result<Vec<StageCounts>, StageError> {
+    pub fn run(
+        &mut self,
+        progress: &mut dyn FnMut(f64) -> bool,
+    ) -> Result<Option<Vec<StageCounts>>, StageError> {
         loop {
             self.turn(Place::Source)?;
             while self.turn(Place::Stage)? {}
             self.turn(Place::Sink)?;
             let nodes = || self.nodes.iter().map(|(_, node)| node);
             let done = nodes().filter_map(|node| node.fraction_done());
-            progress(done.fold(1.0, f64::min));
+            let goes_on = progress(done.fold(1.0, f64::min));
             if nodes().all(|node| node.is_over()) {
-                return Ok(nodes().map(|node| node.counts()).collect());
+                return Ok(Some(nodes().map(|node| node.counts()).collect()));
+            }
+            if !goes_on {
+                return Ok(None);
             }
         }
     }

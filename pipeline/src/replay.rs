@@ -120,7 +120,8 @@ impl<'a> Replay<'a> {
             .collect()
     }
 
-    /// Replays one recording into `out`, if there is one; `progress` is told how far it is, 0 to 1.
+    /// Replays one recording into `out`, if there is one; `progress` is told how far it is, 0 to 1, and by
+    /// returning `false` ends the work ([`ReplayError::Interrupted`]).
     ///
     /// # Errors
     /// If it cannot be read or not be written; what was begun is left with `.part` at its end.
@@ -128,7 +129,7 @@ impl<'a> Replay<'a> {
         &self,
         recording: &Path,
         out: Option<&Path>,
-        progress: &mut dyn FnMut(f64),
+        progress: &mut dyn FnMut(f64) -> bool,
     ) -> Result<Outcome, ReplayError> {
         let cell = self.cell();
         let stem = stem(recording);
@@ -192,11 +193,22 @@ impl<'a> Replay<'a> {
         }
         let inputs = self.inputs(&mut graph, streams.keys().copied(), &streams)?;
         graph.sink("observer", Box::new(&mut observer), inputs);
-        let mut stages = graph.run(progress)?;
+        let mut stages = graph.run(progress)?.ok_or(ReplayError::Interrupted)?;
         // The observer is no stage of the pipeline.
         stages.pop();
         drop(graph);
         Ok(observer.observed.into_outcome(cell, stem, stages, files))
+    }
+
+    /// The files that a replay of `recording` into `out` writes.
+    pub fn files(&self, recording: &Path, out: &Path) -> Vec<PathBuf> {
+        let mut files = Vec::new();
+        for &index in &self.members {
+            if let Settings::Record(config) = &self.pipeline.stages[index].settings {
+                redirect(config, Some(out), &stem(recording), &mut files);
+            }
+        }
+        files
     }
 
     fn cell(&self) -> &'a Cell {

@@ -6,6 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
+use serde::Serialize;
 
 /// A text that was read, and where from.
 #[derive(Debug)]
@@ -57,11 +58,11 @@ impl Problem {
         }
     }
 
-    /// Something wrong with a file as a whole.
+    /// Something wrong with a file as a whole. Where the title begins with the path, that is told once.
     pub fn of_file(path: &Path, title: impl Into<String>) -> Self {
         Self {
             path: Some(path.display().to_string()),
-            ..Self::new(title)
+            ..Self::new(without_path(path, title))
         }
     }
 
@@ -119,6 +120,24 @@ impl Problem {
         )
     }
 
+    /// For machines.
+    fn entry(&self) -> Entry<'_> {
+        let place = self.source.as_ref().zip(self.labels.first());
+        let (line, column) = place
+            .map(|(source, label)| line_and_column(&source.text, label.span.start))
+            .unzip();
+        let path = self.source.as_ref().map(|source| source.path.as_str());
+        let said = self.labels.first().map(|label| label.text.as_str());
+        Entry {
+            file: path.or(self.path.as_deref()),
+            line,
+            column,
+            message: &self.title,
+            label: said.filter(|text| !text.is_empty()),
+            help: self.help.as_deref(),
+        }
+    }
+
     fn render(&self, renderer: &Renderer) -> String {
         let mut group = Group::with_title(Level::ERROR.primary_title(self.title.as_str()));
         if let Some(source) = &self.source {
@@ -144,6 +163,38 @@ impl Problem {
         }
         renderer.render(&[group])
     }
+}
+
+/// What is said of a file, without its path in front.
+pub fn without_path(path: &Path, text: impl Into<String>) -> String {
+    let text = text.into();
+    let rest = text.strip_prefix(&format!("{}: ", path.display()));
+    rest.map_or_else(|| text.clone(), str::to_owned)
+}
+
+/// A problem as a program reads it.
+#[derive(Debug, Serialize)]
+struct Entry<'a> {
+    /// `None` where it is in no file, but in the arguments.
+    file: Option<&'a str>,
+    /// From 1; `None` where it concerns the file as a whole.
+    line: Option<usize>,
+    /// In characters, from 1.
+    column: Option<usize>,
+    message: &'a str,
+    /// What is said at the place itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    label: Option<&'a str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    help: Option<&'a str>,
+}
+
+/// Where a byte of a text stands, from 1.
+fn line_and_column(text: &str, byte: usize) -> (usize, usize) {
+    let before = text.get(..byte).unwrap_or(text);
+    let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+    let line = before.matches('\n').count() + 1;
+    (line, before[line_start..].chars().count() + 1)
 }
 
 /// Everything that is wrong. Never empty where it is returned as an error.
@@ -190,6 +241,12 @@ impl Report {
         Err(self)
     }
 
+    /// Every problem for a program: `{"errors": [{"file", "line", "column", "message", "label", "help"}]}`.
+    pub fn json(&self) -> serde_json::Value {
+        let errors: Vec<Entry<'_>> = self.problems.iter().map(Problem::entry).collect();
+        serde_json::json!({ "errors": errors })
+    }
+
     /// Every problem as rustc prints errors, with colours if `styled`, and their number.
     pub fn render(&self, styled: bool) -> String {
         let renderer = if styled {
@@ -228,3 +285,28 @@ impl fmt::Display for Report {
 }
 
 impl std::error::Error for Report {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_program_reads_file_line_and_column() {
+        let source = Source::new(Path::new("p.yaml"), "a: 1\nä: {b: x}\n".to_owned());
+        let mut report = Report::default();
+        report.push(Problem::at(&source, 13..14, "`x` is no number").help("give one"));
+        report.push(Problem::of_file(Path::new("q.yaml"), "q.yaml: is empty"));
+        let json = report.json();
+        let first = &json["errors"][0];
+        assert_eq!(
+            (&first["line"], &first["column"]),
+            (&2.into(), &8.into()),
+            "{json}"
+        );
+        assert_eq!(first["file"], "p.yaml");
+        assert_eq!(first["help"], "give one");
+        assert_eq!(json["errors"][1]["file"], "q.yaml");
+        assert_eq!(json["errors"][1]["message"], "is empty");
+        assert_eq!(json["errors"][1]["line"], serde_json::Value::Null);
+    }
+}

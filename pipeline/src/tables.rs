@@ -11,6 +11,7 @@ use parquet::arrow::ArrowWriter;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::errors::ParquetError;
 use parquet::file::properties::WriterProperties;
+use tauscope_archive::whole_file::{self, Existing};
 
 use crate::replay::Outcome;
 
@@ -182,7 +183,8 @@ pub fn write_table(
         source,
     };
     let batch = RecordBatch::try_from_iter(columns)?;
-    let part = path.with_extension("parquet.part");
+    let part = whole_file::part_of(path);
+    whole_file::begin(&part);
     let file = File::create(&part).map_err(failed)?;
     let properties = WriterProperties::builder()
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
@@ -191,5 +193,5 @@ pub fn write_table(
     let mut writer = ArrowWriter::try_new(file, batch.schema(), Some(properties))?;
     writer.write(&batch)?;
     writer.close()?;
-    std::fs::rename(&part, path).map_err(failed)
+    whole_file::put_in_place(&part, path, Existing::Replace).map_err(failed)
 }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use tauscope_archive::whole_file::{self, Existing};
 use tauscope_detect::{Config, LearnError, Lessons, Setup, Trained, TrainedError};
 
 /// Ending of the files.
@@ -70,8 +71,11 @@ pub fn write(
     name.push(ENDING);
     let path = PathBuf::from(name);
     let write = || -> Result<(), Box<dyn std::error::Error>> {
-        std::fs::create_dir_all(path.parent().unwrap_or(Path::new(".")))?;
-        Ok(std::fs::write(&path, trained.to_bytes()?)?)
+        Ok(whole_file::write(
+            &path,
+            trained.to_bytes()?,
+            Existing::Replace,
+        )?)
     };
     match write() {
         // Absolute: what names it is copied into pipeline files that lie anywhere.

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use comfy_table::{CellAlignment, Table, presets};
+use tauscope_archive::whole_file::{self, Existing};
 use tauscope_ingest::Topics;
 use tauscope_pipeline::calibrate::{Calibrated, Job};
 use tauscope_pipeline::cell::{Cell, ConstantSpot, EffortUnit};
@@ -12,7 +13,9 @@ use tauscope_pipeline::report::Problem;
 use tauscope_twin::{Expected, Motion, TwinFile};
 
 use super::effort_unit;
+use crate::existing::Force;
 use crate::exit::{Exit, Failure};
+use crate::interrupt;
 use crate::output::Output;
 use crate::progress::Progress;
 
@@ -61,6 +64,8 @@ pub struct Args {
     /// Low-pass on measured and expected effort, in Hz.
     #[arg(long, default_value_t = tauscope_twin::Filters::default().effort_cutoff_hz)]
     effort_cutoff_hz: f64,
+    #[command(flatten)]
+    force: Force,
     /// Machine-readable.
     #[arg(long)]
     json: bool,
@@ -85,6 +90,7 @@ fn motion(text: &str) -> Result<Motion, String> {
 
 /// Calibrates and writes the twin.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
+    args.force.check([args.out.clone()])?;
     let constants = args.torque_constant.iter().cloned().collect();
     let problem = |_: ConstantSpot<'_>, title| Problem::new(title);
     let cell = Cell::from_urdf(&args.robot, args.effort_unit, &constants, &problem)?;
@@ -131,7 +137,9 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         }
     })?;
     calibrated.file.provenance = provenance(args)?;
+    let hold = interrupt::hold();
     write(&args.out, &calibrated.file)?;
+    drop(hold);
     if args.json {
         out.print(&serde_json::to_string_pretty(&calibrated.file).context("the twin")?)?;
     } else {
@@ -162,12 +170,9 @@ fn provenance(args: &Args) -> anyhow::Result<std::collections::BTreeMap<String, 
 /// Writes the twin beside `path` and moves it there once it is whole.
 fn write(path: &Path, file: &TwinFile) -> Result<(), Failure> {
     let text = serde_saphyr::to_string(file).context("the twin")?;
-    let mut part = path.as_os_str().to_owned();
-    part.push(".part");
-    std::fs::write(&part, text)
-        .and_then(|()| std::fs::rename(&part, path))
-        .map_err(|error| Problem::of_file(path, format!("cannot write: {error}")).into())
-        .map_err(|report: tauscope_pipeline::report::Report| Failure::Rejected(report))
+    whole_file::write(path, text, Existing::Replace).map_err(|error| {
+        Failure::Rejected(Problem::of_file(path, format!("cannot write: {error}")).into())
+    })
 }
 
 fn report(calibrated: &Calibrated, cell: &Cell, args: &Args) -> String {

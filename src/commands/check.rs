@@ -14,9 +14,12 @@ use crate::plan;
 /// Check a pipeline file, and print its stages, hosts and links; or check another kind of file.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The pipeline file, or another one with `--kind`.
-    #[arg(default_value = "pipeline.yaml")]
-    file: PathBuf,
+    /// The pipeline file, or another one with `--kind`; by default `pipeline.yaml`.
+    #[arg(conflicts_with = "pipeline")]
+    file: Option<PathBuf>,
+    /// The same, as `replay` takes it.
+    #[arg(long, value_name = "FILE")]
+    pipeline: Option<PathBuf>,
     /// What kind of file it is. Of those that are no pipeline the shape is checked: every key, every
     /// type, every unit of choice.
     #[arg(long, value_enum, default_value_t)]
@@ -32,7 +35,13 @@ pub struct Args {
     json: bool,
 }
 
-#[derive(Debug, Clone, Copy, Default, ValueEnum)]
+impl Args {
+    fn format(&self) -> Format {
+        if self.json { Format::Json } else { self.format }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 enum Format {
     /// Tables.
     #[default]
@@ -45,19 +54,34 @@ enum Format {
     Json,
 }
 
-/// Checks and prints.
+/// Checks and prints. For a program the errors are printed, too: an empty list where nothing is wrong.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
+    let outcome = check(args, out);
+    if let Err(Failure::Rejected(report)) = &outcome
+        && args.format() == Format::Json
+    {
+        let text = serde_json::to_string_pretty(&report.json());
+        out.print(&text.map_err(anyhow::Error::from)?)?;
+        return Ok(Exit::Rejected);
+    }
+    outcome
+}
+
+fn check(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
+    let file = super::pipeline_file(args.file.as_ref(), args.pipeline.as_ref());
     if args.kind != FileKind::Pipeline {
-        args.kind.check_shape(&args.file)?;
+        args.kind.check_shape(file)?;
+        if args.format() == Format::Json {
+            out.print("{\n  \"errors\": []\n}")?;
+        }
         return Ok(Exit::Done);
     }
-    let pipeline = Pipeline::load(&args.file, args.host.as_deref())?;
+    let pipeline = Pipeline::load(file, args.host.as_deref())?;
     for warning in pipeline.warnings(args.host.as_deref()) {
         out.say(&format!("warning: {warning}"));
     }
     let links = plan::links(&pipeline);
-    let format = if args.json { Format::Json } else { args.format };
-    let text = match format {
+    let text = match args.format() {
         Format::Table => plan::table(&pipeline, &links),
         Format::Mermaid => plan::mermaid(&pipeline, &links),
         Format::Dot => plan::dot(&pipeline, &links),
@@ -92,6 +116,7 @@ fn json(pipeline: &Pipeline, links: &[plan::Link]) -> serde_json::Value {
         })
     });
     json!({
+        "errors": [],
         "stages": stages.collect::<Vec<_>>(),
         "hosts": pipeline.hosts,
         "links": links.collect::<Vec<_>>(),

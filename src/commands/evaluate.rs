@@ -6,7 +6,9 @@ use anyhow::Context as _;
 use serde::Serialize;
 use tauscope_evaluate::{Evaluation, Judged, Options, Table};
 
+use crate::existing::Force;
 use crate::exit::{Exit, Failure};
+use crate::interrupt;
 use crate::output::Output;
 use crate::progress::Progress;
 
@@ -36,6 +38,8 @@ pub struct Args {
     /// How many detectors are worked on at once.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
     jobs: u16,
+    #[command(flatten)]
+    force: Force,
     /// Machine-readable.
     #[arg(long)]
     json: bool,
@@ -57,6 +61,8 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         jobs: usize::from(args.jobs),
     };
     let request = tauscope_evaluate::load(&args.set, &options)?;
+    args.force
+        .check(tauscope_evaluate::results(&args.out, &request))?;
     tauscope_evaluate::prepare(&args.out, &request)?;
     let progress = Progress::of_work();
     let result = tauscope_evaluate::run(request, &args.out, &|share, what| {
@@ -73,7 +79,9 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     progress.doing(1.0, "writing");
     let judged = Judged::all(&evaluation);
     let tables = tauscope_evaluate::tables(&evaluation, &judged);
+    let hold = interrupt::hold();
     let files = tauscope_evaluate::write(&args.out, &evaluation, &judged, &tables)?;
+    drop(hold);
     drop(progress);
     if args.json {
         let summary = Summary::of(&evaluation, &judged, &tables, &files);

@@ -5,8 +5,10 @@ use std::path::PathBuf;
 use tauscope_pipeline::cell::EffortUnit;
 
 use super::effort_unit;
+use crate::existing::Force;
 use crate::exit::{Exit, Failure};
 use crate::explain::{self, Arguments, Kept, Request};
+use crate::interrupt;
 use crate::output::Output;
 use crate::progress::Progress;
 
@@ -57,6 +59,8 @@ pub struct Args {
     /// An effect that is left out of the library; may be given several times.
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
+    #[command(flatten)]
+    force: Force,
     /// Print the report as `report.json` holds it.
     #[arg(long)]
     json: bool,
@@ -85,15 +89,18 @@ impl Args {
 /// Explains, and writes what was found.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let request = args.request()?;
+    explain::refuse_to_replace(&args.out, &request, args.force)?;
     let progress = Progress::of_work();
     let input = explain::read(&request, &|share, what| progress.doing(READ * share, what))?;
-    explain::prepare(&args.out, &request)?;
+    explain::make(&args.out)?;
     let kept = Kept::of(&input);
     let step = |share: f64, what: &str| progress.doing(READ + (EXPLAINED - READ) * share, what);
     let mut outcome = tauscope_explain::explain(input, &step)
         .map_err(|error| Failure::rejected(error.to_string()))?;
     progress.doing(EXPLAINED, "writing");
+    let hold = interrupt::hold();
     let made = explain::write(&args.out, &request, &kept, &mut outcome)?;
+    drop(hold);
     drop(progress);
     if args.json {
         out.print(&explain::json(&outcome)?)?;

@@ -6,9 +6,11 @@ use tauscope_explain::report::Verdict;
 use tauscope_pipeline::cell::EffortUnit;
 
 use super::effort_unit;
+use crate::existing::Force;
 use crate::exit::{Exit, Failure};
 use crate::explain::{self, Arguments, Kept};
 use crate::init::{self, Folder, Told};
+use crate::interrupt;
 use crate::output::Output;
 use crate::progress::Progress;
 
@@ -34,9 +36,8 @@ pub struct Args {
     /// Topic of the measured joint states; without it the one that names most of the robot's joints.
     #[arg(long, value_name = "TOPIC")]
     state_topic: Option<String>,
-    /// Replace what an earlier `init` has left in the folder.
-    #[arg(long)]
-    force: bool,
+    #[command(flatten)]
+    force: Force,
 }
 
 /// Shares of the bar.
@@ -74,16 +75,19 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let input = explain::read(&request, &|share, what| {
         progress.doing(LOOKED * share, what)
     })?;
-    explain::prepare(&folder.explained(), &request)?;
+    explain::refuse_to_replace(&folder.explained(), &request, args.force)?;
+    explain::make(&folder.explained())?;
     let kept = Kept::of(&input);
     let step = |share: f64, what: &str| progress.doing(LOOKED + (EXPLAINED - LOOKED) * share, what);
     let mut outcome = tauscope_explain::explain(input, &step)
         .map_err(|error| Failure::rejected(error.to_string()))?;
+    let hold = interrupt::hold();
     explain::write(&folder.explained(), &request, &kept, &mut outcome)?;
 
     let urdf = looked.cell.facts.urdf.as_deref().unwrap_or_default();
     init::write(&folder.robot(), urdf.as_bytes())?;
     folder.write_set(&looked.cell, &looked.state_topic, &fit, &holdout)?;
+    drop(hold);
     let explained = folder.explained().join("twin.yaml");
     let explained = (outcome.report.verdict != Verdict::NotEvaluated).then_some(&*explained);
     let learnt = init::learn(
@@ -94,6 +98,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
             progress.doing(EXPLAINED + (1.0 - EXPLAINED) * share, what);
         },
     )?;
+    let hold = interrupt::hold();
     folder.write_twin(&learnt.twin)?;
     let shown = holdout
         .first()
@@ -102,6 +107,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     folder.write_pipeline(&looked.cell, &looked.state_topic, shown)?;
     let page = init::page(&folder, &looked, &outcome.report, &learnt);
     init::write(&folder.page(), page.as_bytes())?;
+    drop(hold);
     drop(progress);
     out.print(&page)?;
     out.print(&format!("wrote {}", args.out.display()))?;

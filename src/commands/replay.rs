@@ -6,16 +6,19 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
+use tauscope_archive::whole_file;
 use tauscope_dynamics::terms::UNKNOWN;
 use tauscope_pipeline::parallel;
 use tauscope_pipeline::pipeline::Pipeline;
 use tauscope_pipeline::replay::{Outcome, Replay, ReplayError, TwinChoice, stem};
-use tauscope_pipeline::report::{Problem, Report};
+use tauscope_pipeline::report::{Problem, Report, without_path};
 use tauscope_pipeline::tables::{write_events, write_summary};
 use tauscope_pipeline::tally::{Event, JointRms};
 use tauscope_watch::amount;
 
+use crate::existing::Force;
 use crate::exit::{Exit, Failure};
+use crate::interrupt;
 use crate::output::Output;
 use crate::progress::Progress;
 
@@ -42,6 +45,8 @@ pub struct Args {
     /// For archives that already hold a twin's effort: compute it anew, or keep it.
     #[arg(long, value_enum, default_value_t)]
     twin: TwinChoice,
+    #[command(flatten)]
+    force: Force,
     /// Machine-readable.
     #[arg(long)]
     json: bool,
@@ -62,39 +67,67 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         ));
     }
     if let Some(folder) = &args.out {
+        let of = |recording| replay.files(recording, folder);
+        let tables = ["summary.parquet", "events.parquet"].map(|name| folder.join(name));
+        let files = args.recordings.iter().flat_map(|recording| of(recording));
+        args.force.check(files.chain(tables))?;
         std::fs::create_dir_all(folder).map_err(|error| {
             Failure::rejected(format!("cannot make {}: {error}", folder.display()))
         })?;
     }
+    let hold = interrupt::hold();
     let results = replay_all(&replay, args);
     let mut outcomes = Vec::new();
     let mut wrong = Report::default();
-    let mut failed = None;
+    let (mut failed, mut interrupted) = (None, false);
     for (recording, result) in args.recordings.iter().zip(results) {
         match result {
             Ok(outcome) => outcomes.push(outcome),
+            Err(ReplayError::Interrupted) => interrupted = true,
             Err(error) if error.is_input() => {
                 wrong.push(Problem::of_file(recording, error.to_string()));
             }
             Err(error) => {
-                out.say(&format!("error: {}: {error}", recording.display()));
+                let why = without_path(recording, error.to_string());
+                out.say(&format!("error: {}: {why}", recording.display()));
                 failed = Some(Exit::Failed);
             }
         }
     }
-    if let Some(folder) = &args.out {
+    if interrupted {
+        whole_file::remove_unfinished();
+    }
+    if let Some(folder) = args
+        .out
+        .as_ref()
+        .filter(|_| !(interrupted && outcomes.is_empty()))
+    {
         write_summary(folder, &outcomes).context("the summary")?;
         write_events(folder, &outcomes).context("the events")?;
     }
+    drop(hold);
     if args.json {
         let all: Vec<_> = outcomes.iter().map(Summary::of).collect();
         out.print(&serde_json::to_string_pretty(&all).context("the summary")?)?;
     } else if !outcomes.is_empty() {
         out.print(&table(&outcomes))?;
     }
+    if interrupted {
+        return Err(Failure::Interrupted(how_far(args, outcomes.len())));
+    }
     wrong.into_result(())?;
     let lossy = outcomes.iter().any(|outcome| outcome.lost > 0);
     Ok(Exit::from_loss(lossy).and(failed.unwrap_or(Exit::Done)))
+}
+
+fn how_far(args: &Args, done: usize) -> String {
+    let all = args.recordings.len();
+    let kept = match (&args.out, done) {
+        (None, _) | (_, 0) => "no result was written".to_owned(),
+        (Some(out), 1) => format!("its results are in {}", out.display()),
+        (Some(out), _) => format!("the results of these are in {}", out.display()),
+    };
+    format!("after {done} of {all} recordings; {kept}")
 }
 
 /// Results are named after their recordings, so two of one name would overwrite each other.
@@ -137,8 +170,12 @@ fn replay_all(replay: &Replay<'_>, args: &Args) -> Vec<Result<Outcome, ReplayErr
     let progress = Progress::new(args.recordings.len());
     let recordings = args.recordings.iter().enumerate().collect();
     parallel::map(usize::from(args.jobs), recordings, |(index, recording)| {
+        if interrupt::is_asked() {
+            return Err(ReplayError::Interrupted);
+        }
         let result = replay.run(recording, args.out.as_deref(), &mut |fraction| {
             progress.set(index, fraction);
+            !interrupt::is_asked()
         });
         progress.set(index, 1.0);
         result

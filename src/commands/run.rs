@@ -1,6 +1,7 @@
 //! `tauscope run`.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use anyhow::Context;
 use tauscope_pipeline::pipeline::{Pipeline, Stage};
@@ -12,42 +13,68 @@ use tauscope_record::Existing;
 use crate::exit::{Exit, Failure};
 use crate::output::Output;
 use crate::plan;
-use crate::supervisor::{self, Summary};
+use crate::supervisor::{self, Care, Summary, Verbosity};
 
 /// Run a pipeline: check the file, start this host's stages, look after them until the source ends
 /// or Ctrl-C.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Default, clap::Args)]
 pub struct Args {
-    /// The pipeline file.
-    #[arg(default_value = DEFAULT)]
-    pipeline: PathBuf,
+    /// The pipeline file; by default `pipeline.yaml`.
+    #[arg(conflicts_with = "pipeline")]
+    file: Option<PathBuf>,
+    /// The same, as `replay` takes it.
+    #[arg(long, value_name = "FILE")]
+    pipeline: Option<PathBuf>,
     /// Which of the file's hosts this is, where it names several.
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
     /// Let recorders replace files that have the names of theirs.
     #[arg(long)]
     force: bool,
+    /// Fail if a source gives no usable sample within this time, from the start or since the last one.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    expect_data: Option<Duration>,
+    #[command(flatten)]
+    telling: Telling,
     /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
 }
 
-const DEFAULT: &str = "pipeline.yaml";
+/// How much is told.
+#[derive(Debug, Default, clap::Args)]
+struct Telling {
+    /// Say only what must not be missed: warnings, errors, and the summary at the end.
+    #[arg(short, long, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Say more: each step of the start, and every other second how it goes.
+    #[arg(short, long)]
+    verbose: bool,
+}
 
-impl Default for Args {
-    fn default() -> Self {
-        Self {
-            pipeline: DEFAULT.into(),
-            host: None,
-            force: false,
-            json: false,
+impl Telling {
+    fn verbosity(&self) -> Verbosity {
+        match (self.quiet, self.verbose) {
+            (true, _) => Verbosity::Quiet,
+            (false, true) => Verbosity::Verbose,
+            (false, false) => Verbosity::Normal,
         }
+    }
+}
+
+fn seconds(text: &str) -> Result<Duration, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.1..=1e6).contains(&seconds) => Ok(Duration::from_secs_f64(seconds)),
+        _ => Err("it is a number of seconds from 0.1 to 1000000".to_owned()),
     }
 }
 
 /// Runs it.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
-    let mut pipeline = Pipeline::load(&args.pipeline, args.host.as_deref())?;
+    let mut pipeline = Pipeline::load(
+        super::pipeline_file(args.file.as_ref(), args.pipeline.as_ref()),
+        args.host.as_deref(),
+    )?;
     let names = || pipeline.hosts.keys().map(String::as_str);
     let host = match (&args.host, pipeline.hosts.len()) {
         (None, 2..) => {
@@ -66,7 +93,11 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         keep_files(&pipeline, host)?;
     }
     let links = plan::links(&pipeline);
-    let summary = supervisor::run(&pipeline, &links, host)?;
+    let care = Care {
+        expect_data: args.expect_data,
+        verbosity: args.telling.verbosity(),
+    };
+    let summary = supervisor::run(&pipeline, &links, host, care)?;
     let text = if args.json {
         serde_json::to_string_pretty(&summary).context("cannot encode the summary")?
     } else {

@@ -4,15 +4,17 @@ mod case;
 mod set;
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use tauscope_archive::Written;
-use tauscope_ingest::simulated::{self, ScenarioError};
+use tauscope_archive::{Written, whole_file};
+use tauscope_ingest::simulated::{self, Scenario, ScenarioError};
 use tauscope_pipeline::provenance;
 use tauscope_pipeline::scenario::ScenarioFacts;
 
+use crate::existing::Force;
 use crate::exit::{Exit, Failure};
+use crate::interrupt;
 use crate::output::Output;
 use crate::progress::Progress;
 
@@ -26,6 +28,8 @@ pub struct Args {
     /// `concealed.json`.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    #[command(flatten)]
+    force: Force,
     /// Machine-readable.
     #[arg(long)]
     json: bool,
@@ -34,6 +38,7 @@ pub struct Args {
 /// Makes them.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let facts = ScenarioFacts::load(&args.scenario)?;
+    args.force.check(results(&facts, &args.out))?;
     let robot = facts.robot().context("cannot use the URDF")?;
     // What is concealed cannot be had from the recordings.
     let mut told = facts.scenario.clone();
@@ -48,6 +53,8 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         ),
     ]);
     let progress = Progress::new(1);
+    let hold = interrupt::hold();
+    let mut far = 0.0;
     let made = simulated::simulate(
         &robot.scenario,
         &robot.model,
@@ -55,13 +62,17 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         &made_of,
         &mut |fraction| {
             progress.set(0, fraction);
-            true
+            far = fraction;
+            !interrupt::is_asked()
         },
     );
     drop(progress);
     let made = match made {
         Ok(Some(made)) => made,
-        Ok(None) => return Err(anyhow::anyhow!("ended before it was done").into()),
+        Ok(None) => {
+            whole_file::remove_unfinished();
+            return Err(Failure::Interrupted(how_far(args, &facts.scenario, far)));
+        }
         Err(
             error @ (ScenarioError::Unstable { .. }
             | ScenarioError::Write(_)
@@ -74,6 +85,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         None => None,
     };
     let set = set::write(&facts, &made.labels_path, &args.out)?;
+    drop(hold);
     let text = if args.json {
         let recordings: Vec<_> = made
             .recordings
@@ -97,6 +109,43 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     };
     out.print(&text)?;
     Ok(Exit::Done)
+}
+
+/// The files that it may write. A URDF that is there and the same is not replaced, but left.
+fn results(facts: &ScenarioFacts, out: &Path) -> Vec<PathBuf> {
+    let recordings = facts.scenario.recordings.iter();
+    let recordings = recordings.map(|recording| format!("{}.mcap", recording.name));
+    let others = ["labels.json", "set.yaml", "case.yaml", "concealed.json"].map(str::to_owned);
+    let mut files: Vec<PathBuf> = recordings
+        .chain(others)
+        .map(|name| out.join(name))
+        .collect();
+    let robot = out.join(case::robot_name(facts));
+    if std::fs::read(&robot).is_ok_and(|there| there != facts.urdf.as_bytes()) {
+        files.push(robot);
+    }
+    files
+}
+
+/// How many recordings are whole after this share of all their time.
+fn how_far(args: &Args, scenario: &Scenario, share: f64) -> String {
+    const ROUNDING: f64 = 1e-9;
+    let lengths_s = || scenario.recordings.iter().map(|each| each.duration_s);
+    let whole_s: f64 = lengths_s().sum();
+    let mut end_s = 0.0;
+    let ends = lengths_s().map(|length_s| {
+        end_s += length_s;
+        end_s / whole_s
+    });
+    let done = ends.filter(|end| *end <= share + ROUNDING).count();
+    let kept = match done {
+        0 => "nothing was written".to_owned(),
+        _ => format!("these are in {}, without labels", args.out.display()),
+    };
+    format!(
+        "after {done} of {} recordings; {kept}",
+        scenario.recordings.len()
+    )
 }
 
 fn line(written: &Written) -> String {

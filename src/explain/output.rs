@@ -11,6 +11,7 @@ use tauscope_pipeline::report::{Problem, Report};
 use super::input::{Named, Request};
 use super::read::Kept;
 use super::{picture, provenance_of, robot, twin, write_whole};
+use crate::existing::Force;
 use crate::exit::Failure;
 
 const PAGE: &str = "report.html";
@@ -28,31 +29,43 @@ pub struct Made {
     pub notes: Vec<String>,
 }
 
-/// Makes the folder `out` ready: what an explanation before has left there must not stand beside a new report.
+/// Makes the folder `out`.
 ///
 /// # Errors
-/// If it cannot be made, or a file of the input would be overwritten.
-pub fn prepare(out: &Path, request: &Request) -> Result<(), Failure> {
+/// If it cannot be made.
+pub fn make(out: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(out)
-        .map_err(|error| Failure::rejected(format!("cannot make {}: {error}", out.display())))?;
+        .map_err(|error| Failure::rejected(format!("cannot make {}: {error}", out.display())))
+}
+
+/// Refuses where results would take the place of files.
+///
+/// # Errors
+/// If a file of the input would be overwritten, or a result is there already and nobody said that it may be
+/// replaced.
+pub fn refuse_to_replace(out: &Path, request: &Request, force: Force) -> Result<(), Failure> {
     let mut report = Report::default();
     let start = request.start.iter().map(|start| &start.path);
-    let robot = request.robot_path.iter();
-    for input in start.chain(robot) {
-        let is_input = |name: &&str| same_file(&out.join(name), input);
-        if let Some(name) = [TWIN, ROBOT].iter().find(|name| is_input(name)) {
+    let recordings = request.fit.iter().chain(&request.holdout);
+    let inputs = start.chain(&request.robot_path);
+    for input in inputs.chain(recordings.map(|recording| &recording.path)) {
+        if let Some(result) = results(out, request).find(|result| same_file(result, input)) {
+            let name = result.file_name().unwrap_or_default().display();
             let title = format!("the result {name} would overwrite {}", input.display());
             report.push(Problem::new(title).help("give another folder with --out"));
         }
     }
     report.into_result(())?;
-    if out.join(REPORT).is_file() {
-        for name in [REPORT, PAGE, TWIN, ROBOT, PICTURE] {
-            // One that is not there need not be removed; one that cannot be is found when it is written.
-            let _ = std::fs::remove_file(out.join(name));
-        }
-    }
-    Ok(())
+    force.check(results(out, request))
+}
+
+/// What an explanation may write. (Motions that are worth recording next have names that only it knows.)
+fn results<'a>(out: &'a Path, request: &'a Request) -> impl Iterator<Item = PathBuf> + 'a {
+    let fixed = [REPORT, PAGE, TWIN, ROBOT, PICTURE];
+    let recordings = request.fit.iter().chain(&request.holdout);
+    let predictions = recordings.map(|recording| format!("{}.csv", recording.name));
+    let names = fixed.into_iter().map(str::to_owned).chain(predictions);
+    names.map(|name| out.join(name))
 }
 
 fn same_file(a: &Path, b: &Path) -> bool {
@@ -79,6 +92,11 @@ pub fn write(
         }
     }
     let provenance = provenance_of(request).context("what went in")?;
+    // What an explanation before has left there must not stand beside a new report.
+    for name in [REPORT, PAGE, TWIN, ROBOT, PICTURE] {
+        // One that is not there need not be removed; one that cannot be is found when it is written.
+        let _ = std::fs::remove_file(out.join(name));
+    }
     let mut made = Made::default();
     let mut predictions = Vec::new();
     for (recording, rows) in &outcome.predictions {

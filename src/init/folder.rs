@@ -9,6 +9,7 @@ use tauscope_pipeline::report::Problem;
 use tauscope_twin::TwinFile;
 
 use super::write;
+use crate::existing::Force;
 use crate::exit::Failure;
 
 /// The folder and the names in it.
@@ -18,11 +19,11 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// The folder at `path`, which is made. Files that `init` would replace are an error unless `force`.
+    /// The folder at `path`, which is made. Files that `init` would replace are an error unless `force` allows it.
     ///
     /// # Errors
     /// If it cannot be made, or holds a pipeline already.
-    pub fn prepare(path: &Path, force: bool) -> Result<Self, Failure> {
+    pub fn prepare(path: &Path, force: Force) -> Result<Self, Failure> {
         let this = Self {
             path: path.to_owned(),
         };
@@ -35,15 +36,7 @@ impl Folder {
             this.page(),
             this.explained().join("report.json"),
         ];
-        let there: Vec<String> = (mine.iter())
-            .filter(|file| file.exists())
-            .map(|file| file.display().to_string())
-            .collect();
-        if !there.is_empty() && !force {
-            let title = format!("init would replace {}", there.join(", "));
-            let problem = Problem::new(title).help("give another folder with --out, or --force");
-            return Err(Failure::Rejected(problem.into()));
-        }
+        force.check(mine)?;
         std::fs::create_dir_all(path).map_err(|error| {
             let problem = Problem::of_file(path, format!("cannot make the folder: {error}"));
             Failure::Rejected(problem.into())

@@ -4,16 +4,30 @@ use std::path::PathBuf;
 
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
-use tauscope_bus::SampleKind;
+use tauscope_bus::{SampleKind, Trouble};
 use tauscope_pipeline::pipeline::Pipeline;
 
 use super::local::Local;
 use crate::exit::Exit;
 use crate::plan::{Link, Over};
 
+/// Why a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Ended {
+    /// Its sources came to their end, or a stage failed.
+    Completed,
+    /// Ctrl-C or SIGTERM.
+    Interrupted,
+    /// No data came within the time of `--expect-data`.
+    NoData,
+}
+
 /// What came of a run on this host.
 #[derive(Debug, Clone, Serialize)]
 pub struct Summary {
+    /// Why it ended.
+    pub ended: Ended,
     /// The stages of this host, in the order of the pipeline.
     pub stages: Vec<StageSummary>,
     /// The links of this host, by what their receiving ends counted; a link to another host by what
@@ -22,10 +36,17 @@ pub struct Summary {
 }
 
 /// One stage.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a key of the JSON, or known beside them"
+)]
 #[derive(Debug, Clone, Serialize)]
 pub struct StageSummary {
     /// Its name.
     pub stage: String,
+    /// Whether it listens to nobody.
+    #[serde(skip)]
+    is_source: bool,
     /// Whether it ever said what it has done: a program that is not ours may not.
     pub reported: bool,
     /// Samples that came in; for a source, those it read.
@@ -38,6 +59,10 @@ pub struct StageSummary {
     pub restarts: u64,
     /// Whether it was given up.
     pub failed: bool,
+    /// Whether it did not end when it was told to, and was killed.
+    pub killed: bool,
+    /// What kept it from getting anything it could use, to the end.
+    pub trouble: Option<Trouble>,
     /// The files that a recorder completed last.
     pub files: Vec<PathBuf>,
     /// How many files a recorder completed.
@@ -63,8 +88,8 @@ pub struct LinkSummary {
 
 impl Summary {
     /// Adds up what the stages have reported.
-    pub fn new(pipeline: &Pipeline, links: &[Link], stages: &[Local]) -> Self {
-        let mut summary = Self::reported(pipeline, links, stages);
+    pub fn new(pipeline: &Pipeline, links: &[Link], stages: &[Local], ended: Ended) -> Self {
+        let mut summary = Self::reported(pipeline, links, stages, ended);
         summary.count_what_lives_missed();
         // A stage that was killed has sent more than it lived to report, as its listeners know.
         for stage in summary
@@ -106,7 +131,7 @@ impl Summary {
         }
     }
 
-    fn reported(pipeline: &Pipeline, links: &[Link], stages: &[Local]) -> Self {
+    fn reported(pipeline: &Pipeline, links: &[Link], stages: &[Local], ended: Ended) -> Self {
         let here = |at: usize| stages.iter().find(|stage| stage.at == at);
         let links = links.iter().filter_map(|link| {
             let (sender, receiver) = (here(link.from), here(link.to));
@@ -134,6 +159,7 @@ impl Summary {
             })
         });
         Self {
+            ended,
             links: links.collect(),
             stages: stages.iter().map(StageSummary::new).collect(),
         }
@@ -141,7 +167,7 @@ impl Summary {
 
     /// How the run ended.
     pub fn exit(&self) -> Exit {
-        if self.stages.iter().any(|stage| stage.failed) {
+        if self.ended == Ended::NoData || self.stages.iter().any(|stage| stage.failed) {
             return Exit::Failed;
         }
         let dropped = self.stages.iter().any(|stage| stage.dropped > 0);
@@ -159,7 +185,11 @@ impl Summary {
                     "?".to_owned()
                 }
             };
-            let failed = if stage.failed { " (failed)" } else { "" };
+            let failed = match (stage.killed, stage.failed) {
+                (true, _) => " (did not end: killed)",
+                (false, true) => " (failed)",
+                (false, false) => "",
+            };
             stages.add_row([
                 format!("{}{failed}", stage.stage),
                 count(stage.received),
@@ -187,7 +217,25 @@ impl Summary {
                 column.set_cell_alignment(CellAlignment::Right);
             }
         }
-        format!("{}\n\n{}", stages.trim_fmt(), links.trim_fmt())
+        let mut text = format!("{}\n\n{}", stages.trim_fmt(), links.trim_fmt());
+        for stage in &self.stages {
+            let name = &stage.stage;
+            let when = if stage.received == 0 {
+                ""
+            } else {
+                " at the end"
+            };
+            match &stage.trouble {
+                Some(trouble) => {
+                    text += &format!("\n\nwarning: stage `{name}` got no sample{when}: {trouble}");
+                }
+                None if stage.is_source && stage.reported && stage.received == 0 => {
+                    text += &format!("\n\nwarning: stage `{name}` got no sample");
+                }
+                None => {}
+            }
+        }
+        text
     }
 }
 
@@ -207,12 +255,15 @@ impl StageSummary {
         }
         Self {
             stage: stage.seat.stage.clone(),
+            is_source: stage.is_source(),
             reported: stage.tally.is_known(),
             received,
             emitted: sums.emitted,
             dropped: lost + sums.refused,
             restarts: stage.seat.restarts,
             failed: stage.is_lost(),
+            killed: stage.was_killed(),
+            trouble: stage.silence.trouble().cloned(),
             files: stage.tally.newest().files.clone(),
             files_completed: sums.files_completed,
         }

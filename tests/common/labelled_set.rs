@@ -64,6 +64,7 @@ impl Set {
 pub fn evaluate(set: &Path, out: &Path, more: &[&str]) -> Out {
     let named = [
         "evaluate".as_ref(),
+        "--force".as_ref(),
         set.as_os_str(),
         "--out".as_ref(),
         out.as_os_str(),

@@ -55,6 +55,7 @@ impl LearntPipeline<'_> {
 pub fn replay(pipeline: &Path, recording: &Path, out: &Path) -> Out {
     let pipeline = [
         "replay".as_ref(),
+        "--force".as_ref(),
         "--json".as_ref(),
         "--pipeline".as_ref(),
         pipeline.as_os_str(),

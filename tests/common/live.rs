@@ -71,6 +71,27 @@ impl Live {
         }
     }
 
+    /// Waits for a line that has `part` in it and returns it.
+    pub fn wait_for_part(&mut self, part: &str) -> String {
+        let deadline = Instant::now() + PATIENCE;
+        loop {
+            let left = deadline.saturating_duration_since(Instant::now());
+            let Ok(line) = self.lines.recv_timeout(left) else {
+                panic!("no line with {part:?} in {:#?}", self.heard);
+            };
+            self.heard.push(line.clone());
+            if line.contains(part) {
+                return line;
+            }
+        }
+    }
+
+    /// All lines to the end of what it says.
+    pub fn rest(&mut self) -> String {
+        let rest: Vec<String> = self.lines.iter().collect();
+        rest.join("\n")
+    }
+
     /// The process of a stage that is about to be started.
     pub fn wait_for_stage(&mut self, stage: &str) -> u32 {
         let id = self.wait_for(&format!("stage `{stage}` runs as process "));

@@ -30,8 +30,8 @@ def measured(tauscope, robot, out, seed):
     scenario = folder / "scenario.yaml"
     with scenario.open("w") as file:
         run(sys.executable, Path(__file__).with_name("assembly.py"), robot, seed, TRAIN, TEST, stdout=file)
-    run(tauscope, "simulate", scenario, "--out", folder / "set")
-    run(tauscope, "evaluate", folder / "set" / "set.yaml", "--out", folder / "results", "--detectors", "tauscope", "--twin", "rigid")
+    run(tauscope, "simulate", scenario, "--force", "--out", folder / "set")
+    run(tauscope, "evaluate", folder / "set" / "set.yaml", "--force", "--out", folder / "results", "--detectors", "tauscope", "--twin", "rigid")
     learnt = yaml.safe_load((folder / "results" / "learnt.yaml").read_text())
     return learnt["tauscope"]["tauscope"]["learnt"].get("kind_contacts")
 

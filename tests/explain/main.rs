@@ -33,7 +33,10 @@ fn robot(name: &str) -> PathBuf {
 
 /// `tauscope explain` with these arguments, its results in `out`.
 fn explain(out: &Path, arguments: &[&str]) -> Out {
-    let arguments = ["explain"].iter().chain(arguments).map(OsStr::new);
+    let arguments = ["explain", "--force"]
+        .iter()
+        .chain(arguments)
+        .map(OsStr::new);
     Out::answer(arguments.chain(["--out".as_ref(), out.as_os_str()]))
 }
 
@@ -309,7 +312,7 @@ recordings:
     );
     write(&scenario, &text);
     let mut simulate = tauscope();
-    simulate.arg("simulate").arg(&scenario);
+    simulate.arg("simulate").arg(&scenario).arg("--force");
     simulate.arg("--out").arg(folder.path());
     let done = Out::of(simulate);
     assert_eq!(done.code, 0, "{}", done.stderr);

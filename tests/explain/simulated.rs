@@ -31,7 +31,7 @@ pub fn simulate(folder: &Path, text: &str) {
     let scenario = write(&folder.join("scenario.yaml"), text);
     let mut simulate = tauscope();
     simulate
-        .arg("simulate")
+        .args(["simulate", "--force"])
         .arg(scenario)
         .arg("--out")
         .arg(folder);

@@ -127,7 +127,7 @@ class Arm:
         path = os.path.join(self.folder, name)
         with open(path + ".yaml", "w") as file:
             yaml.safe_dump(case | ({"twin": {"model": f"{twin}/twin.yaml"}} if twin else {}), file, sort_keys=False)
-        subprocess.run([tauscope, "explain", path + ".yaml", "--out", path], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        subprocess.run([tauscope, "explain", path + ".yaml", "--force", "--out", path], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         with open(os.path.join(path, "report.json")) as file:
             return json.load(file)
 

@@ -40,9 +40,9 @@ def run(o, seed):
         scenario = folder / "scenario.yaml"
         scenario.write_text(text)
         quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-        if subprocess.run([o.tauscope, "simulate", scenario, "--out", folder], **quiet).returncode:
+        if subprocess.run([o.tauscope, "simulate", scenario, "--force", "--out", folder], **quiet).returncode:
             return None
-        subprocess.run([o.tauscope, "explain", folder / "case.yaml", "--out", folder / "report"], check=True, **quiet)
+        subprocess.run([o.tauscope, "explain", folder / "case.yaml", "--force", "--out", folder / "report"], check=True, **quiet)
         for recording in folder.glob("*.mcap"):
             recording.unlink()
     return json.loads(answer.read_text())["effects"], json.loads(report.read_text())["findings"]

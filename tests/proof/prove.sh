@@ -10,6 +10,6 @@ program=${3:-target/release/tauscope}
 [ $# -ge 3 ] || cargo build --release --quiet
 for case in "$set"/cases/*/case.yaml; do
     name=$(basename "$(dirname "$case")")
-    "$program" explain "$case" --out "$out/$name" >/dev/null
+    "$program" explain "$case" --force --out "$out/$name" >/dev/null
 done
 python3 tests/proof/table.py "$set/answers.json" "$out"

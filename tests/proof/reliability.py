@@ -95,7 +95,7 @@ def explain(o, seed):
         folder = o.out / "explained" / f"{seed:05d}"
         case = o.out / "cases" / f"c{seed:05d}"
         try:
-            subprocess.run([o.tauscope, "explain", case / "case.yaml", "--out", folder], check=True, timeout=LIMIT_S,
+            subprocess.run([o.tauscope, "explain", case / "case.yaml", "--force", "--out", folder], check=True, timeout=LIMIT_S,
                            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
             text = (folder / "report.json").read_text()
         except (subprocess.SubprocessError, OSError) as error:

@@ -69,7 +69,7 @@ class Lab:
             drawn = subprocess.run([sys.executable, HERE.parent / "contacts/paths.py", robot, str(seed), "1", "1", "1", "1"],
                                    check=True, capture_output=True, text=True).stdout
             (folder / "scenario.yaml").write_text(drawn)
-            run(self.program, "simulate", folder / "scenario.yaml", "--out", folder)
+            run(self.program, "simulate", folder / "scenario.yaml", "--force", "--out", folder)
         return folder
 
     def observe(self, factors):
@@ -91,7 +91,7 @@ class Lab:
         answer = json.loads((self.o.out / "answers" / f"{seed:05d}.json").read_text())
         folder = self.o.out / "now"
         try:
-            run(self.program, "explain", self.o.out / "cases" / f"c{seed:05d}" / "case.yaml", "--out", folder, TAUSCOPE_VARY=text)
+            run(self.program, "explain", self.o.out / "cases" / f"c{seed:05d}" / "case.yaml", "--force", "--out", folder, TAUSCOPE_VARY=text)
         except subprocess.CalledProcessError as error:
             return {"failed": error.returncode}
         report = json.loads((folder / "report.json").read_text())
@@ -103,7 +103,7 @@ class Lab:
         return {"said": said, "hit": hit, "missed": missed, "wrong": wrong, "after": after}
 
     def evaluated(self, folder, text):
-        command = [self.program, "evaluate", folder / "set.yaml", "--out", self.o.out / "now", "--detectors", "tauscope", "--json"]
+        command = [self.program, "evaluate", folder / "set.yaml", "--force", "--out", self.o.out / "now", "--detectors", "tauscope", "--json"]
         done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "TAUSCOPE_VARY": text})
         if done.returncode:
             return {"failed": done.returncode}

@@ -182,7 +182,8 @@ impl Cell {
         });
         let file = write(&folder.join("scenario.yaml"), &scenario.to_string());
         let mut simulate = tauscope();
-        simulate.arg("simulate").arg(file).arg("--out").arg(folder);
+        simulate.arg("simulate").arg(file).arg("--force");
+        simulate.arg("--out").arg(folder);
         done(simulate);
         let name = recording["name"].as_str().unwrap();
         let white = folder.join(format!("{name}.mcap"));

@@ -151,6 +151,25 @@ impl ZenohRouter {
     }
 }
 
+/// What Zenoh says of an error, without the places in its source code.
+pub fn zenoh_reason(error: &zenoh::Error) -> String {
+    without_places(&error.to_string())
+}
+
+/// `a b` of `a at /src/c.rs:12. b`.
+fn without_places(text: &str) -> String {
+    let mut kept: Vec<&str> = Vec::new();
+    for word in text.split(' ') {
+        let is_place = word.contains(".rs:");
+        if is_place && kept.last() == Some(&"at") {
+            kept.pop();
+        } else {
+            kept.push(word);
+        }
+    }
+    kept.join(" ")
+}
+
 fn open_session(
     mode: &str,
     endpoints: &ZenohEndpoints,
@@ -159,7 +178,7 @@ fn open_session(
     let failed = |error: zenoh::Error| LinkError::Open {
         stream: "*".to_owned(),
         transport: TRANSPORT,
-        reason: error.to_string(),
+        reason: zenoh_reason(&error),
     };
     // A receiver gives out before the link is closed over it.
     let close_after_us = (patience * 2).as_micros().to_string();
@@ -194,7 +213,7 @@ fn open_error(stream: &str, error: &zenoh::Error) -> LinkError {
     LinkError::Open {
         stream: stream.to_owned(),
         transport: TRANSPORT,
-        reason: error.to_string(),
+        reason: zenoh_reason(error),
     }
 }
 
@@ -206,5 +225,17 @@ fn policy(keep: Keep) -> &'static str {
     match keep {
         Keep::All => "@all",
         Keep::Newest => "@newest",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::without_places;
+
+    #[test]
+    fn an_error_of_zenoh_says_nothing_of_its_source_code() {
+        let text = "Unable to open at /home/x/.cargo/registry/src/a/b.rs:114. - Caused by refused at c.rs:2.";
+        assert_eq!(without_places(text), "Unable to open - Caused by refused");
+        assert_eq!(without_places("no port at 7447"), "no port at 7447");
     }
 }

@@ -6,7 +6,7 @@
 //! | --- | --- |
 //! | standard input, first line | the [`Seat`] |
 //! | standard input, from then on | the line `stop`, or its end, tells the stage to stop: it deals with what has arrived, completes its output and leaves. `SIGTERM` does the same; `SIGINT` is left to the supervisor, since a terminal sends it to both |
-//! | standard output | one [`Line`] each: `{"event":"ready","missing":0}` once its receivers are connected (or the wait for them is over), `{"event":"report",...}` ten times a second, `{"event":"done",...}` at the end |
+//! | standard output | one [`Line`] each: `{"event":"ready","missing":0}` once its receivers are connected (or the wait for them is over), `{"event":"report",...}` ten times a second, `{"event":"note","text":"..."}` where it found something, `{"event":"done",...}` at the end |
 //! | standard error | anything, for people |
 //! | exit code | 0 ended or stopped, 1 failed |
 //!
@@ -48,6 +48,11 @@ pub enum Line {
     },
     /// It runs.
     Report(Report),
+    /// It found something that people want to know.
+    Note {
+        /// What.
+        text: String,
+    },
     /// It leaves.
     Done(Report),
 }
@@ -323,6 +328,13 @@ fn reporting<R>(context: &Context, body: impl FnOnce() -> R) -> R {
         drop(finished);
         result
     })
+}
+
+/// Tells people what a stage that runs in this process has found.
+pub fn note(text: &str) {
+    say(&Line::Note {
+        text: text.to_owned(),
+    });
 }
 
 /// If the supervisor reads no more, the end of standard input says so: a line may be lost then.

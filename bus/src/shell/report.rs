@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::link::{Position, ReceiverCounts, SenderCounts};
 use crate::stage::StageError;
+use crate::trouble::Trouble;
 
 /// What a stage has done so far.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -30,6 +31,9 @@ pub struct Report {
     pub stamp_ns: i64,
     /// How far a source of known length is, from 0 to 1.
     pub fraction_done: Option<f64>,
+    /// Why a source gives nothing that can be used, while it does not.
+    #[serde(default)]
+    pub trouble: Option<Trouble>,
     /// The files that a sink completed last.
     #[serde(default)]
     pub files: Vec<PathBuf>,

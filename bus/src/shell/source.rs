@@ -1,6 +1,6 @@
 //! The loop around a source.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::health::HealthClock;
 use super::report::{Outcome, Poster, Report};
@@ -13,6 +13,8 @@ use crate::stage::{Progress, Source, StageError};
 /// How long a source that has nothing now is left alone.
 /// Resolution: the delay of a sample, against how often the process wakes up.
 const IDLE: Duration = Duration::from_millis(1);
+/// How often a source is asked whether it is in trouble.
+const ASK_EVERY: Duration = Duration::from_millis(500);
 
 /// Runs `source` into `output` until it ends or is told to stop. When it fails its stream gets no
 /// end: it may be started again.
@@ -30,6 +32,8 @@ pub fn run_source<T: Sample>(
             stage: context.stage.clone(),
             ..Report::default()
         },
+        emitted: Instant::now(),
+        asked: Instant::now(),
     };
     let outcome = shell
         .run(source, output)
@@ -45,6 +49,10 @@ struct SourceShell<'a> {
     health: HealthClock<&'a mut dyn Sender<Health>>,
     poster: Poster,
     report: Report,
+    /// When the newest sample went out, or the start.
+    emitted: Instant,
+    /// When the source was last asked whether it is in trouble.
+    asked: Instant,
 }
 
 impl SourceShell<'_> {
@@ -73,7 +81,9 @@ impl SourceShell<'_> {
             }
             let mut out = Out::new(output);
             let progress = source.step(&mut out)?;
-            let due = out.newest.is_some_and(|header| self.health.note(&header));
+            let newest = out.newest;
+            let due = newest.is_some_and(|header| self.health.note(&header));
+            self.ask(source, newest.is_some());
             if due || self.poster.is_due() {
                 self.count(source, output);
                 self.poster.post(&self.report);
@@ -86,6 +96,19 @@ impl SourceShell<'_> {
                 Progress::Idle => std::thread::sleep(IDLE),
                 Progress::End => return Ok(Outcome::Ended),
             }
+        }
+    }
+
+    /// Asks the source now and then whether it is in trouble; one that gives samples again is asked at once.
+    fn ask<T: Sample>(&mut self, source: &mut dyn Source<T>, emitted: bool) {
+        let now = Instant::now();
+        if emitted {
+            self.emitted = now;
+        }
+        let is_over = emitted && self.report.trouble.is_some();
+        if is_over || now.duration_since(self.asked) >= ASK_EVERY {
+            self.asked = now;
+            self.report.trouble = source.trouble(now.duration_since(self.emitted));
         }
     }
 

@@ -50,6 +50,9 @@ pub enum ReplayError {
     /// A link failed.
     #[error(transparent)]
     Link(#[from] tauscope_bus::LinkError),
+    /// Whoever asked for it does not want it any more.
+    #[error("interrupted")]
+    Interrupted,
 }
 
 impl ReplayError {
@@ -57,7 +60,7 @@ impl ReplayError {
     pub fn is_input(&self) -> bool {
         match self {
             Self::Ingest(error) => error.is_input(),
-            Self::Record(_) | Self::Stage(_) | Self::Link(_) => false,
+            Self::Record(_) | Self::Stage(_) | Self::Link(_) | Self::Interrupted => false,
             _ => true,
         }
     }

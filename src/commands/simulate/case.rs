@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use serde::Serialize;
+use tauscope_archive::whole_file::{self, Existing};
 use tauscope_ingest::simulated::{EffortUnit, fit_count};
 use tauscope_pipeline::scenario::ScenarioFacts;
 
@@ -64,10 +65,18 @@ pub fn write(facts: &ScenarioFacts, out: &Path) -> anyhow::Result<PathBuf> {
 /// # Errors
 /// If it cannot be written.
 pub fn put_robot(facts: &ScenarioFacts, out: &Path) -> anyhow::Result<PathBuf> {
+    let robot = robot_name(facts);
+    let path = out.join(&robot);
+    if !std::fs::read(&path).is_ok_and(|there| there == facts.urdf.as_bytes()) {
+        put(&path, &facts.urdf)?;
+    }
+    Ok(robot)
+}
+
+/// The name of the URDF in the folder of the recordings.
+pub fn robot_name(facts: &ScenarioFacts) -> PathBuf {
     let robot = facts.scenario.robot.file_name();
-    let robot = robot.unwrap_or("robot.urdf".as_ref());
-    put(&out.join(robot), &facts.urdf)?;
-    Ok(robot.into())
+    robot.unwrap_or("robot.urdf".as_ref()).into()
 }
 
 /// Writes a file whole or not at all.
@@ -75,8 +84,5 @@ pub fn put_robot(facts: &ScenarioFacts, out: &Path) -> anyhow::Result<PathBuf> {
 /// # Errors
 /// If it cannot be written.
 pub fn put(path: &Path, text: &str) -> anyhow::Result<()> {
-    let mut part = path.as_os_str().to_owned();
-    part.push(".part");
-    let written = std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, path));
-    written.with_context(|| path.display().to_string())
+    whole_file::write(path, text, Existing::Replace).with_context(|| path.display().to_string())
 }

@@ -5,14 +5,19 @@
 //! whoever asks for samples.
 
 mod attachment;
+mod diagnosis;
+mod joint_names;
 mod keys;
+mod publication;
 mod queue;
+mod scout;
+mod watch;
 
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
 use tauscope_archive::ros::{self, Message};
-use tauscope_bus::{Emit, JointState, Progress, Source, StageError};
+use tauscope_bus::{Emit, JointState, Progress, Source, StageError, Trouble, zenoh_reason};
 use zenoh::{Session, Wait};
 
 use crate::config::{Config, ConfigError, ZenohConfig};
@@ -20,8 +25,10 @@ use crate::error::IngestError;
 use crate::pack::{PackCounts, PackSettings, Packer};
 use crate::setup::Setup;
 use attachment::{Attachment, Losses};
+use diagnosis::Expected;
 use keys::KeyScheme;
 use queue::{Queue, Role, Waiting};
+use watch::Watch;
 
 /// How long a sample waits for the command of its instant \[ns\].
 /// Tuned: by hand, on no recorded seeds; not swept.
@@ -64,6 +71,7 @@ pub struct ZenohSource {
     tool: ros::InertiaStamped,
     learn: ros::Bool,
     counts: ZenohCounts,
+    watch: Watch,
 }
 
 impl std::fmt::Debug for ZenohSource {
@@ -82,7 +90,7 @@ impl ZenohSource {
     pub fn open(zenoh: &ZenohConfig, config: &Config, setup: &Setup) -> Result<Self, IngestError> {
         let session = zenoh::open(session_config(zenoh)?)
             .wait()
-            .map_err(|error| IngestError::Zenoh(error.to_string()))?;
+            .map_err(|error| IngestError::Zenoh(zenoh_reason(&error)))?;
         let queue = Arc::new(Queue::new(zenoh.queue));
         let scheme = KeyScheme::new(zenoh, &setup.cell);
         let topics = &zenoh.topics;
@@ -119,6 +127,13 @@ impl ZenohSource {
             tool: ros::InertiaStamped::default(),
             learn: ros::Bool::default(),
             counts: ZenohCounts::default(),
+            watch: Watch::new(Expected {
+                scheme,
+                topic: topics.state.clone(),
+                joints: setup.joint_names.clone(),
+                connect: zenoh.connect.clone(),
+                listen: zenoh.listen.clone(),
+            }),
         })
     }
 
@@ -138,8 +153,7 @@ impl ZenohSource {
 
     /// Whether the session is connected to anybody.
     pub fn is_connected(&self) -> bool {
-        let info = self.session.info();
-        info.peers_zid().wait().next().is_some() || info.routers_zid().wait().next().is_some()
+        scout::connected(&self.session) > 0
     }
 
     /// Reads a message into the place of its role.
@@ -174,6 +188,9 @@ impl ZenohSource {
             self.decode(waiting, &payload)
                 .map_err(|error| error.to_string())
         };
+        if waiting.role == Role::State {
+            self.watch.state(decoded.as_ref().err().map(String::as_str));
+        }
         if let Err(reason) = decoded {
             if self.counts.undecodable == 0 {
                 tracing::warn!("{}: {reason}; further ones are only counted", waiting.key);
@@ -207,6 +224,7 @@ impl Source<JointState> for ZenohSource {
             }
             while let Some(sample) = self.packer.pop(now_ns()) {
                 out.emit(&mut |slot| *slot = sample)?;
+                self.watch.sample(&sample, self.packer.counts());
                 progress = Progress::More;
             }
             if waiting.is_none() {
@@ -220,6 +238,11 @@ impl Source<JointState> for ZenohSource {
         let counts = self.counts();
         // A message that overflowed leaves a hole in the numbers too, where there are numbers.
         self.packer.counts().dropped() + counts.undecodable + counts.overflowed.max(counts.lost)
+    }
+
+    fn trouble(&mut self, silent_for: Duration) -> Option<Trouble> {
+        let packed = self.packer.counts();
+        self.watch.trouble(silent_for, &self.session, packed)
     }
 }
 
@@ -257,7 +280,7 @@ fn subscribe(
             ConfigError::Zenoh {
                 what: "key",
                 text: key.to_owned(),
-                reason: error.to_string(),
+                reason: zenoh_reason(&error),
             }
             .into()
         })
@@ -296,7 +319,7 @@ fn session_config(zenoh: &ZenohConfig) -> Result<zenoh::Config, ConfigError> {
                     "setting"
                 },
                 text: format!("{key}: {value}"),
-                reason: error.to_string(),
+                reason: zenoh_reason(&error),
             })?;
     }
     Ok(config)

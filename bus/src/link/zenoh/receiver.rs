@@ -8,7 +8,7 @@ use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::Subscriber;
 use zenoh::qos::CongestionControl;
 
-use super::{Zenoh, encoding, open_error, policy};
+use super::{Zenoh, encoding, open_error, policy, zenoh_reason};
 use crate::link::queue::{Message, Queue};
 use crate::link::sequence::Tracker;
 use crate::link::{Keep, LinkError, MAX_DEPTH, Position, Received, Receiver, ReceiverCounts};
@@ -77,7 +77,7 @@ impl<T: Sample> ZenohReceiver<T> {
             .wait()
             .map_err(|error| LinkError::Receive {
                 stream: self.stream.clone(),
-                reason: error.to_string(),
+                reason: zenoh_reason(&error),
             })
     }
 }

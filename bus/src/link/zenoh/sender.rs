@@ -10,7 +10,7 @@ use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::CongestionControl;
 use zenoh::sample::SampleKind as Change;
 
-use super::{Zenoh, encoding, open_error, policy};
+use super::{Zenoh, encoding, open_error, policy, zenoh_reason};
 use crate::link::{Audience, Keep, LinkError, Sender, SenderCounts};
 use crate::sample::{Sample, flags};
 
@@ -156,7 +156,7 @@ impl<T: Sample> ZenohSender<T> {
             .wait()
             .map_err(|error| LinkError::Send {
                 stream: self.stream.clone(),
-                reason: error.to_string(),
+                reason: zenoh_reason(&error),
             })
     }
 }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use tauscope_archive::whole_file::{self, Existing};
 use tauscope_archive::{Compression, McapWriter, Written, ros};
 use tauscope_dynamics::Model;
 
@@ -99,9 +100,7 @@ fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), Scenario
     };
     let mut text = serde_json::to_vec_pretty(value).map_err(|error| unwritable(error.into()))?;
     text.push(b'\n');
-    let part = path.with_extension("json.part");
-    std::fs::write(&part, text).map_err(unwritable)?;
-    std::fs::rename(&part, path).map_err(unwritable)
+    whole_file::write(path, text, Existing::Replace).map_err(unwritable)
 }
 
 /// Each recording has a name of its own.

@@ -11,9 +11,9 @@ const MAX_WARNED: usize = 16;
 /// How a topic's name becomes a key.
 #[derive(Debug, Clone)]
 pub(super) struct KeyScheme {
-    keys: Keys,
-    domain: u32,
-    prefix: String,
+    pub keys: Keys,
+    pub domain: u32,
+    pub prefix: String,
 }
 
 impl KeyScheme {
@@ -29,9 +29,18 @@ impl KeyScheme {
     /// The key expression of a topic whose messages have this DDS type. The type's hash is left open:
     /// messages of another version of the type are better read with a warning than missed in silence.
     pub fn key(&self, topic: &str, dds_type: &str) -> String {
+        let stem = self.stem(topic, dds_type);
+        match self.keys {
+            Keys::RmwZenoh => format!("{stem}/*"),
+            Keys::Ros2dds | Keys::Tauscope => stem,
+        }
+    }
+
+    /// The same without the type's hash.
+    pub fn stem(&self, topic: &str, dds_type: &str) -> String {
         let topic = topic.trim_matches('/');
         match self.keys {
-            Keys::RmwZenoh => format!("{}/{topic}/{dds_type}/*", self.domain),
+            Keys::RmwZenoh => format!("{}/{topic}/{dds_type}", self.domain),
             Keys::Ros2dds | Keys::Tauscope if self.prefix.is_empty() => topic.to_owned(),
             Keys::Ros2dds | Keys::Tauscope => format!("{}/{topic}", self.prefix),
         }

@@ -34,6 +34,7 @@ impl PictureFile {
         }
         whole_file::set_part_aside(path).map_err(|error| failed(&error))?;
         let file = File::create_new(&part).map_err(|error| failed(&error))?;
+        whole_file::begin(&part);
         let encoder = Encoder::new_eager(
             CrateVersion::LOCAL,
             EncodingOptions::PROTOBUF_COMPRESSED,

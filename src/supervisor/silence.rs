@@ -1,0 +1,129 @@
+//! What is said of a stage that gets nothing it can use: at once, again when something else is wrong, now and then
+//! while it lasts, and when it is over.
+
+use std::time::{Duration, Instant};
+
+use tauscope_bus::Trouble;
+
+/// The same trouble is told again after this time, in short; from then on at twice the time before.
+const FIRST_REMINDER: Duration = Duration::from_secs(30);
+/// But at least this often.
+const LONGEST_REMINDER: Duration = Duration::from_mins(10);
+
+/// The trouble of one stage, as far as it was told.
+#[derive(Debug, Default)]
+pub struct Silence {
+    told: Option<Told>,
+}
+
+#[derive(Debug)]
+struct Told {
+    trouble: Trouble,
+    since: Instant,
+    reminder: Instant,
+    wait: Duration,
+}
+
+impl Silence {
+    /// The trouble that is there now, if any, and for how long nothing has come: what is to be said, and
+    /// whether it is a warning.
+    pub fn note(
+        &mut self,
+        trouble: Option<&Trouble>,
+        silent_for: Duration,
+        now: Instant,
+    ) -> Option<(bool, String)> {
+        let Some(trouble) = trouble else {
+            let told = self.told.take()?;
+            let lasted = (now - told.since).as_secs_f64();
+            return Some((false, format!("samples come again after {lasted:.0} s")));
+        };
+        let seconds = silent_for.as_secs_f64();
+        match &mut self.told {
+            Some(told) if told.trouble.is_like(trouble) => {
+                if now < told.reminder {
+                    return None;
+                }
+                told.wait = (told.wait * 2).min(LONGEST_REMINDER);
+                told.reminder = now + told.wait;
+                Some((true, format!("still: {} ({seconds:.0} s)", trouble.what)))
+            }
+            told => {
+                let since = told
+                    .as_ref()
+                    .map_or(now.checked_sub(silent_for).unwrap_or(now), |told| {
+                        told.since
+                    });
+                *told = Some(Told {
+                    trouble: trouble.clone(),
+                    since,
+                    reminder: now + FIRST_REMINDER,
+                    wait: FIRST_REMINDER,
+                });
+                let age = if silent_for < Duration::from_secs(1) {
+                    String::new()
+                } else {
+                    format!("no usable sample for {seconds:.0} s: ")
+                };
+                Some((true, format!("{age}{trouble}")))
+            }
+        }
+    }
+
+    /// The trouble that was told and is not over.
+    pub fn trouble(&self) -> Option<&Trouble> {
+        self.told.as_ref().map(|told| &told.trouble)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn trouble_is_told_once_then_seldom_and_its_end_is_told() {
+        let start = Instant::now();
+        let mut silence = Silence::default();
+        let trouble = Trouble::new("nobody publishes a/b");
+        let mut said = Vec::new();
+        for second in 3..100 {
+            let silent_for = Duration::from_secs(second);
+            if let Some((warns, text)) =
+                silence.note(Some(&trouble), silent_for, start + silent_for)
+            {
+                assert!(warns);
+                said.push(text);
+            }
+        }
+        let expected = [
+            "no usable sample for 3 s: nobody publishes a/b",
+            "still: nobody publishes a/b (33 s)",
+            "still: nobody publishes a/b (93 s)",
+        ];
+        assert_eq!(said, expected);
+        let end = start + Duration::from_secs(100);
+        let over = silence.note(None, Duration::ZERO, end);
+        assert_eq!(
+            over,
+            Some((false, "samples come again after 100 s".to_owned()))
+        );
+        assert_eq!(silence.note(None, Duration::ZERO, end), None);
+    }
+
+    #[test]
+    fn another_trouble_is_told_at_once() {
+        let start = Instant::now();
+        let mut silence = Silence::default();
+        let three = Duration::from_secs(3);
+        silence.note(Some(&Trouble::new("no router")), three, start + three);
+        let other = silence.note(
+            Some(&Trouble::new("no publisher")),
+            three * 2,
+            start + three * 2,
+        );
+        assert_eq!(
+            other,
+            Some((true, "no usable sample for 6 s: no publisher".to_owned()))
+        );
+    }
+}

@@ -1,0 +1,315 @@
+//! From what was waited for, what came and what was seen to the likeliest slip. Pure.
+
+use tauscope_archive::ros::{self, Message as _};
+use tauscope_bus::Trouble;
+
+use super::joint_names::{list, slip};
+use super::keys::KeyScheme;
+use super::publication::{Form, Publication};
+use super::scout::Seen;
+use crate::config::Keys;
+
+/// Topics that are less alike than this (Jaro-Winkler, 0 to 1) were not meant.
+const LEAST_SIMILARITY: f64 = 0.85;
+
+/// What a source waits for.
+#[derive(Debug, Clone)]
+pub(super) struct Expected {
+    pub scheme: KeyScheme,
+    /// The topic as it stands in the pipeline file.
+    pub topic: String,
+    pub joints: Vec<String>,
+    pub connect: Vec<String>,
+    pub listen: Vec<String>,
+}
+
+/// What came on the topic since the last sample.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Fed {
+    /// There were samples before.
+    pub was_well: bool,
+    /// Messages of the topic.
+    pub messages: u64,
+    pub undecodable: u64,
+    /// Why the last one could not be read.
+    pub reason: Option<String>,
+    /// Messages of other joints, without positions, not finite, with stamps that do not advance.
+    pub foreign: u64,
+    pub incomplete: u64,
+    pub not_finite: u64,
+    pub stale: u64,
+}
+
+impl Expected {
+    fn dds_type() -> String {
+        ros::JointState::dds_type()
+    }
+
+    fn key(&self) -> String {
+        self.scheme.key(&self.topic, &Self::dds_type())
+    }
+
+    fn stem(&self) -> String {
+        self.scheme.stem(&self.topic, &Self::dds_type())
+    }
+
+    fn lines(&self) -> Vec<String> {
+        vec![
+            format!("{} on {}", ros::JointState::TYPE, self.key()),
+            format!("joints {}", list(&self.joints)),
+        ]
+    }
+}
+
+/// Why nothing that can be used comes.
+pub(super) fn diagnose(expected: &Expected, fed: &Fed, seen: &Seen) -> Trouble {
+    let stem = expected.stem();
+    let own = seen.publications.by_key.get(&stem);
+    let trouble = if seen.connected == 0 {
+        unconnected(expected, fed, seen)
+    } else if fed.messages > 0 {
+        unusable(expected, fed, own)
+    } else if let Some(own) = own.filter(|own| own.publishers() > 0) {
+        let them = if own.publishers() == 1 {
+            "its publisher sends"
+        } else {
+            "its publishers send"
+        };
+        Trouble::new(format!("{stem} is announced, but {them} nothing")).likely(Some(
+            "the driver is up, but not connected to the robot, or it is paused".to_owned(),
+        ))
+    } else if fed.was_well {
+        Trouble::new(format!("the publisher of {stem} has gone"))
+    } else {
+        Trouble::new(format!("nobody publishes {stem}")).likely(misnamed(expected, seen))
+    };
+    trouble.expects(expected.lines()).sees(lines(seen, &stem))
+}
+
+fn unconnected(expected: &Expected, fed: &Fed, seen: &Seen) -> Trouble {
+    if expected.connect.is_empty() {
+        return Trouble::new(format!(
+            "nobody has connected to {}",
+            expected.listen.join(", ")
+        ))
+        .likely(Some(
+            "let the robot's router or bridge connect to this address".to_owned(),
+        ));
+    }
+    let lost = if fed.was_well {
+        "the connection is lost: "
+    } else {
+        ""
+    };
+    let all = expected.connect.join(", ");
+    let tried = seen.endpoints.iter().map(|(endpoint, fault)| match fault {
+        Some(fault) => format!("{endpoint}: {fault}"),
+        None => {
+            format!("{endpoint}: answers, but not as Zenoh: another service, or `tls/` is needed")
+        }
+    });
+    let refused = seen.endpoints.iter().any(|(_, fault)| fault.is_some());
+    let likely = if refused {
+        "the router does not run (`ros2 run rmw_zenoh_cpp rmw_zenohd`), a firewall is between, or `connect` has \
+         the wrong address"
+    } else {
+        "`connect` has the wrong port, or the wrong protocol"
+    };
+    Trouble::new(format!("{lost}router {all} cannot be reached"))
+        .sees(tried)
+        .likely(Some(likely.to_owned()))
+}
+
+/// Messages come, but none can be used.
+fn unusable(expected: &Expected, fed: &Fed, own: Option<&Publication>) -> Trouble {
+    let stem = expected.stem();
+    if fed.undecodable > 0 {
+        let reason = fed.reason.clone().unwrap_or_default();
+        return Trouble::new(format!("the messages on {stem} are no {} in CDR", ros::JointState::TYPE))
+            .sees([reason])
+            .likely(Some(format!("the key carries another type, or its publisher does not encode with CDR (4 bytes of header, then {})", ros::JointState::TYPE)));
+    }
+    let found = own.map_or(&[][..], |own| &own.joints);
+    if fed.not_finite > 0 {
+        return Trouble::new(format!("the joint states on {stem} hold NaN or infinity")).likely(
+            Some("the driver has no measurement yet, or none of this field".to_owned()),
+        );
+    }
+    if let Some(slip) = slip(&expected.joints, found) {
+        let what = if fed.foreign > 0 {
+            "name none of this robot's joints"
+        } else {
+            "do not name all of this robot's joints"
+        };
+        return Trouble::new(format!("the joint states on {stem} {what}")).likely(Some(slip));
+    }
+    if fed.incomplete > 0 {
+        return Trouble::new(format!("the joint states on {stem} have no positions"));
+    }
+    if fed.stale > 0 {
+        return Trouble::new(format!("the stamps of the joint states on {stem} do not advance"))
+            .likely(Some("the publisher repeats one message, or two publishers with different clocks share the topic".to_owned()));
+    }
+    Trouble::new(format!("the joint states on {stem} make no whole sample"))
+}
+
+/// What else is published that was probably meant.
+fn misnamed(expected: &Expected, seen: &Seen) -> Option<String> {
+    let all = &seen.publications.by_key;
+    if all.is_empty() {
+        return Some(format!(
+            "{} connected, but nobody publishes anything: start the driver; ROS 2 must use rmw_zenoh, or \
+             zenoh-bridge-ros2dds must run beside it",
+            peers(seen.connected)
+        ));
+    }
+    let topic = format!("/{}", expected.topic.trim_matches('/'));
+    let states = || all.iter().filter(|(_, found)| found.is_joint_state());
+    let here = |found: &Publication| match (&found.form, expected.scheme.keys) {
+        (Form::Rmw { domain, .. }, Keys::RmwZenoh) => *domain == expected.scheme.domain,
+        (Form::Plain, Keys::Ros2dds | Keys::Tauscope) => true,
+        _ => false,
+    };
+    // The same topic under another name of the scheme: domain, namespace, kind of key.
+    let same = states().find(|(key, found)| names(key, found, &topic));
+    if let Some((key, found)) = same {
+        return Some(same_topic(expected, key, found, &topic));
+    }
+    // The same name with another type.
+    let other_type = all
+        .iter()
+        .find(|(key, found)| here(found) && names(key, found, &topic));
+    if let Some((
+        _,
+        Publication {
+            type_name: Some(type_name),
+            ..
+        },
+    )) = other_type
+    {
+        return Some(format!(
+            "{topic} carries {type_name}, not {}",
+            ros::JointState::TYPE
+        ));
+    }
+    let alike = states()
+        .filter(|(_, found)| here(found))
+        .map(|(key, found)| topic_of(expected, key, found))
+        .map(|theirs| (strsim::jaro_winkler(&theirs, &topic), theirs))
+        .max_by(|a, b| a.0.total_cmp(&b.0));
+    match alike {
+        Some((similarity, theirs)) if similarity >= LEAST_SIMILARITY => Some(format!(
+            "the topic is {theirs}, you wrote {topic}: set `topics: {{state: {theirs}}}`"
+        )),
+        Some((_, theirs)) => Some(format!(
+            "joint states are published on {theirs}: if these are meant, set `topics: {{state: {theirs}}}`"
+        )),
+        None => states().next().map(|(key, found)| scheme_of(key, found)),
+    }
+}
+
+/// Whether a key names this topic, perhaps below a namespace.
+fn names(key: &str, found: &Publication, topic: &str) -> bool {
+    match &found.form {
+        Form::Rmw { topic: theirs, .. } => theirs == topic,
+        Form::Plain => format!("/{key}").ends_with(topic),
+    }
+}
+
+/// The topic as the pipeline file would name it.
+fn topic_of(expected: &Expected, key: &str, found: &Publication) -> String {
+    match &found.form {
+        Form::Rmw { topic, .. } => topic.clone(),
+        Form::Plain => {
+            let below = key
+                .strip_prefix(&expected.scheme.prefix)
+                .filter(|rest| rest.starts_with('/'));
+            below.map_or_else(|| format!("/{key}"), str::to_owned)
+        }
+    }
+}
+
+fn same_topic(expected: &Expected, key: &str, found: &Publication, topic: &str) -> String {
+    match (&found.form, expected.scheme.keys) {
+        (Form::Rmw { domain, .. }, Keys::RmwZenoh) => format!(
+            "its publishers have ROS_DOMAIN_ID={domain}, the pipeline says {}: set `domain: {domain}`",
+            expected.scheme.domain
+        ),
+        (Form::Plain, Keys::Ros2dds | Keys::Tauscope) => {
+            let namespace = key
+                .strip_suffix(topic.trim_start_matches('/'))
+                .unwrap_or_default();
+            let namespace = match namespace.trim_matches('/') {
+                "" => "\"\"",
+                namespace => namespace,
+            };
+            format!("the topic is published as {key}: set `namespace: {namespace}`")
+        }
+        _ => scheme_of(key, found),
+    }
+}
+
+/// Which kind of key this is.
+fn scheme_of(key: &str, found: &Publication) -> String {
+    match &found.form {
+        Form::Rmw { domain, topic } => format!(
+            "{key} is a key of rmw_zenoh: set `keys: rmw_zenoh`, `domain: {domain}` and `topics: {{state: {topic}}}`"
+        ),
+        Form::Plain => {
+            let (namespace, topic) = key.rsplit_once('/').unwrap_or(("\"\"", key));
+            format!(
+                "{key} is no key of rmw_zenoh, but of zenoh-bridge-ros2dds or of a program of your own: set \
+                 `keys: ros2dds`, `namespace: {namespace}` and `topics: {{state: /{topic}}}`"
+            )
+        }
+    }
+}
+
+/// What is seen, a line a key: first the own one, then joint states, then all others.
+fn lines(seen: &Seen, stem: &str) -> Vec<String> {
+    let mut all: Vec<_> = seen.publications.by_key.iter().collect();
+    all.sort_by_key(|(key, found)| (key.as_str() != stem, !found.is_joint_state()));
+    let mut lines: Vec<String> = all
+        .into_iter()
+        .map(|(key, found)| line(key, found))
+        .collect();
+    if seen.publications.more > 0 {
+        lines.push(format!(
+            "{} messages of further keys",
+            seen.publications.more
+        ));
+    }
+    if lines.is_empty() && seen.connected > 0 {
+        lines.push(format!("{} connected, no key", peers(seen.connected)));
+    }
+    lines
+}
+
+fn line(key: &str, found: &Publication) -> String {
+    let mut facts = Vec::new();
+    facts.extend(found.type_name.clone());
+    if found.publishers() > 0 {
+        facts.push(counted(found.publishers() as u64, "publisher"));
+    }
+    facts.push(match found.heard {
+        0 => "no message".to_owned(),
+        heard => counted(heard, "message"),
+    });
+    if !found.joints.is_empty() {
+        facts.push(format!("joints {}", list(&found.joints)));
+    }
+    format!("{key} ({})", facts.join(", "))
+}
+
+fn counted(count: u64, what: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {what}{plural}")
+}
+
+fn peers(count: usize) -> String {
+    let is = if count == 1 { "is" } else { "are" };
+    format!("{} {is}", counted(count as u64, "Zenoh peer"))
+}
+
+#[cfg(test)]
+mod tests;

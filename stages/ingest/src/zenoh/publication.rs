@@ -1,0 +1,269 @@
+//! What others publish on Zenoh, read from keys and from the tokens with which ROS 2 announces its publishers.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use tauscope_archive::ros::{self, Message as _};
+
+use super::attachment::Attachment;
+
+/// Keys that are remembered; further ones are only counted.
+const MAX_KEYS: usize = 256;
+/// Messages of a key that are looked into.
+const LOOKED_INTO: u64 = 50;
+/// Names of joints, or publishers, of one key that are remembered.
+const MAX_NAMES: usize = 64;
+/// Larger messages are no joint states.
+const MAX_PAYLOAD_BYTES: usize = 65_536;
+/// Stands for `/` within a part of a token: `rmw_zenoh`, `zenoh-bridge-ros2dds`.
+const SLASHES: [char; 2] = ['%', '§'];
+
+/// How a key names a topic.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Form {
+    /// `<domain>/<topic>/<type>/<type hash>`.
+    Rmw {
+        /// `ROS_DOMAIN_ID`.
+        domain: u32,
+        /// The topic, with its slash.
+        topic: String,
+    },
+    /// Any other.
+    Plain,
+}
+
+/// What is known of one key.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Publication {
+    /// How the key names its topic.
+    pub form: Form,
+    /// `sensor_msgs/msg/JointState`, where it is known.
+    pub type_name: Option<String>,
+    /// Publishers that have announced themselves.
+    pub announced: usize,
+    /// Messages that were heard.
+    pub heard: u64,
+    /// Joints that its messages name.
+    pub joints: Vec<String>,
+    /// Publishers that the messages name.
+    senders: BTreeSet<[u8; 16]>,
+}
+
+impl Publication {
+    fn new(form: Form, type_name: Option<String>) -> Self {
+        Self {
+            form,
+            type_name,
+            announced: 0,
+            heard: 0,
+            joints: Vec::new(),
+            senders: BTreeSet::new(),
+        }
+    }
+
+    /// Whether it carries joint states.
+    pub fn is_joint_state(&self) -> bool {
+        self.type_name.as_deref() == Some(ros::JointState::TYPE)
+    }
+
+    /// How many publish it, as far as that is known.
+    pub fn publishers(&self) -> usize {
+        self.announced.max(self.senders.len())
+    }
+
+    fn look_into(&mut self, payload: &[u8]) {
+        let mut state = ros::JointState::default();
+        let looks_like_one = payload.len() <= MAX_PAYLOAD_BYTES
+            && ros::decode_into(payload, &mut state).is_ok()
+            && !state.name.is_empty()
+            && state.name.iter().all(|name| !name.is_empty());
+        if looks_like_one {
+            self.type_name
+                .get_or_insert_with(|| ros::JointState::TYPE.to_owned());
+            for name in state.name {
+                if self.joints.len() < MAX_NAMES && !self.joints.contains(&name) {
+                    self.joints.push(name);
+                }
+            }
+        }
+    }
+}
+
+/// All that was seen on a session.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Publications {
+    /// By key, without the hash of the type.
+    pub by_key: BTreeMap<String, Publication>,
+    /// Messages and tokens of keys for which there was no room.
+    pub more: u64,
+}
+
+impl Publications {
+    /// Takes note of a message.
+    pub fn hear(&mut self, key: &str, payload: &[u8], attachment: Option<Attachment>) {
+        let (name, form, type_name) = read_key(key);
+        let Some(publication) = self.entry(name, form, type_name) else {
+            return;
+        };
+        publication.heard += 1;
+        if publication.heard <= LOOKED_INTO {
+            publication.look_into(payload);
+        }
+        if let Some(attachment) = attachment
+            && publication.senders.len() < MAX_NAMES
+        {
+            publication.senders.insert(attachment.publisher);
+        }
+    }
+
+    /// Takes note of a token; those of others than publishers say nothing.
+    pub fn announce(&mut self, token: &str) {
+        let Some((name, form, type_name)) = read_token(token) else {
+            return;
+        };
+        if let Some(publication) = self.entry(name, form, Some(type_name)) {
+            publication.announced += 1;
+        }
+    }
+
+    fn entry(
+        &mut self,
+        name: String,
+        form: Form,
+        type_name: Option<String>,
+    ) -> Option<&mut Publication> {
+        if self.by_key.len() >= MAX_KEYS && !self.by_key.contains_key(&name) {
+            self.more += 1;
+            return None;
+        }
+        let publication = self
+            .by_key
+            .entry(name)
+            .or_insert_with(|| Publication::new(form, None));
+        publication.type_name = publication.type_name.take().or(type_name);
+        Some(publication)
+    }
+}
+
+/// The key without a type's hash, how it names its topic, and its type if it says so.
+fn read_key(key: &str) -> (String, Form, Option<String>) {
+    let parts: Vec<&str> = key.split('/').collect();
+    if let [domain, topic @ .., dds_type, hash] = &parts[..]
+        && hash.starts_with("RIHS")
+        && let (Ok(domain), Some(type_name)) = (domain.parse(), ros_type(dds_type))
+    {
+        return rmw(domain, &topic.join("/"), dds_type, type_name);
+    }
+    (key.to_owned(), Form::Plain, None)
+}
+
+fn rmw(
+    domain: u32,
+    topic: &str,
+    dds_type: &str,
+    type_name: String,
+) -> (String, Form, Option<String>) {
+    let name = format!("{domain}/{topic}/{dds_type}");
+    let topic = format!("/{topic}");
+    (name, Form::Rmw { domain, topic }, Some(type_name))
+}
+
+/// The same of a publisher's token: `@ros2_lv/<domain>/<session>/<node>/<entity>/MP/<enclave>/<namespace>/<node
+/// name>/<topic>/<type>/<hash>/<qos>` or `@/<session>/@ros2_lv/MP/<key>/<type>/<qos>`.
+fn read_token(token: &str) -> Option<(String, Form, String)> {
+    let parts: Vec<&str> = token.split('/').collect();
+    match &parts[..] {
+        [
+            "@ros2_lv",
+            domain,
+            _,
+            _,
+            _,
+            "MP",
+            _,
+            _,
+            _,
+            topic,
+            dds_type,
+            ..,
+        ] => {
+            let topic = topic.replace(SLASHES, "/");
+            let type_name = ros_type(dds_type)?;
+            let domain = domain.parse().ok()?;
+            let (name, form, _) = rmw(domain, topic.trim_matches('/'), dds_type, type_name.clone());
+            Some((name, form, type_name))
+        }
+        ["@", _, "@ros2_lv", "MP", key, type_name, ..] => Some((
+            key.replace(SLASHES, "/"),
+            Form::Plain,
+            type_name.replace(SLASHES, "/"),
+        )),
+        _ => None,
+    }
+}
+
+/// `sensor_msgs/msg/JointState` for `sensor_msgs::msg::dds_::JointState_`.
+fn ros_type(dds_type: &str) -> Option<String> {
+    let (folder, name) = dds_type.split_once("::dds_::")?;
+    Some(format!(
+        "{}/{}",
+        folder.replace("::", "/"),
+        name.strip_suffix('_')?
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_and_tokens_of_one_publisher_come_together() {
+        let mut seen = Publications::default();
+        let dds_type = ros::JointState::dds_type();
+        seen.announce(&format!(
+            "@ros2_lv/3/abc/0/10/MP/%/%/driver/%arm%joint_states/{dds_type}/RIHS01_x/::,7:,:,:,,"
+        ));
+        seen.announce(&format!(
+            "@ros2_lv/3/abc/0/11/MS/%/%/viewer/%arm%joint_states/{dds_type}/RIHS01_x/::,7:,:,:,,"
+        ));
+        let state = ros::JointState {
+            name: vec!["a".to_owned(), "b".to_owned()],
+            ..ros::JointState::default()
+        };
+        let mut body = Vec::new();
+        ros::encode(&state, &mut body).unwrap();
+        seen.hear(
+            &format!("3/arm/joint_states/{dds_type}/RIHS01_x"),
+            &body,
+            None,
+        );
+        let (key, found) = seen.by_key.first_key_value().unwrap();
+        assert_eq!(key, &format!("3/arm/joint_states/{dds_type}"));
+        assert!(found.is_joint_state());
+        assert_eq!((found.publishers(), found.heard), (1, 1));
+        assert_eq!(found.joints, ["a", "b"]);
+        let topic = "/arm/joint_states".to_owned();
+        assert_eq!(found.form, Form::Rmw { domain: 3, topic });
+    }
+
+    #[test]
+    fn a_bridge_announces_its_keys_too() {
+        let mut seen = Publications::default();
+        seen.announce(
+            "@/abc/@ros2_lv/MP/bot1§joint_states/sensor_msgs§msg§JointState/::,10:,:,:,,",
+        );
+        let (key, found) = seen.by_key.first_key_value().unwrap();
+        assert_eq!(key, "bot1/joint_states");
+        assert!(found.is_joint_state());
+        assert_eq!(found.form, Form::Plain);
+    }
+
+    #[test]
+    fn keys_without_number_do_not_fill_the_memory() {
+        let mut seen = Publications::default();
+        for n in 0..1000 {
+            seen.hear(&format!("key/{n}"), b"", None);
+        }
+        assert_eq!(seen.by_key.len(), MAX_KEYS);
+        assert_eq!(seen.more, 1000 - MAX_KEYS as u64);
+    }
+}

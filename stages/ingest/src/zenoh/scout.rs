@@ -1,0 +1,187 @@
+//! Looks on a session for what else is there, while what is waited for does not come.
+//!
+//! For a short time it hears everything, which may be much (cameras), asks for the tokens with which ROS 2 announces
+//! its publishers, and tries the endpoints that cannot be reached. Then it is quiet for longer than it looked.
+
+use std::net::{TcpStream, ToSocketAddrs};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use zenoh::pubsub::Subscriber;
+use zenoh::{Session, Wait};
+
+use super::attachment::Attachment;
+use super::publication::Publications;
+
+/// How long it hears everything.
+const LOOK_FOR: Duration = Duration::from_millis(1500);
+/// From one look to the next.
+const LOOK_EVERY: Duration = Duration::from_secs(10);
+/// How long an endpoint may take to answer.
+const ANSWER_WITHIN: Duration = Duration::from_millis(1500);
+/// Everything but what Zenoh and ROS 2 say of themselves.
+const EVERYTHING: &str = "**";
+/// Tokens of `rmw_zenoh` and of `zenoh-bridge-ros2dds`.
+const TOKENS: [&str; 2] = ["@ros2_lv/**", "@/*/@ros2_lv/**"];
+
+/// What was seen in one look.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Seen {
+    /// What is published.
+    pub publications: Publications,
+    /// Endpoints that were tried, and why they did not answer; nothing for those that did.
+    pub endpoints: Vec<(String, Option<String>)>,
+    /// Routers and peers that the session is connected to.
+    pub connected: usize,
+}
+
+/// Looks around.
+#[derive(Debug)]
+pub(super) struct Scout {
+    endpoints: Vec<String>,
+    found: Arc<Mutex<Seen>>,
+    /// A thread tries the endpoints; there is never more than one.
+    trying: Arc<AtomicBool>,
+    look: Option<Look>,
+    began: Option<Instant>,
+    /// What the last whole look gave.
+    newest: Option<Seen>,
+}
+
+/// Hears everything until it is dropped.
+#[derive(Debug)]
+struct Look {
+    began: Instant,
+    _everything: Option<Subscriber<()>>,
+}
+
+impl Scout {
+    /// For a session that connects to these endpoints.
+    pub fn new(endpoints: &[String]) -> Self {
+        Self {
+            endpoints: endpoints.to_vec(),
+            found: Arc::default(),
+            trying: Arc::default(),
+            look: None,
+            began: None,
+            newest: None,
+        }
+    }
+
+    /// Begins a look where it is time for one, ends one that took its time; what was seen last.
+    pub fn look(&mut self, session: &Session) -> Option<&Seen> {
+        let now = Instant::now();
+        if let Some(look) = &self.look
+            && now.duration_since(look.began) >= LOOK_FOR
+        {
+            self.look = None;
+            let mut seen = lock(&self.found).clone();
+            seen.connected = connected(session);
+            self.newest = Some(seen);
+        }
+        // Once a router answers, other things are seen than before.
+        let had_connection = self.newest.as_ref().map(|seen| seen.connected > 0);
+        let changed = had_connection.is_some_and(|had| had != (connected(session) > 0));
+        let is_due = |began: Instant| changed || now.duration_since(began) >= LOOK_EVERY;
+        if self.look.is_none() && self.began.is_none_or(is_due) {
+            self.began = Some(now);
+            self.look = Some(self.begin(session, now));
+        }
+        self.newest.as_ref()
+    }
+
+    /// All is well: nothing is looked for, and what was seen is forgotten.
+    pub fn rest(&mut self) {
+        self.look = None;
+        self.began = None;
+        self.newest = None;
+    }
+
+    fn begin(&self, session: &Session, now: Instant) -> Look {
+        *lock(&self.found) = Seen::default();
+        if connected(session) == 0 {
+            self.try_endpoints();
+        }
+        for tokens in TOKENS {
+            let found = Arc::clone(&self.found);
+            let asked = session
+                .liveliness()
+                .get(tokens)
+                .timeout(LOOK_FOR)
+                .callback(move |reply| {
+                    if let Ok(token) = reply.result() {
+                        lock(&found)
+                            .publications
+                            .announce(token.key_expr().as_str());
+                    }
+                });
+            // A session that cannot ask has no connection, which is said.
+            let _ = asked.wait();
+        }
+        let found = Arc::clone(&self.found);
+        let everything = session
+            .declare_subscriber(EVERYTHING)
+            .callback(move |sample| {
+                let bytes = sample.attachment().map(zenoh::bytes::ZBytes::to_bytes);
+                let attachment = bytes.and_then(|bytes| Attachment::parse(&bytes));
+                let (key, payload) = (sample.key_expr().as_str(), sample.payload().to_bytes());
+                lock(&found).publications.hear(key, &payload, attachment);
+            });
+        Look {
+            began: now,
+            _everything: everything.wait().ok(),
+        }
+    }
+
+    /// Tries the endpoints in a thread of its own: names may take long to be looked up.
+    fn try_endpoints(&self) {
+        if self.trying.swap(true, Ordering::Relaxed) {
+            return;
+        }
+        let (endpoints, found) = (self.endpoints.clone(), Arc::clone(&self.found));
+        let trying = Arc::clone(&self.trying);
+        std::thread::spawn(move || {
+            for endpoint in endpoints {
+                let fault = fault_of(&endpoint);
+                lock(&found).endpoints.push((endpoint, fault));
+            }
+            trying.store(false, Ordering::Relaxed);
+        });
+    }
+}
+
+/// How many routers and peers a session is connected to.
+pub(super) fn connected(session: &Session) -> usize {
+    let info = session.info();
+    info.peers_zid().wait().count() + info.routers_zid().wait().count()
+}
+
+/// Why `tcp/10.0.0.1:7447` cannot be reached, if it cannot.
+fn fault_of(endpoint: &str) -> Option<String> {
+    let (_, address) = endpoint.split_once('/')?;
+    let address = address.split(['?', '#']).next().unwrap_or(address);
+    let addresses = match address.to_socket_addrs() {
+        Ok(addresses) => addresses,
+        Err(error) => return Some(format!("its name is not known: {error}")),
+    };
+    let mut fault = Some("its name has no address".to_owned());
+    for address in addresses {
+        match TcpStream::connect_timeout(&address, ANSWER_WITHIN) {
+            Ok(_) => return None,
+            Err(error) => {
+                fault = Some(match error.kind() {
+                    std::io::ErrorKind::ConnectionRefused => "connection refused".to_owned(),
+                    std::io::ErrorKind::TimedOut => "no answer".to_owned(),
+                    _ => error.to_string(),
+                });
+            }
+        }
+    }
+    fault
+}
+
+/// Nothing in here can be left half done, so a panic elsewhere does not matter.
+fn lock(found: &Mutex<Seen>) -> MutexGuard<'_, Seen> {
+    found.lock().unwrap_or_else(PoisonError::into_inner)
+}

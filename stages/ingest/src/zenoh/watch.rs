@@ -1,0 +1,99 @@
+//! Notices that a live source gives nothing that can be used, and finds out why.
+
+use std::time::{Duration, Instant};
+
+use tauscope_bus::{JointState, Trouble, flags};
+use zenoh::Session;
+
+use super::diagnosis::{Expected, Fed, diagnose};
+use super::scout::Scout;
+use crate::pack::PackCounts;
+
+/// A source that gave nothing for so long is looked after; what is wrong is known a look later.
+const SILENT_AFTER: Duration = Duration::from_secs(1);
+/// Samples without efforts are waited through for so long: a driver may begin with them.
+const EFFORTS_WITHIN: Duration = Duration::from_secs(3);
+
+/// Watches over one source.
+#[derive(Debug)]
+pub(super) struct Watch {
+    expected: Expected,
+    scout: Scout,
+    fed: Fed,
+    /// What packing had counted at the newest sample.
+    packed: PackCounts,
+    first_sample: Option<Instant>,
+    has_effort: bool,
+}
+
+impl Watch {
+    /// Over a source that waits for this.
+    pub fn new(expected: Expected) -> Self {
+        Self {
+            scout: Scout::new(&expected.connect),
+            expected,
+            fed: Fed::default(),
+            packed: PackCounts::default(),
+            first_sample: None,
+            has_effort: false,
+        }
+    }
+
+    /// A joint state came; `fault` is why it could not be read.
+    pub fn state(&mut self, fault: Option<&str>) {
+        self.fed.messages += 1;
+        if let Some(fault) = fault {
+            self.fed.undecodable += 1;
+            self.fed.reason = Some(fault.to_owned());
+        }
+    }
+
+    /// A sample went out.
+    pub fn sample(&mut self, sample: &JointState, packed: PackCounts) {
+        self.has_effort |= sample.header.has(flags::EFFORT_MEASURED);
+        self.first_sample.get_or_insert_with(Instant::now);
+        self.packed = packed;
+        if self.fed.messages > 0 {
+            self.fed = Fed {
+                was_well: true,
+                ..Fed::default()
+            };
+        }
+    }
+
+    /// What is wrong, `silent_for` after the last sample.
+    pub fn trouble(
+        &mut self,
+        silent_for: Duration,
+        session: &Session,
+        packed: PackCounts,
+    ) -> Option<Trouble> {
+        if silent_for < SILENT_AFTER {
+            self.scout.rest();
+            return self.effortless();
+        }
+        let seen = self.scout.look(session)?;
+        let fed = Fed {
+            foreign: packed.foreign - self.packed.foreign,
+            incomplete: packed.incomplete - self.packed.incomplete,
+            not_finite: packed.not_finite - self.packed.not_finite,
+            stale: packed.late + packed.repeated - self.packed.late - self.packed.repeated,
+            ..self.fed.clone()
+        };
+        Some(diagnose(&self.expected, &fed, seen))
+    }
+
+    fn effortless(&self) -> Option<Trouble> {
+        let since = self.first_sample?;
+        if self.has_effort || since.elapsed() < EFFORTS_WITHIN {
+            return None;
+        }
+        let trouble = Trouble::new("the joint states hold no effort: there is nothing to compare");
+        Some(
+            trouble.likely(Some(
+                "the driver leaves `effort` out by default, or publishes currents on another topic"
+                    .to_owned(),
+            )),
+        )
+    }
+}

@@ -1,0 +1,101 @@
+//! A robot on Zenoh: a router in this process, and publishers as ROS 2 would have them.
+#![allow(dead_code, reason = "each test file uses its own part")]
+#![allow(clippy::unwrap_used, reason = "only tests are in here")]
+
+use std::net::TcpListener;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, SystemTime};
+
+use tauscope_archive::ros::{self, Message as _};
+use zenoh::{Session, Wait as _};
+
+/// The joints of the bundled robot.
+pub const JOINTS: [&str; 7] = [
+    "joint1", "joint2", "joint3", "joint4", "joint5", "joint6", "joint7",
+];
+
+/// An endpoint that nobody listens on right now.
+pub fn endpoint() -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    format!("tcp/{}", listener.local_addr().unwrap())
+}
+
+/// A router that listens there.
+pub fn router(endpoint: &str) -> Session {
+    let mut config = zenoh::Config::default();
+    for (key, value) in [
+        ("mode", "\"router\"".to_owned()),
+        ("listen/endpoints", format!("[\"{endpoint}\"]")),
+        ("scouting/multicast/enabled", "false".to_owned()),
+    ] {
+        config.insert_json5(key, &value).unwrap();
+    }
+    zenoh::open(config).wait().unwrap()
+}
+
+/// The key of `rmw_zenoh`.
+pub fn rmw_key(domain: u32, topic: &str) -> String {
+    let (dds_type, hash) = (ros::JointState::dds_type(), ros::JointState::TYPE_HASH);
+    format!("{domain}/{topic}/{dds_type}/{hash}")
+}
+
+/// The token with which `rmw_zenoh` announces a publisher.
+pub fn rmw_token(domain: u32, topic: &str) -> String {
+    let (dds_type, hash) = (ros::JointState::dds_type(), ros::JointState::TYPE_HASH);
+    let topic = topic.replace('/', "%");
+    format!("@ros2_lv/{domain}/abc/0/10/MP/%/%/driver/%{topic}/{dds_type}/{hash}/::,7:,:,:,,")
+}
+
+/// Publishes joint states, a hundred a second, until it is dropped.
+pub struct Publisher {
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Publisher {
+    /// Of these joints under this key.
+    pub fn start(session: &Session, key: &str, joints: &[&str]) -> Self {
+        let body = |joints: &[String]| {
+            let now = SystemTime::now()
+                .duration_since(SystemTime::UNIX_EPOCH)
+                .unwrap();
+            let zeros = vec![0.0; joints.len()];
+            let mut state = ros::JointState {
+                name: joints.to_vec(),
+                position: zeros.clone(),
+                velocity: zeros.clone(),
+                effort: zeros,
+                ..ros::JointState::default()
+            };
+            state.header.stamp.sec = now.as_secs() as i32;
+            state.header.stamp.nanosec = now.subsec_nanos();
+            let mut body = Vec::new();
+            ros::encode(&state, &mut body).unwrap();
+            body
+        };
+        let stop = Arc::new(AtomicBool::new(false));
+        let (stopped, session, key) = (Arc::clone(&stop), session.clone(), key.to_owned());
+        let joints: Vec<String> = joints.iter().map(ToString::to_string).collect();
+        let thread = std::thread::spawn(move || {
+            while !stopped.load(Ordering::Relaxed) {
+                session.put(&key, body(&joints)).wait().unwrap();
+                std::thread::sleep(Duration::from_millis(10));
+            }
+        });
+        Self {
+            stop,
+            thread: Some(thread),
+        }
+    }
+}
+
+impl Drop for Publisher {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            thread.join().unwrap();
+        }
+    }
+}
