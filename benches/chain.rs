@@ -58,6 +58,7 @@ fn source(joint_names: &[String]) -> RecordedSource {
         cell: "demo".to_owned(),
         joint_names: joint_names.to_vec(),
         tool: None,
+        has_tool_link: false,
     };
     RecordedSource::open_file(&file, &Config::default(), &setup).expect("the bundled recording")
 }

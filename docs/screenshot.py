@@ -1,6 +1,6 @@
 """Opens a recording in a headless Rerun viewer, sets the time and saves what is seen.
 
-    screenshot.py RECORDING.rrd PICTURE.png SECONDS
+    screenshot.py RECORDING.rrd PICTURE.png SECONDS [TIMELINE]
 
 Drives the viewer over its Model Context Protocol server, which comes with it. See screenshot.sh.
 """
@@ -17,7 +17,8 @@ import rerun_cli
 
 WIDTH, HEIGHT, TITLE_BAR = 1600, 1000, 29
 PORT = 9917
-TIMELINE = "ros2_timestamp"
+# The other is `recording_time`, of an explanation.
+TIMELINE = sys.argv[4] if len(sys.argv) > 4 else "ros2_timestamp"
 # The binary itself: the `rerun` beside it in the venv is a wrapper that does not pass on a signal.
 RERUN = str(pathlib.Path(rerun_cli.__file__).with_name("rerun"))
 
@@ -108,4 +109,4 @@ def main(recording, picture, seconds):
     whole.unlink()
 
 
-main(*sys.argv[1:])
+main(*sys.argv[1:4])

@@ -1,7 +1,10 @@
 //! Tells the supervisor, and so people, what a detector or a watch finds, as it finds it.
 
 use tauscope_bus::shell;
-use tauscope_bus::{Detection, Emit, EventKind, LinkError, Stage, StageError, TwinState, flags};
+use tauscope_bus::{
+    Contact, ContactFollower, Detection, Emit, EventKind, LinkError, Stage, StageError, TwinState,
+    flags,
+};
 
 use tauscope_pipeline::cell::CellFacts;
 use tauscope_watch as watch;
@@ -18,8 +21,7 @@ struct Told {
     effort_unit: &'static str,
     /// Stamp of the first sample, from which times are counted \[ns\].
     start_ns: Option<i64>,
-    /// The sample of this event with the largest score.
-    strongest: Option<Detection>,
+    contacts: ContactFollower,
 }
 
 impl<S> Announced<S> {
@@ -29,7 +31,7 @@ impl<S> Announced<S> {
             joint_names: cell.joint_names.clone(),
             effort_unit: cell.effort_unit.as_str(),
             start_ns: None,
-            strongest: None,
+            contacts: ContactFollower::default(),
         };
         Self { stage, told }
     }
@@ -81,24 +83,22 @@ impl Told {
     fn line(&mut self, detection: &Detection) -> Option<String> {
         let start_ns = *self.start_ns.get_or_insert(detection.header.stamp_ns);
         let t = (detection.header.stamp_ns - start_ns) as f64 * 1e-9;
-        let is_stronger = |before: &Detection| detection.score > before.score;
-        if detection.alarm() && self.strongest.as_ref().is_none_or(is_stronger) {
-            self.strongest = Some(*detection);
-        }
+        let ended = self.contacts.push(detection);
         let watches = detection.detector.as_str() == watch::NAME;
         match detection.event() {
             EventKind::Onset if watches => Some(self.change(t, start_ns, detection)),
-            EventKind::Offset if watches => {
-                let told = self.strongest.take()?;
-                let learned = format!("{t:8.3} s  learned: the arm as it is now is the rule");
-                told.header.has(flags::CHANGE).then_some(learned)
-            }
+            EventKind::Offset if watches => ended?
+                .size
+                .map(|_| format!("{t:8.3} s  learned: the arm as it is now is the rule")),
             EventKind::None => None,
-            EventKind::Onset => Some(format!("{t:8.3} s  {}", detection.state)),
-            EventKind::Offset => {
-                let strongest = self.strongest.take()?;
-                Some(format!("{t:8.3} s  over{}", self.strength(&strongest)))
+            EventKind::Onset => {
+                let begun = format!("{t:8.3} s  {}", detection.state);
+                Some(match ended {
+                    Some(before) => format!("{t:8.3} s  {}\n{begun}", self.over(&before)),
+                    None => begun,
+                })
             }
+            EventKind::Offset => Some(format!("{t:8.3} s  {}", self.over(&ended?))),
         }
     }
 
@@ -114,16 +114,15 @@ impl Told {
         format!("{t:8.3} s  since {since:.1} s: {words}{over}")
     }
 
-    /// Where and how hard, as far as it is known.
-    fn strength(&self, strongest: &Detection) -> String {
-        let mut text = String::new();
-        if strongest.header.has(flags::FORCE) {
-            let newtons = strongest.force_n.iter().map(|f| f * f).sum::<f64>().sqrt();
-            text += &format!("; at its strongest {newtons:.0} N at {}", strongest.link);
+    /// What is known of a contact that is over.
+    fn over(&self, contact: &Contact) -> String {
+        let mut text = format!("over after {:.2} s", contact.duration_s());
+        if contact.peak().is_some() {
+            text += &format!("; at its strongest {contact}");
         }
         let loaded = self.joint_names.iter().enumerate();
         let loaded: Vec<&str> = loaded
-            .filter(|(j, _)| strongest.joints & (1 << j) != 0)
+            .filter(|(j, _)| *j < 32 && contact.joints & (1 << j) != 0)
             .map(|(_, name)| name.as_str())
             .collect();
         if !loaded.is_empty() {

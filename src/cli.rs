@@ -3,7 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    calibrate, check, evaluate, explain, info, init, repair, replay, run, schema, simulate, stage,
+    calibrate, check, evaluate, explain, info, init, repair, replay, run, schema, send, simulate,
+    stage,
 };
 
 /// A robot's measured effort beside its digital twin's: stream, detect, record.
@@ -28,6 +29,7 @@ pub enum Command {
     Calibrate(calibrate::Args),
     Explain(explain::Args),
     Evaluate(evaluate::Args),
+    Send(send::Args),
     Simulate(simulate::Args),
     Init(init::Args),
     Info(info::Args),

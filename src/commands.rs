@@ -10,6 +10,7 @@ pub mod repair;
 pub mod replay;
 pub mod run;
 pub mod schema;
+pub mod send;
 pub mod simulate;
 pub mod stage;
 

@@ -103,6 +103,7 @@ fn run(command: &Command, out: &mut Output) -> u8 {
         Command::Calibrate(args) => commands::calibrate::run(args, out),
         Command::Explain(args) => commands::explain::run(args, out),
         Command::Evaluate(args) => commands::evaluate::run(args, out),
+        Command::Send(args) => commands::send::run(args, out),
         Command::Simulate(args) => commands::simulate::run(args, out),
         Command::Init(args) => commands::init::run(args, out),
         Command::Info(args) => commands::info::run(args, out),

@@ -4,6 +4,9 @@
 
 mod common;
 
+#[path = "common/python.rs"]
+mod python;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -12,31 +15,6 @@ use common::{Out, bundled, root, skipped, tauscope, write};
 use tauscope_archive::{Recording, ros};
 
 const PACKAGES: [&str; 2] = ["mcap==1.6.0", "mcap-ros2-support==0.6.0"];
-
-/// A Python with the packages, in a venv under `target/`; without Python, or without its packages,
-/// says what is missing.
-fn python() -> Result<PathBuf, String> {
-    let venv = root().join("target/python-independent-reader");
-    let python = venv.join("bin/python");
-    let run = |command: &mut Command| match command.output() {
-        Ok(out) if out.status.success() => Ok(()),
-        Ok(out) => Err(String::from_utf8_lossy(&out.stderr).trim().to_owned()),
-        Err(error) => Err(error.to_string()),
-    };
-    let ready = || run(Command::new(&python).args(["-c", "import mcap, mcap_ros2"]));
-    if ready().is_err() {
-        run(Command::new("python3")
-            .args(["-m", "venv", "--clear"])
-            .arg(&venv))
-        .map_err(|error| format!("no Python with venv: {error}"))?;
-        run(Command::new(&python)
-            .args(["-m", "pip", "install", "--quiet"])
-            .args(PACKAGES))
-        .map_err(|error| format!("{} cannot be installed: {error}", PACKAGES.join(" ")))?;
-        ready().map_err(|error| format!("the packages do not work: {error}"))?;
-    }
-    Ok(python)
-}
 
 /// What our own reader finds in a topic.
 #[derive(Default)]
@@ -92,7 +70,7 @@ fn replayed(folder: &Path) -> PathBuf {
 
 #[test]
 fn the_reference_reader_finds_our_numbers() {
-    let python = match python() {
+    let python = match python::python("python-independent-reader", &PACKAGES, "mcap, mcap_ros2") {
         Ok(python) => python,
         Err(why) => return skipped("the_reference_reader_finds_our_numbers", &why),
     };

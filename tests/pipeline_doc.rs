@@ -1,4 +1,4 @@
-//! The pipelines in `docs/pipeline.md` are good ones.
+//! The pipelines in `docs/pipeline.md` and `docs/publish.md` are good ones.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
@@ -8,7 +8,9 @@ use common::{Out, bundled, root, write};
 
 #[test]
 fn every_pipeline_in_the_documentation_passes_the_check() {
-    let text = std::fs::read_to_string(root().join("docs/pipeline.md")).unwrap();
+    let pages = ["docs/pipeline.md", "docs/publish.md"];
+    let text = pages.map(|page| std::fs::read_to_string(root().join(page)).unwrap());
+    let text = text.concat();
     let blocks = text
         .split("```yaml\n")
         .skip(1)
@@ -16,7 +18,7 @@ fn every_pipeline_in_the_documentation_passes_the_check() {
     let pipelines: Vec<&str> = blocks
         .filter(|block| block.starts_with("version: 1"))
         .collect();
-    assert!(pipelines.len() >= 2, "{} pipelines", pipelines.len());
+    assert!(pipelines.len() >= 3, "{} pipelines", pipelines.len());
     for pipeline in pipelines {
         let folder = tempfile::tempdir().unwrap();
         for file in ["demo_arm.urdf", "demo.mcap"] {

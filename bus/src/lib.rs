@@ -1,5 +1,7 @@
 #![doc = include_str!("../README.md")]
 
+pub mod command;
+mod contact;
 mod effort_unit;
 pub mod link;
 pub mod sample;
@@ -8,6 +10,7 @@ pub mod shell;
 pub mod stage;
 mod trouble;
 
+pub use contact::{Contact, ContactFollower, Force};
 pub use effort_unit::EffortUnit;
 pub use link::{
     Audience, Domain, InProcess, Keep, LinkError, Position, Received, Receiver, ReceiverCounts,
@@ -15,8 +18,8 @@ pub use link::{
     zenoh_reason,
 };
 pub use sample::{
-    Detection, EventKind, Header, Health, JointArray, JointState, MAX_JOINTS, Name, Sample,
-    SampleKind, SampleRef, TwinState, flags,
+    Command, Detection, EventKind, Header, Health, JointArray, JointState, MAX_JOINTS, Name,
+    Sample, SampleKind, SampleRef, TwinState, Verb, flags,
 };
 pub use seat::Seat;
 pub use stage::{Emit, Progress, Sink, Source, Stage, StageError};

@@ -5,12 +5,14 @@
 //! [`Header::joint_count`] on are zero. Angles are rad (or m for a prismatic joint), velocities
 //! rad/s, efforts N m (N) or A, as the cell declares.
 
+mod command;
 mod name;
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
+pub use command::{Command, Verb};
 pub use name::Name;
 
 /// The most joints one cell may have. Fixed, because a sample's size is.
@@ -80,7 +82,7 @@ impl Header {
 /// What a robot says of itself at one instant, and what belongs to that instant.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable, ZeroCopySend)]
-#[type_name("tauscope/JointState/1")]
+#[type_name("tauscope/JointState/2")]
 pub struct JointState {
     /// Stamp, sequence, flags.
     pub header: Header,
@@ -102,6 +104,8 @@ pub struct JointState {
     pub tool_com_m: [f64; 3],
     /// Its inertia about that centre, tool axes: xx, xy, xz, yy, yz, zz \[kg m²\].
     pub tool_inertia_kgm2: [f64; 6],
+    /// What somebody told the pipeline, from this sample on; all zeros for nothing.
+    pub command: Command,
 }
 
 /// What the twin made of a [`JointState`].
@@ -242,7 +246,7 @@ impl SampleKind {
     /// The type's name on the bus, the same in every process and language.
     pub fn type_name(self) -> &'static str {
         match self {
-            Self::JointState => "tauscope/JointState/1",
+            Self::JointState => "tauscope/JointState/2",
             Self::TwinState => "tauscope/TwinState/1",
             Self::Detection => "tauscope/Detection/3",
             Self::Health => "tauscope/Health/1",

@@ -94,6 +94,7 @@ impl Request {
             twin: topics.twin.clone().filter(|_| reference),
             tool: None,
             learn: None,
+            commands: None,
         }
     }
 

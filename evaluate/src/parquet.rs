@@ -134,6 +134,10 @@ fn numbers(rows: &mut Rows, numbers: &Numbers) {
     rows.number("window_best_sigmas", window(|w| w.best_sigmas));
     rows.number("window_auc", window(|w| w.auc));
     rows.number("false_alarms_per_hour", numbers.false_alarms_per_hour);
+    rows.number(
+        "false_alarms_per_hour_bound",
+        numbers.false_alarms_per_hour_bound,
+    );
     let strict_per_hour = numbers.strict_false_alarms_per_hour;
     rows.number("strict_false_alarms_per_hour", strict_per_hour);
     rows.number("free_hours", numbers.free_hours);

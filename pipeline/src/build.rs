@@ -6,10 +6,11 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use tauscope_bus::{
-    Emit, JointState, LinkError, Progress, SampleKind, Source, StageError, Trouble,
+    Emit, JointState, LinkError, Progress, SampleKind, Source, StageError, Trouble, ZenohEndpoints,
 };
 use tauscope_detect::Detect;
-use tauscope_ingest::{IngestError, Paced, Rate, SimulatedRobot};
+use tauscope_ingest::{Commanded, IngestError, Paced, Rate, SimulatedRobot};
+use tauscope_publish::{PublishError, Publisher};
 use tauscope_record::{CellInfo, RecordError, Recorder, StreamInfo};
 use tauscope_twin::{Correction, Twin, TwinFile};
 use tauscope_watch::{self as watch, Watch};
@@ -49,6 +50,22 @@ pub fn ingest_setup(cell: &Cell) -> tauscope_ingest::Setup {
                 com_m: tool.com_m,
                 inertia_kgm2: tool.inertia_kgm2,
             }),
+        has_tool_link: cell.tool_link().is_some(),
+    }
+}
+
+/// A source of `cell` with the commands that its configuration lets in, and those of an archive.
+///
+/// # Errors
+/// If commands cannot be listened to.
+pub fn commanded(
+    source: Box<dyn Source<JointState>>,
+    config: &tauscope_ingest::Config,
+    cell: &Cell,
+) -> Result<Commanded, LinkError> {
+    match &config.commands {
+        Some(endpoints) => Commanded::live(source, &ingest_setup(cell), endpoints),
+        None => Ok(Commanded::archived(source)),
     }
 }
 
@@ -254,6 +271,8 @@ pub struct StreamFacts {
     pub kind: SampleKind,
     /// The detector, where it is one of ours.
     pub detector: Option<String>,
+    /// Whether its detections, if it makes any, tell of contacts.
+    pub judges_contact: bool,
 }
 
 /// A recorder of `streams`, which belong to `cells`.
@@ -285,4 +304,32 @@ pub fn recorder(
         })
         .collect();
     Recorder::new(config, &cells, &streams, provenance)
+}
+
+/// A publisher of `streams` of one cell. `restarted`: it is not its first life.
+///
+/// # Errors
+/// If it cannot reach or be reached by those it is to tell.
+pub fn publisher(
+    config: &tauscope_publish::Config,
+    commands: Option<&ZenohEndpoints>,
+    cell: &Cell,
+    streams: &[StreamFacts],
+    restarted: bool,
+) -> Result<Publisher, PublishError> {
+    let streams = streams.iter().map(|stream| tauscope_publish::StreamInfo {
+        stage: stream.stage.clone(),
+        kind: stream.kind,
+        detector: stream.detector.clone(),
+        judges_contact: stream.judges_contact,
+    });
+    let setup = tauscope_publish::Setup {
+        cell: cell.facts.name.clone(),
+        joint_names: cell.facts.joint_names.clone(),
+        model: cell.model.clone(),
+        streams: streams.collect(),
+        commands: commands.cloned(),
+        restarted,
+    };
+    Publisher::new(config, &setup)
 }

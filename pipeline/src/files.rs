@@ -47,9 +47,7 @@ impl FileKind {
 
     /// The schema as a text for editors.
     pub fn schema_text(self) -> String {
-        let mut schema = self.schema().to_value();
-        plain_descriptions(&mut schema);
-        format!("{schema:#}")
+        text_of_schema(&self.schema())
     }
 
     /// Checks the shape of the file at `path`.
@@ -68,6 +66,13 @@ impl FileKind {
             Self::Set => of::<SetFile>(path),
         }
     }
+}
+
+/// A schema as a text for editors and people.
+pub fn text_of_schema(schema: &Schema) -> String {
+    let mut schema = schema.clone().to_value();
+    plain_descriptions(&mut schema);
+    format!("{schema:#}")
 }
 
 /// Descriptions come from Rust documentation, where brackets are escaped.

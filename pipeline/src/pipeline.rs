@@ -109,6 +109,8 @@ impl Pipeline {
                     .collect(),
                 keep: match entry.keep {
                     Some(KeepEntry::Newest) => Keep::Newest,
+                    // Nobody waits for those who are told.
+                    None if wiring.roles[index] == Role::Publish => Keep::Newest,
                     Some(KeepEntry::All) | None => Keep::All,
                 },
                 settings,

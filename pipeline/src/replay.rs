@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use tauscope_bus::{Detection, JointState, SampleKind, Source, TwinState};
-use tauscope_ingest::{ArchivedTwin, RecordedSource};
+use tauscope_ingest::{ArchivedTwin, Commanded, RecordedSource};
 use tauscope_record::{Existing, FileName};
 use tauscope_twin::TwinFile;
 
@@ -148,7 +148,8 @@ impl<'a> Replay<'a> {
                 .cloned();
             let stream = match (&stage.settings, input) {
                 (Settings::Ingest(config), _) => {
-                    Some(graph.source(&stage.name, self.open(config, recording)?)?)
+                    let source = Commanded::archived(self.open(config, recording)?);
+                    Some(graph.source(&stage.name, Box::new(source))?)
                 }
                 (Settings::Twin { config, model }, Some(input)) => {
                     let model = model.as_ref();
@@ -181,6 +182,7 @@ impl<'a> Replay<'a> {
                     Settings::Twin { .. }
                     | Settings::Detect { .. }
                     | Settings::Explain { .. }
+                    | Settings::Publish { .. }
                     | Settings::Outside(_),
                     _,
                 ) => None,

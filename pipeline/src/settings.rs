@@ -2,6 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tauscope_bus::ZenohEndpoints;
 use tauscope_twin::TwinFile;
 
 /// What a stage is told of its own.
@@ -35,6 +36,13 @@ pub enum Settings {
     },
     /// A recorder.
     Record(tauscope_record::Config),
+    /// A publisher.
+    Publish {
+        /// From the pipeline file.
+        config: tauscope_publish::Config,
+        /// Where the cell's source takes commands, if it does.
+        commands: Option<ZenohEndpoints>,
+    },
     /// A program that is not ours.
     Outside(OutsideEntry),
 }

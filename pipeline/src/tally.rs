@@ -1,7 +1,7 @@
 //! What a replay says of a recording: how far the twin was off, and what the detectors found.
 
 use serde::Serialize;
-use tauscope_bus::{Detection, EventKind, TwinState, flags};
+use tauscope_bus::{Contact, ContactFollower, Detection, EventKind, TwinState, flags};
 
 /// A joint that is faster than this moves \[rad/s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
@@ -96,7 +96,7 @@ pub struct Event {
     pub link: Option<String>,
     /// The joints that detected.
     pub joints: Vec<String>,
-    /// Force on the robot in the world frame \[N\], where estimated; the largest of the event.
+    /// Force on the robot in the world frame \[N\], where estimated; that of the sample with the largest score.
     pub force: Option<[f64; 3]>,
     /// The largest score.
     pub peak_score: f64,
@@ -117,8 +117,7 @@ pub struct DetectionTally {
     pub events: Vec<Event>,
     joint_names: Vec<String>,
     start_ns: Option<i64>,
-    newest_ns: i64,
-    open: bool,
+    contacts: ContactFollower,
 }
 
 impl DetectionTally {
@@ -131,8 +130,7 @@ impl DetectionTally {
             events: Vec::new(),
             joint_names: joint_names.to_vec(),
             start_ns: None,
-            newest_ns: 0,
-            open: false,
+            contacts: ContactFollower::default(),
         }
     }
 
@@ -146,54 +144,38 @@ impl DetectionTally {
     /// Adds a sample: an event begins, goes on or ends.
     pub fn add(&mut self, sample: &Detection) {
         let start_ns = *self.start_ns.get_or_insert(sample.header.stamp_ns);
-        let seconds = |ns: i64| (ns - start_ns) as f64 * 1e-9;
-        self.newest_ns = sample.header.stamp_ns;
         if self.detector.is_empty() {
             sample.detector.as_str().clone_into(&mut self.detector);
         }
         self.judged += u64::from(sample.header.has(flags::READY));
-        match sample.event() {
-            EventKind::Onset => {
-                if let Some(last) = self.events.last_mut().filter(|_| self.open) {
-                    last.t_off = seconds(sample.header.stamp_ns);
-                }
-                self.open = true;
-                self.events.push(Event {
-                    t: seconds(sample.header.stamp_ns),
-                    t_off: seconds(sample.header.stamp_ns),
-                    t_contact: seconds(sample.contact_ns),
-                    kind: sample.state.to_string(),
-                    link: None,
-                    joints: Vec::new(),
-                    force: None,
-                    peak_score: sample.score,
-                    size: sample.header.has(flags::CHANGE).then_some(sample.size),
-                });
-            }
-            EventKind::Offset => self.open = false,
-            EventKind::None => {}
+        if let Some(ended) = self.contacts.push(sample) {
+            self.events.pop();
+            self.events.push(self.event(&ended, start_ns));
         }
-        let Some(event) = self.events.last_mut() else {
-            return;
-        };
-        if sample.event() == EventKind::Offset || self.open {
-            event.t_off = seconds(sample.header.stamp_ns);
+        if let Some(open) = self.contacts.open() {
+            // What began before is known better now.
+            if sample.event() == EventKind::None {
+                self.events.pop();
+            }
+            self.events.push(self.event(open, start_ns));
         }
-        // Where the score peaks, the contact is told best.
-        if self.open && (event.link.is_none() || sample.score >= event.peak_score) {
-            event.peak_score = event.peak_score.max(sample.score);
-            event.kind = sample.state.to_string();
-            if !sample.link.as_str().is_empty() {
-                event.link = Some(sample.link.to_string());
-            }
-            if sample.header.has(flags::FORCE) {
-                event.force = Some(sample.force_n);
-            }
-            for (j, name) in self.joint_names.iter().enumerate() {
-                if sample.joints & (1 << j) != 0 && !event.joints.contains(name) {
-                    event.joints.push(name.clone());
-                }
-            }
+    }
+
+    fn event(&self, contact: &Contact, start_ns: i64) -> Event {
+        let seconds = |ns: i64| (ns - start_ns) as f64 * 1e-9;
+        let link = contact.link.as_str();
+        let joints = self.joint_names.iter().enumerate();
+        let joints = joints.filter(|(j, _)| *j < 32 && contact.joints & (1 << j) != 0);
+        Event {
+            t: seconds(contact.onset_ns),
+            t_off: seconds(contact.end_ns),
+            t_contact: seconds(contact.contact_ns),
+            kind: contact.kind.to_string(),
+            link: (!link.is_empty()).then(|| link.to_owned()),
+            joints: joints.map(|(_, name)| name.clone()).collect(),
+            force: contact.peak().map(|peak| peak.force_n),
+            peak_score: contact.peak_score,
+            size: contact.size,
         }
     }
 }

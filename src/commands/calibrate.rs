@@ -100,6 +100,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         twin: args.twin_topic.clone(),
         tool: None,
         learn: None,
+        commands: None,
     };
     if args.motion == Motion::Commanded && args.command_topic.is_none() {
         return Err(Failure::rejected(

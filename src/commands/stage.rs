@@ -47,6 +47,10 @@ enum SeatError {
     Ingest(#[from] tauscope_ingest::IngestError),
     #[error(transparent)]
     Record(#[from] tauscope_record::RecordError),
+    #[error(transparent)]
+    Publish(#[from] tauscope_publish::PublishError),
+    #[error("cannot take commands: {0}")]
+    Commands(#[from] tauscope_bus::LinkError),
 }
 
 /// Takes the seat and runs the stage to its end.
@@ -61,6 +65,7 @@ pub fn run(_args: &StageArgs) -> ExitCode {
         Ok(Made::Detect(mut detect)) => child.stage(&mut *detect),
         Ok(Made::Watch(mut watch)) => child.stage(&mut *watch),
         Ok(Made::Record(mut recorder)) => child.sink(&mut *recorder),
+        Ok(Made::Publish(mut publisher)) => child.sink(&mut *publisher),
         Err(error) => child.fail(&error),
     }
 }
@@ -91,6 +96,7 @@ enum Made {
     Detect(Box<Announced<Kept>>),
     Watch(Box<Announced<tauscope_watch::Watch>>),
     Record(Box<tauscope_record::Recorder>),
+    Publish(Box<tauscope_publish::Publisher>),
 }
 
 impl Made {
@@ -109,12 +115,8 @@ impl Made {
                     .as_ref()
                     .map(ScenarioFacts::robot)
                     .transpose()?;
-                Self::Source(build::ingest(
-                    config,
-                    robot.as_ref(),
-                    cell()?,
-                    told.after_ns,
-                )?)
+                let source = build::ingest(config, robot.as_ref(), cell()?, told.after_ns)?;
+                Self::Source(Box::new(build::commanded(source, config, cell()?)?))
             }
             Settings::Twin { config, model } => {
                 Self::Twin(Box::new(build::twin(config, model.as_ref(), cell()?)?))
@@ -138,6 +140,12 @@ impl Made {
                 let cells: Vec<&Cell> = cells.iter().collect();
                 let recorder = build::recorder(config, &cells, &told.streams, &told.provenance)?;
                 Self::Record(Box::new(recorder))
+            }
+            Settings::Publish { config, commands } => {
+                let restarted = child.seat().restarts > 0;
+                let publisher =
+                    build::publisher(config, commands.as_ref(), cell()?, &told.streams, restarted)?;
+                Self::Publish(Box::new(publisher))
             }
             Settings::Outside(_) => return Err(SeatError::Outside),
         })

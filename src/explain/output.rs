@@ -8,7 +8,7 @@ use tauscope_explain::report::Verdict;
 use tauscope_explain::{Outcome, html};
 use tauscope_pipeline::report::{Problem, Report};
 
-use super::input::Request;
+use super::input::{Named, Request};
 use super::read::Kept;
 use super::{picture, provenance_of, robot, twin, write_whole};
 use crate::existing::Force;
@@ -109,24 +109,43 @@ pub fn write(
             .insert(recording.clone(), name);
         predictions.push(path);
     }
+    let evaluated = outcome.report.verdict != Verdict::NotEvaluated;
+    let twin = evaluated.then(|| twin_text(request, kept, outcome, &provenance, &mut made));
+    let twin = twin.transpose()?;
+    let urdf = evaluated.then(|| robot_text(request, kept, outcome, &mut made));
+    let urdf = urdf.flatten();
+    let shown = |path: &Path| path.display().to_string();
+    let all = |recordings: &[Named]| recordings.iter().map(|named| shown(&named.path)).collect();
+    let around = html::Around {
+        date: today(),
+        provenance,
+        model: kept.bodies.then_some(&kept.model),
+        robot: request.robot_path.as_deref().map(shown),
+        start: request.start.as_ref().map(|start| shown(&start.path)),
+        fit: all(&request.fit),
+        holdout: all(&request.holdout),
+        twin: twin.is_some().then(|| shown(&out.join(TWIN))),
+        corrected_robot: urdf.is_some().then(|| shown(&out.join(ROBOT))),
+    };
     let put = |name: &str, text: &str, made: &mut Made| {
         let path = out.join(name);
         write_whole(&path, text.as_bytes())?;
         made.files.push(path);
         Ok::<(), Failure>(())
     };
-    let page = html::page(&outcome.report, &outcome.pictures, &provenance);
+    let page = html::page(&outcome.report, &outcome.pictures, &around);
     put(PAGE, &page, &mut made)?;
     put(REPORT, &json(outcome)?, &mut made)?;
     for (name, text) in &outcome.trajectories {
         put(name, text, &mut made)?;
     }
-    if outcome.report.verdict != Verdict::NotEvaluated {
-        let file = twin_text(request, kept, outcome, &provenance, &mut made)?;
-        put(TWIN, &file, &mut made)?;
-        if let Some(urdf) = robot_text(request, kept, outcome, &mut made) {
-            put(ROBOT, &urdf, &mut made)?;
-        }
+    if let Some(twin) = &twin {
+        put(TWIN, twin, &mut made)?;
+    }
+    if let Some(urdf) = &urdf {
+        put(ROBOT, urdf, &mut made)?;
+    }
+    if evaluated {
         let path = out.join(PICTURE);
         let shown = picture::of(&outcome.report, &outcome.pictures, kept);
         tauscope_record::write_explanation(&path, &shown).context("the picture")?;
@@ -134,6 +153,12 @@ pub fn write(
     }
     made.files.append(&mut predictions);
     Ok(made)
+}
+
+/// The day, as ISO 8601 writes it, in UTC.
+fn today() -> String {
+    let now = jiff::Timestamp::now();
+    now.strftime("%Y-%m-%d").to_string()
 }
 
 /// The report's content.

@@ -1,7 +1,9 @@
 //! `explain.rrd`: the same as the page, for the Rerun viewer.
 
 use tauscope_explain::report::{Finding, JointPicture, RecordingPicture, Report};
-use tauscope_record::{ExplainedEvent, ExplainedJoint, ExplainedRecording, Explanation};
+use tauscope_record::{
+    ExplainedEvent, ExplainedJoint, ExplainedRecording, ExplainedRobot, Explanation,
+};
 
 use super::read::Kept;
 
@@ -17,6 +19,26 @@ pub fn of(report: &Report, pictures: &[RecordingPicture], kept: &Kept) -> Explan
         text_markdown: text(report),
         recordings: pictures.iter().map(recording).collect(),
         events: events.collect(),
+        robot: kept.bodies.then(|| robot(report, kept)),
+    }
+}
+
+/// The robot, with the links of the joints in which something was found.
+fn robot(report: &Report, kept: &Kept) -> ExplainedRobot {
+    let model = &kept.model;
+    let link_of = |finding: &Finding| {
+        let of_joint = |joint: &String| {
+            let child = model.joints()[model.joint_index(joint)?].child_link;
+            Some(model.links()[child].name.clone())
+        };
+        finding
+            .link
+            .clone()
+            .or_else(|| finding.joint.as_ref().and_then(of_joint))
+    };
+    ExplainedRobot {
+        model: model.clone(),
+        found: report.findings.iter().filter_map(link_of).collect(),
     }
 }
 
@@ -24,6 +46,7 @@ fn recording(picture: &RecordingPicture) -> ExplainedRecording {
     let joint = |joint: &JointPicture| ExplainedJoint {
         name: joint.joint.clone(),
         time_s: joint.time_s.clone(),
+        position: joint.position.clone(),
         measured: joint.measured.clone(),
         twin: joint.before.clone(),
         corrected: joint.after.clone(),

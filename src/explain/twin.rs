@@ -28,6 +28,7 @@ pub fn file(
         twin: request.twin_topic.clone(),
         tool: None,
         learn: None,
+        commands: None,
     };
     let expected = match request.twin_topic {
         Some(_) => Expected::Topic,

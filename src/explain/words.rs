@@ -98,7 +98,13 @@ fn parameters(finding: &Finding) -> String {
     let lines = named.into_iter().map(|(name, value)| match value {
         Value::Number(number) => {
             let value = number.as_f64().map_or_else(|| number.to_string(), figure);
-            format!("{name} {value}{}", interval(name, intervals))
+            let (label, unit) = finding.label_and_unit(name);
+            let unit = if unit.is_empty() {
+                unit
+            } else {
+                format!(" {unit}")
+            };
+            format!("{label} {value}{unit}{}", interval(name, intervals))
         }
         Value::String(text) => format!("{name} {text}"),
         other => format!("{name} {other}"),

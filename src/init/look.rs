@@ -178,6 +178,7 @@ impl Told<'_> {
             twin: None,
             tool: None,
             learn: None,
+            commands: None,
         };
         let twin = tauscope_twin::Config::default();
         let job = Job {

@@ -18,6 +18,8 @@ const DEPTH_ALL: usize = 1024;
 /// Samples that a stage which keeps the newest may leave unread: some, so that a pause of the
 /// scheduler costs nothing.
 const DEPTH_NEWEST: usize = 16;
+/// The same for who hears several streams and tells others: a longer pause costs nothing either.
+const DEPTH_TOLD: usize = 256;
 /// Stages of another host are started by another hand: how long they are waited for \[ms\].
 const START_ACROSS_HOSTS_MS: u64 = 60_000;
 
@@ -28,7 +30,7 @@ pub struct Instructions {
     pub settings: Settings,
     /// Its cells.
     pub cells: Vec<CellFacts>,
-    /// What is recorded of each stage it listens to, for a recorder.
+    /// What is known of the stages it listens to, for a recorder or a publisher.
     pub streams: Vec<StreamFacts>,
     /// What made the archive, for a recorder.
     pub provenance: BTreeMap<String, String>,
@@ -118,10 +120,11 @@ impl Planner<'_> {
             .iter()
             .filter_map(|cell| self.pipeline.cells.get(cell));
         let is_recorder = stage.role == Role::Record;
+        let hears_all = stage.role.hears_health();
         Instructions {
             settings: settings.clone(),
             cells: cells.map(|cell| cell.facts.clone()).collect(),
-            streams: if is_recorder {
+            streams: if hears_all {
                 self.pipeline.streams(&stage.inputs)
             } else {
                 Vec::new()
@@ -156,6 +159,7 @@ impl Planner<'_> {
                 keep: link.keep,
                 depth: match link.keep {
                     Keep::All => DEPTH_ALL,
+                    Keep::Newest if self.hears_health(at) => DEPTH_TOLD,
                     Keep::Newest => DEPTH_NEWEST,
                 },
                 resume: None,
@@ -168,9 +172,9 @@ impl Planner<'_> {
         inputs
     }
 
-    /// A recorder keeps the health reports of what it records.
+    /// A recorder keeps the health reports of what it records, a publisher tells them.
     fn hears_health(&self, at: usize) -> bool {
-        self.pipeline.stages[at].role == Role::Record
+        self.pipeline.stages[at].role.hears_health()
     }
 
     fn output(&self, at: usize, kind: SampleKind) -> Output {

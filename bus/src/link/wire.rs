@@ -12,7 +12,7 @@
 //! | `header.flags` | `u32` | 24 |
 //! | `header.joint_count` | `u32` | 28 |
 //!
-//! | `tauscope/JointState/1`, 880 bytes | type | at |
+//! | `tauscope/JointState/2`, 968 bytes | type | at |
 //! | --- | --- | --- |
 //! | `position` | `[f64; 16]` | 32 |
 //! | `velocity` | `[f64; 16]` | 160 |
@@ -23,6 +23,11 @@
 //! | `tool_mass_kg` | `f64` | 800 |
 //! | `tool_com_m` | `[f64; 3]` | 808 |
 //! | `tool_inertia_kgm2` | `[f64; 6]` | 832 |
+//! | `command.verb` | `u32` | 880 |
+//! | `command.reserved` | `u32` | 884 |
+//! | `command.value` | `f64` | 888 |
+//! | `command.com_m` | `[f64; 3]` | 896 |
+//! | `command.text` | name | 920 |
 //!
 //! | `tauscope/TwinState/1`, 1056 bytes | type | at |
 //! | --- | --- | --- |
@@ -70,7 +75,7 @@ mod tests {
     use std::collections::BTreeMap;
     use std::mem::offset_of;
 
-    use crate::sample::{Detection, Header, Health, JointState, TwinState};
+    use crate::sample::{Command, Detection, Header, Health, JointState, TwinState};
 
     /// Size in bytes where it is given, and the offset of each field.
     type Layout = (Option<usize>, Vec<(String, usize)>);
@@ -121,14 +126,27 @@ mod tests {
             .map(|(name, offset)| (format!("header.{name}"), offset))
             .collect();
         assert_eq!(tables["every sample"], (None, header));
+        let command = rows(layout!(Command: verb, reserved, value, com_m, text))
+            .into_iter()
+            .map(|(name, at)| {
+                (
+                    format!("command.{name}"),
+                    at + offset_of!(JointState, command),
+                )
+            })
+            .collect::<Vec<_>>();
         assert_eq!(
-            tables["tauscope/JointState/1"],
+            tables["tauscope/JointState/2"],
             (
                 Some(size_of::<JointState>()),
-                rows(
-                    layout!(JointState: position, velocity, effort, command_position,
+                [
+                    rows(
+                        layout!(JointState: position, velocity, effort, command_position,
                     command_velocity, reference_effort, tool_mass_kg, tool_com_m, tool_inertia_kgm2)
-                )
+                    ),
+                    command
+                ]
+                .concat()
             )
         );
         assert_eq!(

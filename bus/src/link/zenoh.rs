@@ -12,7 +12,7 @@
 //!
 //! A sample is put with
 //!
-//! - encoding `zenoh/bytes;tauscope/JointState/1`, the type name of the sample after the semicolon;
+//! - encoding `zenoh/bytes;tauscope/JointState/2`, the type name of the sample after the semicolon;
 //! - payload: the sample as it lies in memory, little-endian, without a frame: see [`wire`](super::wire)
 //!   for the offsets;
 //! - attachment: the sender's instance, a little-endian `u64`, another one after each restart, while
@@ -32,6 +32,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use zenoh::Wait as _;
 use zenoh::bytes::Encoding;
@@ -45,7 +46,7 @@ mod sender;
 const TRANSPORT: &str = "zenoh";
 
 /// Where Zenoh sessions of this host meet others, e.g. `tcp/10.0.0.1:7447`.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ZenohEndpoints {
     /// Where it listens.
@@ -54,6 +55,27 @@ pub struct ZenohEndpoints {
     /// Where it connects to; it tries until it succeeds, and again when a connection breaks.
     #[serde(default)]
     pub connect: Vec<String>,
+}
+
+impl ZenohEndpoints {
+    /// A session of its own there, for other traffic than streams; what it connects to need not be there yet.
+    ///
+    /// # Errors
+    /// As [`Zenoh::open`].
+    pub fn session(&self) -> Result<zenoh::Session, LinkError> {
+        open_session("peer", self, PATIENCE)
+    }
+
+    /// Where another session on this host meets one that has these: where it listens, and what it connects to. For a
+    /// listener on all interfaces that is the loopback.
+    pub fn reached_at(&self) -> impl Iterator<Item = String> + '_ {
+        let listens = self.listen.iter().map(|endpoint| {
+            endpoint
+                .replace("/0.0.0.0:", "/127.0.0.1:")
+                .replace("/[::]:", "/[::1]:")
+        });
+        listens.chain(self.connect.iter().cloned())
+    }
 }
 
 /// Streams between hosts. Clones share one session.

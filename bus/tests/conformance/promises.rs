@@ -264,7 +264,7 @@ pub fn another_type_is_refused<S: Sides>() {
         } => {
             assert_eq!(stream, STREAM);
             assert!(expected.contains("tauscope/TwinState/1"), "{expected}");
-            assert!(found.contains("tauscope/JointState/1"), "{found}");
+            assert!(found.contains("tauscope/JointState/2"), "{found}");
         }
         other => panic!("{other}"),
     }

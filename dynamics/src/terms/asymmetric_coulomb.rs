@@ -17,6 +17,7 @@ pub(super) static EFFECT: Effect = Effect {
         "Direction-dependent friction",
         "Coulomb friction that differs by direction",
         "Dry friction that is larger in one direction than in the other.",
+        "Joint {place}: gear, seals and brake, for it turns harder one way than the other.",
         "Joint {place} has Coulomb friction of {coulomb_positive_nm} forward and {coulomb_negative_nm} backward that the twin leaves out.",
     ),
     family: Family::Friction,

@@ -31,6 +31,7 @@ pub(super) static EFFECT: Effect = Effect {
         "Backlash",
         "backlash",
         "Play in the gear: for a moment after each reversal the motor turns alone.",
+        "Joint {place}: play between motor and link; gear, coupling, key and their screws.",
         "Joint {place} has a play of {gap_rad} behind a rotor of {rotor_inertia_kgm2}.",
     ),
     family: Family::Transmission,

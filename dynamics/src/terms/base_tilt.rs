@@ -19,6 +19,7 @@ pub(super) static EFFECT: Effect = Effect {
         "Base tilt",
         "a base that is tilted",
         "The base does not stand level, or is mounted otherwise than the model says.",
+        "The base: is it level, are its screws tight, and does the URDF have it as it is mounted?",
         "The base is tilted: roll {roll_rad}, pitch {pitch_rad}.",
     ),
     family: Family::Mounting,

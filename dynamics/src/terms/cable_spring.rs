@@ -30,6 +30,7 @@ pub(super) static EFFECT: Effect = Effect {
         "Cable spring",
         "cable spring",
         "A cable or hose pulls the joint back to where it hangs freely.",
+        "Joint {place}: the cables and hoses along it; does one pull or hang on something?",
         "A cable or dress pack pulls at joint {place} with {stiffness_nm_per_rad}, at rest at {rest_angle_rad}.",
     ),
     family: Family::Spring,

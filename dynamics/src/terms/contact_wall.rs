@@ -51,6 +51,7 @@ pub(super) static EFFECT: Effect = Effect {
         "Contact with a wall",
         "contact with something stiff",
         "The arm pressed against something firm.",
+        "The surroundings of the tool: what does the arm run into?",
         "The end of the arm runs into something stiff, {stiffness_n_per_m}.",
     ),
     family: Family::Contact,

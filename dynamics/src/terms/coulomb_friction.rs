@@ -15,6 +15,7 @@ pub static EFFECT: Effect = Effect {
             "Coulomb friction",
             "Coulomb friction",
             "A constant resistance against the motion, whatever the speed: dry friction in gear and bearings.",
+            "Joint {place}: does its brake drag, its gear or a seal rub, a cable scrape?",
             "Joint {place} has Coulomb friction of {coulomb_nm} that the twin leaves out.",
         )
     },

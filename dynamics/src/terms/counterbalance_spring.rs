@@ -15,6 +15,7 @@ pub(super) static EFFECT: Effect = Effect {
         "Counterbalance spring",
         "counterbalance spring",
         "A spring or gas strut carries part of the weight.",
+        "Joint {place}: spring or gas strut that carries weight; is there one that the URDF does not have?",
         "A counterbalance of {amplitude_nm} acts on joint {place}, at rest at {rest_angle_rad}.",
     ),
     family: Family::Spring,

@@ -25,6 +25,7 @@ pub(super) static EFFECT: Effect = Effect {
             "External push",
             "a push from outside",
             "Something or somebody pushed the arm for a while.",
+            "Who or what touched the arm at link {place} then?",
             "Something pushed link {place} with ({force_x_n}, {force_y_n}, {force_z_n}).",
         )
     },

@@ -20,6 +20,7 @@ pub(super) static EFFECT: Effect = Effect {
         "Friction step",
         "Coulomb friction that changed once",
         "Friction that changed once and stayed: a brake that drags, a bearing that failed, grease that was renewed.",
+        "Joint {place}: what changed then? A brake that drags, a bearing, new grease.",
         "The Coulomb friction of joint {place} jumped from {coulomb_before_nm} to {coulomb_after_nm}, {change_time_session_s} into the session.",
     ),
     family: Family::Friction,

@@ -25,6 +25,7 @@ pub(super) static EFFECT: Effect = Effect {
         "Joint elasticity",
         "joint elasticity",
         "The gear or its flexspline twists under load, so that the link follows behind the motor.",
+        "Joint {place}: gear and flexspline; a loose screw between gear and link gives, too.",
         "Joint {place} is elastic, {stiffness_nm_per_rad}, behind a rotor of {rotor_inertia_kgm2}.",
     ),
     family: Family::Transmission,

@@ -27,6 +27,7 @@ pub(super) static EFFECT: Effect = Effect {
         "Link centre of mass",
         "another centre of mass",
         "A link's mass is distributed otherwise than its model says.",
+        "Link {place}: what is mounted on it, and where, that the URDF does not have?",
         "The centre of mass of link {place} is off by ({delta_com_x_m}, {delta_com_y_m}, {delta_com_z_m}) in its frame.",
     ),
     family: Family::Body,

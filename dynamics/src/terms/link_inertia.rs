@@ -15,6 +15,7 @@ pub(super) static EFFECT: Effect = Effect {
         "Link inertia",
         "link inertia",
         "A link is another body than its model says: mass, centre and inertia together.",
+        "Link {place}: what is mounted on it or missing from it, against the URDF?",
         "Link {place} is another body than its URDF says, and no one name fits that: its mass is off by {delta_mass_kg}, its first moment (mass times centre) by ({delta_first_moment_x_kgm:number}, {delta_first_moment_y_kgm:number}, {delta_first_moment_z_kgm:number}) kg m, and so is its inertia; what is left depends on the motion of all joints that carry it.",
     ),
     family: Family::Body,

@@ -18,12 +18,16 @@ const MOST_DRAWN: f64 = 0.6;
 /// at the centre of mass.
 pub(super) static EFFECT: Effect = Effect {
     name: "link_mass",
-    words: Words::new(
-        "Link mass",
-        "another mass",
-        "A link is heavier or lighter than its model says.",
-        "Link {place} is heavier than in the URDF by {delta_mass_kg}.",
-    ),
+    words: Words {
+        less: Some("Link {place} is lighter than in the URDF by {less}."),
+        ..Words::new(
+            "Link mass",
+            "another mass",
+            "A link is heavier or lighter than its model says.",
+            "Link {place}: what is mounted on it or missing from it, against the URDF?",
+            "Link {place} is heavier than in the URDF by {delta_mass_kg}.",
+        )
+    },
     family: Family::Body,
     place: PlaceKind::Link,
     layer: Layer::Body,

@@ -13,6 +13,7 @@ pub(super) static EFFECT: Effect = Effect {
         "Load-dependent friction",
         "load dependent friction",
         "Friction that grows with the torque through the gear: the joint rubs more the more it carries.",
+        "Joint {place}: lubrication of the gear, for it rubs more the more it carries.",
         "The friction of joint {place} grows with the load on its gear, by {coefficient} of it.",
     ),
     family: Family::Friction,

@@ -17,6 +17,7 @@ pub static EFFECT: Effect = Effect {
         "Payload",
         "a payload",
         "Something is mounted on or held by the tool that the twin does not know of.",
+        "The tool: what is mounted on it or held by it that the URDF does not have?",
         "The arm carries {mass_kg} that nobody told the twin of.",
     ),
     family: Family::Body,

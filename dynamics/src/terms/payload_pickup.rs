@@ -16,6 +16,7 @@ pub(super) static EFFECT: Effect = Effect {
         "Payload for a while",
         "a payload for a while",
         "Something was picked up and put down again that the twin does not know of.",
+        "The gripper: what did it hold in that time?",
         "The arm carries {mass_kg} for a while in each recording, from {t_start_s} to {t_end_s}.",
     ),
     family: Family::Body,

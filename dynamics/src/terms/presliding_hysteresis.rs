@@ -21,6 +21,7 @@ pub(super) static EFFECT: Effect = Effect {
         "Pre-sliding hysteresis",
         "presliding hysteresis",
         "The joint gives like a spring before it slips, so that friction lags behind each reversal.",
+        "",
         "The friction of joint {place}, {coulomb_nm}, builds up over its bristles after each reversal, with {bristle_stiffness_nm_per_rad}.",
     ),
     family: Family::Friction,

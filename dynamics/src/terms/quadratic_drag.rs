@@ -13,6 +13,7 @@ pub(super) static EFFECT: Effect = Effect {
         "Quadratic drag",
         "quadratic drag",
         "Resistance that grows with the square of the speed: fast gears in oil.",
+        "Joint {place}: oil or grease of the gear; too much of it, or too stiff?",
         "Joint {place} has a drag of {drag_nms2_per_rad2} that the twin leaves out.",
     ),
     family: Family::Friction,

@@ -14,6 +14,7 @@ pub(super) static EFFECT: Effect = Effect {
         "Rotor inertia",
         "rotor inertia",
         "Inertia of motor and gear, seen through the gear, that only acceleration shows.",
+        "",
         "Joint {place} turns a rotor of {inertia_kgm2} (armature) that the twin leaves out.",
     ),
     family: Family::Transmission,

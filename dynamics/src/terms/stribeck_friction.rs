@@ -19,6 +19,7 @@ pub(super) static EFFECT: Effect = Effect {
         "Stribeck friction",
         "Stribeck friction",
         "Friction that is highest when motion begins and falls with speed: the joint sticks before it slips.",
+        "Joint {place}: lubrication of gear and bearings; does it stick before it moves?",
         "Joint {place} has friction that falls from {static_nm} at standstill to {coulomb_nm} in motion, over {stribeck_velocity_rad_s} that the twin leaves out.",
     ),
     family: Family::Friction,

@@ -17,6 +17,7 @@ pub static EFFECT: Effect = Effect {
         "Unknown",
         "something that no name fits",
         "Something that no name of the library fits; the correction only describes it.",
+        "Joint {place}: look at it, and at its sensor, while it moves as in the recordings.",
         "Something in joint {place} has no name.",
     ),
     family: Family::Unnamed,

@@ -21,6 +21,7 @@ pub(super) static EFFECT: Effect = Effect {
         "Warm-up friction",
         "viscous friction that falls as the joint warms up",
         "Viscous friction that fades while the joint gets warm.",
+        "Joint {place}: the grease of its gear, unless the arm was cold at the start.",
         "The viscous friction of joint {place} falls as it warms up: {viscous_warm_nms_per_rad} warm and {viscous_extra_cold_nms_per_rad} more when cold, within {time_constant_s}.",
     ),
     family: Family::Friction,

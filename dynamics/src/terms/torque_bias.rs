@@ -13,6 +13,7 @@ pub static EFFECT: Effect = Effect {
         "Torque offset",
         "torque bias",
         "The torque is reported with a constant offset: a sensor that was not zeroed.",
+        "Joint {place}: zero its torque sensor or current offset.",
         "The effort of joint {place} is recorded with an offset of {bias_nm}.",
     ),
     family: Family::Recording,

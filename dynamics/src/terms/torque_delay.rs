@@ -18,6 +18,7 @@ pub(super) static EFFECT: Effect = Effect {
         "Torque delay",
         "torque delay",
         "The torque is reported late against the position.",
+        "The recorder and the controller's clock: effort and position have not the same time.",
         "The effort is recorded {delay_s} late.",
     ),
     family: Family::Recording,

@@ -16,6 +16,7 @@ pub(super) static EFFECT: Effect = Effect {
         "Torque low-pass filter",
         "torque lowpass",
         "The reported torque is smoothed, so that fast changes are missing.",
+        "The controller's settings: the effort is smoothed before it is reported.",
         "The effort is recorded through a low-pass of {cutoff_hz}.",
     ),
     family: Family::Recording,

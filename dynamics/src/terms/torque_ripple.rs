@@ -22,6 +22,7 @@ pub(super) static EFFECT: Effect = Effect {
         "Torque ripple",
         "torque ripple",
         "A wave in the torque that repeats with each turn of motor or gear.",
+        "Joint {place}: gear and motor; is a tooth, a bearing or a sensor's disc worn or off centre?",
         "The effort of joint {place} ripples by {amplitude_nm}, {cycles_per_rev:ratio} times a revolution.",
     ),
     family: Family::Spring,

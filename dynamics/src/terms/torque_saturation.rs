@@ -13,6 +13,7 @@ pub(super) static EFFECT: Effect = Effect {
         "Torque saturation",
         "torque saturation",
         "The torque stops at a limit: of the sensor's range, or of the drive.",
+        "Joint {place}: the range of its sensor and the limit of its drive.",
         "The recorded effort of joint {place} saturates at {limit_nm}.",
     ),
     family: Family::Recording,

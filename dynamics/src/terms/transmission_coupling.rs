@@ -13,6 +13,7 @@ pub(super) static EFFECT: Effect = Effect {
         "Transmission coupling",
         "transmission coupling",
         "Torque of one joint shows in another: coupled gears or belts, as in a wrist.",
+        "Joint {place} and joint {source}: coupled gears or belts, and the decoupling in the controller.",
         "Joint {place} carries {coefficient} times the effort of joint {source}.",
     ),
     family: Family::Transmission,

@@ -15,6 +15,7 @@ pub static EFFECT: Effect = Effect {
             "Viscous friction",
             "viscous friction",
             "Resistance that grows with speed: grease, seals, gear churning.",
+            "Joint {place}: grease of gear and bearings; the wrong one, too much of it, or cold?",
             "Joint {place} has viscous friction of {viscous_nms_per_rad} that the twin leaves out.",
         )
     },

@@ -9,8 +9,10 @@ pub struct Words {
     pub title: &'static str,
     /// Within a sentence: `a payload`.
     pub noun: &'static str,
-    /// What it means at the arm: what a mechanic looks for.
+    /// What it means at the arm.
     pub meaning: &'static str,
+    /// What a mechanic looks at; `{place}` and `{source}` are filled in. Empty where there is nothing to mend.
+    pub look_at: &'static str,
     /// A finding.
     pub finding: &'static str,
     /// A finding of less of it than a corrected twin says, `{less}` of it; for an effect that may fall below what is known.
@@ -20,17 +22,19 @@ pub struct Words {
 }
 
 impl Words {
-    /// Only a heading, a noun and a finding.
+    /// Heading, noun, meaning, what to look at, and a finding.
     pub const fn new(
         title: &'static str,
         noun: &'static str,
         meaning: &'static str,
+        look_at: &'static str,
         finding: &'static str,
     ) -> Self {
         Self {
             title,
             noun,
             meaning,
+            look_at,
             finding,
             less: None,
             without_numbers: None,

@@ -7,9 +7,15 @@ use super::line_class;
 use crate::judged::Judged;
 use crate::metrics::samples::Labelled;
 
-/// About so many points a curve.
+/// About so many points a curve over its whole length.
 /// Resolution: about one per pixel; changes the page's size.
 const POINTS: usize = 400;
+/// About so many points a curve within what is enlarged.
+/// Resolution: as above, over a twentieth of the range.
+const FINE: usize = 8000;
+/// Who lives with more false positives than this does not use the detector.
+/// Tuned: by eye, for the picture; no number depends on it.
+const ZOOM: f64 = 0.05;
 
 /// One picture with a curve a detector, of the first seed; none if no test recording has both contact and
 /// free motion.
@@ -21,35 +27,65 @@ pub(super) fn section(judged: &[Judged<'_>]) -> Option<Markup> {
     if curves.is_empty() {
         return None;
     }
-    let panel = Panel {
-        x: Axis::between(0.0, 1.0, 56.0, 536.0),
-        y: Axis::between(0.0, 1.0, 440.0, 26.0),
-    };
-    let ends = [0.0, 1.0];
+    let fine: Vec<_> = curves
+        .iter()
+        .map(|(index, judged, _)| (*index, zoomed(&samples(judged).roc(FINE))))
+        .collect();
+    let whole = curves
+        .iter()
+        .map(|(index, _, curve)| (*index, curve.clone()));
+    let whole: Vec<_> = whole.collect();
     Some(html! {
         div.card {
             div.curves {
-                svg.plot viewBox="0 0 560 486" role="img" aria-label="Receiver operating characteristics of all detectors" {
-                    (panel.frame(5, 5, Some("False positive rate: share of free samples above the threshold"), "True positive rate: share of contact samples above it"))
-                    (panel.line("line chance", &ends, &ends))
-                    @for (index, _, curve) in &curves {
-                        @let (xs, ys): (Vec<f64>, Vec<f64>) = curve.iter().copied().unzip();
-                        (panel.line(&format!("line own {}", line_class(*index)), &xs, &ys))
-                    }
-                }
+                (picture(&fine, ZOOM, "up to 5 % false positives"))
                 p.legend {
                     @for (at, (index, judged, curve)) in curves.iter().enumerate() {
                         @let covered = curves[at + 1..].iter().find(|(.., later)| later == curve);
                         span class={ "key own " (line_class(*index)) } {
-                            (judged.label) " (" (format!("{:.3}", judged.first().samples.auc)) ")"
+                            (judged.label) " (AUC " (format!("{:.3}", judged.first().samples.auc)) ")"
                             @if let Some((_, by, _)) = covered { ", under " (by.label) }
                         }
                     }
                     span.key.chance { "chance (0.5)" }
                 }
             }
+            details {
+                summary { "The whole curves" }
+                div.curves { (picture(&whole, 1.0, "whole")) }
+            }
         }
     })
+}
+
+/// Curves by detector up to a false positive rate.
+fn picture(curves: &[(usize, Vec<(f64, f64)>)], most: f64, what: &str) -> Markup {
+    let panel = Panel {
+        x: Axis::between(0.0, most, 56.0, 536.0),
+        y: Axis::between(0.0, 1.0, 440.0, 26.0),
+    };
+    html! {
+        svg.plot.square viewBox="0 0 560 486" role="img" aria-label={ "Receiver operating characteristics, " (what) } {
+            (panel.frame(5, 5, Some("False positive rate: share of free samples above"), "True positive rate: share of contact samples above"))
+            (panel.line("line chance", &[0.0, most], &[0.0, most]))
+            @for (index, curve) in curves {
+                @let (xs, ys): (Vec<f64>, Vec<f64>) = curve.iter().copied().unzip();
+                (panel.line(&format!("line own {}", line_class(*index)), &xs, &ys))
+            }
+        }
+    }
+}
+
+/// A curve up to [`ZOOM`], with its point there.
+fn zoomed(curve: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let within = curve.iter().copied().take_while(|(x, _)| *x <= ZOOM);
+    let mut points: Vec<(f64, f64)> = within.collect();
+    if let (Some(&(x0, y0)), Some(&(x1, y1))) = (points.last(), curve.get(points.len()))
+        && x1 > x0
+    {
+        points.push((ZOOM, y0 + (ZOOM - x0) / (x1 - x0) * (y1 - y0)));
+    }
+    points
 }
 
 fn samples(judged: &Judged<'_>) -> Labelled {
@@ -59,4 +95,16 @@ fn samples(judged: &Judged<'_>) -> Labelled {
         all.positive.extend_from_slice(&one.samples.positive);
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_enlarged_curve_ends_at_its_edge() {
+        let points = zoomed(&[(0.0, 0.0), (0.0, 0.6), (0.1, 0.8), (1.0, 1.0)]);
+        assert_eq!(points.len(), 3);
+        assert!((points[2].0 - ZOOM).abs() < 1e-12 && (points[2].1 - 0.7).abs() < 1e-12);
+    }
 }

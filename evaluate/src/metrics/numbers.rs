@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::events::{Matched, Matching, duration_s, free_s, in_alarm};
 use super::samples::{Labelled, flags};
-use super::statistics::Distribution;
+use super::statistics::{Distribution, poisson_bound_95};
 use crate::input::Request;
 use crate::runner::{Output, Runner};
 
@@ -108,6 +108,8 @@ pub struct Numbers {
     pub false_alarms: usize,
     /// The same per hour of contact-free time.
     pub false_alarms_per_hour: f64,
+    /// The rate is below this with 95 % confidence (Poisson) \[1/h\].
+    pub false_alarms_per_hour_bound: f64,
     /// Alarms that begin outside every labelled contact, nothing forgiven: no tolerance, no recovery time, none merged.
     pub strict_false_alarms: usize,
     /// The same per hour of contact-free time.
@@ -176,6 +178,7 @@ impl Numbers {
             found: matched.iter().filter(|m| m.detection.is_some()).count(),
             false_alarms,
             false_alarms_per_hour: false_alarms as f64 / free_hours,
+            false_alarms_per_hour_bound: poisson_bound_95(false_alarms) / free_hours,
             strict_false_alarms,
             strict_false_alarms_per_hour: strict_false_alarms as f64 / free_hours,
             free_hours,

@@ -58,6 +58,35 @@ pub fn quantile(sorted: &[f64], share: f64) -> f64 {
     sorted[below] + (at - at.floor()) * (sorted[above] - sorted[below])
 }
 
+/// The largest mean of a Poisson distribution under which so few or fewer events still come in one of 20 cases: an upper
+/// bound at 95 %, one-sided (Garwood, "Fiducial limits for the Poisson distribution", 1936).
+pub fn poisson_bound_95(count: usize) -> f64 {
+    /// Statistical: one of 20.
+    const RARE: f64 = 0.05;
+    /// Resolution: a float has 53 bits.
+    const HALVINGS: usize = 60;
+    // Of so few or fewer events, by its logarithm, for e^-mean may be too small for a float.
+    let so_few = |mean: f64| {
+        let (mut log_term, mut sum) = (-mean, (-mean).exp());
+        for k in 1..=count {
+            log_term += (mean / k as f64).ln();
+            sum += log_term.exp();
+        }
+        sum
+    };
+    let n = count as f64;
+    let (mut low, mut high) = (n, n + 4.0 * n.sqrt() + 10.0);
+    for _ in 0..HALVINGS {
+        let middle = f64::midpoint(low, high);
+        if so_few(middle) > RARE {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -74,5 +103,15 @@ mod tests {
     fn nothing_has_no_mean() {
         let of = Distribution::of([]);
         assert!(of.mean.is_nan() && of.p99.is_nan());
+    }
+
+    #[test]
+    fn nothing_in_five_minutes_is_under_36_an_hour() {
+        // Half of the 95 % quantile of chi squared with 2 k + 2 degrees of freedom.
+        for (count, bound) in [(0, 2.9957), (1, 4.7439), (10, 16.9622), (100, 118.0793)] {
+            assert!((poisson_bound_95(count) - bound).abs() < 1e-3, "{count}");
+        }
+        assert!((poisson_bound_95(0) / (5.0 / 60.0) - 35.95).abs() < 0.01);
+        assert!(poisson_bound_95(2000).is_finite());
     }
 }

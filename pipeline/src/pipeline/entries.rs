@@ -3,6 +3,7 @@
 mod detector;
 mod model_fits;
 mod outputs;
+mod publish;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -121,6 +122,9 @@ impl<'a> Resolver<'a> {
         }
         if let Some(config) = &entry.record {
             return self.record(&place.key("record"), config);
+        }
+        if let Some(config) = &entry.publish {
+            return self.publish(index, &place.key("publish"), config);
         }
         let outside = entry.outside.as_ref()?;
         self.outside(index, &place.key("outside").key("command"), outside)

@@ -96,7 +96,7 @@ impl From<Endpoints> for Vec<String> {
 }
 
 /// A stage: its name, where it runs, what it listens to, and exactly one of `ingest`, `twin`,
-/// `detect`, `explain`, `record` and `outside`, which says what it is.
+/// `detect`, `explain`, `record`, `publish` and `outside`, which says what it is.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StageEntry {
@@ -133,6 +133,9 @@ pub struct StageEntry {
     /// A recorder: archive and picture.
     #[serde(default)]
     pub record: Option<tauscope_record::Config>,
+    /// A publisher: what the robot's cell is told, over Zenoh and Modbus. Not a safety function.
+    #[serde(default)]
+    pub publish: Option<tauscope_publish::Config>,
     /// A stage that is not ours: a program that takes its place in the pipeline.
     #[serde(default)]
     pub outside: Option<OutsideEntry>,

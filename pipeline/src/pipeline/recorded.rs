@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use tauscope_record::{RecordError, Recorder};
 use tauscope_watch as watch;
 
-use super::{Pipeline, Stage};
+use super::{Pipeline, Role, Stage};
 use crate::build::{self, StreamFacts};
 use crate::cell::Cell;
 use crate::provenance::sha256;
@@ -47,6 +47,7 @@ impl Pipeline {
                 cell: maker.cells.first()?.clone(),
                 kind: maker.role.gives()?,
                 detector,
+                judges_contact: maker.role != Role::Explain,
             })
         });
         facts.collect()

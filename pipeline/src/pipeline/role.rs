@@ -1,11 +1,11 @@
-//! What a stage is: which of the six, what it takes and what it gives.
+//! What a stage is: which of the seven, what it takes and what it gives.
 
 use tauscope_bus::SampleKind;
 
 use super::file::StageEntry;
 use crate::settings::OutputEntry;
 
-/// Which of the six kinds of stage.
+/// Which of the seven kinds of stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// A source of joint states.
@@ -18,6 +18,8 @@ pub enum Role {
     Explain,
     /// A recorder.
     Record,
+    /// A publisher.
+    Publish,
     /// A program that is not ours, and what it puts out.
     Outside(Option<SampleKind>),
 }
@@ -36,7 +38,9 @@ pub enum Takes {
 }
 
 /// The keys of a stage that say what it is.
-pub const ROLE_KEYS: [&str; 6] = ["ingest", "twin", "detect", "explain", "record", "outside"];
+pub const ROLE_KEYS: [&str; 7] = [
+    "ingest", "twin", "detect", "explain", "record", "publish", "outside",
+];
 
 impl Role {
     /// All that `entry` claims to be, with the key that says so. Exactly one in a good file.
@@ -51,6 +55,7 @@ impl Role {
             entry.detect.as_ref().map(|_| Self::Detect),
             entry.explain.as_ref().map(|_| Self::Explain),
             entry.record.as_ref().map(|_| Self::Record),
+            entry.publish.as_ref().map(|_| Self::Publish),
             outside,
         ];
         ROLE_KEYS
@@ -68,6 +73,7 @@ impl Role {
             Self::Detect => "detect",
             Self::Explain => "explain",
             Self::Record => "record",
+            Self::Publish => "publish",
             Self::Outside(_) => "outside",
         }
     }
@@ -78,9 +84,14 @@ impl Role {
             Self::Ingest => Takes::Nothing,
             Self::Twin => Takes::One(SampleKind::JointState),
             Self::Detect | Self::Explain => Takes::One(SampleKind::TwinState),
-            Self::Record | Self::Outside(None) => Takes::Many,
+            Self::Record | Self::Publish | Self::Outside(None) => Takes::Many,
             Self::Outside(Some(_)) => Takes::AnyOne,
         }
+    }
+
+    /// Whether it also hears how the stages fare that it listens to.
+    pub fn hears_health(self) -> bool {
+        matches!(self, Self::Record | Self::Publish)
     }
 
     /// What it puts out.
@@ -89,7 +100,7 @@ impl Role {
             Self::Ingest => Some(SampleKind::JointState),
             Self::Twin => Some(SampleKind::TwinState),
             Self::Detect | Self::Explain => Some(SampleKind::Detection),
-            Self::Record => None,
+            Self::Record | Self::Publish => None,
             Self::Outside(output) => output,
         }
     }

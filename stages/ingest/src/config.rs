@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use tauscope_bus::ZenohEndpoints;
 
 /// A source: exactly one of `file`, `csv`, `zenoh` and `simulate`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -21,6 +22,10 @@ pub struct Config {
     /// A simulated cell.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub simulate: Option<SimulateConfig>,
+    /// Where commands are taken in while the pipeline runs: acknowledge, mute, payload, learn, label. Without it,
+    /// nowhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub commands: Option<ZenohEndpoints>,
     /// How fast recorded or simulated samples are given out. Live messages come when they come.
     pub rate: Rate,
     /// Low-pass on positions before they are differentiated, where the source gives no velocity \[Hz\].
@@ -38,6 +43,7 @@ impl Default for Config {
             csv: None,
             zenoh: None,
             simulate: None,
+            commands: None,
             rate: Rate::default(),
             velocity_cutoff_hz: 20.0,
             max_age_s: 0.5,
@@ -74,6 +80,10 @@ pub struct Topics {
     /// Requests that the detectors learn the robot's usual behaviour anew (`std_msgs/msg/Bool`, true).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub learn: Option<String>,
+    /// Commands of an archive of tauscope (`diagnostic_msgs/msg/DiagnosticArray`), so that they hold in a replay as they
+    /// did live. Where a recording does not have the topic, nothing was told. Live commands come another way.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub commands: Option<String>,
 }
 
 impl Default for Topics {
@@ -84,6 +94,7 @@ impl Default for Topics {
             twin: None,
             tool: None,
             learn: None,
+            commands: Some("/commands".to_owned()),
         }
     }
 }

@@ -38,6 +38,7 @@
 //! ```
 
 mod archived_twin;
+mod commanded;
 mod config;
 mod error;
 mod pacing;
@@ -49,6 +50,7 @@ mod sources;
 mod zenoh;
 
 pub use archived_twin::{ArchivedTwin, ArchivedTwinTopics};
+pub use commanded::Commanded;
 pub use config::{
     Config, ConfigError, CsvConfig, FileConfig, Keys, Rate, SimulateConfig, Topics, ZenohConfig,
 };

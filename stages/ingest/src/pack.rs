@@ -65,6 +65,8 @@ pub struct Packer {
     fixed_tool: Option<Tool>,
     /// Somebody has asked for learning since the newest sample.
     learning_asked: bool,
+    /// Commands of a recording that no sample has taken yet.
+    told: VecDeque<tauscope_bus::Command>,
     pending: VecDeque<JointState>,
     newest_ns: Option<i64>,
     flushed: bool,
@@ -114,6 +116,7 @@ impl Packer {
             tools: Side::default(),
             fixed_tool: setup.tool,
             learning_asked: false,
+            told: VecDeque::new(),
             pending: VecDeque::new(),
             newest_ns: None,
             flushed: false,
@@ -202,6 +205,13 @@ impl Packer {
     /// has no stamp of its own.
     pub fn learn(&mut self, message: ros::Bool) {
         self.learning_asked |= message.data;
+    }
+
+    /// Takes a command of a recording: it belongs to the state that comes next.
+    pub fn told(&mut self, command: tauscope_bus::Command) {
+        if self.told.len() < MAX_PENDING {
+            self.told.push_back(command);
+        }
     }
 
     /// Gives out the next sample that need not wait any longer; `now_ns` is the present on the clock
@@ -326,6 +336,7 @@ impl Packer {
             position: whole.position,
             velocity: differentiated.velocity,
             effort: whole.effort,
+            command: self.told.pop_front().unwrap_or_default(),
             ..JointState::default()
         });
     }

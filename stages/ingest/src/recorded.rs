@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use tauscope_archive::{ArchiveError, Damage, Messages, Recording, ros};
+use tauscope_bus::command::Request;
 use tauscope_bus::{Emit, JointState, Progress, Source, StageError};
 
 use crate::config::{Config, CsvConfig, FileConfig, Topics};
@@ -28,6 +29,7 @@ enum Role {
     Reference,
     Tool,
     Learn,
+    Told,
 }
 
 /// A source that reads a recording, once, from its beginning to its end. Memory is bounded whatever
@@ -42,6 +44,7 @@ pub struct RecordedSource {
     message: ros::JointState,
     tool: ros::InertiaStamped,
     learn: ros::Bool,
+    told: ros::DiagnosticArray,
     log_times_ns: (i64, i64),
     now_ns: i64,
     ended: bool,
@@ -112,6 +115,7 @@ impl RecordedSource {
             message: ros::JointState::default(),
             tool: ros::InertiaStamped::default(),
             learn: ros::Bool::default(),
+            told: ros::DiagnosticArray::default(),
             log_times_ns,
             now_ns: log_times_ns.0,
             ended: false,
@@ -206,6 +210,7 @@ impl RecordedSource {
             None => return Ok(()),
             Some(Role::Tool) => message.decode_into(&mut self.tool),
             Some(Role::Learn) => message.decode_into(&mut self.learn),
+            Some(Role::Told) => message.decode_into(&mut self.told),
             Some(_) => message.decode_into(&mut self.message),
         };
         if let Err(error) = decoded {
@@ -223,9 +228,24 @@ impl RecordedSource {
             Some(Role::Reference) => packer.reference(&self.message, now_ns),
             Some(Role::Tool) => packer.tool(&self.tool, now_ns),
             Some(Role::Learn) => packer.learn(self.learn),
+            Some(Role::Told) => self.take_told(),
             None => {}
         }
         Ok(())
+    }
+
+    /// The commands of a message of an archive. What is none of ours is told of and left alone.
+    fn take_told(&mut self) {
+        for status in &self.told.status {
+            let argument = |name: &str| {
+                let found = status.values.iter().find(|pair| pair.key == name);
+                found.map(|pair| pair.value.as_str())
+            };
+            match Request::archived(&status.name, argument) {
+                Ok(command) => self.packer.told(command),
+                Err(refusal) => tracing::warn!("{}: {refusal}", self.path.display()),
+            }
+        }
     }
 }
 
@@ -240,17 +260,23 @@ fn roles<'a>(
         (&topics.twin, Role::Reference),
         (&topics.tool, Role::Tool),
         (&topics.learn, Role::Learn),
+        (&topics.commands, Role::Told),
     ] {
         wanted.extend(topic.as_deref().map(|name| (name, role)));
     }
-    // Where nobody asked for learning, nobody wrote it down.
+    // Where nobody asked for learning or told anything, nobody wrote it down. Another's topic may have the name.
     let is_there = |name: &str| recording.topics().iter().any(|topic| topic.name == name);
-    wanted.retain(|(name, role)| !matches!(role, Role::Learn) || is_there(name));
+    wanted.retain(|(name, role)| match role {
+        Role::Learn => is_there(name),
+        Role::Told => recording.topic_of::<ros::DiagnosticArray>(name).is_ok(),
+        _ => true,
+    });
     let mut roles = vec![None; recording.topics().len()];
     for &(name, role) in &wanted {
         let topic = match role {
             Role::Tool => recording.topic_of::<ros::InertiaStamped>(name)?,
             Role::Learn => recording.topic_of::<ros::Bool>(name)?,
+            Role::Told => recording.topic_of::<ros::DiagnosticArray>(name)?,
             _ => recording.topic_of::<ros::JointState>(name)?,
         };
         if let Some(index) = recording.topics().iter().position(|each| each == topic) {

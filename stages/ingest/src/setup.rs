@@ -9,6 +9,8 @@ pub struct Setup {
     pub joint_names: Vec<String>,
     /// The tool that is attached, as far as no topic says otherwise.
     pub tool: Option<Tool>,
+    /// Whether it is known which link carries a tool.
+    pub has_tool_link: bool,
 }
 
 /// A tool, in the frame of the link it is attached to.

@@ -16,6 +16,7 @@ use tauscope_bus::{Header, Health, SampleKind, SampleRef, TwinState, flags};
 use self::command::CommandTopics;
 use self::detections::DetectionTopics;
 use self::joints::{JointTopic, status};
+use crate::contacts::Told;
 use crate::error::RecordError;
 use crate::streams::{Stream, Streams};
 
@@ -118,6 +119,7 @@ impl Archive {
         streams: &Streams,
         index: usize,
         sample: SampleRef<'_>,
+        told: Told<'_>,
     ) -> Result<(), RecordError> {
         let stream = &streams.all[index];
         match (sample, &mut self.topics[index]) {
@@ -149,7 +151,7 @@ impl Archive {
                 }
             }
             (SampleRef::Detection(detection), Topics::Detection(topics)) => {
-                topics.write(&mut self.file, streams, stream, detection)?;
+                topics.write(&mut self.file, streams, stream, (detection, told))?;
             }
             // `Streams::find` lets only samples of the announced type through.
             _ => {}

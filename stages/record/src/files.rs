@@ -7,6 +7,7 @@ use tauscope_bus::SampleRef;
 
 use crate::archive::Archive;
 use crate::config::Config;
+use crate::contacts::Told;
 use crate::error::RecordError;
 use crate::file_name::{FileName, fill_in};
 use crate::rerun::FilePicture;
@@ -71,6 +72,7 @@ impl Files {
         streams: &Streams,
         index: usize,
         sample: SampleRef<'_>,
+        told: Told<'_>,
     ) -> Result<(), RecordError> {
         if self.names().next().is_none() {
             return Ok(());
@@ -88,7 +90,7 @@ impl Files {
             None => self.begin(streams, now_ns)?,
         };
         open.start_ns.get_or_insert(now_ns);
-        let kept = open.accept(streams, index, sample);
+        let kept = open.accept(streams, index, sample, told);
         self.open = Some(open);
         kept
     }
@@ -164,12 +166,13 @@ impl OpenFiles {
         streams: &Streams,
         index: usize,
         sample: SampleRef<'_>,
+        told: Told<'_>,
     ) -> Result<(), RecordError> {
         if let Some(archive) = &mut self.archive {
-            archive.accept(streams, index, sample)?;
+            archive.accept(streams, index, sample, told)?;
         }
         if let Some(picture) = &mut self.picture {
-            picture.accept(streams, index, sample)?;
+            picture.accept(streams, index, sample, told)?;
         }
         Ok(())
     }

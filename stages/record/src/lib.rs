@@ -3,6 +3,7 @@
 
 mod archive;
 mod config;
+mod contacts;
 mod error;
 mod file_name;
 mod files;
@@ -16,7 +17,8 @@ pub use error::RecordError;
 pub use file_name::{FileName, FileNameError};
 pub use recorder::Recorder;
 pub use rerun::explanation::{
-    ExplainedEvent, ExplainedJoint, ExplainedRecording, Explanation, write_explanation,
+    ExplainedEvent, ExplainedJoint, ExplainedRecording, ExplainedRobot, Explanation,
+    write_explanation,
 };
 pub use streams::{CellInfo, StreamInfo};
 pub use tauscope_archive::Compression;

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use tauscope_bus::{SampleRef, Sink, StageError};
 
 use crate::config::Config;
+use crate::contacts::Contacts;
 use crate::error::RecordError;
 use crate::files::Files;
 use crate::rerun::LivePicture;
@@ -18,6 +19,7 @@ use crate::streams::{CellInfo, StreamInfo, Streams};
 /// hour together.
 pub struct Recorder {
     streams: Streams,
+    contacts: Contacts,
     files: Files,
     live: Option<LivePicture>,
 }
@@ -46,6 +48,7 @@ impl Recorder {
         let live = viewer.map(|url| LivePicture::start(url, &streams));
         let live = live.transpose()?;
         Ok(Self {
+            contacts: Contacts::new(streams.all.len()),
             streams,
             files,
             live,
@@ -60,9 +63,10 @@ impl Recorder {
 
     fn keep(&mut self, from: &str, sample: SampleRef<'_>) -> Result<(), RecordError> {
         let index = self.streams.find(from, &sample)?;
-        self.files.accept(&self.streams, index, sample)?;
+        let told = self.contacts.push(index, sample);
+        self.files.accept(&self.streams, index, sample, told)?;
         if let Some(live) = &mut self.live {
-            live.accept(&self.streams, index, sample)?;
+            live.accept(&self.streams, index, sample, told)?;
         }
         Ok(())
     }

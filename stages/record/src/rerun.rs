@@ -28,6 +28,7 @@ use self::blueprint::Purpose;
 use self::file::PictureFile;
 use self::live::Live;
 use self::painter::{Pace, Painter};
+use crate::contacts::Told;
 use crate::error::RecordError;
 use crate::streams::Streams;
 
@@ -54,9 +55,12 @@ impl FilePicture {
         streams: &Streams,
         index: usize,
         sample: SampleRef<'_>,
+        told: Told<'_>,
     ) -> Result<(), RecordError> {
         let Self { painter, file } = self;
-        painter.accept(streams, index, sample, &mut |message| file.write(&message))
+        painter.accept(streams, (index, sample, told), &mut |message| {
+            file.write(&message)
+        })
     }
 
     /// Completes the file; gives its name.
@@ -100,9 +104,10 @@ impl LivePicture {
         streams: &Streams,
         index: usize,
         sample: SampleRef<'_>,
+        told: Told<'_>,
     ) -> Result<(), RecordError> {
         let Self { painter, live } = self;
-        painter.accept(streams, index, sample, &mut push_to(live))
+        painter.accept(streams, (index, sample, told), &mut push_to(live))
     }
 
     /// Shows the viewer what was gathered.

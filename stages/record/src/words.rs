@@ -1,6 +1,6 @@
 //! What a detection says in words, the same in the archive and in the picture.
 
-use tauscope_bus::{Detection, Name, flags};
+use tauscope_bus::{Contact, Detection, flags};
 use tauscope_dynamics::terms::UNKNOWN;
 
 /// How serious it is.
@@ -27,9 +27,9 @@ impl Severity {
     }
 }
 
-/// The joints that detected, by name.
-pub(crate) fn loaded_joints<'a>(detection: &Detection, joints: &'a [String]) -> Vec<&'a str> {
-    let loaded = |j: &usize| detection.joints & (1 << j) != 0;
+/// The joints that detected (bit j for joint j), by name.
+pub(crate) fn loaded_joints(bits: u32, joints: &[String]) -> Vec<&str> {
+    let loaded = |j: &usize| bits & (1 << j) != 0;
     (0..joints.len().min(32))
         .filter(loaded)
         .map(|j| joints[j].as_str())
@@ -53,12 +53,17 @@ pub(crate) fn headline(detection: &Detection) -> String {
     }
 }
 
-/// What it means that an alarm ended which said `state`: a contact is over, a change of the arm was learned.
-pub(crate) fn over(state: &Name) -> &'static str {
-    match state.as_str() {
-        "contact" | "collision" | "cooperation" => "contact ended",
-        _ => "learned: the rule from now on",
+/// What it means that an alarm ended: a contact is over, a change of the arm was learned.
+pub(crate) fn over(ended: &Contact) -> String {
+    if ended.size.is_some() {
+        return "learned: the rule from now on".to_owned();
     }
+    let kind = ended.kind.as_str().replace('_', " ");
+    let mut text = format!("{kind} ended after {:.2} s", ended.duration_s());
+    if ended.peak().is_some() {
+        text += &format!(", at its strongest {ended}");
+    }
+    text
 }
 
 #[cfg(test)]
@@ -82,7 +87,7 @@ mod tests {
         assert_eq!(headline(&detection), "collision at link5");
         assert_eq!(Severity::of(&detection), Severity::Collision);
         let joints = ["a", "b", "c"].map(str::to_owned);
-        assert_eq!(loaded_joints(&detection, &joints), ["a", "c"]);
+        assert_eq!(loaded_joints(detection.joints, &joints), ["a", "c"]);
         detection.header.flags |= flags::CHANGE;
         (detection.state, detection.size) = ("torque_gain".into(), 1.08);
         assert_eq!(headline(&detection), "torque gain 1.080 at link5");

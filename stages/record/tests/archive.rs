@@ -109,16 +109,19 @@ fn a_detection_is_told_once_when_it_begins_and_once_when_it_ends() {
     let expected = [
         (Level::Stale as u8, "not ready"),
         (Level::Ok as u8, "free"),
-        (Level::Warn as u8, "contact at link5"),
-        (Level::Ok as u8, "free"),
+        (Level::Warn as u8, "contact at link5 (first guess)"),
+        (
+            Level::Ok as u8,
+            "contact ended after 1.04 s, at its strongest 26 N at link5",
+        ),
     ];
     assert_eq!(told, expected);
     assert_eq!(statuses[2].hardware_id, "demo");
-    let values: BTreeMap<_, _> = statuses[2]
-        .values
-        .iter()
-        .map(|v| (v.key.as_str(), v.value.as_str()))
-        .collect();
+    let values_of = |status: usize| -> BTreeMap<_, _> {
+        let values = statuses[status].values.iter();
+        values.map(|v| (v.key.as_str(), v.value.as_str())).collect()
+    };
+    let values = values_of(2);
     let onset = instants
         .iter()
         .find(|i| i.detection.event == Detection::ONSET)
@@ -129,9 +132,27 @@ fn a_detection_is_told_once_when_it_begins_and_once_when_it_ends() {
     assert_eq!(values["score"].parse::<f64>().unwrap(), detection.score);
     assert_eq!(values["joints"], "joint1 joint2 joint3 joint4");
     assert_eq!(values["link"], "link5");
-    let (seconds, nanoseconds) = values["t_contact"].split_once('.').unwrap();
+    assert_eq!(values["estimate"], "provisional");
+    let guess_n = values["force_n"].parse::<f64>().unwrap();
+    let (seconds, nanoseconds) = values["t_contact_s"].split_once('.').unwrap();
     let contact_ns = format!("{seconds}{nanoseconds}").parse::<i64>().unwrap();
     assert_eq!(contact_ns, detection.contact_ns);
+
+    // Its end tells the whole contact, a number a key.
+    let values = values_of(3);
+    assert_eq!((values["event"], values["state"]), ("offset", "free"));
+    assert_eq!((values["estimate"], values["kind"]), ("final", "contact"));
+    assert_eq!(values["link"], "link5");
+    let number = |key: &str| values[key].parse::<f64>().unwrap();
+    let strongest = |i: &&Instant| (i.detection.score * 1e6) as i64;
+    let strongest = instants.iter().max_by_key(strongest).unwrap().detection;
+    let force_n = strongest.force_n;
+    let peak_n = force_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+    assert_eq!(number("peak_force_n"), peak_n);
+    assert!(guess_n < 0.5 * peak_n, "{guess_n}");
+    assert_eq!(number("direction_y"), force_n[1] / peak_n);
+    assert_eq!(number("point_z_m"), strongest.point_m[2]);
+    assert!((number("duration_s") - 1.04).abs() < 0.01);
 
     // The wrench is about the world's origin.
     let wrenches = read::<WrenchStamped>(&path, "/external_wrench");
@@ -272,7 +293,7 @@ fn what_was_not_announced_is_an_error_that_names_it() {
     assert!(
         error
             .to_string()
-            .contains("stage `twin` sent a tauscope/JointState/1"),
+            .contains("stage `twin` sent a tauscope/JointState/2"),
         "{error}"
     );
 }

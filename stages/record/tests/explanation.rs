@@ -9,8 +9,10 @@ use std::path::Path;
 
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::log::{Chunk, LogMsg};
+use tauscope_dynamics::Model;
 use tauscope_record::{
-    ExplainedEvent, ExplainedJoint, ExplainedRecording, Explanation, write_explanation,
+    ExplainedEvent, ExplainedJoint, ExplainedRecording, ExplainedRobot, Explanation,
+    write_explanation,
 };
 
 fn joint(name: &str, friction_nm: f64) -> ExplainedJoint {
@@ -28,6 +30,7 @@ fn joint(name: &str, friction_nm: f64) -> ExplainedJoint {
         .collect();
     ExplainedJoint {
         name: name.to_owned(),
+        position: time_s.iter().map(|t| (0.8 * t).sin()).collect(),
         time_s,
         measured,
         twin,
@@ -74,7 +77,27 @@ fn explanation() -> Explanation {
                 sentence: "The friction of joint 2 rises and stays.".to_owned(),
             },
         ],
+        robot: Some(ExplainedRobot {
+            model: arm(),
+            found: vec!["link3".to_owned()],
+        }),
     }
+}
+
+/// An arm of six cylinders.
+fn arm() -> Model {
+    let mut urdf = r#"<robot name="arm"><link name="link0"/>"#.to_owned();
+    for child in 1..=6 {
+        urdf += &format!(
+            r#"<link name="link{child}"><inertial><mass value="1"/>
+              <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>
+              <visual><geometry><cylinder radius="0.05" length="0.2"/></geometry></visual></link>
+            <joint name="joint{child}" type="continuous"><parent link="link{}"/><child link="link{child}"/>
+              <origin xyz="0 0 0.2"/><axis xyz="0 1 0"/></joint>"#,
+            child - 1
+        );
+    }
+    Model::from_urdf(&(urdf + "</robot>")).unwrap()
 }
 
 /// The chunks of the recording by entity, and the paths of the blueprint.
@@ -138,6 +161,18 @@ fn the_file_holds_efforts_residuals_events_text_and_layout() {
     assert_eq!(rows(&recording["/rec_00/log"]), 2);
     assert!(!recording.contains_key("/rec_04/events/1"));
     assert!(blueprint.iter().any(|path| path.starts_with("/view/")));
+    // Six links, every 20 ms, on the timeline that the picture opens on.
+    let moved = &recording["/transforms"];
+    assert_eq!(rows(moved), 6 * 500);
+    let moved = moved.iter().find(|chunk| !chunk.is_static()).unwrap();
+    let times = moved.timelines()[&"recording_time".into()].times_raw();
+    assert_eq!((times[0], times[6]), (0, 20_000_000));
+    assert!(recording.contains_key("/robot/link6"));
+    assert!(
+        blueprint
+            .iter()
+            .any(|path| path.ends_with("/EyeControls3D"))
+    );
 }
 
 #[test]

@@ -16,6 +16,12 @@ fn every_effect_has_words_of_its_own_about_what_it_has() {
             assert!(!name.is_empty(), "{}", effect.name);
         }
         assert!(names.insert(words.title), "two are a `{}`", words.title);
+        let look_at = Some(words.look_at).filter(|text| !text.is_empty());
+        if let Some(sentence) = look_at {
+            let ends = sentence.ends_with(['.', '?']);
+            let places = places(sentence).all(|(place, _)| matches!(place, "place" | "source"));
+            assert!(ends && places, "{}: {sentence}", effect.name);
+        }
         let sentences = [Some(words.meaning), Some(words.finding), words.less]
             .into_iter()
             .chain([words.without_numbers]);

@@ -139,6 +139,7 @@ const PRIOR_CONTACTS: f64 = 40.0;
 /// Mean measurements of collisions and cooperations.
 /// Statistical: over 349 collisions and 573 cooperations of twelve simulated arms under impedance control, seeds 701
 /// to 712, which nothing else was tuned or judged on: `tests/contacts/kinds_prior.py TAUSCOPE ROBOT.urdf OUT`.
+#[expect(clippy::approx_constant, reason = "a measured mean that happens to be near -π")]
 const PRIOR_MEANS: [[f64; MEASURED]; 2] = [[0.536, -1.804, 2.163], [-0.027, -3.141, 0.594]];
 /// Covariance of the measurements within a kind.
 /// Statistical: over the same contacts.

@@ -207,7 +207,7 @@ impl Context<'_> {
             own.trajectories.clear();
             named.extend(own);
             if undetectable.is_empty() {
-                undetectable = findings::undetectable(&search, &found, &joints);
+                undetectable = findings::undetectable(&search, &found, input, &joints);
             }
             actives.extend(found.fit.actives);
         }

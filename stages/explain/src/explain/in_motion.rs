@@ -73,7 +73,7 @@ impl Context<'_> {
         progress(0.8, "rivals");
         let before = Fit::new(&problem, scales()).refined(&problem);
         let named = findings::of(&search, &found, &before, input, &joints);
-        let undetectable = findings::undetectable(&search, &found, &joints);
+        let undetectable = findings::undetectable(&search, &found, input, &joints);
         Ok(Ok(Judged {
             before,
             found: found.fit,

@@ -15,6 +15,7 @@ pub static EFFECT: Effect = Effect {
         "Torque scale",
         "torque scale",
         "What a recorded effort of 1 is in N m.",
+        "",
         "The effort of joint {place} is recorded {gain} times the model's.",
     ),
     family: Family::Recording,

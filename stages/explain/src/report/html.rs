@@ -7,18 +7,25 @@
 pub mod chart;
 mod effects;
 mod findings;
+mod groups;
 mod number_format;
 mod proof;
 mod rivals;
+mod robot;
+mod todo;
+mod tone;
 mod traces;
 
 use std::collections::BTreeMap;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use tauscope_dynamics::Model;
 
 use crate::report::schema::{RecordingPicture, Report, Verdict};
+use crate::report::sentences::error_left;
 
-use self::number_format::{almost_all, effort_unit};
+use self::number_format::{effort_unit, percent};
+use self::tone::Tone;
 
 /// The style sheet of our pages.
 pub const STYLE: &str = include_str!("html/style.css");
@@ -30,15 +37,35 @@ pub const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'";
 /// Tuned: by eye, for the layout of the page.
 const LONG: usize = 130;
 
+/// What the page tells beside the report. Paths are as the reader would type them; what is not there is left out.
+#[derive(Debug, Clone, Default)]
+pub struct Around<'a> {
+    /// By what the report was made, of which files: stands at the foot as it is.
+    pub provenance: BTreeMap<String, String>,
+    /// The day on which it was made.
+    pub date: String,
+    /// The robot, to be drawn.
+    pub model: Option<&'a Model>,
+    /// The URDF.
+    pub robot: Option<String>,
+    /// The corrected twin that was started from.
+    pub start: Option<String>,
+    /// Recordings that were fitted.
+    pub fit: Vec<String>,
+    /// Recordings that were not.
+    pub holdout: Vec<String>,
+    /// The corrected twin, if one was written.
+    pub twin: Option<String>,
+    /// The corrected robot, if one was written.
+    pub corrected_robot: Option<String>,
+}
+
 /// The page.
 ///
 /// `pictures` are the recordings to draw, none if there are none; the first stamp among them counts as the start of the
-/// session. `provenance` stands at the foot as it is: by what was the report made, of which files, when.
-pub fn page(
-    report: &Report,
-    pictures: &[RecordingPicture],
-    provenance: &BTreeMap<String, String>,
-) -> String {
+/// session.
+pub fn page(report: &Report, pictures: &[RecordingPicture], around: &Around<'_>) -> String {
+    let robot = (around.model).and_then(|model| robot::picture(report, model, pictures));
     let sections: Vec<Section> = [
         Section::of(
             "missing",
@@ -52,7 +79,7 @@ pub fn page(
             "Joint by joint",
             traces::joints(report, pictures),
         ),
-        Section::of("rivals", "Rivals, and why not", rivals::rejected(report)),
+        Section::of("rivals", "Rivals", rivals::rejected(report)),
         Section::of("next", "What to record next", rivals::next(report)),
         Section::of(
             "hidden",
@@ -78,6 +105,7 @@ pub fn page(
             body {
                 main {
                     (header(report))
+                    (todo::todo(report, around, robot))
                     @if sections.len() > 1 {
                         nav {
                             @for section in &sections { a href={ "#" (section.id) } { (section.title) } }
@@ -89,7 +117,7 @@ pub fn page(
                             (section.body)
                         }
                     }
-                    (footer(report, provenance))
+                    (footer(report, &around.provenance))
                 }
             }
         }
@@ -118,18 +146,8 @@ fn verdict_text(verdict: Verdict) -> &'static str {
     }
 }
 
-/// Class and sign of a verdict: it must not hang on colour alone.
-fn verdict_badge(verdict: Verdict) -> (&'static str, &'static str) {
-    match verdict {
-        Verdict::Explained => ("explained", "✓"),
-        Verdict::NothingMissing => ("nothing", "✓"),
-        Verdict::UnknownRemains => ("unknown", "?"),
-        Verdict::NotEvaluated => ("none", "–"),
-    }
-}
-
 fn header(report: &Report) -> Markup {
-    let (class, sign) = verdict_badge(report.verdict);
+    let Tone { class, sign, text } = Tone::of(report);
     let reason = report
         .reason
         .as_deref()
@@ -138,7 +156,7 @@ fn header(report: &Report) -> Markup {
     html! {
         header class={ "verdict " (class) } {
             p.kicker {
-                span.badge { span.sign aria-hidden="true" { (sign) } " " (verdict_text(report.verdict)) }
+                span.badge { span.sign aria-hidden="true" { (sign) } " " (text) }
                 span.case { (report.case) }
             }
             h1.long[report.summary.chars().count() > LONG] { (report.summary) }
@@ -167,10 +185,10 @@ fn facts(report: &Report) -> Vec<(String, String)> {
             "effects found"
         };
         facts.push((count.to_string(), text.to_owned()));
-        let share = proof::recovered(&rows);
-        if share.is_finite() && !proof::is_elsewhere(report) {
-            let text = "of the squared error is gone on held-out data, which was never fitted";
-            facts.push((almost_all(share.max(0.0)), text.to_owned()));
+        let left = error_left(&report.holdout_rms_before, &report.holdout_rms_after);
+        if left.is_finite() && !proof::is_elsewhere(report) {
+            let text = "of the error (RMS) is left on held-out data, which was never fitted";
+            facts.push((percent(left), text.to_owned()));
         }
     }
     let known = rows.iter().filter(|row| row.over_noise().is_finite());
@@ -179,7 +197,7 @@ fn facts(report: &Report) -> Vec<(String, String)> {
     });
     if known > 0 {
         let text = format!(
-            "joints at the noise floor{}",
+            "joints at the noise of the measurement{}",
             if report.findings.is_empty() {
                 ""
             } else {
@@ -202,7 +220,7 @@ fn footer(report: &Report, provenance: &BTreeMap<String, String>) -> Markup {
                     dt { "Mismatch, residual" } dd { "Measured effort minus the twin’s effort." }
                     dt { "Held-out" } dd { "Recordings, or parts of them, that no number on this page was fitted to. Errors on them show whether the correction predicts." }
                     dt { "RMS" } dd { "Root of the mean square of the residual over all samples as recorded, not filtered and not trimmed." }
-                    dt { "Noise floor" } dd { "RMS of the white noise in the measured effort. No model can come below it." }
+                    dt { "Noise" } dd { "RMS of the white noise in the measured effort, estimated from its fastest changes on the fitted recordings. It is an estimate: what changes from sample to sample and yet follows the motion counts as noise, too." }
                     dt { "95 % interval" } dd { "The true value lies in it in 95 of 100 cases like this one." }
                 }
             }

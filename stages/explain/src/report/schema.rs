@@ -4,6 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use tauscope_dynamics::terms::words;
+
+use crate::report::sentences::in_amperes;
 
 /// The report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -37,7 +40,7 @@ pub struct Report {
     pub holdout_rms_before: Vec<f64>,
     /// The same of the corrected twin.
     pub holdout_rms_after: Vec<f64>,
-    /// White noise of the measured effort, by joint \[effort unit\]: no model can do better.
+    /// White noise of the measured effort, by joint \[effort unit\], estimated from its fastest changes on the fitted recordings.
     pub noise_floor: Vec<f64>,
     /// By hold-out recording, the file with the corrected twin's effort.
     pub holdout_predictions: BTreeMap<String, String>,
@@ -90,10 +93,25 @@ pub struct Finding {
     /// Evidence for it against leaving it out, from the effective sample size \[nats\].
     #[serde(default)]
     pub evidence_nats: f64,
+    /// How much effort it is: what is left without it less what is left with it, as root mean square at the joint where
+    /// that is most \[effort unit\].
+    #[serde(default)]
+    pub effort_rms: f64,
     /// Rivals that this data cannot tell apart, most probable first.
     pub equivalent_to: Vec<Rival>,
     /// The finding as a sentence.
     pub sentence: String,
+}
+
+impl Finding {
+    /// A parameter's name without its unit, and the unit that its number is in.
+    pub fn label_and_unit<'n>(&self, name: &'n str) -> (&'n str, String) {
+        match words::unit(name) {
+            Some((stem, unit)) if self.in_amperes => (stem, in_amperes(unit)),
+            Some((stem, unit)) => (stem, unit.to_owned()),
+            None => (name, String::new()),
+        }
+    }
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
@@ -152,6 +170,9 @@ pub struct Undetectable {
     pub link: Option<String>,
     /// By parameter.
     pub smallest_findable: BTreeMap<String, f64>,
+    /// Whether its efforts are in A and not in N m, whatever the names of its numbers say.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub in_amperes: bool,
 }
 
 /// A motion that would separate rivals that tie.

@@ -10,6 +10,7 @@ fn setup() -> Setup {
         cell: "demo".to_owned(),
         joint_names: ["a", "b", "c"].map(str::to_owned).to_vec(),
         tool: None,
+        has_tool_link: false,
     }
 }
 

@@ -38,6 +38,7 @@ pub fn cell(joints: &str) -> Setup {
         cell: "demo".to_owned(),
         joint_names: joints.split_whitespace().map(str::to_owned).collect(),
         tool: None,
+        has_tool_link: false,
     }
 }
 

@@ -1,13 +1,13 @@
-//! What a joint state carries besides the measurement, the command, the tool and requests for learning, so that the
-//! archive replays as the recording did. Written when they change; a command that stays is told again now
-//! and then, because a source takes none that is old.
+//! What a joint state carries besides the measurement, so that the archive replays as the recording did: the commanded
+//! motion, the tool, requests for learning, and what somebody told the pipeline. Written when they change; a commanded
+//! motion that stays is told again now and then, because a source takes none that is old.
 
-use tauscope_archive::ros::{self, Inertia, InertiaStamped};
+use tauscope_archive::ros::{self, DiagnosticArray, Inertia, InertiaStamped, Level};
 use tauscope_archive::{TopicWriter, WriteError};
 use tauscope_bus::{JointArray, JointState, flags};
 
 use super::File;
-use super::joints::JointTopic;
+use super::joints::{JointTopic, status};
 use crate::streams::{Stream, Streams};
 
 /// The topics of the command, the tool and the requests, made when there is something to write.
@@ -22,6 +22,9 @@ pub(super) struct CommandTopics {
     attached: Option<Tool>,
     learn_name: String,
     learn: Option<TopicWriter<ros::Bool>>,
+    told_name: String,
+    told: Option<TopicWriter<DiagnosticArray>>,
+    cell: String,
 }
 
 /// A command is told again after this time \[ns\].
@@ -49,11 +52,32 @@ impl CommandTopics {
             attached: None,
             learn_name: format!("{prefix}/learn{suffix}"),
             learn: None,
+            told_name: format!("{prefix}/commands{suffix}"),
+            told: None,
+            cell: streams.cells[stream.cell].name.clone(),
         }
     }
 
-    /// What must be read before the state itself: a request for learning holds from the state behind it on.
+    /// What must be read before the state itself: a request for learning, or a command, holds from the state behind it
+    /// on.
     pub fn write_ahead(&mut self, file: &mut File, sample: &JointState) -> Result<(), WriteError> {
+        if let Some(verb) = sample.command.verb() {
+            let arguments = sample.command.arguments();
+            let words: Vec<&str> = arguments.iter().map(|(_, value)| value.as_str()).collect();
+            let words = format!("{} {}", verb.as_str(), words.join(" "));
+            let array = DiagnosticArray {
+                header: ros::Header::new(sample.header.stamp_ns, ""),
+                status: vec![status(
+                    Level::Ok,
+                    verb.as_str(),
+                    words.trim_end().to_owned(),
+                    &self.cell,
+                    arguments,
+                )],
+            };
+            let name = || self.told_name.clone();
+            file.write_late(&mut self.told, name, &sample.header, &array)?;
+        }
         if sample.header.has(flags::LEARN) {
             let asked = ros::Bool { data: true };
             let name = || self.learn_name.clone();

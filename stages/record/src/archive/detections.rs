@@ -2,12 +2,13 @@
 
 use tauscope_archive::ros::{self, DiagnosticArray, Float64, Level, Wrench, WrenchStamped};
 use tauscope_archive::{TopicWriter, WriteError};
-use tauscope_bus::{Detection, EventKind, Name, flags};
+use tauscope_bus::{Contact, Detection, EventKind, Force, Name, flags};
 
 use super::File;
 use super::joints::status;
+use crate::contacts::Told;
 use crate::streams::{Stream, Streams};
-use crate::words::{Severity, headline, loaded_joints};
+use crate::words::{Severity, headline, loaded_joints, over};
 
 /// The topics of a detector.
 pub(super) struct DetectionTopics {
@@ -47,7 +48,7 @@ impl DetectionTopics {
         file: &mut File,
         streams: &Streams,
         stream: &Stream,
-        detection: &Detection,
+        (detection, told): (&Detection, Told<'_>),
     ) -> Result<(), WriteError> {
         let header = &detection.header;
         if header.has(flags::READY) {
@@ -88,9 +89,18 @@ impl DetectionTopics {
         if now != self.previous || detection.event() != EventKind::None {
             self.previous = now;
             let cell = &streams.cells[stream.cell];
+            let teller = Teller {
+                detection,
+                label: &stream.label,
+                cell: &cell.name,
+                joints: &cell.joint_names,
+            };
+            let ended = told.ended.as_ref().map(|ended| teller.end(ended));
+            let now = (ended.is_none() || detection.event() == EventKind::Onset)
+                .then(|| teller.now(told.open));
             let array = DiagnosticArray {
                 header: ros::Header::new(header.stamp_ns, ""),
-                status: vec![event(detection, stream, &cell.name, &cell.joint_names)],
+                status: ended.into_iter().chain(now).collect(),
             };
             file.write(self.events, header, &array)?;
         }
@@ -98,56 +108,101 @@ impl DetectionTopics {
     }
 }
 
-/// What began, ended or changed.
-fn event(
-    detection: &Detection,
-    stream: &Stream,
-    cell: &str,
-    joints: &[String],
-) -> ros::DiagnosticStatus {
-    let level = match Severity::of(detection) {
-        Severity::Ok => Level::Ok,
-        Severity::Contact => Level::Warn,
-        Severity::Collision => Level::Error,
-        Severity::NotReady => Level::Stale,
-    };
-    let kind = match detection.event() {
-        EventKind::Onset => "onset",
-        EventKind::Offset => "offset",
-        EventKind::None => "state",
-    };
-    let mut values = vec![
-        ("event", kind.to_owned()),
-        ("detector", detection.detector.to_string()),
-        ("state", detection.state.to_string()),
-        ("score", detection.score.to_string()),
-        ("threshold", detection.threshold.to_string()),
-    ];
-    if detection.alarm() {
-        values.push(("t_contact", seconds(detection.contact_ns)));
-        values.push(("joints", loaded_joints(detection, joints).join(" ")));
-        if !detection.link.as_str().is_empty() {
-            values.push(("link", detection.link.to_string()));
+/// Says what began, ended or changed.
+struct Teller<'a> {
+    detection: &'a Detection,
+    label: &'a str,
+    cell: &'a str,
+    joints: &'a [String],
+}
+
+type Values = Vec<(&'static str, String)>;
+
+impl Teller<'_> {
+    /// What holds from now on; of a contact that begins, the first guess.
+    fn now(&self, open: Option<&Contact>) -> ros::DiagnosticStatus {
+        let level = match Severity::of(self.detection) {
+            Severity::Ok => Level::Ok,
+            Severity::Contact => Level::Warn,
+            Severity::Collision => Level::Error,
+            Severity::NotReady => Level::Stale,
+        };
+        let kind = match self.detection.event() {
+            EventKind::Onset => "onset",
+            EventKind::Offset => "offset",
+            EventKind::None => "state",
+        };
+        let mut values = self.values(kind);
+        let mut message = headline(self.detection);
+        if let Some(open) = open.filter(|_| self.detection.alarm()) {
+            // A watch reports a change of the arm once it is sure.
+            if open.size.is_none() {
+                message += " (first guess)";
+                values.push(("estimate", "provisional".to_owned()));
+            }
+            self.add_contact(open, "force_n", &mut values);
         }
-        if detection.header.has(flags::CHANGE) {
-            values.push(("size", detection.size.to_string()));
+        status(level, self.label, message, self.cell, values)
+    }
+
+    /// What a contact was, now that it is over.
+    fn end(&self, ended: &Contact) -> ros::DiagnosticStatus {
+        let mut values = self.values("offset");
+        values.push(("estimate", "final".to_owned()));
+        self.add_contact(ended, "peak_force_n", &mut values);
+        values.push(("duration_s", ended.duration_s().to_string()));
+        let level = if self.detection.state.as_str() == "not_ready" {
+            Level::Stale
+        } else {
+            Level::Ok
+        };
+        status(level, self.label, over(ended), self.cell, values)
+    }
+
+    fn values(&self, event: &str) -> Values {
+        let detection = self.detection;
+        vec![
+            ("event", event.to_owned()),
+            ("detector", detection.detector.to_string()),
+            ("state", detection.state.to_string()),
+            ("score", detection.score.to_string()),
+            ("threshold", detection.threshold.to_string()),
+        ]
+    }
+
+    fn add_contact(&self, contact: &Contact, force_key: &'static str, values: &mut Values) {
+        values.push(("kind", contact.kind.to_string()));
+        values.push(("t_contact_s", seconds(contact.contact_ns)));
+        values.push((
+            "joints",
+            loaded_joints(contact.joints, self.joints).join(" "),
+        ));
+        if !contact.link.as_str().is_empty() {
+            values.push(("link", contact.link.to_string()));
+        }
+        if let Some(size) = contact.size {
+            values.push(("size", size.to_string()));
+        }
+        if let Some(force) = contact.peak() {
+            values.push((force_key, force.norm_n().to_string()));
+            values.extend(places(force));
         }
     }
-    if detection.header.has(flags::FORCE) {
-        values.push(("force_n", triple(detection.force_n)));
-        values.push(("point_m", triple(detection.point_m)));
-    }
-    status(level, &stream.label, headline(detection), cell, values)
+}
+
+/// Where a force points and acts, a number a key.
+fn places(force: &Force) -> impl Iterator<Item = (&'static str, String)> {
+    let directions = ["direction_x", "direction_y", "direction_z"];
+    let points = ["point_x_m", "point_y_m", "point_z_m"];
+    let values = directions.into_iter().zip(force.direction());
+    let values = values.chain(points.into_iter().zip(force.point_m));
+    values.map(|(key, value)| (key, value.to_string()))
 }
 
 /// Seconds since the epoch, with all nanoseconds.
 fn seconds(ns: i64) -> String {
     let time = ros::Time::from_ns(ns);
     format!("{}.{:09}", time.sec, time.nanosec)
-}
-
-fn triple([x, y, z]: [f64; 3]) -> String {
-    format!("{x} {y} {z}")
 }
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

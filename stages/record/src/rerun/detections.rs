@@ -1,16 +1,19 @@
 //! What a detector's stream draws: score and threshold, its state as a band, events in words, the
-//! touched link's colour and the force. And where the detector tells of them the force's frequency content, with
+//! touched link's colour and the force. Arrow and colour show the contact as far as it is known by then: force and link
+//! of the sample with the largest score so far; so they come to what the words say at its end. And where the detector
+//! tells of them the force's frequency content, with
 //! the state behind it, and the directions of force and motion (figures 1 and 2 of Salt Ducaju et al., "Fast
 //! Contact Detection and Classification for Kinesthetic Teaching in Robots using only Embedded Sensors", 2022).
 
 use rerun::archetypes::{StateConfiguration, TextLog};
-use rerun::{EntityPath, TextLogLevel};
-use tauscope_bus::{Detection, EventKind, Name, flags};
+use rerun::{EntityPath, Rgba32, TextLogLevel};
+use tauscope_bus::{Contact, Detection, EventKind, Name, flags};
 
 use super::palette::{CONTACT, LINK, MOTION, RISE, STATES};
 use super::robot::Robot;
 use super::store::{Out, Store, entity};
-use super::tracks::{Arrow, ArrowTrack, BandTrack, RowTrack, ScalarTrack, StateTrack, norm};
+use super::tracks::{Arrow, ArrowTrack, BandTrack, RowTrack, ScalarTrack, StateTrack};
+use crate::contacts::Told;
 use crate::error::RecordError;
 use crate::streams::{Stream, Streams};
 use crate::words::{Severity, headline, loaded_joints, over};
@@ -40,6 +43,8 @@ pub(super) struct DetectionTracks {
     content: Option<Content>,
     /// State that was told last, and when.
     told: Option<(Name, i64)>,
+    /// Where the arrow of the force ends: it moves with the touched link \[m\].
+    arrow_m: Option<[f64; 3]>,
 }
 
 /// The force's frequency content, and the states behind it.
@@ -133,6 +138,7 @@ impl DetectionTracks {
             directions: ArrowTrack::new(directions),
             content: None,
             told: None,
+            arrow_m: None,
         })
     }
 
@@ -144,7 +150,7 @@ impl DetectionTracks {
     /// Takes a detection of the stream number `index`; the recording began at `start_ns`.
     pub fn accept(
         &mut self,
-        detection: &Detection,
+        (detection, told): (&Detection, Told<'_>),
         (index, stream): (usize, &Stream),
         start_ns: i64,
         joints: &[String],
@@ -156,7 +162,6 @@ impl DetectionTracks {
             self.score.push(header, &[detection.score]);
         }
         self.threshold.push(header, &[detection.threshold]);
-        let before = self.told.map(|(state, _)| state).unwrap_or_default();
         let as_told = |(state, told_ns): (Name, i64)| {
             state == detection.state && header.stamp_ns.abs_diff(told_ns) < STATE_PERIOD_NS
         };
@@ -164,10 +169,14 @@ impl DetectionTracks {
             self.told = Some((detection.state, header.stamp_ns));
             self.state.push(header, detection.state.as_str());
         }
-        if detection.event() != EventKind::None {
-            self.tell(detection, &before, start_ns, joints, store)?;
+        let seconds = (header.stamp_ns - start_ns) as f64 * 1e-9;
+        if let Some(ended) = &told.ended {
+            self.tell_end(ended, seconds, detection, joints, store)?;
         }
-        self.draw_arrows(detection);
+        if let Some(open) = told.open.filter(|_| detection.event() == EventKind::Onset) {
+            self.tell_onset(open, seconds, detection, joints, store)?;
+        }
+        self.draw_arrows(detection, told.open);
         if header.has(flags::CONTENT) {
             if self.content.is_none() {
                 let mut keep = |message| {
@@ -181,22 +190,27 @@ impl DetectionTracks {
             }
         }
         if let Some(robot) = robot {
-            let touched = detection.alarm().then_some(detection.link.as_str());
-            robot.touch(header, index, touched);
+            robot.touch(header, index, told.open.map(|open| open.link.as_str()));
         }
         Ok(())
     }
 
-    fn draw_arrows(&mut self, detection: &Detection) {
+    fn draw_arrows(&mut self, detection: &Detection, open: Option<&Contact>) {
         let header = &detection.header;
         let point_m = detection.point_m;
         // The force ends where it acts; directions begin there.
-        let force = header.has(flags::FORCE).then(|| {
-            let vector_m = detection.force_n.map(|newton| newton * M_PER_N);
+        let force = open.and_then(|open| Some((open, open.peak()?)));
+        self.arrow_m = force.map(|(open, peak)| {
+            let is_there = header.has(flags::FORCE) && detection.link == open.link;
+            let now_m = is_there.then_some(point_m);
+            now_m.or(self.arrow_m).unwrap_or(peak.point_m)
+        });
+        let force = force.zip(self.arrow_m).map(|((open, peak), end_m)| {
+            let vector_m = peak.force_n.map(|newton| newton * M_PER_N);
             [Arrow {
-                origin_m: std::array::from_fn(|i| point_m[i] - vector_m[i]),
+                origin_m: std::array::from_fn(|i| end_m[i] - vector_m[i]),
                 vector_m,
-                label: format!("{:.0} N", norm(detection.force_n)),
+                label: open.to_string(),
             }]
         });
         self.force.push(header, force);
@@ -215,42 +229,51 @@ impl DetectionTracks {
         self.directions.push(header, directions);
     }
 
-    fn tell(
+    fn tell_onset(
         &mut self,
+        open: &Contact,
+        seconds: f64,
         detection: &Detection,
-        before: &Name,
-        start_ns: i64,
         joints: &[String],
         store: &Store,
     ) -> Result<(), RecordError> {
-        let header = &detection.header;
-        let ended = detection.event() == EventKind::Offset;
-        let what = if ended {
-            over(before).to_owned()
-        } else {
-            headline(detection)
-        };
-        let mut parts = vec![format!(
-            "{:.2} s: {what}",
-            (header.stamp_ns - start_ns) as f64 * 1e-9
-        )];
-        let joints = loaded_joints(detection, joints);
-        if !joints.is_empty() {
-            parts.push(format!("seen by {}", joints.join(", ")));
-        }
-        if header.has(flags::FORCE) {
-            parts.push(format!("{:.0} N", norm(detection.force_n)));
+        let mut text = format!("{seconds:.2} s: {}", headline(detection));
+        // A watch reports a change of the arm once it is sure.
+        if open.size.is_none() {
+            let force = open.peak().map(|peak| format!(": {:.0} N", peak.norm_n()));
+            text += &format!(" (first guess{})", force.unwrap_or_default());
         }
         let level = match Severity::of(detection) {
-            _ if ended => TextLogLevel::INFO,
             Severity::Collision => TextLogLevel::ERROR,
             _ => TextLogLevel::WARN,
         };
-        let colour = if detection.alarm() { CONTACT } else { LINK };
-        let text = TextLog::new(parts.join(", "))
-            .with_level(level)
-            .with_color(colour);
-        self.events.push(store, header, &self.events_entity, &text)
+        let text = text + &seen_by(open, joints);
+        self.add_text(text, level, CONTACT, detection, store)
+    }
+
+    fn tell_end(
+        &mut self,
+        ended: &Contact,
+        seconds: f64,
+        detection: &Detection,
+        joints: &[String],
+        store: &Store,
+    ) -> Result<(), RecordError> {
+        let text = format!("{seconds:.2} s: {}{}", over(ended), seen_by(ended, joints));
+        self.add_text(text, TextLogLevel::INFO, LINK, detection, store)
+    }
+
+    fn add_text(
+        &mut self,
+        text: String,
+        level: &str,
+        colour: Rgba32,
+        detection: &Detection,
+        store: &Store,
+    ) -> Result<(), RecordError> {
+        let text = TextLog::new(text).with_level(level).with_color(colour);
+        self.events
+            .push(store, &detection.header, &self.events_entity, &text)
     }
 
     pub fn flush(&mut self, store: &Store, out: &mut Out<'_>) -> Result<(), RecordError> {
@@ -266,4 +289,13 @@ impl DetectionTracks {
             None => Ok(()),
         }
     }
+}
+
+/// The joints that felt a contact, as the end of a sentence.
+fn seen_by(contact: &Contact, joints: &[String]) -> String {
+    let joints = loaded_joints(contact.joints, joints);
+    if joints.is_empty() {
+        return String::new();
+    }
+    format!(", seen by {}", joints.join(", "))
 }

@@ -3,7 +3,8 @@
 //!
 //! By recording and joint, an entity each: `<recording>/<joint>/effort` (series measured, twin, corrected) and
 //! `<recording>/<joint>/residual` (before, after); by recording and event `<recording>/events/<number>`, told in
-//! `<recording>/log`; and `explanation`, the text. On the importer's timelines, and on `recording_time`, which begins
+//! `<recording>/log`; `robot/<link>`, the robot as it moves in the first recording, moved by `transforms`; and
+//! `explanation`, the text. On the importer's timelines, and on `recording_time`, which begins
 //! with each recording, so that all can be laid over each other.
 
 use std::path::Path;
@@ -17,20 +18,23 @@ use rerun::{
     Timeline,
 };
 
-use super::blueprint::explanation::messages;
 use tauscope_archive::whole_file::Existing;
+use tauscope_bus::{Header, MAX_JOINTS};
+use tauscope_dynamics::Model;
 
+use super::blueprint::explanation::messages;
 use super::file::PictureFile;
 use super::palette::{CORRECTED, EVENT, EXPECTED, MEASURED, QUIET};
+use super::robot::Robot;
 use super::store::{Store, entity, unserializable};
-use super::tracks::{LOG_TIME, PUBLISH_TIME, STAMP};
+use super::tracks::{LOG_TIME, PUBLISH_TIME, STAMP, Times};
 use crate::error::RecordError;
 
 /// Seconds from the start of each recording: the timeline that the picture opens on.
 pub(super) const RECORDING_TIME: &str = "recording_time";
 
 /// What the picture of an explanation shows.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Explanation {
     /// Name of the case.
     pub case: String,
@@ -42,6 +46,17 @@ pub struct Explanation {
     pub recordings: Vec<ExplainedRecording>,
     /// What acts for a while or from some time on.
     pub events: Vec<ExplainedEvent>,
+    /// The robot, where there is one.
+    pub robot: Option<ExplainedRobot>,
+}
+
+/// The robot in the picture of an explanation.
+#[derive(Debug, Clone)]
+pub struct ExplainedRobot {
+    /// The robot; its joints are those of each recording.
+    pub model: Model,
+    /// The links in or at which something was found.
+    pub found: Vec<String>,
 }
 
 /// A recording in the picture of an explanation.
@@ -64,6 +79,8 @@ pub struct ExplainedJoint {
     pub name: String,
     /// Time since the recording's first sample \[s\].
     pub time_s: Vec<f64>,
+    /// Position \[rad or m\].
+    pub position: Vec<f64>,
     /// Measured effort \[effort unit\].
     pub measured: Vec<f64>,
     /// Effort of the twin as it was.
@@ -102,7 +119,8 @@ pub fn write_explanation(path: &Path, explanation: &Explanation) -> Result<(), R
         id: StoreId::random(StoreKind::Recording, application.clone()),
     };
     file.write(&store.announcement())?;
-    for message in messages(explanation, &application)? {
+    let robot = explanation.draw_robot(&store, &mut file)?;
+    for message in messages(explanation, robot.as_ref(), &application)? {
         file.write(&message)?;
     }
     let text = TextDocument::new(explanation.text_markdown.as_str())
@@ -117,6 +135,48 @@ pub fn write_explanation(path: &Path, explanation: &Explanation) -> Result<(), R
         }
     }
     file.finish().map(drop)
+}
+
+impl Explanation {
+    /// The robot as it moves in the first recording.
+    fn draw_robot(
+        &self,
+        store: &Store,
+        file: &mut PictureFile,
+    ) -> Result<Option<Robot>, RecordError> {
+        let (Some(drawn), Some(recording)) = (&self.robot, self.recordings.first()) else {
+            return Ok(None);
+        };
+        let dof = drawn.model.dof();
+        if dof == 0 || dof > MAX_JOINTS || recording.joints.len() != dof {
+            return Ok(None);
+        }
+        let times = || Times::since(RECORDING_TIME, recording.start_ns);
+        let mut write = |message| file.write(&message);
+        let mut robot = Robot::new(&drawn.model, "", times, store, &mut write)?;
+        for link in &drawn.found {
+            robot.paint(link, EVENT);
+        }
+        for (row, time_s) in recording.joints[0].time_s.iter().enumerate() {
+            let mut position = [0.0; MAX_JOINTS];
+            let joints = recording.joints.iter();
+            for (to, joint) in position.iter_mut().zip(joints) {
+                *to = joint.position.get(row).copied().unwrap_or(f64::NAN);
+            }
+            if !(time_s.is_finite() && position.iter().all(|q| q.is_finite())) {
+                continue;
+            }
+            let stamp_ns = recording.start_ns.saturating_add(nanos(*time_s));
+            let header = Header {
+                stamp_ns,
+                received_ns: stamp_ns,
+                ..Header::default()
+            };
+            robot.pose(&header, &position);
+        }
+        robot.flush(store, &mut write)?;
+        Ok(Some(robot))
+    }
 }
 
 /// Where the text is.

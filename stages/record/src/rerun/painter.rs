@@ -7,7 +7,8 @@ use tauscope_bus::{Health, JointState, SampleKind, SampleRef, TwinState, flags};
 use super::detections::DetectionTracks;
 use super::robot::Robot;
 use super::store::{Out, Store, entity};
-use super::tracks::{RowTrack, ScalarTrack};
+use super::tracks::{RowTrack, ScalarTrack, Times};
+use crate::contacts::Told;
 use crate::error::RecordError;
 use crate::streams::{Stream, Streams};
 
@@ -86,7 +87,13 @@ impl Painter {
         let mut robots = Vec::new();
         for (index, cell) in streams.cells.iter().enumerate() {
             robots.push(match &cell.model {
-                Some(model) => Some(Robot::new(model, &streams.prefix(index), &store, out)?),
+                Some(model) => Some(Robot::new(
+                    model,
+                    &streams.prefix(index),
+                    Times::default,
+                    &store,
+                    out,
+                )?),
                 None => None,
             });
         }
@@ -121,12 +128,11 @@ impl Painter {
         matches!(&self.tracks[stream], Tracks::Detection(tracks) if tracks.has_content())
     }
 
-    /// Takes a sample of the stream number `index`.
+    /// Takes a sample of the stream number `index`, with what is known of its contact.
     pub fn accept(
         &mut self,
         streams: &Streams,
-        index: usize,
-        sample: SampleRef<'_>,
+        (index, sample, told): (usize, SampleRef<'_>, Told<'_>),
         out: &mut Out<'_>,
     ) -> Result<(), RecordError> {
         let cell = streams.all[index].cell;
@@ -144,6 +150,7 @@ impl Painter {
             (SampleRef::Detection(detection), Tracks::Detection(tracks)) => {
                 let joints = &streams.cells[cell].joint_names;
                 let of = (index, &streams.all[index]);
+                let detection = (detection, told);
                 tracks.accept(detection, of, start_ns, joints, robot, &self.store)?;
             }
             // `Streams::find` lets only samples of the announced type through.

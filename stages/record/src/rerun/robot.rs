@@ -55,10 +55,11 @@ struct DrawnLink {
 }
 
 impl Robot {
-    /// A robot, and the messages that give its links their shapes.
+    /// A robot, and the messages that give its links their shapes; `times` gives those of its tracks.
     pub fn new(
         model: &Model,
         prefix: &str,
+        times: impl Fn() -> Times,
         store: &Store,
         out: &mut Out<'_>,
     ) -> Result<Self, RecordError> {
@@ -79,7 +80,6 @@ impl Robot {
             } else {
                 OTHER_LINK
             };
-            let (times, shown) = Default::default();
             links.push(DrawnLink {
                 index,
                 name,
@@ -87,8 +87,8 @@ impl Robot {
                 entity,
                 shapes,
                 colour,
-                times,
-                shown,
+                times: times(),
+                shown: Vec::new(),
             });
         }
         let mut robot = Self {
@@ -96,7 +96,7 @@ impl Robot {
             data: Data::new(model),
             model: model.clone(),
             links,
-            poses: PoseTrack::new(entity(prefix, &["transforms"]), root),
+            poses: PoseTrack::new(entity(prefix, &["transforms"]), root, times()),
             posed_ns: None,
             coloured_ns: None,
             touched: BTreeMap::new(),
@@ -190,6 +190,13 @@ impl Robot {
             &mut self.data,
             &position_rad[..self.model.dof()],
         );
+    }
+
+    /// Gives a link a colour of its own for all times to come.
+    pub fn paint(&mut self, link: &str, colour: Rgba32) {
+        if let Some(link) = self.links.iter_mut().find(|drawn| drawn.name == link) {
+            link.colour = colour;
+        }
     }
 
     /// Colours the link that the detector of a stream takes to be touched.

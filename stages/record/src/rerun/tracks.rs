@@ -32,6 +32,8 @@ pub(super) fn time_point(header: &Header) -> TimePoint {
 pub(super) struct Times {
     received_ns: Vec<i64>,
     stamp_ns: Vec<i64>,
+    /// Name and zero of a timeline of its own that counts from the recording's start \[ns since the epoch\].
+    since: Option<(&'static str, i64)>,
 }
 
 impl Times {
@@ -40,15 +42,27 @@ impl Times {
         self.stamp_ns.push(header.stamp_ns);
     }
 
-    pub fn take(&mut self) -> [TimeColumn; 3] {
+    /// Times on a timeline that counts from `start_ns`, too.
+    pub fn since(name: &'static str, start_ns: i64) -> Self {
+        Self {
+            since: Some((name, start_ns)),
+            ..Self::default()
+        }
+    }
+
+    pub fn take(&mut self) -> Vec<TimeColumn> {
         let received = std::mem::take(&mut self.received_ns);
         let stamp = std::mem::take(&mut self.stamp_ns);
-        [
+        let since = self.since.map(|(name, start_ns)| {
+            TimeColumn::new_duration_nanos(name, stamp.iter().map(|ns| ns - start_ns))
+        });
+        let stamps = [
             (LOG_TIME, received),
             (PUBLISH_TIME, stamp.clone()),
             (STAMP, stamp),
-        ]
-        .map(|(name, ns)| TimeColumn::new_timestamp_nanos_since_epoch(name, ns))
+        ];
+        let stamps = stamps.map(|(name, ns)| TimeColumn::new_timestamp_nanos_since_epoch(name, ns));
+        stamps.into_iter().chain(since).collect()
     }
 }
 
@@ -112,11 +126,11 @@ pub(super) struct PoseTrack {
 }
 
 impl PoseTrack {
-    pub fn new(entity: EntityPath, parent_frame: String) -> Self {
+    pub fn new(entity: EntityPath, parent_frame: String, times: Times) -> Self {
         Self {
             entity,
             parent_frame,
-            times: Times::default(),
+            times,
             child_frames: Vec::new(),
             translations: Vec::new(),
             quaternions: Vec::new(),
@@ -217,11 +231,6 @@ impl ArrowTrack {
             .map_err(unserializable(&self.entity))?;
         out(store.columns(&self.entity, self.times.take(), columns)?)
     }
-}
-
-/// Length of a vector.
-pub(super) fn norm(vector: [f64; 3]) -> f64 {
-    vector.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
 /// The states that something passes through.

@@ -181,6 +181,7 @@ mod tests {
             t_end: Some(start_s + 1.0),
             explains: 0.3,
             over_rest: 9.0,
+            effort_rms: 1.0,
             evidence_nats: 40.0,
             equivalent_to: Vec::new(),
             sentence: String::new(),

@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use tauscope_dynamics::terms::PlaceKind;
+use tauscope_dynamics::terms::{Layer, PlaceKind};
 
 use crate::data::column::Column;
 use crate::fit::fitted::Fit;
+use crate::read::input::Input;
 use crate::report::schema::Undetectable;
 use crate::select::evidence::{LEAST_EVIDENCE, LEAST_SIZE};
 use crate::select::explanation::Explanation;
@@ -17,8 +18,11 @@ use crate::select::search::Search;
 pub fn undetectable(
     search: &Search<'_>,
     found: &Explanation,
+    input: &Input,
     joints: &[String],
 ) -> Vec<Undetectable> {
+    // Nobody knows what a joint's current is in N m; a body weighs the same in any unit.
+    let in_amperes = input.effort_unit == "A" && input.torque_constants_nm_per_a.is_none();
     let base = Base::new(search.problem, &found.fit, search.hypotheses.len());
     let mut all = Vec::new();
     for hypothesis in search.hypotheses {
@@ -61,6 +65,7 @@ pub fn undetectable(
             joint,
             link,
             smallest_findable: BTreeMap::from([(told_as.to_owned(), smallest)]),
+            in_amperes: in_amperes && hypothesis.effect.layer != Layer::Body,
         });
     }
     all

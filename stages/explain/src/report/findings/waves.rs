@@ -38,6 +38,7 @@ pub fn merge_waves(findings: &mut Vec<Finding>) {
                     first.intervals_95.insert((*renamed).to_owned(), interval);
                 }
             }
+            first.effort_rms = first.effort_rms.hypot(second.effort_rms);
             first.explains = (first.explains + second.explains).min(1.0);
             first.sentence = format!("{} {}", first.sentence, second.sentence);
         }

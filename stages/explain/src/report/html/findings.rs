@@ -5,16 +5,20 @@ use tauscope_dynamics::terms::UNKNOWN;
 
 use super::chart::{Axis, r};
 use super::effects::{effect_at, effect_meaning, effect_title, place};
-use super::number_format::{almost_all, number_text, parameter, percent, value, with_digits_of};
+use super::groups;
+use super::number_format::{
+    almost_all, effort_unit, number_text, parameter_in, percent, value, with_digits_of,
+};
 use super::proof;
 use crate::report::schema::{Finding, Report, Verdict};
-use crate::report::sentences::in_amperes;
 
 /// A card a finding, or that there is none.
 pub(super) fn cards(report: &Report) -> Option<Markup> {
     if report.verdict == Verdict::NotEvaluated && report.findings.is_empty() {
         return None;
     }
+    let groups = groups::of(report);
+    let unit = effort_unit(&report.effort_unit);
     Some(html! {
         @if report.findings.is_empty() {
             p {
@@ -25,13 +29,22 @@ pub(super) fn cards(report: &Report) -> Option<Markup> {
                 }
             }
         }
-        @for (index, finding) in report.findings.iter().enumerate() {
-            (card(index + 1, finding))
+        @if report.findings.len() > 1 {
+            p.lead { "By joint and link, that with the largest effort first." }
+        }
+        @for group in &groups {
+            @if report.findings.len() > 1 {
+                h3.group {
+                    (group.title())
+                    @if group.effort > 0.0 { span.muted { "up to " (number_text(group.effort)) " " (unit) " RMS" } }
+                }
+            }
+            @for finding in &group.findings { (card(finding, unit)) }
         }
     })
 }
 
-fn card(number: usize, finding: &Finding) -> Markup {
+fn card(finding: &Finding, effort_unit: &str) -> Markup {
     let kind = if finding.effect == UNKNOWN.name {
         "card unknown"
     } else {
@@ -41,7 +54,6 @@ fn card(number: usize, finding: &Finding) -> Markup {
     html! {
         article class=(kind) {
             h3 {
-                span.number { (number) }
                 (effect_title(&finding.effect))
                 @if let Some(place) = place(finding.joint.as_deref(), finding.link.as_deref()) {
                     span.place { (place) }
@@ -51,6 +63,9 @@ fn card(number: usize, finding: &Finding) -> Markup {
             p.sentence { (finding.sentence) }
             @if let Some(meaning) = effect_meaning(&finding.effect) { p.meaning { (meaning) } }
             p.figures {
+                @if finding.effort_rms > 0.0 {
+                    span { "Effort " b { (number_text(finding.effort_rms)) " " (effort_unit) } " RMS" }
+                }
                 span { "Explains " b { (percent(finding.explains)) } " of the mismatch " (meter(finding.explains)) }
                 span { "Confidence " b { (almost_all(finding.confidence)) } }
                 @if let Some(when) = when { span { (when) } }
@@ -128,13 +143,11 @@ fn parameters(finding: &Finding) -> Markup {
             thead { tr { th { "Parameter" } th.num { "Value" } th.num { "95 % interval" } th {} } }
             tbody {
                 @for (name, given) in parameters {
-                    @let (label, unit) = parameter(name);
-                    @let amperes = finding.in_amperes.then(|| in_amperes(unit));
-                    @let unit = amperes.as_deref().unwrap_or(unit);
+                    @let (label, unit) = parameter_in(name, finding.in_amperes);
                     @let interval = finding.intervals_95.get(name).copied();
                     tr {
                         th scope="row" { (label) }
-                        td.num { b { (value(given, interval)) } " " (unit) (degrees(given.as_f64(), unit)) }
+                        td.num { b { (value(given, interval)) } " " (unit) (degrees(given.as_f64(), &unit)) }
                         @if let Some([low, high]) = interval {
                             td.num { (with_digits_of(low, [low, high])) " to " (with_digits_of(high, [low, high])) }
                             td { (interval_picture(given.as_f64(), [low, high])) }

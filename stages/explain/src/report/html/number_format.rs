@@ -3,6 +3,8 @@
 use serde_json::Value;
 use tauscope_dynamics::terms::words::unit;
 
+use crate::report::sentences::in_amperes;
+
 /// `some_name` as `Some name`.
 pub(super) fn sentence_case(name: &str) -> String {
     let words = name.replace('_', " ");
@@ -40,6 +42,17 @@ pub(super) fn parameter(name: &str) -> (String, &'static str) {
         .or_else(second)
         .unwrap_or_else(|| (name.to_owned(), ""));
     (parameter_label(&stem), unit)
+}
+
+/// The same, where it is known whether efforts are in A.
+pub(super) fn parameter_in(name: &str, amperes: bool) -> (String, String) {
+    let (label, unit) = parameter(name);
+    let unit = if amperes {
+        in_amperes(unit)
+    } else {
+        unit.to_owned()
+    };
+    (label, unit)
 }
 
 fn parameter_label(stem: &str) -> String {

@@ -8,7 +8,7 @@ use crate::report::schema::{Located, Report, Verdict};
 
 /// How many rows of a table are shown at once.
 /// Tuned: by eye, for the layout of the page.
-const ROWS: usize = 10;
+const ROWS: usize = 6;
 
 /// A joint with an error below this many times its noise is at the noise floor.
 /// Tuned: by hand, on no recorded seeds; not swept.
@@ -17,6 +17,10 @@ const QUIET: f64 = 1.3;
 /// A joint with an error above this many times its noise still has a mismatch.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEFT: f64 = 3.0;
+
+/// A joint at less than this many times its noise shows that the estimate is too high.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const BELOW: f64 = 0.95;
 
 /// A joint's errors on held-out data \[effort unit\]; what is not known is not a number.
 #[derive(Debug, Clone)]
@@ -40,6 +44,11 @@ impl Row<'_> {
     /// Whether nothing but noise is left.
     pub fn is_quiet(&self) -> bool {
         self.over_noise() <= QUIET
+    }
+
+    /// Whether less than the estimated noise is left, by so much that it must be said.
+    pub fn is_below(&self) -> bool {
+        self.over_noise() < BELOW
     }
 
     /// Whether more than noise is left, by so much that it must be said.
@@ -88,20 +97,6 @@ pub(super) fn rows(report: &Report) -> Vec<Row<'_>> {
         .enumerate()
         .map(row)
         .collect()
-}
-
-/// Share of the squared error that is gone, each joint in units of its noise.
-pub(super) fn recovered(rows: &[Row<'_>]) -> f64 {
-    let (before, after) = rows
-        .iter()
-        .filter(|row| row.before.is_finite() && row.after.is_finite())
-        .fold((0.0, 0.0), |(before, after), row| {
-            (
-                before + row.before.powi(2) * row.weight(),
-                after + row.after.powi(2) * row.weight(),
-            )
-        });
-    1.0 - after / before
 }
 
 /// Whether all that was found happened in recordings that were fitted, so that held-out data cannot show it.
@@ -158,7 +153,7 @@ fn share_bar(share: f64) -> Markup {
         0.0
     };
     html! {
-        svg.bar viewBox="0 0 220 16" role="img" aria-label=(percent(share)) {
+        svg.bar viewBox="0 0 230 16" role="img" aria-label=(percent(share)) {
             rect.rail y="3" width="160" height="10" rx="2" {}
             rect.before y="3" width=(r(width)) height="10" rx="2" {}
             text x="168" y="13" { (percent(share)) }
@@ -197,13 +192,12 @@ pub(super) fn before_and_after(report: &Report) -> Option<Markup> {
     let left: Vec<String> = rows
         .iter()
         .filter(|row| row.is_left())
-        .map(|row| {
-            format!(
-                "{} at {} its noise floor",
-                row.joint,
-                times(row.over_noise())
-            )
-        })
+        .map(|row| format!("{} at {} its noise", row.joint, times(row.over_noise())))
+        .collect();
+    let below: Vec<&str> = rows
+        .iter()
+        .filter(|row| row.is_below())
+        .map(|row| row.joint)
         .collect();
     Some(html! {
         p.lead {
@@ -220,17 +214,23 @@ pub(super) fn before_and_after(report: &Report) -> Option<Markup> {
                 (left.join(", ")) "."
             }
         }
+        @if !below.is_empty() {
+            p.muted {
+                "Below the estimated noise: " (below.join(", ")) ". The estimate counts as noise whatever changes from sample to sample; "
+                "here a part of that follows the motion, or the held-out recordings are quieter than the fitted ones."
+            }
+        }
         p.legend {
             span.key.before { "Twin as it was" }
             span.key.after { "Corrected twin" }
-            span.key.noise { "Noise floor: no model can do better" }
+            span.key.noise { "Noise of the measurement, estimated" }
         }
         (bars(&rows, unit))
         table.proof {
             thead { tr {
                 th { "Joint" }
                 th.num { "Before [" (unit) "]" } th.num { "After [" (unit) "]" } th.num { "Change" }
-                th.num { "Noise floor [" (unit) "]" } th.num { "After, over noise" }
+                th.num { "Noise [" (unit) "]" } th.num { "After, over noise" }
             } }
             tbody {
                 @for row in &rows {
@@ -261,15 +261,6 @@ fn change(row: &Row<'_>) -> String {
 /// Two bars a joint. Where the joints are of very different strength each is drawn to its own scale, else the small
 /// ones could not be seen.
 fn bars(rows: &[Row<'_>], unit: &str) -> Markup {
-    /// Left end of the bars \[px\].
-    /// Tuned: by eye, for the layout of the page.
-    const START: f64 = 130.0;
-    /// Length of the longest bar \[px\].
-    /// Tuned: by eye, for the layout of the page.
-    const WIDTH: f64 = 640.0;
-    /// Height of a joint's row \[px\].
-    /// Tuned: by eye, for the layout of the page.
-    const PITCH: f64 = 46.0;
     let largest = |row: &Row<'_>| {
         [row.before, row.after, row.noise]
             .into_iter()
@@ -280,32 +271,41 @@ fn bars(rows: &[Row<'_>], unit: &str) -> Markup {
     let top = all.iter().copied().fold(0.0, f64::max);
     let least = all.iter().copied().filter(|v| *v > 0.0).fold(top, f64::min);
     let own_scale = top > 8.0 * least;
-    let height = PITCH * rows.len() as f64 + 6.0;
     let width = |value: f64, scale: f64| {
-        if value.is_finite() && scale > 0.0 {
-            value / scale * WIDTH
+        let share = if scale > 0.0 { value / scale } else { 0.0 };
+        let share = if share.is_finite() {
+            share.clamp(0.0, 1.0)
         } else {
             0.0
-        }
+        };
+        format!("--w:{}%", r(100.0 * share))
+    };
+    // Beyond the mark of the noise, where that is beyond the bar.
+    let beside = |value: f64, noise: f64, scale: f64| {
+        let beyond = if scale > 0.0 {
+            (noise - value) / scale
+        } else {
+            0.0
+        };
+        let beyond = if beyond > 0.0 { beyond.min(1.0) } else { 0.0 };
+        format!("margin-left:{}%", r(100.0 * beyond))
     };
     html! {
         figure {
-            svg.bars viewBox={ "0 0 960 " (r(height)) } role="img" aria-label="error on held-out data by joint, before and after" {
-                @for (j, (row, largest)) in rows.iter().zip(&all).enumerate() {
-                    @let y = PITCH * j as f64 + 4.0;
+            div.bars role="img" aria-label="error on held-out data by joint, before and after" {
+                @for (row, largest) in rows.iter().zip(&all) {
                     @let scale = if own_scale { *largest } else { top };
-                    @let noise_px = START + width(row.noise, scale);
-                    text.joint.end x=(r(START - 12.0)) y=(r(y + 23.0)) { (short(row.joint)) }
-                    @for (class, value, y) in [("before", row.before, y), ("after", row.after, y + 19.0)] {
-                        rect class=(class) x=(r(START)) y=(r(y)) width=(r(width(value, scale).max(1.0))) height="16" rx="2" {}
-                        @if value.is_finite() {
-                            text.amount x=(r(START + width(value, scale).max(width(row.noise, scale)) + 8.0)) y=(r(y + 12.5)) {
-                                (number_text(value)) " " (unit)
+                    div.name { (row.joint) }
+                    div.pair {
+                        @for (class, value) in [("before", row.before), ("after", row.after)] {
+                            div class={ "bar " (class) } {
+                                i style=(width(value, scale)) {}
+                                @if value.is_finite() {
+                                    span style=(beside(value, row.noise, scale)) { (number_text(value)) " " (unit) }
+                                }
                             }
                         }
-                    }
-                    @if row.noise.is_finite() {
-                        line.floor x1=(r(noise_px)) x2=(r(noise_px)) y1=(r(y - 2.0)) y2=(r(y + 37.0)) {}
+                        @if row.noise.is_finite() { div.floor { i style=(width(row.noise, scale)) {} } }
                     }
                 }
             }
@@ -314,16 +314,4 @@ fn bars(rows: &[Row<'_>], unit: &str) -> Markup {
             }
         }
     }
-}
-
-/// A name that fits beside a bar.
-fn short(name: &str) -> String {
-    /// Longest name that is shown whole \[characters\].
-    /// Tuned: by eye, for the layout of the page.
-    const LETTERS: usize = 17;
-    if name.chars().count() <= LETTERS {
-        return name.to_owned();
-    }
-    let kept: String = name.chars().take(LETTERS - 1).collect();
-    kept + "…"
 }

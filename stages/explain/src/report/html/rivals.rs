@@ -6,27 +6,31 @@ use maud::{Markup, html};
 
 use super::effects::{effect_at, effect_title, place};
 use super::findings::list;
-use super::number_format::{number_text, parameter};
+use super::number_format::{number_text, parameter_in};
 use super::proof;
 use crate::report::schema::{NextMotion, Rejected, Report, Undetectable, Verdict};
 
-/// How many rejected rivals are shown at once.
+/// How many rejected rivals the line names.
 /// Tuned: by eye, for the layout of the page.
-const ROWS: usize = 12;
+const NAMES: usize = 4;
 
-/// The rivals that were considered, and what spoke against them.
+/// The rivals that were considered in one line; what spoke against each is folded away.
 pub(super) fn rejected(report: &Report) -> Option<Markup> {
     if report.rejected.is_empty() {
         return None;
     }
-    let (first, rest) = report.rejected.split_at(report.rejected.len().min(ROWS));
+    let name =
+        |rival: &Rejected| effect_at(&rival.effect, rival.joint.as_deref(), rival.link.as_deref());
+    let first: Vec<String> = report.rejected.iter().take(NAMES).map(name).collect();
+    let more = report.rejected.len() - first.len();
     Some(html! {
-        (rejected_table(first))
-        @if !rest.is_empty() {
-            details {
-                summary { (rest.len()) " more" }
-                (rejected_table(rest))
+        details {
+            summary {
+                "Tried, and not named: " (first.join("; "))
+                @if more > 0 { "; and " (more) " more" }
+                " (why not?)"
             }
+            (rejected_table(&report.rejected))
         }
     })
 }
@@ -83,13 +87,18 @@ fn next_motion(motion: &NextMotion) -> Markup {
                         effect_at(&rival.effect, rival.joint.as_deref(), rival.link.as_deref())
                     }))) }
                 }
-                @if let Some(file) = &motion.trajectory {
-                    span {
-                        "Trajectory: "
-                        @if is_plain_name(file) { a href=(file) { (file) } } @else { code { (file) } }
-                    }
-                }
+                span { (trajectory(motion)) }
             }
+        }
+    }
+}
+
+/// The file with a motion, if there is one.
+pub(super) fn trajectory(motion: &NextMotion) -> Markup {
+    html! {
+        @if let Some(file) = &motion.trajectory {
+            "Trajectory: "
+            @if is_plain_name(file) { a href=(file) { (file) } } @else { code { (file) } }
         }
     }
 }
@@ -124,15 +133,15 @@ pub(super) fn undetectable(report: &Report) -> Option<Markup> {
 
 fn matrix(report: &Report, hidden: &[&Undetectable]) -> Markup {
     let mut seen = BTreeSet::new();
-    let rows: Vec<(&str, &str)> = hidden
+    let rows: Vec<(&str, &str, bool)> = hidden
         .iter()
         .flat_map(|hidden| {
             let parameters = hidden.smallest_findable.keys();
-            parameters.map(|name| (hidden.effect.as_str(), name.as_str()))
+            parameters.map(|name| (hidden.effect.as_str(), name.as_str(), hidden.in_amperes))
         })
         .filter(|row| seen.insert(*row))
         .collect();
-    let cell = |(effect, name): (&str, &str), joint: &String| {
+    let cell = |(effect, name, _): (&str, &str, bool), joint: &String| {
         hidden
             .iter()
             .filter(|hidden| hidden.effect == effect && hidden.joint.as_ref() == Some(joint))
@@ -144,7 +153,7 @@ fn matrix(report: &Report, hidden: &[&Undetectable]) -> Markup {
                 thead { tr { th { "Effect" } th { "Found from" } @for joint in &report.joints { th.num { (joint) } } } }
                 tbody {
                     @for row in rows {
-                        @let (label, unit) = parameter(row.1);
+                        @let (label, unit) = parameter_in(row.1, row.2);
                         tr {
                             th scope="row" { (effect_title(row.0)) }
                             td { (label) @if !unit.is_empty() { " [" (unit) "]" } }
@@ -170,7 +179,7 @@ fn others_table(hidden: &[&Undetectable]) -> Markup {
                         td { (place_or_all(hidden.joint.as_deref(), hidden.link.as_deref())) }
                         td {
                             @for (index, (name, least)) in hidden.smallest_findable.iter().enumerate() {
-                                @let (label, unit) = parameter(name);
+                                @let (label, unit) = parameter_in(name, hidden.in_amperes);
                                 @if index > 0 { ", " }
                                 (label) " " (number_text(*least)) " " (unit)
                             }

@@ -41,6 +41,7 @@ fn finding(effect: &str, sentence: &str) -> Finding {
         explains: 0.63,
         over_rest: 9.0,
         evidence_nats: 40.0,
+        effort_rms: 2.0,
         equivalent_to: Vec::new(),
         sentence: sentence.to_owned(),
     }
@@ -76,6 +77,7 @@ fn full() -> Report {
         joint: Some("joint2".to_owned()),
         link: None,
         smallest_findable: [("inertia_kgm2".to_owned(), 0.021)].into(),
+        in_amperes: false,
     }];
     report.next_motions = vec![NextMotion {
         separates: report.findings[1].equivalent_to.clone(),
@@ -105,8 +107,15 @@ fn picture(fill: impl Fn(usize) -> f64) -> RecordingPicture {
     }
 }
 
-fn provenance() -> BTreeMap<String, String> {
-    [("made by".to_owned(), "tauscope 0.1.0".to_owned())].into()
+fn around() -> Around<'static> {
+    Around {
+        provenance: [("made by".to_owned(), "tauscope 0.1.0".to_owned())].into(),
+        date: "2026-11-23".to_owned(),
+        robot: Some("arm.urdf".to_owned()),
+        fit: vec!["rec_00.mcap".to_owned()],
+        twin: Some("report/twin.yaml".to_owned()),
+        ..Around::default()
+    }
 }
 
 /// Every element that is opened is closed, in order.
@@ -134,7 +143,7 @@ fn assert_well_formed(page: &str) {
 fn all_that_was_found_is_on_the_page() {
     let report = full();
     let wavy = picture(|i| (i as f64).sin());
-    let page = page(&report, &[wavy], &provenance());
+    let page = page(&report, &[wavy], &around());
     assert_well_formed(&page);
     let texts = [
         "The summary.",
@@ -168,7 +177,7 @@ fn all_that_was_found_is_on_the_page() {
 
 #[test]
 fn it_needs_nothing_from_elsewhere() {
-    let page = page(&full(), &[picture(|i| i as f64)], &provenance());
+    let page = page(&full(), &[picture(|i| i as f64)], &around());
     for word in [
         "http:", "https:", "src=", "url(", "@import", "<script", "<link",
     ] {
@@ -200,8 +209,18 @@ fn text_is_escaped() {
     let mut drawn = picture(|i| i as f64);
     drawn.recording = nasty.to_owned();
     drawn.joints[0].joint = nasty.to_owned();
-    let provenance = [(nasty.to_owned(), nasty.to_owned())].into();
-    let page = page(&report, &[drawn], &provenance);
+    let around = Around {
+        provenance: [(nasty.to_owned(), nasty.to_owned())].into(),
+        date: nasty.to_owned(),
+        robot: Some(nasty.to_owned()),
+        start: Some(nasty.to_owned()),
+        fit: vec![nasty.to_owned()],
+        holdout: vec![nasty.to_owned()],
+        twin: Some(nasty.to_owned()),
+        corrected_robot: Some(nasty.to_owned()),
+        model: None,
+    };
+    let page = page(&report, &[drawn], &around);
     assert_well_formed(&page);
     assert!(!page.contains("<script"));
     assert!(!page.contains("href=\"javascript"));
@@ -216,7 +235,7 @@ fn every_verdict_makes_a_page() {
         (Verdict::UnknownRemains, "Something unknown remains"),
         (Verdict::NotEvaluated, "Not evaluated"),
     ] {
-        let page = page(&empty(verdict), &[], &BTreeMap::new());
+        let page = page(&empty(verdict), &[], &Around::default());
         assert_well_formed(&page);
         assert!(page.contains(text) && page.contains("The summary."));
     }
@@ -226,7 +245,7 @@ fn every_verdict_makes_a_page() {
     report.holdout_rms_before.clear();
     report.holdout_rms_after.clear();
     report.noise_floor.clear();
-    let page = page(&report, &[], &provenance());
+    let page = page(&report, &[], &around());
     assert_well_formed(&page);
     assert!(page.contains("Why: The joints stand still."));
 }
@@ -235,8 +254,8 @@ fn every_verdict_makes_a_page() {
 fn what_is_left_is_said_whatever_the_verdict() {
     let mut report = empty(Verdict::NothingMissing);
     report.holdout_rms_after = vec![0.1, 2.0];
-    let page = page(&report, &[], &provenance());
-    assert!(page.contains("joint2 at 20 × its noise floor"));
+    let page = page(&report, &[], &around());
+    assert!(page.contains("joint2 at 20 × its noise"));
     assert!(page.contains("Nothing was named."));
     assert!(!page.contains("is noise, as far as this data shows"));
 }
@@ -257,7 +276,7 @@ fn what_is_no_number_does_not_show() {
     report.undetectable[0].smallest_findable = [("inertia_kgm2".to_owned(), nan)].into();
     let gaps = picture(|i| if i % 7 == 0 { nan } else { i as f64 });
     for pictures in [vec![gaps], vec![picture(|_| nan)], vec![picture(|_| 0.0)]] {
-        let page = page(&report, &pictures, &BTreeMap::new());
+        let page = page(&report, &pictures, &Around::default());
         assert_well_formed(&page);
         assert!(!page.contains("NaN") && !page.contains("inf "));
     }
@@ -267,8 +286,111 @@ fn what_is_no_number_does_not_show() {
 fn numbers_of_a_joint_without_a_scale_are_in_amperes() {
     let mut report = full();
     report.findings.truncate(1);
-    assert!(page(&report, &[], &BTreeMap::new()).contains("</b> N m"));
+    assert!(page(&report, &[], &Around::default()).contains("</b> N m"));
     report.findings[0].in_amperes = true;
-    let page = page(&report, &[], &BTreeMap::new());
+    let page = page(&report, &[], &Around::default());
     assert!(page.contains("</b> A") && !page.contains("</b> N m"));
+}
+
+#[test]
+fn the_box_says_what_to_load_what_to_look_at_and_what_to_record() {
+    let mut report = full();
+    report.findings[0].parameters.clear();
+    let page = page(&report, &[], &around());
+    let (_, todo) = page.split_once("id=\"now\"").unwrap_or_default();
+    let (todo, _) = todo.split_once("</section>").unwrap_or_default();
+    for text in [
+        "twin: {model: report/twin.yaml}",
+        "It leaves 15 % of the error",
+        "Joint joint1: does its brake drag",
+        "Move slowly.",
+        "href=\"next_1.csv\"",
+        "2026-11-23",
+        "arm.urdf",
+        "rec_00.mcap",
+    ] {
+        assert!(todo.contains(text), "{text} is missing in {todo}");
+    }
+    report.holdout_rms_after = report.holdout_rms_before.clone();
+    let page = super::page(&report, &[], &around());
+    assert!(page.contains("Nothing yet. On recordings that were not fitted"));
+    assert!(!page.contains("twin: {model:"));
+    let none = empty(Verdict::NotEvaluated);
+    assert!(
+        super::page(&none, &[], &around())
+            .contains("There is no corrected twin without a verdict.")
+    );
+}
+
+#[test]
+fn the_place_with_the_largest_effort_comes_first_whatever_explains_most() {
+    let mut report = full();
+    report.findings[0].effort_rms = 0.27;
+    report.findings[1].joint = Some("joint2".to_owned());
+    report.findings[1].effort_rms = 12.7;
+    report.findings[1].explains = 0.02;
+    let page = page(&report, &[], &Around::default());
+    let at = |text: &str| page.find(text).unwrap_or(usize::MAX);
+    assert!(at("up to 12.7 N m") < at("up to 0.270 N m"));
+    assert!(at("The second sentence.") < at("The first sentence."));
+}
+
+#[test]
+fn the_verdicts_colour_follows_the_share_that_has_no_name() {
+    let mut report = full();
+    report.verdict = Verdict::UnknownRemains;
+    report.findings[1].effect = "unknown".to_owned();
+    for (explains, left, class, text) in [
+        (0.0, 0.1, "explained", "Explained but for less than 1 %"),
+        (0.05, 0.1, "nothing", "Explained but for 5 %"),
+        (0.4, 0.1, "unknown", "Something unknown remains: 40 %"),
+        (0.0, 0.8, "unknown", "Something unknown remains: 62 %"),
+    ] {
+        report.findings[1].explains = explains;
+        report.holdout_rms_after = vec![left, 0.1];
+        let page = page(&report, &[], &Around::default());
+        assert!(page.contains(&format!("verdict {class}")), "{class}");
+        assert!(page.contains(text), "{text}");
+    }
+}
+
+#[test]
+fn no_sentence_contradicts_another() {
+    let mut report = full();
+    // Below the noise as it is estimated.
+    report.holdout_rms_after = vec![0.05, 0.1];
+    report.findings[0].sentence =
+        "On recordings that were not fitted the error falls to 11 %.".to_owned();
+    let page = page(&report, &[], &Around::default());
+    assert!(!page.contains("no model can do better"));
+    assert!(page.contains("Below the estimated noise: joint1."));
+    // One measure of what is left: the root mean square.
+    assert!(!page.contains("squared error"));
+    assert!(page.contains("<dt>11 %</dt>"), "{page}");
+    // A joint in A has no N m, and its limits neither.
+    report.findings.truncate(1);
+    report.findings[0].in_amperes = true;
+    report.effort_unit = "A".to_owned();
+    report.undetectable[0].smallest_findable = [("coulomb_nm".to_owned(), 0.02)].into();
+    report.undetectable[0].in_amperes = true;
+    assert!(!super::page(&report, &[], &Around::default()).contains("N m"));
+}
+
+#[test]
+fn the_robot_is_drawn_with_what_was_found() {
+    let urdf = include_str!("../../../../../tests/data/demo_arm.urdf");
+    let Ok(model) = Model::from_urdf(urdf) else {
+        panic!("the bundled arm");
+    };
+    let mut report = full();
+    report.joints = model.joint_names().map(str::to_owned).collect();
+    let around = Around {
+        model: Some(&model),
+        ..Around::default()
+    };
+    let page = page(&report, &[], &around);
+    assert_well_formed(&page);
+    assert_eq!(page.matches("<circle class=\"joint\"").count(), 6);
+    assert_eq!(page.matches("<circle class=\"joint found\"").count(), 1);
+    assert!(page.contains("joint1 · 2.00 N m"));
 }

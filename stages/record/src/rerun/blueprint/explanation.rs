@@ -4,7 +4,8 @@
 use rerun::ApplicationId;
 use rerun::blueprint::{
     Blueprint, BlueprintActivation, BlueprintPanel, ContainerLike, Horizontal, SelectionPanel,
-    StateTimelineView, Tabs, TextDocumentView, TextLogView, TimePanel, TimeSeriesView, Vertical,
+    Spatial3DView, StateTimelineView, Tabs, TextDocumentView, TextLogView, TimePanel,
+    TimeSeriesView, Vertical,
 };
 use rerun::external::re_sdk_types::blueprint::components::PanelState;
 use rerun::log::LogMsg;
@@ -15,14 +16,16 @@ use crate::rerun::explanation::{
     ExplainedRecording, Explanation, RECORDING_TIME, effort_entity, event_entity, events_of,
     log_entity, residual_entity, text_entity,
 };
+use crate::rerun::robot::Robot;
 
 /// The layout's messages.
 pub(in crate::rerun) fn messages(
     explanation: &Explanation,
+    robot: Option<&Robot>,
     application: &ApplicationId,
 ) -> Result<Vec<LogMsg>, RecordError> {
     let mut properties = Properties::default();
-    let left = left(explanation, &mut properties);
+    let left = left(explanation, robot, &mut properties);
     let mut tabs: Vec<ContainerLike> = explanation
         .recordings
         .iter()
@@ -53,23 +56,46 @@ pub(in crate::rerun) fn messages(
     properties.messages(&blueprint, application, BlueprintActivation::default())
 }
 
-/// The text, and below it the log of what happened if anything did.
-fn left(explanation: &Explanation, properties: &mut Properties) -> ContainerLike {
+/// The robot, below it the text, and the log of what happened if anything did.
+fn left(
+    explanation: &Explanation,
+    robot: Option<&Robot>,
+    properties: &mut Properties,
+) -> ContainerLike {
+    let mut views = Vec::<ContainerLike>::new();
+    let mut shares = Vec::new();
+    if let Some(robot) = robot {
+        let name = explanation
+            .recordings
+            .first()
+            .map_or("", |first| &first.name);
+        let view = Spatial3DView::new(format!("Robot in {name}"))
+            .with_origin(robot.entity().clone())
+            .with_contents([format!("{}/**", robot.entity())])
+            .into();
+        properties.look_at(&view, robot.view_point());
+        views.push(view);
+        shares.push(2.4);
+    }
     let text = TextDocumentView::new("Verdict")
         .with_contents([text_entity().to_string()])
         .into();
-    if explanation.events.is_empty() {
-        return text;
+    views.push(text);
+    shares.push(3.0);
+    if !explanation.events.is_empty() {
+        let logs = explanation
+            .recordings
+            .iter()
+            .map(|recording| log_entity(&recording.name).to_string());
+        let log = TextLogView::new("When").with_contents(logs).into();
+        properties.events(&log);
+        views.push(log);
+        shares.push(1.0);
     }
-    let logs = explanation
-        .recordings
-        .iter()
-        .map(|recording| log_entity(&recording.name).to_string());
-    let log = TextLogView::new("When").with_contents(logs).into();
-    properties.events(&log);
-    Vertical::new([text, log])
-        .with_row_shares([3.0, 1.0])
-        .into()
+    if views.len() == 1 {
+        return views.remove(0);
+    }
+    Vertical::new(views).with_row_shares(shares).into()
 }
 
 /// A recording: a row a joint, and a band for what happened.

@@ -1,0 +1,263 @@
+//! Commands of people and controllers to a running pipeline.
+//!
+//! A command is asked for as a [`Request`] (JSON). The source of the cell checks it, gives it to the next joint state
+//! as a [`Command`] and answers with that joint state's stamp: from there on it holds. So a command stands in the one
+//! order that all samples have, is archived with its sample, and holds from the same sample in a replay.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::sample::{Command, Name, Verb};
+
+mod ask;
+
+pub use ask::{AskError, ask};
+
+/// The longest lease of a mute \[s\].
+pub const LONGEST_MUTE_S: f64 = 60.0;
+/// The heaviest payload that is believed \[kg\].
+const HEAVIEST_KG: f64 = 10_000.0;
+/// The farthest centre of mass that is believed \[m\].
+const FARTHEST_M: f64 = 100.0;
+
+/// The key expression under which the source of `cell` takes requests.
+pub fn key(cell: &str) -> String {
+    format!("{cell}/commands")
+}
+
+/// A command as it is asked for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "verb", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Request {
+    /// Somebody has seen the alarm: a latched collision is released once it has ended.
+    Acknowledge,
+    /// Alarms raise no stop for so long. The lease ends by itself; 0 ends it at once.
+    Mute {
+        /// From the sample that takes the command \[s\].
+        #[schemars(range(min = 0.0, max = LONGEST_MUTE_S))]
+        seconds: f64,
+    },
+    /// The tool that is attached from now on, as a point mass; 0 kg for none.
+    Payload {
+        /// Mass \[kg\].
+        mass_kg: f64,
+        /// Centre of mass in the tool link's frame \[m\].
+        #[serde(default)]
+        com_m: [f64; 3],
+    },
+    /// Detectors that learn while they run begin to learn anew.
+    Learn,
+    /// A note in the archive.
+    Label {
+        /// At most 48 bytes of UTF-8.
+        text: String,
+    },
+}
+
+/// What a source says to a [`Request`].
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "answer", rename_all = "snake_case")]
+pub enum Answer {
+    /// It holds.
+    Taken {
+        /// Stamp of the first sample for which it holds \[ns since the epoch\].
+        stamp_ns: i64,
+    },
+    /// It does not, and nothing has changed.
+    Refused {
+        /// Why, and what to do.
+        reason: String,
+    },
+}
+
+/// Why a request is refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Refusal {
+    /// Not a request.
+    #[error("this is no command: {0}")]
+    NotARequest(String),
+    /// A lease that is none, or too long.
+    #[error("a mute lasts 0 to {LONGEST_MUTE_S} s, not {0} s; ask again when it has ended")]
+    Lease(f64),
+    /// A mass that no arm carries.
+    #[error("a payload has a mass of 0 to {HEAVIEST_KG} kg, not {0} kg")]
+    Mass(f64),
+    /// A centre of mass that is nowhere near.
+    #[error("a centre of mass is within {FARTHEST_M} m of the tool link")]
+    CentreOfMass,
+    /// A label without text, or with too much of it.
+    #[error("a label has 1 to {limit} bytes of text, no line breaks, not these {found}", limit = Name::CAPACITY)]
+    Label {
+        /// How many bytes it has.
+        found: usize,
+    },
+}
+
+impl Request {
+    /// The command of this verb with these arguments, as [`Command::arguments`] wrote them.
+    ///
+    /// # Errors
+    /// If there is no such verb, or an argument is missing or wrong.
+    pub fn archived<'a>(
+        verb: &str,
+        argument: impl Fn(&str) -> Option<&'a str>,
+    ) -> Result<Command, Refusal> {
+        let wrong = |name: &str| Refusal::NotARequest(format!("`{verb}` has no sound `{name}`"));
+        let number = |name: &str| {
+            let value = argument(name).and_then(|text| text.parse().ok());
+            value.ok_or_else(|| wrong(name))
+        };
+        let known = Verb::ALL.iter().find(|each| each.as_str() == verb);
+        let request = match known.ok_or_else(|| Refusal::NotARequest(format!("`{verb}`")))? {
+            Verb::Acknowledge => Request::Acknowledge,
+            Verb::Mute => Request::Mute {
+                seconds: number("seconds")?,
+            },
+            Verb::Payload => {
+                let text = argument("com_m").ok_or_else(|| wrong("com_m"))?;
+                let com_m: Result<Vec<f64>, _> = text.split(' ').map(str::parse).collect();
+                let com_m = com_m.ok().and_then(|com_m| com_m.try_into().ok());
+                Request::Payload {
+                    mass_kg: number("mass_kg")?,
+                    com_m: com_m.ok_or_else(|| wrong("com_m"))?,
+                }
+            }
+            Verb::Learn => Request::Learn,
+            Verb::Label => Request::Label {
+                text: argument("text").ok_or_else(|| wrong("text"))?.to_owned(),
+            },
+        };
+        request.command()
+    }
+
+    /// The request in `json`.
+    ///
+    /// # Errors
+    /// If it is none.
+    pub fn from_json(json: &[u8]) -> Result<Self, Refusal> {
+        serde_json::from_slice(json).map_err(|error| Refusal::NotARequest(error.to_string()))
+    }
+
+    /// The command that it asks for.
+    ///
+    /// # Errors
+    /// If it asks for something that cannot be.
+    pub fn command(&self) -> Result<Command, Refusal> {
+        Ok(match self {
+            Self::Acknowledge => Command::of(Verb::Acknowledge),
+            Self::Mute { seconds } if !(0.0..=LONGEST_MUTE_S).contains(seconds) => {
+                return Err(Refusal::Lease(*seconds));
+            }
+            Self::Mute { seconds } => Command {
+                value: *seconds,
+                ..Command::of(Verb::Mute)
+            },
+            Self::Payload { mass_kg, .. } if !(0.0..=HEAVIEST_KG).contains(mass_kg) => {
+                return Err(Refusal::Mass(*mass_kg));
+            }
+            Self::Payload { com_m, .. }
+                if com_m.iter().any(|x| x.abs() > FARTHEST_M || x.is_nan()) =>
+            {
+                return Err(Refusal::CentreOfMass);
+            }
+            Self::Payload { mass_kg, com_m } => Command {
+                value: *mass_kg,
+                com_m: *com_m,
+                ..Command::of(Verb::Payload)
+            },
+            Self::Learn => Command::of(Verb::Learn),
+            Self::Label { text } if !is_label(text) => {
+                return Err(Refusal::Label { found: text.len() });
+            }
+            Self::Label { text } => Command {
+                text: Name::new(text),
+                ..Command::of(Verb::Label)
+            },
+        })
+    }
+}
+
+fn is_label(text: &str) -> bool {
+    (1..=Name::CAPACITY).contains(&text.len()) && !text.chars().any(char::is_control)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn taken(json: &str) -> Result<Command, String> {
+        Request::from_json(json.as_bytes())
+            .and_then(|request| request.command())
+            .map_err(|refusal| refusal.to_string())
+    }
+
+    #[test]
+    fn what_is_asked_for_is_what_is_told() {
+        let command = taken(r#"{"verb": "acknowledge"}"#).unwrap();
+        assert_eq!(command.verb(), Some(Verb::Acknowledge));
+        let command = taken(r#"{"verb": "mute", "seconds": 60}"#).unwrap();
+        assert_eq!((command.verb(), command.value), (Some(Verb::Mute), 60.0));
+        let command = taken(r#"{"verb": "payload", "mass_kg": 1.5}"#).unwrap();
+        assert_eq!((command.value, command.com_m), (1.5, [0.0; 3]));
+        let command = taken(r#"{"verb": "label", "text": "new gripper"}"#).unwrap();
+        assert_eq!(command.text.as_str(), "new gripper");
+        assert_eq!(Command::default().verb(), None);
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_with_the_reason() {
+        for (json, reason) in [
+            (
+                r#"{"verb": "stop"}"#,
+                "unknown variant `stop`, expected one of `acknowledge`",
+            ),
+            (r#"{"verb": "mute"}"#, "missing field `seconds`"),
+            (
+                r#"{"verb": "mute", "seconds": 61}"#,
+                "a mute lasts 0 to 60 s, not 61 s",
+            ),
+            (
+                r#"{"verb": "mute", "seconds": -1}"#,
+                "a mute lasts 0 to 60 s, not -1 s",
+            ),
+            (r#"{"verb": "payload", "mass_kg": -2}"#, "not -2 kg"),
+            (
+                r#"{"verb": "payload", "mass_kg": 2, "com_m": [0, 0, 1e9]}"#,
+                "within 100 m",
+            ),
+            (
+                r#"{"verb": "label", "text": ""}"#,
+                "1 to 48 bytes of text, no line breaks, not these 0",
+            ),
+            ("free", "this is no command"),
+        ] {
+            let refusal = taken(json).unwrap_err();
+            assert!(refusal.contains(reason), "{json}: {refusal}");
+        }
+    }
+
+    #[test]
+    fn an_archived_command_is_the_same() {
+        for request in [
+            Request::Acknowledge,
+            Request::Mute { seconds: 0.1 + 0.2 },
+            Request::Payload {
+                mass_kg: 1.0 / 3.0,
+                com_m: [1e-17, -0.1, 2.5],
+            },
+            Request::Learn,
+            Request::Label {
+                text: "ä b".to_owned(),
+            },
+        ] {
+            let command = request.command().unwrap();
+            let arguments = command.arguments();
+            let find = |name: &str| {
+                let found = arguments.iter().find(|(key, _)| *key == name);
+                found.map(|(_, value)| value.as_str())
+            };
+            let verb = command.verb().unwrap();
+            assert_eq!(Request::archived(verb.as_str(), find), Ok(command));
+        }
+    }
+}

@@ -1,0 +1,231 @@
+//! A contact, from its first sample to its last: what is told of it once it is over.
+//!
+//! At the onset little of the force is there yet, and the link is a guess. What terminal, archive, picture and replay
+//! tell of a contact comes from here, so that all of them tell the same.
+
+use std::fmt;
+
+use crate::sample::{Detection, EventKind, Name, flags};
+
+/// A contact, or a change of the arm, as a detector tells it.
+///
+/// Kind, link and force are those of the sample with the largest score, for there the contact is told best: the largest
+/// of many estimates of a force would be too large.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contact {
+    /// Its kind: the detector's state, e.g. `contact`, `collision`.
+    pub kind: Name,
+    /// The touched link; empty where not estimated.
+    pub link: Name,
+    /// The joints that detected it: bit j for joint j.
+    pub joints: u32,
+    /// Estimated beginning \[ns since the epoch\].
+    pub contact_ns: i64,
+    /// Stamp of the sample that raised the alarm \[ns since the epoch\].
+    pub onset_ns: i64,
+    /// Stamp of the sample that ended it, or of the newest while it lasts \[ns since the epoch\].
+    pub end_ns: i64,
+    /// The newest sample whose score reached the threshold, if one did \[ns since the epoch\].
+    last_high_ns: Option<i64>,
+    /// The largest score.
+    pub peak_score: f64,
+    /// Size of a change of the arm ([`flags::CHANGE`]), as it was told at its onset.
+    pub size: Option<f64>,
+    /// Where the score is largest, as far as a force was estimated.
+    force: Option<Force>,
+}
+
+/// A force on the robot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Force {
+    /// World frame \[N\].
+    pub force_n: [f64; 3],
+    /// Where it is taken to act, world frame \[m\].
+    pub point_m: [f64; 3],
+}
+
+impl Force {
+    /// How strong it is \[N\].
+    pub fn norm_n(&self) -> f64 {
+        self.force_n.iter().map(|f| f * f).sum::<f64>().sqrt()
+    }
+
+    /// Unit vector, world frame; zeros for no force.
+    pub fn direction(&self) -> [f64; 3] {
+        let norm_n = self.norm_n();
+        self.force_n
+            .map(|f| if norm_n > 0.0 { f / norm_n } else { 0.0 })
+    }
+}
+
+impl Contact {
+    fn begins(detection: &Detection) -> Self {
+        let mut contact = Self {
+            kind: detection.state,
+            link: detection.link,
+            joints: 0,
+            contact_ns: detection.contact_ns,
+            onset_ns: detection.header.stamp_ns,
+            end_ns: detection.header.stamp_ns,
+            last_high_ns: None,
+            peak_score: f64::NEG_INFINITY,
+            size: detection
+                .header
+                .has(flags::CHANGE)
+                .then_some(detection.size),
+            force: None,
+        };
+        contact.goes_on(detection);
+        contact
+    }
+
+    fn goes_on(&mut self, detection: &Detection) {
+        self.end_ns = detection.header.stamp_ns;
+        if detection.score >= detection.threshold {
+            self.last_high_ns = Some(self.end_ns);
+        }
+        let is_known = !self.link.as_str().is_empty();
+        if is_known && detection.score < self.peak_score {
+            return;
+        }
+        self.peak_score = self.peak_score.max(detection.score);
+        self.kind = detection.state;
+        self.joints |= detection.joints;
+        if !detection.link.as_str().is_empty() {
+            self.link = detection.link;
+        }
+        if detection.header.has(flags::FORCE) {
+            self.force = Some(Force {
+                force_n: detection.force_n,
+                point_m: detection.point_m,
+            });
+        }
+    }
+
+    /// The force at the peak of the contact, as far as one was estimated.
+    pub fn peak(&self) -> Option<&Force> {
+        self.force.as_ref()
+    }
+
+    /// From the sample that raised the alarm to the last one whose score reached the threshold \[s\]. Both come late by
+    /// about as much; the estimated beginning is less exact, and the alarm is held for a while.
+    pub fn duration_s(&self) -> f64 {
+        let last_ns = self.last_high_ns.unwrap_or(self.end_ns);
+        last_ns.saturating_sub(self.onset_ns).max(0) as f64 * 1e-9
+    }
+}
+
+/// Where and how hard, in the words that every output has: `24 N at link5`.
+impl fmt::Display for Contact {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.peak(), self.link.as_str()) {
+            (Some(peak), "") => write!(f, "{:.0} N", peak.norm_n()),
+            (Some(peak), link) => write!(f, "{:.0} N at {link}", peak.norm_n()),
+            (None, "") => f.write_str("place unknown"),
+            (None, link) => write!(f, "at {link}"),
+        }
+    }
+}
+
+/// Follows a detector's contacts. Holds one contact and allocates nothing.
+#[derive(Debug, Clone, Default)]
+pub struct ContactFollower {
+    open: Option<Contact>,
+}
+
+impl ContactFollower {
+    /// Takes the next sample. Gives the contact that ends there, if one does: at its offset, or where the next one
+    /// begins at once.
+    pub fn push(&mut self, detection: &Detection) -> Option<Contact> {
+        let stamp_ns = detection.header.stamp_ns;
+        let end = |mut contact: Contact| {
+            contact.end_ns = stamp_ns;
+            contact
+        };
+        match (detection.event(), &mut self.open) {
+            (EventKind::Onset, open) => open.replace(Contact::begins(detection)).map(end),
+            (EventKind::Offset, open) => open.take().map(end),
+            (EventKind::None, Some(contact)) => {
+                contact.goes_on(detection);
+                None
+            }
+            (EventKind::None, None) => None,
+        }
+    }
+
+    /// The contact that lasts, as far as it is known by now.
+    pub fn open(&self) -> Option<&Contact> {
+        self.open.as_ref()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(t: i64, event: u32, score: f64, link: &str, newton: f64) -> Detection {
+        let mut detection = Detection {
+            state: "contact".into(),
+            link: link.into(),
+            score,
+            event,
+            contact_ns: 5,
+            joints: 1 << (t % 3),
+            force_n: [0.0, newton, 0.0],
+            ..Detection::default()
+        };
+        detection.header.stamp_ns = t;
+        detection.header.flags = flags::ALARM | flags::FORCE;
+        detection
+    }
+
+    #[test]
+    fn the_end_tells_link_and_force_at_the_peak_of_the_contact_not_the_onsets_guess() {
+        let mut contacts = ContactFollower::default();
+        assert!(contacts.push(&Detection::default()).is_none());
+        contacts.push(&sample(10, Detection::ONSET, 9.0, "link2", 4.0));
+        assert_eq!(contacts.open().unwrap().to_string(), "4 N at link2");
+        // A wild guess at another link is none of the peak.
+        contacts.push(&sample(20, 0, 20.0, "link1", 300.0));
+        contacts.push(&sample(30, 0, 80.0, "link5", 24.0));
+        contacts.push(&sample(40, 0, 70.0, "link5", 25.0));
+        // It swings back.
+        contacts.push(&sample(45, 0, 12.0, "link5", -60.0));
+        let end = sample(50, Detection::OFFSET, 1.0, "", 0.0);
+        let ended = contacts.push(&end).unwrap();
+        assert_eq!(ended.to_string(), "24 N at link5");
+        assert!((ended.peak().unwrap().direction()[1] - 1.0).abs() < 1e-12);
+        assert_eq!(
+            (ended.contact_ns, ended.onset_ns, ended.end_ns),
+            (5, 10, 50)
+        );
+        // The alarm was held until 50.
+        assert!((ended.duration_s() - 35e-9).abs() < 1e-15);
+        assert!(contacts.open().is_none());
+        assert!(contacts.push(&end).is_none());
+    }
+
+    #[test]
+    fn a_contact_ends_where_the_next_one_begins() {
+        let mut contacts = ContactFollower::default();
+        contacts.push(&sample(10, Detection::ONSET, 9.0, "link2", 4.0));
+        let next = sample(20, Detection::ONSET, 9.0, "link3", 6.0);
+        let ended = contacts.push(&next).unwrap();
+        assert_eq!(
+            (ended.end_ns, ended.to_string().as_str()),
+            (20, "4 N at link2")
+        );
+        assert_eq!(contacts.open().unwrap().to_string(), "6 N at link3");
+    }
+
+    #[test]
+    fn a_detector_that_tells_no_place_has_contacts_too() {
+        let mut contacts = ContactFollower::default();
+        let mut onset = sample(10, Detection::ONSET, 9.0, "", 0.0);
+        onset.header.flags = flags::ALARM;
+        contacts.push(&onset);
+        let contact = contacts.open().unwrap();
+        assert!(contact.peak().is_none());
+        assert_eq!(contact.to_string(), "place unknown");
+    }
+}

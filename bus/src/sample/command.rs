@@ -1,0 +1,89 @@
+//! What somebody told the pipeline, as it travels with a joint state.
+
+use bytemuck::{Pod, Zeroable};
+use iceoryx2::prelude::ZeroCopySend;
+
+use super::Name;
+
+macro_rules! verbs {
+    ($($(#[$doc:meta])* $verb:ident = $number:literal, $name:ident;)+) => {
+        /// What a [`Command`] tells to do.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        #[repr(u32)]
+        pub enum Verb {
+            $($(#[$doc])* $verb = $number,)+
+        }
+
+        impl Verb {
+            /// All there are.
+            pub const ALL: &[Self] = &[$(Self::$verb),+];
+
+            /// In a word, as in a [`Request`](crate::command::Request).
+            pub fn as_str(self) -> &'static str {
+                match self {
+                    $(Self::$verb => stringify!($name),)+
+                }
+            }
+        }
+    };
+}
+verbs! {
+    /// Somebody has seen the alarm.
+    Acknowledge = 1, acknowledge;
+    /// Alarms raise no stop for so long.
+    Mute = 2, mute;
+    /// Another tool is attached.
+    Payload = 3, payload;
+    /// Detectors learn anew.
+    Learn = 4, learn;
+    /// A note in the archive.
+    Label = 5, label;
+}
+
+/// A command as it travels, in the joint state from which it holds. All zeros: none.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable, ZeroCopySend)]
+pub struct Command {
+    /// A [`Verb`] as its number; 0 for no command. Read it with [`Command::verb`].
+    pub verb: u32,
+    /// Zero.
+    pub reserved: u32,
+    /// Seconds of a mute \[s\], mass of a payload \[kg\].
+    pub value: f64,
+    /// Centre of mass of a payload in the tool link's frame \[m\].
+    pub com_m: [f64; 3],
+    /// Text of a label.
+    pub text: Name,
+}
+
+impl Command {
+    /// What it tells to do; `None` for no command, or one of a later version.
+    pub fn verb(&self) -> Option<Verb> {
+        let mut all = Verb::ALL.iter().copied();
+        all.find(|verb| *verb as u32 == self.verb)
+    }
+
+    /// A command without arguments.
+    pub(crate) fn of(verb: Verb) -> Self {
+        Self {
+            verb: verb as u32,
+            ..Self::default()
+        }
+    }
+
+    /// The numbers and texts that go with the verb, by name: what an archive holds. Numbers read back are the same.
+    pub fn arguments(&self) -> Vec<(&'static str, String)> {
+        match self.verb() {
+            Some(Verb::Mute) => vec![("seconds", self.value.to_string())],
+            Some(Verb::Payload) => {
+                let [x, y, z] = self.com_m;
+                vec![
+                    ("mass_kg", self.value.to_string()),
+                    ("com_m", format!("{x} {y} {z}")),
+                ]
+            }
+            Some(Verb::Label) => vec![("text", self.text.to_string())],
+            Some(Verb::Acknowledge | Verb::Learn) | None => Vec::new(),
+        }
+    }
+}

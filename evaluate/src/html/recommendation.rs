@@ -1,0 +1,151 @@
+//! Which detector to take, and why; and which of them is in alarm where nothing touches the robot.
+
+use maud::{Markup, html};
+
+use crate::judged::Judged;
+use crate::metrics::Numbers;
+
+/// From this share of the contact-free time on an alarm that stays on is no alarm any more.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const ALWAYS_ON: f64 = 0.05;
+/// From this share on it must be said.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const OFTEN_ON: f64 = 0.01;
+
+/// The detector with the fewest mistakes: contacts that it missed and false alarms together, one as bad as the other; of
+/// equals the one that is in alarm for less time, then the faster one. One that is in alarm for long is none, unless all
+/// are. `None` where nothing was scored or no test recording holds a contact.
+pub(super) fn best<'a, 'b>(judged: &'b [Judged<'a>]) -> Option<&'b Judged<'a>> {
+    let of = |judged: &Judged<'_>| rank(judged.first());
+    let scored = judged.iter().filter(|j| !j.scored.is_empty());
+    scored
+        .filter(|judged| judged.first().events > 0)
+        .min_by(|a, b| {
+            of(a)
+                .partial_cmp(&of(b))
+                .unwrap_or(std::cmp::Ordering::Equal)
+        })
+}
+
+/// What detectors are ordered by; the smallest is the best.
+fn rank(numbers: &Numbers) -> (bool, usize, f64, f64) {
+    let share = numbers.free_share_in_alarm;
+    let delay = numbers.delay_s.p50;
+    (
+        share > ALWAYS_ON,
+        mistakes(numbers),
+        if share.is_finite() { share } else { 0.0 },
+        if delay.is_finite() { delay } else { f64::MAX },
+    )
+}
+
+fn mistakes(numbers: &Numbers) -> usize {
+    numbers.events - numbers.found + numbers.false_alarms
+}
+
+/// The recommendation in a sentence; every number in it is of the one detector.
+pub(super) fn sentence(judged: &[Judged<'_>]) -> String {
+    let Some(best) = best(judged) else {
+        return format!(
+            "{} detectors ran; none can be recommended, because no labelled test recording holds a contact",
+            judged.len()
+        );
+    };
+    let numbers = best.first();
+    let reason = if judged.len() == 1 {
+        "It is the only one that ran:".to_owned()
+    } else if rank(numbers).0 {
+        "All are in alarm for much of the time without contact; it makes the fewest mistakes of them:".to_owned()
+    } else {
+        let alike = |other: &&Judged<'_>| {
+            let other = other.first();
+            mistakes(other) == mistakes(numbers) && other.free_share_in_alarm <= ALWAYS_ON
+        };
+        let alike = judged.iter().filter(alike).count() - 1;
+        match alike {
+            0 => "It makes the fewest mistakes:".to_owned(),
+            1 => "It makes the fewest mistakes, as few as one other, and is in alarm for less time or faster:".to_owned(),
+            _ => format!(
+                "It makes the fewest mistakes, as few as {alike} others, and is in alarm for the least time or the fastest:"
+            ),
+        }
+    };
+    format!("Take {}. {reason} {}.", best.label, said_of(numbers))
+}
+
+fn said_of(numbers: &Numbers) -> String {
+    let delay_ms = 1e3 * numbers.delay_s.p50;
+    let delay = if delay_ms.is_finite() {
+        format!(", half of them within {delay_ms:.0} ms")
+    } else {
+        String::new()
+    };
+    format!(
+        "it finds {} of {} contacts{delay}, with {}",
+        numbers.found,
+        numbers.events,
+        false_alarms(numbers)
+    )
+}
+
+/// How many false alarms, in which time, and what that allows to be said.
+pub(super) fn false_alarms(numbers: &Numbers) -> String {
+    let count = match numbers.false_alarms {
+        0 => "no false alarm".to_owned(),
+        1 => "1 false alarm".to_owned(),
+        n => format!("{n} false alarms"),
+    };
+    let bound = numbers.false_alarms_per_hour_bound;
+    if !bound.is_finite() {
+        return count;
+    }
+    format!(
+        "{count} in {:.1} min without contact (under {} an hour at 95 %)",
+        60.0 * numbers.free_hours,
+        bound_text(bound)
+    )
+}
+
+/// Rounded up, so that it stays a bound: `36`, `0.4`.
+pub(super) fn bound_text(per_hour: f64) -> String {
+    if per_hour >= 10.0 {
+        format!("{:.0}", per_hour.ceil())
+    } else {
+        format!("{:.1}", (10.0 * per_hour).ceil() / 10.0)
+    }
+}
+
+/// Detectors that are in alarm for long where nothing touches the robot: an alarm that never ends is one false alarm.
+pub(super) fn flagged(judged: &[Judged<'_>]) -> Option<Markup> {
+    let often = |judged: &&Judged<'_>| judged.first().free_share_in_alarm > OFTEN_ON;
+    let mut flagged: Vec<&Judged<'_>> = judged.iter().filter(often).collect();
+    flagged.sort_by(|a, b| {
+        let share = |judged: &Judged<'_>| judged.first().free_share_in_alarm;
+        share(b).total_cmp(&share(a))
+    });
+    (!flagged.is_empty()).then(|| {
+        let said = |judged: &&Judged<'_>| {
+            let share = 100.0 * judged.first().free_share_in_alarm;
+            format!("{} {share:.0} %", judged.label)
+        };
+        let all: Vec<String> = flagged.iter().map(said).collect();
+        html! {
+            p.rival {
+                b { "In alarm without contact for much of the time: " }
+                (all.join(", "))
+                ". An alarm that lasts counts as one false alarm, however long it is: read the counts of these with care."
+            }
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bound_is_rounded_up() {
+        assert_eq!(bound_text(35.95), "36");
+        assert_eq!(bound_text(0.31), "0.4");
+    }
+}

@@ -1,0 +1,59 @@
+//! A publisher must serve one cell, and know where the cell's source takes commands.
+
+use tauscope_bus::{SampleKind, ZenohEndpoints};
+use tauscope_publish::{Config, ConfigError};
+
+use super::Resolver;
+use crate::pipeline::role::Role;
+use crate::settings::Settings;
+use crate::yaml::Place;
+
+impl Resolver<'_> {
+    pub(super) fn publish(
+        &mut self,
+        index: usize,
+        place: &Place,
+        config: &Config,
+    ) -> Option<Settings> {
+        let wiring = self.wiring?;
+        let one_cell = match wiring.cells[index].len() {
+            1 => Ok(()),
+            _ => Err(ConfigError::ManyCells),
+        };
+        let judges = |input: &usize| {
+            wiring.roles[*input] != Role::Explain
+                && wiring.roles[*input].gives() == Some(SampleKind::Detection)
+        };
+        let hears_detector = wiring.inputs[index].iter().any(judges);
+        let heard = hears_detector.then_some(()).ok_or(ConfigError::NoDetector);
+        if let Err(error) = config.check().and(one_cell).and(heard) {
+            self.report.push(self.file.at_key(place, error.to_string()));
+            return None;
+        }
+        let commands = self.commands(index);
+        let hears_source = wiring.inputs[index]
+            .iter()
+            .any(|&input| wiring.roles[input].gives() == Some(SampleKind::JointState));
+        if commands.is_some() && !hears_source {
+            let title = "the source takes commands, but the publisher does not listen to it";
+            let problem = self.file.at_key(place, title);
+            self.report.push(problem.help(
+                "commands come with the joint states: add the source to the publisher's `inputs`",
+            ));
+            return None;
+        }
+        Some(Settings::Publish {
+            config: config.clone(),
+            commands,
+        })
+    }
+
+    /// Where the source of the stage's cell takes commands.
+    fn commands(&self, index: usize) -> Option<ZenohEndpoints> {
+        let wiring = self.wiring?;
+        let cells = &wiring.cells[index];
+        (0..wiring.roles.len())
+            .filter(|&at| wiring.cells[at] == *cells)
+            .find_map(|at| self.entry(at).ingest.as_ref()?.commands.clone())
+    }
+}

@@ -1,0 +1,224 @@
+//! What to do now: which file to load, what to look at, what to record next; and what the page was made from.
+
+use maud::{Markup, html};
+use tauscope_dynamics::terms::{UNKNOWN, effect, words};
+
+use super::Around;
+use super::effects::effect_title;
+use super::groups::{self, Group};
+use super::number_format::{almost_all, percent};
+use super::proof;
+use super::rivals::trajectory;
+use crate::report::schema::{Finding, NextMotion, Report, Rival, Verdict};
+use crate::report::sentences::{UNCHANGED, error_left};
+
+/// How many parts a mechanic is sent to.
+/// Tuned: by eye, for the layout of the page.
+const PARTS: usize = 4;
+
+/// The box.
+pub(super) fn todo(report: &Report, around: &Around<'_>, robot: Option<Markup>) -> Markup {
+    html! {
+        section.todo id="now" {
+            h2 { "What to do now" }
+            div.with-robot {
+                dl.steps {
+                    div { dt { "Load" } dd { (load(report, around)) } }
+                    div { dt { "Look at" } dd { (look_at(report)) } }
+                    div { dt { "Record next" } dd { (record(report)) } }
+                }
+                @if let Some(robot) = robot { (robot) }
+            }
+            (made_from(around))
+        }
+    }
+}
+
+/// Whether it is part of a corrected twin: it did not come and go.
+fn lasts(finding: &Finding) -> bool {
+    finding.t_end.is_none()
+}
+
+/// The file for the pipeline, or why there is none.
+fn load(report: &Report, around: &Around<'_>) -> Markup {
+    let Some(twin) = around
+        .twin
+        .as_deref()
+        .filter(|_| report.verdict != Verdict::NotEvaluated)
+    else {
+        return html! { p { "Nothing. There is no corrected twin without a verdict." } };
+    };
+    let left = error_left(&report.holdout_rms_before, &report.holdout_rms_after);
+    let in_pipeline = html! {
+        pre { code { "twin: {model: " (twin) "}" } }
+        @if let Some(robot) = &around.corrected_robot {
+            p.muted { "Or give " code { (robot) } " as the cell’s " code { "robot:" } " in its place. With both, the correction would count twice." }
+        }
+    };
+    if report.findings.iter().any(lasts) {
+        if left >= UNCHANGED && !proof::is_elsewhere(report) {
+            return html! {
+                p { "Nothing yet. On recordings that were not fitted, " code { (twin) } " is no better than the twin as it was. Record more first." }
+            };
+        }
+        return html! {
+            p {
+                "The corrected twin, in your pipeline file"
+                @if left < UNCHANGED { ". It leaves " (percent(left)) " of the error on recordings that were not fitted" }
+                ":"
+            }
+            (in_pipeline)
+        };
+    }
+    html! {
+        p {
+            @if report.findings.is_empty() { "The twin can stay as it is. " }
+            @else { "What was found came and went, so the twin’s physics can stay as it is. " }
+            "This file adds the noise and the scores that detectors need for their thresholds:"
+        }
+        (in_pipeline)
+    }
+}
+
+/// What a mechanic looks at, the largest effort first.
+fn look_at(report: &Report) -> Markup {
+    let groups = groups::of(report);
+    let all: Vec<&Finding> = groups
+        .iter()
+        .flat_map(|group| group.findings.iter().copied())
+        .collect();
+    // Of each place the largest.
+    let of_group = |group: &Group<'_>| {
+        let mut findings = group.findings.iter();
+        findings
+            .find_map(|finding| Some((part(finding)?, finding.effect.clone(), finding.confidence)))
+    };
+    let parts: Vec<(String, String, f64)> = groups.iter().filter_map(of_group).collect();
+    if parts.is_empty() {
+        return html! {
+            p {
+                @if all.is_empty() { "Nothing: no effect was found." }
+                @else { "Nothing: what was found is part of such an arm, and no fault." }
+            }
+        };
+    }
+    html! {
+        ul {
+            @for (text, effect, confidence) in parts.iter().take(PARTS) {
+                li {
+                    (text)
+                    span.muted { " (" (effect_title(effect)) ", confidence " (almost_all(*confidence)) ")" }
+                }
+            }
+        }
+        @if parts.len() > PARTS { p.muted { (parts.len() - PARTS) " more places are below, with smaller efforts." } }
+    }
+}
+
+/// What to look at for a finding; nothing where it is no fault.
+fn part(finding: &Finding) -> Option<String> {
+    let effect = effect(&finding.effect)?;
+    let template = effect.words.look_at;
+    if template.is_empty() {
+        return None;
+    }
+    let source = finding
+        .parameters
+        .get("source_joint")
+        .and_then(|source| source.as_str());
+    let place = finding
+        .link
+        .as_deref()
+        .or(finding.joint.as_deref())
+        .unwrap_or("");
+    Some(words::fill(template, |name, _| match name {
+        "source" => source.unwrap_or("the other joint").to_owned(),
+        _ => place.to_owned(),
+    }))
+}
+
+/// The motion that would tell more, or that none is needed.
+fn record(report: &Report) -> Markup {
+    if let Some(first) = most_wanted(report) {
+        return html! {
+            p { (first.sentence) " " (trajectory(first)) }
+            @if report.next_motions.len() > 1 {
+                p.muted { a href="#next" { (report.next_motions.len() - 1) " more motions" } }
+            }
+        };
+    }
+    let left: Vec<&str> = (proof::rows(report).iter())
+        .filter(|row| row.is_left())
+        .map(|row| row.joint)
+        .collect();
+    let text = match report.verdict {
+        Verdict::NotEvaluated => {
+            "The same motion again, after what is said above is mended.".to_owned()
+        }
+        Verdict::UnknownRemains => {
+            let unknown = report.findings.iter().filter(|f| f.effect == UNKNOWN.name);
+            let mut joints: Vec<&str> = unknown.filter_map(|f| f.joint.as_deref()).collect();
+            joints.extend(
+                left.iter()
+                    .filter(|joint| !joints.contains(joint))
+                    .copied()
+                    .collect::<Vec<_>>(),
+            );
+            let which = if joints.is_empty() {
+                "every joint".to_owned()
+            } else {
+                joints.join(", ")
+            };
+            format!(
+                "Move {which} over the whole range, slowly and fast, in both directions, in several poses of the arm; then explain \
+                 these recordings together with today’s."
+            )
+        }
+        _ if !left.is_empty() => format!(
+            "More than noise is left at {}: move {} over the whole range, slowly and fast, in both directions.",
+            left.join(", "),
+            if left.len() == 1 { "it" } else { "them" }
+        ),
+        _ => "Nothing more is needed.".to_owned(),
+    };
+    html! { p { (text) } }
+}
+
+/// The motion for the finding with the largest effort of those that have one.
+fn most_wanted(report: &Report) -> Option<&NextMotion> {
+    let groups = groups::of(report);
+    let findings = groups.iter().flat_map(|group| group.findings.iter());
+    let rank: Vec<(&str, Option<&str>)> = findings
+        .map(|finding| (finding.effect.as_str(), finding.joint.as_deref()))
+        .collect();
+    let place = |motion: &&NextMotion| {
+        let winner = motion.separates.first();
+        let of = |w: &Rival| {
+            let own = (w.effect.as_str(), w.joint.as_deref());
+            rank.iter().position(|known| *known == own)
+        };
+        winner.and_then(of).unwrap_or(usize::MAX)
+    };
+    report.next_motions.iter().min_by_key(place)
+}
+
+/// When, and from what.
+fn made_from(around: &Around<'_>) -> Markup {
+    let list = |paths: &[String]| -> Markup {
+        html! {
+            @for (index, path) in paths.iter().enumerate() {
+                @if index > 0 { ", " }
+                code { (path) }
+            }
+        }
+    };
+    html! {
+        p.inputs {
+            @if !around.date.is_empty() { "Made " (around.date) ". " }
+            @if let Some(robot) = &around.robot { "Robot: " code { (robot) } ". " }
+            @if let Some(start) = &around.start { "Started from: " code { (start) } ". " }
+            @if !around.fit.is_empty() { "Fitted: " (list(&around.fit)) ". " }
+            @if !around.holdout.is_empty() { "Held out: " (list(&around.holdout)) "." }
+        }
+    }
+}

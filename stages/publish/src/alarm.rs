@@ -1,0 +1,209 @@
+//! The life of an alarm: a pure state machine over detections and commands. Time is that of the samples.
+//!
+//! ```text
+//!              contact begins                     collision begins
+//!     free ───────────────────▶ contact    (any) ─────────────────▶ collision, which stays
+//!       ▲                          │                                     │
+//!       └──────────────────────────┘                  acknowledge, while │ acknowledge,
+//!       ▲        contact ends                       the contact lasts    │ when it is over
+//!       │                                                  ▼             │
+//!       └───────────────────────────────────────────  acknowledged       │
+//!       │                 contact ends                                   │
+//!       └────────────────────────────────────────────────────────────────┘
+//! ```
+//!
+//! - A collision is latched: it never ends by itself.
+//! - A collision that begins after the acknowledgement is a new one.
+//! - While muted, contacts and collisions raise no stop and none is latched. A collision that was latched before stays.
+//!   One that still lasts when the lease ends is latched then.
+//! - Before every detector has judged a sample, and while one cannot judge, nothing is free.
+
+use tauscope_bus::{Command, Detection, Verb, flags};
+
+use crate::config::Latch;
+
+/// Commands that wait for the detections of their instant at most.
+const MAX_WAITING: usize = 64;
+
+/// Where an alarm stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum State {
+    /// A detector cannot judge, or has said nothing yet.
+    NotReady,
+    /// Nothing touches the robot.
+    Free,
+    /// Something touches it.
+    Contact,
+    /// It has collided, and nobody has acknowledged that.
+    Collision,
+    /// Somebody has acknowledged the collision, which is not over yet.
+    Acknowledged,
+}
+
+/// The latch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Latched {
+    No,
+    Unseen,
+    Acknowledged,
+}
+
+/// What a detector said last.
+#[derive(Debug, Clone, Copy, Default)]
+struct View {
+    ready: bool,
+    alarm: bool,
+    latches: bool,
+}
+
+/// A lease, in stamps \[ns\].
+#[derive(Debug, Clone, Copy)]
+struct Lease {
+    from_ns: i64,
+    until_ns: i64,
+}
+
+/// The alarm of one cell.
+#[derive(Debug)]
+pub struct Alarm {
+    latch: Latch,
+    views: Vec<View>,
+    latched: Latched,
+    lease: Option<Lease>,
+    /// By stamp.
+    waiting: Vec<(i64, Command)>,
+    now_ns: i64,
+}
+
+impl Alarm {
+    /// The alarm of a cell with so many detectors. After a restart it is not known what was latched: it begins
+    /// with a collision then, for somebody to look.
+    pub fn new(latch: Latch, detectors: usize, restarted: bool) -> Self {
+        Self {
+            latch,
+            views: vec![View::default(); detectors],
+            latched: if restarted {
+                Latched::Unseen
+            } else {
+                Latched::No
+            },
+            lease: None,
+            waiting: Vec::new(),
+            now_ns: 0,
+        }
+    }
+
+    /// Takes a command that holds from `stamp_ns` on: from the first detection with that stamp or a later one,
+    /// whichever of the two streams was faster.
+    pub fn command(&mut self, stamp_ns: i64, command: Command) {
+        if self.waiting.len() == MAX_WAITING {
+            self.waiting.remove(0);
+        }
+        let at = self.waiting.partition_point(|(at, _)| *at <= stamp_ns);
+        self.waiting.insert(at, (stamp_ns, command));
+    }
+
+    /// Takes what detector number `detector` says of a sample.
+    pub fn detection(&mut self, detector: usize, detection: &Detection) {
+        let header = &detection.header;
+        self.now_ns = header.stamp_ns;
+        if header.has(flags::RESET) {
+            // The clock of the lease is void.
+            self.lease = None;
+        }
+        while self
+            .waiting
+            .first()
+            .is_some_and(|(at, _)| *at <= header.stamp_ns)
+        {
+            let (stamp_ns, command) = self.waiting.remove(0);
+            self.carry_out(stamp_ns, &command);
+        }
+        let alarm = detection.alarm() && !header.has(flags::CHANGE);
+        let now = View {
+            ready: header.has(flags::READY),
+            alarm,
+            latches: alarm
+                && (self.latch == Latch::Contact || detection.state.as_str() == "collision"),
+        };
+        let Some(view) = self.views.get_mut(detector) else {
+            return;
+        };
+        let begins = now.latches && !view.latches;
+        *view = now;
+        if now.latches && !self.is_muted() && (begins || self.latched == Latched::No) {
+            self.latched = Latched::Unseen;
+        }
+        if self.latched == Latched::Acknowledged && !self.in_contact() {
+            self.latched = Latched::No;
+        }
+    }
+
+    fn carry_out(&mut self, stamp_ns: i64, command: &Command) {
+        match command.verb() {
+            Some(Verb::Acknowledge) if self.latched == Latched::Unseen => {
+                self.latched = if self.in_contact() {
+                    Latched::Acknowledged
+                } else {
+                    Latched::No
+                };
+            }
+            Some(Verb::Mute) => {
+                self.lease = Some(Lease {
+                    from_ns: stamp_ns,
+                    until_ns: stamp_ns.saturating_add((command.value * 1e9) as i64),
+                });
+            }
+            _ => {}
+        }
+    }
+
+    /// Whether a detector sees a contact now, muted or not.
+    pub fn in_contact(&self) -> bool {
+        self.views.iter().any(|view| view.alarm)
+    }
+
+    /// Where the alarm stands.
+    pub fn state(&self) -> State {
+        match self.latched {
+            Latched::Unseen => State::Collision,
+            Latched::Acknowledged => State::Acknowledged,
+            Latched::No if self.in_contact() => State::Contact,
+            Latched::No if self.views.iter().all(|view| view.ready) => State::Free,
+            Latched::No => State::NotReady,
+        }
+    }
+
+    /// Whether the robot may move, as far as detections go.
+    pub fn is_free(&self) -> bool {
+        match self.state() {
+            State::Free => true,
+            State::Contact => self.is_muted(),
+            State::NotReady | State::Collision | State::Acknowledged => false,
+        }
+    }
+
+    /// What is left of a mute \[s\]; 0 without one.
+    pub fn muted_s(&self) -> f64 {
+        let left = self.lease.map_or(0, |lease| {
+            if lease.from_ns <= self.now_ns {
+                lease.until_ns - self.now_ns
+            } else {
+                0
+            }
+        });
+        left.max(0) as f64 * 1e-9
+    }
+
+    fn is_muted(&self) -> bool {
+        self.muted_s() > 0.0
+    }
+
+    /// Stamp of the newest detection \[ns since the epoch\].
+    pub fn now_ns(&self) -> i64 {
+        self.now_ns
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,173 @@
+//! The stage's part of the pipeline file.
+
+use std::net::SocketAddr;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What the cell is told, and how. At least one of `zenoh` and `modbus`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    /// Messages over Zenoh: JSON, and ROS 2 where wanted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub zenoh: Option<ZenohConfig>,
+    /// A Modbus TCP server for a PLC.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub modbus: Option<ModbusConfig>,
+    /// Which contacts stay until somebody acknowledges them.
+    pub latch: Latch,
+    /// Without a sample of each detector for so long, everything reads as stop \[s\].
+    #[schemars(range(min = 0.02, max = 60.0))]
+    pub stop_after_s: f64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            zenoh: None,
+            modbus: None,
+            latch: Latch::default(),
+            stop_after_s: 0.5,
+        }
+    }
+}
+
+/// Which contacts stay until somebody acknowledges them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Latch {
+    /// Those that the detector calls a collision.
+    #[default]
+    Collision,
+    /// All: for a detector that does not tell a collision from a contact that is meant.
+    Contact,
+}
+
+/// Messages over Zenoh. At least one of `connect` and `listen` must be given: nothing is found by multicast.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ZenohConfig {
+    /// Endpoints to connect to, e.g. `tcp/localhost:7447`; tried again until they answer.
+    pub connect: Vec<String>,
+    /// Endpoints to listen on.
+    pub listen: Vec<String>,
+    /// Whether JSON is published under `<cell>/<topic>`.
+    pub json: bool,
+    /// ROS 2 messages as `rmw_zenoh` expects them; without it, none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ros2: Option<Ros2Config>,
+}
+
+impl Default for ZenohConfig {
+    fn default() -> Self {
+        Self {
+            connect: Vec::new(),
+            listen: Vec::new(),
+            json: true,
+            ros2: None,
+        }
+    }
+}
+
+/// ROS 2 messages.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Ros2Config {
+    /// `ROS_DOMAIN_ID` of the listeners.
+    #[schemars(range(max = 232))]
+    pub domain: u32,
+    /// Namespace of the topics; by default the cell's name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub namespace: Option<String>,
+}
+
+/// A Modbus TCP server.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ModbusConfig {
+    /// Address and port that it listens on. Whoever reaches it can read and acknowledge: Modbus has no passwords.
+    #[schemars(with = "String")]
+    pub listen: SocketAddr,
+}
+
+impl Default for ModbusConfig {
+    fn default() -> Self {
+        Self {
+            listen: SocketAddr::from(([127, 0, 0, 1], 1502)),
+        }
+    }
+}
+
+/// What is wrong with a configuration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum ConfigError {
+    /// Nothing is told to anybody.
+    #[error("a publisher that tells nobody; give `zenoh` or `modbus`")]
+    Nobody,
+    /// Nothing can reach it.
+    #[error("`zenoh` needs at least one endpoint in `connect` or `listen`")]
+    NoEndpoint,
+    /// Neither form of message.
+    #[error("`zenoh` publishes nothing; give `json: true` or `ros2: {{}}`")]
+    NoMessages,
+    /// No detector, whose verdicts are what it is about.
+    #[error("a publisher listens to at least one detector")]
+    NoDetector,
+    /// Several cells.
+    #[error("a publisher serves one cell; make a publisher for each")]
+    ManyCells,
+}
+
+impl Config {
+    /// Whether it can be run.
+    ///
+    /// # Errors
+    /// What keeps it from running.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        if self.zenoh.is_none() && self.modbus.is_none() {
+            return Err(ConfigError::Nobody);
+        }
+        let Some(zenoh) = &self.zenoh else {
+            return Ok(());
+        };
+        if zenoh.connect.is_empty() && zenoh.listen.is_empty() {
+            return Err(ConfigError::NoEndpoint);
+        }
+        if !zenoh.json && zenoh.ros2.is_none() {
+            return Err(ConfigError::NoMessages);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(yaml: &str) -> Config {
+        serde_saphyr::from_str(yaml).unwrap()
+    }
+
+    #[test]
+    fn what_stands_in_the_file() {
+        let config = parse("{zenoh: {connect: [tcp/a:1], ros2: {}}, modbus: {}, latch: contact}");
+        assert_eq!(config.check(), Ok(()));
+        assert_eq!(config.latch, Latch::Contact);
+        assert!(config.modbus.unwrap().listen.ip().is_loopback());
+    }
+
+    #[test]
+    fn a_publisher_that_nobody_hears_is_refused() {
+        for (yaml, error) in [
+            ("{}", ConfigError::Nobody),
+            ("{zenoh: {ros2: {}}}", ConfigError::NoEndpoint),
+            (
+                "{zenoh: {listen: [tcp/a:1], json: false}}",
+                ConfigError::NoMessages,
+            ),
+        ] {
+            assert_eq!(parse(yaml).check(), Err(error), "{yaml}");
+        }
+    }
+}

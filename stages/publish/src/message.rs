@@ -1,0 +1,199 @@
+//! The JSON messages. Their JSON Schema is made from these types: `tauscope schema --messages`.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::alarm::State;
+
+/// Under `<cell>/alarm`: what the cell is to do.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct AlarmMessage {
+    /// Stamp of the newest detection \[ns since the epoch\].
+    pub stamp_ns: i64,
+    /// Where the alarm stands.
+    pub state: AlarmState,
+    /// Whether the robot may move, as far as detections go.
+    pub free: bool,
+    /// Whether a detector sees a contact now, muted or not.
+    pub contact: bool,
+    /// What is left of a mute \[s\]; 0 without one.
+    pub muted_s: f64,
+    /// The touched link; left out where there is none, or it is not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub link: Option<String>,
+    /// The estimated force on the robot, world frame \[N\].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_n: Option<[f64; 3]>,
+}
+
+/// Where the alarm stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AlarmState {
+    /// No sample came for too long, or the run has ended: stop.
+    Silent,
+    /// A detector cannot judge: stop.
+    NotReady,
+    /// Nothing touches the robot.
+    Free,
+    /// Something touches it: stop, unless muted.
+    Contact,
+    /// It has collided, and nobody has acknowledged that: stop.
+    Collision,
+    /// The acknowledged collision is not over yet: stop.
+    Acknowledged,
+}
+
+impl AlarmState {
+    /// Its number in a Modbus register.
+    pub fn number(self) -> u16 {
+        match self {
+            Self::Silent => 0,
+            Self::NotReady => 1,
+            Self::Free => 2,
+            Self::Contact => 3,
+            Self::Collision => 4,
+            Self::Acknowledged => 5,
+        }
+    }
+
+    /// In a word, as in JSON.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Silent => "silent",
+            Self::NotReady => "not_ready",
+            Self::Free => "free",
+            Self::Contact => "contact",
+            Self::Collision => "collision",
+            Self::Acknowledged => "acknowledged",
+        }
+    }
+}
+
+impl From<State> for AlarmState {
+    fn from(state: State) -> Self {
+        match state {
+            State::NotReady => Self::NotReady,
+            State::Free => Self::Free,
+            State::Contact => Self::Contact,
+            State::Collision => Self::Collision,
+            State::Acknowledged => Self::Acknowledged,
+        }
+    }
+}
+
+/// Under `<cell>/detections/<detector>`: what a detector says of a sample.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct DetectionMessage {
+    /// Stamp of the sample \[ns since the epoch\].
+    pub stamp_ns: i64,
+    /// Its number in the detector's stream; a hole means loss.
+    pub sequence: u64,
+    /// The detector's name.
+    pub detector: String,
+    /// What it says in its own words: `free`, `contact`, `collision`, ….
+    pub state: String,
+    /// Whether it judged this sample.
+    pub ready: bool,
+    /// Whether it sees a contact, or a change of the arm.
+    pub alarm: bool,
+    /// What begins or ends at this sample.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub event: Option<EventMessage>,
+    /// The score, in the detector's own unit.
+    pub score: f64,
+    /// The score from which on it raises an alarm.
+    pub threshold: f64,
+    /// Estimated beginning of the contact, while an alarm lasts \[ns since the epoch\].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contact_ns: Option<i64>,
+    /// The joints that detected.
+    pub joints: Vec<String>,
+    /// The touched link, where it is estimated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub link: Option<String>,
+    /// Estimated force on the robot, world frame \[N\].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_n: Option<[f64; 3]>,
+    /// Where the force is taken to act, world frame \[m\].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub point_m: Option<[f64; 3]>,
+}
+
+/// What begins or ends at a sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum EventMessage {
+    /// The alarm is raised.
+    Onset,
+    /// The alarm ends.
+    Offset,
+}
+
+/// Under `<cell>/joint_states`, `<cell>/twin/joint_states` and `<cell>/residual`: numbers by joint.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
+pub struct JointsMessage {
+    /// Stamp of the sample \[ns since the epoch\].
+    pub stamp_ns: i64,
+    /// Its number in the stream; a hole means loss.
+    pub sequence: u64,
+    /// The joints, in URDF order.
+    pub name: Vec<String>,
+    /// Position \[rad or m\].
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub position: Vec<f64>,
+    /// Velocity \[rad/s or m/s\].
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub velocity: Vec<f64>,
+    /// Effort in the cell's unit: measured, the twin's, or the residual \[N m, N or A\].
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub effort: Vec<f64>,
+}
+
+/// Under `<cell>/command`: a command that was taken.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct CommandMessage {
+    /// Stamp of the first sample for which it holds \[ns since the epoch\].
+    pub stamp_ns: i64,
+    /// What was told.
+    pub verb: String,
+    /// The numbers and texts that go with it.
+    pub arguments: std::collections::BTreeMap<String, String>,
+}
+
+/// Under `<cell>/health/<stage>`: how a stage fares, once a second.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct HealthMessage {
+    /// Stamp of the stage's newest sample \[ns since the epoch\].
+    pub stamp_ns: i64,
+    /// The stage.
+    pub stage: String,
+    /// Samples that came in.
+    pub received: u64,
+    /// Samples that went out.
+    pub emitted: u64,
+    /// Samples that were lost or refused.
+    pub dropped: u64,
+    /// How often it was started again.
+    pub restarts: u64,
+}
+
+/// All messages, by the topic behind the cell's name. Only their schema is of use.
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(title = "tauscope messages")]
+pub struct Messages {
+    /// `<cell>/alarm`.
+    pub alarm: AlarmMessage,
+    /// `<cell>/detections/<detector>`.
+    pub detections: DetectionMessage,
+    /// `<cell>/joint_states`, `<cell>/twin/joint_states`, `<cell>/residual`.
+    pub joints: JointsMessage,
+    /// `<cell>/command`.
+    pub command: CommandMessage,
+    /// `<cell>/health/<stage>`.
+    pub health: HealthMessage,
+    /// What `<cell>/commands` takes.
+    pub commands: tauscope_bus::command::Request,
+    /// What it answers.
+    pub answer: tauscope_bus::command::Answer,
+}

@@ -1,0 +1,356 @@
+//! The publisher as a stage: samples go in, and the cell is told.
+//!
+//! It waits for nobody. Zenoh drops what a listener does not take; a Modbus client reads the newest. What the publisher
+//! itself has no time for gives way in its link, which counts it. The alarm's time is that of the samples; only the
+//! watch over silence has a clock.
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use tauscope_bus::{
+    Command, Detection, Health, JointState, SampleKind, SampleRef, Sink, StageError, TwinState,
+    ZenohEndpoints,
+};
+use tauscope_dynamics::Model;
+
+use crate::alarm::Alarm;
+use crate::config::{Config, ConfigError};
+use crate::diagnostics::is_news;
+use crate::error::PublishError;
+use crate::message::{AlarmMessage, AlarmState, CommandMessage};
+use crate::modbus::{Board, Commands, Modbus};
+use crate::outputs::Outputs;
+use crate::poses::Poses;
+use crate::status::Status;
+
+/// While nothing changes the alarm is told this often, in time of the samples \[ns\].
+const REPEAT_NS: u64 = 100_000_000;
+/// And in time of the clock, while nothing comes.
+const REPEAT: Duration = Duration::from_millis(100);
+
+/// What a publisher must know of its cell.
+#[derive(Debug, Clone)]
+pub struct Setup {
+    /// The cell's name.
+    pub cell: String,
+    /// Its joints, in URDF order.
+    pub joint_names: Vec<String>,
+    /// Its robot, where there is one: for forces at links.
+    pub model: Option<Model>,
+    /// The streams that it listens to.
+    pub streams: Vec<StreamInfo>,
+    /// Where the cell's source takes commands, if it does.
+    pub commands: Option<ZenohEndpoints>,
+    /// Whether this stage has been started again: what was latched is not known then.
+    pub restarted: bool,
+}
+
+/// A stream that a publisher listens to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StreamInfo {
+    /// The stage it comes from.
+    pub stage: String,
+    /// What it carries.
+    pub kind: SampleKind,
+    /// The detector that speaks in it, where that is known.
+    pub detector: Option<String>,
+    /// Whether it says whether something touches the robot; a watch over the twin does not.
+    pub judges_contact: bool,
+}
+
+/// A stream of detections.
+struct Detector {
+    stage: String,
+    /// What tells it from the others: the detector's name, or the stage's where two run the same.
+    label: String,
+    /// Its place in the alarm.
+    in_alarm: Option<usize>,
+    before: Option<Detection>,
+    heard: Option<Instant>,
+}
+
+/// Tells the cell what the detectors find. Not a safety function.
+pub struct Publisher {
+    cell: String,
+    detectors: Vec<Detector>,
+    alarm: Alarm,
+    status: Status,
+    poses: Option<Poses>,
+    outputs: Option<Outputs>,
+    board: Board,
+    modbus: Option<Modbus>,
+    shown: Option<(AlarmMessage, Instant)>,
+    /// Messages that could not be published.
+    unsent: u64,
+}
+
+impl Publisher {
+    /// Opens all that `config` asks for.
+    ///
+    /// # Errors
+    /// If configuration and streams do not fit together, or Zenoh or Modbus cannot be opened.
+    pub fn new(config: &Config, setup: &Setup) -> Result<Self, PublishError> {
+        config.check()?;
+        let mut judges = 0;
+        let detections = |stream: &&StreamInfo| stream.kind == SampleKind::Detection;
+        let detectors = setup.streams.iter().filter(detections).map(|stream| {
+            let in_alarm = stream.judges_contact.then(|| {
+                judges += 1;
+                judges - 1
+            });
+            Detector {
+                stage: stream.stage.clone(),
+                label: label(stream, &setup.streams),
+                in_alarm,
+                before: None,
+                heard: None,
+            }
+        });
+        let detectors: Vec<Detector> = detectors.collect();
+        if judges == 0 {
+            return Err(ConfigError::NoDetector.into());
+        }
+        let poses = setup.model.clone().map(Poses::new);
+        let root = poses
+            .as_ref()
+            .and_then(Poses::root)
+            .unwrap_or("world")
+            .to_owned();
+        let session = match endpoints(config, setup) {
+            Some(endpoints) => Some(endpoints.session()?),
+            None => None,
+        };
+        let labels: Vec<&str> = detectors.iter().map(|each| each.label.as_str()).collect();
+        let outputs = match (&session, &config.zenoh) {
+            (Some(session), Some(zenoh)) => Some(Outputs::open(
+                session,
+                zenoh,
+                &setup.cell,
+                &setup.joint_names,
+                &root,
+                &labels,
+            )?),
+            _ => None,
+        };
+        let status = Status::silent(Duration::from_secs_f64(config.stop_after_s));
+        let board = Board::new(status.clone());
+        let commands = session
+            .filter(|_| setup.commands.is_some())
+            .map(|session| Commands {
+                session,
+                cell: setup.cell.clone(),
+            });
+        let modbus = config.modbus.as_ref();
+        let modbus = modbus.map(|modbus| Modbus::serve(modbus.listen, &board, commands));
+        Ok(Self {
+            cell: setup.cell.clone(),
+            alarm: Alarm::new(config.latch, judges, setup.restarted),
+            detectors,
+            status,
+            poses,
+            outputs,
+            board,
+            modbus: modbus.transpose()?,
+            shown: None,
+            unsent: 0,
+        })
+    }
+
+    /// Where the Modbus server listens.
+    pub fn modbus_address(&self) -> Option<std::net::SocketAddr> {
+        self.modbus.as_ref().map(Modbus::address)
+    }
+
+    fn joint_state(&mut self, sample: &JointState) {
+        let stamp_ns = sample.header.stamp_ns;
+        if let Some(poses) = &mut self.poses {
+            poses.push(stamp_ns, &sample.position);
+        }
+        if sample.command.verb().is_some() {
+            self.alarm.command(stamp_ns, sample.command);
+            let message = told(stamp_ns, &sample.command);
+            self.tell(|outputs, _| outputs.command(&message));
+        }
+        self.tell(|outputs, _| outputs.joint_state(sample));
+    }
+
+    fn twin(&mut self, sample: &TwinState) {
+        if let Some(poses) = &mut self.poses {
+            poses.push(sample.header.stamp_ns, &sample.position);
+        }
+        self.tell(|outputs, _| outputs.twin(sample));
+    }
+
+    fn detection(&mut self, index: usize, detection: &Detection) {
+        let detector = &mut self.detectors[index];
+        let news = is_news(detector.before.as_ref(), detection);
+        detector.before = Some(*detection);
+        detector.heard = Some(Instant::now());
+        if let Some(place) = detector.in_alarm {
+            self.alarm.detection(place, detection);
+            self.status.detections += 1;
+        }
+        // First what the robot is to do, then what people want to know.
+        self.show();
+        let label = self.detectors[index].label.clone();
+        self.tell(|outputs, poses| outputs.detection(detection, &label, news, poses));
+    }
+
+    fn health(&mut self, health: &Health) {
+        self.tell(|outputs, _| outputs.health(health));
+    }
+
+    /// Brings what is shown up to date.
+    fn show(&mut self) {
+        let judges = self.detectors.iter().filter(|each| each.in_alarm.is_some());
+        let heard: Option<Vec<Instant>> = judges.clone().map(|each| each.heard).collect();
+        self.status.heard = heard.and_then(|all| all.into_iter().min());
+        let touched = judges
+            .filter_map(|each| each.before.as_ref())
+            .find(|detection| detection.alarm());
+        let link = touched
+            .map(|detection| detection.link.to_string())
+            .filter(|link| !link.is_empty());
+        let number = link
+            .as_deref()
+            .and_then(|link| self.poses.as_ref()?.link(link));
+        self.status.link_number = number.map_or(0, |at| u16::try_from(at + 1).unwrap_or(u16::MAX));
+        self.status.alarm = AlarmMessage {
+            stamp_ns: self.alarm.now_ns(),
+            state: AlarmState::from(self.alarm.state()),
+            free: self.alarm.is_free(),
+            contact: self.alarm.in_contact(),
+            muted_s: self.alarm.muted_s(),
+            link,
+            force_n: touched
+                .filter(|detection| detection.header.has(tauscope_bus::flags::FORCE))
+                .map(|detection| detection.force_n),
+        };
+        self.board.show(&self.status);
+        self.announce(Instant::now());
+    }
+
+    /// Tells the alarm, if it has changed or was told too long ago.
+    fn announce(&mut self, now: Instant) {
+        let alarm = self.status.at(now);
+        let old = self.shown.as_ref().is_none_or(|(shown, since)| {
+            let same = (
+                shown.state,
+                shown.free,
+                shown.contact,
+                shown.muted_s > 0.0,
+                &shown.link,
+            ) == (
+                alarm.state,
+                alarm.free,
+                alarm.contact,
+                alarm.muted_s > 0.0,
+                &alarm.link,
+            );
+            let aged = alarm.stamp_ns.abs_diff(shown.stamp_ns) >= REPEAT_NS;
+            !same || aged || now.saturating_duration_since(*since) >= REPEAT
+        });
+        if old {
+            self.tell(|outputs, _| outputs.alarm(&alarm));
+            self.shown = Some((alarm, now));
+        }
+    }
+
+    /// Publishes, where somebody is told. What cannot be published is counted; the first time is told of.
+    fn tell(
+        &mut self,
+        publish: impl FnOnce(&mut Outputs, Option<&mut Poses>) -> Result<(), PublishError>,
+    ) {
+        let Some(outputs) = &mut self.outputs else {
+            return;
+        };
+        if let Err(error) = publish(outputs, self.poses.as_mut()) {
+            if self.unsent == 0 {
+                tracing::warn!("{}: {error}; further ones are only counted", self.cell);
+            }
+            self.unsent += 1;
+        }
+    }
+}
+
+impl Sink for Publisher {
+    fn accept(&mut self, from: &str, sample: SampleRef<'_>) -> Result<(), StageError> {
+        match sample {
+            SampleRef::JointState(sample) => self.joint_state(sample),
+            SampleRef::TwinState(sample) => self.twin(sample),
+            SampleRef::Detection(detection) => {
+                let index = self.detectors.iter().position(|each| each.stage == from);
+                let index = index.ok_or_else(|| {
+                    StageError::failed(PublishError::UnknownStage {
+                        stage: from.to_owned(),
+                    })
+                })?;
+                self.detection(index, detection);
+            }
+            SampleRef::Health(health) => self.health(health),
+        }
+        // A detector may be silent while others speak.
+        self.announce(Instant::now());
+        Ok(())
+    }
+
+    fn idle(&mut self) -> Result<(), StageError> {
+        self.announce(Instant::now());
+        Ok(())
+    }
+
+    fn finish(&mut self) -> Result<(), StageError> {
+        // The run is over: nothing is known from here on.
+        self.status.heard = None;
+        self.board.show(&self.status);
+        self.shown = None;
+        self.announce(Instant::now());
+        Ok(())
+    }
+
+    fn dropped(&self) -> u64 {
+        self.unsent
+    }
+}
+
+/// Where its session goes: to the listeners, and to where the source takes commands.
+fn endpoints(config: &Config, setup: &Setup) -> Option<ZenohEndpoints> {
+    let zenoh = config.zenoh.as_ref().map(|zenoh| ZenohEndpoints {
+        listen: zenoh.listen.clone(),
+        connect: zenoh.connect.clone(),
+    });
+    let mut all = match (zenoh, &setup.commands) {
+        (None, None) => return None,
+        (zenoh, _) => zenoh.unwrap_or_default(),
+    };
+    for endpoint in setup.commands.iter().flat_map(ZenohEndpoints::reached_at) {
+        if !all.connect.contains(&endpoint) && !all.listen.contains(&endpoint) {
+            all.connect.push(endpoint);
+        }
+    }
+    Some(all)
+}
+
+fn label(stream: &StreamInfo, all: &[StreamInfo]) -> String {
+    let same = |detector: &String| {
+        let all = all
+            .iter()
+            .filter(|other| other.detector.as_ref() == Some(detector));
+        all.count() == 1
+    };
+    let name = stream.detector.as_ref().filter(|detector| same(detector));
+    name.unwrap_or(&stream.stage).clone()
+}
+
+fn told(stamp_ns: i64, command: &Command) -> CommandMessage {
+    let arguments = command.arguments().into_iter();
+    CommandMessage {
+        stamp_ns,
+        verb: command
+            .verb()
+            .map_or_else(String::new, |verb| verb.as_str().to_owned()),
+        arguments: arguments
+            .map(|(name, value)| (name.to_owned(), value))
+            .collect::<BTreeMap<_, _>>(),
+    }
+}
