@@ -296,7 +296,7 @@ impl Supervisor<'_> {
 
 fn died(name: &str, how: &str, again: Option<Duration>) -> String {
     match again {
-        None => format!("error: stage `{name}` {how}; it is not started again"),
+        None => format!("error: stage `{name}` {how} and is not started again"),
         Some(Duration::ZERO) => format!("warning: stage `{name}` {how}: starting it again"),
         Some(wait) => {
             let wait = wait.as_millis();

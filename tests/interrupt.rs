@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use common::{Out, bundled, root, tauscope, write};
+use common::{Out, bundled, tauscope, write};
 use live::{Live, signal, stage, wait_until};
 
 /// Runs `command`, sends it a signal when `ripe`, and gives what it said.
@@ -115,11 +115,23 @@ fn replay_keeps_what_is_whole_and_the_others_leave_nothing() {
     let long = long_recording(folder.path());
     let robot = bundled().join("demo_arm.urdf");
     let out = folder.path().join("out");
+    let pipeline = write(
+        &folder.path().join("pipeline.yaml"),
+        &format!(
+            "version: 1
+cells: {{demo: {{robot: {robot}}}}}
+stages:
+- {{name: ingest, ingest: {{file: {{path: {long}}}}}}}
+- {{name: twin, input: ingest, twin: {{}}}}
+- {{name: record, inputs: [ingest, twin], record: {{mcap: out.mcap}}}}
+",
+            robot = robot.display(),
+            long = long.display(),
+        ),
+    );
     let mut replay = tauscope();
-    replay
-        .current_dir(root())
-        .args(["replay", "--out"])
-        .arg(&out);
+    replay.arg("replay").arg("--pipeline").arg(pipeline);
+    replay.arg("--out").arg(&out);
     replay.arg(bundled().join("demo.mcap")).arg(&long);
     let part = out.join("long.mcap.part");
     let said = interrupted(replay, "INT", || {
@@ -206,10 +218,12 @@ stages:
     );
     write(&folder.path().join("pipeline.yaml"), &text);
     let mut live = Live::start(folder.path(), &[]);
-    live.wait_for("warning: stage `ingest` has not begun after 4 s: it waits for `deaf`");
+    live.wait_for("warning: stage `deaf` has not begun after 4 s");
     signal(live.id(), "INT");
     live.wait_for("warning: stage `deaf` was told to end and still runs; it is killed in 8 s");
-    live.wait_for("error: stage `deaf` did not end when it was told to, and was killed");
+    live.wait_for(
+        "error: stage `deaf` did not end when it was told to, was killed and is not started again",
+    );
     let (code, summary) = live.end();
     assert_eq!(code, 1, "{summary}");
     assert_eq!(stage(&summary, "deaf")["killed"], true, "{summary}");

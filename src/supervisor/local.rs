@@ -206,7 +206,7 @@ impl Local {
                 self.state = State::Ended;
                 return End::InOrder;
             }
-            _ if self.killed => "did not end when it was told to, and was killed".to_owned(),
+            _ if self.killed => "did not end when it was told to, was killed".to_owned(),
             (_, Some(Outcome::Failed(why) | Outcome::Unfit(why))) => format!("failed: {why}"),
             (Ok(status), _) => words_for(status),
             (Err(error), _) => format!("cannot be waited for: {error}"),

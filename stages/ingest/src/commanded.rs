@@ -6,9 +6,12 @@
 
 mod inbox;
 
+use std::time::Duration;
+
 use tauscope_bus::command::Answer;
 use tauscope_bus::{
-    Command, Emit, JointState, LinkError, Progress, Source, StageError, Verb, ZenohEndpoints, flags,
+    Command, Emit, JointState, LinkError, Progress, Source, StageError, Trouble, Verb,
+    ZenohEndpoints, flags,
 };
 
 use crate::setup::{Setup, Tool};
@@ -159,6 +162,10 @@ impl Source<JointState> for Commanded {
 
     fn fraction_done(&self) -> Option<f64> {
         self.inner.fraction_done()
+    }
+
+    fn trouble(&mut self, silent_for: Duration) -> Option<Trouble> {
+        self.inner.trouble(silent_for)
     }
 }
 
