@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use comfy_table::{CellAlignment, Table, presets};
+use tauscope_archive::ros::JointState;
 use tauscope_archive::whole_file::{self, Existing};
+use tauscope_archive::{ArchiveError, Recording};
 use tauscope_ingest::Topics;
 use tauscope_pipeline::calibrate::{Calibrated, Job};
 use tauscope_pipeline::cell::{Cell, ConstantSpot, EffortUnit};
@@ -107,6 +109,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
             "--motion commanded needs --command-topic",
         ));
     }
+    check_cutoffs(args)?;
     let twin = tauscope_twin::Config {
         model: None,
         motion: args.motion,
@@ -146,6 +149,34 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         out.print(&report(&calibrated, &cell, args))?;
     }
     Ok(Exit::from_loss(calibrated.lost > 0))
+}
+
+/// A low-pass above half the rate of a recording would pass everything, noise included.
+fn check_cutoffs(args: &Args) -> Result<(), Failure> {
+    let cutoffs = [
+        ("--velocity-cutoff-hz", args.velocity_cutoff_hz),
+        ("--effort-cutoff-hz", args.effort_cutoff_hz),
+    ];
+    for path in args.recordings.iter().chain(&args.validation) {
+        let rejected = |error: ArchiveError| Failure::rejected(error.to_string());
+        let recording = Recording::open(path).map_err(rejected)?;
+        let topic = recording
+            .topic_of::<JointState>(&args.state_topic)
+            .map_err(rejected)?;
+        let span_ns = recording.end_ns().unwrap_or(0) - recording.start_ns().unwrap_or(0);
+        let rate_hz = topic.message_count as f64 / (span_ns as f64 * 1e-9);
+        for (name, cutoff_hz) in cutoffs {
+            if cutoff_hz > rate_hz / 2.0 {
+                let title = format!(
+                    "{}: {rate_hz:.1} joint states a second, so {name} {cutoff_hz} would pass everything",
+                    path.display()
+                );
+                let help = format!("give less than {:.1}, half the rate", rate_hz / 2.0);
+                return Err(Failure::Rejected(Problem::new(title).help(help).into()));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// What went in, by name and hash.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
-use tauscope_archive::whole_file;
+use tauscope_archive::{Recording, whole_file};
 use tauscope_dynamics::terms::UNKNOWN;
 use tauscope_pipeline::parallel;
 use tauscope_pipeline::pipeline::Pipeline;
@@ -52,6 +52,17 @@ pub struct Args {
     json: bool,
 }
 
+/// Every recording must be one before the first is replayed: results of some would be mistaken for all.
+fn check_recordings(args: &Args) -> Result<(), Report> {
+    let mut report = Report::default();
+    for path in &args.recordings {
+        if let Err(error) = Recording::open(path) {
+            report.push(Problem::new(error.to_string()));
+        }
+    }
+    report.into_result(())
+}
+
 /// Replays them.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let pipeline = Pipeline::load(&args.pipeline, None)?;
@@ -66,6 +77,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
             "note: stage `{stage}` is a program of its own and not replayed; `tauscope run` runs it"
         ));
     }
+    check_recordings(args)?;
     if let Some(folder) = &args.out {
         let of = |recording| replay.files(recording, folder);
         let tables = ["summary.parquet", "events.parquet"].map(|name| folder.join(name));

@@ -179,10 +179,8 @@ stages:
       # A recording, as fast as it was recorded. `replay` puts its own recordings in its place.
       file: {path: RECORDING, topics: {state: TOPIC}}
       rate: 1
-      # The robot itself, from ROS 2 with rmw_zenoh. Take these lines for the three above:
-      # zenoh:
-      #   connect: tcp/localhost:7447
-      #   rmw_zenoh: {domain: 0, topics: {state: TOPIC}}
+      # The robot itself, from ROS 2 with rmw_zenoh, in place of the line with `file`. docs/live.md has other ways.
+      # zenoh: {connect: ["tcp/localhost:7447"], domain: 0, topics: {state: TOPIC}}
 
   - name: twin
     input: ingest
