@@ -120,7 +120,7 @@ fn what_is_no_bag_of_ros_is_unreadable() {
     for (name, content, says) in [
         ("empty.mcap", &b""[..], "the file is empty"),
         ("ros1.bag", b"#ROSBAG V2.0\n....", "rosbags-convert"),
-        ("a.csv", b"1,2,3,4,5,6,7,8,9", "needs a column mapping"),
+        ("a.csv", b"1,2,3,4,5,6,7,8,9", "a.columns.yaml"),
         ("a.txt", b"some other text here", "neither an MCAP"),
     ] {
         let path = folder.path().join(name);

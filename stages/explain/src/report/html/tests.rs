@@ -343,8 +343,8 @@ fn the_verdicts_colour_follows_the_share_that_has_no_name() {
     for (explains, left, class, text) in [
         (0.0, 0.1, "explained", "Explained but for less than 1 %"),
         (0.05, 0.1, "nothing", "Explained but for 5 %"),
-        (0.4, 0.1, "unknown", "Something unknown remains: 40 %"),
-        (0.0, 0.8, "unknown", "Something unknown remains: 62 %"),
+        (0.4, 0.1, "remains", "Something unknown remains: 40 %"),
+        (0.0, 0.8, "remains", "Something unknown remains: 62 %"),
     ] {
         report.findings[1].explains = explains;
         report.holdout_rms_after = vec![left, 0.1];

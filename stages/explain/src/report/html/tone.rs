@@ -48,10 +48,10 @@ impl Tone {
             ("nothing", "✓", text)
         } else if share.is_finite() {
             let text = format!("Something unknown remains: {}", percent(share));
-            ("unknown", "?", text)
+            ("remains", "?", text)
         } else {
             let text = verdict_text(Verdict::UnknownRemains).to_owned();
-            ("unknown", "?", text)
+            ("remains", "?", text)
         };
         Self { class, sign, text }
     }

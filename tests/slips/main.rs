@@ -1,0 +1,154 @@
+//! The slips of a first day: a wrong file, a wrong name, a wrong unit. Each must end with the exit code that the README
+//! promises, and with words that name the place, the cause and the remedy. None may give a silent zero or take the
+//! place of a file. `tests/silence.rs` has those of a live run.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod arguments;
+mod files;
+mod recordings;
+
+use std::path::{Path, PathBuf};
+
+use common::{Out, bundled};
+
+/// What somebody types, and what the answer must have. `@name` is a file of the [`Desk`].
+struct Slip {
+    typed: &'static str,
+    code: u8,
+    says: &'static [&'static str],
+}
+
+/// A folder with files that people mix up.
+struct Desk {
+    folder: tempfile::TempDir,
+}
+
+impl Desk {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let this = Self { folder };
+        for name in [
+            "demo.mcap",
+            "demo_validation.mcap",
+            "demo_arm.urdf",
+            "demo.twin.yaml",
+        ] {
+            std::fs::copy(bundled().join(name), this.path(name)).unwrap();
+        }
+        let demo = std::fs::read(this.path("demo.mcap")).unwrap();
+        std::fs::write(this.path("torn.mcap"), &demo[..100_000]).unwrap();
+        std::fs::write(this.path("stub.mcap"), &demo[..8]).unwrap();
+        std::fs::write(this.path("empty.mcap"), "").unwrap();
+        std::fs::write(this.path("words.mcap"), "hello\n").unwrap();
+        std::fs::write(this.path("ros1.bag"), "#ROSBAG V2.0\n").unwrap();
+        std::fs::write(this.path("table.csv"), "0,1\n1,2\n").unwrap();
+        std::fs::create_dir(this.path("folder")).unwrap();
+        let other = std::fs::read_to_string(this.path("demo_arm.urdf")).unwrap();
+        std::fs::write(this.path("other.urdf"), other.replace("\"joint", "\"axis_")).unwrap();
+        std::fs::write(
+            this.path("broken.urdf"),
+            "<robot name=\"arm\"><link name=\"base\"></robot>",
+        )
+        .unwrap();
+        std::fs::write(
+            this.path("pipeline.yaml"),
+            "version: 1
+cells: {demo: {robot: demo_arm.urdf}}
+stages:
+- {name: ingest, ingest: {file: {path: demo.mcap}, rate: fast}}
+- {name: twin, input: ingest, twin: {}}
+- {name: detect, input: twin, detect: {naive_difference: {}, threshold: {score: 10}}}
+- {name: record, inputs: [ingest, twin, detect], record: {mcap: \"out-{n}.mcap\"}}
+",
+        )
+        .unwrap();
+        this
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// Files and folders with their lengths: a slip must leave them as they are.
+    fn inventory(&self) -> Vec<(PathBuf, u64)> {
+        let mut all = Vec::new();
+        walk(self.folder.path(), &mut all);
+        all.sort();
+        all
+    }
+
+    fn answer(&self, typed: &str) -> Out {
+        let words = typed.split_whitespace();
+        let argument = |word: &str| match word.strip_prefix('@') {
+            Some(name) => self.path(name).into_os_string(),
+            None => word.into(),
+        };
+        Out::answer(words.map(argument).collect::<Vec<_>>())
+    }
+}
+
+fn walk(folder: &Path, all: &mut Vec<(PathBuf, u64)>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let entry = entry.unwrap();
+        let path = entry.path();
+        if path.is_dir() {
+            walk(&path, all);
+        } else {
+            all.push((path, entry.metadata().unwrap().len()));
+        }
+    }
+}
+
+/// Types every slip at a fresh desk and says all that were answered otherwise.
+fn type_all(slips: &[Slip]) {
+    let desk = Desk::new();
+    let before = desk.inventory();
+    let mut wrong = Vec::new();
+    for slip in slips {
+        let out = desk.answer(slip.typed);
+        let said = format!("{}\n{}", out.stdout, out.stderr);
+        let missing: Vec<_> = slip
+            .says
+            .iter()
+            .filter(|words| !said.contains(**words))
+            .collect();
+        let doubled = doubled_path(&said);
+        if out.code != slip.code.into() || !missing.is_empty() || doubled.is_some() {
+            wrong.push(format!(
+                "tauscope {}: {} for {}, without {missing:?}, twice {doubled:?}\n{said}",
+                slip.typed, out.code, slip.code
+            ));
+        }
+        if slip.code == 2 {
+            let after = desk.inventory();
+            for (path, bytes) in &before {
+                assert!(
+                    after.contains(&(path.clone(), *bytes)),
+                    "tauscope {} changed {}",
+                    slip.typed,
+                    path.display()
+                );
+            }
+        }
+    }
+    assert!(
+        wrong.is_empty(),
+        "{} of {}:\n{}",
+        wrong.len(),
+        slips.len(),
+        wrong.join("\n")
+    );
+}
+
+/// A path that stands twice in a row, as errors that are handed up say it.
+fn doubled_path(said: &str) -> Option<&str> {
+    said.lines().find(|line| {
+        let mut parts = line.trim_start_matches("error: ").split(": ");
+        let first = parts.next().filter(|part| part.contains('/'));
+        first.is_some() && first == parts.next()
+    })
+}
