@@ -166,6 +166,8 @@ stages:
         .arg(&long)
         .arg("--out")
         .arg(&twin);
+    let again = folder.path().join("again.mcap");
+    std::fs::copy(&long, &again).unwrap();
     let mut explain = tauscope();
     explain
         .arg("explain")
@@ -173,7 +175,7 @@ stages:
         .arg(&robot)
         .arg("--fit")
         .arg(&long)
-        .arg(&long);
+        .arg(&again);
     explain.arg("--out").arg(&report);
     for (command, result) in [(calibrate, &twin), (explain, &report.join("report.json"))] {
         let began = std::time::Instant::now();
