@@ -73,7 +73,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     };
     let request = explain::from_arguments(&arguments, std::collections::BTreeSet::new())?;
     let input = explain::read(&request, &|share, what| {
-        progress.doing(LOOKED * share, what)
+        progress.doing(LOOKED * share, what);
     })?;
     explain::refuse_to_replace(&folder.explained(), &request, args.force)?;
     explain::make(&folder.explained())?;

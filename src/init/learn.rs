@@ -57,7 +57,7 @@ pub fn learn(
         .chain([REGRESSION.to_owned()])
         .collect();
     let tried = evaluate(set, &twins, true, &|share, what| {
-        progress(TRIED * share, what)
+        progress(TRIED * share, what);
     })?;
     let mut trials = trials(&tried, &twins);
     trials.sort_by(|a, b| {

@@ -111,13 +111,13 @@ fn type_all(slips: &[Slip]) {
     for slip in slips {
         let out = desk.answer(slip.typed);
         let said = format!("{}\n{}", out.stdout, out.stderr);
-        let missing: Vec<_> = slip
+        let missing: Vec<&&str> = slip
             .says
             .iter()
             .filter(|words| !said.contains(**words))
             .collect();
         let doubled = doubled_path(&said);
-        if out.code != slip.code.into() || !missing.is_empty() || doubled.is_some() {
+        if out.code != i32::from(slip.code) || !missing.is_empty() || doubled.is_some() {
             wrong.push(format!(
                 "tauscope {}: {} for {}, without {missing:?}, twice {doubled:?}\n{said}",
                 slip.typed, out.code, slip.code
