@@ -209,3 +209,64 @@ fn a_broken_table_is_refused_with_its_line() {
     );
     assert!(!folder.path().join("out/dirty.mcap").exists());
 }
+
+/// When `init` sees five contact-free recordings of the arm, its pipeline finds the four pushes of a sixth, and nothing in
+/// five others in which nothing touches the arm.
+#[test]
+fn a_ur10e_is_initialised_and_its_pushes_are_found() {
+    let Some(shared) = shared("a_ur10e_is_initialised_and_its_pushes_are_found") else {
+        return;
+    };
+    let recording = |name: &str| shared.join("recordings/ur10e").join(format!("{name}.mcap"));
+    let folder = tempfile::tempdir().unwrap();
+    let cell = folder.path().join("cell");
+    let mut init = tauscope();
+    init.arg("init").args([
+        recording("20_02_10-30sec_12harm"),
+        recording("20_02_05-20sec_12harm"),
+        recording("20_02_05-20sec_8harm"),
+        recording("20_01_31-unload"),
+        recording("20_01_17-p1"),
+    ]);
+    init.arg("--robot").arg(shared.join("robots/ur10e.urdf"));
+    init.arg("--out").arg(&cell);
+    let init = Out::of(init);
+    assert_eq!(init.code, 0, "{}", init.stderr);
+    assert!(init.stdout.contains("Effort is in A"), "{}", init.stdout);
+
+    let mut replay = tauscope();
+    replay.args(["replay", "--json", "--pipeline"]);
+    replay.arg(cell.join("pipeline.yaml"));
+    replay.arg("--out").arg(folder.path().join("results"));
+    replay.args([
+        recording("push_pose_1"),
+        recording("20_01_17-ptp_10_points"),
+        recording("20_01_17-p2"),
+        recording("jointwise_1"),
+        recording("jointwise_2"),
+        recording("jointwise_5"),
+    ]);
+    let replay = Out::of(replay);
+    assert_eq!(replay.code, 0, "{}", replay.stderr);
+    let summary: serde_json::Value = serde_json::from_str(&replay.stdout).unwrap();
+    let found = summary.as_array().unwrap().iter().map(|recording| {
+        let events = recording["detectors"][0]["events"].as_array().unwrap();
+        let begins = events
+            .iter()
+            .map(|event| event["t_contact"].as_f64().unwrap());
+        begins.collect::<Vec<f64>>()
+    });
+    let found: Vec<Vec<f64>> = found.collect();
+    // As README.md of the recordings has them.
+    let pushed = [(2.0, 2.7), (4.7, 5.9), (8.4, 9.5), (12.0, 13.3)];
+    assert_eq!(found[0].len(), pushed.len(), "{:?}", found[0]);
+    for (begins, (from, to)) in found[0].iter().zip(pushed) {
+        assert!(
+            (from - 0.3..to).contains(begins),
+            "{begins} is not {from} to {to}"
+        );
+    }
+    for quiet in &found[1..] {
+        assert!(quiet.is_empty(), "{quiet:?}");
+    }
+}
