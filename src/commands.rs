@@ -2,10 +2,12 @@
 
 pub mod calibrate;
 pub mod check;
+pub mod completions;
 pub mod evaluate;
 pub mod explain;
 pub mod info;
 pub mod init;
+pub mod man;
 pub mod repair;
 pub mod replay;
 pub mod run;

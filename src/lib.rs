@@ -108,6 +108,8 @@ fn run(command: &Command, out: &mut Output) -> u8 {
         Command::Init(args) => commands::init::run(args, out),
         Command::Info(args) => commands::info::run(args, out),
         Command::Repair(args) => commands::repair::run(args, out),
+        Command::Completions(args) => commands::completions::run(args, out),
+        Command::Man(args) => commands::man::run(args, out),
         Command::Stage(_) | Command::Exec(_) => Err(exit::Failure::rejected(
             "this command is for `tauscope run`",
         )),

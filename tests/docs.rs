@@ -100,3 +100,20 @@ fn the_bundled_files_pass_the_check() {
     command.current_dir(root()).arg("check");
     assert_eq!(Out::of(command).code, 0);
 }
+
+#[test]
+fn the_page_of_keys_is_what_the_program_says() {
+    let page = std::fs::read_to_string(root().join("docs/keys.md")).unwrap();
+    let (intro, _) = page.split_once("## ").unwrap();
+    let kinds = ["pipeline", "twin", "case", "set", "scenario"];
+    let tables = kinds.map(|kind| {
+        let keys = Out::answer(["schema", kind, "--keys"]);
+        assert_eq!(keys.code, 0, "{keys:?}");
+        format!("## {kind}\n\n{}", keys.stdout)
+    });
+    let expected = format!("{intro}{}", tables.join("\n"));
+    assert!(
+        page == expected,
+        "docs/keys.md is behind the types: run docs/keys.sh"
+    );
+}

@@ -61,6 +61,20 @@ fn every_contact_of_the_bundled_set_is_found_and_scored() {
     let page = std::fs::read_to_string(out.join("report.html")).unwrap();
     assert!(page.contains("<svg") && !page.contains("<script") && !page.contains("://"));
     assert!(out.join("results.parquet").is_file() && out.join("events.parquet").is_file());
+
+    let again = [
+        "evaluate",
+        set.to_str().unwrap(),
+        "--out",
+        out.to_str().unwrap(),
+    ];
+    let again = common::Out::answer(again.iter().chain(&LIGHT));
+    assert_eq!(again.code, 2, "{again:?}");
+    assert!(again.stderr.contains("--force"), "{again:?}");
+    assert_eq!(
+        std::fs::read_to_string(out.join("report.html")).unwrap(),
+        page
+    );
 }
 
 #[test]

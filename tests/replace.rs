@@ -84,4 +84,24 @@ fn a_second_run_into_one_place_is_refused() {
         &at("explained"),
         &["report.json", "b.csv"],
     );
+    // The name of a motion to record next is known to the explanation alone.
+    std::fs::create_dir(at("moved")).unwrap();
+    write(&at("moved/next_viscous_joint1.csv"), "0,0\n");
+    let moved = at("moved").display().to_string();
+    let refused = Out::answer([
+        "explain",
+        "--robot",
+        &robot,
+        "--fit",
+        &a,
+        "--holdout",
+        &b,
+        "--out",
+        &moved,
+    ]);
+    assert_eq!(refused.code, 2, "{refused:?}");
+    assert!(
+        refused.stderr.contains("next_viscous_joint1.csv is there"),
+        "{refused:?}"
+    );
 }

@@ -163,8 +163,12 @@ fn rename_to_new(part: &Path, path: &Path) -> io::Result<()> {
 mod tests {
     use super::*;
 
+    /// What is unfinished is the process's own, so one test at a time may write.
+    static WRITING: Mutex<()> = Mutex::new(());
+
     #[test]
     fn a_file_that_is_there_stays_unless_it_is_to_be_replaced() {
+        let _alone = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("new/twin.yaml");
         write(&path, "old", Existing::Keep).unwrap();
@@ -178,6 +182,7 @@ mod tests {
 
     #[test]
     fn what_is_unfinished_is_removed_and_what_is_whole_stays() {
+        let _alone = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
         let folder = tempfile::tempdir().unwrap();
         let (whole, torn) = (
             folder.path().join("a.json"),

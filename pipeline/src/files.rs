@@ -2,6 +2,7 @@
 //! `tauscope check --kind` checks.
 
 mod case;
+mod keys;
 mod set;
 
 use std::path::Path;
@@ -48,6 +49,11 @@ impl FileKind {
     /// The schema as a text for editors.
     pub fn schema_text(self) -> String {
         text_of_schema(&self.schema())
+    }
+
+    /// All its keys as Markdown tables below headings of the third level.
+    pub fn keys_text(self) -> String {
+        keys::keys(&self.schema().to_value(), 3)
     }
 
     /// Checks the shape of the file at `path`.

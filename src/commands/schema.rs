@@ -16,12 +16,17 @@ pub struct Args {
     /// Instead, of the JSON messages that a publisher publishes and a source takes.
     #[arg(long, conflicts_with = "kind")]
     messages: bool,
+    /// Instead, all keys of that kind of file, as Markdown tables.
+    #[arg(long, conflicts_with = "messages")]
+    keys: bool,
 }
 
 /// Prints it.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     out.print(&if args.messages {
         files::text_of_schema(&schemars::schema_for!(Messages))
+    } else if args.keys {
+        args.kind.keys_text()
     } else {
         args.kind.schema_text()
     })?;

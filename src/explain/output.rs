@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use tauscope_explain::report::Verdict;
+use tauscope_explain::report::{MOTION_PREFIX, Verdict};
 use tauscope_explain::{Outcome, html};
 use tauscope_pipeline::report::{Problem, Report};
 
@@ -59,13 +59,28 @@ pub fn refuse_to_replace(out: &Path, request: &Request, force: Force) -> Result<
     force.check(results(out, request))
 }
 
-/// What an explanation may write. (Motions that are worth recording next have names that only it knows.)
+/// What an explanation may write. Motions that are worth recording next have names that only it knows; those of an
+/// explanation before count.
 fn results<'a>(out: &'a Path, request: &'a Request) -> impl Iterator<Item = PathBuf> + 'a {
     let fixed = [REPORT, PAGE, TWIN, ROBOT, PICTURE];
     let recordings = request.fit.iter().chain(&request.holdout);
     let predictions = recordings.map(|recording| format!("{}.csv", recording.name));
     let names = fixed.into_iter().map(str::to_owned).chain(predictions);
-    names.map(|name| out.join(name))
+    names.map(|name| out.join(name)).chain(motions(out))
+}
+
+/// The motions to record next that stand in the folder.
+fn motions(out: &Path) -> Vec<PathBuf> {
+    // A folder that cannot be read is found when it is made.
+    let entries = std::fs::read_dir(out).into_iter().flatten().flatten();
+    let is_motion = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        name.starts_with(MOTION_PREFIX) && name.ends_with(".csv")
+    };
+    entries
+        .map(|entry| entry.path())
+        .filter(is_motion)
+        .collect()
 }
 
 fn same_file(a: &Path, b: &Path) -> bool {
@@ -93,9 +108,10 @@ pub fn write(
     }
     let provenance = provenance_of(request).context("what went in")?;
     // What an explanation before has left there must not stand beside a new report.
-    for name in [REPORT, PAGE, TWIN, ROBOT, PICTURE] {
+    let fixed = [REPORT, PAGE, TWIN, ROBOT, PICTURE].map(|name| out.join(name));
+    for path in fixed.into_iter().chain(motions(out)) {
         // One that is not there need not be removed; one that cannot be is found when it is written.
-        let _ = std::fs::remove_file(out.join(name));
+        let _ = std::fs::remove_file(path);
     }
     let mut made = Made::default();
     let mut predictions = Vec::new();

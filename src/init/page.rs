@@ -1,6 +1,5 @@
 //! What was found, on one page.
 
-use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use tauscope_explain::report::{Report, Verdict};
@@ -28,11 +27,7 @@ pub fn page(folder: &Folder, looked: &Looked, report: &Report, learnt: &Learnt) 
     section(&mut text, "Detector", &[]);
     list(&mut text, &learnt.sentences);
 
-    let next = report.next_motions.iter();
-    let mut next: Vec<String> = next.map(|motion| motion.sentence.clone()).collect();
-    let mut seen = BTreeSet::new();
-    next.retain(|sentence| seen.insert(sentence.clone()));
-    let next = first(next, &page.display().to_string());
+    let next = first(motions(report), &page.display().to_string());
     if !next.is_empty() {
         section(&mut text, "Record next", &[]);
         list(&mut text, &next);
@@ -56,6 +51,32 @@ pub fn page(folder: &Folder, looked: &Looked, report: &Report, learnt: &Learnt) 
         ],
     );
     text
+}
+
+/// The motions to record next; a motion that is the same for several joints is told once.
+fn motions(report: &Report) -> Vec<String> {
+    // Stands for the joint in a sentence.
+    const ITS: &str = "joint \0 ";
+    let mut told: Vec<(String, Vec<&str>)> = Vec::new();
+    for motion in &report.next_motions {
+        let joint = motion.separates.first().and_then(|it| it.joint.as_deref());
+        let joint = joint.unwrap_or_default();
+        let sentence = motion.sentence.replace(&format!("joint {joint} "), ITS);
+        match told.iter_mut().find(|(same, _)| *same == sentence) {
+            Some((_, joints)) if joints.contains(&joint) => {}
+            Some((_, joints)) => joints.push(joint),
+            None => told.push((sentence, vec![joint])),
+        }
+    }
+    let told = told.into_iter();
+    told.map(|(sentence, joints)| match &joints[..] {
+        [first @ .., last] if !first.is_empty() => {
+            let all = format!("each of the joints {} and {last} ", first.join(", "));
+            sentence.replace(ITS, &all)
+        }
+        _ => sentence.replace(ITS, &format!("joint {} ", joints.concat())),
+    })
+    .collect()
 }
 
 /// How much smaller the error of the held-out recordings got, joint by joint.

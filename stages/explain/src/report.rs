@@ -16,4 +16,5 @@ pub(crate) mod schema;
 pub(crate) mod sentences;
 pub(crate) mod verdict;
 
+pub use next_motion::MOTION_PREFIX;
 pub use schema::*;

@@ -11,6 +11,9 @@ use crate::physics::active::Hypothesis;
 use crate::read::input::Input;
 use crate::report::schema::{NextMotion, Rival};
 
+/// How the name of a file with a motion to record next begins.
+pub const MOTION_PREFIX: &str = "next_";
+
 /// Share of a joint's range that a trajectory uses.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const RANGE: f64 = 0.8;
@@ -158,7 +161,7 @@ pub fn of(
         sentence: (parts.iter().map(|part| part.words(&joints[joint])))
             .collect::<Vec<_>>()
             .join(" "),
-        trajectory: Some(format!("next_{}_{place}.csv", winner.effect.name)),
+        trajectory: Some(format!("{MOTION_PREFIX}{}_{place}.csv", winner.effect.name)),
     };
     let centre = centre_of(input);
     Some((motion, csv(&input.model, &parts, joint, &centre)))
