@@ -284,6 +284,16 @@ impl<'a> Resolver<'a> {
         let Ok((key, settings)) = ingest.source() else {
             return;
         };
+        if config.expected == Expected::Topic
+            && let Some(help) = settings.without_twin()
+        {
+            let title = format!(
+                "the source `{}` reads no other twin's effort for this",
+                self.entry(source).name
+            );
+            let problem = self.file.at(&place.key("expected"), title).help(help);
+            self.report.push(problem);
+        }
         let Some(topics) = settings.topics() else {
             return;
         };
