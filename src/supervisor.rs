@@ -71,6 +71,12 @@ pub fn run(
     host: Option<&str>,
     care: Care,
 ) -> anyhow::Result<Summary> {
+    // A run that was killed could not do it itself.
+    if let Err(error) = tauscope_bus::link::remove_left_behind() {
+        eprintln!(
+            "warning: what killed runs have left in /tmp and /dev/shm cannot be removed: {error}"
+        );
+    }
     let domain = Domain::unique();
     let router = Router::open(pipeline, links, host)?;
     let meeting_point = router.as_ref().map(Router::endpoint);
