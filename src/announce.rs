@@ -1,5 +1,7 @@
 //! Tells the supervisor, and so people, what a detector or a watch finds, as it finds it.
 
+pub mod commands;
+
 use tauscope_bus::shell;
 use tauscope_bus::{
     Contact, ContactFollower, Detection, Emit, EventKind, LinkError, Stage, StageError, TwinState,

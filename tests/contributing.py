@@ -90,7 +90,7 @@ cells: {{demo: {{robot: tests/data/demo_arm.urdf}}}}
 stages:
   - {{name: ingest, ingest: {source}}}
   - {{name: twin, input: ingest, twin: {{model: tests/data/demo.twin.yaml}}}}
-{more}  - {{name: record, inputs: [ingest, twin{inputs}], record: {{mcap: out/example.mcap}}}}
+{more}  - {{name: record, inputs: [ingest, twin{inputs}], record: {{mcap: "out/example-{{n}}.mcap"}}}}
 """
 DEMO = "{file: {path: tests/data/demo.mcap}, rate: fast}"
 

@@ -101,7 +101,7 @@ fn a_command_holds_from_the_stamp_that_was_answered_live_and_in_a_replay() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     pipeline(folder, port(), "", ", tool: {link: tool}");
-    let run = Live::start(folder, &[]);
+    let mut run = Live::start(folder, &[]);
     let expected = [
         (
             stamp(&send_at_last(folder, &["label", "new", "gripper"])),
@@ -124,6 +124,16 @@ fn a_command_holds_from_the_stamp_that_was_answered_live_and_in_a_replay() {
             vec![],
         ),
     ];
+    // The terminal tells them, too.
+    for words in [
+        "label: new gripper",
+        "alarms muted for 0.3 s",
+        "payload 1.25 kg, centre of mass 0 0 0.1 m",
+        "detectors learn anew",
+        "alarm acknowledged",
+    ] {
+        run.wait_for_part(words);
+    }
     let (code, summary) = run.end();
     assert_eq!(code, 0, "{summary:#}");
 

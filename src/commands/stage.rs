@@ -13,7 +13,7 @@ use tauscope_pipeline::report::Report;
 use tauscope_pipeline::scenario::ScenarioFacts;
 use tauscope_pipeline::settings::Settings;
 
-use crate::announce::Announced;
+use crate::announce::{self, Announced};
 use crate::supervisor::Instructions;
 
 /// A stage of ours: its seat stands on standard input.
@@ -116,7 +116,8 @@ impl Made {
                     .map(ScenarioFacts::robot)
                     .transpose()?;
                 let source = build::ingest(config, robot.as_ref(), cell()?, told.after_ns)?;
-                Self::Source(Box::new(build::commanded(source, config, cell()?)?))
+                let source = build::commanded(source, config, cell()?)?;
+                Self::Source(Box::new(announce::commands::Announced::new(source)))
             }
             Settings::Twin { config, model } => {
                 Self::Twin(Box::new(build::twin(config, model.as_ref(), cell()?)?))

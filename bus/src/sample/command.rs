@@ -63,6 +63,22 @@ impl Command {
         all.find(|verb| *verb as u32 == self.verb)
     }
 
+    /// For people; `None` for no command.
+    pub fn in_words(&self) -> Option<String> {
+        Some(match self.verb()? {
+            Verb::Acknowledge => "alarm acknowledged".to_owned(),
+            Verb::Mute if self.value > 0.0 => format!("alarms muted for {} s", self.value),
+            Verb::Mute => "mute taken back".to_owned(),
+            Verb::Payload if self.value > 0.0 => {
+                let [x, y, z] = self.com_m;
+                format!("payload {} kg, centre of mass {x} {y} {z} m", self.value)
+            }
+            Verb::Payload => "no payload".to_owned(),
+            Verb::Learn => "detectors learn anew".to_owned(),
+            Verb::Label => format!("label: {}", self.text),
+        })
+    }
+
     /// A command without arguments.
     pub(crate) fn of(verb: Verb) -> Self {
         Self {

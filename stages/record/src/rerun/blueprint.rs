@@ -18,7 +18,7 @@ use self::properties::Properties;
 use super::detections::{
     content_entity, events_entity, norms_entity, score_entity, state_entity, threshold_entity,
 };
-use super::painter::Painter;
+use super::painter::{Painter, commands_entity};
 use super::palette::{AXES, CONTACT, EXPECTED, MEASURED, RESIDUAL, SCORE};
 use super::store::entity;
 use super::tracks::STAMP;
@@ -96,10 +96,10 @@ impl Layout<'_> {
         let events: Vec<_> = self
             .of(cell, SampleKind::Detection)
             .map(|stream| events_entity(stream).to_string())
-            .chain([format!(
-                "{}/diagnostics/**",
-                entity(&self.streams.prefix(cell), &[])
-            )])
+            .chain([
+                format!("{}/diagnostics/**", entity(&self.streams.prefix(cell), &[])),
+                commands_entity(self.streams, cell).to_string(),
+            ])
             .collect();
         let events = TextLogView::new("Events").with_contents(events).into();
         self.properties.events(&events);

@@ -34,6 +34,11 @@ impl Pace {
     };
 }
 
+/// Where the commands to a cell are told.
+pub(super) fn commands_entity(streams: &Streams, cell: usize) -> EntityPath {
+    entity(&format!("{}/commands", streams.prefix(cell)), &[])
+}
+
 /// Turns samples into messages.
 #[derive(Debug)]
 pub(super) struct Painter {
@@ -50,6 +55,8 @@ pub(super) struct Painter {
     tracks: Vec<Tracks>,
     /// By stream: entity and what its last report said of trouble.
     health: Vec<(EntityPath, u64)>,
+    /// By cell: where its commands are told.
+    commands: Vec<EntityPath>,
     texts: RowTrack,
 }
 
@@ -104,6 +111,8 @@ impl Painter {
             let topic = format!("{}/diagnostics", streams.prefix(stream.cell));
             health.push((entity(&topic, &[&stream.stage]), 0));
         }
+        let cells = 0..streams.cells.len();
+        let commands = cells.map(|cell| commands_entity(streams, cell)).collect();
         let texts = RowTrack::default();
         Ok(Self {
             store,
@@ -114,6 +123,7 @@ impl Painter {
             robots,
             tracks,
             health,
+            commands,
             texts,
         })
     }
@@ -145,7 +155,14 @@ impl Painter {
         let start_ns = self.start_ns.unwrap_or(stamp_ns);
         match (sample, &mut self.tracks[index]) {
             (SampleRef::Health(health), _) => self.report(index, health)?,
-            (SampleRef::JointState(state), tracks) => tracks.joint_state(state, robot),
+            (SampleRef::JointState(state), tracks) => {
+                tracks.joint_state(state, robot);
+                if let Some(words) = state.command.in_words() {
+                    let text = TextLog::new(words).with_level(TextLogLevel::INFO);
+                    let entity = &self.commands[cell];
+                    self.texts.push(&self.store, &state.header, entity, &text)?;
+                }
+            }
             (SampleRef::TwinState(state), tracks) => tracks.twin_state(state, robot),
             (SampleRef::Detection(detection), Tracks::Detection(tracks)) => {
                 let joints = &streams.cells[cell].joint_names;

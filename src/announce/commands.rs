@@ -1,0 +1,120 @@
+//! Tells the supervisor, and so people, which commands the source of a cell has taken, and when a mute ends.
+
+use std::time::Duration;
+
+use tauscope_bus::command::LONGEST_MUTE_S;
+use tauscope_bus::{
+    Emit, JointState, LinkError, Progress, Source, StageError, Trouble, Verb, shell,
+};
+
+/// A source whose commands are told to the supervisor. Its stream is untouched.
+pub struct Announced<S> {
+    source: S,
+    told: Told,
+}
+
+/// What has been told so far.
+#[derive(Debug, Default)]
+struct Told {
+    /// Stamp of the first sample, from which times are counted \[ns\].
+    start_ns: Option<i64>,
+    /// When the mute ends \[ns\], while there is one.
+    muted_until_ns: Option<i64>,
+}
+
+impl<S> Announced<S> {
+    /// Any source.
+    pub fn new(source: S) -> Self {
+        let told = Told::default();
+        Self { source, told }
+    }
+}
+
+impl<S: Source<JointState>> Source<JointState> for Announced<S> {
+    fn step(&mut self, out: &mut dyn Emit<JointState>) -> Result<Progress, StageError> {
+        self.source.step(&mut Listener {
+            out,
+            told: &mut self.told,
+        })
+    }
+
+    fn dropped(&self) -> u64 {
+        self.source.dropped()
+    }
+
+    fn fraction_done(&self) -> Option<f64> {
+        self.source.fraction_done()
+    }
+
+    fn trouble(&mut self, silent_for: Duration) -> Option<Trouble> {
+        self.source.trouble(silent_for)
+    }
+}
+
+struct Listener<'a> {
+    out: &'a mut dyn Emit<JointState>,
+    told: &'a mut Told,
+}
+
+impl Emit<JointState> for Listener<'_> {
+    fn emit(&mut self, write: &mut dyn FnMut(&mut JointState)) -> Result<(), LinkError> {
+        let told = &mut *self.told;
+        self.out.emit(&mut |slot| {
+            write(slot);
+            for line in told.lines(slot) {
+                shell::note(&line);
+            }
+        })
+    }
+}
+
+impl Told {
+    /// What is to be said of a sample.
+    fn lines(&mut self, state: &JointState) -> impl Iterator<Item = String> + use<> {
+        let now_ns = state.header.stamp_ns;
+        let start_ns = *self.start_ns.get_or_insert(now_ns);
+        let t = (now_ns - start_ns) as f64 * 1e-9;
+        let over = self.muted_until_ns.is_some_and(|until| now_ns >= until);
+        if over {
+            self.muted_until_ns = None;
+        }
+        let command = &state.command;
+        if command.verb() == Some(Verb::Mute) {
+            let lease_ns = (command.value.clamp(0.0, LONGEST_MUTE_S) * 1e9) as i64;
+            self.muted_until_ns = (lease_ns > 0).then(|| now_ns.saturating_add(lease_ns));
+        }
+        let over = over.then(|| format!("{t:8.3} s  the mute is over"));
+        let taken = command.in_words();
+        let taken = taken.map(|words| format!("{t:8.3} s  {words}"));
+        over.into_iter().chain(taken)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tauscope_bus::Command;
+
+    #[test]
+    fn a_mute_is_told_when_it_begins_and_when_it_ends() {
+        let mut told = Told::default();
+        let mut said = Vec::new();
+        for n in 0..5_i64 {
+            let mut state = JointState::default();
+            state.header.stamp_ns = 1_000_000_000 * n;
+            if n == 1 {
+                state.command = Command {
+                    verb: Verb::Mute as u32,
+                    value: 2.0,
+                    ..Command::default()
+                };
+            }
+            said.extend(told.lines(&state));
+        }
+        let expected = [
+            "   1.000 s  alarms muted for 2 s",
+            "   3.000 s  the mute is over",
+        ];
+        assert_eq!(said, expected);
+    }
+}
