@@ -54,6 +54,8 @@ const LOOK_EVERY: Duration = Duration::from_millis(250);
 pub struct Care {
     /// A run in which a source gives nothing for so long has failed.
     pub expect_data: Option<Duration>,
+    /// The run ends by itself so long after the first sample.
+    pub for_data: Option<Duration>,
     /// How much is told.
     pub verbosity: Verbosity,
 }
@@ -71,6 +73,12 @@ pub fn run(
     host: Option<&str>,
     care: Care,
 ) -> anyhow::Result<Summary> {
+    // A run that was killed could not do it itself.
+    if let Err(error) = tauscope_bus::link::remove_left_behind() {
+        eprintln!(
+            "warning: what killed runs have left in /tmp and /dev/shm cannot be removed: {error}"
+        );
+    }
     let domain = Domain::unique();
     let router = Router::open(pipeline, links, host)?;
     let meeting_point = router.as_ref().map(Router::endpoint);
@@ -117,6 +125,7 @@ async fn supervise(
         care,
         began: now,
         told_unready: false,
+        first_sample: None,
     };
     supervisor.start_all()?;
     supervisor.watch(events).await?;
@@ -137,6 +146,8 @@ struct Supervisor<'a> {
     began: Instant,
     /// It was told which stages do not begin.
     told_unready: bool,
+    /// When a source gave its first sample.
+    first_sample: Option<Instant>,
 }
 
 impl Supervisor<'_> {

@@ -130,3 +130,46 @@ fn a_stage_that_keeps_dying_ends_the_run() {
     assert_eq!(code, 1, "{summary}");
     assert_eq!(stage(&summary, "twin")["failed"], true);
 }
+
+#[test]
+fn what_a_killed_run_leaves_is_removed_by_the_next_one_and_what_lives_is_not() {
+    let folder = tempfile::tempdir().unwrap();
+    pipeline(folder.path());
+    let mut dead = Live::start(folder.path(), &[]);
+    dead.wait_for_stage("record");
+    let domain = |live: &Live| format!("t{:07x}", live.id());
+    let left = |domain: &str| -> Vec<std::path::PathBuf> {
+        let entries = ["/tmp", "/dev/shm"].map(|it| std::fs::read_dir(it).unwrap());
+        let paths = entries.into_iter().flatten().map(|it| it.unwrap().path());
+        paths
+            .filter(|path| {
+                let name = path.file_name().unwrap().to_string_lossy().into_owned();
+                name.trim_start_matches("tauscope_").starts_with(domain)
+            })
+            .collect()
+    };
+    let killed = domain(&dead);
+    signal(dead.id(), "KILL");
+    drop(dead);
+    assert!(left(&killed).len() > 1, "{:?}", left(&killed));
+    // As if a minute had passed.
+    let folder_of = left(&killed)
+        .into_iter()
+        .find(|path| path.starts_with("/tmp"));
+    let earlier = std::time::SystemTime::now() - Duration::from_mins(2);
+    let opened = std::fs::File::open(folder_of.unwrap()).unwrap();
+    opened.set_modified(earlier).unwrap();
+
+    let other = tempfile::tempdir().unwrap();
+    pipeline(other.path());
+    let mut live = Live::start(other.path(), &[]);
+    live.wait_for_stage("record");
+    assert_eq!(left(&killed), Vec::<std::path::PathBuf>::new());
+    let own = left(&domain(&live));
+    tauscope_bus::link::remove_left_behind().unwrap();
+    assert!(
+        !own.is_empty() && own.iter().all(|path| path.exists()),
+        "{own:?}"
+    );
+    assert_eq!(live.end().0, 0);
+}

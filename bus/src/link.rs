@@ -21,7 +21,7 @@ pub mod zenoh;
 
 pub use fan_out::FanOut;
 pub use in_process::InProcess;
-pub use shared_memory::{Domain, DomainError, SharedMemory};
+pub use shared_memory::{Domain, DomainError, SharedMemory, left_behind, remove_left_behind};
 pub use zenoh::{Zenoh, ZenohEndpoints, ZenohRouter, zenoh_reason};
 
 /// How long a sender waits for one keep-all receiver that takes nothing, before it counts the

@@ -38,10 +38,12 @@ use crate::sample::Sample;
 
 mod backpressure;
 mod domain;
+mod leftovers;
 mod receiver;
 mod sender;
 
 pub use domain::{Domain, DomainError};
+pub use leftovers::{left_behind, remove_left_behind};
 
 const TRANSPORT: &str = "iceoryx2";
 /// Most receivers of a stream per [`Keep`]. Shared memory is laid out for all of them, but only

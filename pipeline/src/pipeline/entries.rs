@@ -287,12 +287,9 @@ impl<'a> Resolver<'a> {
         if config.expected == Expected::Topic
             && let Some(help) = settings.without_twin()
         {
-            let title = format!(
-                "the source `{}` reads no other twin's effort for this",
-                self.entry(source).name
-            );
-            let problem = self.file.at(&place.key("expected"), title).help(help);
-            self.report.push(problem);
+            let title = "the source reads no other twin's effort for this";
+            self.report
+                .push(self.file.at(&place.key("expected"), title).help(help));
         }
         let Some(topics) = settings.topics() else {
             return;

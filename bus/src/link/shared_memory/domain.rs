@@ -12,7 +12,7 @@ use super::open_error;
 use crate::link::LinkError;
 
 /// Where Linux keeps shared memory that has a name.
-const SEGMENTS: &str = "/dev/shm";
+pub(super) const SEGMENTS: &str = "/dev/shm";
 
 /// The name under which the processes of one run find each other on a host, and that keeps two runs
 /// apart: 1 to 16 of `a-z`, `0-9` and `_`.
@@ -29,6 +29,9 @@ impl Domain {
     /// Longest name in bytes: sockets below it must have paths of less than 104.
     /// Physical: `sockaddr_un` of Linux holds a path of 108 bytes, that of macOS 104.
     pub const CAPACITY: usize = 16;
+
+    /// How the name of a domain's folder in `/tmp` begins.
+    pub(super) const FOLDER: &str = "tauscope_";
 
     /// The domain of that name.
     ///
@@ -52,6 +55,12 @@ impl Domain {
         Self(format!("t{:07x}{nanoseconds:08x}", std::process::id()))
     }
 
+    /// Whether [`Domain::unique`] gives such names.
+    pub(super) fn is_unique_name(name: &str) -> bool {
+        let digits = name.strip_prefix('t').unwrap_or_default();
+        digits.len() == 15 && digits.bytes().all(|b| b.is_ascii_hexdigit())
+    }
+
     /// The name.
     pub fn as_str(&self) -> &str {
         &self.0
@@ -59,7 +68,7 @@ impl Domain {
 
     /// Where the files of the domain lie, besides those in shared memory.
     pub fn directory(&self) -> PathBuf {
-        PathBuf::from(format!("/tmp/tauscope_{}", self.0))
+        PathBuf::from(format!("/tmp/{}{}", Self::FOLDER, self.0))
     }
 
     /// Removes all that a domain has left on this host. Nobody may use it any more: iceoryx2 takes
@@ -134,6 +143,7 @@ mod tests {
     #[test]
     fn a_unique_domain_is_a_domain() {
         let domain = Domain::unique();
+        assert!(Domain::is_unique_name(domain.as_str()), "{domain}");
         assert_eq!(Domain::new(domain.as_str()), Ok(domain));
     }
 
