@@ -69,7 +69,14 @@ fn the_wheel_reads_recordings_and_runs_commands() {
         // Not from the source tree: what is tested is what is installed.
         pytest
             .current_dir(folder.path())
-            .args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "--durations=5"])
+            .args([
+                "-m",
+                "pytest",
+                "-q",
+                "-p",
+                "no:cacheprovider",
+                "--durations=5",
+            ])
             .arg(root().join("python/tests"));
         pytest
     });

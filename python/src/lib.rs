@@ -17,12 +17,20 @@ use table::Table;
 ///
 /// Raises `ValueError(message, file, line)` where nothing can be read.
 #[pyfunction]
+#[expect(
+    clippy::needless_pass_by_value,
+    reason = "pyo3 converts into owned paths"
+)]
 fn read_joint_states(
     py: Python<'_>,
     path: PathBuf,
     topic: Option<String>,
 ) -> PyResult<(Table, String, Vec<String>)> {
     // Ctrl-C is noted by the interpreter, which must be asked for it.
+    #[expect(
+        clippy::redundant_closure_for_method_calls,
+        reason = "the method is not general enough over lifetimes"
+    )]
     let may_go_on = || Python::attach(|py| py.check_signals());
     match py.detach(|| joint_states::read(&path, topic.as_deref(), &may_go_on)) {
         Ok(read) => Ok((Table::of(read.batch), read.topic, read.lost)),
@@ -37,6 +45,10 @@ fn read_joint_states(
 
 /// Reads a Parquet file that a command wrote.
 #[pyfunction]
+#[expect(
+    clippy::needless_pass_by_value,
+    reason = "pyo3 converts into owned paths"
+)]
 fn read_parquet(py: Python<'_>, path: PathBuf) -> PyResult<Table> {
     py.detach(|| table::read_parquet(&path))
         .map_err(|error| PyValueError::new_err(format!("{}: {error}", path.display())))

@@ -16,7 +16,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyCapsule;
 
 /// Columns of equal length in Arrow's layout. `pyarrow.table`, `polars.from_arrow`, `duckdb` and every other library
-/// that knows the Arrow PyCapsule interface takes it without a copy.
+/// that knows the Arrow `PyCapsule` interface takes it without a copy.
 #[pyclass(module = "tauscope", frozen)]
 #[derive(Debug)]
 pub struct Table {
@@ -59,7 +59,9 @@ impl Table {
             .into_iter()
             .map(|column| Arc::new(Float64Array::from(column)) as ArrayRef);
         let columns = std::iter::once((key, first)).chain(names.into_iter().zip(arrays));
-        Ok(Self::of(RecordBatch::try_from_iter(columns).map_err(refused)?))
+        Ok(Self::of(
+            RecordBatch::try_from_iter(columns).map_err(refused)?,
+        ))
     }
 
     /// Number of rows.

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import pytest
 
+import tauscope
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -14,9 +16,7 @@ def data() -> Path:
 
 
 @pytest.fixture(scope="session")
-def concealed(data: Path, tmp_path_factory: pytest.TempPathFactory):
+def concealed(data: Path, tmp_path_factory: pytest.TempPathFactory) -> tauscope.Simulation:
     """Recordings of an arm with one physical effect that its URDF does not have."""
-    import tauscope
-
     out = tmp_path_factory.mktemp("concealed")
     return tauscope.simulate(data / "concealed.scenario.yaml", out=out)

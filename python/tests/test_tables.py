@@ -16,7 +16,8 @@ def test_a_recording_is_a_table_with_three_columns_a_joint(data: Path) -> None:
     frame = pyarrow.table(recording).to_pandas()
     assert len(frame) == len(recording) == counted["/joint_states"] > 1000
     assert len(recording.joints) == 7
-    assert list(frame.columns[:4]) == ["stamp_ns", *(f"{recording.joints[0]}.{q}" for q in ("position", "velocity", "effort"))]
+    joint = recording.joints[0]
+    assert list(frame.columns[:4]) == ["stamp_ns", f"{joint}.position", f"{joint}.velocity", f"{joint}.effort"]
     assert frame["stamp_ns"].is_monotonic_increasing
     joint = recording.joints[1]
     position, velocity = frame[f"{joint}.position"], frame[f"{joint}.velocity"]
@@ -41,12 +42,20 @@ def test_the_data_outlive_the_recording(data: Path) -> None:
     assert table["stamp_ns"].to_pylist() == before
 
 
-def test_pandas_takes_it(data: Path) -> None:
+def test_pandas_takes_it_by_itself(data: Path) -> None:
     recording = tauscope.read(data / "demo.mcap", topic="/joint_states")
-    frame = pandas.DataFrame.from_arrow(recording) if hasattr(pandas.DataFrame, "from_arrow") else None
-    if frame is None:
-        frame = pyarrow.table(recording).to_pandas()
-    assert frame.shape == (len(recording), 22)
+    assert pandas.DataFrame.from_arrow(recording).shape == (len(recording), 22)
+
+
+def test_a_value_that_a_message_does_not_have_is_null(tmp_path: Path) -> None:
+    table = tmp_path / "positions.csv"
+    table.write_text("0.0,0.1,0.2\n0.1,0.3,0.4\n")
+    (tmp_path / "positions.columns.yaml").write_text(
+        "{time: {number: 1}, position: {first: 2}, joints: [shoulder, elbow]}"
+    )
+    read = pyarrow.table(tauscope.read(table))
+    assert read["shoulder.position"].to_pylist() == [0.1, 0.3]
+    assert read["elbow.effort"].to_pylist() == [None, None]
 
 
 def test_a_torn_recording_is_read_up_to_the_tear_and_says_so(data: Path, tmp_path: Path) -> None:
@@ -68,9 +77,11 @@ def test_a_missing_file_and_a_missing_topic_are_input_errors(data: Path, tmp_pat
 
 def test_a_broken_line_of_a_table_is_named(tmp_path: Path) -> None:
     table = tmp_path / "broken.csv"
-    header = "timestamp," + ",".join(f"{name}_{joint}" for name in ("actual_q", "actual_qd", "actual_current") for joint in range(6))
-    row = ",".join(["0.5"] * 18)
-    table.write_text(f"{header}\n0.0,{row}\n0.1,{row.replace('0.5', 'x', 1)}\n")
+    # As the RTDE recorder of Universal Robots writes it.
+    quantities = ("actual_q", "actual_qd", "actual_current")
+    header = " ".join(["timestamp", *(f"{name}_{joint}" for name in quantities for joint in range(6))])
+    values = " ".join(["0.5"] * 17)
+    table.write_text(f"{header}\n0.0 0.5 {values}\n0.1 x {values}\n")
     with pytest.raises(tauscope.InputError) as caught:
         tauscope.read(table)
     assert (caught.value.file, caught.value.line) == (str(table), 3)
