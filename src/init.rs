@@ -1,5 +1,6 @@
 //! `tauscope init`: from contact-free recordings to a folder with a running pipeline.
 //!
+//! 0. [`live`]: with `--live`, the recordings are made first.
 //! 1. [`look`]: the topic, the joints and the unit of the effort.
 //! 2. `explain` makes the twin, and holds some recordings out.
 //! 3. [`learn`]: the detector learns behind it, judged on the recordings held out.
@@ -7,6 +8,7 @@
 
 mod folder;
 mod learn;
+mod live;
 mod look;
 mod page;
 
@@ -19,6 +21,7 @@ use crate::exit::Failure;
 
 pub use folder::Folder;
 pub use learn::learn;
+pub use live::Live;
 pub use look::Told;
 pub use page::page;
 

@@ -20,7 +20,7 @@ mod terminal;
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{CommandFactory as _, Parser};
 use rustix::process::{Signal, set_parent_process_death_signal};
 use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::prelude::*;
@@ -143,8 +143,8 @@ fn outcome(command: &Command, out: &mut Output) -> Result<exit::Exit, exit::Fail
         Command::Init(args) => commands::init::run(args, out),
         Command::Info(args) => commands::info::run(args, out),
         Command::Repair(args) => commands::repair::run(args, out),
-        Command::Completions(args) => commands::completions::run(args, out),
-        Command::Man(args) => commands::man::run(args, out),
+        Command::Completions(args) => commands::completions::run(args, Cli::command(), out),
+        Command::Man(args) => commands::man::run(args, Cli::command(), out),
         Command::Stage(_) | Command::Exec(_) => Err(exit::Failure::rejected(
             "this command is for `tauscope run`",
         )),

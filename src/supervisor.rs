@@ -54,6 +54,8 @@ const LOOK_EVERY: Duration = Duration::from_millis(250);
 pub struct Care {
     /// A run in which a source gives nothing for so long has failed.
     pub expect_data: Option<Duration>,
+    /// The run ends by itself so long after the first sample.
+    pub for_data: Option<Duration>,
     /// How much is told.
     pub verbosity: Verbosity,
 }
@@ -123,6 +125,7 @@ async fn supervise(
         care,
         began: now,
         told_unready: false,
+        first_sample: None,
     };
     supervisor.start_all()?;
     supervisor.watch(events).await?;
@@ -143,6 +146,8 @@ struct Supervisor<'a> {
     began: Instant,
     /// It was told which stages do not begin.
     told_unready: bool,
+    /// When a source gave its first sample.
+    first_sample: Option<Instant>,
 }
 
 impl Supervisor<'_> {

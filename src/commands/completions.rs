@@ -1,9 +1,7 @@
 //! `tauscope completions`.
 
-use clap::CommandFactory as _;
 use clap_complete::Shell;
 
-use crate::cli::Cli;
 use crate::exit::{Exit, Failure};
 use crate::output::Output;
 
@@ -17,12 +15,12 @@ pub struct Args {
     shell: Shell,
 }
 
-/// Prints it.
-pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
+/// Prints it for the `program`'s command line.
+pub fn run(args: &Args, mut program: clap::Command, out: &mut Output) -> Result<Exit, Failure> {
     let mut script = Vec::new();
     clap_complete::generate(
         args.shell,
-        &mut Cli::command(),
+        &mut program,
         env!("CARGO_PKG_NAME"),
         &mut script,
     );

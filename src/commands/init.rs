@@ -9,7 +9,7 @@ use super::effort_unit;
 use crate::existing::Force;
 use crate::exit::{Exit, Failure};
 use crate::explain::{self, Arguments, Kept};
-use crate::init::{self, Folder, Told};
+use crate::init::{self, Folder, Live, Told};
 use crate::interrupt;
 use crate::output::Output;
 use crate::progress::Progress;
@@ -22,8 +22,23 @@ use crate::progress::Progress;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Recordings in which nothing touches the robot.
-    #[arg(required = true, value_name = "RECORDING")]
+    #[arg(
+        required_unless_present = "live",
+        conflicts_with = "live",
+        value_name = "RECORDING"
+    )]
     recordings: Vec<PathBuf>,
+    /// Record the running robot for so long instead, in five pieces. Let it move; nothing may touch it.
+    #[arg(long, value_name = "SECONDS")]
+    live: Option<f64>,
+    /// The live source, as in the `ingest` of a pipeline file.
+    #[arg(
+        long,
+        value_name = "YAML",
+        requires = "live",
+        default_value = "zenoh: {connect: [\"tcp/localhost:7447\"]}"
+    )]
+    source: String,
     /// The robot's URDF.
     #[arg(long, value_name = "URDF")]
     robot: PathBuf,
@@ -47,11 +62,23 @@ const EXPLAINED: f64 = 0.75;
 /// Sets up the cell.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let folder = Folder::prepare(&args.out, args.force)?;
+    let recordings = match args.live {
+        None => args.recordings.clone(),
+        Some(seconds) => {
+            let (source, robot) = (&args.source, &args.robot);
+            let live = Live {
+                seconds,
+                source,
+                robot,
+            };
+            live.record(&folder, out)?
+        }
+    };
     let progress = Progress::of_work();
     progress.doing(0.0, "looking at the recordings");
     let told = Told {
         robot: &args.robot,
-        recordings: &args.recordings,
+        recordings: &recordings,
         state_topic: args.state_topic.as_deref(),
         effort_unit: args.effort_unit,
     };
@@ -100,11 +127,9 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     )?;
     let hold = interrupt::hold();
     folder.write_twin(&learnt.twin)?;
-    let shown = holdout
-        .first()
-        .or(fit.first())
-        .unwrap_or(&args.recordings[0]);
-    folder.write_pipeline(&looked.cell, &looked.state_topic, shown)?;
+    let shown = holdout.first().or(fit.first()).unwrap_or(&recordings[0]);
+    let live = args.live.is_some().then_some(&*args.source);
+    folder.write_pipeline(&looked.cell, &looked.state_topic, shown, live)?;
     let page = init::page(&folder, &looked, &outcome.report, &learnt);
     init::write(&folder.page(), page.as_bytes())?;
     drop(hold);

@@ -3,9 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use clap::CommandFactory as _;
 
-use crate::cli::Cli;
 use crate::existing::Force;
 use crate::exit::{Exit, Failure};
 use crate::output::Output;
@@ -22,11 +20,10 @@ pub struct Args {
     force: Force,
 }
 
-/// Writes them.
-pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
-    let mut command = Cli::command();
-    command.build();
-    let pages = pages(&command).context("cannot make the pages")?;
+/// Writes them for the `program`'s command line.
+pub fn run(args: &Args, mut program: clap::Command, out: &mut Output) -> Result<Exit, Failure> {
+    program.build();
+    let pages = pages(&program).context("cannot make the pages")?;
     args.force
         .check(pages.iter().map(|(name, _)| args.out.join(name)))?;
     std::fs::create_dir_all(&args.out).map_err(|error| {

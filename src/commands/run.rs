@@ -95,6 +95,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let links = plan::links(&pipeline);
     let care = Care {
         expect_data: args.expect_data,
+        for_data: None,
         verbosity: args.telling.verbosity(),
     };
     let summary = supervisor::run(&pipeline, &links, host, care)?;

@@ -69,6 +69,16 @@ impl Folder {
         self.path.join("set.yaml")
     }
 
+    /// The recordings that `--live` makes.
+    pub fn recordings(&self) -> PathBuf {
+        self.path.join("recordings")
+    }
+
+    /// The pipeline that makes them.
+    pub fn recorder(&self) -> PathBuf {
+        self.path.join("record.yaml")
+    }
+
     /// What was found.
     pub fn page(&self) -> PathBuf {
         self.path.join("init.md")
@@ -118,7 +128,8 @@ impl Folder {
         write(&self.twin(), text.as_bytes())
     }
 
-    /// Writes the pipeline file, which plays `recording` until it is told to listen to the robot, and its schema.
+    /// Writes the pipeline file, and its schema. It listens to the `live` source; without one it plays `recording` until
+    /// it is told to listen to the robot.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -127,12 +138,15 @@ impl Folder {
         cell: &Cell,
         state_topic: &str,
         recording: &Path,
+        live: Option<&str>,
     ) -> Result<(), Failure> {
         let schema = FileKind::Pipeline.schema_text();
         write(&self.path.join("pipeline.schema.json"), schema.as_bytes())?;
         let absolute = std::path::absolute(recording);
         let recording = absolute.as_deref().unwrap_or(recording);
+        let source = live.map_or(RECORDED.to_owned(), |live| LIVE.replace("LIVE", live));
         let text = PIPELINE
+            .replace("SOURCE", &source)
             .replace("CELL", &name(&cell.facts.name))
             .replace("UNIT", cell.facts.effort_unit.as_str())
             .replace("RECORDING", &quoted(&recording.display().to_string()))
@@ -142,7 +156,7 @@ impl Folder {
 }
 
 /// A text as YAML holds any text.
-fn quoted(text: &str) -> String {
+pub fn quoted(text: &str) -> String {
     format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
 }
 
@@ -175,12 +189,7 @@ cells:
 
 stages:
   - name: ingest
-    ingest:
-      # A recording, as fast as it was recorded. `replay` puts its own recordings in its place.
-      file: {path: RECORDING, topics: {state: TOPIC}}
-      rate: 1
-      # The robot itself, from ROS 2 with rmw_zenoh, in place of the line with `file`. docs/live.md has other ways.
-      # zenoh: {connect: ["tcp/localhost:7447"], domain: 0, topics: {state: TOPIC}}
+SOURCE
 
   - name: twin
     input: ingest
@@ -199,6 +208,16 @@ stages:
       mcap: "out/CELL-{n}.mcap"
       rerun: {file: "out/CELL-{n}.rrd"}
 "#;
+
+const RECORDED: &str = r#"    ingest:
+      # A recording, as fast as it was recorded. `replay` puts its own recordings in its place.
+      file: {path: RECORDING, topics: {state: TOPIC}}
+      rate: 1
+      # The robot itself, from ROS 2 with rmw_zenoh, in place of the line with `file`. docs/live.md has other ways.
+      # zenoh: {connect: ["tcp/localhost:7447"], domain: 0, topics: {state: TOPIC}}"#;
+
+const LIVE: &str = "    # The robot itself. `replay` puts its own recordings in its place.
+    ingest: {LIVE}";
 
 #[cfg(test)]
 mod tests {

@@ -24,6 +24,7 @@ impl Supervisor<'_> {
             self.tell_who_does_not_begin(now);
             self.tell_who_is_silent(now);
             self.end_without_data(now);
+            self.end_in_time(now);
         }
         self.tell_who_does_not_end(now);
         let stages = &self.stages;
@@ -161,6 +162,20 @@ impl Supervisor<'_> {
         ));
         self.ended = Ended::NoData;
         self.stop();
+    }
+
+    /// Ends the run that lasts for so much data.
+    fn end_in_time(&mut self, now: Instant) {
+        let mut sources = self.stages.iter().filter(|stage| stage.is_source());
+        if self.first_sample.is_none() && sources.any(|stage| stage.flow.count() > 0) {
+            self.first_sample = Some(now);
+        }
+        let lasted = self.first_sample.map(|first| now.duration_since(first));
+        if let (Some(lasted), Some(limit)) = (lasted, self.care.for_data)
+            && lasted >= limit
+        {
+            self.stop();
+        }
     }
 
     fn is_fed_by_other_hosts(&self, stage: &Local) -> bool {

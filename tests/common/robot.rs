@@ -4,7 +4,7 @@
 
 use std::net::TcpListener;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU16, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime};
 
@@ -16,10 +16,17 @@ pub const JOINTS: [&str; 7] = [
     "joint1", "joint2", "joint3", "joint4", "joint5", "joint6", "joint7",
 ];
 
-/// An endpoint that nobody listens on right now.
+/// An endpoint that nobody listens on right now: below the ports that Linux gives to connections, so that none of those
+/// takes it in the meantime.
 pub fn endpoint() -> String {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    format!("tcp/{}", listener.local_addr().unwrap())
+    static NEXT: AtomicU16 = AtomicU16::new(0);
+    loop {
+        let spread = (std::process::id() % 1000) as u16 * 10;
+        let port = 20_000 + (spread + NEXT.fetch_add(1, Ordering::Relaxed)) % 12_000;
+        if TcpListener::bind(("127.0.0.1", port)).is_ok() {
+            return format!("tcp/127.0.0.1:{port}");
+        }
+    }
 }
 
 /// A router that listens there.

@@ -1,0 +1,135 @@
+//! Recordings of the live robot, in place of those that were made before.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use tauscope_pipeline::pipeline::Pipeline;
+use tauscope_pipeline::report::Problem;
+
+use super::folder::{Folder, quoted};
+use crate::exit::{Exit, Failure};
+use crate::interrupt;
+use crate::output::Output;
+use crate::plan;
+use crate::supervisor::{self, Care, Verbosity};
+
+/// Recordings that are made: one in four is held out, as where somebody gives five.
+const RECORDINGS: f64 = 5.0;
+/// The shortest time that is worth it \[s\].
+const SHORTEST_S: f64 = 10.0;
+/// Without joint states for so long the command fails; by then the source has said why.
+const EXPECT_DATA: Duration = Duration::from_secs(15);
+
+/// A live source, and for how long it is recorded.
+#[derive(Debug)]
+pub struct Live<'a> {
+    /// How long \[s\].
+    pub seconds: f64,
+    /// The settings of the source, as in a pipeline's `ingest`.
+    pub source: &'a str,
+    /// The URDF.
+    pub robot: &'a Path,
+}
+
+impl Live<'_> {
+    /// Records, and gives the recordings. The pipeline that does it stays in the folder.
+    ///
+    /// # Errors
+    /// If the source's settings are wrong, nothing comes, data was lost, or somebody interrupts it.
+    pub fn record(&self, folder: &Folder, out: &mut Output) -> Result<Vec<PathBuf>, Failure> {
+        if self.seconds.is_nan() || self.seconds < SHORTEST_S {
+            let title = format!("{} s are too short to learn from", self.seconds);
+            let help = format!("give {SHORTEST_S} s or more; a minute or two are a good start");
+            return Err(Failure::Rejected(Problem::new(title).help(help).into()));
+        }
+        let recordings = folder.recordings();
+        if let Some(old) = of_folder(&recordings).first() {
+            let title = format!("{} is there already", old.display());
+            let help = "move the recordings of an earlier start away, or give them as RECORDING in place of --live";
+            return Err(Failure::Rejected(Problem::new(title).help(help).into()));
+        }
+        let file = folder.recorder();
+        super::write(&file, self.pipeline(&recordings).as_bytes())?;
+        let pipeline = Pipeline::load(&file, None)?;
+        let links = plan::links(&pipeline);
+        let care = Care {
+            expect_data: Some(EXPECT_DATA),
+            for_data: Some(Duration::from_secs_f64(self.seconds)),
+            verbosity: Verbosity::Normal,
+        };
+        out.say(&format!(
+            "recording for {} s: move the robot through different motions, and let nothing touch it",
+            self.seconds
+        ));
+        let hold = interrupt::hold();
+        let summary = supervisor::run(&pipeline, &links, None, care)?;
+        if interrupt::is_asked() {
+            let there = format!(
+                "while recording; {} holds what there is",
+                recordings.display()
+            );
+            return Err(Failure::Interrupted(there));
+        }
+        drop(hold);
+        match summary.exit() {
+            Exit::Done => Ok(of_folder(&recordings)),
+            exit => {
+                out.print(&summary.table())?;
+                let lost = exit == Exit::Lossy;
+                let why = if lost {
+                    "samples were lost"
+                } else {
+                    "the recording failed"
+                };
+                Err(Failure::Failed(anyhow::anyhow!(
+                    "{why}; nothing was learnt"
+                )))
+            }
+        }
+    }
+
+    fn pipeline(&self, recordings: &Path) -> String {
+        let absolute = |path: &Path| {
+            let absolute = std::path::absolute(path);
+            let path = absolute.as_deref().unwrap_or(path);
+            path.display().to_string()
+        };
+        RECORDER
+            .replace("ROBOT", &quoted(&absolute(self.robot)))
+            .replace("SOURCE", self.source)
+            .replace(
+                "FILES",
+                &quoted(&format!("{}/{{n}}.mcap", absolute(recordings))),
+            )
+            .replace("SECONDS", &format!("{:.1}", self.seconds / RECORDINGS))
+    }
+}
+
+/// The recordings in a folder; none where there is no folder.
+fn of_folder(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let paths = entries.map(|entry| entry.path());
+    let mut recordings: Vec<PathBuf> = paths
+        .filter(|path| {
+            path.extension()
+                .is_some_and(|extension| extension == "mcap")
+        })
+        .collect();
+    recordings.sort();
+    recordings
+}
+
+const RECORDER: &str = r"# Written by `tauscope init --live`: records the robot, and nothing else. `tauscope run` runs it again.
+version: 1
+
+cells:
+  arm: {robot: ROBOT}
+
+stages:
+  - name: ingest
+    ingest: {SOURCE}
+
+  - name: record
+    inputs: [ingest]
+    record: {mcap: FILES, split: {after_s: SECONDS}}
+";
