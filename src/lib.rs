@@ -1,7 +1,7 @@
 //! The `tauscope` program: command line, supervisor, and what it writes for people. Its physics is in the stages, its
 //! files and the stages built from them are in `tauscope_pipeline`.
 //!
-//! [`answer`] runs a command as a function.
+//! [`answer`] runs a command as a function; [`answer_alone`] does so for a process that does nothing else.
 
 mod announce;
 mod cli;
@@ -21,6 +21,7 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{CommandFactory as _, Parser};
+use rustix::process::{Signal, set_parent_process_death_signal};
 use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::prelude::*;
 
@@ -29,18 +30,7 @@ use output::Output;
 
 /// The program: its arguments are the command line, its words go to the terminal.
 pub fn main() -> ExitCode {
-    // What stages warn of, and what libraries fail in, goes where errors go.
-    let targets = Targets::new()
-        .with_default(LevelFilter::ERROR)
-        .with_target("tauscope", LevelFilter::WARN);
-    let lines = tracing_subscriber::fmt::layer()
-        .with_writer(std::io::stderr)
-        .with_ansi(terminal::has_colour())
-        .without_time()
-        .with_target(false);
-    tracing_subscriber::registry()
-        .with(lines.with_filter(targets))
-        .init();
+    show_warnings(terminal::has_colour());
     match Cli::parse().command.unwrap_or_default() {
         Command::Stage(args) => commands::stage::run(&args),
         Command::Exec(args) => commands::stage::exec(&args),
@@ -52,9 +42,26 @@ pub fn main() -> ExitCode {
                 eprintln!("error: cannot listen to signals: {error}");
                 return ExitCode::FAILURE;
             }
-            ExitCode::from(run(&command, &mut Output::Terminal))
+            let mut out = Output::Terminal;
+            let outcome = outcome(&command, &mut out);
+            ExitCode::from(exit::code(outcome, &mut out))
         }
     }
+}
+
+/// What stages warn of, and what libraries fail in, goes where errors go.
+fn show_warnings(coloured: bool) {
+    let targets = Targets::new()
+        .with_default(LevelFilter::ERROR)
+        .with_target("tauscope", LevelFilter::WARN);
+    let lines = tracing_subscriber::fmt::layer()
+        .with_writer(std::io::stderr)
+        .with_ansi(coloured)
+        .without_time()
+        .with_target(false);
+    tracing_subscriber::registry()
+        .with(lines.with_filter(targets))
+        .init();
 }
 
 /// What a command answered.
@@ -66,6 +73,8 @@ pub struct Answer {
     pub stdout: String,
     /// What it would have written to standard error, but for what stages warn of through `tracing`.
     pub stderr: String,
+    /// What is wrong with arguments or files where nothing was started, as `check --json` prints it: `{"errors": [...]}`.
+    pub errors: serde_json::Value,
 }
 
 /// Runs a command as a function, without a process: `arguments` are those behind the program's name.
@@ -75,11 +84,22 @@ pub fn answer(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> Answe
     let name = OsString::from(env!("CARGO_PKG_NAME"));
     let arguments = arguments.into_iter().map(Into::into);
     let mut output = Output::Memory(String::new(), String::new());
-    let code = match Cli::try_parse_from(std::iter::once(name).chain(arguments)) {
-        Ok(cli) => run(&cli.command.unwrap_or_default(), &mut output),
+    let no_errors = serde_json::json!({ "errors": [] });
+    let (code, errors) = match Cli::try_parse_from(std::iter::once(name).chain(arguments)) {
+        Ok(cli) => {
+            let outcome = outcome(&cli.command.unwrap_or_default(), &mut output);
+            let errors = match &outcome {
+                Err(exit::Failure::Rejected(report)) => report.json(),
+                _ => no_errors,
+            };
+            (exit::code(outcome, &mut output), errors)
+        }
         Err(error) => {
             output.say(&error.to_string());
-            u8::try_from(error.exit_code()).unwrap_or(u8::MAX)
+            (
+                u8::try_from(error.exit_code()).unwrap_or(u8::MAX),
+                no_errors,
+            )
         }
     };
     let (stdout, stderr) = match output {
@@ -90,12 +110,27 @@ pub fn answer(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> Answe
         code,
         stdout,
         stderr,
+        errors,
     }
 }
 
-/// Runs a command that needs no process of its own; its exit code.
-fn run(command: &Command, out: &mut Output) -> u8 {
-    let outcome = match command {
+/// As [`answer`], in a process that is there for this command alone and ends with the process that started it. Signals
+/// end it as they end the program; what stages warn of goes to standard error.
+///
+/// # Errors
+/// If signals cannot be listened to.
+pub fn answer_alone(
+    arguments: impl IntoIterator<Item = impl Into<OsString>>,
+) -> std::io::Result<Answer> {
+    show_warnings(false);
+    set_parent_process_death_signal(Some(Signal::TERM))?;
+    interrupt::listen()?;
+    Ok(answer(arguments))
+}
+
+/// Runs a command that needs no process of its own.
+fn outcome(command: &Command, out: &mut Output) -> Result<exit::Exit, exit::Failure> {
+    match command {
         Command::Run(args) => commands::run::run(args, out),
         Command::Check(args) => commands::check::run(args, out),
         Command::Schema(args) => commands::schema::run(args, out),
@@ -113,6 +148,5 @@ fn run(command: &Command, out: &mut Output) -> u8 {
         Command::Stage(_) | Command::Exec(_) => Err(exit::Failure::rejected(
             "this command is for `tauscope run`",
         )),
-    };
-    exit::code(outcome, out)
+    }
 }

@@ -61,6 +61,7 @@ impl Out {
             code,
             stdout,
             stderr,
+            ..
         } = tauscope::answer(arguments);
         Self {
             code: code.into(),
