@@ -284,9 +284,8 @@ impl<'a> Resolver<'a> {
         let Ok((key, settings)) = ingest.source() else {
             return;
         };
-        if config.expected == Expected::Topic
-            && let Some(help) = settings.without_twin()
-        {
+        let wanted = config.expected == Expected::Topic;
+        if let Some(help) = settings.without_twin().filter(|_| wanted) {
             let title = "the source reads no other twin's effort for this";
             self.report
                 .push(self.file.at(&place.key("expected"), title).help(help));
