@@ -28,7 +28,7 @@ fn publish(session: &zenoh::Session, stop: &AtomicBool) {
         "demo_train_sweep.mcap",
         "demo_validation.mcap",
     ] {
-        let recording = Recording::open(&bundled().join(name)).unwrap();
+        let recording = Recording::open(bundled().join(name)).unwrap();
         let mut states = recording.joint_states("/joint_states").unwrap();
         while let Some(state) = states.next_state() {
             let state = state.unwrap();
