@@ -10,7 +10,7 @@ use crate::damage::{Damage, seconds};
 use crate::error::ArchiveError;
 use crate::joint_facts::{JointFacts, JointTallies};
 use crate::recording::{Message, Recording, RecordingKind};
-use crate::ros::{JointState, Message as _};
+use crate::ros::{JointState, JointStateDecoder};
 use crate::topic::Topic;
 
 /// A pause counts as a gap if it is this many times as long as the topic's mean period.
@@ -145,12 +145,13 @@ struct Tally {
     undecodable: u64,
     joints: Option<JointsInfo>,
     values: JointTallies,
+    decoder: JointStateDecoder,
     state: JointState,
 }
 
 impl Tally {
     fn new(topic: &Topic) -> Self {
-        let joints = topic.type_name == JointState::TYPE && topic.message_encoding == "cdr";
+        let joints = topic.joint_state_type().is_some();
         Self {
             topic: Topic {
                 message_count: 0,
@@ -162,6 +163,7 @@ impl Tally {
             undecodable: 0,
             joints: joints.then(JointsInfo::default),
             values: JointTallies::default(),
+            decoder: JointStateDecoder::default(),
             state: JointState::default(),
         }
     }
@@ -179,7 +181,7 @@ impl Tally {
             }
         }
         if let Some(joints) = &mut self.joints {
-            match message.decode_into(&mut self.state) {
+            match message.joint_state_into(&mut self.decoder, &mut self.state) {
                 Ok(()) => {
                     joints.add(&self.state);
                     self.values.add(&self.state);
@@ -229,6 +231,14 @@ impl JointsInfo {
             remarks.push(format!(
                 "the effort of {} is 0 in all messages",
                 zero.join(", ")
+            ));
+        }
+        let lacking = self.joints.iter().filter(|joint| joint.lacks_effort);
+        let lacking: Vec<&str> = lacking.map(|joint| joint.name.as_str()).collect();
+        if self.effort && !lacking.is_empty() {
+            remarks.push(format!(
+                "the effort of {} is in no message",
+                lacking.join(", ")
             ));
         }
         if self.repeated_messages > 0 {

@@ -33,6 +33,8 @@ pub struct JointFacts {
     pub travel: f64,
     /// Whether efforts are given and all of them are 0.
     pub effort_is_zero: bool,
+    /// Whether no effort is given that is a number.
+    pub lacks_effort: bool,
 }
 
 impl JointFacts {
@@ -134,6 +136,7 @@ impl JointTally {
             position_range: self.range,
             velocity_slope: (self.moved > TELLING_MOTION).then(|| self.products / self.squares),
             travel: self.moved,
+            lacks_effort: self.efforts == 0,
             effort_is_zero: self.efforts > 0 && self.zeros == self.efforts,
         }
     }

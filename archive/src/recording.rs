@@ -131,6 +131,25 @@ impl Recording {
     /// [`ArchiveError::Empty`], [`ArchiveError::NoSuchTopic`], [`ArchiveError::WrongType`] or
     /// [`ArchiveError::NoMessages`].
     pub fn topic_of<M: ros::Message>(&self, name: &str) -> Result<&Topic, ArchiveError> {
+        let is_one = |topic: &Topic| topic.type_name == M::TYPE && topic.message_encoding == "cdr";
+        self.topic_where(name, M::TYPE, is_one)
+    }
+
+    /// The topic `name`, which must carry joint states of any type as CDR, and at least one.
+    ///
+    /// # Errors
+    /// As [`Recording::topic_of`].
+    pub fn joint_state_topic(&self, name: &str) -> Result<&Topic, ArchiveError> {
+        let is_one = |topic: &Topic| topic.joint_state_type().is_some();
+        self.topic_where(name, &ros::JointStateType::names(), is_one)
+    }
+
+    fn topic_where(
+        &self,
+        name: &str,
+        type_name: &str,
+        is_one: impl Fn(&Topic) -> bool,
+    ) -> Result<&Topic, ArchiveError> {
         if self.message_count() == 0 {
             return Err(ArchiveError::Empty {
                 path: self.path.clone(),
@@ -139,12 +158,12 @@ impl Recording {
         }
         let index = self.topic_indexes(name)?[0];
         let topic = &self.topics.list[index];
-        if topic.type_name != M::TYPE || topic.message_encoding != "cdr" {
+        if !is_one(topic) {
             return Err(ArchiveError::WrongType {
                 path: self.path.clone(),
                 topic: name.to_owned(),
                 found: format!("{} as {:?}", topic.type_name, topic.message_encoding),
-                expected: format!("{} as \"cdr\"", M::TYPE),
+                expected: format!("{type_name} as \"cdr\""),
             });
         }
         if topic.message_count == 0 {
@@ -181,9 +200,9 @@ impl Recording {
     /// The joint states on `topic`, decoded, in the order of their log times.
     ///
     /// # Errors
-    /// As [`Recording::topic_of`] and [`Recording::messages`].
+    /// As [`Recording::joint_state_topic`] and [`Recording::messages`].
     pub fn joint_states(&self, topic: &str) -> Result<JointStates, ArchiveError> {
-        self.topic_of::<ros::JointState>(topic)?;
+        self.joint_state_topic(topic)?;
         Ok(JointStates::new(self.messages(&[topic])?))
     }
 

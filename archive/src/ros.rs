@@ -4,10 +4,12 @@
 
 mod cdr;
 mod diagnostic_array;
+mod dynamic_joint_state;
 mod float64;
 mod header;
 mod inertia_stamped;
 mod joint_state;
+mod joint_state_type;
 mod std_bool;
 #[cfg(test)]
 mod type_hash;
@@ -18,10 +20,12 @@ use serde::de::DeserializeOwned;
 
 pub use cdr::{DecodeError, EncodeError, decode, decode_into, encode};
 pub use diagnostic_array::{DiagnosticArray, DiagnosticStatus, KeyValue, Level};
+pub use dynamic_joint_state::{DynamicJointState, InterfaceValue};
 pub use float64::Float64;
 pub use header::{Header, Time};
 pub use inertia_stamped::{Inertia, InertiaStamped};
 pub use joint_state::JointState;
+pub use joint_state_type::{JointStateDecoder, JointStateType};
 pub use std_bool::Bool;
 pub use wrench_stamped::{Vector3, Wrench, WrenchStamped};
 

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::ros::JointStateType;
+
 /// A topic of a recording.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Topic {
@@ -17,6 +19,14 @@ pub struct Topic {
     pub type_hash: Option<String>,
     /// Messages that can be read.
     pub message_count: u64,
+}
+
+impl Topic {
+    /// Of which type its joint states are, if it carries any that can be read.
+    pub fn joint_state_type(&self) -> Option<JointStateType> {
+        let of = JointStateType::of(&self.type_name);
+        of.filter(|_| self.message_encoding == "cdr")
+    }
 }
 
 /// The topics of a recording, and which channel belongs to which.

@@ -4,13 +4,16 @@
 
 mod common;
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use common::{Copied, PERIOD_NS, START_NS, read_all, shared, state, write};
 use rusqlite::Connection;
 use tauscope_archive::ros::{self, JointState, Message};
-use tauscope_archive::{ArchiveError, Compression, Damage, DamageKind, Recording, RecordingKind};
+use tauscope_archive::{
+    ArchiveError, Compression, Damage, DamageKind, Info, McapWriter, Recording, RecordingKind,
+};
 
 /// How rosbag2 lays out its database.
 const TABLES: &str = "
@@ -43,6 +46,66 @@ fn database(path: &Path, range: std::ops::Range<i64>, tables: &str, pack: bool) 
         insert.execute((9, ns, vec![0_u8; 3000])).unwrap();
     }
     connection.execute_batch("COMMIT").unwrap();
+}
+
+/// A joint state as `ros2_control` tells it, with a sensor behind the joints; joint `b` has no effort.
+fn dynamic(i: i64) -> ros::DynamicJointState {
+    let state = state(i);
+    let interfaces = |named: &[(&str, f64)]| ros::InterfaceValue {
+        interface_names: named.iter().map(|(name, _)| (*name).to_owned()).collect(),
+        values: named.iter().map(|(_, value)| *value).collect(),
+    };
+    ros::DynamicJointState {
+        header: state.header,
+        joint_names: ["a", "b", "ft"].map(str::to_owned).to_vec(),
+        interface_values: vec![
+            interfaces(&[("effort", state.effort[0]), ("position", state.position[0])]),
+            interfaces(&[("position", state.position[1])]),
+            interfaces(&[("force.x", 7.0)]),
+        ],
+    }
+}
+
+#[test]
+fn dynamic_joint_states_read_as_joint_states_out_of_every_bag() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("dynamic.mcap");
+    let mut writer = McapWriter::create(&path, Compression::Zstd, &BTreeMap::new()).unwrap();
+    let topic = writer
+        .add_topic::<ros::DynamicJointState>("/joint_states")
+        .unwrap();
+    let sqlite = folder.path().join("dynamic.db3");
+    let connection = Connection::open(&sqlite).unwrap();
+    let type_name = ros::DynamicJointState::TYPE;
+    let tables = TABLES.replace(JointState::TYPE, type_name);
+    connection.execute_batch(&tables).unwrap();
+    for i in 0..50 {
+        let ns = START_NS + i * PERIOD_NS;
+        writer.write(topic, ns, ns, &dynamic(i)).unwrap();
+        let mut body = Vec::new();
+        ros::encode(&dynamic(i), &mut body).unwrap();
+        let insert = "INSERT INTO messages (topic_id, timestamp, data) VALUES (7, ?1, ?2)";
+        connection.execute(insert, (ns, body)).unwrap();
+    }
+    let mcap = writer.finish().unwrap().path;
+    for path in [mcap, sqlite] {
+        let recording = Recording::open(&path).unwrap();
+        assert_eq!(joint_states_of(&recording).len(), 50);
+        let info = Info::read(&recording).unwrap();
+        let info = info.topics[0].joints.as_ref().unwrap();
+        assert_eq!(info.names, ["a", "b"]);
+        assert!(info.position && info.effort && !info.velocity);
+        assert!(
+            info.remarks()
+                .contains(&"the effort of b is in no message".to_owned())
+        );
+    }
+    // What is no joint state is refused with the types that would be one.
+    let other = write(&folder.path().join("other.mcap"), Compression::None, 20);
+    let Err(error) = Recording::open(other).unwrap().joint_states("/contact") else {
+        panic!("a flag is no joint state");
+    };
+    assert!(error.to_string().contains(type_name), "{error}");
 }
 
 fn joint_states_of(recording: &Recording) -> Vec<i64> {

@@ -269,7 +269,7 @@ fn topics_that_are_not_as_wanted_are_told() {
     assert!(error("/x").ends_with("no topic \"/x\"; it has /joint_states, /contact"));
     assert!(error("/contact").ends_with(
         "topic \"/contact\" carries std_msgs/msg/Bool as \"cdr\", expected \
-         sensor_msgs/msg/JointState as \"cdr\""
+         sensor_msgs/msg/JointState or control_msgs/msg/DynamicJointState as \"cdr\""
     ));
     let path = write(&folder.path().join("a.mcap"), Compression::Zstd, 0);
     assert!(matches!(

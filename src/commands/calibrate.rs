@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use comfy_table::{CellAlignment, Table, presets};
-use tauscope_archive::ros::JointState;
 use tauscope_archive::whole_file::{self, Existing};
 use tauscope_archive::{ArchiveError, Recording};
 use tauscope_ingest::Topics;
@@ -161,7 +160,7 @@ fn check_cutoffs(args: &Args) -> Result<(), Failure> {
         let rejected = |error: ArchiveError| Failure::rejected(error.to_string());
         let recording = Recording::open(path).map_err(rejected)?;
         let topic = recording
-            .topic_of::<JointState>(&args.state_topic)
+            .joint_state_topic(&args.state_topic)
             .map_err(rejected)?;
         let span_ns = recording.end_ns().unwrap_or(0) - recording.start_ns().unwrap_or(0);
         let rate_hz = topic.message_count as f64 / (span_ns as f64 * 1e-9);

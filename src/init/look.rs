@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use tauscope_archive::ros::{JointState, Message as _};
+use tauscope_archive::ros::JointStateType;
 use tauscope_archive::{Info, Recording};
 use tauscope_dynamics::effort_scale::{EffortScale, Slope, TELLING};
 use tauscope_ingest::Topics;
@@ -118,7 +118,7 @@ impl Told<'_> {
         let first = &self.recordings[0];
         let recording = Recording::open(first).map_err(|error| Problem::new(error.to_string()))?;
         let topics = recording.topics().iter();
-        let topics = topics.filter(|topic| topic.type_name == JointState::TYPE);
+        let topics = topics.filter(|topic| topic.joint_state_type().is_some());
         let named = topics.filter_map(|topic| {
             let names = first_joint_names(first, &topic.name).ok()?;
             let wanted = &cell.facts.joint_names;
@@ -128,7 +128,7 @@ impl Told<'_> {
         });
         let best = named.max();
         best.map(|(.., name)| name).ok_or_else(|| {
-            let title = format!("{} holds no {}", first.display(), JointState::TYPE);
+            let title = format!("{} holds no {}", first.display(), JointStateType::names());
             let topics = recording.topics().iter().map(|topic| topic.name.as_str());
             let help = format!("its topics are {}", suggest::list(topics));
             Problem::new(title).help(help).into()

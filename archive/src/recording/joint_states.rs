@@ -2,7 +2,7 @@
 
 use super::messages::Messages;
 use crate::error::ArchiveError;
-use crate::ros::JointState;
+use crate::ros::{JointState, JointStateDecoder};
 
 /// A message with the times of its way.
 #[derive(Debug, Clone, Copy)]
@@ -18,6 +18,7 @@ pub struct Stamped<T> {
 /// Joint states of one topic in the order of their log times. One message's memory is used for all.
 pub struct JointStates {
     messages: Messages,
+    decoder: JointStateDecoder,
     state: JointState,
 }
 
@@ -25,6 +26,7 @@ impl JointStates {
     pub(super) fn new(messages: Messages) -> Self {
         Self {
             messages,
+            decoder: JointStateDecoder::default(),
             state: JointState::default(),
         }
     }
@@ -39,7 +41,8 @@ impl JointStates {
             Err(error) => return Some(Err(error)),
         };
         let (log_time_ns, publish_time_ns) = (message.log_time_ns, message.publish_time_ns);
-        Some(message.decode_into(&mut self.state).map(|()| Stamped {
+        let decoded = message.joint_state_into(&mut self.decoder, &mut self.state);
+        Some(decoded.map(|()| Stamped {
             log_time_ns,
             publish_time_ns,
             message: &self.state,

@@ -45,6 +45,22 @@ impl Message<'_> {
         ros::decode_into(self.body, message).map_err(|source| self.error(source))
     }
 
+    /// Decodes a joint state of its topic's type over one that is there already.
+    ///
+    /// # Errors
+    /// [`ArchiveError::Decode`] if it is not of that type; `state` is then void.
+    pub fn joint_state_into(
+        &self,
+        decoder: &mut ros::JointStateDecoder,
+        state: &mut ros::JointState,
+    ) -> Result<(), ArchiveError> {
+        let of = self.topic.joint_state_type();
+        let of = of.unwrap_or(ros::JointStateType::JointState);
+        decoder
+            .decode_into(of, self.body, state)
+            .map_err(|source| self.error(source))
+    }
+
     fn error(&self, source: ros::DecodeError) -> ArchiveError {
         ArchiveError::Decode {
             path: self.path.to_owned(),

@@ -6,7 +6,10 @@ use std::fmt::Write as _;
 
 use sha2::{Digest, Sha256};
 
-use super::{Bool, DiagnosticArray, Float64, InertiaStamped, JointState, Message, WrenchStamped};
+use super::{
+    Bool, DiagnosticArray, DynamicJointState, Float64, InertiaStamped, JointState, Message,
+    WrenchStamped,
+};
 
 /// `type_id` of `type_description_interfaces/msg/FieldType`.
 const BASE_TYPES: [(&str, u32); 9] = [
@@ -104,6 +107,7 @@ fn the_type_hashes_follow_from_the_texts() {
     assert_eq!(hash::<WrenchStamped>(), WrenchStamped::TYPE_HASH);
     assert_eq!(hash::<InertiaStamped>(), InertiaStamped::TYPE_HASH);
     assert_eq!(hash::<DiagnosticArray>(), DiagnosticArray::TYPE_HASH);
+    assert_eq!(hash::<DynamicJointState>(), DynamicJointState::TYPE_HASH);
     assert_eq!(hash::<Bool>(), Bool::TYPE_HASH);
     assert_eq!(hash::<Float64>(), Float64::TYPE_HASH);
 }

@@ -284,6 +284,13 @@ impl<'a> Resolver<'a> {
         let Ok((key, settings)) = ingest.source() else {
             return;
         };
+        if config.expected == Expected::Topic
+            && let Some(help) = settings.without_twin()
+        {
+            let title = "the source reads no other twin's effort for this";
+            self.report
+                .push(self.file.at(&place.key("expected"), title).help(help));
+        }
         let Some(topics) = settings.topics() else {
             return;
         };

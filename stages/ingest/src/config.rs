@@ -1,12 +1,16 @@
 //! The source's part of the pipeline file.
 
+mod ur_rtde;
+
 use std::path::PathBuf;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use tauscope_bus::ZenohEndpoints;
 
-/// A source: exactly one of `file`, `csv`, `zenoh` and `simulate`.
+pub use ur_rtde::{UrEffort, UrRtdeConfig};
+
+/// A source: exactly one of `file`, `csv`, `zenoh`, `ur_rtde` and `simulate`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
@@ -19,6 +23,9 @@ pub struct Config {
     /// Live messages over Zenoh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub zenoh: Option<ZenohConfig>,
+    /// Live data of a Universal Robots controller.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ur_rtde: Option<UrRtdeConfig>,
     /// A simulated cell.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub simulate: Option<SimulateConfig>,
@@ -42,6 +49,7 @@ impl Default for Config {
             file: None,
             csv: None,
             zenoh: None,
+            ur_rtde: None,
             simulate: None,
             commands: None,
             rate: Rate::default(),
@@ -66,7 +74,7 @@ pub struct FileConfig {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Topics {
-    /// Measured joint states (`sensor_msgs/msg/JointState`).
+    /// Measured joint states (`sensor_msgs/msg/JointState` or `control_msgs/msg/DynamicJointState`).
     pub state: String,
     /// Commanded positions, perhaps velocities (`sensor_msgs/msg/JointState`).
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -254,7 +262,7 @@ impl JsonSchema for Rate {
 pub enum ConfigError {
     /// Not exactly one source.
     #[error(
-        "an ingest stage has exactly one of `file`, `csv`, `zenoh` and `simulate`, found {found}"
+        "an ingest stage has exactly one of `file`, `csv`, `zenoh`, `ur_rtde` and `simulate`, found {found}"
     )]
     OneSource {
         /// How many were given.
@@ -263,6 +271,23 @@ pub enum ConfigError {
     /// A Zenoh source that nothing can reach.
     #[error("`zenoh` needs at least one endpoint in `connect` or `listen`")]
     NoEndpoint,
+    /// Not the six joints of an arm of Universal Robots.
+    #[error(
+        "`ur_rtde` reads six joints, found {found}: name them from base to wrist, `joints: [shoulder_pan_joint, ...]`"
+    )]
+    UrJoints {
+        /// How many there are.
+        found: usize,
+    },
+    /// A joint of the cell that the controller does not know.
+    #[error("`joints` of `ur_rtde` does not name joint `{joint}` of the robot")]
+    UrJointUnnamed {
+        /// The joint.
+        joint: String,
+    },
+    /// A payload, and no link to attach it to.
+    #[error("`payload: true` needs a `tool` of the cell with the `link` that is the flange")]
+    UrPayload,
     /// Zenoh does not take an endpoint or a key.
     #[error("zenoh does not take {what} `{text}`: {reason}")]
     Zenoh {

@@ -26,6 +26,9 @@ pub enum IngestError {
     /// The scenario cannot be simulated.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
+    /// The system has no thread left.
+    #[error("no thread for the connection: {0}")]
+    Thread(std::io::Error),
     /// Zenoh cannot be reached, or not be used.
     #[error("zenoh: {0}")]
     Zenoh(String),
@@ -38,6 +41,7 @@ impl IngestError {
         !matches!(
             self,
             Self::Zenoh(_)
+                | Self::Thread(_)
                 | Self::Scenario(
                     ScenarioError::Unstable { .. }
                         | ScenarioError::Write(_)

@@ -1,4 +1,5 @@
-//! Where samples come from: recordings, live ROS 2 over Zenoh, the simulated cell.
+//! Where samples come from: recordings, live ROS 2 over Zenoh, Universal Robots controllers, the simulated
+//! cell.
 //!
 //! Whatever the source, its messages go through the same packing: joints are brought into the cell's
 //! order by name, and each sample takes with it what belongs to its instant. That part is pure; the
@@ -43,16 +44,20 @@ mod config;
 mod error;
 mod pacing;
 mod pack;
+mod queue;
 mod recorded;
 mod setup;
 pub mod simulated;
 mod sources;
+mod tcp;
+mod ur_rtde;
 mod zenoh;
 
 pub use archived_twin::{ArchivedTwin, ArchivedTwinTopics};
 pub use commanded::Commanded;
 pub use config::{
-    Config, ConfigError, CsvConfig, FileConfig, Keys, Rate, SimulateConfig, Topics, ZenohConfig,
+    Config, ConfigError, CsvConfig, FileConfig, Keys, Rate, SimulateConfig, Topics, UrEffort,
+    UrRtdeConfig, ZenohConfig,
 };
 pub use error::IngestError;
 pub use pacing::Paced;
@@ -60,4 +65,5 @@ pub use pack::{PackCounts, PackError};
 pub use recorded::RecordedSource;
 pub use setup::{Setup, Tool};
 pub use sources::{Entry, Opening, SOURCES, SimulatedRobot, SourceSettings, open};
+pub use ur_rtde::UrRtdeSource;
 pub use zenoh::{ZenohCounts, ZenohSource};

@@ -241,6 +241,12 @@ impl Packer {
         self.flushed = true;
     }
 
+    /// The first joint, and its field, that came in the states and was never finite.
+    pub fn never_finite(&self) -> Option<(String, &'static str)> {
+        let (joint, field) = self.state.never_finite()?;
+        Some((self.layouts.joint_name(joint).to_owned(), field))
+    }
+
     /// Says, after the last message, why there was no sample if there was none.
     ///
     /// # Errors
@@ -250,9 +256,9 @@ impl Packer {
             return Ok(());
         }
         let messages = self.messages;
-        if let Some((joint, field)) = self.state.never_finite() {
+        if let Some((joint, field)) = self.never_finite() {
             return Err(PackError::NotFiniteThroughout {
-                joint: self.layouts.joint_name(joint).to_owned(),
+                joint,
                 field,
                 messages,
             });

@@ -42,6 +42,7 @@ pub struct RecordedSource {
     packer: Packer,
     first: Option<JointState>,
     message: ros::JointState,
+    decoder: ros::JointStateDecoder,
     tool: ros::InertiaStamped,
     learn: ros::Bool,
     told: ros::DiagnosticArray,
@@ -113,6 +114,7 @@ impl RecordedSource {
             packer: Packer::new(setup, settings)?,
             first: None,
             message: ros::JointState::default(),
+            decoder: ros::JointStateDecoder::default(),
             tool: ros::InertiaStamped::default(),
             learn: ros::Bool::default(),
             told: ros::DiagnosticArray::default(),
@@ -211,7 +213,7 @@ impl RecordedSource {
             Some(Role::Tool) => message.decode_into(&mut self.tool),
             Some(Role::Learn) => message.decode_into(&mut self.learn),
             Some(Role::Told) => message.decode_into(&mut self.told),
-            Some(_) => message.decode_into(&mut self.message),
+            Some(_) => message.joint_state_into(&mut self.decoder, &mut self.message),
         };
         if let Err(error) = decoded {
             self.undecodable += 1;
@@ -277,7 +279,7 @@ fn roles<'a>(
             Role::Tool => recording.topic_of::<ros::InertiaStamped>(name)?,
             Role::Learn => recording.topic_of::<ros::Bool>(name)?,
             Role::Told => recording.topic_of::<ros::DiagnosticArray>(name)?,
-            _ => recording.topic_of::<ros::JointState>(name)?,
+            _ => recording.joint_state_topic(name)?,
         };
         if let Some(index) = recording.topics().iter().position(|each| each == topic) {
             roles[index] = Some(role);

@@ -7,13 +7,14 @@ use tauscope_bus::{JointState, Source};
 use tauscope_dynamics::Model;
 
 use crate::config::{
-    Config, ConfigError, CsvConfig, FileConfig, SimulateConfig, Topics, ZenohConfig,
+    Config, ConfigError, CsvConfig, FileConfig, SimulateConfig, Topics, UrRtdeConfig, ZenohConfig,
 };
 use crate::error::IngestError;
 use crate::pacing::Paced;
 use crate::recorded::RecordedSource;
 use crate::setup::Setup;
 use crate::simulated::{Scenario, ScenarioError, SimulatedCell};
+use crate::ur_rtde::UrRtdeSource;
 use crate::zenoh::ZenohSource;
 
 /// The entry of the source with this key, which is that of its field in [`Config`].
@@ -32,7 +33,13 @@ macro_rules! entry {
     };
 }
 /// All sources, by their keys in a pipeline file.
-pub static SOURCES: &[Entry] = &[entry!(file), entry!(csv), entry!(zenoh), entry!(simulate)];
+pub static SOURCES: &[Entry] = &[
+    entry!(file),
+    entry!(csv),
+    entry!(zenoh),
+    entry!(ur_rtde),
+    entry!(simulate),
+];
 
 /// What the table says of a source.
 #[derive(Debug)]
@@ -65,6 +72,11 @@ pub trait SourceSettings {
 
     /// The topics that it reads, if it reads any.
     fn topics(&self) -> Option<&Topics> {
+        None
+    }
+
+    /// What would help where another twin's effort is wanted and it gives none; `None` if it gives one, or has topics.
+    fn without_twin(&self) -> Option<&'static str> {
         None
     }
 
@@ -161,6 +173,23 @@ impl SourceSettings for ZenohConfig {
             "nothing can reach this source: it neither connects nor listens",
             "give `connect: [\"tcp/localhost:7447\"]`",
         ))
+    }
+}
+
+impl SourceSettings for UrRtdeConfig {
+    fn open(&self, cell: &Opening<'_>) -> Result<Box<dyn Source<JointState>>, IngestError> {
+        Ok(Box::new(UrRtdeSource::open(self, cell.config, cell.setup)?))
+    }
+
+    fn fault(&self) -> Option<(&'static str, &'static str)> {
+        self.host.trim().is_empty().then_some((
+            "the controller has no address",
+            "give `host: 192.168.0.10`, or the controller's name",
+        ))
+    }
+
+    fn without_twin(&self) -> Option<&'static str> {
+        (!self.target_moment).then_some("set `target_moment: true` there")
     }
 }
 

@@ -9,10 +9,11 @@ mod diagnosis;
 mod joint_names;
 mod keys;
 mod publication;
-mod queue;
 mod scout;
+mod waiting;
 mod watch;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
@@ -23,11 +24,12 @@ use zenoh::{Session, Wait};
 use crate::config::{Config, ConfigError, ZenohConfig};
 use crate::error::IngestError;
 use crate::pack::{PackCounts, PackSettings, Packer};
+use crate::queue::Queue;
 use crate::setup::Setup;
 use attachment::{Attachment, Losses};
 use diagnosis::Expected;
 use keys::KeyScheme;
-use queue::{Queue, Role, Waiting};
+use waiting::{Role, Waiting};
 use watch::Watch;
 
 /// How long a sample waits for the command of its instant \[ns\].
@@ -63,11 +65,13 @@ pub struct ZenohCounts {
 pub struct ZenohSource {
     /// Keeps the subscriptions alive.
     session: Session,
-    queue: Arc<Queue>,
+    queue: Arc<Queue<Waiting>>,
     packer: Packer,
     losses: Losses,
     hashes: keys::HashWatch,
     message: ros::JointState,
+    /// By role, because each topic has its own type.
+    decoders: BTreeMap<Role, ros::JointStateDecoder>,
     tool: ros::InertiaStamped,
     learn: ros::Bool,
     counts: ZenohCounts,
@@ -103,12 +107,23 @@ impl ZenohSource {
         ];
         for (topic, role) in named {
             let Some(topic) = topic else { continue };
-            let key = match role {
-                Role::Tool => scheme.key(topic, &ros::InertiaStamped::dds_type()),
-                Role::Learn => scheme.key(topic, &ros::Bool::dds_type()),
-                _ => scheme.key(topic, &ros::JointState::dds_type()),
+            let only = match role {
+                Role::Tool => Some(ros::InertiaStamped::dds_type()),
+                Role::Learn => Some(ros::Bool::dds_type()),
+                Role::State | Role::Command | Role::Reference => None,
             };
-            subscribe(&session, &key, role, &queue)?;
+            if let Some(dds_type) = only {
+                subscribe(
+                    &session,
+                    &scheme.key(topic, &dds_type),
+                    (role, None),
+                    &queue,
+                )?;
+                continue;
+            }
+            for (key, of) in scheme.joint_state_keys(topic) {
+                subscribe(&session, &key, (role, of), &queue)?;
+            }
         }
         let settings = PackSettings {
             velocity_cutoff_hz: config.velocity_cutoff_hz,
@@ -124,6 +139,7 @@ impl ZenohSource {
             losses: Losses::default(),
             hashes: keys::HashWatch::new(&scheme),
             message: ros::JointState::default(),
+            decoders: BTreeMap::new(),
             tool: ros::InertiaStamped::default(),
             learn: ros::Bool::default(),
             counts: ZenohCounts::default(),
@@ -167,10 +183,16 @@ impl ZenohSource {
                 ros::Bool::TYPE_HASH,
                 ros::decode_into(payload, &mut self.learn),
             ),
-            Role::State | Role::Command | Role::Reference => (
-                ros::JointState::TYPE_HASH,
-                ros::decode_into(payload, &mut self.message),
-            ),
+            role @ (Role::State | Role::Command | Role::Reference) => {
+                let decoder = self.decoders.entry(role).or_default();
+                let Some(of) = waiting.joint_state_type else {
+                    return decoder.guess_into(payload, &mut self.message).map(|_| ());
+                };
+                (
+                    of.hash(),
+                    decoder.decode_into(of, payload, &mut self.message),
+                )
+            }
         };
         self.hashes.compare(&waiting.key, hash);
         decoded
@@ -241,8 +263,7 @@ impl Source<JointState> for ZenohSource {
     }
 
     fn trouble(&mut self, silent_for: Duration) -> Option<Trouble> {
-        let packed = self.packer.counts();
-        self.watch.trouble(silent_for, &self.session, packed)
+        self.watch.trouble(silent_for, &self.session, &self.packer)
     }
 }
 
@@ -256,8 +277,8 @@ fn now_ns() -> i64 {
 fn subscribe(
     session: &Session,
     key: &str,
-    role: Role,
-    queue: &Arc<Queue>,
+    (role, joint_state_type): (Role, Option<ros::JointStateType>),
+    queue: &Arc<Queue<Waiting>>,
 ) -> Result<(), IngestError> {
     let queue = Arc::clone(queue);
     session
@@ -268,6 +289,7 @@ fn subscribe(
                 .and_then(|bytes| Attachment::parse(&bytes.to_bytes()));
             queue.push(Waiting {
                 role,
+                joint_state_type,
                 received_ns: now_ns(),
                 key: sample.key_expr().clone().into_owned(),
                 payload: sample.payload().clone(),

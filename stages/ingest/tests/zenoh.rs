@@ -65,6 +65,31 @@ fn body(message: &ros::JointState) -> Vec<u8> {
     body
 }
 
+/// The same as `ros2_control` tells it, with a sensor among the joints. An effort that is NaN is left out.
+fn dynamic_body(state: &ros::JointState) -> Vec<u8> {
+    let interfaces = |named: &[(&str, f64)]| ros::InterfaceValue {
+        interface_names: named.iter().map(|(name, _)| (*name).to_owned()).collect(),
+        values: named.iter().map(|(_, value)| *value).collect(),
+    };
+    let joint = |i: usize| {
+        let mut all = vec![("temperature", 40.0), ("position", state.position[i])];
+        let effort = state.effort[i];
+        all.extend((!effort.is_nan()).then_some(("effort", effort)));
+        interfaces(&all)
+    };
+    let mut message = ros::DynamicJointState {
+        header: state.header.clone(),
+        joint_names: state.name.clone(),
+        interface_values: (0..state.name.len()).map(joint).collect(),
+    };
+    message.joint_names.insert(0, "wrist_ft".to_owned());
+    let sensor = interfaces(&[("force.x", 1.0)]);
+    message.interface_values.insert(0, sensor);
+    let mut body = Vec::new();
+    ros::encode(&message, &mut body).unwrap();
+    body
+}
+
 /// Puts states until the first one comes through: a subscription takes its time to become known.
 fn meet(session: &Session, key: &str, source: &mut ZenohSource) {
     let deadline = Instant::now() + PATIENCE;
@@ -263,4 +288,67 @@ fn what_cannot_work_is_refused() {
     let error = open(nonsense);
     assert!(error.is_input());
     assert!(error.to_string().contains("localhost:7447"), "{error}");
+}
+
+#[test]
+fn dynamic_joint_states_of_ros2_control_are_joint_states() {
+    let rmw = format!(
+        "0/dynamic_joint_states/{}/{}",
+        ros::DynamicJointState::dds_type(),
+        ros::DynamicJointState::TYPE_HASH
+    );
+    for (keys, key) in [
+        (Keys::RmwZenoh, rmw.as_str()),
+        (Keys::Tauscope, "demo/dynamic_joint_states"),
+    ] {
+        let endpoint = endpoint();
+        let session = publisher(&endpoint);
+        let topics = Topics {
+            state: "/dynamic_joint_states".to_owned(),
+            ..Topics::default()
+        };
+        let mut source = source(&endpoint, keys, topics);
+        let deadline = Instant::now() + PATIENCE;
+        let mut out = Collect(Vec::new());
+        for i in 1.. {
+            assert!(Instant::now() < deadline, "nothing came through");
+            let state = state(i * MS, "b a", &[2.0, 1.0], &[20.0, 10.0]);
+            session.put(key, dynamic_body(&state)).wait().unwrap();
+            source.step(&mut out).unwrap();
+            if let Some(sample) = out.0.first() {
+                assert_eq!(sample.position[..2], [1.0, 2.0]);
+                assert_eq!(sample.effort[..2], [10.0, 20.0]);
+                assert!(sample.header.has(flags::EFFORT_MEASURED));
+                break;
+            }
+        }
+        assert_eq!(source.counts().undecodable, 0);
+    }
+}
+
+#[test]
+fn a_joint_whose_effort_nobody_publishes_is_named() {
+    let endpoint = endpoint();
+    let session = publisher(&endpoint);
+    let mut source = source(&endpoint, Keys::Tauscope, Topics::default());
+    let (deadline, began) = (Instant::now() + PATIENCE, Instant::now());
+    let mut out = Collect(Vec::new());
+    let mut i = 0;
+    let trouble = loop {
+        assert!(Instant::now() < deadline, "nothing was said");
+        i += 1;
+        let state = state(i * MS, "b a", &[2.0, 1.0], &[f64::NAN, 10.0]);
+        session
+            .put("demo/joint_states", dynamic_body(&state))
+            .wait()
+            .unwrap();
+        source.step(&mut out).unwrap();
+        match source.trouble(began.elapsed()) {
+            Some(trouble) if source.pack_counts().not_finite > 0 => break trouble,
+            _ => {}
+        }
+    };
+    assert!(out.0.is_empty());
+    let said = format!("{trouble:?}");
+    assert!(said.contains("no effort of joint `b`"), "{said}");
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::queue::Role;
+use super::waiting::Role;
 
 /// Publishers that are remembered; a node that is started again comes with another id.
 /// Resolution: memory.

@@ -1,6 +1,6 @@
 //! From what was waited for, what came and what was seen to the likeliest slip. Pure.
 
-use tauscope_archive::ros::{self, Message as _};
+use tauscope_archive::ros::JointStateType;
 use tauscope_bus::Trouble;
 
 use super::joint_names::{list, slip};
@@ -37,38 +37,39 @@ pub(super) struct Fed {
     pub foreign: u64,
     pub incomplete: u64,
     pub not_finite: u64,
+    /// A joint and the field of it that came and was never finite.
+    pub never_finite: Option<(String, &'static str)>,
     pub stale: u64,
 }
 
 impl Expected {
-    fn dds_type() -> String {
-        ros::JointState::dds_type()
-    }
-
-    fn key(&self) -> String {
-        self.scheme.key(&self.topic, &Self::dds_type())
-    }
-
-    fn stem(&self) -> String {
-        self.scheme.stem(&self.topic, &Self::dds_type())
+    /// The key without the type's hash: that of the type which is published, else of the usual one.
+    fn stem(&self, seen: &Seen) -> String {
+        let stem = |of: JointStateType| self.scheme.stem(&self.topic, &of.dds_type());
+        let mut all = JointStateType::ALL.into_iter().map(stem);
+        let found = all.find(|stem| seen.publications.by_key.contains_key(stem));
+        found.unwrap_or_else(|| stem(JointStateType::JointState))
     }
 
     fn lines(&self) -> Vec<String> {
-        vec![
-            format!("{} on {}", ros::JointState::TYPE, self.key()),
-            format!("joints {}", list(&self.joints)),
-        ]
+        let keys = self.scheme.joint_state_keys(&self.topic);
+        let keys = keys.into_iter().map(|(key, of)| match of {
+            Some(of) => format!("{} on {key}", of.name()),
+            None => format!("{} on {key}", JointStateType::names()),
+        });
+        keys.chain([format!("joints {}", list(&self.joints))])
+            .collect()
     }
 }
 
 /// Why nothing that can be used comes.
 pub(super) fn diagnose(expected: &Expected, fed: &Fed, seen: &Seen) -> Trouble {
-    let stem = expected.stem();
+    let stem = expected.stem(seen);
     let own = seen.publications.by_key.get(&stem);
     let trouble = if seen.connected == 0 {
         unconnected(expected, fed, seen)
     } else if fed.messages > 0 {
-        unusable(expected, fed, own)
+        unusable(expected, fed, &stem, own)
     } else if let Some(own) = own.filter(|own| own.publishers() > 0) {
         let them = if own.publishers() == 1 {
             "its publisher sends"
@@ -121,15 +122,23 @@ fn unconnected(expected: &Expected, fed: &Fed, seen: &Seen) -> Trouble {
 }
 
 /// Messages come, but none can be used.
-fn unusable(expected: &Expected, fed: &Fed, own: Option<&Publication>) -> Trouble {
-    let stem = expected.stem();
+fn unusable(expected: &Expected, fed: &Fed, stem: &str, own: Option<&Publication>) -> Trouble {
     if fed.undecodable > 0 {
         let reason = fed.reason.clone().unwrap_or_default();
-        return Trouble::new(format!("the messages on {stem} are no {} in CDR", ros::JointState::TYPE))
+        return Trouble::new(format!("the messages on {stem} are no {} in CDR", JointStateType::names()))
             .sees([reason])
-            .likely(Some(format!("the key carries another type, or its publisher does not encode with CDR (4 bytes of header, then {})", ros::JointState::TYPE)));
+            .likely(Some("the key carries another type, or its publisher does not encode with CDR (4 bytes of header, then the message)".to_owned()));
     }
     let found = own.map_or(&[][..], |own| &own.joints);
+    if let Some((joint, field)) = &fed.never_finite {
+        return Trouble::new(format!(
+            "the joint states on {stem} have no {field} of joint `{joint}`: it is NaN or infinite in all of them"
+        ))
+        .likely(Some(format!(
+            "the driver has no measurement yet, or does not measure the {field} of this joint: make the joint `fixed` \
+             in the URDF"
+        )));
+    }
     if fed.not_finite > 0 {
         return Trouble::new(format!("the joint states on {stem} hold NaN or infinity")).likely(
             Some("the driver has no measurement yet, or none of this field".to_owned()),
@@ -189,7 +198,7 @@ fn misnamed(expected: &Expected, seen: &Seen) -> Option<String> {
     {
         return Some(format!(
             "{topic} carries {type_name}, not {}",
-            ros::JointState::TYPE
+            JointStateType::names()
         ));
     }
     let alike = states()

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use tauscope_archive::ros::JointStateType;
+
 use crate::config::{Keys, ZenohConfig};
 
 /// Hashes that are warned of, each once.
@@ -33,6 +35,15 @@ impl KeyScheme {
         match self.keys {
             Keys::RmwZenoh => format!("{stem}/*"),
             Keys::Ros2dds | Keys::Tauscope => stem,
+        }
+    }
+
+    /// The key expressions of a topic of joint states, whatever their type, with the type where the key tells it.
+    pub fn joint_state_keys(&self, topic: &str) -> Vec<(String, Option<JointStateType>)> {
+        let typed = |of: JointStateType| (self.key(topic, &of.dds_type()), Some(of));
+        match self.keys {
+            Keys::RmwZenoh => JointStateType::ALL.map(typed).to_vec(),
+            Keys::Ros2dds | Keys::Tauscope => vec![(self.key(topic, ""), None)],
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use tauscope_archive::ros::{self, Message as _};
+use tauscope_archive::ros::{self, JointStateType};
 
 use super::attachment::Attachment;
 
@@ -62,7 +62,9 @@ impl Publication {
 
     /// Whether it carries joint states.
     pub fn is_joint_state(&self) -> bool {
-        self.type_name.as_deref() == Some(ros::JointState::TYPE)
+        self.type_name
+            .as_deref()
+            .is_some_and(|name| JointStateType::of(name).is_some())
     }
 
     /// How many publish it, as far as that is known.
@@ -72,13 +74,15 @@ impl Publication {
 
     fn look_into(&mut self, payload: &[u8]) {
         let mut state = ros::JointState::default();
-        let looks_like_one = payload.len() <= MAX_PAYLOAD_BYTES
-            && ros::decode_into(payload, &mut state).is_ok()
+        if payload.len() > MAX_PAYLOAD_BYTES {
+            return;
+        }
+        let of = ros::JointStateDecoder::default().guess_into(payload, &mut state);
+        if let Ok(of) = of
             && !state.name.is_empty()
-            && state.name.iter().all(|name| !name.is_empty());
-        if looks_like_one {
-            self.type_name
-                .get_or_insert_with(|| ros::JointState::TYPE.to_owned());
+            && state.name.iter().all(|name| !name.is_empty())
+        {
+            self.type_name.get_or_insert_with(|| of.name().to_owned());
             for name in state.name {
                 if self.joints.len() < MAX_NAMES && !self.joints.contains(&name) {
                     self.joints.push(name);
@@ -213,6 +217,8 @@ fn ros_type(dds_type: &str) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use tauscope_archive::ros::Message as _;
+
     use super::*;
 
     #[test]

@@ -3,7 +3,6 @@
 //! For a short time it hears everything, which may be much (cameras), asks for the tokens with which ROS 2 announces
 //! its publishers, and tries the endpoints that cannot be reached. Then it is quiet for longer than it looked.
 
-use std::net::{TcpStream, ToSocketAddrs};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -13,6 +12,7 @@ use zenoh::{Session, Wait};
 
 use super::attachment::Attachment;
 use super::publication::Publications;
+use crate::tcp;
 
 /// How long it hears everything.
 const LOOK_FOR: Duration = Duration::from_millis(1500);
@@ -161,24 +161,8 @@ pub(super) fn connected(session: &Session) -> usize {
 fn fault_of(endpoint: &str) -> Option<String> {
     let (_, address) = endpoint.split_once('/')?;
     let address = address.split(['?', '#']).next().unwrap_or(address);
-    let addresses = match address.to_socket_addrs() {
-        Ok(addresses) => addresses,
-        Err(error) => return Some(format!("its name is not known: {error}")),
-    };
-    let mut fault = Some("its name has no address".to_owned());
-    for address in addresses {
-        match TcpStream::connect_timeout(&address, ANSWER_WITHIN) {
-            Ok(_) => return None,
-            Err(error) => {
-                fault = Some(match error.kind() {
-                    std::io::ErrorKind::ConnectionRefused => "connection refused".to_owned(),
-                    std::io::ErrorKind::TimedOut => "no answer".to_owned(),
-                    _ => error.to_string(),
-                });
-            }
-        }
-    }
-    fault
+    let reached = tcp::connect(address, ANSWER_WITHIN);
+    reached.err().map(|fault| fault.to_string())
 }
 
 /// Nothing in here can be left half done, so a panic elsewhere does not matter.

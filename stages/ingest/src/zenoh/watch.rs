@@ -7,7 +7,7 @@ use zenoh::Session;
 
 use super::diagnosis::{Expected, Fed, diagnose};
 use super::scout::Scout;
-use crate::pack::PackCounts;
+use crate::pack::{PackCounts, Packer};
 
 /// A source that gave nothing for so long is looked after; what is wrong is known a look later.
 const SILENT_AFTER: Duration = Duration::from_secs(1);
@@ -66,16 +66,18 @@ impl Watch {
         &mut self,
         silent_for: Duration,
         session: &Session,
-        packed: PackCounts,
+        packer: &Packer,
     ) -> Option<Trouble> {
         if silent_for < SILENT_AFTER {
             self.scout.rest();
             return self.effortless();
         }
+        let packed = packer.counts();
         let seen = self.scout.look(session)?;
         let fed = Fed {
             foreign: packed.foreign - self.packed.foreign,
             incomplete: packed.incomplete - self.packed.incomplete,
+            never_finite: packer.never_finite(),
             not_finite: packed.not_finite - self.packed.not_finite,
             stale: packed.late + packed.repeated - self.packed.late - self.packed.repeated,
             ..self.fed.clone()

@@ -1,3 +1,5 @@
+use tauscope_archive::ros::{self, Message as _};
+
 use super::*;
 use crate::config::ZenohConfig;
 

@@ -4,46 +4,21 @@ use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use zenoh::bytes::ZBytes;
-use zenoh::key_expr::KeyExpr;
-
-use super::attachment::Attachment;
-
-/// Which part of a sample a message brings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Role {
-    State,
-    Command,
-    Reference,
-    Tool,
-    Learn,
-}
-
-/// A message as it came.
+/// The queue between the threads that receive and the stage's.
 #[derive(Debug)]
-pub(super) struct Waiting {
-    pub role: Role,
-    pub received_ns: i64,
-    pub key: KeyExpr<'static>,
-    pub payload: ZBytes,
-    pub attachment: Option<Attachment>,
-}
-
-/// The queue between Zenoh's threads and the stage's.
-#[derive(Debug)]
-pub(super) struct Queue {
-    state: Mutex<State>,
+pub(crate) struct Queue<T> {
+    state: Mutex<State<T>>,
     filled: Condvar,
     capacity: usize,
 }
 
 #[derive(Debug)]
-struct State {
-    messages: VecDeque<Waiting>,
+struct State<T> {
+    messages: VecDeque<T>,
     overflowed: u64,
 }
 
-impl Queue {
+impl<T> Queue<T> {
     pub fn new(capacity: usize) -> Self {
         Self {
             state: Mutex::new(State {
@@ -56,7 +31,7 @@ impl Queue {
     }
 
     /// Adds a message and never waits.
-    pub fn push(&self, message: Waiting) {
+    pub fn push(&self, message: T) {
         let mut state = self.lock();
         if state.messages.len() >= self.capacity {
             state.messages.pop_front();
@@ -68,9 +43,9 @@ impl Queue {
     }
 
     /// Takes the oldest message, waiting at most `patience` for one.
-    pub fn pop(&self, patience: Duration) -> Option<Waiting> {
+    pub fn pop(&self, patience: Duration) -> Option<T> {
         let state = self.lock();
-        let empty = |state: &mut State| state.messages.is_empty();
+        let empty = |state: &mut State<T>| state.messages.is_empty();
         let (mut state, _) = self
             .filled
             .wait_timeout_while(state, patience, empty)
@@ -84,7 +59,7 @@ impl Queue {
     }
 
     /// Nothing in here can be left half done, so a panic elsewhere does not matter.
-    fn lock(&self) -> MutexGuard<'_, State> {
+    fn lock(&self) -> MutexGuard<'_, State<T>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -93,25 +68,13 @@ impl Queue {
 mod tests {
     use super::*;
 
-    fn message(received_ns: i64) -> Waiting {
-        Waiting {
-            role: Role::State,
-            received_ns,
-            key: KeyExpr::try_from("a/b").unwrap().into_owned(),
-            payload: ZBytes::default(),
-            attachment: None,
-        }
-    }
-
     #[test]
     fn the_oldest_gives_way_and_is_counted() {
         let queue = Queue::new(3);
         for i in 0..5 {
-            queue.push(message(i));
+            queue.push(i);
         }
-        let took: Vec<_> = std::iter::from_fn(|| queue.pop(Duration::ZERO))
-            .map(|message| message.received_ns)
-            .collect();
+        let took: Vec<_> = std::iter::from_fn(|| queue.pop(Duration::ZERO)).collect();
         assert_eq!(took, [2, 3, 4]);
         assert_eq!(queue.overflowed(), 2);
     }
@@ -121,7 +84,7 @@ mod tests {
         let queue = std::sync::Arc::new(Queue::new(3));
         let other = std::sync::Arc::clone(&queue);
         let waiter = std::thread::spawn(move || other.pop(Duration::from_secs(10)));
-        queue.push(message(7));
-        assert_eq!(waiter.join().unwrap().unwrap().received_ns, 7);
+        queue.push(7);
+        assert_eq!(waiter.join().unwrap(), Some(7));
     }
 }
