@@ -32,7 +32,7 @@ const PAPERS_GAMMA: f64 = 6.2;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// How the external force is had and watched.
+    /// How the external force is estimated and filtered.
     pub signals: SignalSettings,
     /// When a contact begins and ends.
     pub detection: MachineSettings,

@@ -13,7 +13,7 @@ use crate::frame::{ConfigError, Impedance, Setup, Tap, rate};
 use crate::salt_ducaju::sliding_dft::{BandError, SlidingDft, bins};
 use crate::salt_ducaju::wrench::ToolPoint;
 
-/// How the external force is had and watched: what the detectors after Salt Ducaju et al. share.
+/// How the external force is estimated and filtered: what the detectors after Salt Ducaju et al. share.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SignalSettings {

@@ -28,7 +28,7 @@ pub(crate) const NAME: &str = "fisher_discriminant";
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// How the external force is had and watched.
+    /// How the external force is estimated and filtered.
     pub signals: SignalSettings,
     /// When a contact begins and ends.
     pub detection: MachineSettings,

@@ -29,7 +29,7 @@ pub(crate) const NAME: &str = "frequency_classifier";
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// How the external force is had and watched.
+    /// How the external force is estimated and filtered.
     pub signals: SignalSettings,
     /// When a contact begins and ends.
     pub detection: MachineSettings,
