@@ -277,3 +277,22 @@ impl<T: Sample, S: Sender<T> + ?Sized> Sender<T> for &mut S {
         (**self).counts()
     }
 }
+
+impl<T: Sample, R: Receiver<T> + ?Sized> Receiver<T> for &mut R {
+    fn receive(
+        &mut self,
+        timeout: Duration,
+        read: &mut dyn FnMut(&T),
+    ) -> Result<Received, LinkError> {
+        (**self).receive(timeout, read)
+    }
+    fn counts(&self) -> ReceiverCounts {
+        (**self).counts()
+    }
+    fn position(&self) -> Option<Position> {
+        (**self).position()
+    }
+    fn resume(&mut self, position: Position) {
+        (**self).resume(position);
+    }
+}

@@ -13,16 +13,16 @@ use std::time::Duration;
 pub mod child;
 mod health;
 mod report;
+mod single;
 mod sink;
-mod source;
-mod stage;
+pub mod tree;
 
 pub use child::{Child, ChildError, Line, note, outside};
 pub use health::HealthClock;
 pub use report::{Board, InputReport, Outcome, Report};
+pub use single::{run_source, run_stage};
 pub use sink::{SinkInput, run_sink};
-pub use source::run_source;
-pub use stage::run_stage;
+pub use tree::Tree;
 
 /// How long a shell waits for a sample before it looks whether it is to stop.
 /// Resolution: how soon a stop is noticed, against how often the stage wakes up.

@@ -317,10 +317,10 @@ fn reporting<R>(context: &Context, body: impl FnOnce() -> R) -> R {
         scope.spawn(move || {
             while until_finished.recv_timeout(REPORT_EVERY) == Err(mpsc::RecvTimeoutError::Timeout)
             {
-                let report = context.board.read();
-                // Empty until the loop has begun.
-                if report.outcome.is_none() && !report.stage.is_empty() {
-                    say(&Line::Report(report));
+                for report in context.board.read() {
+                    if report.outcome.is_none() {
+                        say(&Line::Report(report));
+                    }
                 }
             }
         });
