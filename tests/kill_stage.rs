@@ -1,4 +1,4 @@
-//! kill -9 of any one stage: the supervisor says so and starts it again within a second, and the
+//! Stages in processes of their own, and kill -9 of any one of them: the supervisor says so and starts it again within a second, and the
 //! others go on.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
@@ -21,9 +21,9 @@ fn pipeline(folder: &Path) {
         "version: 1
 cells: {{demo: {{robot: {robot}}}}}
 stages:
-- {{name: ingest, ingest: {{file: {{path: {recording}}}, rate: 4}}}}
-- {{name: twin, input: ingest, twin: {{}}}}
-- {{name: detect, input: twin, detect: {{naive_difference: {{}}, threshold: {{score: 1000}}}}}}
+- {{name: ingest, process: ingest, ingest: {{file: {{path: {recording}}}, rate: 4}}}}
+- {{name: twin, process: twin, input: ingest, twin: {{}}}}
+- {{name: detect, process: detect, input: twin, detect: {{naive_difference: {{}}, threshold: {{score: 1000}}}}}}
 - {{name: record, inputs: [ingest, twin, detect], record: {{mcap: out.mcap}}}}
 ",
         robot = data.join("demo_arm.urdf").display(),

@@ -3,7 +3,9 @@
 //!
 //! - [`run_source`], [`run_stage`], [`run_sink`] run one over links that are open; they return a
 //!   [`Report`] however it ends.
-//! - [`child`] does so in a process of its own, which takes its [`Seat`](crate::Seat) from standard
+//! - [`Tree`] is the loop around a source or a link and all stages that hang on it in one process; [`crew`] runs any
+//!   number of trees in one process.
+//! - [`child`] runs a stage in a process of its own, which takes its [`Seat`](crate::Seat) from standard
 //!   input; [`outside`] is all that the `main` of a stage from another crate needs.
 
 use std::sync::Arc;
@@ -11,6 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 pub mod child;
+mod crew;
 mod health;
 mod report;
 mod single;
@@ -18,6 +21,7 @@ mod sink;
 pub mod tree;
 
 pub use child::{Child, ChildError, Line, note, outside};
+pub use crew::{Member, Unmade, crew};
 pub use health::HealthClock;
 pub use report::{Board, InputReport, Outcome, Report};
 pub use single::{run_source, run_stage};

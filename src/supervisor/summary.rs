@@ -91,28 +91,39 @@ impl Summary {
     pub fn new(pipeline: &Pipeline, links: &[Link], stages: &[Local], ended: Ended) -> Self {
         let mut summary = Self::reported(pipeline, links, stages, ended);
         summary.count_what_lives_missed();
-        // A stage that was killed has sent more than it lived to report, as its listeners know.
-        for stage in summary
-            .stages
-            .iter_mut()
-            .filter(|stage| stage.restarts > 0 || stage.failed)
-        {
-            let links = summary
-                .links
-                .iter_mut()
-                .filter(|link| link.from == stage.stage);
-            let known =
-                links.map(|link| link.received.map_or(0, |received| received + link.dropped));
-            stage.emitted = stage.emitted.max(known.max().unwrap_or(0));
-            for link in summary
-                .links
-                .iter_mut()
-                .filter(|link| link.from == stage.stage)
-            {
-                link.emitted = Some(stage.emitted);
-            }
+        for at in 0..summary.stages.len() {
+            summary.count_unreported(at);
         }
         summary
+    }
+
+    /// A stage that was killed has sent more than it lived to report, as its listeners know. Those in its process heard
+    /// each sample before anybody else did, and died with it.
+    fn count_unreported(&mut self, at: usize) {
+        let Self { stages, links, .. } = self;
+        let StageSummary {
+            restarts, failed, ..
+        } = stages[at];
+        if restarts == 0 && !failed {
+            return;
+        }
+        let name = stages[at].stage.clone();
+        let mine = |link: &&mut LinkSummary| link.from == name;
+        let known = links.iter_mut().filter(mine);
+        let known = known.map(|link| link.received.map_or(0, |received| received + link.dropped));
+        let emitted = stages[at].emitted.max(known.max().unwrap_or(0));
+        stages[at].emitted = emitted;
+        for link in links.iter_mut().filter(mine) {
+            link.emitted = Some(emitted);
+            if link.over != Over::InProcess {
+                continue;
+            }
+            link.received = Some(emitted - link.dropped.min(emitted));
+            let listener = stages.iter_mut().find(|stage| stage.stage == link.to);
+            if let (Some(listener), Some(received)) = (listener, link.received) {
+                listener.received = received;
+            }
+        }
     }
 
     /// What went to a stage that died and was not there for its next life, or had none, is lost, too.
@@ -201,6 +212,7 @@ impl Summary {
         let mut links = new(&["link", "emitted", "received", "dropped"]);
         for link in &self.links {
             let over = match link.over {
+                Over::InProcess => " (in process)",
                 Over::SharedMemory => "",
                 Over::Zenoh => " (Zenoh)",
             };

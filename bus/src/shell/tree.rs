@@ -20,7 +20,7 @@ use crate::stage::{Source, StageError};
 pub use node::{Branch, Outlet, branch};
 pub use turn::Turn;
 
-use node::{Part, walk};
+use node::walk;
 use root::{Linked, Root, SourceRoot};
 
 /// How often the wait for receivers looks whether the tree is to stop.
