@@ -80,7 +80,10 @@ fn over(maker: &Stage, listener: &Stage) -> Over {
     let is_called = matches!(listener.role, Role::Twin | Role::Detect | Role::Explain)
         && listener.keep == Keep::All
         && !matches!(maker.role, Role::Outside(_));
-    match (maker.host == listener.host, maker.process == listener.process) {
+    match (
+        maker.host == listener.host,
+        maker.process == listener.process,
+    ) {
         (false, _) => Over::Zenoh,
         (true, true) if is_called => Over::InProcess,
         (true, _) => Over::SharedMemory,

@@ -176,7 +176,9 @@ impl Supervisor<'_> {
         // Each life's exit is its last event, so there are none of earlier ones.
         debug_assert_eq!(self.crews[crew].life, life, "an event of another life");
         match event {
-            Event::Said(line) => self.view.warn(&format!("[{}] {line}", self.crews[crew].name)),
+            Event::Said(line) => self
+                .view
+                .warn(&format!("[{}] {line}", self.crews[crew].name)),
             Event::Reported(line) => self.hear(crew, &line),
             Event::Exited(status) => {
                 self.crews[crew].exited();

@@ -72,7 +72,10 @@ fn a_good_file_is_shown_as_tables_pictures_and_json() {
     let mermaid = check(folder.path(), &stages(GOOD), &["--format", "mermaid"]).stdout;
     assert!(mermaid.starts_with("flowchart LR\n"), "{mermaid}");
     assert!(mermaid.contains("s1 -->|twin states| s2"), "{mermaid}");
-    assert!(mermaid.contains("subgraph process_0 [\"demo\"]"), "{mermaid}");
+    assert!(
+        mermaid.contains("subgraph process_0 [\"demo\"]"),
+        "{mermaid}"
+    );
     assert!(mermaid.contains("s0 ==>|joint states| s1"), "{mermaid}");
     let dot = check(folder.path(), &stages(GOOD), &["--format", "dot"]).stdout;
     assert!(
@@ -95,7 +98,7 @@ fn the_process_of_a_stage_is_its_own_its_cells_or_that_of_all() {
 {more}
 cells: {{demo: {{robot: arm.urdf{cell}}}}}
 stages:
-- {{name: ingest, ingest: {{zenoh: {{connect: tcp/localhost:7447}}}}}}
+- {{name: ingest, ingest: {{zenoh: {{connect: [tcp/127.0.0.1:7447]}}}}}}
 - {{name: twin, input: ingest{twin}, twin: {{}}}}
 - {{name: demo, inputs: [ingest, twin], record: {{mcap: out.mcap}}}}
 "

@@ -57,6 +57,10 @@ fn topics(archive: &Path) -> BTreeMap<String, Vec<(u64, Vec<u8>)>> {
             .or_default()
             .push(one);
     }
+    for messages in topics.values_mut() {
+        // Of two detectors on one topic the order is that of arrival.
+        messages.sort();
+    }
     topics.retain(|topic, _| !topic.contains("health") && !topic.contains("diagnostics"));
     topics
 }
@@ -101,7 +105,7 @@ fn a_killed_process_comes_back_with_all_its_stages() {
     pipeline(folder.path(), "4", "");
     let mut live = Live::start(folder.path(), &[]);
     let recorder = live.wait_for_stage("record");
-    let ids = ["ingest", "twin", "one", "two"].map(|name| live.wait_for_stage(name));
+    let ids = ["two", "one", "twin", "ingest"].map(|name| live.wait_for_stage(name));
     assert!(ids.iter().all(|id| *id == ids[0] && *id != recorder));
     let part = folder.path().join("out.mcap.part");
     wait_until("samples flow", || {
@@ -113,7 +117,7 @@ fn a_killed_process_comes_back_with_all_its_stages() {
             "warning: stage `{name}` was killed by signal 9: starting it again"
         ));
     }
-    let again = live.wait_for_stage("two");
+    let again = live.wait_for_stage("ingest");
     assert!(again != ids[0] && is_alive(again) && is_alive(recorder));
     let (code, summary) = live.end();
     assert_eq!(code, 0, "{summary}");
@@ -175,13 +179,35 @@ stages:
     for name in ["good_in", "good_twin", "good_detect"] {
         assert_eq!(number(name, "restarts"), 0, "{summary}");
     }
-    assert_eq!(number("good_detect", "received"), number("good_in", "emitted"));
+    assert_eq!(
+        number("good_detect", "received"),
+        number("good_in", "emitted")
+    );
 }
 
 #[test]
 fn a_recorder_that_stands_still_delays_no_detection_and_loses_nothing() {
     let folder = tempfile::tempdir().unwrap();
+    let scenario = format!(
+        "version: 1
+name: fast
+robot: {}
+rate_hz: 1000
+recordings:
+- {{name: loop, duration_s: 30, motion: {{fourier: {{period_s: 10, harmonics: 4, speed: 0.4, acceleration_rad_s2: 2.5, range: 0.5}}}}}}
+",
+        bundled().join("demo_arm.urdf").display()
+    );
+    write(&folder.path().join("scenario.yaml"), &scenario);
     pipeline(folder.path(), "realtime", "");
+    let file = folder.path().join("pipeline.yaml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let (before, rest) = text.split_once("file: {path: ").unwrap();
+    let (_, after) = rest.split_once('}').unwrap();
+    write(
+        &file,
+        &format!("{before}simulate: {{scenario: scenario.yaml}}{after}"),
+    );
     let mut live = Live::start(folder.path(), &["--verbose"]);
     let recorder = live.wait_for_stage("record");
     let part = folder.path().join("out.mcap.part");
@@ -197,7 +223,8 @@ fn a_recorder_that_stands_still_delays_no_detection_and_loses_nothing() {
         during = received(&mut live, "two").max(during);
     }
     signal(recorder, "CONT");
-    assert!(during > before + 2_000, "{before}, then {during}");
+    // More than the link itself has room for.
+    assert!(during > before + 4_000, "{before}, then {during}");
     signal(live.id(), "INT");
     let (code, summary) = live.end();
     assert_eq!(code, 0, "{summary}");

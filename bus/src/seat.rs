@@ -8,7 +8,9 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use crate::effort_unit::EffortUnit;
-use crate::link::{Audience, Domain, Keep, MAX_RECEIVERS, PATIENCE, Position, SpillSettings, ZenohEndpoints};
+use crate::link::{
+    Audience, Domain, Keep, MAX_RECEIVERS, PATIENCE, Position, SpillSettings, ZenohEndpoints,
+};
 use crate::sample::SampleKind;
 
 mod links;

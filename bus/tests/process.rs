@@ -178,7 +178,13 @@ fn meet(process: &mut Process, sender: &mut dyn Sender<JointState>, sinks: &mut 
         while !ready.is_finished() {
             sinks.look();
         }
-        assert_eq!(ready.join().unwrap(), Line::Ready { stage: "echo".to_owned(), missing: 0 });
+        assert_eq!(
+            ready.join().unwrap(),
+            Line::Ready {
+                stage: "echo".to_owned(),
+                missing: 0
+            }
+        );
     });
     assert_eq!(sender.wait_for_receivers(LONG).unwrap(), 0);
 }

@@ -106,11 +106,17 @@ fn run(mood: Mood) -> (Vec<Report>, Vec<(&'static str, i64)>, Vec<i64>) {
     let out = Outlet::new(vec![twin], None);
     let source = Box::new(Counter(0));
     let tree = Tree::of_source(&turn, post(&links, "count", ""), source, out);
-    let reports = tree.run(&Context::new("count"));
-    let mut seen = Vec::new();
-    let now = std::time::Duration::ZERO;
-    let read = &mut |twin: &TwinState| seen.push(twin.header.stamp_ns);
-    while outside.receive(now, read).unwrap() == Received::Sample {}
+    let soon = std::time::Duration::from_millis(500);
+    let (reports, seen) = std::thread::scope(|scope| {
+        let seen = scope.spawn(move || {
+            let mut seen = Vec::new();
+            let read = &mut |twin: &TwinState| seen.push(twin.header.stamp_ns);
+            while outside.receive(soon, read).unwrap() == Received::Sample {}
+            seen
+        });
+        let reports = tree.run(&Context::new("count"));
+        (reports, seen.join().unwrap())
+    });
     let heard = heard.lock().unwrap().clone();
     (reports, heard, seen)
 }

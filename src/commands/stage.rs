@@ -130,11 +130,7 @@ fn member(seat: &Seat, shared: &tauscope_detect::Shared) -> Result<Member, SeatE
             effort_cutoff_hz,
         } => {
             let watch = build::watch(config, model.as_ref(), *effort_cutoff_hz, cell()?)?;
-            Member::Judge(Box::new(Announced::new(
-                &seat.stage,
-                watch,
-                &cell()?.facts,
-            )))
+            Member::Judge(Box::new(Announced::new(&seat.stage, watch, &cell()?.facts)))
         }
         Settings::Record(config) => {
             let cells: Vec<&Cell> = cells.iter().collect();

@@ -20,7 +20,9 @@ pub fn mermaid(pipeline: &Pipeline, links: &[Link]) -> String {
         }
         None => text.push_str(inner),
     };
-    for (host, stages) in by(pipeline, 0..pipeline.stages.len(), |stage| stage.host.as_deref()) {
+    for (host, stages) in by(pipeline, 0..pipeline.stages.len(), |stage| {
+        stage.host.as_deref()
+    }) {
         let mut on_host = String::new();
         for (process, stages) in by(pipeline, stages, |stage| Some(&stage.process)) {
             let mut in_process = String::new();
@@ -57,7 +59,9 @@ pub fn mermaid(pipeline: &Pipeline, links: &[Link]) -> String {
 /// A Graphviz digraph.
 pub fn dot(pipeline: &Pipeline, links: &[Link]) -> String {
     let mut text = "digraph pipeline {\n  rankdir=LR;\n  node [shape=box];\n".to_owned();
-    for (host, stages) in by(pipeline, 0..pipeline.stages.len(), |stage| stage.host.as_deref()) {
+    for (host, stages) in by(pipeline, 0..pipeline.stages.len(), |stage| {
+        stage.host.as_deref()
+    }) {
         if let Some(host) = host {
             let _ = writeln!(
                 text,

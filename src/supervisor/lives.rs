@@ -79,7 +79,7 @@ impl Supervisor<'_> {
             crew.started(process);
             id
         };
-        for index in tree {
+        for index in tree.into_iter().rev() {
             let stage = &mut self.stages[index];
             stage.started();
             let name = &stage.seat.stage;

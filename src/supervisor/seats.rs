@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-use tauscope_bus::seat::{Cell as SeatCell, Input, Output, OutputLink, TransportKind};
 use tauscope_bus::link::SpillSettings;
+use tauscope_bus::seat::{Cell as SeatCell, Input, Output, OutputLink, TransportKind};
 use tauscope_bus::{Audience, Domain, Keep, SampleKind, Seat, ZenohEndpoints};
 use tauscope_pipeline::build::StreamFacts;
 use tauscope_pipeline::cell::CellFacts;
@@ -129,7 +129,9 @@ impl Planner<'_> {
         let shared = |link: &&Link| link.over == Over::SharedMemory;
         let mut count = BTreeMap::<(usize, bool), usize>::new();
         for link in self.links.iter().filter(shared) {
-            *count.entry((link.from, link.keep == Keep::All)).or_default() += 1;
+            *count
+                .entry((link.from, link.keep == Keep::All))
+                .or_default() += 1;
         }
         count.into_values().max().unwrap_or(0) + LIVES
     }

@@ -132,6 +132,10 @@ impl Summary {
             |stage: &&mut StageSummary| (stage.restarts > 0 || stage.failed) && stage.reported;
         for stage in self.stages.iter_mut().filter(died) {
             for link in self.links.iter_mut().filter(|link| link.to == stage.stage) {
+                // Nothing is on its way there, and both ends live and die together.
+                if link.over == Over::InProcess {
+                    continue;
+                }
                 let (Some(emitted), Some(received)) = (link.emitted, link.received) else {
                     continue;
                 };

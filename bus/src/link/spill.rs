@@ -193,8 +193,7 @@ impl<T: Sample> Sender<T> for Spill<T> {
 
     fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError> {
         let deadline = Instant::now() + timeout;
-        let pending =
-            |state: &mut State<T>| state.returned.is_none() && state.failure.is_none();
+        let pending = |state: &mut State<T>| state.returned.is_none() && state.failure.is_none();
         let shared = Arc::clone(&self.shared);
         let mut state = shared.lock();
         if !state.ended {

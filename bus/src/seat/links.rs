@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use super::{Input, Output, OutputLink, Seat, TransportKind};
 use crate::link::{
-    Audience, Domain, FanOut, Keep, LinkError, Position, Received, Receiver, ReceiverCounts, Sender,
-    SharedMemory, Spill, Transport as _, Zenoh, ZenohEndpoints,
+    Audience, Domain, FanOut, Keep, LinkError, Position, Received, Receiver, ReceiverCounts,
+    Sender, SharedMemory, Spill, Transport as _, Zenoh, ZenohEndpoints,
 };
 use crate::sample::{Detection, Health, JointState, Sample, SampleKind, SampleRef, TwinState};
 
@@ -87,7 +87,8 @@ impl Links {
                 }
                 if audience.keep_all > 0 {
                     let patient = shared_memory.with_patience(SPILLED_PATIENCE);
-                    let inner = patient.sender(stream, Audience::of(Keep::All, audience.keep_all))?;
+                    let inner =
+                        patient.sender(stream, Audience::of(Keep::All, audience.keep_all))?;
                     let spill = Spill::new(inner, spill, self.patience, audience.keep_all);
                     ways.push(Box::new(spill));
                 }

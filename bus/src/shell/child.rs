@@ -257,11 +257,13 @@ pub(super) fn reporting<R>(board: &Board, body: impl FnOnce() -> R) -> R {
 pub(super) fn say_posted(board: &Board) {
     // Locked before it is read, so that no older report comes after a newer one.
     let mut out = io::stdout().lock();
+    let mut text = Vec::new();
     let posted = board.read().into_iter();
     for report in posted.filter(|report| report.outcome.is_none()) {
-        write_line(&mut out, &Line::Report(report));
+        write_line(&mut text, &Line::Report(report));
     }
-    let _ = out.flush();
+    // At once: what is killed meanwhile has said what all have done, or nothing.
+    let _ = out.write_all(&text).and_then(|()| out.flush());
 }
 
 /// Says that a stage begins.

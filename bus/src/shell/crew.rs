@@ -144,7 +144,10 @@ where
 
 fn report_now_and_then(running: &Running, until_it_ends: &mpsc::Receiver<()>) {
     while until_it_ends.recv_timeout(REPORT_EVERY) == Err(mpsc::RecvTimeoutError::Timeout) {
-        let boards: Vec<Board> = lock(running).iter().map(|tree| tree.board.clone()).collect();
+        let boards: Vec<Board> = lock(running)
+            .iter()
+            .map(|tree| tree.board.clone())
+            .collect();
         for board in boards {
             say_posted(&board);
         }
@@ -167,7 +170,10 @@ fn live(
     let failed = match lived {
         Ok(Ok(reports)) => Ok(reports),
         Ok(Err(unmade)) => Err((unmade.stage, unmade.why)),
-        Err(panic) => Err((first.to_owned(), format!("it panicked: {}", words_of(&*panic)))),
+        Err(panic) => Err((
+            first.to_owned(),
+            format!("it panicked: {}", words_of(&*panic)),
+        )),
     };
     let reports = failed.unwrap_or_else(|(stage, why)| {
         // As far as it came; before it began there is nothing on the board.
@@ -287,7 +293,10 @@ impl<'a> Grower<'a> {
         let post = Post {
             stage: seat.stage.clone(),
             restarts: seat.restarts,
-            from: seat.inputs.first().map_or_else(String::new, |input| input.from.clone()),
+            from: seat
+                .inputs
+                .first()
+                .map_or_else(String::new, |input| input.from.clone()),
             health: health_sender(&links, seat)?,
         };
         let Some(output) = &seat.output else {

@@ -121,7 +121,11 @@ impl<'a> Tree<'a> {
                 let mut reports = self.reports();
                 // Only the first hears whether it is to stop; for the others a stream ends.
                 for (place, report) in reports.iter_mut().enumerate() {
-                    let outcome = if place == 0 { &outcome } else { &Outcome::Ended };
+                    let outcome = if place == 0 {
+                        &outcome
+                    } else {
+                        &Outcome::Ended
+                    };
                     report.outcome = Some(outcome.clone());
                 }
                 context.board.post(&reports);

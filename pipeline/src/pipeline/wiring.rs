@@ -49,9 +49,7 @@ pub fn check(file: &Located<PipelineFile>, report: &mut Report) -> Option<Wiring
     let cells = order
         .as_ref()
         .map(|order| checker.cells(&roles, &inputs, order));
-    let processes = cells
-        .as_ref()
-        .map(|cells| checker.processes(&roles, cells));
+    let processes = cells.as_ref().map(|cells| checker.processes(&roles, cells));
     if checker.broken {
         return None;
     }

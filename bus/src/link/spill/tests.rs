@@ -43,7 +43,10 @@ fn the_stage_does_not_wait_for_a_receiver_that_takes_nothing_and_nothing_is_lost
     assert!(take_to_end(&mut *receiver).into_iter().eq(0..1_000));
     assert_eq!(sender.wait_until_taken(LONG).unwrap(), 0);
     assert_eq!(receiver.counts().lost, 0);
-    assert_eq!((sender.counts().sent, sender.counts().undelivered), (1_000, 0));
+    assert_eq!(
+        (sender.counts().sent, sender.counts().undelivered),
+        (1_000, 0)
+    );
 }
 
 #[test]
