@@ -3,8 +3,8 @@ twin and the detector twin_regression.
 
     python3 benches/cells.py target/release/tauscope 50 100 150 [--seconds 20] [--processes cell|one|apart]
 
-For each number of cells it prints the time until all have begun, the computing time in cores, the memory of all
-processes, how late the run ended, and whether a sample was dropped. `cell`: a process a cell; `one`: one for all;
+For each number of cells it prints the time until all have begun, the computing time in cores while all run, the memory
+of all processes, how late the run ended, and whether a sample was dropped. `cell`: a process a cell; `one`: one for all;
 `apart`: one a stage.
 """
 
@@ -31,7 +31,7 @@ recordings:
 """
 
 
-def pipeline(cells, processes, recording):
+def pipeline(cells, processes, recording, rate="realtime"):
     """The pipeline file of so many cells."""
     robot = DATA / "demo_arm.urdf"
     lines = ["version: 1"] + (["process: cells"] if processes == "one" else []) + ["cells:"]
@@ -39,7 +39,7 @@ def pipeline(cells, processes, recording):
     for n in range(cells):
         own = (lambda name: f", process: {name}") if processes == "apart" else (lambda name: "")
         lines += [
-            f"- {{name: in{n}{own(f'in{n}')}, cell: c{n}, ingest: {{file: {{path: {recording}}}, rate: realtime}}}}",
+            f"- {{name: in{n}{own(f'in{n}')}, cell: c{n}, ingest: {{file: {{path: {recording}}}, rate: {rate}}}}}",
             f"- {{name: twin{n}{own(f'twin{n}')}, input: in{n}, twin: {{}}}}",
             f"- {{name: detect{n}{own(f'detect{n}')}, input: twin{n}, "
             "detect: {twin_regression: {}, threshold: {score: 1000}}}",
@@ -60,9 +60,32 @@ def memory_mb(parent):
     return total / 1024
 
 
-def run(program, folder, cells, processes, seconds, recording):
+def computing_s(parent):
+    """Computing time of a process's children so far [s]."""
+    total = 0
+    for process in pathlib.Path(f"/proc/{parent}/task/{parent}/children").read_text().split() + [str(parent)]:
+        fields = pathlib.Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()
+        total += int(fields[11]) + int(fields[12])
+    return total / os.sysconf("SC_CLK_TCK")
+
+
+def watch(parent, seconds, seen):
+    """Measures a run that has just begun: computing time over the middle of it, and memory at its end."""
+    try:
+        time.sleep(0.2 * seconds)
+        before, since = computing_s(parent), time.monotonic()
+        time.sleep(0.5 * seconds)
+        seen["cores"] = (computing_s(parent) - before) / (time.monotonic() - since)
+        seen["memory_mb"] = memory_mb(parent)
+    except OSError:
+        # It has ended early, which its row says.
+        pass
+
+
+def run(program, folder, cells, args, recording):
     """One run; its row."""
-    (folder / "pipeline.yaml").write_text(pipeline(cells, processes, recording))
+    seconds = args.seconds
+    (folder / "pipeline.yaml").write_text(pipeline(cells, args.processes, recording, args.rate))
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     started = time.monotonic()
     process = subprocess.Popen(
@@ -72,15 +95,14 @@ def run(program, folder, cells, processes, seconds, recording):
         stderr=subprocess.PIPE,
         text=True,
     )
-    begun, memory = [], []
+    begun, seen = [], {}
 
     def listen():
         for line in process.stderr:
             if line.startswith("stage `") and " begins" in line:
                 begun.append(time.monotonic() - started)
-            if len(begun) == 3 * cells and not memory:
-                memory.append(0.0)
-                threading.Timer(seconds / 2, lambda: memory.append(memory_mb(process.pid))).start()
+            if len(begun) == 3 * cells and line.startswith("stage `"):
+                threading.Thread(target=watch, args=(process.pid, seconds, seen)).start()
 
     listener = threading.Thread(target=listen)
     listener.start()
@@ -89,13 +111,13 @@ def run(program, folder, cells, processes, seconds, recording):
     wall = time.monotonic() - started
     listener.join()
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    cpu_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     ready = max(begun, default=float("nan"))
     dropped = sum(stage["dropped"] for stage in summary["stages"])
     emitted = sum(s["emitted"] for s in summary["stages"] if s["stage"].startswith("detect"))
     late = wall - ready - seconds
     print(
-        f"| {cells} | {processes} | {ready:.1f} | {cpu / (wall or 1):.2f} | {max(memory, default=0):.0f} "
+        f"| {cells} | {args.processes} | {args.rate} | {ready:.1f} | {seen.get('cores', 0):.2f} | {1e6 * cpu_s / (emitted or 1):.1f} | {seen.get('memory_mb', 0):.0f} "
         f"| {late:.1f} | {emitted} | {dropped} | {code} |",
         flush=True,
     )
@@ -108,6 +130,7 @@ def main():
     parser.add_argument("cells", type=int, nargs="+")
     parser.add_argument("--seconds", type=int, default=20)
     parser.add_argument("--processes", choices=["cell", "one", "apart"], default="cell")
+    parser.add_argument("--rate", default="realtime", help="as the source's `rate`; `fast` shows what pacing costs")
     args = parser.parse_args()
     program = args.program.resolve()
     with tempfile.TemporaryDirectory() as name:
@@ -118,10 +141,10 @@ def main():
         subprocess.run(simulated, cwd=folder, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         recording = next((folder / "simulated").rglob("*.mcap"))
         print(f"{os.cpu_count()} cores, {args.seconds} s")
-        print("| cells | processes | begun [s] | cores | memory [MB] | late [s] | judged | dropped | exit |")
-        print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+        print("| cells | processes | rate | begun [s] | cores | time a sample [us] | memory [MB] | late [s] | judged | dropped | exit |")
+        print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
         for cells in args.cells:
-            run(program, folder, cells, args.processes, args.seconds, recording)
+            run(program, folder, cells, args, recording)
 
 
 if __name__ == "__main__":

@@ -151,7 +151,9 @@ fn what_a_killed_run_leaves_is_removed_by_the_next_one_and_what_lives_is_not() {
     let killed = domain(&dead);
     signal(dead.id(), "KILL");
     drop(dead);
-    wait_until("its stages have gone", || !ids.iter().any(|&id| is_alive(id)));
+    wait_until("its stages have gone", || {
+        !ids.iter().any(|&id| is_alive(id))
+    });
     assert!(left(&killed).len() > 1, "{:?}", left(&killed));
     // As if a minute had passed.
     let folder_of = left(&killed)

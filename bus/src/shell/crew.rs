@@ -59,6 +59,9 @@ impl Unmade {
     }
 }
 
+/// Makes the stages of one tree out of their seats.
+type Make = dyn Fn(&[Seat]) -> Result<Vec<Member>, Unmade> + Send + Sync;
+
 /// The trees that run.
 type Running = Arc<Mutex<Vec<Alive>>>;
 
@@ -73,7 +76,7 @@ pub fn crew<M>(make: M) -> ExitCode
 where
     M: Fn(&[Seat]) -> Result<Vec<Member>, Unmade> + Send + Sync + 'static,
 {
-    let make = Arc::new(make);
+    let make: Arc<Make> = Arc::new(make);
     let running = Running::default();
     let stop_all = {
         let running = Arc::clone(&running);
@@ -159,7 +162,7 @@ fn live(
     seats: &[Seat],
     context: &Context,
     transports: &Transports,
-    make: &dyn Fn(&[Seat]) -> Result<Vec<Member>, Unmade>,
+    make: &Make,
     running: &Running,
 ) {
     let lived = catch_unwind(AssertUnwindSafe(|| {
