@@ -90,7 +90,7 @@ impl Summary {
     /// Adds up what the stages have reported.
     pub fn new(pipeline: &Pipeline, links: &[Link], stages: &[Local], ended: Ended) -> Self {
         let mut summary = Self::reported(pipeline, links, stages, ended);
-        summary.count_what_lives_missed();
+        summary.count_what_was_missed();
         for at in 0..summary.stages.len() {
             summary.count_unreported(at);
         }
@@ -126,11 +126,10 @@ impl Summary {
         }
     }
 
-    /// What went to a stage that died and was not there for its next life, or had none, is lost, too.
-    fn count_what_lives_missed(&mut self) {
-        let died =
-            |stage: &&mut StageSummary| (stage.restarts > 0 || stage.failed) && stage.reported;
-        for stage in self.stages.iter_mut().filter(died) {
+    /// What went to a stage while it was not there is lost, too, though nobody has seen a hole: it died and was not back
+    /// yet, or had no further life, or came later than the one it hears would wait.
+    fn count_what_was_missed(&mut self) {
+        for stage in self.stages.iter_mut().filter(|stage| stage.reported) {
             for link in self.links.iter_mut().filter(|link| link.to == stage.stage) {
                 // Nothing is on its way there, and both ends live and die together.
                 if link.over == Over::InProcess {
