@@ -19,6 +19,8 @@ pub struct Announced<S> {
 
 /// What has been told so far.
 struct Told {
+    /// Who finds it.
+    stage: String,
     joint_names: Vec<String>,
     effort_unit: &'static str,
     /// Stamp of the first sample, from which times are counted \[ns\].
@@ -27,9 +29,10 @@ struct Told {
 }
 
 impl<S> Announced<S> {
-    /// `stage` in a cell.
-    pub fn new(stage: S, cell: &CellFacts) -> Self {
+    /// `stage` of that name in a cell.
+    pub fn new(name: &str, stage: S, cell: &CellFacts) -> Self {
         let told = Told {
+            stage: name.to_owned(),
             joint_names: cell.joint_names.clone(),
             effort_unit: cell.effort_unit.as_str(),
             start_ns: None,
@@ -74,7 +77,7 @@ impl Emit<Detection> for Listener<'_> {
         self.out.emit(&mut |slot| {
             write(slot);
             if let Some(line) = told.line(slot) {
-                shell::note(&line);
+                shell::note(&told.stage, &line);
             }
         })
     }

@@ -1,5 +1,6 @@
-//! Runs the stages of one host, each as a process of its own, and looks after them.
+//! Runs the stages of one host in their processes, and looks after them.
 //!
+//! Stages of one process that hear each other are a tree: they begin, end and die together, alone or with their process.
 //! A stage that dies is started again, at once the first time and later the more often it dies; one
 //! that dies too often is given up, and with it the run. On Ctrl-C or SIGTERM the sources are ended
 //! and the rest finishes with what it has; a second time ends everything at once. A stage that does not
@@ -8,7 +9,9 @@
 //!
 //! Whoever gets nothing it can use is named within seconds, with what is there instead ([`watchman`]).
 
+mod crew;
 mod flow;
+mod lives;
 mod local;
 mod patience;
 mod process;
@@ -21,7 +24,6 @@ mod tally;
 mod view;
 mod watchman;
 
-use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Context;
@@ -31,8 +33,9 @@ use tokio::sync::mpsc;
 use tokio::time::Instant;
 
 use crate::plan::{Link, Over};
+use crew::Crew;
 use local::{Local, Reported};
-use process::{Event, Process};
+use process::Event;
 use router::Router;
 pub use seats::Instructions;
 pub use summary::{Ended, Summary};
@@ -60,7 +63,7 @@ pub struct Care {
     pub verbosity: Verbosity,
 }
 
-/// Which life of which stage an event belongs to.
+/// Which life of which process an event belongs to.
 type Mark = (usize, u64);
 
 /// Runs the stages on `host` (all without one) until they have ended.
@@ -111,12 +114,11 @@ async fn supervise(
     };
     let (sender, events) = mpsc::channel(EVENTS);
     let now = Instant::now();
+    let (stages, crews) = lives::crews(pipeline, links, seats);
     let mut supervisor = Supervisor {
         pipeline,
-        stages: seats
-            .into_iter()
-            .map(|(at, seat)| Local::new(at, seat))
-            .collect(),
+        stages,
+        crews,
         shared_memory,
         sender,
         stopping: false,
@@ -136,6 +138,7 @@ async fn supervise(
 struct Supervisor<'a> {
     pipeline: &'a Pipeline,
     stages: Vec<Local>,
+    crews: Vec<Crew>,
     shared_memory: Option<SharedMemory>,
     sender: mpsc::Sender<(Mark, Event)>,
     stopping: bool,
@@ -151,35 +154,11 @@ struct Supervisor<'a> {
 }
 
 impl Supervisor<'_> {
-    /// Those that listen before those they listen to, so that few wait for long.
-    fn start_all(&mut self) -> anyhow::Result<()> {
-        for index in (0..self.stages.len()).rev() {
-            self.start(index)?;
-        }
-        Ok(())
-    }
-
-    fn start(&mut self, index: usize) -> anyhow::Result<()> {
-        let stage = &mut self.stages[index];
-        let settings = &self.pipeline.stages[stage.at].settings;
-        let folder = self.pipeline.path.parent().unwrap_or(Path::new(""));
-        let command = process::command(settings, folder)?;
-        let mark = (index, stage.seat.restarts);
-        let process = Process::start(command, &stage.seat, mark, self.sender.clone())?;
-        let id = process.id();
-        self.view.note(&format!(
-            "stage `{}` runs as process {id}",
-            stage.seat.stage
-        ));
-        stage.started(process);
-        Ok(())
-    }
-
     async fn watch(&mut self, mut events: mpsc::Receiver<(Mark, Event)>) -> anyhow::Result<()> {
         let mut interrupt = signal(SignalKind::interrupt()).context("cannot catch Ctrl-C")?;
         let mut terminate = signal(SignalKind::terminate()).context("cannot catch SIGTERM")?;
         let mut look = tokio::time::interval(LOOK_EVERY);
-        while !self.stages.iter().all(Local::is_over) {
+        while !self.is_over() {
             let due = self.stages.iter().filter_map(Local::due).min();
             let alarm = due.unwrap_or_else(|| Instant::now() + NEVER);
             tokio::select! {
@@ -188,46 +167,55 @@ impl Supervisor<'_> {
                 () = tokio::time::sleep_until(alarm) => self.alarm(),
                 now = look.tick() => self.look(now),
             }
+            self.close_crews();
         }
         Ok(())
     }
 
-    fn take(&mut self, (index, life): Mark, event: Event) {
-        let stage = &mut self.stages[index];
+    fn take(&mut self, (crew, life): Mark, event: Event) {
         // Each life's exit is its last event, so there are none of earlier ones.
-        debug_assert_eq!(stage.seat.restarts, life, "an event of another life");
+        debug_assert_eq!(self.crews[crew].life, life, "an event of another life");
         match event {
-            Event::Said(line) => self.view.warn(&format!("[{}] {line}", stage.seat.stage)),
-            Event::Reported(line) => match stage.report(&line) {
-                Reported::Counts => {}
-                Reported::Ready { missing } => {
-                    let missing = match missing {
-                        0 => String::new(),
-                        some => format!(", without {some} of its listeners"),
-                    };
-                    let line = format!("stage `{}` begins{missing}", stage.seat.stage);
-                    self.view.detail(&line);
-                }
-                Reported::Note(text) => {
-                    self.view.note(&format!("[{}] {text}", stage.seat.stage));
-                }
-                Reported::Other(line) => {
-                    self.view.note(&format!("[{}] {line}", stage.seat.stage));
-                }
-            },
+            Event::Said(line) => self
+                .view
+                .warn(&format!("[{}] {line}", self.crews[crew].name)),
+            Event::Reported(line) => self.hear(crew, &line),
             Event::Exited(status) => {
-                let name = stage.seat.stage.clone();
-                match stage.exited(status) {
-                    local::End::InOrder => {}
-                    local::End::Died { how, again } => {
-                        self.clean();
-                        self.view.warn(&died(&name, &how, again));
-                        if again.is_none() {
-                            self.stop();
-                        }
-                    }
-                }
+                self.crews[crew].exited();
+                self.process_ended(crew, &status);
                 self.settle();
+            }
+        }
+    }
+
+    /// Takes a line of a process's standard output.
+    fn hear(&mut self, crew: usize, line: &str) {
+        let Some(index) = self.speaker(crew, line) else {
+            let name = &self.crews[crew].name;
+            self.view.note(&format!("[{name}] {line}"));
+            return;
+        };
+        let stage = &mut self.stages[index];
+        match stage.report(line) {
+            Reported::Counts => {
+                let root = stage.root;
+                if stage.is_done() && !self.crews[crew].outside {
+                    self.tree_ended(root);
+                }
+            }
+            Reported::Ready { missing } => {
+                let missing = match missing {
+                    0 => String::new(),
+                    some => format!(", without {some} of its listeners"),
+                };
+                let line = format!("stage `{}` begins{missing}", stage.seat.stage);
+                self.view.detail(&line);
+            }
+            Reported::Note(text) => {
+                self.view.note(&format!("[{}] {text}", stage.seat.stage));
+            }
+            Reported::Other(line) => {
+                self.view.note(&format!("[{}] {line}", stage.seat.stage));
             }
         }
     }
@@ -244,8 +232,9 @@ impl Supervisor<'_> {
         if self.stopping {
             self.view.note("ending everything at once");
             for stage in &mut self.stages {
-                stage.kill();
+                stage.is_to_end(false);
             }
+            self.crews.iter().for_each(Crew::kill);
             return;
         }
         self.ended = Ended::Interrupted;
@@ -274,7 +263,7 @@ impl Supervisor<'_> {
             let recorder = self.is_recorder(index);
             let stage = &mut self.stages[index];
             if self.stopping && all_over && (is_source || is_remote) {
-                stage.stop(recorder);
+                self.ask_to_end(index, recorder);
             } else if all_over && !is_source && !is_remote {
                 stage.finish_by(Instant::now() + GRACE);
             }
@@ -293,25 +282,17 @@ impl Supervisor<'_> {
             }
             if !self.stages[index].is_waiting() {
                 let recorder = self.is_recorder(index);
-                self.stages[index].stop(recorder);
+                self.ask_to_end(index, recorder);
                 continue;
             }
-            if let Err(error) = self.start(index) {
+            let root = self.stages[index].root;
+            if let Err(error) = self.start(root) {
                 self.view.warn(&format!("error: {error:#}"));
-                self.stages[index].give_up();
+                for index in self.tree(root) {
+                    self.stages[index].give_up();
+                }
                 self.stop();
             }
-        }
-    }
-}
-
-fn died(name: &str, how: &str, again: Option<Duration>) -> String {
-    match again {
-        None => format!("error: stage `{name}` {how} and is not started again"),
-        Some(Duration::ZERO) => format!("warning: stage `{name}` {how}: starting it again"),
-        Some(wait) => {
-            let wait = wait.as_millis();
-            format!("warning: stage `{name}` {how}: starting it again in {wait} ms")
         }
     }
 }

@@ -56,13 +56,13 @@ fn a_good_file_is_shown_as_tables_pictures_and_json() {
     assert_eq!(
         rows,
         [
-            "|stage|is|cell|host|listens to|puts out|",
-            "|ingest|ingest|demo|this one||joint states|",
-            "|twin|twin|demo|this one|ingest|twin states|",
-            "|detect|detect|demo|this one|twin|detections|",
-            "|record|record|demo|this one|ingest, twin, detect||",
+            "|stage|is|cell|host|process|listens to|puts out|",
+            "|ingest|ingest|demo|this one|demo||joint states|",
+            "|twin|twin|demo|this one|demo|ingest|twin states|",
+            "|detect|detect|demo|this one|demo|twin|detections|",
+            "|record|record|demo|this one|record|ingest, twin, detect||",
             "|from|to|carries|over|keeps|",
-            "|ingest|twin|joint states|shared memory|all|",
+            "|ingest|twin|joint states|the process itself|all|",
             "|twin|detect|twin states|shared memory|newest|",
             "|ingest|record|joint states|shared memory|all|",
             "|twin|record|twin states|shared memory|all|",
@@ -72,15 +72,64 @@ fn a_good_file_is_shown_as_tables_pictures_and_json() {
     let mermaid = check(folder.path(), &stages(GOOD), &["--format", "mermaid"]).stdout;
     assert!(mermaid.starts_with("flowchart LR\n"), "{mermaid}");
     assert!(mermaid.contains("s1 -->|twin states| s2"), "{mermaid}");
+    assert!(
+        mermaid.contains("subgraph process_0 [\"demo\"]"),
+        "{mermaid}"
+    );
+    assert!(mermaid.contains("s0 ==>|joint states| s1"), "{mermaid}");
     let dot = check(folder.path(), &stages(GOOD), &["--format", "dot"]).stdout;
     assert!(
-        dot.contains("s0 -> s1 [label=\"joint states\", style=solid];"),
+        dot.contains("s0 -> s1 [label=\"joint states\", style=bold];"),
         "{dot}"
     );
     let json = check(folder.path(), &stages(GOOD), &["--json"]).stdout;
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["links"][1]["stream"], "demo/twin");
     assert_eq!(json["links"][1]["keep"], "newest");
+    assert_eq!(json["stages"][0]["process"], "demo");
+}
+
+#[test]
+fn the_process_of_a_stage_is_its_own_its_cells_or_that_of_all() {
+    let folder = tempfile::tempdir().unwrap();
+    let processes = |more: &str, cell: &str, twin: &str| -> Vec<String> {
+        let text = format!(
+            "version: 1
+{more}
+cells: {{demo: {{robot: arm.urdf{cell}}}}}
+stages:
+- {{name: ingest, ingest: {{zenoh: {{connect: [tcp/127.0.0.1:7447]}}}}}}
+- {{name: twin, input: ingest{twin}, twin: {{}}}}
+- {{name: demo, inputs: [ingest, twin], record: {{mcap: out.mcap}}}}
+"
+        );
+        let out = check(folder.path(), &text, &["--json"]);
+        assert_eq!(out.code, 0, "{}", out.stderr);
+        let json: serde_json::Value = serde_json::from_str(&out.stdout).unwrap();
+        let stages = json["stages"].as_array().unwrap().iter();
+        let names = stages.map(|stage| stage["process"].as_str().unwrap().to_owned());
+        names.collect()
+    };
+    assert_eq!(processes("", "", ""), ["demo", "demo", "demo_record"]);
+    let all = "process: all";
+    assert_eq!(processes(all, "", ""), ["all", "all", "demo"]);
+    let cell = ", process: left";
+    assert_eq!(processes(all, cell, ""), ["left", "left", "demo"]);
+    let own = ", process: one";
+    assert_eq!(processes(all, cell, own), ["left", "one", "demo"]);
+    let bad = "version: 1
+cells: {demo: {robot: arm.urdf}}
+stages:
+- {name: mine, process: two words, outside: {command: [sleep], output: joint_state}}
+";
+    let out = check(folder.path(), bad, &[]);
+    assert_eq!(out.code, 2);
+    for said in [
+        "`two words` cannot be a process's name",
+        "`mine` is a program, which is a process itself",
+    ] {
+        assert!(out.stderr.contains(said), "{}", out.stderr);
+    }
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! kill -9 of any one stage: the supervisor says so and starts it again within a second, and the
+//! Stages in processes of their own, and kill -9 of any one of them: the supervisor says so and starts it again within a second, and the
 //! others go on.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
@@ -21,9 +21,9 @@ fn pipeline(folder: &Path) {
         "version: 1
 cells: {{demo: {{robot: {robot}}}}}
 stages:
-- {{name: ingest, ingest: {{file: {{path: {recording}}}, rate: 4}}}}
-- {{name: twin, input: ingest, twin: {{}}}}
-- {{name: detect, input: twin, detect: {{naive_difference: {{}}, threshold: {{score: 1000}}}}}}
+- {{name: ingest, process: ingest, ingest: {{file: {{path: {recording}}}, rate: 4}}}}
+- {{name: twin, process: twin, input: ingest, twin: {{}}}}
+- {{name: detect, process: detect, input: twin, detect: {{naive_difference: {{}}, threshold: {{score: 1000}}}}}}
 - {{name: record, inputs: [ingest, twin, detect], record: {{mcap: out.mcap}}}}
 ",
         robot = data.join("demo_arm.urdf").display(),
@@ -136,7 +136,7 @@ fn what_a_killed_run_leaves_is_removed_by_the_next_one_and_what_lives_is_not() {
     let folder = tempfile::tempdir().unwrap();
     pipeline(folder.path());
     let mut dead = Live::start(folder.path(), &[]);
-    dead.wait_for_stage("record");
+    let ids = STAGES.map(|stage| dead.wait_for_stage(stage));
     let domain = |live: &Live| format!("t{:07x}", live.id());
     let left = |domain: &str| -> Vec<std::path::PathBuf> {
         let entries = ["/tmp", "/dev/shm"].map(|it| std::fs::read_dir(it).unwrap());
@@ -151,6 +151,9 @@ fn what_a_killed_run_leaves_is_removed_by_the_next_one_and_what_lives_is_not() {
     let killed = domain(&dead);
     signal(dead.id(), "KILL");
     drop(dead);
+    wait_until("its stages have gone", || {
+        !ids.iter().any(|&id| is_alive(id))
+    });
     assert!(left(&killed).len() > 1, "{:?}", left(&killed));
     // As if a minute had passed.
     let folder_of = left(&killed)

@@ -16,12 +16,16 @@ mod in_process;
 mod queue;
 mod sequence;
 mod shared_memory;
+mod spill;
 pub mod wire;
 pub mod zenoh;
 
 pub use fan_out::FanOut;
 pub use in_process::InProcess;
-pub use shared_memory::{Domain, DomainError, SharedMemory, left_behind, remove_left_behind};
+pub use shared_memory::{
+    Domain, DomainError, MAX_RECEIVERS, SharedMemory, left_behind, remove_left_behind,
+};
+pub use spill::{Spill, SpillSettings};
 pub use zenoh::{Zenoh, ZenohEndpoints, ZenohRouter, zenoh_reason};
 
 /// How long a sender waits for one keep-all receiver that takes nothing, before it counts the
@@ -195,6 +199,9 @@ pub trait Sender<T: Sample>: Send {
     /// [`LinkError::Send`] if the transport fails; a slow receiver is no error.
     fn send_with(&mut self, write: &mut dyn FnMut(&mut T)) -> Result<(), LinkError>;
 
+    /// So many samples are lost before they could be sent: the receivers find a hole in the sequence.
+    fn skip(&mut self, count: u64);
+
     /// Tells every receiver that the stream has ended.
     ///
     /// # Errors
@@ -246,6 +253,9 @@ impl<T: Sample, S: Sender<T> + ?Sized> Sender<T> for Box<S> {
     fn send_with(&mut self, write: &mut dyn FnMut(&mut T)) -> Result<(), LinkError> {
         (**self).send_with(write)
     }
+    fn skip(&mut self, count: u64) {
+        (**self).skip(count);
+    }
     fn end(&mut self) -> Result<(), LinkError> {
         (**self).end()
     }
@@ -264,6 +274,9 @@ impl<T: Sample, S: Sender<T> + ?Sized> Sender<T> for &mut S {
     fn send_with(&mut self, write: &mut dyn FnMut(&mut T)) -> Result<(), LinkError> {
         (**self).send_with(write)
     }
+    fn skip(&mut self, count: u64) {
+        (**self).skip(count);
+    }
     fn end(&mut self) -> Result<(), LinkError> {
         (**self).end()
     }
@@ -275,5 +288,24 @@ impl<T: Sample, S: Sender<T> + ?Sized> Sender<T> for &mut S {
     }
     fn counts(&self) -> SenderCounts {
         (**self).counts()
+    }
+}
+
+impl<T: Sample, R: Receiver<T> + ?Sized> Receiver<T> for &mut R {
+    fn receive(
+        &mut self,
+        timeout: Duration,
+        read: &mut dyn FnMut(&T),
+    ) -> Result<Received, LinkError> {
+        (**self).receive(timeout, read)
+    }
+    fn counts(&self) -> ReceiverCounts {
+        (**self).counts()
+    }
+    fn position(&self) -> Option<Position> {
+        (**self).position()
+    }
+    fn resume(&mut self, position: Position) {
+        (**self).resume(position);
     }
 }

@@ -8,12 +8,14 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use crate::effort_unit::EffortUnit;
-use crate::link::{Audience, Domain, Keep, PATIENCE, Position, ZenohEndpoints};
+use crate::link::{
+    Audience, Domain, Keep, MAX_RECEIVERS, PATIENCE, Position, SpillSettings, ZenohEndpoints,
+};
 use crate::sample::SampleKind;
 
 mod links;
 
-pub use links::{AnyReceiver, Links};
+pub use links::{AnyReceiver, Links, Transports};
 
 /// The place of one stage in a pipeline.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -26,6 +28,10 @@ pub struct Seat {
     pub restarts: u64,
     /// The shared memory of this run on this host.
     pub domain: Domain,
+    /// At most so many receivers hear one stream with one policy here, those included that died and have not been
+    /// cleaned up after; equal for all seats of a domain.
+    #[serde(default = "Seat::default_receivers")]
+    pub receivers: usize,
     /// Where this process meets the other hosts, if any of its links goes there.
     #[serde(default)]
     pub zenoh: Option<ZenohEndpoints>,
@@ -57,6 +63,10 @@ impl Seat {
         10_000
     }
 
+    fn default_receivers() -> usize {
+        MAX_RECEIVERS
+    }
+
     fn default_patience_ms() -> u64 {
         PATIENCE.as_millis() as u64
     }
@@ -67,6 +77,7 @@ impl Seat {
             stage: stage.to_owned(),
             restarts: 0,
             domain,
+            receivers: Self::default_receivers(),
             zenoh: None,
             cells: Vec::new(),
             inputs: Vec::new(),
@@ -101,10 +112,12 @@ pub struct Cell {
     pub effort_unit: EffortUnit,
 }
 
-/// A transport between processes.
+/// How a stream gets from one stage to another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TransportKind {
+    /// Both stages are in one [`Tree`](crate::shell::Tree): each sample is handed over where it lies.
+    InProcess,
     /// Shared memory, within a host.
     Iceoryx2,
     /// Across hosts.
@@ -141,7 +154,7 @@ pub struct Output {
     pub stream: String,
     /// What it carries.
     pub kind: SampleKind,
-    /// The ways it leaves; none if nobody listens.
+    /// The ways it leaves its tree; none if nobody listens elsewhere.
     #[serde(default)]
     pub links: Vec<OutputLink>,
 }
@@ -154,4 +167,7 @@ pub struct OutputLink {
     pub transport: TransportKind,
     /// Who listens there.
     pub audience: Audience,
+    /// The queue before it, if the stage is not to wait for those who listen.
+    #[serde(default)]
+    pub spill: Option<SpillSettings>,
 }

@@ -3,7 +3,9 @@
 //!
 //! - [`run_source`], [`run_stage`], [`run_sink`] run one over links that are open; they return a
 //!   [`Report`] however it ends.
-//! - [`child`] does so in a process of its own, which takes its [`Seat`](crate::Seat) from standard
+//! - [`Tree`] is the loop around a source or a link and all stages that hang on it in one process; [`crew`] runs any
+//!   number of trees in one process.
+//! - [`child`] runs a stage in a process of its own, which takes its [`Seat`](crate::Seat) from standard
 //!   input; [`outside`] is all that the `main` of a stage from another crate needs.
 
 use std::sync::Arc;
@@ -11,18 +13,20 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 pub mod child;
+mod crew;
 mod health;
 mod report;
+mod single;
 mod sink;
-mod source;
-mod stage;
+pub mod tree;
 
 pub use child::{Child, ChildError, Line, note, outside};
+pub use crew::{Member, Unmade, crew};
 pub use health::HealthClock;
 pub use report::{Board, InputReport, Outcome, Report};
+pub use single::{run_source, run_stage};
 pub use sink::{SinkInput, run_sink};
-pub use source::run_source;
-pub use stage::run_stage;
+pub use tree::Tree;
 
 /// How long a shell waits for a sample before it looks whether it is to stop.
 /// Resolution: how soon a stop is noticed, against how often the stage wakes up.

@@ -95,6 +95,24 @@ impl<T: Sample, S: Source<T> + ?Sized> Source<T> for Box<S> {
     }
 }
 
+impl<T: Sample, S: Source<T> + ?Sized> Source<T> for &mut S {
+    fn step(&mut self, out: &mut dyn Emit<T>) -> Result<Progress, StageError> {
+        (**self).step(out)
+    }
+
+    fn dropped(&self) -> u64 {
+        (**self).dropped()
+    }
+
+    fn fraction_done(&self) -> Option<f64> {
+        (**self).fraction_done()
+    }
+
+    fn trouble(&mut self, silent_for: Duration) -> Option<Trouble> {
+        (**self).trouble(silent_for)
+    }
+}
+
 /// Turns a stream into another: a pure state machine, without I/O and without a clock of its own.
 pub trait Stage<I: Sample, O: Sample>: Send {
     /// Takes one sample and emits what follows from it.
@@ -114,6 +132,20 @@ pub trait Stage<I: Sample, O: Sample>: Send {
     /// Samples this stage had to refuse so far.
     fn dropped(&self) -> u64 {
         0
+    }
+}
+
+impl<I: Sample, O: Sample, S: Stage<I, O> + ?Sized> Stage<I, O> for &mut S {
+    fn accept(&mut self, sample: &I, out: &mut dyn Emit<O>) -> Result<(), StageError> {
+        (**self).accept(sample, out)
+    }
+
+    fn finish(&mut self, out: &mut dyn Emit<O>) -> Result<(), StageError> {
+        (**self).finish(out)
+    }
+
+    fn dropped(&self) -> u64 {
+        (**self).dropped()
     }
 }
 

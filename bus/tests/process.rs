@@ -72,6 +72,7 @@ impl Around {
             links: vec![OutputLink {
                 transport: TransportKind::Iceoryx2,
                 audience: Audience::of(Keep::All, 1),
+                spill: None,
             }],
         };
         let mut seat = Seat::new("echo", self.domain.clone());
@@ -177,7 +178,13 @@ fn meet(process: &mut Process, sender: &mut dyn Sender<JointState>, sinks: &mut 
         while !ready.is_finished() {
             sinks.look();
         }
-        assert_eq!(ready.join().unwrap(), Line::Ready { missing: 0 });
+        assert_eq!(
+            ready.join().unwrap(),
+            Line::Ready {
+                stage: "echo".to_owned(),
+                missing: 0
+            }
+        );
     });
     assert_eq!(sender.wait_for_receivers(LONG).unwrap(), 0);
 }

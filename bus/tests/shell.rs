@@ -281,7 +281,7 @@ fn a_stage_that_fails_says_why_and_ends_no_stream() {
         Some(Outcome::Failed("it is broken".to_owned()))
     );
     assert_eq!((report.received, report.emitted), (4, 2));
-    assert_eq!(context.board.read(), report);
+    assert_eq!(context.board.read(), [report]);
     let mut heard = 0;
     let soon = Duration::from_millis(10);
     while output.receive(soon, &mut |_| heard += 1).unwrap() == tauscope_bus::Received::Sample {}

@@ -48,6 +48,8 @@ pub struct Stage {
     pub role: Role,
     /// Where it runs, where the file names hosts.
     pub host: Option<String>,
+    /// The process it runs in, on that host.
+    pub process: String,
     /// Its cell; several for a stage that listens to several.
     pub cells: BTreeSet<String>,
     /// What it listens to, by place in [`Pipeline::stages`].
@@ -102,6 +104,7 @@ impl Pipeline {
                 name: entry.name.clone(),
                 role: wiring.roles[index],
                 host: wiring.hosts[index].clone(),
+                process: wiring.processes[index].clone(),
                 cells: wiring.cells[index].clone(),
                 inputs: wiring.inputs[index]
                     .iter()

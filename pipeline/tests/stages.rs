@@ -5,8 +5,16 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use tauscope_bus::{EffortUnit, Emit, JointState, LinkError, Sample, Stage, TwinState, flags};
+use tauscope_bus::link::FanOut;
+use tauscope_bus::shell::Context;
+use tauscope_bus::shell::tree::{Outlet, Post, Tree, Turn, branch};
+use tauscope_bus::{
+    Detection, EffortUnit, Emit, JointState, LinkError, Progress, Sample, Source, Stage,
+    StageError, TwinState, flags,
+};
 use tauscope_detect::{Config, DETECTORS, Threshold};
 use tauscope_pipeline::build;
 use tauscope_pipeline::cell::Cell;
@@ -252,4 +260,73 @@ fn detectors(cell: &Cell, stream: &dyn Fn(&[JointState]) -> Vec<TwinState>) {
         judged >= 3,
         "only {judged} detectors run without having learnt"
     );
+}
+
+/// Plays a motion, and counts what is allocated once the stages behind it are warm.
+struct Player {
+    motion: Vec<JointState>,
+    next: usize,
+    before: usize,
+    allocated: Arc<AtomicUsize>,
+}
+
+impl Source<JointState> for Player {
+    fn step(&mut self, out: &mut dyn Emit<JointState>) -> Result<Progress, StageError> {
+        let count = ALLOCATIONS.with(std::cell::Cell::get);
+        if self.next == WARM {
+            self.before = count;
+        }
+        let Some(state) = self.motion.get(self.next) else {
+            self.allocated.store(count - self.before, Ordering::Relaxed);
+            return Ok(Progress::End);
+        };
+        self.next += 1;
+        out.emit(&mut |slot| *slot = *state)?;
+        Ok(Progress::More)
+    }
+}
+
+#[test]
+fn from_source_to_alarm_nothing_is_allocated_for_a_sample() {
+    let cell = cell();
+    let config = Config::default().with_any((DETECTORS[0].settings)());
+    let config = Config {
+        threshold: Threshold {
+            score: Some(100.0),
+            sigmas: None,
+        },
+        ..config
+    };
+    let post = |stage: &str, from: &str| Post {
+        stage: stage.to_owned(),
+        restarts: 0,
+        from: from.to_owned(),
+        health: Box::new(FanOut::new(Vec::new())),
+    };
+    let turn = Turn::default();
+    let detect: Box<dyn Stage<TwinState, Detection>> =
+        Box::new(build::detect(&config, None, &cell, None).unwrap());
+    let detect = branch(
+        &turn,
+        post("detect", "twin"),
+        detect,
+        Outlet::new(Vec::new(), None),
+    );
+    let out = Outlet::new(vec![detect], None);
+    let twin = branch(&turn, post("twin", "play"), twin(&cell), out);
+    let allocated = Arc::new(AtomicUsize::new(usize::MAX));
+    let samples = 10 * WARM;
+    let player = Player {
+        motion: motion(samples, RATE_HZ),
+        next: 0,
+        before: 0,
+        allocated: Arc::clone(&allocated),
+    };
+    let out = Outlet::new(vec![twin], None);
+    let tree = Tree::of_source(&turn, post("play", ""), Box::new(player), out);
+    let reports = tree.run(&Context::new("play"));
+    assert_eq!(reports[2].received, samples as u64);
+    // Ten times a second the stages report.
+    let allocated = allocated.load(Ordering::Relaxed);
+    assert!(allocated < samples / 20, "{allocated} in {samples} samples");
 }

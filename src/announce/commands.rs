@@ -16,6 +16,8 @@ pub struct Announced<S> {
 /// What has been told so far.
 #[derive(Debug, Default)]
 struct Told {
+    /// Who takes them.
+    stage: String,
     /// Stamp of the first sample, from which times are counted \[ns\].
     start_ns: Option<i64>,
     /// When the mute ends \[ns\], while there is one.
@@ -23,9 +25,12 @@ struct Told {
 }
 
 impl<S> Announced<S> {
-    /// Any source.
-    pub fn new(source: S) -> Self {
-        let told = Told::default();
+    /// Any source, of that name.
+    pub fn new(name: &str, source: S) -> Self {
+        let told = Told {
+            stage: name.to_owned(),
+            ..Told::default()
+        };
         Self { source, told }
     }
 }
@@ -62,7 +67,7 @@ impl Emit<JointState> for Listener<'_> {
         self.out.emit(&mut |slot| {
             write(slot);
             for line in told.lines(slot) {
-                shell::note(&line);
+                shell::note(&told.stage, &line);
             }
         })
     }

@@ -101,6 +101,7 @@ fn json(pipeline: &Pipeline, links: &[plan::Link]) -> serde_json::Value {
             "name": stage.name,
             "is": stage.role.key(),
             "host": stage.host,
+            "process": stage.process,
             "cells": stage.cells,
             "inputs": stage.inputs.iter().map(|&input| name(input)).collect::<Vec<_>>(),
         })

@@ -1,10 +1,12 @@
 //! The hidden commands with which `tauscope run` starts its stages.
 
+use std::collections::BTreeMap;
 use std::os::unix::process::CommandExt;
 use std::process::{Command, ExitCode};
 
 use rustix::process::{Signal, set_parent_process_death_signal};
-use tauscope_bus::shell::{Child, ChildError};
+use tauscope_bus::Seat;
+use tauscope_bus::shell::{Member, Unmade, crew};
 use tauscope_ingest::SimulatedRobot;
 use tauscope_pipeline::build::{self, BuildError};
 use tauscope_pipeline::cell::Cell;
@@ -16,7 +18,7 @@ use tauscope_pipeline::settings::Settings;
 use crate::announce::{self, Announced};
 use crate::supervisor::Instructions;
 
-/// A stage of ours: its seat stands on standard input.
+/// Stages of ours: their seats stand on standard input.
 #[derive(Debug, clap::Args)]
 pub struct StageArgs {}
 
@@ -53,21 +55,23 @@ enum SeatError {
     Commands(#[from] tauscope_bus::LinkError),
 }
 
-/// Takes the seat and runs the stage to its end.
+/// Takes the seats and runs their stages to their end.
 pub fn run(_args: &StageArgs) -> ExitCode {
-    let child = match Child::take_seat() {
-        Ok(child) => child,
-        Err(error) => return no_seat(&error),
-    };
-    match Made::from_seat(&child) {
-        Ok(Made::Source(mut source)) => child.source(&mut *source),
-        Ok(Made::Twin(mut twin)) => child.stage(&mut *twin),
-        Ok(Made::Detect(mut detect)) => child.stage(&mut *detect),
-        Ok(Made::Watch(mut watch)) => child.stage(&mut *watch),
-        Ok(Made::Record(mut recorder)) => child.sink(&mut *recorder),
-        Ok(Made::Publish(mut publisher)) => child.sink(&mut *publisher),
-        Err(error) => child.fail(&error),
+    crew(make)
+}
+
+/// Makes the stages of one tree.
+fn make(seats: &[Seat]) -> Result<Vec<Member>, Unmade> {
+    // By the twin they are behind: detectors that are given the same samples, one after the other.
+    let mut shared: BTreeMap<&str, tauscope_detect::Shared> = BTreeMap::new();
+    let mut members = Vec::new();
+    for seat in seats {
+        let behind = seat.inputs.first().map_or("", |input| &input.from);
+        let shared = shared.entry(behind).or_default();
+        let made = member(seat, shared);
+        members.push(made.map_err(|error| Unmade::new(&seat.stage, &error))?);
     }
+    Ok(members)
 }
 
 /// Becomes the program, once its end is tied to the supervisor's.
@@ -84,71 +88,61 @@ pub fn exec(args: &ExecArgs) -> ExitCode {
     ExitCode::FAILURE
 }
 
-fn no_seat(error: &ChildError) -> ExitCode {
-    eprintln!("error: {error}; this command is for `tauscope run`");
-    ExitCode::FAILURE
-}
-
-/// A stage of ours, made.
-enum Made {
-    Source(Box<dyn tauscope_bus::Source<tauscope_bus::JointState>>),
-    Twin(Box<tauscope_twin::Twin>),
-    Detect(Box<Announced<Kept>>),
-    Watch(Box<Announced<tauscope_watch::Watch>>),
-    Record(Box<tauscope_record::Recorder>),
-    Publish(Box<tauscope_publish::Publisher>),
-}
-
-impl Made {
-    fn from_seat(child: &Child) -> Result<Self, SeatError> {
-        let told: Instructions = serde_json::from_value(child.seat().config.clone())?;
-        let cells: Vec<Cell> = told
-            .cells
-            .into_iter()
-            .map(Cell::from_facts)
-            .collect::<Result<_, _>>()?;
-        let cell = || cells.first().ok_or(SeatError::NoCell);
-        Ok(match &told.settings {
-            Settings::Ingest(config) => {
-                let robot: Option<SimulatedRobot> = told
-                    .scenario
-                    .as_ref()
-                    .map(ScenarioFacts::robot)
-                    .transpose()?;
-                let source = build::ingest(config, robot.as_ref(), cell()?, told.after_ns)?;
-                let source = build::commanded(source, config, cell()?)?;
-                Self::Source(Box::new(announce::commands::Announced::new(source)))
-            }
-            Settings::Twin { config, model } => {
-                Self::Twin(Box::new(build::twin(config, model.as_ref(), cell()?)?))
-            }
-            Settings::Detect { config, model } => {
-                let mut config = config.clone();
-                let path = learnt_state::resume(&mut config).map_err(SeatError::LearntState)?;
-                let detect = build::detect(&config, model.as_ref(), cell()?, None)?;
-                let detect = Kept::new(detect, path);
-                Self::Detect(Box::new(Announced::new(detect, &cell()?.facts)))
-            }
-            Settings::Explain {
-                config,
-                model,
-                effort_cutoff_hz,
-            } => {
-                let watch = build::watch(config, model.as_ref(), *effort_cutoff_hz, cell()?)?;
-                Self::Watch(Box::new(Announced::new(watch, &cell()?.facts)))
-            }
-            Settings::Record(config) => {
-                let cells: Vec<&Cell> = cells.iter().collect();
-                let recorder = build::recorder(config, &cells, &told.streams, &told.provenance)?;
-                Self::Record(Box::new(recorder))
-            }
-            Settings::Publish { config, commands } => {
-                let restarted = child.seat().restarts > 0;
-                let publisher =
-                    build::publisher(config, commands.as_ref(), cell()?, &told.streams, restarted)?;
-                Self::Publish(Box::new(publisher))
-            }
-            Settings::Outside(_) => return Err(SeatError::Outside),
-        })
-    }
+fn member(seat: &Seat, shared: &tauscope_detect::Shared) -> Result<Member, SeatError> {
+    let told: Instructions = serde_json::from_value(seat.config.clone())?;
+    let cells: Vec<Cell> = told
+        .cells
+        .into_iter()
+        .map(Cell::from_facts)
+        .collect::<Result<_, _>>()?;
+    let cell = || cells.first().ok_or(SeatError::NoCell);
+    Ok(match &told.settings {
+        Settings::Ingest(config) => {
+            let robot: Option<SimulatedRobot> = told
+                .scenario
+                .as_ref()
+                .map(ScenarioFacts::robot)
+                .transpose()?;
+            let source = build::ingest(config, robot.as_ref(), cell()?, told.after_ns)?;
+            let source = build::commanded(source, config, cell()?)?;
+            Member::Source(Box::new(announce::commands::Announced::new(
+                &seat.stage,
+                source,
+            )))
+        }
+        Settings::Twin { config, model } => {
+            Member::Twin(Box::new(build::twin(config, model.as_ref(), cell()?)?))
+        }
+        Settings::Detect { config, model } => {
+            let mut config = config.clone();
+            let path = learnt_state::resume(&mut config).map_err(SeatError::LearntState)?;
+            let detect = build::detect(&config, model.as_ref(), cell()?, Some(shared.clone()))?;
+            let detect = Kept::new(detect, path);
+            Member::Judge(Box::new(Announced::new(
+                &seat.stage,
+                detect,
+                &cell()?.facts,
+            )))
+        }
+        Settings::Explain {
+            config,
+            model,
+            effort_cutoff_hz,
+        } => {
+            let watch = build::watch(config, model.as_ref(), *effort_cutoff_hz, cell()?)?;
+            Member::Judge(Box::new(Announced::new(&seat.stage, watch, &cell()?.facts)))
+        }
+        Settings::Record(config) => {
+            let cells: Vec<&Cell> = cells.iter().collect();
+            let recorder = build::recorder(config, &cells, &told.streams, &told.provenance)?;
+            Member::Sink(Box::new(recorder))
+        }
+        Settings::Publish { config, commands } => {
+            let restarted = seat.restarts > 0;
+            let publisher =
+                build::publisher(config, commands.as_ref(), cell()?, &told.streams, restarted)?;
+            Member::Sink(Box::new(publisher))
+        }
+        Settings::Outside(_) => return Err(SeatError::Outside),
+    })
 }

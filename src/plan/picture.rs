@@ -1,4 +1,4 @@
-//! A plan as a picture, for Mermaid and for Graphviz. Names are letters, digits, `_` and `-`, so
+//! A plan as a picture, for Mermaid and for Graphviz: hosts are boxes, and so are processes of several stages. Names are letters, digits, `_` and `-`, so
 //! nothing needs escaping.
 
 use std::fmt::Write;
@@ -7,28 +7,41 @@ use tauscope_pipeline::pipeline::{Pipeline, Stage, words_for};
 
 use super::{Link, Over};
 
-/// A Mermaid flowchart, hosts as boxes around their stages.
+/// A Mermaid flowchart.
 pub fn mermaid(pipeline: &Pipeline, links: &[Link]) -> String {
     let mut text = "flowchart LR\n".to_owned();
-    for (host, stages) in by_host(pipeline) {
-        let indent = if host.is_some() { "    " } else { "  " };
-        if let Some(host) = host {
-            let _ = writeln!(text, "  subgraph host_{host} [\"{host}\"]");
-        }
-        for (index, stage) in stages {
-            let _ = writeln!(
-                text,
-                "{indent}s{index}[\"{}<br/>{}\"]",
-                stage.name,
-                stage.role.key()
-            );
-        }
-        if host.is_some() {
+    let boxes = |text: &mut String, name: Option<(String, &str)>, inner: &str| match name {
+        Some((id, title)) => {
+            let _ = writeln!(text, "  subgraph {id} [\"{title}\"]");
+            for line in inner.lines() {
+                let _ = writeln!(text, "  {line}");
+            }
             text.push_str("  end\n");
         }
+        None => text.push_str(inner),
+    };
+    for (host, stages) in by(pipeline, 0..pipeline.stages.len(), |stage| {
+        stage.host.as_deref()
+    }) {
+        let mut on_host = String::new();
+        for (process, stages) in by(pipeline, stages, |stage| Some(&stage.process)) {
+            let mut in_process = String::new();
+            for &index in &stages {
+                let stage = &pipeline.stages[index];
+                let (name, role) = (&stage.name, stage.role.key());
+                let _ = writeln!(in_process, "  s{index}[\"{name}<br/>{role}\"]");
+            }
+            let several = process.filter(|_| stages.len() > 1);
+            let first = stages.first().copied().unwrap_or(0);
+            let named = several.map(|name| (format!("process_{first}"), name));
+            boxes(&mut on_host, named, &in_process);
+        }
+        let named = host.map(|name| (format!("host_{name}"), name));
+        boxes(&mut text, named, &on_host);
     }
     for link in links {
         let arrow = match link.over {
+            Over::InProcess => "==>",
             Over::SharedMemory => "-->",
             Over::Zenoh => "-.->",
         };
@@ -43,23 +56,35 @@ pub fn mermaid(pipeline: &Pipeline, links: &[Link]) -> String {
     text
 }
 
-/// A Graphviz digraph, hosts as clusters.
+/// A Graphviz digraph.
 pub fn dot(pipeline: &Pipeline, links: &[Link]) -> String {
     let mut text = "digraph pipeline {\n  rankdir=LR;\n  node [shape=box];\n".to_owned();
-    for (host, stages) in by_host(pipeline) {
+    for (host, stages) in by(pipeline, 0..pipeline.stages.len(), |stage| {
+        stage.host.as_deref()
+    }) {
         if let Some(host) = host {
             let _ = writeln!(
                 text,
                 "  subgraph \"cluster_{host}\" {{\n  label=\"{host}\";"
             );
         }
-        for (index, stage) in stages {
-            let _ = writeln!(
-                text,
-                "  s{index} [label=\"{}\\n{}\"];",
-                stage.name,
-                stage.role.key()
-            );
+        for (process, stages) in by(pipeline, stages, |stage| Some(&stage.process)) {
+            let several = process.filter(|_| stages.len() > 1);
+            if let Some(process) = several {
+                let first = stages.first().copied().unwrap_or(0);
+                let _ = writeln!(
+                    text,
+                    "  subgraph \"cluster_process_{first}\" {{\n  label=\"{process}\"; style=dotted;"
+                );
+            }
+            for index in stages {
+                let stage = &pipeline.stages[index];
+                let (name, role) = (&stage.name, stage.role.key());
+                let _ = writeln!(text, "  s{index} [label=\"{name}\\n{role}\"];");
+            }
+            if several.is_some() {
+                text.push_str("  }\n");
+            }
         }
         if host.is_some() {
             text.push_str("  }\n");
@@ -67,6 +92,7 @@ pub fn dot(pipeline: &Pipeline, links: &[Link]) -> String {
     }
     for link in links {
         let style = match link.over {
+            Over::InProcess => "bold",
             Over::SharedMemory => "solid",
             Over::Zenoh => "dashed",
         };
@@ -81,15 +107,18 @@ pub fn dot(pipeline: &Pipeline, links: &[Link]) -> String {
     text
 }
 
-type OnHost<'a> = (Option<&'a str>, Vec<(usize, &'a Stage)>);
-
-fn by_host(pipeline: &Pipeline) -> Vec<OnHost<'_>> {
-    let mut groups: Vec<OnHost<'_>> = Vec::new();
-    for (index, stage) in pipeline.stages.iter().enumerate() {
-        let host = stage.host.as_deref();
-        match groups.iter_mut().find(|(known, _)| *known == host) {
-            Some((_, stages)) => stages.push((index, stage)),
-            None => groups.push((host, vec![(index, stage)])),
+/// Stages by what `key` says of them, in the order of the pipeline.
+fn by<'a>(
+    pipeline: &'a Pipeline,
+    stages: impl IntoIterator<Item = usize>,
+    key: fn(&'a Stage) -> Option<&'a str>,
+) -> Vec<(Option<&'a str>, Vec<usize>)> {
+    let mut groups: Vec<(Option<&str>, Vec<usize>)> = Vec::new();
+    for index in stages {
+        let key = key(&pipeline.stages[index]);
+        match groups.iter_mut().find(|(known, _)| *known == key) {
+            Some((_, stages)) => stages.push(index),
+            None => groups.push((key, vec![index])),
         }
     }
     groups

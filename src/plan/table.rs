@@ -25,7 +25,15 @@ fn new(header: &[&str]) -> Table {
 }
 
 fn stages(pipeline: &Pipeline) -> String {
-    let mut table = new(&["stage", "is", "cell", "host", "listens to", "puts out"]);
+    let mut table = new(&[
+        "stage",
+        "is",
+        "cell",
+        "host",
+        "process",
+        "listens to",
+        "puts out",
+    ]);
     for stage in &pipeline.stages {
         let inputs: Vec<&str> = stage
             .inputs
@@ -38,6 +46,7 @@ fn stages(pipeline: &Pipeline) -> String {
             stage.role.key().to_owned(),
             cells.join(", "),
             stage.host.clone().unwrap_or_else(|| "this one".to_owned()),
+            stage.process.clone(),
             inputs.join(", "),
             stage.role.gives().map_or("", words_for).to_owned(),
         ]);

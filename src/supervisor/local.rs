@@ -9,7 +9,6 @@ use tokio::time::Instant;
 
 use super::flow::Flow;
 use super::patience::{Overdue, Patience};
-use super::process::Process;
 use super::restart::Deaths;
 use super::silence::Silence;
 use super::tally::Tally;
@@ -21,6 +20,10 @@ pub struct Local {
     pub at: usize,
     /// What its process is told.
     pub seat: Seat,
+    /// The process it runs in, by its place among those of this host.
+    pub crew: usize,
+    /// The first stage of its tree, by its place among those of this host. They begin, end and die together.
+    pub root: usize,
     /// What it has done, over all its lives.
     pub tally: Tally,
     state: State,
@@ -43,28 +46,14 @@ pub struct Local {
 
 #[derive(Debug)]
 enum State {
-    /// Its process runs.
-    Running(Process),
+    /// It runs.
+    Running,
     /// It is started at this time, for the first time or again.
     Waiting(Instant),
     /// It has ended in order.
     Ended,
     /// It died and does not come back.
     Lost,
-}
-
-/// How a process ended.
-#[derive(Debug, PartialEq, Eq)]
-pub enum End {
-    /// It had nothing more to do, or did what it was told.
-    InOrder,
-    /// It died.
-    Died {
-        /// In words: `was killed by signal 9`.
-        how: String,
-        /// After what time it is started again, if it is.
-        again: Option<Duration>,
-    },
 }
 
 /// What a line of a stage's standard output said.
@@ -85,11 +74,13 @@ pub enum Reported<'a> {
 
 impl Local {
     /// A stage that is to be started.
-    pub fn new(at: usize, seat: Seat) -> Self {
+    pub fn new(at: usize, seat: Seat, crew: usize, root: usize) -> Self {
         let now = Instant::now();
         Self {
             at,
             seat,
+            crew,
+            root,
             tally: Tally::default(),
             state: State::Waiting(now),
             deaths: Deaths::default(),
@@ -110,7 +101,7 @@ impl Local {
 
     /// Whether it runs and has said that it begins.
     pub fn is_ready(&self) -> bool {
-        self.ready && matches!(self.state, State::Running(_))
+        self.ready && self.is_running()
     }
 
     /// Whether it did not end and was killed.
@@ -123,9 +114,19 @@ impl Local {
         self.tally.newest().trouble.as_ref()
     }
 
-    /// Its process has been started.
-    pub fn started(&mut self, process: Process) {
-        self.state = State::Running(process);
+    /// Whether its process has been told to run it, and it has not ended.
+    pub fn is_running(&self) -> bool {
+        matches!(self.state, State::Running)
+    }
+
+    /// Whether it has said in this life that it is over.
+    pub fn is_done(&self) -> bool {
+        self.tally.newest().outcome.is_some()
+    }
+
+    /// Its process has been told to run it.
+    pub fn started(&mut self) {
+        self.state = State::Running;
         self.ready = false;
         self.patience = None;
     }
@@ -154,7 +155,7 @@ impl Local {
     pub fn due(&self) -> Option<Instant> {
         match self.state {
             State::Waiting(at) => Some(at),
-            State::Running(_) if self.patience.is_none() => self.finish_by,
+            State::Running if self.patience.is_none() => self.finish_by,
             _ => None,
         }
     }
@@ -167,12 +168,12 @@ impl Local {
     /// Takes a line of its standard output; what is none of the protocol comes back.
     pub fn report<'a>(&mut self, line: &'a str) -> Reported<'a> {
         match serde_json::from_str(line) {
-            Ok(Line::Ready { missing }) => {
+            Ok(Line::Ready { missing, .. }) => {
                 self.ready = true;
                 return Reported::Ready { missing };
             }
             Ok(Line::Report(report) | Line::Done(report)) => self.tally.note(report),
-            Ok(Line::Note { text }) => return Reported::Note(text),
+            Ok(Line::Note { text, .. }) => return Reported::Note(text),
             Err(_) => return Reported::Other(line),
         }
         let now = Instant::now();
@@ -194,30 +195,42 @@ impl Local {
         data.map(|(_, counts)| counts.received).sum()
     }
 
-    /// Its process has ended, and all that it said was heard.
-    pub fn exited(&mut self, status: std::io::Result<ExitStatus>) -> End {
-        let outcome = self.tally.newest().outcome.clone();
-        // One that says itself why it cannot even begin would say the same again, as would one whose
-        // input is not what it was made for.
-        let said_why = outcome.is_some();
+    /// How it died, where it did: by its process's end if `exit` is given, else by what it said itself.
+    pub fn death(&self, exit: Option<&std::io::Result<ExitStatus>>) -> Option<String> {
+        let outcome = self.tally.newest().outcome.as_ref();
+        let failed = outcome.and_then(Outcome::failure);
+        if self.killed {
+            return Some("did not end when it was told to, was killed".to_owned());
+        }
+        match (failed, exit) {
+            (Some(why), _) => Some(format!("failed: {why}")),
+            (None, None) => None,
+            (None, Some(Ok(status))) => Some(words_for(*status)),
+            (None, Some(Err(error))) => Some(format!("cannot be waited for: {error}")),
+        }
+    }
+
+    /// Whether another life could fare better. One that says itself why it cannot even begin would say the same again,
+    /// as would one whose input is not what it was made for.
+    pub fn may_return(&self) -> bool {
+        let outcome = self.tally.newest().outcome.as_ref();
         let is_unfit = matches!(outcome, Some(Outcome::Unfit(_)));
-        let how = match (status, outcome) {
-            (Ok(status), _) if status.success() && !self.killed => {
-                self.state = State::Ended;
-                return End::InOrder;
-            }
-            _ if self.killed => "did not end when it was told to, was killed".to_owned(),
-            (_, Some(Outcome::Failed(why) | Outcome::Unfit(why))) => format!("failed: {why}"),
-            (Ok(status), _) => words_for(status),
-            (Err(error), _) => format!("cannot be waited for: {error}"),
-        };
-        let can_begin = (self.ready || !said_why) && !is_unfit;
-        let may_return = can_begin && !self.last_life && self.patience.is_none();
-        let again = if may_return {
-            self.deaths.note(std::time::Instant::now())
-        } else {
-            None
-        };
+        let can_begin = (self.ready || outcome.is_none()) && !is_unfit;
+        can_begin && !self.last_life && self.patience.is_none()
+    }
+
+    /// Notes a death of its tree, and says after what time it is started again, if it is.
+    pub fn note_death(&mut self) -> Option<Duration> {
+        self.deaths.note(std::time::Instant::now())
+    }
+
+    /// It has ended in order.
+    pub fn end(&mut self) {
+        self.state = State::Ended;
+    }
+
+    /// It died, and is started again after this time, if it is.
+    pub fn die(&mut self, again: Option<Duration>) {
         self.state = match again {
             Some(wait) => {
                 self.next_life();
@@ -225,7 +238,6 @@ impl Local {
             }
             None => State::Lost,
         };
-        End::Died { how, again }
     }
 
     /// Makes the seat of the next life out of what the last one has said.
@@ -258,36 +270,26 @@ impl Local {
         self.finish_by.get_or_insert(by);
     }
 
-    /// Asks it to end; a stage that does not is [`Local::overdue`] then, a `recorder` later than others.
-    pub fn stop(&mut self, recorder: bool) {
+    /// It is told to end; a stage that does not is [`Local::overdue`] then, a `recorder` later than others. Whether it
+    /// was not told before.
+    pub fn is_to_end(&mut self, recorder: bool) -> bool {
+        let first = self.patience.is_none();
         self.patience
             .get_or_insert_with(|| Patience::new(recorder, Instant::now()));
-        if let State::Running(process) = &self.state {
-            process.stop();
-        }
+        first && self.is_running()
     }
 
     /// Whether it should have ended by now, and what is to be done of it.
     pub fn overdue(&mut self, now: Instant) -> Option<Overdue> {
-        let State::Running(_) = &self.state else {
+        if !self.is_running() {
             return None;
-        };
+        }
         self.patience.as_mut()?.overdue(now)
     }
 
-    /// Ends it at once, since it did not end itself.
-    pub fn kill_stubborn(&mut self) {
+    /// It does not end, and is killed.
+    pub fn is_killed(&mut self) {
         self.killed = true;
-        self.kill();
-    }
-
-    /// Ends it at once.
-    pub fn kill(&mut self) {
-        self.patience
-            .get_or_insert_with(|| Patience::new(false, Instant::now()));
-        if let State::Running(process) = &self.state {
-            process.kill();
-        }
     }
 }
 

@@ -1,4 +1,4 @@
-//! One process of a stage: started, listened to, ended.
+//! One process: started, listened to, ended.
 
 use std::path::Path;
 use std::pin::pin;
@@ -7,7 +7,6 @@ use std::time::Duration;
 
 use anyhow::Context;
 use rustix::process::{Pid, Signal, kill_process_group};
-use tauscope_bus::Seat;
 use tauscope_pipeline::settings::{OutsideEntry, Settings};
 use tokio::io::{AsyncBufReadExt, AsyncRead, AsyncWriteExt, BufReader};
 use tokio::process::{Child, ChildStdin, Command};
@@ -15,12 +14,10 @@ use tokio::sync::mpsc;
 
 /// Longer lines of a stage are cut.
 const LONGEST_LINE_BYTES: usize = 64 * 1024;
-/// The line that asks a process to end.
-const STOP: &[u8] = b"stop";
 /// How long a dead process is still heard out.
 const LAST_WORDS: Duration = Duration::from_millis(200);
 
-/// What a stage's process does.
+/// What a process does.
 #[derive(Debug)]
 pub enum Event {
     /// A line on its standard error.
@@ -35,10 +32,11 @@ pub enum Event {
 #[derive(Debug)]
 pub struct Process {
     group: Pid,
-    orders: mpsc::Sender<Vec<u8>>,
+    /// What it is still to be told; none once it is told no more.
+    orders: Option<mpsc::Sender<Vec<u8>>>,
 }
 
-/// How a stage is started.
+/// How the process of a stage is started.
 pub fn command(settings: &Settings, folder: &Path) -> anyhow::Result<Command> {
     let program = std::env::current_exe().context("cannot find the program itself")?;
     let mut command = Command::new(program);
@@ -57,14 +55,16 @@ pub fn command(settings: &Settings, folder: &Path) -> anyhow::Result<Command> {
 }
 
 impl Process {
-    /// Starts it and tells it its seat; what it does comes to `events`, marked with `mark`.
+    /// Starts it and tells it this line; what it does comes to `events`, marked with `mark`. At most `most_told` lines
+    /// wait to be read by it.
     pub fn start<M: Copy + Send + Sync + 'static>(
         mut command: Command,
-        seat: &Seat,
+        name: &str,
+        line: Vec<u8>,
+        most_told: usize,
         mark: M,
         events: mpsc::Sender<(M, Event)>,
     ) -> anyhow::Result<Self> {
-        let line = serde_json::to_vec(seat)?;
         let mut child = command
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -72,23 +72,31 @@ impl Process {
             // Ctrl-C in a terminal goes to the supervisor alone, which ends the stages in order.
             .process_group(0)
             .spawn()
-            .with_context(|| format!("cannot start stage `{}`", seat.stage))?;
+            .with_context(|| format!("cannot start the process of `{name}`"))?;
         let group = child
             .id()
             .and_then(|id| Pid::from_raw(id.cast_signed()))
             .context("the process has no id")?;
-        let (orders, inbox) = mpsc::channel(2);
+        let (orders, inbox) = mpsc::channel(most_told);
         if let Some(stdin) = child.stdin.take() {
             tokio::spawn(tell(stdin, line, inbox));
         }
         tokio::spawn(follow(child, mark, events));
+        let orders = Some(orders);
         Ok(Self { group, orders })
     }
 
-    /// Asks it to end: a source stops, any other stage finishes with what it has.
-    pub fn stop(&self) {
-        // A full inbox holds the same order already; a closed one has no reader left.
-        let _ = self.orders.try_send(STOP.to_vec());
+    /// Tells it a line.
+    pub fn tell(&self, line: Vec<u8>) {
+        // A process that has let so many lines lie does not read; a closed inbox has no reader left.
+        if let Some(orders) = &self.orders {
+            let _ = orders.try_send(line);
+        }
+    }
+
+    /// Tells it no more: it ends once it has done what it was told.
+    pub fn close(&mut self) {
+        self.orders = None;
     }
 
     /// Ends it and all that it started, at once.
@@ -110,8 +118,8 @@ impl Drop for Process {
 }
 
 /// Writes to a process what it is told, and closes its standard input once nobody can tell it more.
-async fn tell(mut stdin: ChildStdin, seat: Vec<u8>, mut orders: mpsc::Receiver<Vec<u8>>) {
-    let mut next = Some(seat);
+async fn tell(mut stdin: ChildStdin, first: Vec<u8>, mut orders: mpsc::Receiver<Vec<u8>>) {
+    let mut next = Some(first);
     while let Some(mut line) = next {
         line.push(b'\n');
         // A process that does not listen any more is one that exits, which is noticed elsewhere.

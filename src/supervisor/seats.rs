@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
+use tauscope_bus::link::SpillSettings;
 use tauscope_bus::seat::{Cell as SeatCell, Input, Output, OutputLink, TransportKind};
 use tauscope_bus::{Audience, Domain, Keep, SampleKind, Seat, ZenohEndpoints};
 use tauscope_pipeline::build::StreamFacts;
@@ -20,6 +21,15 @@ const DEPTH_ALL: usize = 1024;
 const DEPTH_NEWEST: usize = 16;
 /// The same for who hears several streams and tells others: a longer pause costs nothing either.
 const DEPTH_TOLD: usize = 256;
+/// Most memory of the samples that wait for slow listeners, by stream \[bytes\]: 17 s of joint states at 1 kHz.
+/// Resolution: memory, against the pause of a recorder that costs nothing.
+const SPILL_BYTES: usize = 16 << 20;
+/// Samples for recorders and publishers are sent together so often \[ms\].
+/// Resolution: how often a process wakes up, against the delay of a recording.
+const SPILL_LINGER_MS: u64 = 5;
+/// Receivers that died and that nobody has cleaned up after yet.
+/// Resolution: shared memory.
+const LIVES: usize = 2;
 /// Stages of another host are started by another hand: how long they are waited for \[ms\].
 const START_ACROSS_HOSTS_MS: u64 = 60_000;
 
@@ -76,6 +86,7 @@ impl Planner<'_> {
     fn seat(&self, at: usize) -> Result<Seat, serde_json::Error> {
         let stage = &self.pipeline.stages[at];
         let mut seat = Seat::new(&stage.name, self.domain.clone());
+        seat.receivers = self.receivers();
         seat.cells = stage
             .cells
             .iter()
@@ -111,6 +122,18 @@ impl Planner<'_> {
             settings => serde_json::to_value(self.instructions(at, settings))?,
         };
         Ok(seat)
+    }
+
+    /// The most listeners of one stream in shared memory, and room for as many of former lives.
+    fn receivers(&self) -> usize {
+        let shared = |link: &&Link| link.over == Over::SharedMemory;
+        let mut count = BTreeMap::<(usize, bool), usize>::new();
+        for link in self.links.iter().filter(shared) {
+            *count
+                .entry((link.from, link.keep == Keep::All))
+                .or_default() += 1;
+        }
+        count.into_values().max().unwrap_or(0) + LIVES
     }
 
     fn instructions(&self, at: usize, settings: &Settings) -> Instructions {
@@ -182,7 +205,7 @@ impl Planner<'_> {
         Output {
             stream: self.pipeline.stages[at].stream(),
             kind,
-            links: ways(&listeners),
+            links: self.ways(at, kind, &listeners),
         }
     }
 
@@ -194,7 +217,55 @@ impl Planner<'_> {
         Output {
             stream: health_stream(&self.pipeline.stages[at].stream()),
             kind: SampleKind::Health,
-            links: ways(&listeners),
+            links: self.ways(at, SampleKind::Health, &listeners),
+        }
+    }
+
+    /// The ways a stream leaves its tree, and how many listen on each.
+    fn ways(&self, at: usize, kind: SampleKind, listeners: &[&Link]) -> Vec<OutputLink> {
+        let way = |over: Over| {
+            let there = || listeners.iter().filter(|link| link.over == over);
+            let count = |keep| there().filter(|link| link.keep == keep).count();
+            let audience = Audience {
+                keep_all: count(Keep::All),
+                keep_newest: count(Keep::Newest),
+            };
+            let takes = |link: &&Link| self.pipeline.stages[link.to].role.gives().is_none();
+            let all_take = there().all(takes);
+            // Health reports are few: the link itself has room for those of a quarter of an hour.
+            let may_block = match over {
+                Over::InProcess => return None,
+                Over::SharedMemory => audience.keep_all > 0 && kind != SampleKind::Health,
+                Over::Zenoh => true,
+            };
+            let ours = !matches!(self.pipeline.stages[at].settings, Settings::Outside(_));
+            let spill = (may_block && ours).then(|| SpillSettings {
+                bytes: SPILL_BYTES,
+                linger_ms: if all_take { SPILL_LINGER_MS } else { 0 },
+                waits: self.source_can_wait(at),
+            });
+            (audience != Audience::default()).then_some(OutputLink {
+                transport: transport(over),
+                audience,
+                spill,
+            })
+        };
+        [Over::SharedMemory, Over::Zenoh]
+            .into_iter()
+            .filter_map(way)
+            .collect()
+    }
+
+    /// Whether the source of this stage's samples loses nothing while it waits: it reads a file. What a program of
+    /// somebody else does is not known; it is waited for.
+    fn source_can_wait(&self, at: usize) -> bool {
+        let stage = &self.pipeline.stages[at];
+        match (&stage.settings, stage.inputs.first()) {
+            (Settings::Ingest(config), _) => config
+                .source()
+                .is_ok_and(|(_, source)| source.file().is_some()),
+            (_, Some(&input)) => self.source_can_wait(input),
+            (_, None) => true,
         }
     }
 }
@@ -205,31 +276,8 @@ fn health_stream(stream: &str) -> String {
 
 fn transport(over: Over) -> TransportKind {
     match over {
+        Over::InProcess => TransportKind::InProcess,
         Over::SharedMemory => TransportKind::Iceoryx2,
         Over::Zenoh => TransportKind::Zenoh,
     }
-}
-
-/// The ways a stream leaves, and how many listen on each.
-fn ways(listeners: &[&Link]) -> Vec<OutputLink> {
-    let way = |over: Over| {
-        let count = |keep| {
-            listeners
-                .iter()
-                .filter(|link| link.over == over && link.keep == keep)
-                .count()
-        };
-        let audience = Audience {
-            keep_all: count(Keep::All),
-            keep_newest: count(Keep::Newest),
-        };
-        (audience != Audience::default()).then_some(OutputLink {
-            transport: transport(over),
-            audience,
-        })
-    };
-    [Over::SharedMemory, Over::Zenoh]
-        .into_iter()
-        .filter_map(way)
-        .collect()
 }

@@ -90,37 +90,51 @@ impl Summary {
     /// Adds up what the stages have reported.
     pub fn new(pipeline: &Pipeline, links: &[Link], stages: &[Local], ended: Ended) -> Self {
         let mut summary = Self::reported(pipeline, links, stages, ended);
-        summary.count_what_lives_missed();
-        // A stage that was killed has sent more than it lived to report, as its listeners know.
-        for stage in summary
-            .stages
-            .iter_mut()
-            .filter(|stage| stage.restarts > 0 || stage.failed)
-        {
-            let links = summary
-                .links
-                .iter_mut()
-                .filter(|link| link.from == stage.stage);
-            let known =
-                links.map(|link| link.received.map_or(0, |received| received + link.dropped));
-            stage.emitted = stage.emitted.max(known.max().unwrap_or(0));
-            for link in summary
-                .links
-                .iter_mut()
-                .filter(|link| link.from == stage.stage)
-            {
-                link.emitted = Some(stage.emitted);
-            }
+        summary.count_what_was_missed();
+        for at in 0..summary.stages.len() {
+            summary.count_unreported(at);
         }
         summary
     }
 
-    /// What went to a stage that died and was not there for its next life, or had none, is lost, too.
-    fn count_what_lives_missed(&mut self) {
-        let died =
-            |stage: &&mut StageSummary| (stage.restarts > 0 || stage.failed) && stage.reported;
-        for stage in self.stages.iter_mut().filter(died) {
+    /// A stage that was killed has sent more than it lived to report, as its listeners know. Those in its process heard
+    /// each sample before anybody else did, and died with it.
+    fn count_unreported(&mut self, at: usize) {
+        let Self { stages, links, .. } = self;
+        let StageSummary {
+            restarts, failed, ..
+        } = stages[at];
+        if restarts == 0 && !failed {
+            return;
+        }
+        let name = stages[at].stage.clone();
+        let mine = |link: &&mut LinkSummary| link.from == name;
+        let known = links.iter_mut().filter(mine);
+        let known = known.map(|link| link.received.map_or(0, |received| received + link.dropped));
+        let emitted = stages[at].emitted.max(known.max().unwrap_or(0));
+        stages[at].emitted = emitted;
+        for link in links.iter_mut().filter(mine) {
+            link.emitted = Some(emitted);
+            if link.over != Over::InProcess {
+                continue;
+            }
+            link.received = Some(emitted - link.dropped.min(emitted));
+            let listener = stages.iter_mut().find(|stage| stage.stage == link.to);
+            if let (Some(listener), Some(received)) = (listener, link.received) {
+                listener.received = received;
+            }
+        }
+    }
+
+    /// What went to a stage while it was not there is lost, too, though nobody has seen a hole: it died and was not back
+    /// yet, or had no further life, or came later than the one it hears would wait.
+    fn count_what_was_missed(&mut self) {
+        for stage in self.stages.iter_mut().filter(|stage| stage.reported) {
             for link in self.links.iter_mut().filter(|link| link.to == stage.stage) {
+                // Nothing is on its way there, and both ends live and die together.
+                if link.over == Over::InProcess {
+                    continue;
+                }
                 let (Some(emitted), Some(received)) = (link.emitted, link.received) else {
                     continue;
                 };
@@ -201,6 +215,7 @@ impl Summary {
         let mut links = new(&["link", "emitted", "received", "dropped"]);
         for link in &self.links {
             let over = match link.over {
+                Over::InProcess => " (in process)",
                 Over::SharedMemory => "",
                 Over::Zenoh => " (Zenoh)",
             };

@@ -185,7 +185,8 @@ impl Supervisor<'_> {
     }
 
     fn tell_who_does_not_end(&mut self, now: Instant) {
-        for stage in &mut self.stages {
+        for index in 0..self.stages.len() {
+            let stage = &mut self.stages[index];
             let overdue = stage.overdue(now);
             let name = &stage.seat.stage;
             match overdue {
@@ -195,9 +196,12 @@ impl Supervisor<'_> {
                         "warning: stage `{name}` was told to end and still runs; it is killed in {left:.0} s"
                     ));
                 }
-                Some(Overdue::Kill) => stage.kill_stubborn(),
+                Some(Overdue::Kill) => self.kill_stubborn(index),
                 None => {}
             }
+        }
+        for crew in &mut self.crews {
+            crew.kill_if_it_stays(now);
         }
     }
 }

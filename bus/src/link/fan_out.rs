@@ -39,6 +39,12 @@ impl<T: Sample> Sender<T> for FanOut<T> {
         Ok(())
     }
 
+    fn skip(&mut self, count: u64) {
+        for link in &mut self.links {
+            link.skip(count);
+        }
+    }
+
     fn end(&mut self) -> Result<(), LinkError> {
         self.links.iter_mut().try_for_each(Sender::end)
     }

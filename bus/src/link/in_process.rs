@@ -188,6 +188,10 @@ impl<T: Sample> Sender<T> for InProcessSender<T> {
         Ok(())
     }
 
+    fn skip(&mut self, count: u64) {
+        self.next += count;
+    }
+
     fn end(&mut self) -> Result<(), LinkError> {
         let mut sample = T::default();
         sample.header_mut().flags = flags::END;

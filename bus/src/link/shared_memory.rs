@@ -46,16 +46,16 @@ pub use domain::{Domain, DomainError};
 pub use leftovers::{left_behind, remove_left_behind};
 
 const TRANSPORT: &str = "iceoryx2";
-/// Most receivers of a stream per [`Keep`]. Shared memory is laid out for all of them, but only
-/// touched where it is used.
+/// Most receivers of a stream per [`Keep`].
 /// Resolution: shared memory.
-const MAX_RECEIVERS: usize = 16;
+pub const MAX_RECEIVERS: usize = 16;
 /// One sender, and those of its former lives that nobody has cleaned up yet.
 /// Resolution: shared memory.
 const MAX_SENDERS: usize = 4;
-/// A service's state is in flux while another process creates or removes it.
+/// A service's state is in flux while another process creates or removes it. iceoryx2 itself waits half a second, and
+/// then says that it does not exist: on a busy machine its maker may take longer.
 /// Resolution: how long a start may take.
-const OPEN_WITHIN: Duration = Duration::from_secs(2);
+const OPEN_WITHIN: Duration = Duration::from_secs(10);
 
 /// Event of the back channel: the end was taken.
 const END_TAKEN: EventId = EventId::new(0);
@@ -82,6 +82,7 @@ fn greeting(publisher: u128) -> EventId {
 pub struct SharedMemory {
     node: SharedNode,
     patience: Duration,
+    receivers: usize,
 }
 
 /// A node may move between threads but not be used by two at once.
@@ -120,6 +121,7 @@ impl SharedMemory {
         Ok(Self {
             node: SharedNode(Arc::new(Mutex::new(node))),
             patience: PATIENCE,
+            receivers: MAX_RECEIVERS,
         })
     }
 
@@ -127,6 +129,14 @@ impl SharedMemory {
     #[must_use]
     pub fn with_patience(mut self, patience: Duration) -> Self {
         self.patience = patience;
+        self
+    }
+
+    /// The same for streams with at most so many receivers per [`Keep`]; both ends of a stream must say the same.
+    /// Shared memory is laid out for all of them.
+    #[must_use]
+    pub fn with_receivers(mut self, receivers: usize) -> Self {
+        self.receivers = receivers.clamp(1, MAX_RECEIVERS);
         self
     }
 
@@ -150,8 +160,8 @@ impl SharedMemory {
                     .subscriber_max_borrowed_samples(2)
                     .history_size(0)
                     .max_publishers(MAX_SENDERS)
-                    .max_subscribers(MAX_RECEIVERS)
-                    .max_nodes(MAX_RECEIVERS + MAX_SENDERS)
+                    .max_subscribers(self.receivers)
+                    .max_nodes(self.receivers + MAX_SENDERS)
                     .open_or_create()
                     .map_err(|error| {
                         use PublishSubscribeOpenError as E;
@@ -163,9 +173,9 @@ impl SharedMemory {
                                 Failure::Final(type_mismatch::<T>(stream, &name, &config))
                             }
                             SystemInFlux
-                            | Opening(E::IsMarkedForDestruction | E::HangsInCreation) => {
-                                Failure::Passing(open_error(stream, &error))
-                            }
+                            | Opening(
+                                E::IsMarkedForDestruction | E::HangsInCreation | E::DoesNotExist,
+                            ) => Failure::Passing(open_error(stream, &error)),
                             _ => Failure::Final(open_error(stream, &error)),
                         }
                     })
@@ -180,9 +190,9 @@ impl SharedMemory {
                 node.service_builder(&name)
                     .event()
                     .event_id_max_value(MAX_EVENT)
-                    .max_notifiers(MAX_RECEIVERS + MAX_SENDERS)
-                    .max_listeners(MAX_RECEIVERS + MAX_SENDERS)
-                    .max_nodes(MAX_RECEIVERS + MAX_SENDERS)
+                    .max_notifiers(self.receivers + MAX_SENDERS)
+                    .max_listeners(self.receivers + MAX_SENDERS)
+                    .max_nodes(self.receivers + MAX_SENDERS)
                     .open_or_create()
                     .map_err(|error| {
                         use EventOpenError as E;
@@ -190,9 +200,9 @@ impl SharedMemory {
                         let link_error = open_error(stream, &error);
                         match error {
                             SystemInFlux
-                            | Opening(E::IsMarkedForDestruction | E::HangsInCreation) => {
-                                Failure::Passing(link_error)
-                            }
+                            | Opening(
+                                E::IsMarkedForDestruction | E::HangsInCreation | E::DoesNotExist,
+                            ) => Failure::Passing(link_error),
                             _ => Failure::Final(link_error),
                         }
                     })

@@ -1,49 +1,50 @@
 //! The links of a seat, opened.
 
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use super::{Input, Output, Seat, TransportKind};
+use super::{Input, Output, OutputLink, Seat, TransportKind};
 use crate::link::{
-    FanOut, LinkError, Position, Received, Receiver, ReceiverCounts, Sender, SharedMemory,
-    Transport as _, Zenoh,
+    Audience, Domain, FanOut, Keep, LinkError, Position, Received, Receiver, ReceiverCounts,
+    Sender, SharedMemory, Spill, Transport as _, Zenoh, ZenohEndpoints,
 };
 use crate::sample::{Detection, Health, JointState, Sample, SampleKind, SampleRef, TwinState};
 
-/// The transports that a seat's links need.
-#[derive(Debug)]
-pub struct Links {
+/// A sender with a queue before it waits so long for a receiver that lives and takes nothing.
+/// Tuned: by hand, on no recorded seeds; not swept. Longer than any queue lasts.
+const SPILLED_PATIENCE: Duration = Duration::from_mins(10);
+
+/// The transports of a process, opened where one is first needed. Clones are one.
+#[derive(Debug, Clone, Default)]
+pub struct Transports(Arc<Mutex<Open>>);
+
+#[derive(Debug, Default)]
+struct Open {
     shared_memory: Option<SharedMemory>,
     zenoh: Option<Zenoh>,
 }
 
+/// The links of a seat.
+#[derive(Debug)]
+pub struct Links {
+    transports: Transports,
+    domain: Domain,
+    receivers: usize,
+    zenoh: Option<ZenohEndpoints>,
+    patience: Duration,
+}
+
 impl Links {
-    /// Opens the transports.
-    ///
-    /// # Errors
-    /// If one cannot be opened.
-    pub fn open(seat: &Seat) -> Result<Self, LinkError> {
-        let uses = |kind| {
-            let outputs = seat.output.iter().chain(&seat.health);
-            seat.inputs.iter().any(|input| input.transport == kind)
-                || outputs
-                    .flat_map(|output| &output.links)
-                    .any(|link| link.transport == kind)
-        };
-        let shared_memory = if uses(TransportKind::Iceoryx2) {
-            Some(SharedMemory::open(&seat.domain)?.with_patience(seat.patience()))
-        } else {
-            None
-        };
-        let zenoh = if uses(TransportKind::Zenoh) {
-            let endpoints = seat.zenoh.clone().unwrap_or_default();
-            Some(Zenoh::open(&endpoints, seat.patience())?)
-        } else {
-            None
-        };
-        Ok(Self {
-            shared_memory,
-            zenoh,
-        })
+    /// For a seat in the process that has these transports. All seats of a process are in one domain and meet the
+    /// other hosts at the same place.
+    pub fn of(seat: &Seat, transports: &Transports) -> Self {
+        Self {
+            transports: transports.clone(),
+            domain: seat.domain.clone(),
+            receivers: seat.receivers,
+            zenoh: seat.zenoh.clone(),
+            patience: seat.patience(),
+        }
     }
 
     /// Opens the sending end of `output` on all its ways.
@@ -54,19 +55,56 @@ impl Links {
         check::<T>(&output.stream, output.kind)?;
         let mut ways = Vec::new();
         for link in &output.links {
-            ways.push(match link.transport {
-                TransportKind::Iceoryx2 => self
-                    .shared_memory(&output.stream)?
-                    .sender::<T>(&output.stream, link.audience)?,
-                TransportKind::Zenoh => self
-                    .zenoh(&output.stream)?
-                    .sender::<T>(&output.stream, link.audience)?,
-            });
+            self.way(&output.stream, link, &mut ways)?;
         }
         match ways.len() {
             1 => Ok(ways.remove(0)),
             _ => Ok(Box::new(FanOut::new(ways))),
         }
+    }
+
+    fn way<T: Sample>(
+        &self,
+        stream: &str,
+        link: &OutputLink,
+        ways: &mut Vec<Box<dyn Sender<T>>>,
+    ) -> Result<(), LinkError> {
+        let OutputLink {
+            transport,
+            audience,
+            spill,
+        } = *link;
+        match (transport, spill) {
+            (TransportKind::InProcess, _) => return Err(in_process(stream)),
+            (TransportKind::Iceoryx2, None) => {
+                ways.push(self.shared_memory()?.sender(stream, audience)?);
+            }
+            (TransportKind::Iceoryx2, Some(spill)) => {
+                let shared_memory = self.shared_memory()?;
+                let newest = Audience::of(Keep::Newest, audience.keep_newest);
+                if audience.keep_newest > 0 {
+                    ways.push(shared_memory.sender(stream, newest)?);
+                }
+                if audience.keep_all > 0 {
+                    let patient = shared_memory.with_patience(SPILLED_PATIENCE);
+                    let inner =
+                        patient.sender(stream, Audience::of(Keep::All, audience.keep_all))?;
+                    let spill = Spill::new(inner, spill, self.patience, audience.keep_all);
+                    ways.push(Box::new(spill));
+                }
+            }
+            (TransportKind::Zenoh, spill) => {
+                let inner = self.zenoh()?.sender(stream, audience)?;
+                ways.push(match spill {
+                    Some(spill) => {
+                        let receivers = audience.keep_all;
+                        Box::new(Spill::new(inner, spill, self.patience, receivers))
+                    }
+                    None => inner,
+                });
+            }
+        }
+        Ok(())
     }
 
     /// Opens the receiving end of `input`.
@@ -75,16 +113,11 @@ impl Links {
     /// As [`Transport::receiver`](crate::Transport::receiver).
     pub fn receiver<T: Sample>(&self, input: &Input) -> Result<Box<dyn Receiver<T>>, LinkError> {
         check::<T>(&input.stream, input.kind)?;
+        let (stream, keep, depth) = (&input.stream, input.keep, input.depth);
         let mut receiver = match input.transport {
-            TransportKind::Iceoryx2 => self.shared_memory(&input.stream)?.receiver::<T>(
-                &input.stream,
-                input.keep,
-                input.depth,
-            )?,
-            TransportKind::Zenoh => {
-                self.zenoh(&input.stream)?
-                    .receiver::<T>(&input.stream, input.keep, input.depth)?
-            }
+            TransportKind::InProcess => return Err(in_process(stream)),
+            TransportKind::Iceoryx2 => self.shared_memory()?.receiver::<T>(stream, keep, depth)?,
+            TransportKind::Zenoh => self.zenoh()?.receiver::<T>(stream, keep, depth)?,
         };
         if let Some(position) = input.resume {
             receiver.resume(position);
@@ -105,14 +138,34 @@ impl Links {
         })
     }
 
-    fn shared_memory(&self, stream: &str) -> Result<&SharedMemory, LinkError> {
-        self.shared_memory
-            .as_ref()
-            .ok_or_else(|| not_open(stream, "iceoryx2"))
+    fn shared_memory(&self) -> Result<SharedMemory, LinkError> {
+        let mut open = self.transports.lock();
+        let shared = match &open.shared_memory {
+            Some(shared) => shared.clone(),
+            None => open
+                .shared_memory
+                .insert(SharedMemory::open(&self.domain)?)
+                .clone(),
+        };
+        let shared = shared.with_receivers(self.receivers);
+        Ok(shared.with_patience(self.patience))
     }
 
-    fn zenoh(&self, stream: &str) -> Result<&Zenoh, LinkError> {
-        self.zenoh.as_ref().ok_or_else(|| not_open(stream, "zenoh"))
+    fn zenoh(&self) -> Result<Zenoh, LinkError> {
+        let mut open = self.transports.lock();
+        if let Some(zenoh) = &open.zenoh {
+            return Ok(zenoh.clone());
+        }
+        let endpoints = self.zenoh.clone().unwrap_or_default();
+        let zenoh = Zenoh::open(&endpoints, self.patience)?;
+        Ok(open.zenoh.insert(zenoh).clone())
+    }
+}
+
+impl Transports {
+    // Nothing panics between two states of it.
+    fn lock(&self) -> MutexGuard<'_, Open> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -164,10 +217,10 @@ fn check<T: Sample>(stream: &str, kind: SampleKind) -> Result<(), LinkError> {
     })
 }
 
-fn not_open(stream: &str, transport: &'static str) -> LinkError {
+fn in_process(stream: &str) -> LinkError {
     LinkError::Open {
         stream: stream.to_owned(),
-        transport,
-        reason: "the seat was opened without it".to_owned(),
+        transport: "in process",
+        reason: "its two stages are not in one tree".to_owned(),
     }
 }

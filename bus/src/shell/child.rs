@@ -1,4 +1,4 @@
-//! A stage in a process of its own.
+//! A stage in a process of its own, such as one that is not ours.
 //!
 //! Whoever starts the process (a supervisor) talks to it in lines of JSON:
 //!
@@ -18,24 +18,22 @@ use std::error::Error;
 use std::io::{self, BufRead as _, Write as _};
 use std::process::ExitCode;
 use std::sync::mpsc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use tokio::signal::unix::{SignalKind, signal};
 
 use super::report::text_of;
-use super::{Context, Outcome, Report, SinkInput, Stop, run_sink, run_source, run_stage};
-use crate::link::{FanOut, LinkError, Sender};
+use super::tree::{Outlet, Post, Tree, Turn, branch};
+use super::{Board, Context, Outcome, Report, Stop};
+use crate::link::{FanOut, LinkError, Receiver, Sender};
 use crate::sample::{Health, Sample};
-use crate::seat::{Links, Output, Seat};
-use crate::stage::{Sink, Source, Stage};
+use crate::seat::{Links, Seat, Transports};
+use crate::stage::Stage;
 
 /// How often a running stage reports: what a killed stage did since then is not known.
 /// Resolution: the cost of reporting.
-const REPORT_EVERY: Duration = Duration::from_millis(100);
-/// How often the wait for receivers looks whether the stage is to stop.
-/// Resolution: how soon a stop is noticed.
-const LOOK_EVERY: Duration = Duration::from_millis(200);
+pub(super) const REPORT_EVERY: Duration = Duration::from_millis(100);
 
 /// What a stage's process says on standard output.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -43,6 +41,9 @@ const LOOK_EVERY: Duration = Duration::from_millis(200);
 pub enum Line {
     /// It begins.
     Ready {
+        /// The stage, where the process has several.
+        #[serde(default)]
+        stage: String,
         /// How many of the receivers it expects are not there.
         missing: usize,
     },
@@ -50,6 +51,9 @@ pub enum Line {
     Report(Report),
     /// It found something that people want to know.
     Note {
+        /// The stage, where the process has several.
+        #[serde(default)]
+        stage: String,
         /// What.
         text: String,
     },
@@ -108,7 +112,8 @@ impl Child {
         let seat: Seat = serde_json::from_str(&line).map_err(ChildError::NotASeat)?;
         let stop = Stop::new();
         stop_with_the_supervisor(stop.clone());
-        stop_on_signals(stop.clone()).map_err(ChildError::Signals)?;
+        let stopped = stop.clone();
+        stop_on_signals(move || stopped.stop()).map_err(ChildError::Signals)?;
         let context = Context {
             stage: seat.stage.clone(),
             restarts: seat.restarts,
@@ -123,56 +128,33 @@ impl Child {
         &self.seat
     }
 
-    /// Runs `source` here to its end.
-    pub fn source<T: Sample>(self, source: &mut dyn Source<T>) -> ExitCode {
-        self.run(|child, links, health| {
-            let Seat { inputs, output, .. } = &child.seat;
-            let (true, Some(output)) = (inputs.is_empty(), output) else {
-                return Err(child.shape("no input and an output"));
-            };
-            let mut sender = links.sender::<T>(output)?;
-            child.ready(Some(&mut *sender), health)?;
-            Ok(run_source(&child.context, source, &mut *sender, health))
-        })
-    }
-
     /// Runs `stage` here to its end.
     pub fn stage<I: Sample, O: Sample>(self, stage: &mut dyn Stage<I, O>) -> ExitCode {
-        self.run(|child, links, health| {
-            let Seat { inputs, output, .. } = &child.seat;
+        let Self { seat, context } = &self;
+        let report = reporting(&context.board, || {
+            let Seat { inputs, output, .. } = seat;
             let ([input], Some(output)) = (inputs.as_slice(), output) else {
-                return Err(child.shape("one input and an output"));
+                return Err(self.shape("one input and an output"));
             };
-            let mut sender = links.sender::<O>(output)?;
-            child.ready(Some(&mut *sender), health)?;
-            let mut receiver = links.receiver::<I>(input)?;
-            Ok(run_stage(
-                &child.context,
-                stage,
-                &input.from,
-                &mut *receiver,
-                &mut *sender,
-                health,
-            ))
-        })
-    }
-
-    /// Runs `sink` here to its end.
-    pub fn sink(self, sink: &mut dyn Sink) -> ExitCode {
-        self.run(|child, links, health| {
-            if child.seat.inputs.is_empty() || child.seat.output.is_some() {
-                return Err(child.shape("inputs and no output"));
-            }
-            child.ready::<Health>(None, health)?;
-            let inputs = child.seat.inputs.iter().map(|input| {
-                Ok(SinkInput {
-                    from: input.from.clone(),
-                    receiver: links.any_receiver(input)?,
-                })
-            });
-            let inputs = inputs.collect::<Result<_, LinkError>>()?;
-            Ok(run_sink(&child.context, sink, inputs, health))
-        })
+            let links = Links::of(seat, &Transports::default());
+            let turn = Turn::default();
+            let out = Outlet::new(Vec::new(), Some(links.sender::<O>(output)?));
+            let post = Post {
+                stage: seat.stage.clone(),
+                restarts: seat.restarts,
+                from: input.from.clone(),
+                health: health_sender(&links, seat)?,
+            };
+            let first = branch(&turn, post, Box::new(stage), out);
+            let open = Box::new(|| Ok(links.receiver::<I>(input)? as Box<dyn Receiver<I>>));
+            let mut tree = Tree::of_link(&turn, first, open);
+            tree.begin(context, seat.start_within(), &mut say_ready)?;
+            Ok(tree.run(context).pop().unwrap_or_default())
+        });
+        match report {
+            Ok(report) => done(report),
+            Err(error) => self.fail(&error),
+        }
     }
 
     /// Says that the stage could not be made from its seat.
@@ -182,62 +164,6 @@ impl Child {
             outcome: Some(Outcome::Failed(text_of(error))),
             ..Report::default()
         })
-    }
-
-    fn run(
-        self,
-        body: impl FnOnce(&Self, &Links, &mut dyn Sender<Health>) -> Result<Report, ChildError>,
-    ) -> ExitCode {
-        let body = || -> Result<Report, ChildError> {
-            let links = Links::open(&self.seat)?;
-            let mut health = health_sender(&links, self.seat.health.as_ref())?;
-            body(&self, &links, &mut *health)
-        };
-        let report = reporting(&self.context, body);
-        match report {
-            Ok(report) => done(report),
-            Err(error) => self.fail(&error),
-        }
-    }
-
-    /// Waits for the receivers of this stage's streams and says so.
-    fn ready<T: Sample>(
-        &self,
-        output: Option<&mut dyn Sender<T>>,
-        health: &mut dyn Sender<Health>,
-    ) -> Result<(), ChildError> {
-        let deadline = Instant::now() + self.seat.start_within();
-        let mut missing = self.missing_at(deadline, health)?;
-        if let Some(output) = output {
-            missing += self.missing_at(deadline, output)?;
-        }
-        if missing > 0 {
-            let within = self.seat.start_within();
-            tracing::warn!(
-                stage = self.seat.stage,
-                missing,
-                ?within,
-                "receivers are not there"
-            );
-        }
-        say(&Line::Ready { missing });
-        Ok(())
-    }
-
-    /// How many receivers of `stream` are missing when all are there, it is time, or the stage is to
-    /// stop.
-    fn missing_at<T: Sample>(
-        &self,
-        deadline: Instant,
-        stream: &mut dyn Sender<T>,
-    ) -> Result<usize, LinkError> {
-        loop {
-            let left = deadline.saturating_duration_since(Instant::now());
-            let missing = stream.wait_for_receivers(left.min(LOOK_EVERY))?;
-            if missing == 0 || left.is_zero() || self.context.stop.is_stopped() {
-                return Ok(missing);
-            }
-        }
     }
 
     fn shape(&self, expected: &'static str) -> ChildError {
@@ -300,28 +226,25 @@ where
     }
 }
 
-fn health_sender(
+/// Where the health of this seat's stage goes.
+pub(super) fn health_sender(
     links: &Links,
-    output: Option<&Output>,
+    seat: &Seat,
 ) -> Result<Box<dyn Sender<Health>>, LinkError> {
-    match output {
+    match &seat.health {
         Some(output) => links.sender(output),
         None => Ok(Box::new(FanOut::new(Vec::new()))),
     }
 }
 
 /// Runs `body` while another thread says now and then what is on the board.
-fn reporting<R>(context: &Context, body: impl FnOnce() -> R) -> R {
+pub(super) fn reporting<R>(board: &Board, body: impl FnOnce() -> R) -> R {
     std::thread::scope(|scope| {
         let (finished, until_finished) = mpsc::channel::<()>();
         scope.spawn(move || {
             while until_finished.recv_timeout(REPORT_EVERY) == Err(mpsc::RecvTimeoutError::Timeout)
             {
-                let report = context.board.read();
-                // Empty until the loop has begun.
-                if report.outcome.is_none() && !report.stage.is_empty() {
-                    say(&Line::Report(report));
-                }
+                say_posted(board);
             }
         });
         let result = body();
@@ -330,18 +253,45 @@ fn reporting<R>(context: &Context, body: impl FnOnce() -> R) -> R {
     })
 }
 
+/// Says what is on the board, unless it has all been said for the last time.
+pub(super) fn say_posted(board: &Board) {
+    // Locked before it is read, so that no older report comes after a newer one.
+    let mut out = io::stdout().lock();
+    let mut text = Vec::new();
+    let posted = board.read().into_iter();
+    for report in posted.filter(|report| report.outcome.is_none()) {
+        write_line(&mut text, &Line::Report(report));
+    }
+    // At once: what is killed meanwhile has said what all have done, or nothing.
+    let _ = out.write_all(&text).and_then(|()| out.flush());
+}
+
+/// Says that a stage begins.
+pub(super) fn say_ready(stage: &str, missing: usize) {
+    say(&Line::Ready {
+        stage: stage.to_owned(),
+        missing,
+    });
+}
+
 /// Tells people what a stage that runs in this process has found.
-pub fn note(text: &str) {
+pub fn note(stage: &str, text: &str) {
     say(&Line::Note {
+        stage: stage.to_owned(),
         text: text.to_owned(),
     });
 }
 
 /// If the supervisor reads no more, the end of standard input says so: a line may be lost then.
-fn say(line: &Line) {
+pub(super) fn say(line: &Line) {
+    let mut out = io::stdout().lock();
+    write_line(&mut out, line);
+    let _ = out.flush();
+}
+
+fn write_line(out: &mut impl io::Write, line: &Line) {
     if let Ok(text) = serde_json::to_string(line) {
-        let mut out = io::stdout().lock();
-        let _ = writeln!(out, "{text}").and_then(|()| out.flush());
+        let _ = writeln!(out, "{text}");
     }
 }
 
@@ -359,7 +309,7 @@ fn stop_with_the_supervisor(stop: Stop) {
     });
 }
 
-fn stop_on_signals(stop: Stop) -> io::Result<()> {
+pub(super) fn stop_on_signals(stop: impl Fn() + Send + 'static) -> io::Result<()> {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_io()
         .build()?;
@@ -372,7 +322,7 @@ fn stop_on_signals(stop: Stop) -> io::Result<()> {
     };
     std::thread::spawn(move || {
         if runtime.block_on(terminate.recv()).is_some() {
-            stop.stop();
+            stop();
         }
         // `_interrupt` is caught and left alone for as long as the process lives.
     });

@@ -69,6 +69,13 @@ impl<S: Sender<Health>> HealthClock<S> {
         self.out.end()
     }
 
+    pub(super) fn wait_for_receivers(
+        &mut self,
+        timeout: std::time::Duration,
+    ) -> Result<usize, LinkError> {
+        self.out.wait_for_receivers(timeout)
+    }
+
     pub(super) fn wait_until_taken(
         &mut self,
         timeout: std::time::Duration,

@@ -116,24 +116,22 @@ impl Outcome {
     }
 }
 
-/// Where a shell posts its report while it runs. Clones are one.
+/// Where stages that run together post their reports, all of one instant. Clones are one.
 #[derive(Debug, Clone, Default)]
-pub struct Board(Arc<Mutex<Report>>);
+pub struct Board(Arc<Mutex<Vec<Report>>>);
 
 impl Board {
-    /// The newest report.
-    pub fn read(&self) -> Report {
+    /// The newest reports; none until the loop has begun.
+    pub fn read(&self) -> Vec<Report> {
         self.0
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .clone()
     }
 
-    pub(super) fn post(&self, report: &Report) {
-        self.0
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .clone_from(report);
+    pub(super) fn post(&self, reports: &[Report]) {
+        let mut posted = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        reports.clone_into(&mut posted);
     }
 }
 
@@ -161,8 +159,8 @@ impl Poster {
         self.posted.elapsed() >= Self::EVERY
     }
 
-    pub(super) fn post(&mut self, report: &Report) {
-        self.board.post(report);
+    pub(super) fn post(&mut self, reports: &[Report]) {
+        self.board.post(reports);
         self.posted = Instant::now();
     }
 }

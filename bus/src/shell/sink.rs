@@ -62,7 +62,7 @@ pub fn run_sink(
         .unwrap_or_else(|error| Outcome::of(&error));
     shell.count();
     shell.report.outcome = Some(outcome);
-    shell.poster.post(&shell.report);
+    shell.poster.post(std::slice::from_ref(&shell.report));
     shell.report
 }
 
@@ -118,7 +118,7 @@ impl SinkShell<'_> {
         let due = self.health.note(sample.header());
         if due || self.poster.is_due() {
             self.count();
-            self.poster.post(&self.report);
+            self.poster.post(std::slice::from_ref(&self.report));
         }
         if due {
             self.health.send(&self.report)?;
@@ -131,7 +131,7 @@ impl SinkShell<'_> {
             self.active = Instant::now();
             self.sink.idle()?;
             self.count();
-            self.poster.post(&self.report);
+            self.poster.post(std::slice::from_ref(&self.report));
         }
         Ok(())
     }

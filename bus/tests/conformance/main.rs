@@ -203,7 +203,8 @@ macro_rules! conforms {
                 order_is_kept, late_joiner_hears_the_rest, slow_reader_that_keeps_all_loses_nothing,
                 slow_reader_that_keeps_the_newest_loses_the_oldest, stuck_reader_is_given_up_and_counted,
                 receiver_gone_and_back, sender_gone_and_back, end_comes_last_and_once, end_is_waited_for,
-                missing_receivers_are_told, another_type_is_refused, loss_over_a_restart_of_the_receiver_is_counted);
+                missing_receivers_are_told, another_type_is_refused, loss_over_a_restart_of_the_receiver_is_counted,
+                what_is_skipped_is_lost);
         }
     };
     (@ $sides:ty: $($promise:ident),+) => {$(

@@ -300,3 +300,24 @@ pub fn loss_over_a_restart_of_the_receiver_is_counted<S: Sides>() {
     assert_eq!(second.counts().lost, 16 - heard.len() as u64);
     assert_eq!(second.counts().received, 1 + heard.len() as u64);
 }
+
+pub fn what_is_skipped_is_lost<S: Sides>() {
+    let sides = S::new(LONG);
+    let mut receiver = sides.receiving().receiver(STREAM, Keep::All, 64).unwrap();
+    let mut sender = sides
+        .sending()
+        .sender::<JointState>(STREAM, audience(1, 0))
+        .unwrap();
+    meet(&mut *sender, &mut [&mut receiver]);
+    send(&mut *sender, 0, 10);
+    sender.skip(7);
+    send(&mut *sender, 10, 10);
+    sender.skip(3);
+    sender.end().unwrap();
+    let heard = take_to_end(&mut *receiver);
+    assert!(heard.into_iter().eq(0..20));
+    assert_eq!(
+        (receiver.counts().received, receiver.counts().lost),
+        (20, 10)
+    );
+}

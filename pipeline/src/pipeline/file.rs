@@ -26,6 +26,10 @@ pub struct PipelineFile {
     /// The hosts by name; left out where everything runs on one.
     #[serde(default)]
     pub hosts: BTreeMap<String, HostEntry>,
+    /// The process in which the sources, twins, detectors and watches of all cells run, where their cell or they
+    /// themselves name no other. Left out, each cell has a process of its own.
+    #[serde(default)]
+    pub process: Option<String>,
     /// The stages, in any order.
     #[schemars(length(min = 1))]
     pub stages: Vec<StageEntry>,
@@ -55,6 +59,9 @@ pub struct CellEntry {
     /// The impedance that a Cartesian controller holds the tool with, where there is one.
     #[serde(default)]
     pub impedance: Option<tauscope_detect::Impedance>,
+    /// The process in which the cell's source, twins, detectors and watches run, where they themselves name no other.
+    #[serde(default)]
+    pub process: Option<String>,
 }
 
 /// How a host is reached by the others.
@@ -109,6 +116,10 @@ pub struct StageEntry {
     /// The host it runs on, where the file names several.
     #[serde(default)]
     pub host: Option<String>,
+    /// The process it runs in. Stages on one host that name the same one share it. Left out, it is that of the cell,
+    /// and for `record` and `publish` one of its own.
+    #[serde(default)]
+    pub process: Option<String>,
     /// The stage it listens to.
     #[serde(default)]
     pub input: Option<String>,

@@ -2,6 +2,7 @@
 
 mod inputs;
 mod order;
+mod processes;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -26,6 +27,8 @@ pub struct Wiring {
     pub cells: Vec<BTreeSet<String>>,
     /// The host each stage runs on, where the file names hosts.
     pub hosts: Vec<Option<String>>,
+    /// The process each stage runs in, on its host.
+    pub processes: Vec<String>,
 }
 
 /// Checks names, roles, inputs, cells and hosts; `None` if they make no pipeline.
@@ -46,6 +49,7 @@ pub fn check(file: &Located<PipelineFile>, report: &mut Report) -> Option<Wiring
     let cells = order
         .as_ref()
         .map(|order| checker.cells(&roles, &inputs, order));
+    let processes = cells.as_ref().map(|cells| checker.processes(&roles, cells));
     if checker.broken {
         return None;
     }
@@ -58,6 +62,7 @@ pub fn check(file: &Located<PipelineFile>, report: &mut Report) -> Option<Wiring
         order: order?,
         cells: cells?,
         hosts,
+        processes: processes?,
     })
 }
 
@@ -98,25 +103,7 @@ impl Checker<'_> {
         let stages = self.stages.iter().enumerate();
         let stages = stages.map(|(at, stage)| (&stage.name, stage_place(at).key("name"), "stage"));
         for (name, place, what) in cells.chain(hosts).chain(stages).collect::<Vec<_>>() {
-            let simple = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-            if name.is_empty() || !name.chars().all(simple) {
-                let problem = match what {
-                    "stage" => self
-                        .file
-                        .at(&place, format!("`{name}` cannot be a {what}'s name")),
-                    _ => self
-                        .file
-                        .at_key(&place, format!("`{name}` cannot be a {what}'s name")),
-                };
-                self.wrong(problem.help("a name is made of letters, digits, `_` and `-`"));
-            } else if name.len() > Name::CAPACITY {
-                let title = format!(
-                    "the name is {} bytes long, at most {} fit",
-                    name.len(),
-                    Name::CAPACITY
-                );
-                self.wrong(self.file.at(&place, title));
-            }
+            self.simple_name(name, &place, what);
         }
         if self.file.value.cells.is_empty() {
             let problem = self.file.at_key(&top.key("cells"), "there is no cell");
@@ -138,6 +125,25 @@ impl Checker<'_> {
                     "the first one",
                 );
             self.wrong(problem);
+        }
+    }
+
+    fn simple_name(&mut self, name: &str, place: &Place, what: &str) {
+        let simple = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+        if name.is_empty() || !name.chars().all(simple) {
+            let title = format!("`{name}` cannot be a {what}'s name");
+            let problem = match what {
+                "stage" | "process" => self.file.at(place, title),
+                _ => self.file.at_key(place, title),
+            };
+            self.wrong(problem.help("a name is made of letters, digits, `_` and `-`"));
+        } else if name.len() > Name::CAPACITY {
+            let title = format!(
+                "the name is {} bytes long, at most {} fit",
+                name.len(),
+                Name::CAPACITY
+            );
+            self.wrong(self.file.at(place, title));
         }
     }
 

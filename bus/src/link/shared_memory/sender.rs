@@ -173,6 +173,10 @@ impl<T: Sample> Sender<T> for SharedMemorySender<T> {
         Ok(())
     }
 
+    fn skip(&mut self, count: u64) {
+        self.next += count;
+    }
+
     fn end(&mut self) -> Result<(), LinkError> {
         self.listen(Duration::ZERO)?;
         self.taken = 0;

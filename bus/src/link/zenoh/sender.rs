@@ -168,6 +168,10 @@ impl<T: Sample> Sender<T> for ZenohSender<T> {
         Ok(())
     }
 
+    fn skip(&mut self, count: u64) {
+        self.next += count;
+    }
+
     fn end(&mut self) -> Result<(), LinkError> {
         {
             let state = self.presence.lock();

@@ -1,0 +1,324 @@
+//! A bounded queue before a sender whose receivers may be slow, so that the stage itself need not wait for them.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use serde::{Deserialize, Serialize};
+
+use super::{LinkError, Sender, SenderCounts};
+use crate::sample::Sample;
+
+/// Samples that are handed over at once.
+/// Resolution: how often the queue is locked, against memory.
+const CHUNK: usize = 64;
+/// Empty chunks that are kept for later.
+/// Resolution: memory, against how often it is allocated.
+const SPARE: usize = 8;
+
+/// What a [`Spill`] may take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SpillSettings {
+    /// The most memory that waiting samples take \[bytes\].
+    pub bytes: usize,
+    /// Samples that come within this time are sent together \[ms\].
+    pub linger_ms: u64,
+    /// When it is full: whether the stage waits, because its source can. Else what has no room is lost, and counted.
+    pub waits: bool,
+}
+
+/// A sender with a queue before it and a thread of its own, which begins with the first sample.
+///
+/// What has no room leaves a hole in the sequence, which the receivers count as lost.
+pub struct Spill<T> {
+    shared: Arc<Shared<T>>,
+    /// Until the thread has it.
+    inner: Option<Box<dyn Sender<T>>>,
+    settings: SpillSettings,
+    /// How many samples may wait.
+    most: usize,
+    /// How long it waits for room, if it waits.
+    patience: Duration,
+    /// Patience has run out, and there was no room since.
+    stuck: bool,
+    receivers: u64,
+    sent: u64,
+    overflowed: u64,
+}
+
+struct Shared<T> {
+    state: Mutex<State<T>>,
+    filled: Condvar,
+    changed: Condvar,
+}
+
+struct State<T> {
+    /// Samples, each with how many were lost before it.
+    chunks: VecDeque<Vec<(u64, T)>>,
+    spare: Vec<Vec<(u64, T)>>,
+    /// Samples that are not sent yet.
+    held: usize,
+    /// Samples lost since the last one that found room.
+    skipped: u64,
+    /// The thread waits to be woken.
+    idle: bool,
+    /// The stream has ended.
+    ended: bool,
+    /// Nobody sends any more.
+    closed: bool,
+    undelivered: u64,
+    failure: Option<LinkError>,
+    /// The sender, once the end has been sent.
+    returned: Option<Box<dyn Sender<T>>>,
+}
+
+impl<T> Default for State<T> {
+    fn default() -> Self {
+        Self {
+            chunks: VecDeque::new(),
+            spare: Vec::new(),
+            held: 0,
+            skipped: 0,
+            idle: false,
+            ended: false,
+            closed: false,
+            undelivered: 0,
+            failure: None,
+            returned: None,
+        }
+    }
+}
+
+impl<T: Sample> Spill<T> {
+    /// Before `inner`, which has so many `receivers` that keep all.
+    pub fn new(
+        inner: Box<dyn Sender<T>>,
+        settings: SpillSettings,
+        patience: Duration,
+        receivers: usize,
+    ) -> Self {
+        Self {
+            shared: Arc::new(Shared {
+                state: Mutex::default(),
+                filled: Condvar::new(),
+                changed: Condvar::new(),
+            }),
+            inner: Some(inner),
+            settings,
+            most: (settings.bytes / size_of::<T>()).max(CHUNK),
+            patience,
+            stuck: false,
+            receivers: receivers as u64,
+            sent: 0,
+            overflowed: 0,
+        }
+    }
+
+    /// Starts the thread, once.
+    fn start(&mut self) -> Result<(), LinkError> {
+        let Some(inner) = self.inner.take() else {
+            return Ok(());
+        };
+        let shared = Arc::clone(&self.shared);
+        let linger = Duration::from_millis(self.settings.linger_ms);
+        let thread = std::thread::Builder::new().name("spill".to_owned());
+        let started = thread.spawn(move || shared.pump(inner, linger));
+        started.map(|_| ()).map_err(|error| LinkError::Send {
+            stream: T::KIND.type_name().to_owned(),
+            reason: format!("no thread for what waits to be sent: {error}"),
+        })
+    }
+}
+
+impl<T: Sample> Sender<T> for Spill<T> {
+    fn send_with(&mut self, write: &mut dyn FnMut(&mut T)) -> Result<(), LinkError> {
+        self.start()?;
+        self.sent += 1;
+        let mut state = self.shared.lock();
+        if state.held >= self.most && self.settings.waits && !self.stuck {
+            let most = self.most;
+            let full = |state: &mut State<T>| state.held >= most && state.failure.is_none();
+            state = wait(&self.shared.changed, state, self.patience, full);
+        }
+        if let Some(error) = state.failure.take() {
+            return Err(error);
+        }
+        self.stuck = state.held >= self.most;
+        if self.stuck {
+            state.skipped += 1;
+            self.overflowed += 1;
+            drop(state);
+            write(&mut T::default());
+            return Ok(());
+        }
+        if state.chunks.back().is_none_or(|chunk| chunk.len() == CHUNK) {
+            let chunk = state.spare.pop();
+            let chunk = chunk.unwrap_or_else(|| Vec::with_capacity(CHUNK));
+            state.chunks.push_back(chunk);
+        }
+        let skipped = std::mem::take(&mut state.skipped);
+        if let Some(chunk) = state.chunks.back_mut() {
+            chunk.push((skipped, T::default()));
+            if let Some((_, slot)) = chunk.last_mut() {
+                write(slot);
+            }
+        }
+        state.held += 1;
+        let idle = state.idle;
+        drop(state);
+        if idle {
+            self.shared.filled.notify_one();
+        }
+        Ok(())
+    }
+
+    fn skip(&mut self, count: u64) {
+        self.shared.lock().skipped += count;
+    }
+
+    fn end(&mut self) -> Result<(), LinkError> {
+        self.start()?;
+        let mut state = self.shared.lock();
+        state.ended = true;
+        drop(state);
+        self.shared.filled.notify_one();
+        Ok(())
+    }
+
+    fn wait_for_receivers(&mut self, timeout: Duration) -> Result<usize, LinkError> {
+        let inner = self.inner.as_mut();
+        inner.map_or(Ok(0), |inner| inner.wait_for_receivers(timeout))
+    }
+
+    fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError> {
+        let deadline = Instant::now() + timeout;
+        let pending = |state: &mut State<T>| state.returned.is_none() && state.failure.is_none();
+        let shared = Arc::clone(&self.shared);
+        let mut state = shared.lock();
+        if !state.ended {
+            return Ok(0);
+        }
+        state = wait(&shared.changed, state, timeout, pending);
+        if let Some(error) = state.failure.take() {
+            return Err(error);
+        }
+        let Some(mut inner) = state.returned.take() else {
+            // They have not even got all of it.
+            state.undelivered += state.held as u64 * self.receivers;
+            return Ok(self.receivers.max(1) as usize);
+        };
+        drop(state);
+        let left = deadline.saturating_duration_since(Instant::now());
+        let missing = inner.wait_until_taken(left)?;
+        self.shared.lock().undelivered = inner.counts().undelivered;
+        Ok(missing)
+    }
+
+    fn counts(&self) -> SenderCounts {
+        SenderCounts {
+            sent: self.sent,
+            undelivered: self.shared.lock().undelivered + self.overflowed * self.receivers,
+        }
+    }
+}
+
+impl<T> Drop for Spill<T> {
+    /// What waits is still sent; a process that exits takes it along.
+    fn drop(&mut self) {
+        self.shared.lock().closed = true;
+        self.shared.filled.notify_one();
+    }
+}
+
+impl<T> Shared<T> {
+    // No code panics while it holds the lock but a stage's own write, which leaves a whole sample behind.
+    fn lock(&self) -> MutexGuard<'_, State<T>> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl<T: Sample> Shared<T> {
+    /// Sends what comes until the stream ends.
+    fn pump(&self, mut inner: Box<dyn Sender<T>>, linger: Duration) {
+        let result = self.send_all(&mut *inner, linger);
+        let mut state = self.lock();
+        match result {
+            Ok(()) => {
+                state.undelivered = inner.counts().undelivered;
+                state.returned = Some(inner);
+            }
+            Err(error) => state.failure = Some(error),
+        }
+        drop(state);
+        self.changed.notify_all();
+    }
+
+    fn send_all(&self, inner: &mut dyn Sender<T>, linger: Duration) -> Result<(), LinkError> {
+        while let Some(mut chunk) = self.next(linger) {
+            let count = chunk.len();
+            for (skipped, sample) in chunk.drain(..) {
+                if skipped > 0 {
+                    inner.skip(skipped);
+                }
+                inner.send_with(&mut |slot| *slot = sample)?;
+            }
+            let mut state = self.lock();
+            state.held -= count;
+            state.undelivered = inner.counts().undelivered;
+            if state.spare.len() < SPARE {
+                state.spare.push(chunk);
+            }
+            drop(state);
+            self.changed.notify_all();
+        }
+        let (ended, skipped) = {
+            let mut state = self.lock();
+            (state.ended, std::mem::take(&mut state.skipped))
+        };
+        if ended {
+            inner.skip(skipped);
+            inner.end()?;
+        }
+        Ok(())
+    }
+
+    /// The oldest chunk; none at the end.
+    fn next(&self, linger: Duration) -> Option<Vec<(u64, T)>> {
+        let mut state = self.lock();
+        if state.chunks.is_empty() && !linger.is_zero() && !state.ended && !state.closed {
+            drop(state);
+            std::thread::sleep(linger);
+            state = self.lock();
+        }
+        loop {
+            if let Some(chunk) = state.chunks.pop_front() {
+                return Some(chunk);
+            }
+            if state.ended || state.closed {
+                return None;
+            }
+            state.idle = true;
+            state = self
+                .filled
+                .wait(state)
+                .unwrap_or_else(PoisonError::into_inner);
+            state.idle = false;
+        }
+    }
+}
+
+fn wait<'a, T>(
+    changed: &Condvar,
+    state: MutexGuard<'a, State<T>>,
+    timeout: Duration,
+    pending: impl FnMut(&mut State<T>) -> bool,
+) -> MutexGuard<'a, State<T>> {
+    changed
+        .wait_timeout_while(state, timeout, pending)
+        .unwrap_or_else(PoisonError::into_inner)
+        .0
+}
+
+#[cfg(test)]
+mod tests;

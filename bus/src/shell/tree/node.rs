@@ -1,0 +1,321 @@
+//! The stages of a tree and where their samples go.
+
+use std::time::{Duration, Instant};
+
+use super::{Post, Turn};
+use crate::link::{LinkError, Sender, SenderCounts};
+use crate::sample::{Header, Health, Sample};
+use crate::shell::health::HealthClock;
+use crate::shell::report::{InputReport, Report};
+use crate::stage::{Emit, Stage, StageError};
+
+/// Where a stage's samples go: to the stages of its tree that hear it, and over links to all others.
+pub struct Outlet<'a, T: Sample> {
+    branches: Vec<Box<dyn Branch<T> + 'a>>,
+    /// None where nobody else hears it.
+    link: Option<Box<dyn Sender<T> + 'a>>,
+    slot: T,
+    sent: u64,
+    newest: Option<Header>,
+}
+
+impl<'a, T: Sample> Outlet<'a, T> {
+    /// To these stages, in this order, and over `link`.
+    pub fn new(
+        branches: Vec<Box<dyn Branch<T> + 'a>>,
+        link: Option<Box<dyn Sender<T> + 'a>>,
+    ) -> Self {
+        Self {
+            branches,
+            link,
+            slot: T::default(),
+            sent: 0,
+            newest: None,
+        }
+    }
+
+    /// The header of what was emitted last since this was asked before.
+    pub(super) fn take_newest(&mut self) -> Option<Header> {
+        self.newest.take()
+    }
+
+    fn counts(&self) -> SenderCounts {
+        let link = self.link.as_ref().map(Sender::counts).unwrap_or_default();
+        SenderCounts {
+            sent: self.sent,
+            undelivered: link.undelivered,
+        }
+    }
+
+    fn wait_for_receivers(&mut self, timeout: Duration) -> Result<usize, LinkError> {
+        let link = self.link.as_mut();
+        link.map_or(Ok(0), |link| link.wait_for_receivers(timeout))
+    }
+
+    fn wait_until_taken(&mut self, deadline: Instant) -> Result<usize, LinkError> {
+        let left = deadline.saturating_duration_since(Instant::now());
+        let link = self.link.as_mut();
+        link.map_or(Ok(0), |link| link.wait_until_taken(left))
+    }
+
+    /// Ends the stream for all that hear it.
+    fn end(&mut self) -> Result<(), StageError> {
+        if let Some(link) = &mut self.link {
+            link.end()?;
+        }
+        let mut branches = self.branches.iter_mut();
+        branches.try_for_each(|branch| {
+            let part = branch.part();
+            if let Some(input) = part.input() {
+                input.ended = true;
+            }
+            part.finish()
+        })
+    }
+}
+
+impl<T: Sample> Emit<T> for Outlet<'_, T> {
+    fn emit(&mut self, write: &mut dyn FnMut(&mut T)) -> Result<(), LinkError> {
+        let Self {
+            branches,
+            link,
+            slot,
+            sent,
+            newest,
+        } = self;
+        if let (Some(link), true) = (&mut *link, branches.is_empty()) {
+            link.send_with(&mut |place| {
+                write(place);
+                *newest = Some(*place.header());
+            })?;
+            *sent += 1;
+            return Ok(());
+        }
+        *slot = T::default();
+        write(slot);
+        slot.header_mut().sequence = *sent;
+        *newest = Some(*slot.header());
+        *sent += 1;
+        // No detector waits for what a recorder is told.
+        let heard = branches.iter_mut().try_for_each(|branch| {
+            branch.hear(slot)?;
+            branch.tell()
+        });
+        if let Some(link) = link {
+            link.send_with(&mut |place| *place = *slot)?;
+        }
+        heard
+    }
+}
+
+/// A stage of a tree and all behind it, as whoever hands it samples sees it.
+pub trait Branch<I> {
+    /// Takes a sample.
+    ///
+    /// # Errors
+    /// If the stage or one behind it fails.
+    fn hear(&mut self, sample: &I) -> Result<(), LinkError>;
+
+    /// Sends a health report if one is due.
+    ///
+    /// # Errors
+    /// What the link says.
+    fn tell(&mut self) -> Result<(), LinkError>;
+
+    /// The stage without its types.
+    fn part(&mut self) -> &mut dyn Part;
+}
+
+/// A stage of a tree, whatever its types are.
+pub trait Part {
+    /// Brings its report up to date.
+    fn count(&mut self);
+
+    /// Its report as it was brought up to date last.
+    fn report(&self) -> &Report;
+
+    /// The part of it that says how its input fares.
+    fn input(&mut self) -> Option<&mut InputReport>;
+
+    /// Waits until all who hear it over links are there; how many are missing.
+    ///
+    /// # Errors
+    /// If a link fails.
+    fn wait_for_receivers(&mut self, timeout: Duration) -> Result<usize, LinkError>;
+
+    /// Its input has ended: so does its stream.
+    ///
+    /// # Errors
+    /// If it, or one behind it, cannot finish.
+    fn finish(&mut self) -> Result<(), StageError>;
+
+    /// Waits until all have read to the end.
+    ///
+    /// # Errors
+    /// If a link fails.
+    fn wait_until_taken(&mut self, deadline: Instant) -> Result<(), LinkError>;
+
+    /// Each stage that hears it.
+    ///
+    /// # Errors
+    /// The first that `visit` gives.
+    fn behind(
+        &mut self,
+        visit: &mut dyn FnMut(&mut dyn Part) -> Result<(), LinkError>,
+    ) -> Result<(), LinkError>;
+}
+
+/// Visits a part and all behind it.
+pub(super) fn walk(
+    part: &mut dyn Part,
+    visit: &mut dyn FnMut(&mut dyn Part) -> Result<(), LinkError>,
+) -> Result<(), LinkError> {
+    visit(part)?;
+    part.behind(&mut |behind| walk(behind, visit))
+}
+
+/// What all stages of a tree have: their streams, their report and their health.
+pub(super) struct Frame<'a, O: Sample> {
+    pub place: usize,
+    pub turn: Turn,
+    pub out: Outlet<'a, O>,
+    pub health: HealthClock<Box<dyn Sender<Health> + 'a>>,
+    pub report: Report,
+    /// A health report is due.
+    pub due: bool,
+}
+
+impl<'a, O: Sample> Frame<'a, O> {
+    pub fn new(turn: &Turn, post: Post<'a>, out: Outlet<'a, O>) -> Self {
+        let inputs = if post.from.is_empty() {
+            Vec::new()
+        } else {
+            vec![InputReport {
+                from: post.from,
+                ..InputReport::default()
+            }]
+        };
+        Self {
+            place: turn.place(&post.stage),
+            turn: turn.clone(),
+            out,
+            health: HealthClock::new(post.health, &post.stage, post.restarts),
+            report: Report {
+                stage: post.stage,
+                inputs,
+                ..Report::default()
+            },
+            due: false,
+        }
+    }
+
+    /// Brings the report up to date, but for what the stage itself knows.
+    pub fn count(&mut self, refused: u64) {
+        self.report.refused = refused;
+        self.report.count_output(self.out.counts());
+        self.report.count_inputs();
+        self.report.stamp_ns = self.health.stamp_ns();
+    }
+
+    pub fn wait_for_receivers(&mut self, timeout: Duration) -> Result<usize, LinkError> {
+        Ok(self.health.wait_for_receivers(timeout)? + self.out.wait_for_receivers(timeout)?)
+    }
+
+    pub fn wait_until_taken(&mut self, deadline: Instant) -> Result<(), LinkError> {
+        let data = self.out.wait_until_taken(deadline)?;
+        let left = deadline.saturating_duration_since(Instant::now());
+        self.report.untaken = data + self.health.wait_until_taken(left)?;
+        Ok(())
+    }
+
+    pub fn end(&mut self) -> Result<(), StageError> {
+        self.out.end()
+    }
+
+    pub fn behind(
+        &mut self,
+        visit: &mut dyn FnMut(&mut dyn Part) -> Result<(), LinkError>,
+    ) -> Result<(), LinkError> {
+        let mut branches = self.out.branches.iter_mut();
+        branches.try_for_each(|branch| visit(branch.part()))
+    }
+}
+
+struct Node<'a, I: Sample, O: Sample> {
+    frame: Frame<'a, O>,
+    stage: Box<dyn Stage<I, O> + 'a>,
+}
+
+/// A stage with all that hear it in its tree.
+pub fn branch<'a, I: Sample, O: Sample>(
+    turn: &Turn,
+    post: Post<'a>,
+    stage: Box<dyn Stage<I, O> + 'a>,
+    out: Outlet<'a, O>,
+) -> Box<dyn Branch<I> + 'a> {
+    let frame = Frame::new(turn, post, out);
+    Box::new(Node { frame, stage })
+}
+
+impl<I: Sample, O: Sample> Branch<I> for Node<'_, I, O> {
+    fn hear(&mut self, sample: &I) -> Result<(), LinkError> {
+        let Self { frame, stage } = self;
+        if let Some(input) = frame.report.inputs.first_mut() {
+            input.counts.received += 1;
+        }
+        frame.due = frame.health.note(sample.header());
+        let (turn, out) = (&frame.turn, &mut frame.out);
+        turn.of(frame.place, || stage.accept(sample, out))
+    }
+
+    fn tell(&mut self) -> Result<(), LinkError> {
+        if std::mem::take(&mut self.frame.due) {
+            self.count();
+            self.frame.health.send(&self.frame.report)?;
+        }
+        Ok(())
+    }
+
+    fn part(&mut self) -> &mut dyn Part {
+        self
+    }
+}
+
+impl<I: Sample, O: Sample> Part for Node<'_, I, O> {
+    fn count(&mut self) {
+        self.frame.count(self.stage.dropped());
+    }
+
+    fn report(&self) -> &Report {
+        &self.frame.report
+    }
+
+    fn input(&mut self) -> Option<&mut InputReport> {
+        self.frame.report.inputs.first_mut()
+    }
+
+    fn wait_for_receivers(&mut self, timeout: Duration) -> Result<usize, LinkError> {
+        self.frame.wait_for_receivers(timeout)
+    }
+
+    fn finish(&mut self) -> Result<(), StageError> {
+        let Self { frame, stage } = self;
+        let (turn, out) = (&frame.turn, &mut frame.out);
+        turn.of(frame.place, || stage.finish(out))?;
+        frame.end()?;
+        self.count();
+        self.frame.health.end(&self.frame.report)?;
+        Ok(())
+    }
+
+    fn wait_until_taken(&mut self, deadline: Instant) -> Result<(), LinkError> {
+        self.frame.wait_until_taken(deadline)
+    }
+
+    fn behind(
+        &mut self,
+        visit: &mut dyn FnMut(&mut dyn Part) -> Result<(), LinkError>,
+    ) -> Result<(), LinkError> {
+        self.frame.behind(visit)
+    }
+}

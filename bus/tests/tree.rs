@@ -1,0 +1,188 @@
+//! A tree of stages in one thread: what goes where, and what happens where one of them fails.
+
+// Helpers outside a test function.
+#![allow(clippy::unwrap_used)]
+
+use std::sync::{Arc, Mutex};
+
+use tauscope_bus::shell::tree::{Branch, Outlet, Post, Tree, Turn, branch};
+use tauscope_bus::shell::{Context, Outcome, Report};
+use tauscope_bus::{
+    Audience, Detection, Emit, InProcess, JointState, Keep, Progress, Received, Receiver, Source,
+    Stage, StageError, Transport, TwinState,
+};
+
+/// Emits stamps 0, 1, ... two at a time.
+struct Counter(i64);
+
+impl Source<JointState> for Counter {
+    fn step(&mut self, out: &mut dyn Emit<JointState>) -> Result<Progress, StageError> {
+        if self.0 == 100 {
+            return Ok(Progress::End);
+        }
+        for _ in 0..2 {
+            out.emit(&mut |state| state.header.stamp_ns = self.0)?;
+            self.0 += 1;
+        }
+        Ok(Progress::More)
+    }
+}
+
+/// Emits every sample, and one more at the end.
+struct Twin;
+
+impl Stage<JointState, TwinState> for Twin {
+    fn accept(
+        &mut self,
+        state: &JointState,
+        out: &mut dyn Emit<TwinState>,
+    ) -> Result<(), StageError> {
+        assert_eq!(state.header.stamp_ns, state.header.sequence as i64);
+        Ok(out.emit(&mut |twin| twin.header.stamp_ns = state.header.stamp_ns)?)
+    }
+
+    fn finish(&mut self, out: &mut dyn Emit<TwinState>) -> Result<(), StageError> {
+        Ok(out.emit(&mut |twin| twin.header.stamp_ns = 1_000)?)
+    }
+}
+
+type Heard = Arc<Mutex<Vec<(&'static str, i64)>>>;
+
+/// What a detector does at the stamp 50.
+#[derive(Clone, Copy, PartialEq)]
+enum Mood {
+    Well,
+    Fails,
+    Panics,
+    Unfit,
+}
+
+struct Detector(&'static str, Heard, Mood);
+
+impl Stage<TwinState, Detection> for Detector {
+    fn accept(
+        &mut self,
+        twin: &TwinState,
+        out: &mut dyn Emit<Detection>,
+    ) -> Result<(), StageError> {
+        let stamp_ns = twin.header.stamp_ns;
+        self.1.lock().unwrap().push((self.0, stamp_ns));
+        match self.2 {
+            Mood::Fails if stamp_ns == 50 => return Err(StageError::failed("it is broken")),
+            Mood::Unfit if stamp_ns == 50 => return Err(StageError::Unfit("no".to_owned())),
+            Mood::Panics if stamp_ns == 50 => panic!("it is upset"),
+            _ => {}
+        }
+        Ok(out.emit(&mut |detection| detection.header.stamp_ns = stamp_ns)?)
+    }
+}
+
+fn post(links: &InProcess, stage: &str, from: &str) -> Post<'static> {
+    let health = links.sender(&format!("{stage}/health"), Audience::default());
+    Post {
+        stage: stage.to_owned(),
+        restarts: 0,
+        from: from.to_owned(),
+        health: health.unwrap(),
+    }
+}
+
+/// A source, a twin, whose stream is heard outside as well, and two detectors, the second in this mood.
+fn run(mood: Mood) -> (Vec<Report>, Vec<(&'static str, i64)>, Vec<i64>) {
+    let links = InProcess::new();
+    let mut outside: Box<dyn Receiver<TwinState>> =
+        links.receiver("c/twin", Keep::All, 1_024).unwrap();
+    let link = links.sender("c/twin", Audience::of(Keep::All, 1)).unwrap();
+    let heard = Heard::default();
+    let turn = Turn::default();
+    let detectors = [("one", Mood::Well), ("two", mood)].map(|(name, mood)| {
+        let stage = Detector(name, Arc::clone(&heard), mood);
+        let out = Outlet::new(Vec::new(), None);
+        branch(&turn, post(&links, name, "twin"), Box::new(stage), out)
+    });
+    let out = Outlet::new(detectors.into(), Some(link));
+    let twin: Box<dyn Branch<JointState>> =
+        branch(&turn, post(&links, "twin", "count"), Box::new(Twin), out);
+    let out = Outlet::new(vec![twin], None);
+    let source = Box::new(Counter(0));
+    let tree = Tree::of_source(&turn, post(&links, "count", ""), source, out);
+    let soon = std::time::Duration::from_millis(500);
+    let (reports, seen) = std::thread::scope(|scope| {
+        let seen = scope.spawn(move || {
+            let mut seen = Vec::new();
+            let read = &mut |twin: &TwinState| seen.push(twin.header.stamp_ns);
+            while outside.receive(soon, read).unwrap() == Received::Sample {}
+            seen
+        });
+        let reports = tree.run(&Context::new("count"));
+        (reports, seen.join().unwrap())
+    });
+    let heard = heard.lock().unwrap().clone();
+    (reports, heard, seen)
+}
+
+fn counts(reports: &[Report]) -> Vec<(&str, u64, u64)> {
+    let one = reports.iter();
+    one.map(|report| (report.stage.as_str(), report.received, report.emitted))
+        .collect()
+}
+
+#[test]
+fn each_sample_goes_through_all_stages_before_the_next_and_to_those_outside() {
+    let (reports, heard, seen) = run(Mood::Well);
+    assert_eq!(
+        counts(&reports),
+        [
+            ("count", 100, 100),
+            ("twin", 100, 101),
+            ("one", 101, 101),
+            ("two", 101, 101)
+        ]
+    );
+    let stamps = || (0..100).chain([1_000]);
+    assert!(seen.into_iter().eq(stamps()));
+    assert!(
+        heard
+            .into_iter()
+            .eq(stamps().flat_map(|stamp| [("one", stamp), ("two", stamp)]))
+    );
+    for report in &reports {
+        assert_eq!(report.outcome, Some(Outcome::Ended), "{report:?}");
+        assert!(report.is_complete(), "{report:?}");
+        assert!(report.inputs.iter().all(|input| input.ended), "{report:?}");
+    }
+}
+
+#[test]
+fn where_a_stage_fails_or_panics_the_tree_ends_says_who_it_was_and_the_books_balance() {
+    for (mood, outcome) in [
+        (Mood::Fails, Outcome::Failed("it is broken".to_owned())),
+        (Mood::Unfit, Outcome::Unfit("no".to_owned())),
+        (
+            Mood::Panics,
+            Outcome::Failed("it panicked: it is upset".to_owned()),
+        ),
+    ] {
+        let (reports, _, seen) = run(mood);
+        for report in &reports {
+            let with = Outcome::Failed("stage `two`, which runs with it, failed".to_owned());
+            let expected = if report.stage == "two" {
+                &outcome
+            } else {
+                &with
+            };
+            assert_eq!(report.outcome.as_ref(), Some(expected));
+        }
+        assert_eq!(
+            counts(&reports),
+            [
+                ("count", 51, 51),
+                ("twin", 51, 51),
+                ("one", 51, 51),
+                ("two", 51, 50)
+            ]
+        );
+        let outside = if mood == Mood::Panics { 50 } else { 51 };
+        assert_eq!(seen.len(), outside);
+    }
+}

@@ -1,0 +1,227 @@
+//! The lives of processes and of the trees of stages in them: how they begin, how they end, who comes back.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::ExitStatus;
+use std::time::Duration;
+
+use serde::Deserialize;
+use tauscope_bus::Seat;
+use tauscope_pipeline::pipeline::{Pipeline, Role};
+use tokio::time::Instant;
+
+use super::Supervisor;
+use super::crew::Crew;
+use super::local::Local;
+use super::process::{self, Process};
+use crate::plan::{self, Link};
+
+/// The stages with these seats and the processes they run in.
+pub(super) fn crews(
+    pipeline: &Pipeline,
+    links: &[Link],
+    seats: Vec<(usize, Seat)>,
+) -> (Vec<Local>, Vec<Crew>) {
+    let roots = plan::roots(pipeline, links);
+    let here: BTreeMap<usize, usize> = seats
+        .iter()
+        .enumerate()
+        .map(|(index, (at, _))| (*at, index))
+        .collect();
+    let (mut stages, mut crews) = (Vec::new(), Vec::<Crew>::new());
+    for (index, (at, seat)) in seats.into_iter().enumerate() {
+        let stage = &pipeline.stages[at];
+        let place = crews.iter().position(|crew| crew.name == stage.process);
+        let place = place.unwrap_or_else(|| {
+            let outside = matches!(stage.role, Role::Outside(_));
+            crews.push(Crew::new(&stage.process, outside));
+            crews.len() - 1
+        });
+        crews[place].stages.push(index);
+        // A tree is on one host.
+        let root = here.get(&roots[at]).copied().unwrap_or(index);
+        stages.push(Local::new(at, seat, place, root));
+    }
+    (stages, crews)
+}
+
+impl Supervisor<'_> {
+    /// Those that listen before those they listen to, so that few wait for long.
+    pub(super) fn start_all(&mut self) -> anyhow::Result<()> {
+        for index in (0..self.stages.len()).rev() {
+            if self.stages[index].root == index {
+                self.start(index)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Starts a tree, and its process where it does not run.
+    pub(super) fn start(&mut self, root: usize) -> anyhow::Result<()> {
+        let tree = self.tree(root);
+        let seats: Vec<&Seat> = tree.iter().map(|&index| &self.stages[index].seat).collect();
+        let place = self.stages[root].crew;
+        let crew = &mut self.crews[place];
+        let line = crew.line(&seats)?;
+        let id = if let Some(process) = crew.process() {
+            process.tell(line);
+            process.id()
+        } else {
+            let settings = &self.pipeline.stages[self.stages[root].at].settings;
+            let folder = self.pipeline.path.parent().unwrap_or(Path::new(""));
+            let command = process::command(settings, folder)?;
+            // The seats of each tree, a word to end for each stage, and the same once more.
+            let most_told = 4 * crew.stages.len() + 2;
+            let (name, mark) = (crew.name.clone(), (place, crew.life));
+            let events = self.sender.clone();
+            let process = Process::start(command, &name, line, most_told, mark, events)?;
+            let id = process.id();
+            crew.started(process);
+            id
+        };
+        for index in tree.into_iter().rev() {
+            let stage = &mut self.stages[index];
+            stage.started();
+            let name = &stage.seat.stage;
+            self.view
+                .note(&format!("stage `{name}` runs as process {id}"));
+        }
+        Ok(())
+    }
+
+    /// The stages of a tree, its first one first.
+    pub(super) fn tree(&self, root: usize) -> Vec<usize> {
+        let all = 0..self.stages.len();
+        all.filter(|&index| self.stages[index].root == root)
+            .collect()
+    }
+
+    /// Whether nothing runs and nothing will.
+    pub(super) fn is_over(&self) -> bool {
+        self.stages.iter().all(Local::is_over)
+            && self.crews.iter().all(|crew| crew.process().is_none())
+    }
+
+    /// Which stage of a process a line is from.
+    pub(super) fn speaker(&self, crew: usize, line: &str) -> Option<usize> {
+        #[derive(Deserialize)]
+        struct Named {
+            stage: String,
+        }
+        let crew = &self.crews[crew];
+        if let [only] = crew.stages.as_slice() {
+            return Some(*only);
+        }
+        let named: Named = serde_json::from_str(line).ok()?;
+        let mut stages = crew.stages.iter().copied();
+        stages.find(|&index| self.stages[index].seat.stage == named.stage)
+    }
+
+    /// A stage of a tree has said that it is over: once all have, so is the tree.
+    pub(super) fn tree_ended(&mut self, root: usize) {
+        let tree = self.tree(root);
+        let over = |&index: &usize| {
+            let stage = &self.stages[index];
+            stage.is_done() || !stage.is_running()
+        };
+        if tree.iter().all(over) {
+            self.over(&tree, None);
+            self.settle();
+        }
+    }
+
+    /// A process has ended, and all that it said was heard.
+    pub(super) fn process_ended(&mut self, crew: usize, status: &std::io::Result<ExitStatus>) {
+        let stages = self.crews[crew].stages.clone();
+        let in_order = status.as_ref().is_ok_and(ExitStatus::success);
+        if let ([only], true, true) = (stages.as_slice(), self.crews[crew].outside, in_order)
+            && !self.stages[*only].was_killed()
+        {
+            self.stages[*only].end();
+            return;
+        }
+        for root in stages {
+            if self.stages[root].root == root && self.stages[root].is_running() {
+                let tree = self.tree(root);
+                self.over(&tree, Some(status));
+            }
+        }
+    }
+
+    /// A tree is over, by its process's end if `exit` is given.
+    fn over(&mut self, tree: &[usize], exit: Option<&std::io::Result<ExitStatus>>) {
+        let running: Vec<usize> = (tree.iter().copied())
+            .filter(|&index| self.stages[index].is_running())
+            .collect();
+        let deaths: Vec<Option<String>> = running
+            .iter()
+            .map(|&index| self.stages[index].death(exit))
+            .collect();
+        if deaths.iter().all(Option::is_none) {
+            for index in running {
+                self.stages[index].end();
+            }
+            return;
+        }
+        self.clean();
+        let may_return = running.iter().all(|&index| self.stages[index].may_return());
+        let root = running.first().map(|&index| self.stages[index].root);
+        let again = root
+            .filter(|_| may_return)
+            .and_then(|root| self.stages[root].note_death());
+        for (index, how) in running.into_iter().zip(deaths) {
+            let stage = &mut self.stages[index];
+            let how = how.unwrap_or_else(|| "ended with the others".to_owned());
+            self.view.warn(&died(&stage.seat.stage, &how, again));
+            stage.die(again);
+        }
+        if again.is_none() {
+            self.stop();
+        }
+    }
+
+    /// Ends the processes that have nothing left to do.
+    pub(super) fn close_crews(&mut self) {
+        for crew in &mut self.crews {
+            let mut stages = crew.stages.iter().map(|&index| &self.stages[index]);
+            if !crew.outside && stages.all(Local::is_over) {
+                crew.close(Instant::now());
+            }
+        }
+    }
+
+    /// Asks a stage, and its tree, to end.
+    pub(super) fn ask_to_end(&mut self, index: usize, recorder: bool) {
+        if self.stages[index].is_to_end(recorder) {
+            let stage = &self.stages[index];
+            self.crews[stage.crew].stop(&stage.seat.stage);
+        }
+    }
+
+    /// Ends a stage that does not end itself: its process, or, where others still live in that, its tree is given up.
+    pub(super) fn kill_stubborn(&mut self, index: usize) {
+        let Local { crew, root, .. } = self.stages[index];
+        let tree = self.tree(root);
+        for &index in &tree {
+            self.stages[index].is_killed();
+        }
+        let mut others = self.crews[crew].stages.iter();
+        if others.all(|other| tree.contains(other) || self.stages[*other].is_over()) {
+            self.crews[crew].kill();
+            return;
+        }
+        self.over(&tree, None);
+        self.settle();
+    }
+}
+
+fn died(name: &str, how: &str, again: Option<Duration>) -> String {
+    match again {
+        None => format!("error: stage `{name}` {how} and is not started again"),
+        Some(Duration::ZERO) => format!("warning: stage `{name}` {how}: starting it again"),
+        Some(wait) => {
+            let wait = wait.as_millis();
+            format!("warning: stage `{name}` {how}: starting it again in {wait} ms")
+        }
+    }
+}
