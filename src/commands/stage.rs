@@ -139,7 +139,9 @@ impl Made {
             }
             Settings::Record(config) => {
                 let cells: Vec<&Cell> = cells.iter().collect();
-                let recorder = build::recorder(config, &cells, &told.streams, &told.provenance)?;
+                let mut recorder =
+                    build::recorder(config, &cells, &told.streams, &told.provenance)?;
+                recorder.repair_leftovers(config);
                 Self::Record(Box::new(recorder))
             }
             Settings::Publish { config, commands } => {
