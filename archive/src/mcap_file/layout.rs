@@ -12,6 +12,9 @@ use crate::topic::{Topic, Topics};
 /// Most damages of a file that are told.
 /// Resolution: bounds memory.
 const MAX_DAMAGES: usize = 1000;
+/// Most channels of a file.
+/// Resolution: bounds time; a robot has some hundreds.
+const MAX_CHANNELS: usize = 4096;
 /// Longest schemas, channels and metadata of a file together \[bytes\].
 /// Resolution: bounds memory.
 const MAX_KEPT_BYTES: u64 = 256 << 20;
@@ -167,6 +170,11 @@ impl Layout {
                 });
             }
             Record::Channel(channel) => {
+                if self.channels.len() >= MAX_CHANNELS && !self.channels.contains_key(&channel.id) {
+                    return Err(format!(
+                        "more than {MAX_CHANNELS} channels, which is the limit"
+                    ));
+                }
                 self.channels.entry(channel.id).or_insert(channel);
             }
             Record::Metadata(metadata) => self.metadata.push(metadata),
