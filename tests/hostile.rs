@@ -218,7 +218,8 @@ fn a_robot_that_is_none_is_refused_with_the_limit() {
     let folder = tempfile::tempdir().unwrap();
     let urdf = folder.path().join("large.urdf");
     fs::File::create(&urdf).unwrap().set_len(500 << 20).unwrap();
-    let text = "version: 1\ncells: {a: {robot: large.urdf}}\nstages: []\n";
+    let text = "version: 1\ncells: {a: {robot: large.urdf}}\n\
+                stages:\n- {name: x, ingest: {zenoh: {connect: [tcp/127.0.0.1:7447]}}}\n";
     let file = write(&folder.path().join("pipeline.yaml"), text);
     refused_soon("the limit is 16777216", || {
         Out::answer([Path::new("check"), &file]).stderr

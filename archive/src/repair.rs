@@ -85,7 +85,7 @@ pub fn repair_in_place(part: &Path) -> Result<Repaired, RepairError> {
     let to = whole_file::unused_name(&name).map_err(ArchiveError::io(&name))?;
     let work = part.with_file_name(format!("{}.repairing.mcap.part", stem(part)));
     let repaired = write_held(&[part], &to, &work)?;
-    let torn = |damage: &Damage| damage.kind == DamageKind::TornTail;
+    let torn = |damage: &Damage| damage.kind == DamageKind::TornTail || !damage.loses_data();
     if repaired.damage.iter().all(torn) {
         fs::remove_file(part)
             .and_then(|()| whole_file::sync_folder_of(part))

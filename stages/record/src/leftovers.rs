@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use tauscope_archive::{DamageKind, RepairError, repair_in_place, whole_file};
+use tauscope_archive::{Damage, DamageKind, RepairError, repair_in_place, whole_file};
 
 use crate::config::Config;
 use crate::file_name::FileName;
@@ -90,8 +90,9 @@ fn one(part: &Path, min_free_mb: f64) {
             tracing::warn!(
                 "{shown}, which a run before left unfinished, was repaired: {path}, {messages} messages"
             );
-            let torn = |kind: &DamageKind| *kind == DamageKind::TornTail;
-            for damage in repaired.damage.iter().filter(|damage| !torn(&damage.kind)) {
+            let more =
+                |damage: &&Damage| damage.loses_data() && damage.kind != DamageKind::TornTail;
+            for damage in repaired.damage.iter().filter(more) {
                 tracing::warn!("{shown} is kept, as not all of it could be read: {damage}");
             }
         }
