@@ -46,6 +46,13 @@ pub struct Verdict {
     pub remedy: Option<String>,
 }
 
+/// What keeps any run from using shared memory here, and what to do: too little of it would end the
+/// stages with a bus error.
+pub fn no_shared_memory() -> Option<Verdict> {
+    let verdict = verdicts::shared_memory(&facts::shared_memory());
+    (verdict.level == Level::Error).then_some(verdict)
+}
+
 impl Verdict {
     fn ok(check: &'static str, found: impl Into<String>) -> Self {
         Self {

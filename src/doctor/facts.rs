@@ -134,7 +134,7 @@ pub fn read(pipeline: Option<&Pipeline>, host: Option<&str>) -> Facts {
     facts
 }
 
-fn shared_memory() -> Result<u64, String> {
+pub(super) fn shared_memory() -> Result<u64, String> {
     let path = Path::new(SHARED_MEMORY);
     whole_file::check_writable(path)
         .and_then(|()| whole_file::free_bytes(path))

@@ -21,7 +21,7 @@ fn a_machine_that_does_not_say_much_is_not_judged() {
 fn shared_memory_that_is_small_is_told_before_it_is_a_bus_error() {
     let of = |mb: u64| level(&shared_memory(&Ok(mb * 1_000_000)));
     assert_eq!(
-        [of(8), of(64), of(1000)],
+        [of(2), of(20), of(1000)],
         [Level::Error, Level::Warning, Level::Ok]
     );
     assert_eq!(

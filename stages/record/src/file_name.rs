@@ -159,22 +159,23 @@ impl FileName {
 
     /// Its parts, folder by folder; the last is the file.
     fn components(&self) -> Vec<Vec<Part>> {
-        let mut components = vec![Vec::new()];
+        let mut components = Vec::new();
+        let mut last = Vec::new();
         for part in &self.parts {
             let Part::Text(text) = part else {
-                components.last_mut().map(|last| last.push(part.clone()));
+                last.push(part.clone());
                 continue;
             };
             for (i, piece) in text.split('/').enumerate() {
                 if i > 0 {
-                    components.push(Vec::new());
+                    components.push(std::mem::take(&mut last));
                 }
                 if !piece.is_empty() {
-                    let piece = Part::Text(piece.to_owned());
-                    components.last_mut().map(|last| last.push(piece));
+                    last.push(Part::Text(piece.to_owned()));
                 }
             }
         }
+        components.push(last);
         components
     }
 

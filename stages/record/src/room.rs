@@ -30,7 +30,7 @@ pub(crate) struct Room {
 impl Room {
     /// Of the disk that `folder` lies on, which need not be there yet.
     pub fn new(folder: PathBuf, min_free_mb: f64) -> Self {
-        Self::asked(folder, min_free_mb, |path| whole_file::free_bytes(path))
+        Self::asked(folder, min_free_mb, whole_file::free_bytes)
     }
 
     fn asked(folder: PathBuf, min_free_mb: f64, ask: Ask) -> Self {
