@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    calibrate, check, completions, evaluate, explain, info, init, man, repair, replay, run, schema,
-    send, simulate, stage,
+    calibrate, check, completions, doctor, evaluate, explain, info, init, man, repair, replay, run,
+    schema, send, simulate, stage,
 };
 
 /// A robot's measured effort beside its digital twin's: stream, detect, record.
@@ -34,6 +34,7 @@ pub enum Command {
     Init(init::Args),
     Info(info::Args),
     Repair(repair::Args),
+    Doctor(doctor::Args),
     Completions(completions::Args),
     Man(man::Args),
     #[command(hide = true)]

@@ -3,6 +3,7 @@
 pub mod calibrate;
 pub mod check;
 pub mod completions;
+pub mod doctor;
 pub mod evaluate;
 pub mod explain;
 pub mod info;

@@ -6,6 +6,7 @@
 mod announce;
 mod cli;
 mod commands;
+mod doctor;
 mod existing;
 mod exit;
 mod explain;
@@ -143,6 +144,7 @@ fn outcome(command: &Command, out: &mut Output) -> Result<exit::Exit, exit::Fail
         Command::Init(args) => commands::init::run(args, out),
         Command::Info(args) => commands::info::run(args, out),
         Command::Repair(args) => commands::repair::run(args, out),
+        Command::Doctor(args) => commands::doctor::run(args, out),
         Command::Completions(args) => commands::completions::run(args, Cli::command(), out),
         Command::Man(args) => commands::man::run(args, Cli::command(), out),
         Command::Stage(_) | Command::Exec(_) => Err(exit::Failure::rejected(

@@ -27,5 +27,8 @@ pub use mcap_write::{
     CHUNK_SPAN_NS, Compression, McapWriter, PROVENANCE, TopicWriter, WriteError, Written,
 };
 pub use recording::{JointStates, Message, Messages, Recording, RecordingKind, Stamped};
-pub use repair::{RepairError, Repaired, repair, repaired_path};
+pub use repair::{
+    RepairError, Repaired, RepairedFolder, repair, repair_folder, repair_in_place,
+    repaired_folder_path, repaired_path,
+};
 pub use topic::Topic;

@@ -1,24 +1,27 @@
 //! Writing MCAP files as ROS 2 does.
 
+mod disk_sync;
 mod error;
-mod rosbag2;
+mod options;
+pub(crate) mod rosbag2;
 mod summary_order;
 
 use std::collections::BTreeMap;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{File, OpenOptions};
 use std::io::BufWriter;
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use mcap::records::{MessageHeader, Metadata};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 use crate::ros;
 use crate::whole_file::{self, Existing, part_of};
+use disk_sync::DiskSync;
 pub use error::WriteError;
-use error::yaml;
-pub(crate) use error::{io, mcap};
+pub(crate) use error::{io, mcap, yaml};
+pub use options::Compression;
+pub(crate) use options::options;
 
 /// A chunk is closed, and handed to the operating system, when the next message would make it span
 /// this much log time: what a kill can cost at most \[ns\].
@@ -27,23 +30,13 @@ pub const CHUNK_SPAN_NS: i64 = 100_000_000;
 /// A chunk is also closed at this size \[bytes\].
 /// Resolution: memory, against the file's size.
 const CHUNK_BYTES: usize = 1 << 20;
+/// What the index takes for a chunk, at most, with a dozen topics \[bytes\].
+/// Resolution: how much room a file that is open keeps for its end.
+const INDEX_BYTES_A_CHUNK: u64 = 500;
 /// Says who wrote the file; without a version, which stands in the provenance.
 const LIBRARY: &str = "tauscope";
 /// Name of the metadata record with the provenance.
 pub const PROVENANCE: &str = "tauscope";
-
-/// How chunks are packed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Compression {
-    /// Zstandard: smallest.
-    #[default]
-    Zstd,
-    /// LZ4: faster, larger.
-    Lz4,
-    /// Not at all.
-    None,
-}
 
 /// Writes one MCAP file: profile `ros2`, CDR messages with their `ros2msg` text, and the metadata
 /// that rosbag2 looks for.
@@ -56,14 +49,19 @@ pub enum Compression {
 /// the index, which grows by about 300 bytes with each chunk (10 MB an hour).
 pub struct McapWriter {
     writer: mcap::Writer<BufWriter<File>>,
+    /// The same file, to sync it and to ask for its length.
+    file: File,
     path: PathBuf,
     part: PathBuf,
     set_aside: Option<PathBuf>,
     existing: Existing,
+    sync: Option<DiskSync>,
     topics: Vec<WrittenTopic>,
     /// Log time of the first message in the open chunk.
     chunk_start_ns: Option<i64>,
     chunk_bytes: usize,
+    /// Chunks that were closed.
+    chunks: u64,
     /// Bytes in the file when the last chunk was closed.
     bytes: u64,
     log_times_ns: Option<(i64, i64)>,
@@ -121,7 +119,7 @@ impl McapWriter {
         let path = path.as_ref().to_owned();
         let part = part_of(&path);
         if let Some(folder) = path.parent() {
-            fs::create_dir_all(folder).map_err(io(folder))?;
+            whole_file::create_folder(folder).map_err(io(folder))?;
         }
         let set_aside = whole_file::set_part_aside(&path).map_err(io(&part))?;
         let file = OpenOptions::new()
@@ -130,7 +128,10 @@ impl McapWriter {
             .create_new(true)
             .open(&part)
             .map_err(io(&part))?;
+        whole_file::hold(&file).map_err(io(&part))?;
+        whole_file::sync_folder_of(&part).map_err(io(&part))?;
         whole_file::begin(&part);
+        let twin = file.try_clone().map_err(io(&part))?;
         let writer = options(compression)
             .profile("ros2")
             .library(LIBRARY)
@@ -138,13 +139,16 @@ impl McapWriter {
             .map_err(mcap(&part))?;
         let mut this = Self {
             writer,
+            file: twin,
             path,
             part,
             set_aside,
             existing: Existing::Keep,
+            sync: None,
             topics: Vec::new(),
             chunk_start_ns: None,
             chunk_bytes: 0,
+            chunks: 0,
             bytes: 0,
             log_times_ns: None,
             body: Vec::new(),
@@ -159,6 +163,28 @@ impl McapWriter {
     pub fn existing(mut self, existing: Existing) -> Self {
         self.existing = existing;
         self
+    }
+
+    /// Brings each closed chunk to the disk, though not more often than `every`. Without this only the
+    /// complete file is synced, and a power cut may cost all of an incomplete one.
+    ///
+    /// # Errors
+    /// If the thread for it cannot be started.
+    pub fn synced_every(mut self, every: Duration) -> Result<Self, WriteError> {
+        let file = self.file.try_clone();
+        let sync = file.and_then(|file| DiskSync::start(file, every));
+        self.sync = Some(sync.map_err(io(&self.part))?);
+        Ok(self)
+    }
+
+    /// The longest that the disk took to sync what was written.
+    pub fn slowest_sync(&self) -> Duration {
+        self.sync.as_ref().map_or(Duration::ZERO, DiskSync::slowest)
+    }
+
+    /// What its index, which is written at the end, will take \[bytes\].
+    pub fn index_bytes(&self) -> u64 {
+        self.chunks * INDEX_BYTES_A_CHUNK
     }
 
     /// Length of the file when its last chunk was closed \[bytes\].
@@ -265,8 +291,11 @@ impl McapWriter {
         }
         self.chunk_bytes = 0;
         self.writer.flush().map_err(mcap(&self.part))?;
-        self.bytes = fs::metadata(&self.part).map_err(io(&self.part))?.len();
-        Ok(())
+        self.chunks += 1;
+        self.bytes = self.file.metadata().map_err(io(&self.part))?.len();
+        self.sync
+            .as_ref()
+            .map_or(Ok(()), |sync| sync.ask().map_err(io(&self.part)))
     }
 
     /// Completes the file and gives it its proper name, which [`Written::path`] tells.
@@ -277,8 +306,7 @@ impl McapWriter {
         if self.existing == Existing::Keep {
             self.path = whole_file::unused_name(&self.path).map_err(io(&self.path))?;
         }
-        let bag = rosbag2::serialized_metadata(&self.path, &self.topics, self.log_times_ns)
-            .map_err(yaml(&self.part))?;
+        let bag = self.bag().map_err(yaml(&self.part))?;
         self.write_metadata(
             "rosbag2",
             &BTreeMap::from([("serialized_metadata".to_owned(), bag)]),
@@ -297,6 +325,20 @@ impl McapWriter {
             path,
             bytes,
         })
+    }
+
+    /// The metadata of the bag that consists of this one file.
+    fn bag(&self) -> Result<String, serde_saphyr::SerializeError> {
+        let topics = self.topics.iter().map(|topic| rosbag2::BagTopic {
+            name: topic.name.clone(),
+            type_name: topic.type_name.to_owned(),
+            encoding: "cdr".to_owned(),
+            type_hash: topic.type_hash.to_owned(),
+            offered_qos: None,
+            messages: topic.count,
+        });
+        let file = rosbag2::BagFile::new(&self.path, self.log_times_ns);
+        rosbag2::information(&topics.collect::<Vec<_>>(), &[file])
     }
 
     fn write_metadata(
@@ -331,20 +373,4 @@ pub(crate) fn complete(
     let bytes = file.metadata().map_err(io(part))?.len();
     whole_file::put_in_place(part, path, existing).map_err(io(path))?;
     Ok(bytes)
-}
-
-/// Options that every file of ours shares.
-pub(crate) fn options(compression: Compression) -> mcap::WriteOptions {
-    mcap::WriteOptions::new()
-        .compression(match compression {
-            Compression::Zstd => Some(mcap::Compression::Zstd),
-            Compression::Lz4 => Some(mcap::Compression::Lz4),
-            Compression::None => None,
-        })
-        // One thread: else the bytes depend on the number of cores.
-        .compression_threads(0)
-        // Chunks are closed by time and size here.
-        .chunk_size(None)
-        // A chunk comes into the file whole: a torn one is never patched.
-        .disable_seeking(true)
 }

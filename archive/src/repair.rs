@@ -1,7 +1,11 @@
-//! Rebuilds an MCAP file whose writer died, or that was damaged since.
+//! Rebuilds an MCAP file whose writer died, or that was damaged since, and joins the pieces that a
+//! writer left which died several times.
+
+mod error;
+mod folder;
 
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions};
+use std::fs::{self, File, OpenOptions};
 use std::io::{BufWriter, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,147 +16,238 @@ use crate::cursor::Cursor;
 use crate::damage::{Damage, DamageKind};
 use crate::error::ArchiveError;
 use crate::mcap_file::{Layout, McapCursor, Order, attachment_header};
+use crate::mcap_write::rosbag2::{self, BagFile, BagTopic};
 use crate::mcap_write::{self, Compression, WriteError, Written};
 use crate::recording::{Recording, RecordingKind};
 use crate::whole_file::{self, Existing};
 
+pub use error::RepairError;
+pub use folder::{RepairedFolder, repair_folder, repaired_folder_path};
+
 /// Name of the metadata record that says what was repaired.
 const REPAIR: &str = "tauscope_repair";
+/// Name of the metadata record that rosbag2 looks for.
+const ROSBAG2: &str = "rosbag2";
 /// Chunks of a repaired file have at least this size, but for the last \[bytes\].
 /// Resolution: the file's size, against memory and what a damaged chunk costs.
 const CHUNK_BYTES: usize = 1 << 20;
-
-/// Why a recording cannot be repaired.
-#[derive(Debug, thiserror::Error)]
-pub enum RepairError {
-    /// It cannot be read at all.
-    #[error(transparent)]
-    Read(#[from] ArchiveError),
-    /// The new file cannot be written.
-    #[error(transparent)]
-    Write(#[from] WriteError),
-    /// Something lies where the new file should go.
-    #[error("{}: is there already", path.display())]
-    Exists {
-        /// Where.
-        path: PathBuf,
-    },
-}
 
 /// What [`repair`] has made.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Repaired {
     /// The new file.
     pub written: Written,
-    /// What of the old one could not be taken over. Empty if it was whole.
+    /// The files that it was made from, in the order of their times.
+    pub from: Vec<PathBuf>,
+    /// What of the old ones could not be taken over. Empty if they were whole.
     pub damage: Vec<Damage>,
 }
 
 /// Where [`repair`] puts its file: `a.repaired.mcap` beside `a.mcap` or `a.mcap.part`.
 pub fn repaired_path(path: &Path) -> PathBuf {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let stem = name.strip_suffix(".part").unwrap_or(&name);
-    let stem = stem.strip_suffix(".mcap").unwrap_or(stem);
-    path.with_file_name(format!("{stem}.repaired.mcap"))
+    path.with_file_name(format!("{}.repaired.mcap", stem(path)))
 }
 
-/// Writes all that can be read of the MCAP file `from` into the new file `to`, in the order in which
-/// it lies there, with a sound index. A metadata record `tauscope_repair` says what was damaged.
-/// `from` is not touched.
+/// `a` of `a.mcap` and of `a.mcap.part`.
+fn stem(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let stem = name.strip_suffix(".part").unwrap_or(&name);
+    stem.strip_suffix(".mcap").unwrap_or(stem).to_owned()
+}
+
+/// Writes all that can be read of the MCAP files `pieces` into the new file `to`: one piece after the
+/// other in the order of their times, each in the order in which it lies there, with a sound index,
+/// statistics and the metadata that rosbag2 looks for. A metadata record `tauscope_repair` says what
+/// was damaged. The pieces are not touched.
 ///
 /// # Errors
-/// If `from` is no MCAP file or cannot be read from its first record, or `to` is there already or
-/// cannot be written.
-pub fn repair(from: &Path, to: &Path) -> Result<Repaired, RepairError> {
+/// If one is no MCAP file, is being written or cannot be read from its first record, or `to` is there
+/// already or cannot be written.
+pub fn repair(pieces: &[impl AsRef<Path>], to: &Path) -> Result<Repaired, RepairError> {
+    let part = whole_file::part_of(to);
+    write(pieces, to, &part)
+}
+
+/// Repairs `part`, what a dead writer of `a.mcap` left as `a.mcap.part`, to `a.mcap`, or to the first
+/// of `a.1.mcap`, `a.2.mcap`, ... that is free. `part` is removed once the new file is on the disk, and
+/// only if nothing but its torn end is missing from that.
+///
+/// # Errors
+/// As [`repair`]; `part` stays then.
+pub fn repair_in_place(part: &Path) -> Result<Repaired, RepairError> {
+    let held = File::open(part).map_err(ArchiveError::io(part))?;
+    if held.try_lock().is_err() {
+        return Err(RepairError::BeingWritten {
+            path: part.to_owned(),
+        });
+    }
+    let name = part.with_extension("");
+    let to = whole_file::unused_name(&name).map_err(ArchiveError::io(&name))?;
+    let work = part.with_file_name(format!("{}.repairing.mcap.part", stem(part)));
+    let repaired = write_held(&[part], &to, &work)?;
+    let torn = |damage: &Damage| damage.kind == DamageKind::TornTail || !damage.loses_data();
+    if repaired.damage.iter().all(torn) {
+        fs::remove_file(part)
+            .and_then(|()| whole_file::sync_folder_of(part))
+            .map_err(ArchiveError::io(part))?;
+    }
+    Ok(repaired)
+}
+
+fn write(pieces: &[impl AsRef<Path>], to: &Path, work: &Path) -> Result<Repaired, RepairError> {
+    for piece in pieces {
+        let path = piece.as_ref();
+        if whole_file::is_being_written(path).map_err(ArchiveError::io(path))? {
+            let path = path.to_owned();
+            return Err(RepairError::BeingWritten { path });
+        }
+    }
+    write_held(pieces, to, work)
+}
+
+/// As [`repair`], by way of the unfinished file `work`, of pieces that nobody writes.
+fn write_held(
+    pieces: &[impl AsRef<Path>],
+    to: &Path,
+    work: &Path,
+) -> Result<Repaired, RepairError> {
     if to.try_exists().map_err(ArchiveError::io(to))? {
         return Err(RepairError::Exists {
             path: to.to_owned(),
         });
     }
-    let recording = Recording::open(from)?;
-    if recording.kind() != RecordingKind::Mcap {
-        return Err(RepairError::Read(ArchiveError::UnknownFormat {
-            path: from.to_owned(),
-            reason: format!("{}; only MCAP files can be repaired", recording.kind()),
-        }));
+    let mut layouts = Vec::new();
+    for piece in pieces {
+        layouts.push(Arc::new(layout(piece.as_ref())?));
     }
-    let layout = Arc::new(Layout::read(from)?);
-    let part = whole_file::part_of(to);
-    whole_file::begin(&part);
+    layouts.sort_by_key(|layout| layout.log_times.map(|(start_ns, _)| start_ns));
+    let Some(first) = layouts.first() else {
+        let path = to.to_owned();
+        return Err(RepairError::NothingThere { path });
+    };
+    whole_file::begin(work);
     let file = OpenOptions::new()
         .read(true)
         .write(true)
         .create(true)
         .truncate(true)
-        .open(&part)
-        .map_err(mcap_write::io(&part))?;
+        .open(work)
+        .map_err(mcap_write::io(work))?;
     let writer = mcap_write::options(Compression::Zstd)
-        .profile(&layout.profile)
-        .library(&layout.library)
+        .profile(&first.profile)
+        .library(&first.library)
         .create(BufWriter::new(file))
-        .map_err(mcap_write::mcap(&part))?;
+        .map_err(mcap_write::mcap(work))?;
     let mut copy = Copy {
-        damage: layout.damage.clone(),
-        layout,
+        damage: Vec::new(),
+        topics: BTreeMap::new(),
+        log_times_ns: None,
+        metadata: Vec::new(),
         writer,
-        part,
-        messages: 0,
+        part: work.to_owned(),
     };
-    copy.declare()?;
-    copy.messages()?;
-    copy.attachments()?;
-    copy.metadata()?;
+    for layout in &layouts {
+        copy.piece(layout)?;
+    }
+    copy.finish_metadata(&layouts, to)?;
+    let messages = copy.topics.values().map(|topic| topic.messages).sum();
     let bytes = mcap_write::complete(copy.writer, &copy.part, to, Existing::Keep)?;
     Ok(Repaired {
         written: Written {
             path: to.to_owned(),
-            messages: copy.messages,
+            messages,
             bytes,
         },
+        from: layouts.iter().map(|layout| layout.path.clone()).collect(),
         damage: copy.damage,
     })
 }
 
+fn layout(path: &Path) -> Result<Layout, RepairError> {
+    let recording = Recording::open(path)?;
+    if recording.kind() != RecordingKind::Mcap {
+        return Err(RepairError::Read(ArchiveError::UnknownFormat {
+            path: path.to_owned(),
+            reason: format!("{}; only MCAP files can be repaired", recording.kind()),
+        }));
+    }
+    Ok(Layout::read(path)?)
+}
+
 struct Copy {
-    layout: Arc<Layout>,
     writer: mcap::Writer<BufWriter<File>>,
     part: PathBuf,
-    messages: u64,
+    /// By channel of the new file.
+    topics: BTreeMap<u16, BagTopic>,
+    log_times_ns: Option<(i64, i64)>,
+    /// Records that are in the new file.
+    metadata: Vec<Metadata>,
     damage: Vec<Damage>,
 }
 
 impl Copy {
-    /// Schemas and channels, with the numbers they had.
-    fn declare(&mut self) -> Result<(), WriteError> {
-        for (&id, schema) in &self.layout.schemas {
-            self.writer
-                .add_schema_with_id(id, &schema.name, &schema.encoding, &schema.data)
-                .map_err(mcap_write::mcap(&self.part))?;
-        }
-        for (&id, channel) in &self.layout.channels {
-            // A schema that lay behind the tear is gone.
-            let known = self.layout.schemas.contains_key(&channel.schema_id);
-            self.writer
-                .add_channel_with_id(
-                    id,
-                    if known { channel.schema_id } else { 0 },
-                    &channel.topic,
-                    &channel.message_encoding,
-                    &channel.metadata,
-                )
-                .map_err(mcap_write::mcap(&self.part))?;
-        }
-        Ok(())
+    fn piece(&mut self, layout: &Arc<Layout>) -> Result<(), RepairError> {
+        self.damage.extend_from_slice(&layout.damage);
+        let channels = self.declare(layout)?;
+        self.messages(layout, &channels)?;
+        self.attachments(layout)?;
+        Ok(self.metadata(layout)?)
     }
 
-    fn messages(&mut self) -> Result<(), RepairError> {
-        let every = |channel| Some(usize::from(channel));
-        let mut cursor = McapCursor::new(Arc::clone(&self.layout), Order::File, every)?;
+    /// Schemas and channels: those of the first piece with the numbers they had, of each further one
+    /// those that are new. Gives the new number of each channel.
+    fn declare(&mut self, layout: &Layout) -> Result<BTreeMap<u16, u16>, WriteError> {
+        let first = self.topics.is_empty();
+        let mut schemas = BTreeMap::new();
+        for (&id, schema) in &layout.schemas {
+            let (name, encoding, data) = (&schema.name, &schema.encoding, &schema.data);
+            let new = if first {
+                self.writer.add_schema_with_id(id, name, encoding, data)
+            } else {
+                self.writer.add_schema(name, encoding, data)
+            };
+            schemas.insert(id, new.map_err(mcap_write::mcap(&self.part))?);
+        }
+        let mut channels = BTreeMap::new();
+        for (&id, channel) in &layout.channels {
+            // A schema that lay behind the tear is gone.
+            let schema = schemas.get(&channel.schema_id).copied().unwrap_or(0);
+            let (topic, encoding) = (&channel.topic, &channel.message_encoding);
+            let metadata = &channel.metadata;
+            let new = if first {
+                self.writer
+                    .add_channel_with_id(id, schema, topic, encoding, metadata)
+            } else {
+                self.writer.add_channel(schema, topic, encoding, metadata)
+            };
+            let new = new.map_err(mcap_write::mcap(&self.part))?;
+            channels.insert(id, new);
+            let of = |key: &str| channel.metadata.get(key).cloned();
+            let type_of = layout.schemas.get(&channel.schema_id);
+            self.topics.entry(new).or_insert_with(|| BagTopic {
+                name: topic.clone(),
+                type_name: type_of.map_or_else(String::new, |schema| schema.name.clone()),
+                encoding: encoding.clone(),
+                type_hash: of("topic_type_hash").unwrap_or_default(),
+                offered_qos: of("offered_qos_profiles"),
+                messages: 0,
+            });
+        }
+        Ok(channels)
+    }
+
+    fn messages(
+        &mut self,
+        layout: &Arc<Layout>,
+        channels: &BTreeMap<u16, u16>,
+    ) -> Result<(), RepairError> {
+        let every = |channel| channels.get(&channel).map(|&new| usize::from(new));
+        let mut cursor = McapCursor::new(Arc::clone(layout), Order::File, every)?;
         let mut chunk_bytes = 0;
         loop {
             match cursor.advance() {
                 Ok(true) => {}
-                Ok(false) => return Ok(()),
+                Ok(false) => break,
                 Err(ArchiveError::Damaged(damage)) => {
                     // A flaw within a torn or plain part may have been found before.
                     if !self.damage.contains(&damage) {
@@ -163,7 +258,7 @@ impl Copy {
                 Err(error) => return Err(error.into()),
             }
             let Some(message) = cursor.current() else {
-                return Ok(());
+                break;
             };
             let header = MessageHeader {
                 channel_id: message.topic as u16,
@@ -174,17 +269,23 @@ impl Copy {
             self.writer
                 .write_to_known_channel(&header, message.body)
                 .map_err(mcap_write::mcap(&self.part))?;
-            self.messages += 1;
+            if let Some(topic) = self.topics.get_mut(&header.channel_id) {
+                topic.messages += 1;
+            }
+            let ns = message.log_time_ns;
+            let (start_ns, end_ns) = self.log_times_ns.unwrap_or((ns, ns));
+            self.log_times_ns = Some((start_ns.min(ns), end_ns.max(ns)));
             chunk_bytes += message.body.len();
             if chunk_bytes >= CHUNK_BYTES {
                 chunk_bytes = 0;
                 self.writer.flush().map_err(mcap_write::mcap(&self.part))?;
             }
         }
+        // The next piece begins a chunk of its own.
+        Ok(self.writer.flush().map_err(mcap_write::mcap(&self.part))?)
     }
 
-    fn attachments(&mut self) -> Result<(), RepairError> {
-        let layout = Arc::clone(&self.layout);
+    fn attachments(&mut self, layout: &Layout) -> Result<(), RepairError> {
         let mut file = File::open(&layout.path).map_err(ArchiveError::io(&layout.path))?;
         for &(at, len) in &layout.attachments {
             file.seek(SeekFrom::Start(at))
@@ -203,7 +304,7 @@ impl Copy {
             };
             file.seek(SeekFrom::Start(at + data_at))
                 .map_err(ArchiveError::io(&layout.path))?;
-            self.attachment(&mut file, header, data_len)?;
+            self.attachment(&mut file, &layout.path, header, data_len)?;
         }
         Ok(())
     }
@@ -211,6 +312,7 @@ impl Copy {
     fn attachment(
         &mut self,
         from: &mut File,
+        path: &Path,
         header: mcap::records::AttachmentHeader,
         len: u64,
     ) -> Result<(), RepairError> {
@@ -220,9 +322,7 @@ impl Copy {
         let mut left = from.take(len);
         let mut piece = vec![0; 64 << 10];
         loop {
-            let read = left
-                .read(&mut piece)
-                .map_err(ArchiveError::io(&self.layout.path))?;
+            let read = left.read(&mut piece).map_err(ArchiveError::io(path))?;
             if read == 0 {
                 break;
             }
@@ -236,22 +336,48 @@ impl Copy {
         Ok(())
     }
 
-    fn metadata(&mut self) -> Result<(), WriteError> {
+    /// The metadata records of a piece, but for what pieces before have said and what is said anew.
+    fn metadata(&mut self, layout: &Layout) -> Result<(), WriteError> {
+        for metadata in &layout.metadata {
+            if metadata.name != ROSBAG2 && !self.metadata.contains(metadata) {
+                self.write_metadata(metadata.clone())?;
+            }
+        }
+        Ok(())
+    }
+
+    fn finish_metadata(&mut self, pieces: &[Arc<Layout>], to: &Path) -> Result<(), WriteError> {
         let damage = self.damage.iter().enumerate();
         let mut report: BTreeMap<_, _> = damage
             .map(|(i, damage)| (format!("damage_{i}"), damage.to_string()))
             .collect();
-        let source = self.layout.path.file_name().unwrap_or_default();
-        report.insert("source".to_owned(), source.to_string_lossy().into_owned());
-        let report = Metadata {
+        let source = |layout: &Arc<Layout>| {
+            let name = layout.path.file_name().unwrap_or_default();
+            name.to_string_lossy().into_owned()
+        };
+        let sources: Vec<String> = pieces.iter().map(source).collect();
+        report.insert("source".to_owned(), sources.join(", "));
+        self.write_metadata(Metadata {
             name: REPAIR.to_owned(),
             metadata: report,
-        };
-        for metadata in self.layout.metadata.iter().chain([&report]) {
-            self.writer
-                .write_metadata(metadata)
-                .map_err(mcap_write::mcap(&self.part))?;
+        })?;
+        if pieces.iter().all(|layout| layout.profile != "ros2") {
+            return Ok(());
         }
+        let topics: Vec<BagTopic> = self.topics.values().cloned().collect();
+        let bag = rosbag2::information(&topics, &[BagFile::new(to, self.log_times_ns)])
+            .map_err(mcap_write::yaml(&self.part))?;
+        self.write_metadata(Metadata {
+            name: ROSBAG2.to_owned(),
+            metadata: BTreeMap::from([("serialized_metadata".to_owned(), bag)]),
+        })
+    }
+
+    fn write_metadata(&mut self, metadata: Metadata) -> Result<(), WriteError> {
+        self.writer
+            .write_metadata(&metadata)
+            .map_err(mcap_write::mcap(&self.part))?;
+        self.metadata.push(metadata);
         Ok(())
     }
 }

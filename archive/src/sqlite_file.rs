@@ -40,7 +40,9 @@ impl SqliteFile {
             damage: Vec::new(),
             packed_messages,
         };
-        let Err(error) = file.look_through(&connect(path, false)?) else {
+        let connection = connect(path, false)?;
+        are_tables(&connection, path)?;
+        let Err(error) = file.look_through(&connection) else {
             return Ok(file);
         };
         file.look_as_far_as_it_goes(&connect(path, true)?, &error)
@@ -143,6 +145,8 @@ fn connect(path: &Path, torn: bool) -> Result<Connection, ArchiveError> {
             path,
             OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX,
         )?;
+        // A view or a trigger of a stranger's may run for ever, or call what it should not.
+        connection.pragma_update(None, "trusted_schema", false)?;
         if torn {
             // Without it, SQLite refuses a file that is shorter than its header says.
             connection.pragma_update(None, "writable_schema", true)?;
@@ -153,6 +157,31 @@ fn connect(path: &Path, torn: bool) -> Result<Connection, ArchiveError> {
         path: path.to_owned(),
         source,
     })
+}
+
+/// Refuses what rosbag2 never writes: a view in the place of a table may run for ever.
+fn are_tables(connection: &Connection, path: &Path) -> Result<(), ArchiveError> {
+    let kind = |name: &str| {
+        connection.query_row(
+            "SELECT type || CASE WHEN sql LIKE 'CREATE VIRTUAL%' THEN ' (virtual)' ELSE '' END \
+             FROM sqlite_master WHERE name = ?1",
+            [name],
+            |row| row.get::<_, String>(0),
+        )
+    };
+    for name in ["topics", "messages"] {
+        // That there is none, or that it cannot be read, is told by whoever reads it.
+        match kind(name) {
+            Ok(kind) if kind != "table" => {
+                return Err(ArchiveError::Unreadable {
+                    path: path.to_owned(),
+                    reason: format!("`{name}` is a {kind}, where rosbag2 has a table"),
+                });
+            }
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 fn topics(connection: &Connection) -> rusqlite::Result<Vec<(i64, Topic)>> {
@@ -169,6 +198,7 @@ fn topics(connection: &Connection) -> rusqlite::Result<Vec<(i64, Topic)>> {
             type_name: row.get("type")?,
             message_encoding: row.get("serialization_format")?,
             type_hash: hash.filter(|hash| !hash.is_empty()),
+            offered_qos: None,
             message_count: 0,
         };
         Ok((row.get("id")?, topic))

@@ -17,6 +17,9 @@ pub struct Topic {
     pub message_encoding: String,
     /// Hash of the type, if the recording says it.
     pub type_hash: Option<String>,
+    /// The quality of service that its publishers offered, as YAML, if the recording says it.
+    #[serde(skip)]
+    pub offered_qos: Option<String>,
     /// Messages that can be read.
     pub message_count: u64,
 }
@@ -33,6 +36,8 @@ impl Topic {
 #[derive(Debug, Default)]
 pub(crate) struct Topics {
     pub(crate) list: Vec<Topic>,
+    /// Name, type and encoding: a file may declare tens of thousands.
+    known: BTreeMap<(String, String, String), usize>,
     by_channel: BTreeMap<u16, usize>,
 }
 
@@ -45,16 +50,17 @@ impl Topics {
 
     /// Adds a topic, or its messages to the one of the same name and type.
     pub(crate) fn add(&mut self, topic: Topic) -> usize {
-        let same = |known: &Topic| {
-            known.name == topic.name
-                && known.type_name == topic.type_name
-                && known.message_encoding == topic.message_encoding
-        };
-        if let Some(index) = self.list.iter().position(same) {
+        let same = (
+            topic.name.clone(),
+            topic.type_name.clone(),
+            topic.message_encoding.clone(),
+        );
+        if let Some(&index) = self.known.get(&same) {
             self.list[index].message_count += topic.message_count;
             return index;
         }
         self.list.push(topic);
+        self.known.insert(same, self.list.len() - 1);
         self.list.len() - 1
     }
 

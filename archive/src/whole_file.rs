@@ -7,12 +7,12 @@
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use rustix::fs::{CWD, RenameFlags, renameat_with};
+use rustix::fs::{Access, AtFlags, CWD, RenameFlags, renameat_with};
 use rustix::io::Errno;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -66,7 +66,7 @@ pub fn part_of(path: &Path) -> PathBuf {
 /// is to be kept. No `.part` stays.
 pub fn write(path: &Path, contents: impl AsRef<[u8]>, existing: Existing) -> io::Result<()> {
     if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder)?;
+        create_folder(folder)?;
     }
     let part = part_of(path);
     begin(&part);
@@ -95,10 +95,94 @@ pub fn put_in_place(part: &Path, path: &Path, existing: Existing) -> io::Result<
         Existing::Keep => rename_to_new(part, path)?,
     }
     end(part);
+    sync_folder_of(path)
+}
+
+/// Makes it outlast a power cut that `path` is there, has its name, or is gone.
+///
+/// # Errors
+/// If the folder that it is in cannot be opened or synced.
+pub fn sync_folder_of(path: &Path) -> io::Result<()> {
     match path.parent() {
         Some(folder) if folder != Path::new("") => File::open(folder)?.sync_all(),
         _ => File::open(".")?.sync_all(),
     }
+}
+
+/// Makes `folder`, and those above it, where they are missing; they outlast a power cut.
+///
+/// # Errors
+/// If it cannot be made.
+pub fn create_folder(folder: &Path) -> io::Result<()> {
+    if folder == Path::new("") || folder.is_dir() {
+        return Ok(());
+    }
+    if let Some(above) = folder.parent() {
+        create_folder(above)?;
+    }
+    match fs::create_dir(folder) {
+        Err(error) if error.kind() != io::ErrorKind::AlreadyExists || !folder.is_dir() => {
+            Err(error)
+        }
+        _ => sync_folder_of(folder),
+    }
+}
+
+/// Says to all other processes that `part`, which has just been made, is being written: for as long
+/// as it is open.
+///
+/// # Errors
+/// If the file system fails.
+pub fn hold(part: &File) -> io::Result<()> {
+    match part.lock() {
+        // Some network file systems know no locks.
+        Err(error) if error.kind() == io::ErrorKind::Unsupported => Ok(()),
+        locked => locked,
+    }
+}
+
+/// Whether a writer of `part` lives.
+///
+/// # Errors
+/// If the file cannot be opened.
+pub fn is_being_written(part: &Path) -> io::Result<bool> {
+    let file = File::open(part)?;
+    Ok(matches!(
+        file.try_lock_shared(),
+        Err(TryLockError::WouldBlock)
+    ))
+}
+
+/// Whether this user may make files in `folder`, or make that where it is not there yet.
+///
+/// # Errors
+/// What keeps from it, in the operating system's words.
+pub fn check_writable(folder: &Path) -> io::Result<()> {
+    let there = folder.ancestors().find(|above| above.exists());
+    let there = there
+        .filter(|above| *above != Path::new(""))
+        .unwrap_or(Path::new("."));
+    if !there.is_dir() {
+        return Err(io::ErrorKind::NotADirectory.into());
+    }
+    // The effective user: what a service may not do, its file's owner may.
+    Ok(rustix::fs::accessat(
+        CWD,
+        there,
+        Access::WRITE_OK | Access::EXEC_OK,
+        AtFlags::EACCESS,
+    )?)
+}
+
+/// Bytes that an ordinary user may still write on the disk of `path`, which need not be there yet.
+///
+/// # Errors
+/// If the file system does not say.
+pub fn free_bytes(path: &Path) -> io::Result<u64> {
+    let there = path.ancestors().find(|above| above.exists());
+    let there = there.filter(|above| *above != Path::new(""));
+    let room = rustix::fs::statvfs(there.unwrap_or(Path::new(".")))?;
+    Ok(room.f_bavail.saturating_mul(room.f_frsize))
 }
 
 /// The first of `a.mcap`, `a.1.mcap`, `a.2.mcap`, ... that no file has.
@@ -118,16 +202,23 @@ pub fn unused_name(path: &Path) -> io::Result<PathBuf> {
 /// it may hold the only copy of a recording. Gives its new name, if there was one.
 ///
 /// # Errors
-/// If the folder cannot be read or the file not be renamed.
+/// If the folder cannot be read or the file not be renamed; [`io::ErrorKind::ResourceBusy`] if its
+/// writer lives.
 pub fn set_part_aside(path: &Path) -> io::Result<Option<PathBuf>> {
     let part = part_of(path);
     if !part.try_exists()? {
         return Ok(None);
     }
+    if is_being_written(&part)? {
+        let busy = "another process is writing it: give this one another name";
+        return Err(io::Error::new(io::ErrorKind::ResourceBusy, busy));
+    }
     let mut n = 1;
     loop {
-        let aside = part_of(&numbered(path, n));
-        if !aside.try_exists()? {
+        let name = numbered(path, n);
+        let aside = part_of(&name);
+        // Where the one before has been repaired, its name is taken.
+        if !aside.try_exists()? && !name.try_exists()? {
             rename_to_new(&part, &aside)?;
             return Ok(Some(aside));
         }
@@ -193,6 +284,28 @@ mod tests {
         fs::write(&torn, "hal").unwrap();
         remove_unfinished();
         assert!(whole.exists() && !torn.exists());
+    }
+
+    #[test]
+    fn a_part_whose_writer_lives_is_not_moved_out_of_the_way() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.mcap");
+        let part = File::create(part_of(&path)).unwrap();
+        hold(&part).unwrap();
+        let refused = set_part_aside(&path).unwrap_err();
+        assert_eq!(refused.kind(), io::ErrorKind::ResourceBusy);
+        drop(part);
+        let aside = set_part_aside(&path).unwrap().unwrap();
+        assert_eq!(aside, folder.path().join("a.1.mcap.part"));
+    }
+
+    #[test]
+    fn the_room_of_a_folder_that_is_not_there_yet_is_that_of_the_one_above_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let below = folder.path().join("not/there/yet");
+        assert!(free_bytes(&below).unwrap() > 0);
+        create_folder(&below).unwrap();
+        assert!(below.is_dir());
     }
 
     #[test]

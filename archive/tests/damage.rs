@@ -323,7 +323,7 @@ fn a_repaired_file_is_whole() {
         let (before, _) = read_all(&Recording::open(&torn).unwrap());
         let to = repaired_path(&torn);
         assert_eq!(to, repaired_path(&path));
-        let repaired = repair(&torn, &to).unwrap();
+        let repaired = repair(&[&torn], &to).unwrap();
         assert!(!repaired.damage.is_empty(), "{path:?}");
         assert_eq!(repaired.written.messages as usize, before.len());
         let recording = Recording::open(&to).unwrap();
@@ -331,7 +331,7 @@ fn a_repaired_file_is_whole() {
         assert_eq!(read_all(&recording).0, before);
         assert!(recording.metadata().contains_key("tauscope_repair"));
         assert!(matches!(
-            repair(&torn, &to),
+            repair(&[&torn], &to),
             Err(RepairError::Exists { .. })
         ));
     }
@@ -346,7 +346,7 @@ fn a_repair_keeps_metadata_attachments_and_numbers() {
     let bytes = fs::read(&path).unwrap();
     fs::write(&path, &bytes[..bytes.len() - 30]).unwrap();
     let to = folder.path().join("b.mcap");
-    repair(&path, &to).unwrap();
+    repair(&[&path], &to).unwrap();
     let bytes = fs::read(&to).unwrap();
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
     assert_eq!(summary.attachment_indexes.len(), 1);
@@ -395,7 +395,7 @@ proptest! {
                     let _ = message.decode::<JointState>();
                 }
             }
-            let _ = repair(&path, &folder.path().join("repaired.mcap"));
+            let _ = repair(&[&path], &folder.path().join("repaired.mcap"));
         }
     }
 }

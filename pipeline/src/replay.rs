@@ -369,9 +369,19 @@ fn redirect(
     let mut config = tauscope_record::Config {
         // One result for each recording, again and again.
         split: None,
+        keep: None,
         existing: Existing::Replace,
+        // What is lost in a power cut is replayed again.
+        sync_s: 0.0,
         ..config.clone()
     };
+    if let Some(around) = &mut config.around_alarms {
+        for (path, kind) in [(&mut around.mcap, "mcap"), (&mut around.rerun, "rrd")] {
+            let stem = FileName::literal(&out.join(stem));
+            let name = format!("{}.alarm-{{date}}-{{time}}.{kind}", stem.display());
+            *path = path.take().map(|_| name.into());
+        }
+    }
     if config.mcap.is_some() {
         let path = out.join(format!("{stem}.mcap"));
         config.mcap = Some(FileName::literal(&path));
@@ -385,9 +395,5 @@ fn redirect(
             files.push(path);
         }
     }
-    let picture = config
-        .rerun
-        .as_ref()
-        .is_some_and(|rerun| rerun.file.is_some());
-    (config.mcap.is_some() || picture).then_some(config)
+    config.writes_something().then_some(config)
 }

@@ -197,6 +197,10 @@ fn line_and_column(text: &str, byte: usize) -> (usize, usize) {
     (line, before[line_start..].chars().count() + 1)
 }
 
+/// Problems that are shown to people; the rest is counted.
+/// Resolution: more than anybody reads at once.
+const MOST_SHOWN: usize = 20;
+
 /// Everything that is wrong. Never empty where it is returned as an error.
 #[derive(Debug, Clone, Default)]
 pub struct Report {
@@ -222,6 +226,11 @@ impl Report {
             !at.is_some_and(|at| ranges.iter().any(|range| range.contains(&at)))
         });
         self
+    }
+
+    /// How much is wrong.
+    pub fn len(&self) -> usize {
+        self.problems.len()
     }
 
     /// Whether nothing is wrong.
@@ -255,12 +264,15 @@ impl Report {
             Renderer::plain()
         };
         let mut text = String::new();
-        for problem in &self.problems {
+        for problem in self.problems.iter().take(MOST_SHOWN) {
             text += &problem.render(&renderer);
             text += "\n\n";
         }
         let count = self.problems.len();
         let plural = if count == 1 { "" } else { "s" };
+        if count > MOST_SHOWN {
+            text += &format!("and {} more\n\n", count - MOST_SHOWN);
+        }
         text + &format!("{count} error{plural}; nothing was started")
     }
 }
@@ -278,6 +290,7 @@ impl fmt::Display for Report {
         let texts: Vec<String> = self
             .problems
             .iter()
+            .take(MOST_SHOWN)
             .map(|problem| problem.render(&Renderer::plain()))
             .collect();
         f.write_str(&texts.join("\n\n"))

@@ -16,11 +16,21 @@ pub enum UrdfError {
     Unusable(#[from] ModelError),
 }
 
+/// Longest file \[bytes\].
+/// Resolution: bounds memory.
+const MAX_BYTES: u64 = 16 << 20;
+
 /// The text and the robot at `path`.
 ///
 /// # Errors
 /// If there is no such file, it is of another kind, or the robot cannot be used.
 pub fn read(path: &Path) -> Result<(String, Model), UrdfError> {
+    let large = std::fs::metadata(path).map_or(0, |file| file.len());
+    if large > MAX_BYTES {
+        let path = path.display();
+        let title = format!("{path} has {large} bytes, the limit is {MAX_BYTES}");
+        return Err(UrdfError::Unreadable(title));
+    }
     let text = std::fs::read_to_string(path).map_err(|error| {
         let kind = file_kind(path);
         UrdfError::Unreadable(match (error.kind(), kind) {

@@ -10,6 +10,7 @@ use tauscope_pipeline::settings::Settings;
 use tauscope_pipeline::suggest;
 use tauscope_record::Existing;
 
+use crate::doctor;
 use crate::exit::{Exit, Failure};
 use crate::output::Output;
 use crate::plan;
@@ -91,6 +92,10 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         replace_files(&mut pipeline);
     } else {
         keep_files(&pipeline, host)?;
+    }
+    if let Some(verdict) = doctor::no_shared_memory() {
+        let problem = Problem::new(verdict.found).help(verdict.remedy.unwrap_or_default());
+        return Err(Failure::Rejected(problem.into()));
     }
     let links = plan::links(&pipeline);
     let care = Care {

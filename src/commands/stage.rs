@@ -134,7 +134,8 @@ fn member(seat: &Seat, shared: &tauscope_detect::Shared) -> Result<Member, SeatE
         }
         Settings::Record(config) => {
             let cells: Vec<&Cell> = cells.iter().collect();
-            let recorder = build::recorder(config, &cells, &told.streams, &told.provenance)?;
+            let mut recorder = build::recorder(config, &cells, &told.streams, &told.provenance)?;
+            recorder.repair_leftovers(config);
             Member::Sink(Box::new(recorder))
         }
         Settings::Publish { config, commands } => {

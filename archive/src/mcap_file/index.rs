@@ -5,7 +5,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 
 use mcap::records::{ChunkIndex, Footer, Record, Statistics, op};
 
-use super::layout::{Extent, ExtentKind, Layout, words};
+use super::layout::{Extent, ExtentKind, Layout, parse};
 use super::scan::{PlainRun, note_plain};
 use super::walk::{Step, Walk};
 use super::{MAX_RECORD_BYTES, RECORD_PREFIX_BYTES};
@@ -147,13 +147,13 @@ impl Summary {
             };
             walk.read(record.len as usize, &mut body)?;
             let taken = match record.opcode {
-                op::CHUNK_INDEX | op::STATISTICS => mcap::parse_record(record.opcode, &body)
-                    .map(|parsed| match parsed {
+                op::CHUNK_INDEX | op::STATISTICS => {
+                    parse(record.opcode, &body).map(|parsed| match parsed {
                         Record::ChunkIndex(chunk) => self.chunks.push(chunk),
                         Record::Statistics(statistics) => self.statistics = Some(statistics),
                         _ => {}
                     })
-                    .map_err(|error| words(&error)),
+                }
                 opcode => layout.take_in(opcode, &body),
             };
             if let Err(reason) = taken {

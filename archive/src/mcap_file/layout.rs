@@ -5,9 +5,19 @@ use std::path::{Path, PathBuf};
 
 use mcap::records::{Channel, Metadata, Record, op};
 
-use super::chunk::MessageHeader;
+use super::chunk::{Fields, MessageHeader};
 use crate::damage::{Damage, DamageKind};
 use crate::topic::{Topic, Topics};
+
+/// Most damages of a file that are told.
+/// Resolution: bounds memory.
+const MAX_DAMAGES: usize = 1000;
+/// Most channels of a file.
+/// Resolution: bounds time; a robot has some hundreds.
+const MAX_CHANNELS: usize = 4096;
+/// Longest schemas, channels and metadata of a file together \[bytes\].
+/// Resolution: bounds memory.
+const MAX_KEPT_BYTES: u64 = 256 << 20;
 
 /// Where messages lie.
 #[derive(Debug, Clone)]
@@ -62,6 +72,8 @@ pub(crate) struct Layout {
     pub(crate) attachments: Vec<(u64, u64)>,
     pub(crate) damage: Vec<Damage>,
     pub(super) extents: Vec<Extent>,
+    /// Length of the records that were taken in \[bytes\].
+    kept_bytes: u64,
 }
 
 impl Layout {
@@ -80,6 +92,7 @@ impl Layout {
             attachments: Vec::new(),
             damage: Vec::new(),
             extents: Vec::new(),
+            kept_bytes: 0,
         }
     }
 
@@ -93,6 +106,7 @@ impl Layout {
                 type_name: schema.map_or_else(String::new, |schema| schema.name.clone()),
                 message_encoding: channel.message_encoding.clone(),
                 type_hash: channel.metadata.get("topic_type_hash").cloned(),
+                offered_qos: channel.metadata.get("offered_qos_profiles").cloned(),
                 message_count: self.counts.get(&id).copied().unwrap_or(0),
             };
             topics.add_channel(id, topic);
@@ -100,7 +114,11 @@ impl Layout {
         topics
     }
 
+    /// Notes a damage; of very many the first.
     pub(super) fn damage(&mut self, at: u64, kind: DamageKind) {
+        if self.damage.len() >= MAX_DAMAGES {
+            return;
+        }
         self.damage.push(Damage {
             path: self.path.clone(),
             at,
@@ -132,7 +150,13 @@ impl Layout {
         if !matches!(opcode, op::HEADER | op::SCHEMA | op::CHANNEL | op::METADATA) {
             return Ok(());
         }
-        match mcap::parse_record(opcode, body).map_err(|error| words(&error))? {
+        self.kept_bytes += body.len() as u64;
+        if self.kept_bytes > MAX_KEPT_BYTES {
+            return Err(format!(
+                "schemas, channels and metadata of more than {MAX_KEPT_BYTES} bytes, which is the limit"
+            ));
+        }
+        match parse(opcode, body)? {
             Record::Header(header) => {
                 self.header_read = true;
                 self.profile = header.profile;
@@ -146,6 +170,11 @@ impl Layout {
                 });
             }
             Record::Channel(channel) => {
+                if self.channels.len() >= MAX_CHANNELS && !self.channels.contains_key(&channel.id) {
+                    return Err(format!(
+                        "more than {MAX_CHANNELS} channels, which is the limit"
+                    ));
+                }
                 self.channels.entry(channel.id).or_insert(channel);
             }
             Record::Metadata(metadata) => self.metadata.push(metadata),
@@ -153,6 +182,60 @@ impl Layout {
         }
         Ok(())
     }
+}
+
+/// Parses a record whose lengths fit into it.
+///
+/// # Errors
+/// Why it makes no sense, in words.
+pub(super) fn parse(opcode: u8, body: &[u8]) -> Result<Record<'_>, String> {
+    // The mcap crate makes room for a text of any length before it looks whether there is one.
+    if !lengths_fit(opcode, body) {
+        return Err("a text that reaches beyond its record".to_owned());
+    }
+    mcap::parse_record(opcode, body).map_err(|error| words(&error))
+}
+
+/// Whether the texts and the data of a record end within it.
+fn lengths_fit(opcode: u8, body: &[u8]) -> bool {
+    let mut fields = Fields(body);
+    let fit = match opcode {
+        op::HEADER => texts(&mut fields, 2),
+        op::SCHEMA => fields
+            .take(2)
+            .and_then(|_| texts(&mut fields, 2))
+            .and_then(|()| texts(&mut fields, 1)),
+        op::CHANNEL => fields
+            .take(4)
+            .and_then(|_| texts(&mut fields, 2))
+            .and_then(|()| text_map(&mut fields)),
+        op::METADATA => texts(&mut fields, 1).and_then(|()| text_map(&mut fields)),
+        // Times, place and length of the chunk, then the place of each channel's index.
+        op::CHUNK_INDEX => fields
+            .take(32)
+            .and_then(|_| texts(&mut fields, 1))
+            .and_then(|()| fields.take(8))
+            .and_then(|_| texts(&mut fields, 1)),
+        _ => Some(()),
+    };
+    fit.is_some()
+}
+
+fn texts(fields: &mut Fields<'_>, count: usize) -> Option<()> {
+    for _ in 0..count {
+        let len = fields.u32()? as usize;
+        fields.take(len)?;
+    }
+    Some(())
+}
+
+fn text_map(fields: &mut Fields<'_>) -> Option<()> {
+    let len = fields.u32()? as usize;
+    let mut entries = Fields(fields.take(len)?);
+    while !entries.0.is_empty() {
+        texts(&mut entries, 2)?;
+    }
+    Some(())
 }
 
 /// An error of the mcap crate with its cause, in one line.

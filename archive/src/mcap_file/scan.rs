@@ -1,6 +1,7 @@
 //! The layout of a file without a sound index: a walk through all of it, chunks unpacked and
 //! checked.
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io;
 
@@ -126,7 +127,7 @@ impl Scan<'_> {
     /// Takes in what lies in the unpacked chunk.
     fn note_chunk(&mut self, at: u64, body_len: u64, kind: ExtentKind) {
         let mut times: Option<(u64, u64)> = None;
-        let mut channels = Vec::new();
+        let mut channels = BTreeSet::new();
         for record in inner_records(&self.records) {
             let Ok(record) = record else {
                 if kind == ExtentKind::Chunk {
@@ -139,9 +140,7 @@ impl Scan<'_> {
                 self.layout.count(&message);
                 let (start, end) = times.unwrap_or((message.log_time, message.log_time));
                 times = Some((start.min(message.log_time), end.max(message.log_time)));
-                if !channels.contains(&message.channel) {
-                    channels.push(message.channel);
-                }
+                channels.insert(message.channel);
             } else if let Err(reason) = self.layout.take_in(record.opcode, record.body) {
                 self.layout.damage(at, DamageKind::Record { reason });
             }
@@ -152,7 +151,7 @@ impl Scan<'_> {
                 len: RECORD_PREFIX_BYTES + body_len,
                 start_ns,
                 end_ns,
-                channels: channels.into(),
+                channels: channels.into_iter().collect(),
                 kind,
             });
         }

@@ -66,7 +66,7 @@ pub(crate) fn mcap(path: &Path) -> impl FnOnce(mcap::McapError) -> WriteError {
     }
 }
 
-pub(super) fn yaml(path: &Path) -> impl FnOnce(serde_saphyr::SerializeError) -> WriteError {
+pub(crate) fn yaml(path: &Path) -> impl FnOnce(serde_saphyr::SerializeError) -> WriteError {
     let path = path.to_owned();
     move |source| WriteError::Metadata {
         path,

@@ -185,6 +185,7 @@ impl Recording {
             type_name: JointState::TYPE.to_owned(),
             message_encoding: "cdr".to_owned(),
             type_hash: Some(JointState::TYPE_HASH.to_owned()),
+            offered_qos: None,
             message_count: table.rows,
         });
         Ok(Self {

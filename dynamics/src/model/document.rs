@@ -4,9 +4,22 @@
 //! in a vector, and reads an unexpanded xacro as a robot without links. So the XML is looked at
 //! first.
 
-use roxmltree::{Document, Error, Node};
+use roxmltree::{Document, Error, Node, ParsingOptions};
 
 use super::ModelError;
+
+/// Longest text \[bytes\].
+/// Resolution: bounds memory and time.
+const MAX_BYTES: usize = 16 << 20;
+/// Most elements, attributes and texts.
+/// Resolution: bounds memory and time.
+const MAX_NODES: u32 = 200_000;
+/// Most links and joints together: ten times those of a humanoid with hands.
+/// Resolution: bounds time.
+const MAX_PARTS: usize = 2000;
+/// Deepest element in others.
+/// Resolution: bounds the stack.
+const MAX_DEPTH: usize = 64;
 
 /// Where the links and joints stand and which limits are given, each in document order.
 #[derive(Debug)]
@@ -30,7 +43,7 @@ pub(super) struct JointMarks {
 /// # Errors
 /// If it is not XML, not a URDF, a xacro, or a number in it is none.
 pub(super) fn inspect(xml: &str) -> Result<Marks, ModelError> {
-    let document = Document::parse(xml).map_err(|error| not_xml(&error))?;
+    let document = parse(xml)?;
     let root = document.root_element();
     refuse_xacro(&document)?;
     if root.tag_name().name() != "robot" {
@@ -40,6 +53,7 @@ pub(super) fn inspect(xml: &str) -> Result<Marks, ModelError> {
             found,
         });
     }
+    bound(&document)?;
     for part in elements(root).filter(|node| is_any(*node, &["link", "joint"])) {
         check_numbers(part)?;
     }
@@ -50,11 +64,61 @@ pub(super) fn inspect(xml: &str) -> Result<Marks, ModelError> {
     })
 }
 
+/// The document, unless it is larger than any robot's.
+fn parse(xml: &str) -> Result<Document<'_>, ModelError> {
+    if xml.len() > MAX_BYTES {
+        return Err(ModelError::TooLarge {
+            what: "bytes",
+            found: xml.len(),
+            limit: MAX_BYTES,
+        });
+    }
+    let options = ParsingOptions {
+        nodes_limit: MAX_NODES,
+        ..ParsingOptions::default()
+    };
+    Document::parse_with_options(xml, options).map_err(|error| match error {
+        Error::NodesLimitReached => ModelError::TooLarge {
+            what: "elements, attributes and texts",
+            found: MAX_NODES as usize + 1,
+            limit: MAX_NODES as usize,
+        },
+        error => not_xml(&error),
+    })
+}
+
+/// Refuses what would take minutes: many links, or elements nested deep.
+fn bound(document: &Document) -> Result<(), ModelError> {
+    let links = elements(document.root_element())
+        .filter(|node| is_any(*node, &["link", "joint"]))
+        .count();
+    let mut depths: Vec<usize> = Vec::new();
+    let mut deepest = 0;
+    // In document order: a parent comes before its children.
+    for node in document.root().descendants() {
+        let above = node
+            .parent()
+            .and_then(|parent| depths.get(parent.id().get_usize()));
+        let depth = above.map_or(0, |above| above + 1);
+        depths.push(depth);
+        deepest = deepest.max(depth);
+    }
+    for (what, found, limit) in [
+        ("links and joints", links, MAX_PARTS),
+        ("elements within one another", deepest, MAX_DEPTH),
+    ] {
+        if found > limit {
+            return Err(ModelError::TooLarge { what, found, limit });
+        }
+    }
+    Ok(())
+}
+
 /// The link or joint that the URDF reader stumbled over, which it does not name: each is read alone.
 pub(super) fn blame(xml: &str, error: &urdf_rs::UrdfError) -> ModelError {
-    let document = match Document::parse(xml) {
+    let document = match parse(xml) {
         Ok(document) => document,
-        Err(error) => return not_xml(&error),
+        Err(error) => return error,
     };
     let root = document.root_element();
     let version = root.attribute("version").unwrap_or("1.0");

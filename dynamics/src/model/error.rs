@@ -13,6 +13,16 @@ pub enum ModelError {
         /// What the XML reader says.
         reason: String,
     },
+    /// The document is larger than any robot's.
+    #[error("{found} {what}: more than {limit}, which is the limit for a URDF")]
+    TooLarge {
+        /// What there is too much of.
+        what: &'static str,
+        /// How much there is at least.
+        found: usize,
+        /// How much there may be.
+        limit: usize,
+    },
     /// The text is a xacro template.
     #[error(
         "line {line}: `{found}` is xacro, not URDF; expand it first: `xacro FILE.xacro > FILE.urdf`"

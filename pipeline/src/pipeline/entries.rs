@@ -4,6 +4,7 @@ mod detector;
 mod model_fits;
 mod outputs;
 mod publish;
+mod record;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -121,7 +122,7 @@ impl<'a> Resolver<'a> {
             return self.explain(index, &place.key("explain"), config);
         }
         if let Some(config) = &entry.record {
-            return self.record(&place.key("record"), config);
+            return self.record(index, &place.key("record"), config);
         }
         if let Some(config) = &entry.publish {
             return self.publish(index, &place.key("publish"), config);
@@ -350,35 +351,6 @@ impl<'a> Resolver<'a> {
             model: model.cloned(),
             effort_cutoff_hz,
         })
-    }
-
-    fn record(&mut self, place: &Place, config: &tauscope_record::Config) -> Option<Settings> {
-        let mut config = config.clone();
-        let picture = config.rerun.as_mut();
-        let picture_goes_nowhere = picture
-            .as_ref()
-            .is_none_or(|rerun| rerun.file.is_none() && rerun.connect.is_none());
-        if config.mcap.is_none() && picture_goes_nowhere {
-            let problem = self.file.at_key(place, "a recorder that writes nothing");
-            self.report.push(
-                problem.help("give `mcap: out/archive.mcap`, or `rerun: {file: out/picture.rrd}`"),
-            );
-            return None;
-        }
-        for path in config
-            .mcap
-            .iter_mut()
-            .chain(picture.and_then(|rerun| rerun.file.as_mut()))
-        {
-            *path = self.file.resolve(path);
-        }
-        if let Err(error) = config.check_names() {
-            let problem = self.file.at_key(place, error.to_string());
-            self.report
-                .push(problem.help("for example `mcap: out/{date}/{time}.mcap`"));
-            return None;
-        }
-        Some(Settings::Record(config))
     }
 
     fn outside(&mut self, index: usize, place: &Place, outside: &OutsideEntry) -> Option<Settings> {

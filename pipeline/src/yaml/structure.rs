@@ -11,6 +11,10 @@ use super::place::{Place, Spans};
 use crate::report::{Problem, Report, Source};
 use crate::suggest;
 
+/// Mismatches after which no more are looked for.
+/// Resolution: bounds time; more than anybody reads.
+const MOST_MISMATCHES: usize = 200;
+
 /// Compares `value` with the schema of `T`.
 pub fn check<T: JsonSchema>(source: &Arc<Source>, value: &Value, spans: &Spans) -> Report {
     let schema = schemars::schema_for!(T).to_value();
@@ -23,6 +27,9 @@ pub fn check<T: JsonSchema>(source: &Arc<Source>, value: &Value, spans: &Spans) 
                 schema: &schema,
             };
             for error in validator.iter_errors(value) {
+                if report.len() >= MOST_MISMATCHES {
+                    break;
+                }
                 words.say(&error, &mut report);
             }
         }

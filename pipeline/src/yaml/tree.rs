@@ -18,6 +18,9 @@ use crate::report::{Problem, Report, Source};
 /// Deeper than any file of ours.
 /// Resolution: bounds the stack.
 const DEEPEST: usize = 64;
+/// Most mappings: those of a pipeline for a thousand cells.
+/// Resolution: bounds time.
+const MOST_MAPPINGS: usize = 20_000;
 /// Nodes that aliases may add.
 /// Resolution: bounds memory and time.
 const MOST_ALIASED_NODES: usize = 10_000;
@@ -95,6 +98,7 @@ struct Builder<'a> {
     open: Vec<Open>,
     anchors: HashMap<usize, Node>,
     aliased: usize,
+    mappings: usize,
     documents: usize,
     root: Option<Node>,
     report: Report,
@@ -108,6 +112,7 @@ impl<'a> Builder<'a> {
             open: Vec::new(),
             anchors: HashMap::new(),
             aliased: 0,
+            mappings: 0,
             documents: 0,
             root: None,
             report: Report::default(),
@@ -131,6 +136,12 @@ impl<'a> Builder<'a> {
             }
             Event::SequenceStart(anchor, _) => {
                 self.begin(span, anchor, Items::Sequence(Vec::new()))
+            }
+            Event::MappingStart(..) if self.mappings >= MOST_MAPPINGS => {
+                let title = format!("more than {MOST_MAPPINGS} mappings, which is the limit");
+                Err(self
+                    .problem(span, title)
+                    .help("divide the file, or give the large part as a file of its own"))
             }
             Event::MappingStart(anchor, _) => self.begin(
                 span,
@@ -159,6 +170,7 @@ impl<'a> Builder<'a> {
         if self.open.len() == DEEPEST {
             return Err(self.problem(span, format!("nested deeper than {DEEPEST} levels")));
         }
+        self.mappings += usize::from(matches!(items, Items::Mapping { .. }));
         self.open.push(Open {
             start: span.start,
             anchor,

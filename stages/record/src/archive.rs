@@ -7,18 +7,24 @@ mod joints;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use tauscope_archive::ros::{self, DiagnosticArray};
 use tauscope_archive::whole_file::Existing;
-use tauscope_archive::{Compression, McapWriter, TopicWriter, WriteError};
+use tauscope_archive::{McapWriter, TopicWriter, WriteError};
 use tauscope_bus::{Header, Health, SampleKind, SampleRef, TwinState, flags};
 
 use self::command::CommandTopics;
 use self::detections::DetectionTopics;
 use self::joints::{JointTopic, status};
+use crate::config::Config;
 use crate::contacts::Told;
 use crate::error::RecordError;
 use crate::streams::{Stream, Streams};
+
+/// A disk that takes longer to sync than this is told of.
+/// Resolution: ten chunks.
+const SLOW_DISK: Duration = Duration::from_secs(1);
 
 /// An archive that is being written.
 pub(crate) struct Archive {
@@ -83,12 +89,16 @@ impl Archive {
     /// Begins the file with the topics that are known by now.
     pub fn create(
         path: &Path,
-        compression: Compression,
+        config: &Config,
         existing: Existing,
         provenance: &BTreeMap<String, String>,
         streams: &Streams,
     ) -> Result<Self, RecordError> {
-        let writer = McapWriter::create(path, compression, provenance)?.existing(existing);
+        let mut writer =
+            McapWriter::create(path, config.compression, provenance)?.existing(existing);
+        if config.sync_s > 0.0 {
+            writer = writer.synced_every(Duration::from_secs_f64(config.sync_s))?;
+        }
         if let Some(aside) = writer.set_aside() {
             let aside = aside.display();
             tracing::warn!("an unfinished archive of a run before was kept as {aside}");
@@ -209,8 +219,20 @@ impl Archive {
         self.file.writer.bytes()
     }
 
+    /// What the index at its end will take \[bytes\].
+    pub fn index_bytes(&self) -> u64 {
+        self.file.writer.index_bytes()
+    }
+
     /// Completes the file and gives it its name, which is told.
     pub fn finish(self) -> Result<PathBuf, RecordError> {
+        let slowest = self.file.writer.slowest_sync();
+        if slowest > SLOW_DISK {
+            let slowest_s = slowest.as_secs_f64();
+            tracing::warn!(
+                "the disk took up to {slowest_s:.1} s to sync: a power cut would have cost as much"
+            );
+        }
         Ok(self.file.writer.finish()?.path)
     }
 }

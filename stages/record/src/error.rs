@@ -11,15 +11,15 @@ use crate::file_name::FileNameError;
 pub enum RecordError {
     /// The configuration asks for nothing.
     #[error(
-        "a recorder must write something: give `mcap`, `rerun: {{file: …}}` or `rerun: {{connect: …}}`"
+        "a recorder must write something: give `mcap`, `rerun: {{file: …}}`, `rerun: {{connect: …}}` or `around_alarms: {{mcap: …}}`"
     )]
     NothingToWrite,
     /// A file's name cannot be filled in.
     #[error(transparent)]
     FileName(#[from] FileNameError),
-    /// Files are to be split, and all would have one name.
+    /// There are to be several files, and all would have one name.
     #[error(
-        "files are to be split, but `{name}` names only one: put `{{n}}` or `{{time}}` into it", name = name.display()
+        "there are to be several files, but `{name}` names only one: put `{{n}}` or `{{time}}` into it", name = name.display()
     )]
     OneName {
         /// The name.
@@ -106,6 +106,8 @@ pub enum RecordError {
         path: PathBuf,
         /// What failed.
         reason: String,
+        /// The disk is full.
+        full: bool,
     },
     /// The viewer's address is not one.
     #[error(
@@ -125,4 +127,28 @@ pub enum RecordError {
         /// What failed.
         reason: String,
     },
+}
+
+impl RecordError {
+    /// Whether nothing is wrong but that the disk, or this user's share of it, is full.
+    pub(crate) fn is_disk_full(&self) -> bool {
+        match self {
+            Self::Archive(error) => says_full(error),
+            Self::RerunFile { full, .. } => *full,
+            _ => false,
+        }
+    }
+}
+
+/// Whether `error`, or what lies behind it, is that the disk is full.
+pub(crate) fn says_full(error: &(dyn std::error::Error + 'static)) -> bool {
+    let full = |error: &std::io::Error| {
+        matches!(
+            error.kind(),
+            std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded
+        )
+    };
+    std::iter::successors(Some(error), |error| error.source())
+        .filter_map(|error| error.downcast_ref())
+        .any(full)
 }

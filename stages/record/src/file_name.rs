@@ -1,5 +1,7 @@
 //! Names of the files that a recorder writes.
 
+mod like;
+
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -129,6 +131,54 @@ impl FileName {
         self.parts.contains(&Part::Number)
     }
 
+    /// The folder that its files go to, as far as it is known before the first sample is.
+    pub fn known_folder(&self, cell: &str) -> PathBuf {
+        let mut known = String::new();
+        for part in &self.parts {
+            match part {
+                Part::Text(text) => known += text,
+                Part::Cell => known += cell,
+                _ => break,
+            }
+        }
+        known.truncate(known.rfind('/').map_or(0, |slash| slash + 1));
+        known.into()
+    }
+
+    /// Files that are there by a name that this one can become, also by one with a number put in as in
+    /// `a.1.mcap`, and with `ending` behind it.
+    ///
+    /// # Errors
+    /// If a folder that is there cannot be read.
+    pub(crate) fn all_like(&self, cell: &str, ending: &str) -> io::Result<Vec<PathBuf>> {
+        let mut found = Vec::new();
+        like::find(PathBuf::new(), &self.components(), cell, ending, &mut found)?;
+        found.sort();
+        Ok(found)
+    }
+
+    /// Its parts, folder by folder; the last is the file.
+    fn components(&self) -> Vec<Vec<Part>> {
+        let mut components = Vec::new();
+        let mut last = Vec::new();
+        for part in &self.parts {
+            let Part::Text(text) = part else {
+                last.push(part.clone());
+                continue;
+            };
+            for (i, piece) in text.split('/').enumerate() {
+                if i > 0 {
+                    components.push(std::mem::take(&mut last));
+                }
+                if !piece.is_empty() {
+                    last.push(Part::Text(piece.to_owned()));
+                }
+            }
+        }
+        components.push(last);
+        components
+    }
+
     fn fill(&self, cell: &str, start: Timestamp, n: u32) -> PathBuf {
         let fill = |part: &Part| match part {
             Part::Text(text) => text.clone(),
@@ -193,6 +243,46 @@ mod tests {
         let names = ["a-{n}.mcap", "a-{n}.rrd"].map(|file| FileName::parse(&at(file)).unwrap());
         let filled = fill_in(&names.each_ref(), "cell", START_NS).unwrap();
         assert_eq!(filled, [at("a-003.mcap"), at("a-003.rrd")]);
+    }
+
+    #[test]
+    fn files_that_a_name_can_become_are_found_and_no_others() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |file: &str| folder.path().join(file);
+        std::fs::create_dir_all(at("2026-11-22")).unwrap();
+        std::fs::create_dir_all(at("notes")).unwrap();
+        let ours = [
+            "2026-11-22/p-001.mcap",
+            "2026-11-22/p-001.3.mcap",
+            "2026-11-22/p-1000.mcap",
+        ];
+        let others = [
+            "2026-11-22/p-01.mcap",
+            "2026-11-22/q-001.mcap",
+            "2026-11-22/p-001.mcap.part",
+            "notes/p-001.mcap",
+        ];
+        for file in ours.iter().chain(&others) {
+            std::fs::write(at(file), "").unwrap();
+        }
+        let name = FileName::parse(&at("{date}/{cell}-{n}.mcap")).unwrap();
+        let mut expected = ours.map(&at);
+        expected.sort();
+        assert_eq!(name.all_like("p", "").unwrap(), expected);
+        assert_eq!(name.all_like("p", ".part").unwrap(), [at(others[2])]);
+        let elsewhere = FileName::parse(&at("not/there/{n}.mcap")).unwrap();
+        assert!(elsewhere.all_like("p", "").unwrap().is_empty());
+    }
+
+    #[test]
+    fn the_folder_is_known_up_to_the_first_field_that_is_not() {
+        for (text, folder) in [
+            ("a.mcap", ""),
+            ("out/{cell}/a-{n}.mcap", "out/demo/"),
+            ("/data/{date}/a.mcap", "/data/"),
+        ] {
+            assert_eq!(name(text).known_folder("demo"), Path::new(folder), "{text}");
+        }
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use tauscope_archive::whole_file::Existing;
 use tauscope_bus::SampleRef;
 
 use crate::archive::Archive;
@@ -11,6 +12,8 @@ use crate::contacts::Told;
 use crate::error::RecordError;
 use crate::file_name::{FileName, fill_in};
 use crate::rerun::FilePicture;
+use crate::retention;
+use crate::room::Room;
 use crate::streams::Streams;
 
 /// Where files go and when new ones begin.
@@ -21,6 +24,13 @@ pub(crate) struct Files {
     mcap: Option<FileName>,
     rerun: Option<FileName>,
     open: Option<OpenFiles>,
+    room: Room,
+    /// The disk has too little room: what comes is counted and not kept.
+    paused: bool,
+    /// Samples that were not kept.
+    dropped: u64,
+    /// Those of them that were told.
+    dropped_told: u64,
     /// Names of the files that were completed last.
     completed: Vec<PathBuf>,
     completed_count: u64,
@@ -31,6 +41,10 @@ struct OpenFiles {
     picture: Option<FilePicture>,
     /// When the first sample in them was received \[ns since the epoch\].
     start_ns: Option<i64>,
+    /// Samples since the archive's last chunk was closed: what is lost where it cannot be written on.
+    unwritten: u64,
+    /// Length of the archive at that time \[bytes\].
+    written_bytes: u64,
 }
 
 impl Files {
@@ -40,7 +54,20 @@ impl Files {
         provenance: &BTreeMap<String, String>,
         streams: &Streams,
     ) -> Result<Self, RecordError> {
-        config.check_names()?;
+        let mut files = Self::later(config, provenance, streams)?;
+        let known = files.names().all(FileName::is_known_at_start);
+        if known && files.has_room(streams)? {
+            files.open = Some(files.begin(streams, 0)?);
+        }
+        Ok(files)
+    }
+
+    /// Takes the names apart; files are begun with the first sample.
+    pub fn later(
+        config: &Config,
+        provenance: &BTreeMap<String, String>,
+        streams: &Streams,
+    ) -> Result<Self, RecordError> {
         let rerun = config.rerun.as_ref().and_then(|rerun| rerun.file.as_ref());
         let parse = |path: Option<&PathBuf>| path.map(|path| FileName::parse(path)).transpose();
         let mut files = Self {
@@ -49,6 +76,10 @@ impl Files {
             config: config.clone(),
             provenance: provenance.clone(),
             open: None,
+            room: Room::new(PathBuf::new(), config.min_free_mb),
+            paused: false,
+            dropped: 0,
+            dropped_told: 0,
             completed: Vec::new(),
             completed_count: 0,
         };
@@ -56,10 +87,18 @@ impl Files {
         if cells > 1 && files.names().any(FileName::is_of_one_cell) {
             return Err(RecordError::SeveralCells { cells });
         }
-        if files.names().all(FileName::is_known_at_start) {
-            files.open = Some(files.begin(streams, 0)?);
+        let cell = first_cell(streams);
+        let folder = files.names().next().map(|name| name.known_folder(cell));
+        if let Some(folder) = folder {
+            files.room = Room::new(folder, config.min_free_mb);
         }
+        files.remove_what_is_beyond(cell);
         Ok(files)
+    }
+
+    /// Samples that were not kept because the disk had no room.
+    pub fn dropped(&self) -> u64 {
+        self.dropped
     }
 
     fn names(&self) -> impl Iterator<Item = &FileName> {
@@ -77,22 +116,117 @@ impl Files {
         if self.names().next().is_none() {
             return Ok(());
         }
+        if !self.has_room(streams)? {
+            self.dropped += 1;
+            return Ok(());
+        }
+        match self.keep(streams, index, sample, told) {
+            Err(error) if error.is_disk_full() => {
+                self.abandon(&error);
+                Ok(())
+            }
+            kept => kept,
+        }
+    }
+
+    fn keep(
+        &mut self,
+        streams: &Streams,
+        index: usize,
+        sample: SampleRef<'_>,
+        told: Told<'_>,
+    ) -> Result<(), RecordError> {
         let now_ns = sample.header().received_ns;
         if self
             .open
             .as_ref()
             .is_some_and(|open| self.is_full(open, now_ns))
         {
-            self.finish(streams)?;
+            self.complete(streams)?;
         }
         let mut open = match self.open.take() {
             Some(open) => open,
-            None => self.begin(streams, now_ns)?,
+            None => match self.begin(streams, now_ns) {
+                Ok(open) => open,
+                Err(error) => {
+                    self.dropped += u64::from(error.is_disk_full());
+                    return Err(error);
+                }
+            },
         };
         open.start_ns.get_or_insert(now_ns);
         let kept = open.accept(streams, index, sample, told);
         self.open = Some(open);
         kept
+    }
+
+    /// Whether the disk has room to go on; pauses where it has none, and says so.
+    fn has_room(&mut self, streams: &Streams) -> Result<bool, RecordError> {
+        let archive = self.open.as_ref().and_then(|open| open.archive.as_ref());
+        let reserve = archive.map_or(0, Archive::index_bytes);
+        let mut enough = self.room.is_enough(reserve, self.paused);
+        if !enough {
+            enough = self.make_room(streams, reserve);
+        }
+        if enough && self.paused {
+            self.paused = false;
+            let lost = self.lost();
+            tracing::warn!("{}: recording goes on; {lost}", self.room);
+        }
+        if !enough && !self.paused {
+            self.paused = true;
+            let room = self.room.to_string();
+            match self.complete(streams) {
+                Err(error) if error.is_disk_full() => self.abandon(&error),
+                completed => completed?,
+            }
+            tracing::warn!(
+                "{room}: recording pauses until there is more; what comes is counted as lost"
+            );
+        }
+        Ok(enough)
+    }
+
+    /// Where old files may go for new ones: removes the oldest until there is room.
+    fn make_room(&mut self, streams: &Streams, reserve: u64) -> bool {
+        if self.config.keep.is_none() {
+            return false;
+        }
+        let cell = first_cell(streams);
+        loop {
+            let mut removed = Vec::new();
+            for name in self.names() {
+                match retention::remove_oldest(name, cell) {
+                    Ok(mut gone) => removed.append(&mut gone),
+                    Err(error) => tracing::warn!("cannot remove an old recording: {error}"),
+                }
+            }
+            if removed.is_empty() {
+                return false;
+            }
+            tell_removed(&removed);
+            self.room.look();
+            if self.room.is_enough(reserve, self.paused) {
+                return true;
+            }
+        }
+    }
+
+    /// What was lost since it was last told.
+    fn lost(&mut self) -> String {
+        let lost = self.dropped - std::mem::replace(&mut self.dropped_told, self.dropped);
+        format!("{lost} samples were not kept")
+    }
+
+    /// Leaves the open files as they are: the disk was full before it was noticed.
+    fn abandon(&mut self, error: &RecordError) {
+        self.paused = true;
+        self.room.look();
+        let lost = self.open.take().map_or(0, |open| open.unwritten);
+        self.dropped += lost;
+        tracing::warn!(
+            "{error}: recording pauses until there is room; the next run repairs the unfinished file"
+        );
     }
 
     fn is_full(&self, open: &OpenFiles, now_ns: i64) -> bool {
@@ -111,47 +245,92 @@ impl Files {
     }
 
     fn begin(&self, streams: &Streams, start_ns: i64) -> Result<OpenFiles, RecordError> {
-        let cell = streams.cells.first().map_or("", |cell| &cell.name);
+        let cell = first_cell(streams);
         let names: Vec<&FileName> = self.names().collect();
-        let mut paths = fill_in(&names, cell, start_ns)
-            .map_err(RecordError::Folder)?
-            .into_iter();
-        let existing = self.config.existing;
+        let paths = fill_in(&names, cell, start_ns).map_err(RecordError::Folder)?;
+        // What this run has completed is not replaced by what it goes on with.
+        let again = paths.iter().any(|path| self.completed.contains(path));
+        let existing = if again {
+            Existing::Keep
+        } else {
+            self.config.existing
+        };
+        let mut paths = paths.into_iter();
         let mut next = |name: &Option<FileName>| name.as_ref().and_then(|_| paths.next());
         let (mcap, rerun) = (next(&self.mcap), next(&self.rerun));
-        let archive = mcap.map(|path| {
-            let compression = self.config.compression;
-            Archive::create(&path, compression, existing, &self.provenance, streams)
-        });
+        let archive = mcap
+            .map(|path| Archive::create(&path, &self.config, existing, &self.provenance, streams));
         let picture = rerun.map(|path| FilePicture::create(&path, existing, streams));
         Ok(OpenFiles {
             archive: archive.transpose()?,
             picture: picture.transpose()?,
             start_ns: None,
+            unwritten: 0,
+            written_bytes: 0,
         })
     }
 
     /// Hands all to the operating system.
     pub fn flush(&mut self) -> Result<(), RecordError> {
-        let archive = self.open.as_mut().and_then(|open| open.archive.as_mut());
-        archive.map_or(Ok(()), Archive::flush)
+        let Some(open) = &mut self.open else {
+            return Ok(());
+        };
+        match open.archive.as_mut().map_or(Ok(()), Archive::flush) {
+            Err(error) if error.is_disk_full() => self.abandon(&error),
+            flushed => flushed?,
+        }
+        Ok(())
     }
 
-    /// Completes the files that are open.
+    /// Completes the files that are open. The names of those that were completed last are forgotten.
     pub fn finish(&mut self, streams: &Streams) -> Result<(), RecordError> {
+        match self.complete(streams) {
+            Err(error) if error.is_disk_full() => self.abandon(&error),
+            completed => completed?,
+        }
+        if self.dropped > self.dropped_told {
+            let lost = self.lost();
+            tracing::warn!("{}: {lost}", self.room);
+        }
+        Ok(())
+    }
+
+    fn complete(&mut self, streams: &Streams) -> Result<(), RecordError> {
         let Some(open) = self.open.take() else {
             return Ok(());
         };
-        self.completed.clear();
-        // The archive first: it is what lasts, whatever becomes of the picture.
-        if let Some(archive) = open.archive {
-            self.completed.push(archive.finish()?);
+        let unwritten = open.unwritten;
+        let mut completed = Vec::new();
+        let complete = || {
+            // The archive first: it is what lasts, whatever becomes of the picture.
+            if let Some(archive) = open.archive {
+                completed.push(archive.finish()?);
+            }
+            if let Some(picture) = open.picture {
+                completed.push(picture.finish(streams)?);
+            }
+            Ok(())
+        };
+        let outcome: Result<(), RecordError> = complete();
+        self.completed_count += completed.len() as u64;
+        if completed.is_empty() && outcome.is_err() {
+            self.dropped += unwritten;
         }
-        if let Some(picture) = open.picture {
-            self.completed.push(picture.finish(streams)?);
+        self.completed = completed;
+        self.remove_what_is_beyond(first_cell(streams));
+        outcome
+    }
+
+    fn remove_what_is_beyond(&self, cell: &str) {
+        let Some(keep) = &self.config.keep else {
+            return;
+        };
+        for name in self.names() {
+            match retention::remove_what_is_beyond(keep, name, cell) {
+                Ok(removed) => tell_removed(&removed),
+                Err(error) => tracing::warn!("cannot remove old recordings: {error}"),
+            }
         }
-        self.completed_count += self.completed.len() as u64;
-        Ok(())
     }
 
     /// The files that were completed last, and how many were in all.
@@ -169,11 +348,29 @@ impl OpenFiles {
         told: Told<'_>,
     ) -> Result<(), RecordError> {
         if let Some(archive) = &mut self.archive {
+            self.unwritten += 1;
             archive.accept(streams, index, sample, told)?;
+            if archive.bytes() != self.written_bytes {
+                self.written_bytes = archive.bytes();
+                self.unwritten = 1;
+            }
         }
         if let Some(picture) = &mut self.picture {
             picture.accept(streams, index, sample, told)?;
         }
         Ok(())
+    }
+}
+
+fn first_cell(streams: &Streams) -> &str {
+    streams.cells.first().map_or("", |cell| &cell.name)
+}
+
+fn tell_removed(removed: &[PathBuf]) {
+    for path in removed {
+        tracing::warn!(
+            "{} was removed: the oldest goes first (`keep`)",
+            path.display()
+        );
     }
 }

@@ -2,17 +2,21 @@
 //! look at.
 
 mod archive;
+mod around_alarms;
 mod config;
 mod contacts;
 mod error;
 mod file_name;
 mod files;
+mod leftovers;
 mod recorder;
 mod rerun;
+mod retention;
+mod room;
 mod streams;
 mod words;
 
-pub use config::{Config, RerunConfig, Split};
+pub use config::{AroundAlarms, Config, Keep, RerunConfig, Split};
 pub use error::RecordError;
 pub use file_name::{FileName, FileNameError};
 pub use recorder::Recorder;

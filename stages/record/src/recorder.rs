@@ -5,10 +5,12 @@ use std::path::PathBuf;
 
 use tauscope_bus::{SampleRef, Sink, StageError};
 
+use crate::around_alarms::AroundAlarms;
 use crate::config::Config;
 use crate::contacts::Contacts;
 use crate::error::RecordError;
 use crate::files::Files;
+use crate::leftovers::Leftovers;
 use crate::rerun::LivePicture;
 use crate::streams::{CellInfo, StreamInfo, Streams};
 
@@ -21,7 +23,12 @@ pub struct Recorder {
     streams: Streams,
     contacts: Contacts,
     files: Files,
+    around_alarms: Option<AroundAlarms>,
     live: Option<LivePicture>,
+    leftovers: Option<Leftovers>,
+    /// Names of the files that were completed last.
+    completed: Vec<PathBuf>,
+    completed_count: u64,
 }
 
 impl Recorder {
@@ -37,22 +44,38 @@ impl Recorder {
         streams: &[StreamInfo],
         provenance: &BTreeMap<String, String>,
     ) -> Result<Self, RecordError> {
-        let picture = config.rerun.as_ref();
-        let viewer = picture.and_then(|rerun| rerun.connect.as_ref());
-        let file = picture.and_then(|rerun| rerun.file.as_ref());
-        if config.mcap.is_none() && viewer.is_none() && file.is_none() {
+        if !config.writes_something() {
             return Err(RecordError::NothingToWrite);
         }
+        config.check_names()?;
+        let picture = config.rerun.as_ref();
+        let viewer = picture.and_then(|rerun| rerun.connect.as_ref());
         let streams = Streams::new(cells, streams)?;
         let files = Files::new(config, provenance, &streams)?;
+        let around_alarms = config
+            .around_alarms
+            .as_ref()
+            .map(|around| AroundAlarms::new(around, config, provenance, &streams));
         let live = viewer.map(|url| LivePicture::start(url, &streams));
         let live = live.transpose()?;
         Ok(Self {
             contacts: Contacts::new(streams.all.len()),
             streams,
             files,
+            around_alarms: around_alarms.transpose()?,
             live,
+            leftovers: None,
+            completed: Vec::new(),
+            completed_count: 0,
         })
+    }
+
+    /// Begins to repair what earlier recorders of `config`'s names, which died, left unfinished. It says
+    /// what it has repaired. Never destroys data: what is repaired is only removed once all of it is in a
+    /// new file on the disk.
+    pub fn repair_leftovers(&mut self, config: &Config) {
+        let cell = self.streams.cells.first().map_or("", |cell| &cell.name);
+        self.leftovers = Some(Leftovers::repair(config, cell));
     }
 
     /// Messages of the live picture that the viewer was too slow for, or not there for. No data is
@@ -65,19 +88,45 @@ impl Recorder {
         let index = self.streams.find(from, &sample)?;
         let told = self.contacts.push(index, sample);
         self.files.accept(&self.streams, index, sample, told)?;
+        if let Some(around) = &mut self.around_alarms {
+            around.accept(&self.streams, index, sample)?;
+        }
         if let Some(live) = &mut self.live {
             live.accept(&self.streams, index, sample, told)?;
         }
+        self.note_completed();
         Ok(())
     }
 
     fn show_and_flush(&mut self) -> Result<(), RecordError> {
         self.files.flush()?;
+        if let Some(around) = &mut self.around_alarms {
+            around.flush(&self.streams)?;
+        }
+        self.note_completed();
         self.live.as_mut().map_or(Ok(()), LivePicture::idle)
+    }
+
+    /// The files of all, and those around alarms, in one list.
+    fn note_completed(&mut self) {
+        let (files, count) = self.files.completed();
+        let around = self.around_alarms.as_ref().map(AroundAlarms::completed);
+        let (more, more_count) = around.unwrap_or_default();
+        if count + more_count != self.completed_count {
+            self.completed = files.iter().chain(more).cloned().collect();
+            self.completed_count = count + more_count;
+        }
     }
 
     fn complete(&mut self) -> Result<(), RecordError> {
         self.files.finish(&self.streams)?;
+        if let Some(around) = &mut self.around_alarms {
+            around.finish(&self.streams)?;
+        }
+        self.note_completed();
+        if let Some(leftovers) = &mut self.leftovers {
+            leftovers.wait();
+        }
         self.live.as_mut().map_or(Ok(()), LivePicture::finish)
     }
 }
@@ -96,6 +145,12 @@ impl Sink for Recorder {
     }
 
     fn completed_files(&self) -> (&[PathBuf], u64) {
-        self.files.completed()
+        (&self.completed, self.completed_count)
+    }
+
+    fn dropped(&self) -> u64 {
+        let around = self.around_alarms.as_ref();
+        // A sample that neither kept is one sample.
+        (self.files.dropped()).max(around.map_or(0, AroundAlarms::dropped))
     }
 }

@@ -11,7 +11,7 @@ use synthetic::{arm, cell, motion, streams};
 use tauscope_archive::Recording;
 use tauscope_archive::ros::{Float64, JointState, Message};
 use tauscope_bus::Sink;
-use tauscope_record::{Config, Existing, RecordError, Recorder, RerunConfig, Split};
+use tauscope_record::{Config, Existing, Keep, RecordError, Recorder, RerunConfig, Split};
 
 fn recorder(config: &Config) -> Result<Recorder, RecordError> {
     let cells = [cell("demo", Some(arm(false)))];
@@ -157,4 +157,118 @@ fn names_that_cannot_be_are_refused() {
         several.err(),
         Some(RecordError::SeveralCells { cells: 2 })
     ));
+}
+
+/// What a recorder leaves that is killed: the file as it is in the middle of writing.
+fn torn_copy(path: &Path, seconds: f64) {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = Config {
+        mcap: Some(folder.path().join("a.mcap")),
+        ..Config::default()
+    };
+    record(&whole, seconds);
+    let bytes = std::fs::read(folder.path().join("a.mcap")).unwrap();
+    std::fs::write(path, &bytes[..bytes.len() * 2 / 3]).unwrap();
+}
+
+#[test]
+fn what_earlier_recorders_left_is_repaired_by_the_next_and_what_lives_is_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |file: &str| folder.path().join(file);
+    torn_copy(&at("a.mcap.part"), 3.0);
+    torn_copy(&at("a.7.mcap.part"), 3.0);
+    torn_copy(&at("b.mcap.part"), 3.0);
+    std::fs::write(at("a.8.mcap.part"), "nothing of ours").unwrap();
+    let config = Config {
+        mcap: Some(at("a.mcap")),
+        ..Config::default()
+    };
+    let mut recorder = recorder(&config).unwrap();
+    recorder.repair_leftovers(&config);
+    for instant in &motion(1.0) {
+        instant.feed(&mut recorder, "");
+    }
+    recorder.finish().unwrap();
+    let expected = [
+        "a.1.mcap",
+        "a.7.mcap",
+        "a.8.mcap.part",
+        "a.mcap",
+        "b.mcap.part",
+    ];
+    assert_eq!(files(folder.path()), expected.map(at));
+    for repaired in ["a.1.mcap", "a.7.mcap"] {
+        let states = count::<JointState>(&at(repaired), "/joint_states");
+        assert!((300..750).contains(&states), "{repaired}: {states}");
+    }
+    assert_eq!(count::<JointState>(&at("a.mcap"), "/joint_states"), 250);
+}
+
+#[test]
+fn only_so_much_is_kept_the_oldest_goes_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let notes = folder.path().join("a-note.mcap");
+    std::fs::write(&notes, vec![0; 2_000_000]).unwrap();
+    let config = Config {
+        mcap: Some(folder.path().join("a-{time}.mcap")),
+        split: Some(Split {
+            after_s: Some(1.0),
+            after_mb: None,
+        }),
+        keep: Some(Keep {
+            at_most_mb: Some(0.5),
+            at_most_days: None,
+        }),
+        ..Config::default()
+    };
+    record(&config, 8.0);
+    let left = files(folder.path());
+    let bytes: u64 = left
+        .iter()
+        .filter(|file| **file != notes)
+        .map(|file| file.metadata().unwrap().len())
+        .sum();
+    assert!(left.contains(&notes), "not of its names");
+    assert!(bytes < 500_000 && left.len() < 8, "{left:?}");
+    let newest = folder.path().join("a-08-53-27.mcap");
+    assert!(left.contains(&newest), "{left:?}");
+}
+
+#[test]
+fn a_disk_without_room_pauses_the_recording_and_what_it_loses_is_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = Config {
+        mcap: Some(folder.path().join("a.mcap")),
+        // No disk has so much.
+        min_free_mb: 1e15,
+        ..Config::default()
+    };
+    let recorder = record(&config, 1.0);
+    let samples = 250 * 3;
+    assert!(
+        (samples..samples + 3).contains(&recorder.dropped()),
+        "{}",
+        recorder.dropped()
+    );
+    assert_eq!(files(folder.path()), Vec::<PathBuf>::new());
+}
+
+#[test]
+fn a_kill_costs_no_more_than_a_tenth_of_a_second() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = Config {
+        mcap: Some(folder.path().join("a.mcap")),
+        ..Config::default()
+    };
+    let mut recorder = recorder(&config).unwrap();
+    let motion = motion(3.0);
+    for instant in &motion {
+        instant.feed(&mut recorder, "");
+    }
+    // What the operating system has been given is what a killed process leaves.
+    let left = folder.path().join("left.mcap.part");
+    std::fs::copy(folder.path().join("a.mcap.part"), &left).unwrap();
+    let end_ns = Recording::open(&left).unwrap().end_ns().unwrap();
+    let last_ns = motion.last().unwrap().state.header.received_ns;
+    assert!(last_ns - end_ns <= 100_000_000, "{} ns", last_ns - end_ns);
 }

@@ -10,7 +10,7 @@ use rerun::log::LogMsg;
 
 use tauscope_archive::whole_file::{self, Existing, part_of};
 
-use crate::error::RecordError;
+use crate::error::{RecordError, says_full};
 
 /// An `.rrd` file, with `.part` at the end of its name until it is whole.
 pub(super) struct PictureFile {
@@ -18,6 +18,18 @@ pub(super) struct PictureFile {
     part: PathBuf,
     existing: Existing,
     encoder: Encoder<BufWriter<File>>,
+    /// The same file, to sync it.
+    file: File,
+}
+
+type Cause = dyn std::error::Error + 'static;
+
+fn failed(part: &Path, error: &Cause) -> RecordError {
+    RecordError::RerunFile {
+        path: part.to_owned(),
+        reason: error.to_string(),
+        full: says_full(error),
+    }
 }
 
 impl PictureFile {
@@ -25,16 +37,16 @@ impl PictureFile {
     /// has the name when this one is complete.
     pub fn create(path: &Path, existing: Existing) -> Result<Self, RecordError> {
         let part = part_of(path);
-        let failed = |error: &dyn std::fmt::Display| RecordError::RerunFile {
-            path: part.clone(),
-            reason: error.to_string(),
-        };
+        let failed = |error: &Cause| failed(&part, error);
         if let Some(folder) = path.parent() {
-            std::fs::create_dir_all(folder).map_err(|error| failed(&error))?;
+            whole_file::create_folder(folder).map_err(|error| failed(&error))?;
         }
         whole_file::set_part_aside(path).map_err(|error| failed(&error))?;
         let file = File::create_new(&part).map_err(|error| failed(&error))?;
+        whole_file::hold(&file).map_err(|error| failed(&error))?;
+        whole_file::sync_folder_of(&part).map_err(|error| failed(&error))?;
         whole_file::begin(&part);
+        let twin = file.try_clone().map_err(|error| failed(&error))?;
         let encoder = Encoder::new_eager(
             CrateVersion::LOCAL,
             EncodingOptions::PROTOBUF_COMPRESSED,
@@ -46,6 +58,7 @@ impl PictureFile {
             part,
             existing,
             encoder,
+            file: twin,
         })
     }
 
@@ -63,6 +76,7 @@ impl PictureFile {
         self.encoder
             .flush_blocking()
             .map_err(|error| self.failed(&error))?;
+        self.file.sync_all().map_err(|error| self.failed(&error))?;
         let path = match self.existing {
             Existing::Replace => Ok(self.path.clone()),
             Existing::Keep => whole_file::unused_name(&self.path),
@@ -73,10 +87,7 @@ impl PictureFile {
         Ok(path)
     }
 
-    fn failed(&self, error: &dyn std::fmt::Display) -> RecordError {
-        RecordError::RerunFile {
-            path: self.part.clone(),
-            reason: error.to_string(),
-        }
+    fn failed(&self, error: &Cause) -> RecordError {
+        failed(&self.part, error)
     }
 }

@@ -1,0 +1,69 @@
+//! What a recorder is told: where its files go, and that they can.
+
+use std::path::Path;
+
+use tauscope_archive::whole_file;
+
+use super::Resolver;
+use crate::settings::Settings;
+use crate::yaml::Place;
+
+impl Resolver<'_> {
+    pub(super) fn record(
+        &mut self,
+        index: usize,
+        place: &Place,
+        config: &tauscope_record::Config,
+    ) -> Option<Settings> {
+        let mut config = config.clone();
+        if !config.writes_something() {
+            let problem = self.file.at_key(place, "a recorder that writes nothing");
+            self.report.push(
+                problem.help("give `mcap: out/archive.mcap`, or `rerun: {file: out/picture.rrd}`"),
+            );
+            return None;
+        }
+        for path in config.all_names_mut() {
+            *path = self.file.resolve(path);
+        }
+        if let Err(error) = config.check_names() {
+            let problem = self.file.at_key(place, error.to_string());
+            self.report
+                .push(problem.help("for example `mcap: out/{date}/{time}.mcap`"));
+            return None;
+        }
+        if self.is_here(index) {
+            self.can_be_written(index, place, &config)?;
+        }
+        Some(Settings::Record(config))
+    }
+
+    /// Looks whether the folders that a recorder writes to take files of this user.
+    fn can_be_written(
+        &mut self,
+        index: usize,
+        place: &Place,
+        config: &tauscope_record::Config,
+    ) -> Option<()> {
+        let cells = self.wiring.map(|wiring| &wiring.cells[index]);
+        let cell = cells.and_then(|cells| cells.first());
+        let mut folders = config.folders(cell.map_or("", String::as_str));
+        folders.dedup();
+        for folder in folders {
+            if let Err(error) = whole_file::check_writable(&folder) {
+                let shown = if folder == Path::new("") {
+                    Path::new(".")
+                } else {
+                    &folder
+                };
+                let title = format!("cannot write into {}: {error}", shown.display());
+                let problem = self.file.at_key(place, title);
+                self.report.push(problem.help(
+                    "give a folder that this user may write to, or change its owner or rights",
+                ));
+                return None;
+            }
+        }
+        Some(())
+    }
+}

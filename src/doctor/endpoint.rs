@@ -1,0 +1,74 @@
+//! Endpoints as Zenoh writes them: `tls/10.0.0.1:7447#root_ca_certificate=ca.pem;...`.
+
+use std::io;
+use std::net::{TcpListener, TcpStream, ToSocketAddrs};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// How long is waited for one that does not answer.
+/// Resolution: how long the command may take.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// The part that names host and port, if the transport has such.
+pub(super) fn address(endpoint: &str) -> Option<&str> {
+    let (transport, rest) = endpoint.split_once('/')?;
+    let over_tcp = matches!(transport, "tcp" | "tls" | "ws");
+    let end = rest.find(['?', '#']).unwrap_or(rest.len());
+    over_tcp.then_some(&rest[..end])
+}
+
+/// The certificates in an endpoint's settings.
+pub(super) fn certificates(endpoint: &str) -> Vec<PathBuf> {
+    let settings = endpoint
+        .split_once('#')
+        .map_or("", |(_, settings)| settings);
+    let pairs = settings.split(';').filter_map(|pair| pair.split_once('='));
+    let files = pairs.filter(|(key, _)| key.ends_with("certificate"));
+    files.map(|(_, path)| PathBuf::from(path)).collect()
+}
+
+/// Whether it could be listened on now.
+pub(super) fn is_free(address: &str) -> io::Result<()> {
+    TcpListener::bind(address).map(drop)
+}
+
+/// Whether somebody listens there.
+pub(super) fn answers(address: &str) -> io::Result<()> {
+    let mut last = io::Error::from(io::ErrorKind::AddrNotAvailable);
+    for address in address.to_socket_addrs()? {
+        match TcpStream::connect_timeout(&address, PATIENCE) {
+            Ok(_) => return Ok(()),
+            Err(error) => last = error,
+        }
+    }
+    Err(last)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_endpoint_names_an_address_and_certificates() {
+        let endpoint = "tls/cell:7447?prio=1#root_ca_certificate=ca.pem;connect_private_key=k.pem;\
+                        connect_certificate=own.pem";
+        assert_eq!(address(endpoint), Some("cell:7447"));
+        assert_eq!(
+            certificates(endpoint),
+            ["ca.pem", "own.pem"].map(PathBuf::from)
+        );
+        assert_eq!(address("unixsock-stream//tmp/a"), None);
+        assert!(certificates("tcp/127.0.0.1:7447").is_empty());
+    }
+
+    #[test]
+    fn a_port_is_free_until_somebody_listens_on_it() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap().to_string();
+        assert!(is_free(&address).is_err());
+        answers(&address).unwrap();
+        drop(listener);
+        is_free(&address).unwrap();
+        assert!(answers(&address).is_err());
+    }
+}

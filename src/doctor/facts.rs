@@ -1,0 +1,232 @@
+//! What is read of the machine.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use rustix::process::{Resource, getrlimit};
+use tauscope_archive::{Recording, whole_file};
+use tauscope_pipeline::pipeline::{Pipeline, Stage};
+use tauscope_pipeline::settings::Settings;
+
+use super::{certificate, endpoint};
+
+/// Where shared memory lies.
+pub const SHARED_MEMORY: &str = "/dev/shm";
+
+/// What was read; in words why not, where it could not be.
+#[derive(Debug, Clone, Default)]
+pub struct Facts {
+    /// Free bytes of the shared memory.
+    pub shared_memory: Option<Result<u64, String>>,
+    /// Killed runs that left something.
+    pub left_behind: Option<Result<usize, String>>,
+    /// What the kernel takes the time from.
+    pub clock_source: Option<String>,
+    /// Whether something keeps the clock with that of others.
+    pub clock_synchronised: Option<bool>,
+    /// Files a process may have open; `None` for any number.
+    pub open_files: Option<u64>,
+    /// Memory a process may lock \[bytes\]; `None` for all.
+    pub locked_bytes: Option<u64>,
+    /// Folders that recorders write to.
+    pub folders: Vec<Folder>,
+    /// Endpoints that stages listen on or connect to.
+    pub endpoints: Vec<Endpoint>,
+    /// Certificates, with the time they hold from and to \[s since the epoch\].
+    pub certificates: Vec<(PathBuf, Result<(i64, i64), String>)>,
+    /// Now \[s since the epoch\].
+    pub now_s: i64,
+    /// The kernel's version.
+    pub kernel: String,
+}
+
+/// A folder that a recorder writes to.
+#[derive(Debug, Clone)]
+pub struct Folder {
+    /// Where.
+    pub path: PathBuf,
+    /// Whether files can be made there, or why not.
+    pub writable: Result<(), String>,
+    /// Room on its disk \[bytes\].
+    pub free_bytes: Option<u64>,
+    /// At how little recording pauses \[MB\].
+    pub min_free_mb: f64,
+    /// What the newest archive in it took a day \[bytes\].
+    pub bytes_a_day: Option<f64>,
+}
+
+/// An endpoint of a stage.
+#[derive(Debug, Clone)]
+pub struct Endpoint {
+    /// The stage or host.
+    pub of: String,
+    /// As the file has it.
+    pub endpoint: String,
+    /// It is listened on there; else connected to.
+    pub listens: bool,
+    /// Whether that is possible, or why not.
+    pub possible: Result<(), String>,
+}
+
+/// Reads the machine, and what `pipeline` needs of it on `host`.
+pub fn read(pipeline: Option<&Pipeline>, host: Option<&str>) -> Facts {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH);
+    let mut facts = Facts {
+        shared_memory: Some(shared_memory()),
+        left_behind: Some(
+            tauscope_bus::link::left_behind()
+                .map(|domains| domains.len())
+                .map_err(|error| error.to_string()),
+        ),
+        clock_source: line_of("/sys/devices/system/clocksource/clocksource0/current_clocksource"),
+        clock_synchronised: clock_synchronised(),
+        open_files: getrlimit(Resource::Nofile).current,
+        locked_bytes: getrlimit(Resource::Memlock).current,
+        now_s: now.map_or(0, |since| since.as_secs() as i64),
+        kernel: line_of("/proc/sys/kernel/osrelease").unwrap_or_default(),
+        ..Facts::default()
+    };
+    let Some(pipeline) = pipeline else {
+        return facts;
+    };
+    let here = |stage: &&Stage| host.is_none() || stage.host.as_deref() == host;
+    let mut endpoints = Vec::new();
+    for stage in pipeline.stages.iter().filter(here) {
+        endpoints_of(stage, &mut endpoints);
+        if let Settings::Record(config) = &stage.settings {
+            let cell = stage.cells.first().map_or("", String::as_str);
+            let mut folders = config.folders(cell);
+            folders.dedup();
+            let folders = folders.iter().map(|path| folder(path, config.min_free_mb));
+            facts.folders.extend(folders);
+        }
+    }
+    for (name, entry) in &pipeline.hosts {
+        if host == Some(name) {
+            endpoints.extend(
+                entry
+                    .listen
+                    .0
+                    .iter()
+                    .map(|at| (name.clone(), at.clone(), true)),
+            );
+            endpoints.extend(
+                entry
+                    .connect
+                    .0
+                    .iter()
+                    .map(|at| (name.clone(), at.clone(), false)),
+            );
+        }
+    }
+    let mut certificates = BTreeMap::new();
+    for (_, endpoint, _) in &endpoints {
+        for path in endpoint::certificates(endpoint) {
+            let validity = certificate::validity(&path);
+            certificates.insert(path, validity);
+        }
+    }
+    facts.certificates = certificates.into_iter().collect();
+    facts.endpoints = endpoints.into_iter().filter_map(tried).collect();
+    facts
+}
+
+pub(super) fn shared_memory() -> Result<u64, String> {
+    let path = Path::new(SHARED_MEMORY);
+    whole_file::check_writable(path)
+        .and_then(|()| whole_file::free_bytes(path))
+        .map_err(|error| error.to_string())
+}
+
+fn line_of(path: &str) -> Option<String> {
+    Some(fs::read_to_string(path).ok()?.trim().to_owned())
+}
+
+/// As systemd says it, or the file that its client leaves; nothing where neither is there.
+fn clock_synchronised() -> Option<bool> {
+    let mut ask = Command::new("timedatectl");
+    let asked = ask
+        .args(["show", "-p", "NTPSynchronized", "--value"])
+        .output();
+    let said = asked.ok().filter(|asked| asked.status.success());
+    match said.as_ref().map(|said| said.stdout.trim_ascii()) {
+        Some(b"yes") => Some(true),
+        Some(b"no") => Some(false),
+        _ => Path::new("/run/systemd/timesync/synchronized")
+            .exists()
+            .then_some(true),
+    }
+}
+
+fn folder(path: &Path, min_free_mb: f64) -> Folder {
+    Folder {
+        path: path.to_owned(),
+        writable: whole_file::check_writable(path).map_err(|error| error.to_string()),
+        free_bytes: whole_file::free_bytes(path).ok(),
+        min_free_mb,
+        bytes_a_day: bytes_a_day(path),
+    }
+}
+
+/// Of the newest archive that lies there.
+fn bytes_a_day(folder: &Path) -> Option<f64> {
+    let here = if folder == Path::new("") {
+        Path::new(".")
+    } else {
+        folder
+    };
+    let files = fs::read_dir(here).ok()?.filter_map(Result::ok);
+    let archives = files.filter(|file| file.path().extension().is_some_and(|kind| kind == "mcap"));
+    let newest = archives.max_by_key(|file| file.metadata().and_then(|of| of.modified()).ok())?;
+    let recording = Recording::open(newest.path()).ok()?;
+    let seconds = recording.end_ns()?.checked_sub(recording.start_ns()?)? as f64 * 1e-9;
+    (seconds > 1.0).then(|| recording.bytes() as f64 / seconds * 86_400.0)
+}
+
+/// Adds the endpoints of a stage: its name, the endpoint, and whether it is listened on.
+fn endpoints_of(stage: &Stage, endpoints: &mut Vec<(String, String, bool)>) {
+    let mut add = |at: &[String], listens| {
+        let of = |at: &String| (stage.name.clone(), at.clone(), listens);
+        endpoints.extend(at.iter().map(of));
+    };
+    match &stage.settings {
+        Settings::Ingest(config) => {
+            if let Some(zenoh) = &config.zenoh {
+                add(&zenoh.listen, true);
+                add(&zenoh.connect, false);
+            }
+            if let Some(commands) = &config.commands {
+                add(&commands.listen, true);
+                add(&commands.connect, false);
+            }
+        }
+        Settings::Publish { config, .. } => {
+            if let Some(zenoh) = &config.zenoh {
+                add(&zenoh.listen, true);
+                add(&zenoh.connect, false);
+            }
+            if let Some(modbus) = &config.modbus {
+                add(&[format!("tcp/{}", modbus.listen)], true);
+            }
+        }
+        _ => {}
+    }
+}
+
+fn tried((of, endpoint, listens): (String, String, bool)) -> Option<Endpoint> {
+    let address = endpoint::address(&endpoint)?;
+    let tried = if listens {
+        endpoint::is_free(address)
+    } else {
+        endpoint::answers(address)
+    };
+    Some(Endpoint {
+        of,
+        listens,
+        possible: tried.map_err(|error| error.to_string()),
+        endpoint,
+    })
+}

@@ -1,0 +1,103 @@
+use super::*;
+
+fn level(verdict: &Verdict) -> Level {
+    // Whoever is told that something is wrong is told what to do.
+    assert_eq!(
+        verdict.remedy.is_none(),
+        verdict.level == Level::Ok,
+        "{verdict:?}"
+    );
+    verdict.level
+}
+
+#[test]
+fn a_machine_that_does_not_say_much_is_not_judged() {
+    let verdicts = all(&Facts::default());
+    let found: Vec<&Verdict> = verdicts.iter().filter(|it| it.level != Level::Ok).collect();
+    assert!(found.is_empty(), "{found:?}");
+}
+
+#[test]
+fn shared_memory_that_is_small_is_told_before_it_is_a_bus_error() {
+    let of = |mb: u64| level(&shared_memory(&Ok(mb * 1_000_000)));
+    assert_eq!(
+        [of(2), of(20), of(1000)],
+        [Level::Error, Level::Warning, Level::Ok]
+    );
+    assert_eq!(
+        level(&shared_memory(&Err("denied".to_owned()))),
+        Level::Error
+    );
+}
+
+#[test]
+fn leftovers_clock_and_limits_warn() {
+    assert_eq!(level(&left_behind(&Ok(0))), Level::Ok);
+    assert_eq!(level(&left_behind(&Ok(2))), Level::Warning);
+    assert_eq!(level(&clock_source(Some("tsc"))), Level::Ok);
+    assert_eq!(level(&clock_source(Some("hpet"))), Level::Warning);
+    assert_eq!(level(&clock_synchronised(Some(false))), Level::Warning);
+    assert_eq!(level(&open_files(Some(256))), Level::Warning);
+    assert_eq!(level(&open_files(None)), Level::Ok);
+}
+
+#[test]
+fn a_disk_is_judged_by_the_days_it_lasts() {
+    let of = |free_mb: u64, mb_a_day: Option<f64>| {
+        level(&folder(&Folder {
+            path: "out".into(),
+            writable: Ok(()),
+            free_bytes: Some(free_mb * 1_000_000),
+            min_free_mb: 500.0,
+            bytes_a_day: mb_a_day.map(|mb| mb * 1e6),
+        }))
+    };
+    assert_eq!(of(400, None), Level::Error);
+    assert_eq!(of(600, None), Level::Ok);
+    assert_eq!(of(10_500, Some(1000.0)), Level::Ok);
+    assert_eq!(of(2_500, Some(1000.0)), Level::Warning);
+    let closed = Folder {
+        path: "out".into(),
+        writable: Err("read-only".to_owned()),
+        free_bytes: None,
+        min_free_mb: 1.0,
+        bytes_a_day: None,
+    };
+    assert_eq!(level(&folder(&closed)), Level::Error);
+}
+
+#[test]
+fn a_port_that_is_taken_and_a_peer_that_is_away_are_errors() {
+    let of = |listens, possible: Result<(), &str>| {
+        endpoint(&Endpoint {
+            of: "ingest".to_owned(),
+            endpoint: "tls/cell:7447#connect_private_key=secret.pem".to_owned(),
+            listens,
+            possible: possible.map_err(str::to_owned),
+        })
+    };
+    assert_eq!(level(&of(true, Ok(()))), Level::Ok);
+    assert_eq!(level(&of(true, Err("in use"))), Level::Error);
+    let away = of(false, Err("refused"));
+    assert_eq!(level(&away), Level::Error);
+    assert!(!away.found.contains("secret"), "{}", away.found);
+}
+
+#[test]
+fn a_certificate_is_told_of_before_it_runs_out() {
+    const DAY_S: i64 = 86_400;
+    let of = |from_days: i64, to_days: i64| {
+        let now_s = 20_000 * DAY_S;
+        let valid = Ok((now_s + from_days * DAY_S, now_s + to_days * DAY_S));
+        level(&certificate(Path::new("c.pem"), &valid, now_s))
+    };
+    assert_eq!(of(-10, 90), Level::Ok);
+    assert_eq!(of(-10, 10), Level::Warning);
+    assert_eq!(of(-10, -1), Level::Error);
+    assert_eq!(of(1, 90), Level::Error);
+    let unreadable = Err("no such file".to_owned());
+    assert_eq!(
+        level(&certificate(Path::new("c.pem"), &unreadable, 0)),
+        Level::Error
+    );
+}

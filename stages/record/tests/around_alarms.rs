@@ -1,0 +1,121 @@
+//! Around each alarm a file of its own, with what came before it.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+mod synthetic;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use synthetic::{START_NS, STEP_NS, arm, cell, motion, streams};
+use tauscope_archive::Recording;
+use tauscope_bus::Sink;
+use tauscope_record::{AroundAlarms, Config, Recorder};
+
+/// Around the alarms of ten seconds with two pushes: at 3.0 to 4.2 s and at 7.0 to 7.8 s.
+fn record(folder: &Path, around: AroundAlarms) -> Vec<PathBuf> {
+    let config = Config {
+        around_alarms: Some(AroundAlarms {
+            mcap: Some(folder.join("alarm-{n}.mcap")),
+            ..around
+        }),
+        ..Config::default()
+    };
+    let cells = [cell("demo", Some(arm(false)))];
+    let streams = streams("demo", "");
+    let mut recorder = Recorder::new(&config, &cells, &streams, &BTreeMap::new()).unwrap();
+    for instant in &motion(12.0) {
+        instant.feed(&mut recorder, "");
+    }
+    recorder.finish().unwrap();
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut files: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    files
+}
+
+/// From the first to the last joint state \[s since the start\], and whether there is one for each step.
+fn span(file: &Path) -> (f64, f64, bool) {
+    let recording = Recording::open(file).unwrap();
+    assert!(recording.damage().is_empty(), "{}", file.display());
+    let mut states = recording.joint_states("/joint_states").unwrap();
+    let mut stamps = Vec::new();
+    while let Some(state) = states.next_state() {
+        let stamp = state.unwrap().message.header.stamp;
+        stamps.push(i64::from(stamp.sec) * 1_000_000_000 + i64::from(stamp.nanosec) - START_NS);
+    }
+    let dense = stamps.windows(2).all(|pair| pair[1] - pair[0] == STEP_NS);
+    let seconds = |ns: &i64| *ns as f64 * 1e-9;
+    let (first, last) = (stamps.first().unwrap(), stamps.last().unwrap());
+    (seconds(first), seconds(last), dense)
+}
+
+#[test]
+fn each_alarm_has_a_file_from_before_it_to_after_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let around = AroundAlarms {
+        before_s: 1.0,
+        after_s: 0.5,
+        ..AroundAlarms::default()
+    };
+    let files = record(folder.path(), around);
+    let names = ["alarm-001.mcap", "alarm-002.mcap"].map(|name| folder.path().join(name));
+    assert_eq!(files, names);
+    for (file, (onset_s, offset_s)) in files.iter().zip([(3.0, 4.2), (7.0, 7.8)]) {
+        let (first_s, last_s, dense) = span(file);
+        assert!(dense, "{}: a sample is missing", file.display());
+        // The alarm rises and falls within some tenths of a second of the push.
+        let begins = onset_s - 1.0..onset_s - 0.5;
+        let ends = offset_s + 0.2..offset_s + 1.0;
+        assert!(begins.contains(&first_s), "begins at {first_s} s");
+        assert!(ends.contains(&last_s), "ends at {last_s} s");
+    }
+}
+
+#[test]
+fn alarms_whose_files_would_overlap_share_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let around = AroundAlarms {
+        before_s: 2.5,
+        after_s: 1.0,
+        ..AroundAlarms::default()
+    };
+    let files = record(folder.path(), around);
+    assert_eq!(files.len(), 1, "{files:?}");
+    let (first_s, last_s, dense) = span(&files[0]);
+    assert!(
+        first_s < 1.0 && last_s > 8.5 && dense,
+        "{first_s} to {last_s} s"
+    );
+}
+
+#[test]
+fn what_came_before_is_bounded_in_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let around = AroundAlarms {
+        before_s: 60.0,
+        after_s: 0.5,
+        at_most_mb: 1.0,
+        ..AroundAlarms::default()
+    };
+    let files = record(folder.path(), around);
+    // 1 MB is some two seconds of three streams at 250 Hz.
+    let (first_s, _, dense) = span(&files[0]);
+    assert!(
+        first_s > 0.1 && first_s < 3.0 && dense,
+        "begins at {first_s} s"
+    );
+}
+
+#[test]
+fn the_same_samples_give_the_same_files() {
+    let bytes = || {
+        let folder = tempfile::tempdir().unwrap();
+        let files = record(folder.path(), AroundAlarms::default());
+        files
+            .iter()
+            .map(|file| std::fs::read(file).unwrap())
+            .collect::<Vec<_>>()
+    };
+    assert!(bytes() == bytes());
+}
