@@ -142,10 +142,15 @@ impl Made {
                 let recorder = build::recorder(config, &cells, &told.streams, &told.provenance)?;
                 Self::Record(Box::new(recorder))
             }
-            Settings::Publish { config, commands } => {
+            Settings::Publish {
+                config,
+                commands,
+                beside,
+            } => {
                 let restarted = child.seat().restarts > 0;
+                let (commands, streams) = (commands.as_ref(), &told.streams);
                 let publisher =
-                    build::publisher(config, commands.as_ref(), cell()?, &told.streams, restarted)?;
+                    build::publisher(config, commands, beside, cell()?, streams, restarted)?;
                 Self::Publish(Box::new(publisher))
             }
             Settings::Outside(_) => return Err(SeatError::Outside),
