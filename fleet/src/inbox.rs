@@ -72,7 +72,13 @@ pub fn records(key: &str, payload: &[u8]) -> Vec<Event> {
         },
         Err(reason) => Event::Refused(reason),
     };
-    records.into_iter().map(event).collect()
+    let last = records.iter().max_by_key(|record| record.number);
+    let all = last.map(|last| Event::AllRecords {
+        cell: cell.clone(),
+        instance: last.instance.clone(),
+        number: last.number,
+    });
+    records.into_iter().map(event).chain(all).collect()
 }
 
 fn cell_of(key: &str, topic: &str) -> Result<String, Refusal> {

@@ -2,7 +2,14 @@
 
 #[cfg(test)]
 mod fixture;
-pub mod inbox;
-pub mod wall;
-pub mod mailbox;
+pub mod hub;
+mod inbox;
+mod keeper;
+mod mailbox;
+pub mod show;
 pub mod store;
+pub mod wall;
+pub mod web;
+mod words;
+
+pub use hub::{FleetError, Hub, Options};

@@ -86,7 +86,10 @@ mod tests {
         }
         mailbox.urgent(usize::MAX);
         let (all, overflowed) = mailbox.take(Duration::ZERO);
-        assert_eq!((all[0], all.len(), overflowed), (usize::MAX, MAX_WAITING + 1, 3));
+        assert_eq!(
+            (all[0], all.len(), overflowed),
+            (usize::MAX, MAX_WAITING + 1, 3)
+        );
         assert_eq!(mailbox.take(Duration::ZERO), (vec![], 0));
     }
 }

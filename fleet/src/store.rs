@@ -112,10 +112,8 @@ impl Store {
             source,
         };
         let connection = Connection::open(path).map_err(failed)?;
-        connection.busy_timeout(Duration::from_secs(2)).map_err(failed)?;
-        // A power cut may lose the last second, never the file.
         connection
-            .execute_batch("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;")
+            .busy_timeout(Duration::from_secs(2))
             .map_err(failed)?;
         let found: i64 = connection
             .query_row("PRAGMA user_version", [], |row| row.get(0))
@@ -130,6 +128,10 @@ impl Store {
             let path = path.to_owned();
             return Err(StoreError::Version { path, found });
         }
+        // A power cut may lose the last second, never the file.
+        connection
+            .execute_batch("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;")
+            .map_err(failed)?;
         Ok(Self {
             connection,
             path: path.to_owned(),
@@ -161,7 +163,9 @@ impl Store {
     pub fn seen(&self, cell: &str, at_ns: i64, host: &str, robot: &str) -> Result<(), StoreError> {
         let text = "INSERT INTO cells VALUES (?1, ?2, ?3, ?4) ON CONFLICT (cell) DO UPDATE
                     SET seen_ns = ?2, host = ?3, robot = ?4";
-        let done = self.connection.execute(text, params![cell, at_ns, host, robot]);
+        let done = self
+            .connection
+            .execute(text, params![cell, at_ns, host, robot]);
         done.map(|_| ()).map_err(|error| self.failed(error))
     }
 
@@ -195,7 +199,8 @@ impl Store {
             .query_row(known, key, |row| row.get(0))
             .optional()
             .map_err(|error| self.failed(error))?;
-        let text = "INSERT INTO contacts VALUES (?1,?2,?3,?4,?5,?6,?7,?8,?9,?10,?11,?12,?13,?14,?15)
+        let text =
+            "INSERT INTO contacts VALUES (?1,?2,?3,?4,?5,?6,?7,?8,?9,?10,?11,?12,?13,?14,?15)
                     ON CONFLICT DO UPDATE SET kind = ?5, link = ?6, end_ns = coalesce(?9, end_ns),
                     peak_force_n = ?10, latched = max(latched, ?11),
                     acknowledged_ns = coalesce(?12, acknowledged_ns),
@@ -218,7 +223,8 @@ impl Store {
             archive,
         ];
         let done = self.connection.execute(text, values);
-        done.map(|_| known.is_none()).map_err(|error| self.failed(error))
+        done.map(|_| known.is_none())
+            .map_err(|error| self.failed(error))
     }
 
     /// The newest contacts of a cell.
@@ -256,7 +262,8 @@ impl Store {
     /// # Errors
     /// If the file cannot be written.
     pub fn note(&self, cell: &str, note: &Note) -> Result<(), StoreError> {
-        let text = "INSERT INTO notes (cell, at_ns, by, text, baseline) VALUES (?1, ?2, ?3, ?4, ?5)";
+        let text =
+            "INSERT INTO notes (cell, at_ns, by, text, baseline) VALUES (?1, ?2, ?3, ?4, ?5)";
         let values = params![cell, note.at_ns, note.by, note.text, note.baseline];
         let done = self.connection.execute(text, values);
         done.map(|_| ()).map_err(|error| self.failed(error))
@@ -301,7 +308,10 @@ impl Store {
     ///
     /// # Errors
     /// What `work` says, or if the file cannot be written.
-    pub fn at_once(&self, work: impl FnOnce(&Self) -> Result<(), StoreError>) -> Result<(), StoreError> {
+    pub fn at_once(
+        &self,
+        work: impl FnOnce(&Self) -> Result<(), StoreError>,
+    ) -> Result<(), StoreError> {
         let transaction = self
             .connection
             .unchecked_transaction()
@@ -318,7 +328,7 @@ impl Store {
     ) -> Result<Vec<T>, StoreError> {
         let mut statement = self
             .connection
-            .prepare_cached(text)
+            .prepare(text)
             .map_err(|error| self.failed(error))?;
         let rows = statement.query_map(values, read);
         let rows = rows.and_then(Iterator::collect);

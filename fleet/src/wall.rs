@@ -64,6 +64,15 @@ pub enum Event {
         /// What it says.
         record: Box<RecordMessage>,
     },
+    /// The cell has answered with all records that it keeps, up to this number.
+    AllRecords {
+        /// The cell.
+        cell: String,
+        /// The publisher's life.
+        instance: String,
+        /// The last number.
+        number: u64,
+    },
     /// A message that is none, and why.
     Refused(&'static str),
     /// So many Zenoh sessions are reached.
@@ -182,6 +191,16 @@ impl Wall {
                     return effects;
                 };
                 watched.record(&cell, *record, &mut effects);
+                cell
+            }
+            Event::AllRecords {
+                cell,
+                instance,
+                number,
+            } => {
+                if let Some(watched) = self.cells.get_mut(&cell) {
+                    watched.all_records(&instance, number);
+                }
                 cell
             }
         };

@@ -40,16 +40,27 @@ pub struct JointNormal {
     pub rms: f64,
 }
 
+fn root(square: f64) -> f64 {
+    square.max(0.0).sqrt()
+}
+
 impl Store {
     /// Adds a minute of a joint's residual \[effort unit\].
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn minute(&self, cell: &str, joint: &str, at_ns: i64, rms: f64, mean: f64) -> Result<(), StoreError> {
+    pub fn minute(
+        &self,
+        cell: &str,
+        joint: &str,
+        at_ns: i64,
+        rms: f64,
+        mean: f64,
+    ) -> Result<(), StoreError> {
         let hour_ns = at_ns - at_ns.rem_euclid(HOUR_NS);
         let text = "INSERT INTO history VALUES (?1, ?2, ?3, 1, ?4, ?5) ON CONFLICT DO UPDATE
                     SET minutes = minutes + 1, squares = squares + ?4, means = means + ?5";
-        let statement = self.connection.prepare_cached(text);
+        let statement = self.connection.prepare(text);
         let values = params![cell, joint, hour_ns, rms * rms, mean];
         let done = statement.and_then(|mut statement| statement.execute(values));
         done.map(|_| ()).map_err(|error| self.failed(error))
@@ -60,17 +71,17 @@ impl Store {
     /// # Errors
     /// If the file cannot be read.
     pub fn days(&self, cell: &str, since_ns: i64) -> Result<Vec<Day>, StoreError> {
-        let text = "SELECT joint, hour_ns - hour_ns % ?3 AS day, sqrt(sum(squares) / sum(minutes)),
-                    sqrt(min(squares / minutes)), sqrt(max(squares / minutes)),
+        let text = "SELECT joint, hour_ns - hour_ns % ?3 AS day, sum(squares) / sum(minutes),
+                    min(squares / minutes), max(squares / minutes),
                     sum(means) / sum(minutes), sum(minutes)
                     FROM history WHERE cell = ?1 AND hour_ns >= ?2 GROUP BY joint, day ORDER BY joint, day";
         self.rows(text, params![cell, since_ns, DAY_NS], |row| {
             Ok(Day {
                 joint: row.get(0)?,
                 day_ns: row.get(1)?,
-                rms: row.get(2)?,
-                low: row.get(3)?,
-                high: row.get(4)?,
+                rms: root(row.get(2)?),
+                low: root(row.get(3)?),
+                high: root(row.get(4)?),
                 mean: row.get(5)?,
                 minutes: row.get(6)?,
             })
@@ -94,7 +105,7 @@ impl Store {
     pub fn normals(&self, cell: &str) -> Result<Vec<JointNormal>, StoreError> {
         let since_ns = self.baseline_ns(cell)?.unwrap_or(0);
         // The hour of the baseline itself holds minutes from before it.
-        let text = "SELECT joint, sqrt(sum(squares) / sum(minutes)) FROM
+        let text = "SELECT joint, sum(squares) / sum(minutes) FROM
                     (SELECT *, row_number() OVER (PARTITION BY joint ORDER BY hour_ns) AS place
                      FROM history WHERE cell = ?1 AND hour_ns >= ?2)
                     WHERE place <= ?3 GROUP BY joint HAVING sum(minutes) >= ?4 ORDER BY joint";
@@ -102,7 +113,7 @@ impl Store {
         self.rows(text, values, |row| {
             Ok(JointNormal {
                 joint: row.get(0)?,
-                rms: row.get(1)?,
+                rms: root(row.get(1)?),
             })
         })
     }

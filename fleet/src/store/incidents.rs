@@ -106,7 +106,8 @@ impl Store {
     /// If the file cannot be written.
     pub fn raise(&self, news: &News) -> Result<(), StoreError> {
         let failed = |error| self.failed(error);
-        let text = "SELECT id, closed_ns FROM incidents WHERE cell = ?1 AND kind = ?2 AND place = ?3
+        let text =
+            "SELECT id, closed_ns FROM incidents WHERE cell = ?1 AND kind = ?2 AND place = ?3
                     ORDER BY last_ns DESC, id DESC LIMIT 1";
         let cause = params![news.cell, news.kind.as_str(), news.place];
         let last: Option<(i64, Option<i64>)> = self

@@ -34,8 +34,14 @@ fn a_cause_that_comes_again_within_ten_minutes_is_the_same_incident() {
     let all = store.incidents(None, 10).unwrap();
     assert_eq!(all.len(), 2);
     let again = &all[0];
-    assert_eq!((again.count, again.reopened, again.severity), (3, 1, Severity::Critical));
-    assert_eq!((again.opened_ns, again.closed_ns, &again.acknowledged_by), (0, None, &None));
+    assert_eq!(
+        (again.count, again.reopened, again.severity),
+        (3, 1, Severity::Critical)
+    );
+    assert_eq!(
+        (again.opened_ns, again.closed_ns, &again.acknowledged_by),
+        (0, None, &None)
+    );
     store.close("a", Kind::Contact, "link5", 12 * MIN).unwrap();
     store.raise(&news("link5", 23, Severity::Notice)).unwrap();
     assert_eq!(store.incidents(Some("a"), 10).unwrap().len(), 3);
@@ -51,7 +57,11 @@ fn a_contact_is_kept_once_with_all_that_becomes_known_of_it() {
     contact.acknowledged_by = Some("anna".to_owned());
     assert!(!store.contact("a", "x", &contact, "pc", None).unwrap());
     // Of another life it is another one.
-    assert!(store.contact("a", "y", &fixture::contact(1, 9), "pc", Some("a.mcap")).unwrap());
+    assert!(
+        store
+            .contact("a", "y", &fixture::contact(1, 9), "pc", Some("a.mcap"))
+            .unwrap()
+    );
     let kept = store.contacts("a", 10).unwrap();
     assert_eq!(kept.len(), 2);
     assert_eq!(kept[0].archive.as_deref(), Some("a.mcap"));
@@ -63,7 +73,9 @@ fn normal_is_the_first_day_behind_the_newest_baseline() {
     let (_folder, store) = store();
     let add = |day: i64, rms: f64, minutes: i64| {
         for minute in 0..minutes {
-            store.minute("a", "j", day * DAY + minute * MIN, rms, 0.1).unwrap();
+            store
+                .minute("a", "j", day * DAY + minute * MIN, rms, 0.1)
+                .unwrap();
         }
     };
     add(0, 1.0, 59);
@@ -83,7 +95,10 @@ fn normal_is_the_first_day_behind_the_newest_baseline() {
     assert_eq!(store.notes("a", 5).unwrap(), [note]);
     let days = store.days("a", 0).unwrap();
     assert_eq!(days.len(), 3);
-    assert!((days[2].rms - 3.0).abs() < 1e-9 && days[2].minutes == 120, "{days:?}");
+    assert!(
+        (days[2].rms - 3.0).abs() < 1e-9 && days[2].minutes == 120,
+        "{days:?}"
+    );
 }
 
 #[test]
@@ -106,6 +121,10 @@ fn a_file_that_is_none_of_ours_is_refused() {
     other.execute_batch("CREATE TABLE t (x)").unwrap();
     let error = Store::open(&path).unwrap_err().to_string();
     assert!(error.contains("has the version 0"), "{error}");
-    std::fs::write(folder.path().join("text"), "no database, but long enough to be one".repeat(50)).unwrap();
+    std::fs::write(
+        folder.path().join("text"),
+        "no database, but long enough to be one".repeat(50),
+    )
+    .unwrap();
     assert!(Store::open(&folder.path().join("text")).is_err());
 }

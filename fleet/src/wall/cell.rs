@@ -167,10 +167,20 @@ impl Watched {
         });
     }
 
+    /// What is kept of the records has come; what is older is gone.
+    pub fn all_records(&mut self, instance: &str, number: u64) {
+        if self
+            .newest()
+            .is_some_and(|status| status.instance == instance)
+        {
+            self.records = self.records.max(number);
+        }
+    }
+
     /// Where it stands.
     pub fn state(&self, reached: usize, now: Now) -> State {
         let Some((status, at)) = &self.status else {
-            return self.state_without_status(now);
+            return self.state_without_status();
         };
         let stale = |since_ns, why| State::Stale { since_ns, why };
         if status.ended {
@@ -220,7 +230,7 @@ impl Watched {
         }
     }
 
-    fn state_without_status(&self, _now: Now) -> State {
+    fn state_without_status(&self) -> State {
         if !self.lives.is_empty() {
             return State::Unknown {
                 why: UnknownWhy::NoStatus,
@@ -279,6 +289,7 @@ impl Watched {
                 .fold(0u64, |sum, lost| sum.saturating_add(*lost)),
             residual: self.newest().and_then(ResidualView::of),
             curve: self.minutes.iter().copied().collect(),
+            trend: Vec::new(),
             status: self.newest().cloned(),
         }
     }

@@ -51,6 +51,8 @@ pub struct CellView {
     pub residual: Option<ResidualView>,
     /// The residual's length in each of the last minutes \[effort unit\].
     pub curve: Vec<f64>,
+    /// The residual's length by day over the last six weeks, as a share of the normal; empty without a history.
+    pub trend: Vec<f64>,
     /// What it said last; as old as `status_age_ms`.
     pub status: Option<StatusMessage>,
 }

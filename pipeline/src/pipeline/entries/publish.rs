@@ -55,7 +55,7 @@ impl Resolver<'_> {
             return BesidePublisher::default();
         };
         let cells = &wiring.cells[index];
-        let stages = || (0..wiring.roles.len());
+        let stages = || 0..wiring.roles.len();
         let heard = wiring.inputs[index].iter().copied();
         let twin = heard
             .chain(stages().filter(|&at| wiring.cells[at] == *cells))
