@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use tauscope_publish::message::{ContactMessage, Record, StatusMessage};
 
 use crate::store::{JointNormal, Kind, News, Store, StoreError};
-use crate::wall::{Effect, ResidualView, Severity, Snapshot, State, Wall};
+use crate::wall::{Effect, ResidualView, Severity, Snapshot, State, UnknownWhy, Wall};
 use crate::words;
 
 const MINUTE_NS: i64 = 60_000_000_000;
@@ -64,11 +64,14 @@ impl Keeper {
             Effect::Recorded {
                 cell,
                 instance,
+                told_ns,
                 record,
             } => {
                 let status = wall.status_of(cell);
                 match record {
-                    Record::Contact(contact) => self.contact(cell, instance, contact, status),
+                    Record::Contact(contact) => {
+                        self.contact(cell, instance, contact, *told_ns, status)
+                    }
                     Record::Change(change) => {
                         let unit = status.map_or("", |status| status.effort_unit.as_str());
                         self.store.raise(&News {
@@ -77,7 +80,7 @@ impl Keeper {
                             place: format!("{} {}", change.effect, change.joints.join(" ")),
                             severity: Severity::Notice,
                             words: words::change(change, unit),
-                            at_ns: change.since_ns,
+                            at_ns: *told_ns,
                         })
                     }
                 }
@@ -109,26 +112,26 @@ impl Keeper {
         now: State,
         now_ns: i64,
     ) -> Result<(), StoreError> {
-        let silent = |state: State| matches!(state, State::Stale { .. } | State::Unknown { .. });
-        if silent(now) {
-            let news = News {
-                cell: cell.to_owned(),
-                kind: Kind::Silence,
-                place: String::new(),
-                severity: now.severity(),
-                words: format!("{}: {}", now.words(), now.reason()),
-                at_ns: now_ns,
-            };
-            return if silent(before) {
-                self.store.revise(&news)
-            } else {
-                self.store.raise(&news)
-            };
+        match now {
+            // On its way to something else.
+            State::Unknown { why } if why != UnknownWhy::TwoPublishers => Ok(()),
+            State::Stale { .. } | State::Unknown { .. } => {
+                let news = News {
+                    cell: cell.to_owned(),
+                    kind: Kind::Silence,
+                    place: String::new(),
+                    severity: now.severity(),
+                    words: format!("{}: {}", now.words(), now.reason()),
+                    at_ns: now_ns,
+                };
+                if matches!(before, State::Stale { .. }) {
+                    self.store.revise(&news)
+                } else {
+                    self.store.raise(&news)
+                }
+            }
+            _ => self.store.close(cell, Kind::Silence, "", now_ns),
         }
-        if silent(before) {
-            self.store.close(cell, Kind::Silence, "", now_ns)?;
-        }
-        Ok(())
     }
 
     fn contact(
@@ -136,6 +139,7 @@ impl Keeper {
         cell: &str,
         instance: &str,
         contact: &ContactMessage,
+        told_ns: i64,
         status: Option<&StatusMessage>,
     ) -> Result<(), StoreError> {
         let host = status.map_or("", |status| status.host.as_str());
@@ -159,21 +163,22 @@ impl Keeper {
                 Severity::Notice
             },
             words: text,
-            at_ns: contact.onset_ns,
+            at_ns: told_ns,
         };
         if is_new {
             self.store.raise(&news)?;
         } else {
             self.store.revise(&news)?;
         }
-        if let (Some(at_ns), Some(by)) = (contact.acknowledged_ns, &contact.acknowledged_by) {
-            self.store.acknowledge(cell, by, at_ns)?;
+        if let (Some(_), Some(by)) = (contact.acknowledged_ns, &contact.acknowledged_by) {
+            self.store.acknowledge(cell, by, told_ns)?;
         }
         let acknowledged = !contact.latched || contact.acknowledged_ns.is_some();
-        match contact.end_ns.filter(|_| acknowledged) {
-            Some(end_ns) => self.store.close(cell, Kind::Contact, &news.place, end_ns),
-            None => Ok(()),
+        if contact.end_ns.is_some() && acknowledged {
+            self.store
+                .close(cell, Kind::Contact, &news.place, told_ns)?;
         }
+        Ok(())
     }
 
     /// Keeps what is due by the clock: minutes, and once an hour what is normal.

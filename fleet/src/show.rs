@@ -69,6 +69,7 @@ pub fn line(view: &CellView, now_ns: i64) -> String {
 
 fn row(view: &CellView, now_ns: i64) -> [String; 9] {
     let none = || "-".to_owned();
+    let stream_now_ns = view.stream_now_ns().unwrap_or(now_ns);
     let status = view.status.as_ref();
     let contact = status.and_then(|status| status.last_contact.as_ref());
     let state = match view.state {
@@ -82,7 +83,7 @@ fn row(view: &CellView, now_ns: i64) -> [String; 9] {
             .map_or_else(none, |since_ns| words::age_at(since_ns, now_ns)),
         view.sample_age_ms.map_or_else(none, words::age),
         contact.map_or_else(none, |contact| {
-            let ago = words::age_at(contact.onset_ns, now_ns);
+            let ago = words::age_at(contact.onset_ns, stream_now_ns);
             format!("{}, {ago} ago", words::contact(contact))
         }),
         status.map_or_else(none, |status| status.contacts_today.to_string()),

@@ -97,6 +97,8 @@ pub enum Effect {
         cell: String,
         /// The publisher's life.
         instance: String,
+        /// When it was told, by the clock of the cell's computer \[ns since the epoch\].
+        told_ns: i64,
         /// The record.
         record: Record,
     },

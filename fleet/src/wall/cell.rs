@@ -30,8 +30,8 @@ pub struct Watched {
     records: u64,
     /// Lost samples by stage, as last told.
     lost: BTreeMap<String, u64>,
-    /// Clock of the cell minus clock of this host, the smallest since the life began \[ns\].
-    clock_ahead_ns: Option<i64>,
+    /// Clock of the cell minus clock of this host by the fastest message of a minute \[ns\], and when the minute began.
+    clock_ahead: Option<(i64, u64)>,
     minutes: VecDeque<f64>,
     minute: Option<i64>,
     /// The state as of the last settling, and since when \[ns since the epoch\].
@@ -95,14 +95,16 @@ impl Watched {
             }
             self.records = 0;
             self.lost.clear();
-            self.clock_ahead_ns = None;
+            self.clock_ahead = None;
         }
         let ahead_ns = status.sent_ns.saturating_sub(now.unix_ns);
         // What is late looks like a clock that is behind: the message that was fastest tells best.
-        let best = self
-            .clock_ahead_ns
-            .map_or(ahead_ns, |known| known.max(ahead_ns));
-        self.clock_ahead_ns = Some(best);
+        let of_minute =
+            |(_, since_ms): &(i64, u64)| now.running_ms.saturating_sub(*since_ms) < 60_000;
+        self.clock_ahead = Some(match self.clock_ahead.filter(of_minute) {
+            Some((best_ns, since_ms)) => (best_ns.max(ahead_ns), since_ms),
+            None => (ahead_ns, now.running_ms),
+        });
         self.count_losses(name, &status, effects);
         if status.last_record > self.records {
             effects.push(Effect::AskRecords {
@@ -163,6 +165,7 @@ impl Watched {
         effects.push(Effect::Recorded {
             cell: name.to_owned(),
             instance: message.instance,
+            told_ns: message.sent_ns,
             record: message.record,
         });
     }
@@ -195,13 +198,18 @@ impl Watched {
         if let Some(gone) = self.gone {
             return stale(gone.unix_ns, StaleWhy::Token);
         }
+        let unknown = |why| State::Unknown { why };
         if self.lives.len() > 1 {
-            return State::Unknown {
-                why: UnknownWhy::TwoPublishers,
-            };
+            return unknown(UnknownWhy::TwoPublishers);
         }
-        if age_ms > STALE_AFTER_MS || !self.lives.contains(&status.instance) {
+        if age_ms > STALE_AFTER_MS {
             return stale(at.unix_ns, StaleWhy::Status);
+        }
+        if self.lives.is_empty() {
+            return unknown(UnknownWhy::NoToken);
+        }
+        if !self.lives.contains(&status.instance) {
+            return unknown(UnknownWhy::NoStatus);
         }
         let muted_ms = (status.alarm.muted_s * 1e3) as u64;
         let muted = muted_ms
@@ -282,7 +290,7 @@ impl Watched {
             since_ns,
             status_age_ms,
             sample_age_ms,
-            clock_ahead_ms: self.clock_ahead_ns.map(|ns| ns / NS_PER_MS),
+            clock_ahead_ms: self.clock_ahead.map(|(ns, _)| ns / NS_PER_MS),
             lost_samples: self
                 .lost
                 .values()

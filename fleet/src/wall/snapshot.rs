@@ -70,6 +70,16 @@ pub struct ResidualView {
     pub normal: &'static str,
 }
 
+impl CellView {
+    /// Now, by the clock of the cell's samples: ages of what has a stamp are against this \[ns since the epoch\].
+    /// A recording that is played has another time than the fleet host.
+    pub fn stream_now_ns(&self) -> Option<i64> {
+        let newest_ns = self.status.as_ref()?.last_sample_ns?;
+        let age_ns = self.sample_age_ms?.saturating_mul(1_000_000);
+        Some(newest_ns.saturating_add(i64::try_from(age_ns).ok()?))
+    }
+}
+
 impl ResidualView {
     /// Against the twin's calibration.
     pub fn of(status: &StatusMessage) -> Option<Self> {

@@ -63,6 +63,8 @@ pub enum StaleWhy {
 pub enum UnknownWhy {
     /// It lives, but has told no status yet.
     NoStatus,
+    /// It tells a status, but its publisher's token is not there.
+    NoToken,
     /// Two publishers call themselves by this name.
     TwoPublishers,
 }
@@ -155,6 +157,7 @@ impl State {
             },
             Self::Unknown { why } => match why {
                 UnknownWhy::NoStatus => "it lives, but has told no status yet",
+                UnknownWhy::NoToken => "a status came, but the token of its publisher is not there",
                 UnknownWhy::TwoPublishers => "two publishers have this name",
             },
             Self::Contact => "something touches the robot",

@@ -93,7 +93,7 @@ fn a_cell_is_running_only_with_token_status_samples_and_a_detector_that_judges()
 #[test]
 fn a_status_without_a_token_is_not_green() {
     let mut story = Story::new(&[]);
-    story.status(|_| {}).is("stale");
+    story.status(|_| {}).is("unknown").because("token");
     story.alive("x").is("running");
 }
 

@@ -21,7 +21,7 @@ pub fn tile(view: &CellView, now_ns: i64) -> Markup {
                 (badge(view.state))
             }
             p.reason { (reason(view, now_ns)) }
-            @if let Some(status) = status { (facts(view, status, now_ns)) }
+            @if let Some(status) = status { (facts(view, status, view.stream_now_ns().unwrap_or(now_ns))) }
         }
     }
 }
