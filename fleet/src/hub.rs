@@ -101,7 +101,12 @@ impl Hub {
                 wall.remember(&cell, seen_ns);
             }
         }
-        let session = options.endpoints.session()?;
+        let begin = Instant::now();
+        wall.tick(Now {
+            running_ms: 0,
+            unix_ns: unix_ns(),
+        });
+        let session = options.endpoints.lookout()?;
         let mailbox = Arc::new(Mailbox::default());
         listen(&session, &mailbox)?;
         let (show, snapshots) = watch::channel(Arc::new(wall.snapshot()));
@@ -112,7 +117,7 @@ impl Hub {
             wall,
             keeper,
             show,
-            begin: Instant::now(),
+            begin,
             unkept: false,
         };
         let stopped = stop.clone();

@@ -41,6 +41,8 @@ pub struct Presence {
     kept: Arc<Mutex<Kept>>,
     _queryables: [Queryable<()>; 2],
     _token: LivelinessToken,
+    /// It closes when nobody holds it.
+    _session: Session,
 }
 
 impl Presence {
@@ -89,6 +91,7 @@ impl Presence {
                 .declare_token(alive_key(cell, instance))
                 .wait()
                 .map_err(PublishError::zenoh)?,
+            _session: session.clone(),
         })
     }
 
