@@ -45,7 +45,7 @@ killed=$!
 sleep 30
 kill -9 "$killed"
 sleep 4
-python3 docs/page.py "http://$page/" docs/fleet.png 1400 light
+python3 docs/page.py "http://$page/" docs/fleet.png 1400 light 510
 if [ -n "${2:-}" ]; then
     mkdir -p "$folder"
     curl -s "http://$page/fleet.json" >"$folder/fleet.json"

@@ -77,9 +77,10 @@ def main(address, picture, width, scheme="light", height=None):
         time.sleep(1.5)
         wide = browser.evaluate("document.documentElement.scrollWidth")
         shot = {"captureBeyondViewport": True, "format": "png"}
+        shot["clip"] = {"x": 0, "y": 0, "width": width, "height": int(height or 900), "scale": 1}
         if height is None:
             tall = browser.evaluate("document.documentElement.scrollHeight")
-            shot["clip"] = {"x": 0, "y": 0, "width": width, "height": tall, "scale": 1}
+            shot["clip"]["height"] = tall
         with open(picture, "wb") as file:
             file.write(base64.b64decode(browser.call("Page.captureScreenshot", **shot)["data"]))
     finally:

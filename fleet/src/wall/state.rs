@@ -147,7 +147,7 @@ impl State {
         match self {
             Self::Stopped {
                 acknowledged: false,
-            } => "a collision waits for its acknowledgement",
+            } => "a latched alarm waits for its acknowledgement",
             Self::Stopped { acknowledged: true } => "the contact is not over yet",
             Self::Stale { why, .. } => match why {
                 StaleWhy::Token => "its process is gone, or its host is cut off",

@@ -1,8 +1,9 @@
 //! What the fleet is told of the cell: once a second how it fares, and each contact as it comes.
 
+use std::os::unix::process::parent_id;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use tauscope_bus::{Command, Detection, Health, TwinState};
+use tauscope_bus::{Command, Detection, Health, TwinState, flags};
 use zenoh::Session;
 
 use crate::alarm::State;
@@ -39,7 +40,8 @@ pub struct Fleet {
     told: Option<Instant>,
     /// The newest sample: its stamp, and when it came.
     newest: Option<(i64, Instant)>,
-    touched: bool,
+    /// The supervisor. A run whose supervisor was killed ends as if in order, but did not.
+    supervisor: u32,
 }
 
 impl Fleet {
@@ -89,7 +91,7 @@ impl Fleet {
             },
             told: None,
             newest: None,
-            touched: true,
+            supervisor: parent_id(),
         })
     }
 
@@ -100,9 +102,7 @@ impl Fleet {
 
     /// Takes what the twin made of a sample.
     pub fn twin(&mut self, sample: &TwinState) {
-        if !self.touched {
-            self.residual.twin(sample);
-        }
+        self.residual.twin(sample);
     }
 
     /// Takes a command.
@@ -124,7 +124,9 @@ impl Fleet {
         judges: bool,
         alarm: State,
     ) {
-        self.touched = !matches!(alarm, State::Free);
+        if judges && detection.alarm() && !detection.header.has(flags::CHANGE) {
+            self.residual.touched(detection.header.stamp_ns);
+        }
         self.report.detection(at, label, detection, judges, alarm);
     }
 
@@ -164,7 +166,7 @@ impl Fleet {
         let (contacts_today, contacts_since_ns) = self.report.today();
         self.status = StatusMessage {
             sent_ns: now_ns(),
-            ended,
+            ended: ended && parent_id() == self.supervisor,
             alarm: alarm.clone(),
             last_sample_ns: self.newest.map(|(stamp_ns, _)| stamp_ns),
             last_sample_age_ms: age.map(|age| u64::try_from(age.as_millis()).unwrap_or(u64::MAX)),

@@ -11,6 +11,10 @@ const PIECE_NS: i64 = 1_000_000_000;
 /// How many pieces are kept. Resolution: a minute covers a few cycles of most programs.
 const PIECES: usize = 60;
 
+/// What is left out before the sample at which a contact is detected, and behind its last one \[ns\]. Resolution: a
+/// detector takes less to see a contact, and the residual's filters settle within it.
+const AROUND_CONTACT_NS: i64 = 1_000_000_000;
+
 #[derive(Debug, Clone)]
 struct Piece {
     begin_ns: i64,
@@ -26,6 +30,8 @@ pub struct Residual {
     joints: Vec<String>,
     calibrated: Vec<Option<f64>>,
     pieces: VecDeque<Piece>,
+    /// The newest sample at which something touched the robot.
+    touched_ns: Option<i64>,
 }
 
 impl Residual {
@@ -35,14 +41,34 @@ impl Residual {
             joints,
             calibrated,
             pieces: VecDeque::with_capacity(PIECES + 1),
+            touched_ns: None,
         }
     }
 
-    /// Takes what the twin made of a sample; nothing touches the robot.
+    /// Something touches the robot at this sample: what is just before and behind it says nothing of the arm.
+    pub fn touched(&mut self, stamp_ns: i64) {
+        self.touched_ns = Some(stamp_ns);
+        let near_ns = stamp_ns.saturating_sub(AROUND_CONTACT_NS);
+        while self
+            .pieces
+            .back()
+            .is_some_and(|last| last.end_ns >= near_ns)
+        {
+            self.pieces.pop_back();
+        }
+    }
+
+    /// Takes what the twin made of a sample.
     pub fn twin(&mut self, sample: &TwinState) {
         let stamp_ns = sample.header.stamp_ns;
         let residual = &sample.residual[..self.joints.len()];
         if !sample.header.has(flags::READY) || residual.iter().any(|value| !value.is_finite()) {
+            return;
+        }
+        let since_ns = self
+            .touched_ns
+            .map(|touched_ns| stamp_ns.saturating_sub(touched_ns));
+        if since_ns.is_some_and(|since_ns| (0..AROUND_CONTACT_NS).contains(&since_ns)) {
             return;
         }
         // A clock that was set back begins anew.

@@ -199,3 +199,22 @@ fn the_residual_is_that_of_the_last_minute() {
     assert!((message.window_s - 54.0).abs() < 1e-6, "{message:?}");
     assert_eq!(message.joints[0].calibrated, Some(0.5));
 }
+
+#[test]
+fn what_is_around_a_contact_says_nothing_of_the_arm() {
+    let mut residual = Residual::new(vec!["a".to_owned()], vec![None]);
+    for i in 0..300 {
+        let mut sample = TwinState::default();
+        sample.header.stamp_ns = i * S / 10;
+        sample.header.flags = flags::READY;
+        // A push from 10 s to 12 s, seen from 10.5 s to 12 s; the arm swings until 12.5 s.
+        sample.residual[0] = if (100..125).contains(&i) { 9.0 } else { 1.0 };
+        residual.twin(&sample);
+        if (105..=120).contains(&i) {
+            residual.touched(sample.header.stamp_ns);
+        }
+    }
+    let message = residual.message().unwrap();
+    assert!((message.joints[0].rms - 1.0).abs() < 1e-9, "{message:?}");
+    assert!(message.window_s > 20.0, "{message:?}");
+}
