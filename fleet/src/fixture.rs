@@ -23,6 +23,7 @@ pub fn status(instance: &str, sent_s: i64) -> StatusMessage {
         alarm: AlarmMessage {
             state: AlarmState::Free,
             free: true,
+            stamp_ns: sent_s * 1_000_000_000 + 1,
             ..AlarmMessage::silent()
         },
         last_sample_ns: Some(sent_s * 1_000_000_000),

@@ -223,7 +223,8 @@ impl Watched {
                 acknowledged: false,
             },
             AlarmState::Acknowledged => State::Stopped { acknowledged: true },
-            AlarmState::Silent if status.last_sample_ns.is_none() => State::NotReady,
+            // Samples come, and no detector has said anything of one yet.
+            AlarmState::Silent if status.alarm.stamp_ns == 0 => State::NotReady,
             AlarmState::Silent => {
                 let age_ns = status
                     .last_sample_age_ms

@@ -87,6 +87,11 @@ fn a_cell_is_running_only_with_token_status_samples_and_a_detector_that_judges()
         status.last_sample_age_ms = Some(5000);
     });
     story.is("stale").because("no samples");
+    story.wait(1).status(|status| {
+        status.alarm.state = AlarmState::Silent;
+        status.alarm.stamp_ns = 0;
+    });
+    story.is("not ready");
     story.wait(1).status(|_| {}).is("running");
 }
 
