@@ -258,7 +258,8 @@ fn acknowledge(fleet: &mut Fleet, token: &str) {
     let cookie = head
         .lines()
         .find_map(|line| line.strip_prefix("set-cookie: "));
-    fleet.cookie = cookie.unwrap().split(';').next().unwrap().to_owned();
+    let pair = cookie.unwrap().split(';').next();
+    fleet.cookie = pair.unwrap_or_default().into();
     let page = fleet.get("/cells/press");
     let secret = page.split("name=\"csrf\" value=\"").nth(1).unwrap();
     let form = format!("csrf={}", secret.split('"').next().unwrap());

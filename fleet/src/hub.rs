@@ -230,6 +230,9 @@ fn listen(session: &Session, mailbox: &Arc<Mailbox<Mail>>) -> Result<(), FleetEr
     Ok(())
 }
 
+/// Reads an answer of a cell: key and payload.
+type Read = fn(&str, &[u8]) -> Vec<Event>;
+
 /// The thread's own.
 struct Worker {
     session: Session,
@@ -305,7 +308,7 @@ impl Worker {
 
     /// Asks a cell for what was missed; the answer is mail.
     fn ask(&self, effect: &Effect) {
-        let (selector, read): (String, fn(&str, &[u8]) -> Vec<Event>) = match effect {
+        let (selector, read): (String, Read) = match effect {
             Effect::AskStatus { cell } => (format!("{cell}/status"), |key, payload| {
                 vec![inbox::status(key, payload)]
             }),

@@ -118,29 +118,26 @@ impl Store {
         let same = last.filter(|(_, closed_ns)| {
             closed_ns.is_none_or(|closed_ns| news.at_ns.saturating_sub(closed_ns) < REOPEN_NS)
         });
-        match same {
-            Some((id, closed_ns)) => {
-                let text = "UPDATE incidents SET count = count + 1, last_ns = max(last_ns, ?2), words = ?3,
+        if let Some((id, closed_ns)) = same {
+            let text = "UPDATE incidents SET count = count + 1, last_ns = max(last_ns, ?2), words = ?3,
                             severity = max(severity, ?4), closed_ns = NULL, reopened = reopened + ?5,
                             acknowledged_ns = NULL, acknowledged_by = NULL WHERE id = ?1";
-                let again = i64::from(closed_ns.is_some());
-                let values = params![id, news.at_ns, news.words, number(news.severity), again];
-                self.connection.execute(text, values).map_err(failed)?;
-            }
-            None => {
-                let text = "INSERT INTO incidents
+            let again = i64::from(closed_ns.is_some());
+            let values = params![id, news.at_ns, news.words, number(news.severity), again];
+            self.connection.execute(text, values).map_err(failed)?;
+        } else {
+            let text = "INSERT INTO incidents
                             (cell, kind, place, severity, words, opened_ns, last_ns, count, reopened)
                             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?6, 1, 0)";
-                let values = params![
-                    news.cell,
-                    news.kind.as_str(),
-                    news.place,
-                    number(news.severity),
-                    news.words,
-                    news.at_ns
-                ];
-                self.connection.execute(text, values).map_err(failed)?;
-            }
+            let values = params![
+                news.cell,
+                news.kind.as_str(),
+                news.place,
+                number(news.severity),
+                news.words,
+                news.at_ns
+            ];
+            self.connection.execute(text, values).map_err(failed)?;
         }
         Ok(())
     }

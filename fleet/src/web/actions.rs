@@ -35,9 +35,9 @@ pub struct Mute {
     seconds: f64,
 }
 
-/// A text.
+/// A label or a note.
 #[derive(Deserialize)]
-pub struct Text {
+pub struct Written {
     csrf: String,
     text: String,
     /// `on`: the cell's normal is learned anew.
@@ -119,7 +119,7 @@ pub async fn label(
     State(shared): App,
     Path(cell): Path<String>,
     headers: HeaderMap,
-    Form(form): Form<Text>,
+    Form(form): Form<Written>,
 ) -> Response {
     let text = form.text.trim().to_owned();
     command(
@@ -136,7 +136,7 @@ pub async fn note(
     State(shared): App,
     Path(cell): Path<String>,
     headers: HeaderMap,
-    Form(form): Form<Text>,
+    Form(form): Form<Written>,
 ) -> Response {
     let by = match may(&shared, &headers, &form.csrf, &cell) {
         Ok(user) => user,

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use axum::extract::{Request, State};
+use axum::http::uri::Authority;
 use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Uri, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse as _, Response};
@@ -43,7 +44,7 @@ fn refusal(
     headers: &HeaderMap,
 ) -> Option<(StatusCode, &'static str)> {
     let text = |name: &str| headers.get(name).and_then(|value| value.to_str().ok());
-    let host = text("host").or_else(|| uri.authority().map(|authority| authority.as_str()));
+    let host = text("host").or_else(|| uri.authority().map(Authority::as_str));
     // A page of a stranger whose name was made to point here (DNS rebinding) has another host.
     if shared.is_loopback && !host.is_some_and(is_loopback) {
         return Some((

@@ -1,4 +1,4 @@
-//! The wall as OpenMetrics, for Prometheus. Names have base units; `deploy/` has a board and rules for them.
+//! The wall for Prometheus, in the format `OpenMetrics`. Names have base units; `deploy/` has a board and rules for them.
 
 use axum::extract::State as Extract;
 use axum::http::{StatusCode, header};
