@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    calibrate, check, completions, doctor, evaluate, explain, info, init, man, repair, replay, run,
-    schema, send, simulate, stage,
+    calibrate, check, completions, doctor, evaluate, explain, fleet, info, init, man, repair,
+    replay, run, schema, send, simulate, stage,
 };
 
 /// A robot's measured effort beside its digital twin's: stream, detect, record.
@@ -30,6 +30,7 @@ pub enum Command {
     Explain(explain::Args),
     Evaluate(evaluate::Args),
     Send(send::Args),
+    Fleet(fleet::Args),
     Simulate(simulate::Args),
     Init(init::Args),
     Info(info::Args),

@@ -6,6 +6,7 @@ pub mod completions;
 pub mod doctor;
 pub mod evaluate;
 pub mod explain;
+pub mod fleet;
 pub mod info;
 pub mod init;
 pub mod man;

@@ -140,6 +140,7 @@ fn outcome(command: &Command, out: &mut Output) -> Result<exit::Exit, exit::Fail
         Command::Explain(args) => commands::explain::run(args, out),
         Command::Evaluate(args) => commands::evaluate::run(args, out),
         Command::Send(args) => commands::send::run(args, out),
+        Command::Fleet(args) => commands::fleet::run(args, out),
         Command::Simulate(args) => commands::simulate::run(args, out),
         Command::Init(args) => commands::init::run(args, out),
         Command::Info(args) => commands::info::run(args, out),

@@ -1,4 +1,4 @@
-//! The pipelines in `docs/pipeline.md` and `docs/publish.md` are good ones.
+//! The pipelines in `docs/pipeline.md`, `docs/publish.md` and `docs/fleet.md` are good ones.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
@@ -8,7 +8,7 @@ use common::{Out, bundled, root, write};
 
 #[test]
 fn every_pipeline_in_the_documentation_passes_the_check() {
-    let pages = ["docs/pipeline.md", "docs/publish.md"];
+    let pages = ["docs/pipeline.md", "docs/publish.md", "docs/fleet.md"];
     let text = pages.map(|page| std::fs::read_to_string(root().join(page)).unwrap());
     let text = text.concat();
     let blocks = text

@@ -11,7 +11,7 @@ use crate::sample::{Command, Name, Verb};
 
 mod ask;
 
-pub use ask::{AskError, ask};
+pub use ask::{AskError, ask, ask_signed};
 
 /// The longest lease of a mute \[s\].
 pub const LONGEST_MUTE_S: f64 = 60.0;
@@ -54,6 +54,65 @@ pub enum Request {
     },
 }
 
+/// A [`Request`], and who asks: in JSON the request with one more member, `by`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Signed {
+    /// What is asked for.
+    pub request: Request,
+    /// Who asks, where that is known: at most 48 bytes. It is told, not proven.
+    pub by: Option<String>,
+}
+
+impl Signed {
+    /// The request in `json`, with or without a name.
+    ///
+    /// # Errors
+    /// If it is none.
+    pub fn from_json(json: &[u8]) -> Result<Self, Refusal> {
+        let none = |error: serde_json::Error| Refusal::NotARequest(error.to_string());
+        let mut value: serde_json::Value = serde_json::from_slice(json).map_err(none)?;
+        let by = value
+            .as_object_mut()
+            .and_then(|members| members.remove("by"));
+        let by = by.filter(|by| !by.is_null());
+        Ok(Self {
+            by: by
+                .map(serde_json::from_value)
+                .transpose()
+                .map_err(|error| Refusal::NotARequest(format!("`by`: {error}")))?,
+            request: serde_json::from_value(value).map_err(none)?,
+        })
+    }
+
+    /// As JSON.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn to_json(&self) -> Result<String, serde_json::Error> {
+        let mut value = serde_json::to_value(&self.request)?;
+        if let (Some(members), Some(by)) = (value.as_object_mut(), &self.by) {
+            members.insert("by".to_owned(), by.as_str().into());
+        }
+        serde_json::to_string(&value)
+    }
+
+    /// The command that it asks for; who asks is its text, but for a label, which is one.
+    ///
+    /// # Errors
+    /// If it asks for something that cannot be.
+    pub fn command(&self) -> Result<Command, Refusal> {
+        let mut command = self.request.command()?;
+        let by = self.by.as_deref();
+        if let Some(by) = by.filter(|_| command.verb() != Some(Verb::Label)) {
+            if !is_label(by) {
+                return Err(Refusal::Name { found: by.len() });
+            }
+            command.text = Name::new(by);
+        }
+        Ok(command)
+    }
+}
+
 /// What a source says to a [`Request`].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "answer", rename_all = "snake_case")]
@@ -88,6 +147,12 @@ pub enum Refusal {
     /// A label without text, or with too much of it.
     #[error("a label has 1 to {limit} bytes of text, no line breaks, not these {found}", limit = Name::CAPACITY)]
     Label {
+        /// How many bytes it has.
+        found: usize,
+    },
+    /// A name of who asks that is none.
+    #[error("who asks is named in 1 to {limit} bytes of text, no line breaks, not these {found}", limit = Name::CAPACITY)]
+    Name {
         /// How many bytes it has.
         found: usize,
     },
@@ -127,7 +192,8 @@ impl Request {
                 text: argument("text").ok_or_else(|| wrong("text"))?.to_owned(),
             },
         };
-        request.command()
+        let by = argument("by").map(str::to_owned);
+        Signed { request, by }.command()
     }
 
     /// The request in `json`.
@@ -233,6 +299,35 @@ mod tests {
         ] {
             let refusal = taken(json).unwrap_err();
             assert!(refusal.contains(reason), "{json}: {refusal}");
+        }
+    }
+
+    #[test]
+    fn who_asks_is_told_with_the_command_and_archived() {
+        let json = br#"{"verb": "mute", "seconds": 2.5, "by": "anna"}"#;
+        let signed = Signed::from_json(json).unwrap();
+        let command = signed.command().unwrap();
+        assert_eq!(command.by(), Some("anna"));
+        assert_eq!(
+            Signed::from_json(signed.to_json().unwrap().as_bytes()),
+            Ok(signed)
+        );
+        let arguments = command.arguments();
+        let find = |name: &str| {
+            let found = arguments.iter().find(|(key, _)| *key == name);
+            found.map(|(_, value)| value.as_str())
+        };
+        assert_eq!(Request::archived("mute", find), Ok(command));
+        for (json, reason) in [
+            (r#"{"verb": "learn", "by": ""}"#, "who asks is named in"),
+            (r#"{"verb": "learn", "by": 3}"#, "`by`"),
+        ] {
+            let refusal = Signed::from_json(json.as_bytes()).and_then(|signed| signed.command());
+            let refusal = refusal.map_err(|refusal| refusal.to_string());
+            assert!(
+                refusal.clone().is_err_and(|text| text.contains(reason)),
+                "{json}: {refusal:?}"
+            );
         }
     }
 

@@ -16,6 +16,8 @@ use tauscope_twin::{Correction, Twin, TwinFile};
 use tauscope_watch::{self as watch, Watch};
 
 use crate::cell::{Cell, EffortUnit};
+use crate::provenance::sha256;
+use crate::settings::BesidePublisher;
 use crate::trained;
 
 /// Why a stage cannot be built.
@@ -313,6 +315,7 @@ pub fn recorder(
 pub fn publisher(
     config: &tauscope_publish::Config,
     commands: Option<&ZenohEndpoints>,
+    beside: &BesidePublisher,
     cell: &Cell,
     streams: &[StreamFacts],
     restarted: bool,
@@ -323,12 +326,22 @@ pub fn publisher(
         detector: stream.detector.clone(),
         judges_contact: stream.judges_contact,
     });
+    let urdf = cell.facts.urdf.as_ref();
+    let joints = cell.facts.joint_names.iter();
+    let calibrated = joints.map(|name| beside.calibrated.get(name).copied());
     let setup = tauscope_publish::Setup {
         cell: cell.facts.name.clone(),
         joint_names: cell.facts.joint_names.clone(),
         model: cell.model.clone(),
         streams: streams.collect(),
         commands: commands.cloned(),
+        facts: tauscope_publish::Facts {
+            effort_unit: cell.facts.effort_unit.as_str().to_owned(),
+            urdf_sha256: urdf.map(|urdf| sha256(urdf.as_bytes())),
+            twin_sha256: beside.twin_sha256.clone(),
+            calibrated: calibrated.collect(),
+            archive: beside.archive.clone(),
+        },
         restarted,
     };
     Publisher::new(config, &setup)

@@ -1,5 +1,7 @@
 //! What a stage is told of its own.
 
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tauscope_bus::ZenohEndpoints;
@@ -42,9 +44,22 @@ pub enum Settings {
         config: tauscope_publish::Config,
         /// Where the cell's source takes commands, if it does.
         commands: Option<ZenohEndpoints>,
+        /// The twin and the archive of its cell, of which the fleet is told.
+        beside: BesidePublisher,
     },
     /// A program that is not ours.
     Outside(OutsideEntry),
+}
+
+/// What stands beside a publisher in its cell.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct BesidePublisher {
+    /// SHA-256 of the file of the twin.
+    pub twin_sha256: Option<String>,
+    /// By joint name, the residual's standard deviation when that twin was calibrated \[effort unit\].
+    pub calibrated: BTreeMap<String, f64>,
+    /// Where the recorder writes.
+    pub archive: Option<String>,
 }
 
 /// A stage that is not ours.

@@ -138,10 +138,15 @@ fn member(seat: &Seat, shared: &tauscope_detect::Shared) -> Result<Member, SeatE
             recorder.repair_leftovers(config);
             Member::Sink(Box::new(recorder))
         }
-        Settings::Publish { config, commands } => {
+        Settings::Publish {
+            config,
+            commands,
+            beside,
+        } => {
             let restarted = seat.restarts > 0;
+            let (commands, streams) = (commands.as_ref(), &told.streams);
             let publisher =
-                build::publisher(config, commands.as_ref(), cell()?, &told.streams, restarted)?;
+                build::publisher(config, commands, beside, cell()?, streams, restarted)?;
             Member::Sink(Box::new(publisher))
         }
         Settings::Outside(_) => return Err(SeatError::Outside),

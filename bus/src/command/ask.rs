@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use zenoh::Wait as _;
 use zenoh::bytes::Encoding;
 
-use super::{Answer, Request, key};
+use super::{Answer, Request, Signed, key};
 
 /// Nobody answers yet: how long until the question is put again. A session that was just opened is not connected yet.
 const AGAIN_AFTER: Duration = Duration::from_millis(100);
@@ -49,6 +49,20 @@ pub fn ask(
     request: &Request,
     patience: Duration,
 ) -> Result<Answer, AskError> {
+    let request = request.clone();
+    ask_signed(session, cell, &Signed { request, by: None }, patience)
+}
+
+/// As [`ask`], with the name of who asks.
+///
+/// # Errors
+/// As [`ask`].
+pub fn ask_signed(
+    session: &zenoh::Session,
+    cell: &str,
+    signed: &Signed,
+    patience: Duration,
+) -> Result<Answer, AskError> {
     let zenoh = |reason: String| AskError::Zenoh {
         cell: cell.to_owned(),
         reason,
@@ -57,7 +71,7 @@ pub fn ask(
         cell: cell.to_owned(),
         reason,
     };
-    let json = serde_json::to_string(request).map_err(|error| zenoh(error.to_string()))?;
+    let json = signed.to_json().map_err(|error| zenoh(error.to_string()))?;
     let deadline = Instant::now() + patience;
     loop {
         let left = deadline.saturating_duration_since(Instant::now());

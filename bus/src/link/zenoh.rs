@@ -66,6 +66,15 @@ impl ZenohEndpoints {
         open_session("peer", self, PATIENCE)
     }
 
+    /// A session that hears what others say by way of a router, or is that router itself: a router passes on to routers
+    /// and clients, but not from peer to peer, and a client cannot begin before its router is there.
+    ///
+    /// # Errors
+    /// As [`Zenoh::open`].
+    pub fn lookout(&self) -> Result<zenoh::Session, LinkError> {
+        open_session("router", self, PATIENCE)
+    }
+
     /// Where another session on this host meets one that has these: where it listens, and what it connects to. For a
     /// listener on all interfaces that is the loopback.
     pub fn reached_at(&self) -> impl Iterator<Item = String> + '_ {

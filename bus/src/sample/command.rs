@@ -52,7 +52,7 @@ pub struct Command {
     pub value: f64,
     /// Centre of mass of a payload in the tool link's frame \[m\].
     pub com_m: [f64; 3],
-    /// Text of a label.
+    /// Text of a label; of another command who asked for it, empty where that is not known.
     pub text: Name,
 }
 
@@ -63,8 +63,22 @@ impl Command {
         all.find(|verb| *verb as u32 == self.verb)
     }
 
+    /// Who asked for it, where that is known; nobody for a label, whose text is its own.
+    pub fn by(&self) -> Option<&str> {
+        let by = self.text.as_str();
+        (self.verb()? != Verb::Label && !by.is_empty()).then_some(by)
+    }
+
     /// For people; `None` for no command.
     pub fn in_words(&self) -> Option<String> {
+        let what = self.what_in_words()?;
+        Some(match self.by() {
+            Some(by) => format!("{what}, by {by}"),
+            None => what,
+        })
+    }
+
+    fn what_in_words(&self) -> Option<String> {
         Some(match self.verb()? {
             Verb::Acknowledge => "alarm acknowledged".to_owned(),
             Verb::Mute if self.value > 0.0 => format!("alarms muted for {} s", self.value),
@@ -89,6 +103,12 @@ impl Command {
 
     /// The numbers and texts that go with the verb, by name: what an archive holds. Numbers read back are the same.
     pub fn arguments(&self) -> Vec<(&'static str, String)> {
+        let mut arguments = self.own_arguments();
+        arguments.extend(self.by().map(|by| ("by", by.to_owned())));
+        arguments
+    }
+
+    fn own_arguments(&self) -> Vec<(&'static str, String)> {
         match self.verb() {
             Some(Verb::Mute) => vec![("seconds", self.value.to_string())],
             Some(Verb::Payload) => {

@@ -54,6 +54,8 @@ pub struct ZenohConfig {
     pub listen: Vec<String>,
     /// Whether JSON is published under `<cell>/<topic>`.
     pub json: bool,
+    /// Whether `tauscope fleet` sees the cell: a liveliness token, the status once a second, each contact.
+    pub fleet: bool,
     /// ROS 2 messages as `rmw_zenoh` expects them; without it, none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ros2: Option<Ros2Config>,
@@ -65,6 +67,7 @@ impl Default for ZenohConfig {
             connect: Vec::new(),
             listen: Vec::new(),
             json: true,
+            fleet: true,
             ros2: None,
         }
     }
@@ -109,7 +112,7 @@ pub enum ConfigError {
     #[error("`zenoh` needs at least one endpoint in `connect` or `listen`")]
     NoEndpoint,
     /// Neither form of message.
-    #[error("`zenoh` publishes nothing; give `json: true` or `ros2: {{}}`")]
+    #[error("`zenoh` publishes nothing; give `json: true`, `fleet: true` or `ros2: {{}}`")]
     NoMessages,
     /// No detector, whose verdicts are what it is about.
     #[error("a publisher listens to at least one detector")]
@@ -134,7 +137,7 @@ impl Config {
         if zenoh.connect.is_empty() && zenoh.listen.is_empty() {
             return Err(ConfigError::NoEndpoint);
         }
-        if !zenoh.json && zenoh.ros2.is_none() {
+        if !zenoh.json && !zenoh.fleet && zenoh.ros2.is_none() {
             return Err(ConfigError::NoMessages);
         }
         Ok(())
@@ -163,7 +166,7 @@ mod tests {
             ("{}", ConfigError::Nobody),
             ("{zenoh: {ros2: {}}}", ConfigError::NoEndpoint),
             (
-                "{zenoh: {listen: [tcp/a:1], json: false}}",
+                "{zenoh: {listen: [tcp/a:1], json: false, fleet: false}}",
                 ConfigError::NoMessages,
             ),
         ] {

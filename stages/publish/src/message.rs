@@ -1,12 +1,20 @@
 //! The JSON messages. Their JSON Schema is made from these types: `tauscope schema --messages`.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use tauscope_bus::Health;
 
 use crate::alarm::State;
 
+mod status;
+
+pub use status::{
+    ChangeMessage, ContactMessage, JointResidual, Record, RecordMessage, ResidualMessage,
+    STATUS_VERSION, StatusMessage,
+};
+
 /// Under `<cell>/alarm`: what the cell is to do.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct AlarmMessage {
     /// Stamp of the newest detection \[ns since the epoch\].
     pub stamp_ns: i64,
@@ -19,15 +27,30 @@ pub struct AlarmMessage {
     /// What is left of a mute \[s\]; 0 without one.
     pub muted_s: f64,
     /// The touched link; left out where there is none, or it is not known.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub link: Option<String>,
     /// The estimated force on the robot, world frame \[N\].
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_n: Option<[f64; 3]>,
 }
 
+impl AlarmMessage {
+    /// Before anything was heard.
+    pub fn silent() -> Self {
+        Self {
+            stamp_ns: 0,
+            state: AlarmState::Silent,
+            free: false,
+            contact: false,
+            muted_s: 0.0,
+            link: None,
+            force_n: None,
+        }
+    }
+}
+
 /// Where the alarm stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AlarmState {
     /// No sample came for too long, or the run has ended: stop.
@@ -162,7 +185,7 @@ pub struct CommandMessage {
 }
 
 /// Under `<cell>/health/<stage>`: how a stage fares, once a second.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct HealthMessage {
     /// Stamp of the stage's newest sample \[ns since the epoch\].
     pub stamp_ns: i64,
@@ -176,6 +199,19 @@ pub struct HealthMessage {
     pub dropped: u64,
     /// How often it was started again.
     pub restarts: u64,
+}
+
+impl From<&Health> for HealthMessage {
+    fn from(health: &Health) -> Self {
+        Self {
+            stamp_ns: health.header.stamp_ns,
+            stage: health.stage.to_string(),
+            received: health.received,
+            emitted: health.emitted,
+            dropped: health.dropped,
+            restarts: health.restarts,
+        }
+    }
 }
 
 /// All messages, by the topic behind the cell's name. Only their schema is of use.
@@ -192,6 +228,10 @@ pub struct Messages {
     pub command: CommandMessage,
     /// `<cell>/health/<stage>`.
     pub health: HealthMessage,
+    /// `<cell>/status`.
+    pub status: StatusMessage,
+    /// `<cell>/records`.
+    pub records: RecordMessage,
     /// What `<cell>/commands` takes.
     pub commands: tauscope_bus::command::Request,
     /// What it answers.

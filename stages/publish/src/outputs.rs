@@ -213,14 +213,7 @@ impl Outputs {
         let Some(json) = &mut self.json else {
             return Ok(());
         };
-        let message = HealthMessage {
-            stamp_ns: health.header.stamp_ns,
-            stage: health.stage.to_string(),
-            received: health.received,
-            emitted: health.emitted,
-            dropped: health.dropped,
-            restarts: health.restarts,
-        };
+        let message = HealthMessage::from(health);
         json.publish(&format!("health/{}", health.stage), &message)
     }
 }

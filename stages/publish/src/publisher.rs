@@ -17,46 +17,18 @@ use crate::alarm::Alarm;
 use crate::config::{Config, ConfigError};
 use crate::diagnostics::is_news;
 use crate::error::PublishError;
+use crate::fleet::Fleet;
 use crate::message::{AlarmMessage, AlarmState, CommandMessage};
 use crate::modbus::{Board, Commands, Modbus};
 use crate::outputs::Outputs;
 use crate::poses::Poses;
+use crate::setup::{Setup, StreamInfo};
 use crate::status::Status;
 
 /// While nothing changes the alarm is told this often, in time of the samples \[ns\].
 const REPEAT_NS: u64 = 100_000_000;
 /// And in time of the clock, while nothing comes.
 const REPEAT: Duration = Duration::from_millis(100);
-
-/// What a publisher must know of its cell.
-#[derive(Debug, Clone)]
-pub struct Setup {
-    /// The cell's name.
-    pub cell: String,
-    /// Its joints, in URDF order.
-    pub joint_names: Vec<String>,
-    /// Its robot, where there is one: for forces at links.
-    pub model: Option<Model>,
-    /// The streams that it listens to.
-    pub streams: Vec<StreamInfo>,
-    /// Where the cell's source takes commands, if it does.
-    pub commands: Option<ZenohEndpoints>,
-    /// Whether this stage has been started again: what was latched is not known then.
-    pub restarted: bool,
-}
-
-/// A stream that a publisher listens to.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct StreamInfo {
-    /// The stage it comes from.
-    pub stage: String,
-    /// What it carries.
-    pub kind: SampleKind,
-    /// The detector that speaks in it, where that is known.
-    pub detector: Option<String>,
-    /// Whether it says whether something touches the robot; a watch over the twin does not.
-    pub judges_contact: bool,
-}
 
 /// A stream of detections.
 struct Detector {
@@ -77,6 +49,7 @@ pub struct Publisher {
     status: Status,
     poses: Option<Poses>,
     outputs: Option<Outputs>,
+    fleet: Option<Fleet>,
     board: Board,
     modbus: Option<Modbus>,
     shown: Option<(AlarmMessage, Instant)>,
@@ -100,7 +73,7 @@ impl Publisher {
             });
             Detector {
                 stage: stream.stage.clone(),
-                label: label(stream, &setup.streams),
+                label: stream.label(&setup.streams),
                 in_alarm,
                 before: None,
                 heard: None,
@@ -132,6 +105,18 @@ impl Publisher {
             )?),
             _ => None,
         };
+        let fleet = match (&session, &config.zenoh) {
+            (Some(session), Some(zenoh)) if zenoh.fleet => Some(Fleet::open(
+                session,
+                &setup.cell,
+                setup.model.as_ref().map_or("", Model::name),
+                &setup.joint_names,
+                detectors.len(),
+                setup.facts.clone(),
+                setup.commands.is_some(),
+            )?),
+            _ => None,
+        };
         let status = Status::silent(Duration::from_secs_f64(config.stop_after_s));
         let board = Board::new(status.clone());
         let commands = session
@@ -149,6 +134,7 @@ impl Publisher {
             status,
             poses,
             outputs,
+            fleet,
             board,
             modbus: modbus.transpose()?,
             shown: None,
@@ -168,8 +154,14 @@ impl Publisher {
         }
         if sample.command.verb().is_some() {
             self.alarm.command(stamp_ns, sample.command);
+            if let Some(fleet) = &mut self.fleet {
+                fleet.command(stamp_ns, &sample.command);
+            }
             let message = told(stamp_ns, &sample.command);
             self.tell(|outputs, _| outputs.command(&message));
+        }
+        if let Some(fleet) = &mut self.fleet {
+            fleet.sample(stamp_ns);
         }
         self.tell(|outputs, _| outputs.joint_state(sample));
     }
@@ -177,6 +169,9 @@ impl Publisher {
     fn twin(&mut self, sample: &TwinState) {
         if let Some(poses) = &mut self.poses {
             poses.push(sample.header.stamp_ns, &sample.position);
+        }
+        if let Some(fleet) = &mut self.fleet {
+            fleet.twin(sample);
         }
         self.tell(|outputs, _| outputs.twin(sample));
     }
@@ -193,10 +188,18 @@ impl Publisher {
         // First what the robot is to do, then what people want to know.
         self.show();
         let label = self.detectors[index].label.clone();
+        let judges = self.detectors[index].in_alarm.is_some();
+        if let Some(fleet) = &mut self.fleet {
+            fleet.sample(detection.header.stamp_ns);
+            fleet.detection(index, &label, detection, judges, self.alarm.state());
+        }
         self.tell(|outputs, poses| outputs.detection(detection, &label, news, poses));
     }
 
     fn health(&mut self, health: &Health) {
+        if let Some(fleet) = &mut self.fleet {
+            fleet.health(health);
+        }
         self.tell(|outputs, _| outputs.health(health));
     }
 
@@ -264,7 +267,21 @@ impl Publisher {
         let Some(outputs) = &mut self.outputs else {
             return;
         };
-        if let Err(error) = publish(outputs, self.poses.as_mut()) {
+        let told = publish(outputs, self.poses.as_mut());
+        self.note(told);
+    }
+
+    /// Tells the fleet what is new.
+    fn tell_fleet(&mut self, now: Instant, ended: bool) {
+        let Some(fleet) = &mut self.fleet else {
+            return;
+        };
+        let told = fleet.tell(now, &self.status.at(now), self.unsent, ended);
+        self.note(told);
+    }
+
+    fn note(&mut self, told: Result<(), PublishError>) {
+        if let Err(error) = told {
             if self.unsent == 0 {
                 tracing::warn!("{}: {error}; further ones are only counted", self.cell);
             }
@@ -290,12 +307,16 @@ impl Sink for Publisher {
             SampleRef::Health(health) => self.health(health),
         }
         // A detector may be silent while others speak.
-        self.announce(Instant::now());
+        let now = Instant::now();
+        self.announce(now);
+        self.tell_fleet(now, false);
         Ok(())
     }
 
     fn idle(&mut self) -> Result<(), StageError> {
-        self.announce(Instant::now());
+        let now = Instant::now();
+        self.announce(now);
+        self.tell_fleet(now, false);
         Ok(())
     }
 
@@ -304,7 +325,9 @@ impl Sink for Publisher {
         self.status.heard = None;
         self.board.show(&self.status);
         self.shown = None;
-        self.announce(Instant::now());
+        let now = Instant::now();
+        self.announce(now);
+        self.tell_fleet(now, true);
         Ok(())
     }
 
@@ -329,17 +352,6 @@ fn endpoints(config: &Config, setup: &Setup) -> Option<ZenohEndpoints> {
         }
     }
     Some(all)
-}
-
-fn label(stream: &StreamInfo, all: &[StreamInfo]) -> String {
-    let same = |detector: &String| {
-        let all = all
-            .iter()
-            .filter(|other| other.detector.as_ref() == Some(detector));
-        all.count() == 1
-    };
-    let name = stream.detector.as_ref().filter(|detector| same(detector));
-    name.unwrap_or(&stream.stage).clone()
 }
 
 fn told(stamp_ns: i64, command: &Command) -> CommandMessage {

@@ -22,15 +22,7 @@ impl Status {
     /// Before anything was heard.
     pub fn silent(stop_after: Duration) -> Self {
         Self {
-            alarm: AlarmMessage {
-                stamp_ns: 0,
-                state: AlarmState::Silent,
-                free: false,
-                contact: false,
-                muted_s: 0.0,
-                link: None,
-                force_n: None,
-            },
+            alarm: AlarmMessage::silent(),
             link_number: 0,
             detections: 0,
             heard: None,

@@ -5,7 +5,7 @@ use tauscope_publish::{Config, ConfigError};
 
 use super::Resolver;
 use crate::pipeline::role::Role;
-use crate::settings::Settings;
+use crate::settings::{BesidePublisher, Settings};
 use crate::yaml::Place;
 
 impl Resolver<'_> {
@@ -45,7 +45,43 @@ impl Resolver<'_> {
         Some(Settings::Publish {
             config: config.clone(),
             commands,
+            beside: self.beside(index),
         })
+    }
+
+    /// The twin and the archive of the publisher's cell.
+    fn beside(&self, index: usize) -> BesidePublisher {
+        let Some(wiring) = self.wiring else {
+            return BesidePublisher::default();
+        };
+        let cells = &wiring.cells[index];
+        let stages = || 0..wiring.roles.len();
+        let heard = wiring.inputs[index].iter().copied();
+        let twin = heard
+            .chain(stages().filter(|&at| wiring.cells[at] == *cells))
+            .find(|&at| wiring.roles[at] == Role::Twin);
+        let model = twin.and_then(|twin| self.models.get(&twin));
+        let noise = model.iter().flat_map(|model| &model.joints);
+        let writes = |at: usize| {
+            let is_here = wiring.cells[at].iter().any(|cell| cells.contains(cell));
+            self.entry(at)
+                .record
+                .as_ref()
+                .filter(|_| is_here)?
+                .mcap
+                .clone()
+        };
+        BesidePublisher {
+            twin_sha256: twin
+                .and_then(|twin| self.model_sha256.get(&self.entry(twin).name))
+                .cloned(),
+            calibrated: noise
+                .filter_map(|(name, joint)| Some((name.clone(), joint.noise?)))
+                .collect(),
+            archive: stages()
+                .find_map(writes)
+                .map(|path| path.display().to_string()),
+        }
     }
 
     /// Where the source of the stage's cell takes commands.

@@ -8,7 +8,7 @@ use std::sync::mpsc::{self, SyncSender};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use tauscope_bus::command::{self, Answer, Refusal, Request};
+use tauscope_bus::command::{self, Answer, Refusal, Signed};
 use tauscope_bus::{Command, LinkError, Verb, ZenohEndpoints};
 use zenoh::bytes::{Encoding, ZBytes};
 use zenoh::query::Query;
@@ -151,7 +151,7 @@ impl Door {
                 payload.len()
             ));
         }
-        let request = Request::from_json(&payload.to_bytes()).map_err(say)?;
+        let request = Signed::from_json(&payload.to_bytes()).map_err(say)?;
         let command = request.command().map_err(say)?;
         if command.verb() == Some(Verb::Payload) && !self.has_tool_link {
             return Err(

@@ -11,7 +11,7 @@ use tauscope_bus::{
     StageError, TwinState, ZenohEndpoints, flags,
 };
 use tauscope_dynamics::Model;
-use tauscope_publish::{Config, Publisher, Setup, StreamInfo};
+use tauscope_publish::{Config, Facts, Publisher, Setup, StreamInfo};
 
 /// Slow machines run the tests, too; nothing waits this long where all is well.
 pub const PATIENCE: Duration = Duration::from_secs(30);
@@ -60,6 +60,7 @@ pub fn publisher(yaml: &str, commands: Option<&str>) -> Publisher {
             listen: vec![endpoint.to_owned()],
             connect: Vec::new(),
         }),
+        facts: Facts::default(),
         restarted: false,
     };
     Publisher::new(&config, &setup).unwrap()

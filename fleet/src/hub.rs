@@ -1,0 +1,359 @@
+//! The fleet host: one Zenoh session, one thread that keeps the wall, and snapshots for all who look.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use tauscope_bus::command::{Answer, AskError, Signed, ask_signed};
+use tauscope_bus::{LinkError, ZenohEndpoints};
+use tokio::sync::watch;
+use zenoh::Session;
+use zenoh::Wait as _;
+use zenoh::sample::SampleKind;
+
+use crate::inbox;
+use crate::keeper::Keeper;
+use crate::mailbox::Mailbox;
+use crate::store::{Note, Store, StoreError};
+use crate::wall::{Effect, Event, Now, Snapshot, Wall};
+
+/// How often those who look are told. Resolution: a person sees no more.
+const SHOW_EVERY: Duration = Duration::from_millis(250);
+/// How often the wall's clock ticks. Resolution: a cell that is gone is known within 1 s.
+const TICK: Duration = Duration::from_millis(250);
+/// How long a question to a cell may take.
+const ASK_WITHIN: Duration = Duration::from_secs(5);
+/// How long a cell has to take a command; it refuses by itself after 1 s.
+const COMMAND_WITHIN: Duration = Duration::from_secs(3);
+
+/// What a fleet host needs.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// Where the cells are met.
+    pub endpoints: ZenohEndpoints,
+    /// Cells that are expected: they are shown before they are there.
+    pub expected: Vec<String>,
+    /// Where incidents and history are kept; `None` to keep none.
+    pub store: Option<PathBuf>,
+}
+
+/// Why there is no fleet host.
+#[derive(Debug, thiserror::Error)]
+pub enum FleetError {
+    /// Zenoh cannot listen or connect.
+    #[error(transparent)]
+    Session(#[from] LinkError),
+    /// Zenoh does not take a key.
+    #[error("zenoh: {0}")]
+    Zenoh(String),
+    /// Nothing can be kept.
+    #[error("cannot keep incidents: {0}")]
+    Store(#[from] StoreError),
+    /// No thread.
+    #[error("cannot start a thread: {0}")]
+    Thread(#[from] std::io::Error),
+}
+
+impl FleetError {
+    #[expect(
+        clippy::needless_pass_by_value,
+        reason = "so that it maps an error as it is"
+    )]
+    fn zenoh(error: zenoh::Error) -> Self {
+        Self::Zenoh(tauscope_bus::zenoh_reason(&error))
+    }
+}
+
+/// What waits for the hub's thread.
+#[derive(Debug)]
+enum Mail {
+    Event(Event),
+    Acknowledged { cell: String, by: String },
+    Noted { cell: String, note: Note },
+}
+
+/// A fleet host that works until it is dropped.
+pub struct Hub {
+    session: Session,
+    mailbox: Arc<Mailbox<Mail>>,
+    snapshots: watch::Receiver<Arc<Snapshot>>,
+    store: Option<Mutex<Store>>,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Hub {
+    /// Listens to the cells.
+    ///
+    /// # Errors
+    /// If the session or the file cannot be opened.
+    pub fn start(options: &Options) -> Result<Self, FleetError> {
+        let store = options.store.as_deref().map(Store::open).transpose()?;
+        let reader = store.as_ref().map(Store::again).transpose()?;
+        let mut wall = Wall::new(options.expected.iter().cloned());
+        let mut keeper = store.map(Keeper::new);
+        if let Some(keeper) = &mut keeper {
+            let remembered = keeper.remembered()?;
+            keeper.learn(remembered.iter().map(|(cell, _)| cell.as_str()), unix_ns())?;
+            for (cell, seen_ns) in remembered {
+                wall.remember(&cell, seen_ns);
+            }
+        }
+        let begin = Instant::now();
+        wall.tick(Now {
+            running_ms: 0,
+            unix_ns: unix_ns(),
+        });
+        let session = options.endpoints.lookout()?;
+        let mailbox = Arc::new(Mailbox::default());
+        listen(&session, &mailbox)?;
+        let (show, snapshots) = watch::channel(Arc::new(wall.snapshot()));
+        let stop = Arc::new(AtomicBool::new(false));
+        let worker = Worker {
+            session: session.clone(),
+            mailbox: mailbox.clone(),
+            wall,
+            keeper,
+            show,
+            begin,
+            unkept: false,
+        };
+        let stopped = stop.clone();
+        let thread = std::thread::Builder::new().name("fleet".to_owned());
+        let thread = thread.spawn(move || worker.work(&stopped))?;
+        Ok(Self {
+            session,
+            mailbox,
+            snapshots,
+            store: reader.map(Mutex::new),
+            stop,
+            thread: Some(thread),
+        })
+    }
+
+    /// All that is known now.
+    pub fn snapshot(&self) -> Arc<Snapshot> {
+        self.snapshots.borrow().clone()
+    }
+
+    /// Snapshots as they come.
+    pub fn snapshots(&self) -> watch::Receiver<Arc<Snapshot>> {
+        self.snapshots.clone()
+    }
+
+    /// What is kept, if anything is.
+    pub fn kept<T>(
+        &self,
+        read: impl FnOnce(&Store) -> Result<T, StoreError>,
+    ) -> Option<Result<T, StoreError>> {
+        let store = self.store.as_ref()?;
+        // A reader that panicked has changed nothing.
+        let store = store.lock().unwrap_or_else(PoisonError::into_inner);
+        Some(read(&store))
+    }
+
+    /// Sends a command to a cell, as `tauscope send` does, and waits for its answer.
+    ///
+    /// # Errors
+    /// If nobody answers there.
+    pub fn send(&self, cell: &str, signed: &Signed) -> Result<Answer, AskError> {
+        ask_signed(&self.session, cell, signed, COMMAND_WITHIN)
+    }
+
+    /// Somebody has seen what is open at a cell.
+    pub fn acknowledged(&self, cell: &str, by: &str) {
+        let (cell, by) = (cell.to_owned(), by.to_owned());
+        self.mailbox.urgent(Mail::Acknowledged { cell, by });
+    }
+
+    /// Somebody notes something of a cell.
+    pub fn note(&self, cell: &str, note: Note) {
+        let cell = cell.to_owned();
+        self.mailbox.urgent(Mail::Noted { cell, note });
+    }
+}
+
+impl Drop for Hub {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            // A thread that panicked has said so.
+            let _ = thread.join();
+        }
+        // Nothing is left to be sent.
+        let _ = self.session.close().wait();
+    }
+}
+
+fn unix_ns() -> i64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.map_or(0, |since| {
+        i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
+    })
+}
+
+/// Hears tokens, statuses and records of all cells.
+fn listen(session: &Session, mailbox: &Arc<Mailbox<Mail>>) -> Result<(), FleetError> {
+    let tokens = mailbox.clone();
+    session
+        .liveliness()
+        .declare_subscriber("*/@alive/*")
+        .history(true)
+        .callback(move |sample| {
+            let event = match (inbox::token(sample.key_expr().as_str()), sample.kind()) {
+                (None, _) => Event::Refused("token that names no cell"),
+                (Some((cell, instance)), SampleKind::Put) => Event::Alive { cell, instance },
+                (Some((cell, instance)), SampleKind::Delete) => Event::Gone { cell, instance },
+            };
+            tokens.urgent(Mail::Event(event));
+        })
+        .background()
+        .wait()
+        .map_err(FleetError::zenoh)?;
+    for (key, read) in [
+        ("*/status", inbox::status as fn(&str, &[u8]) -> Event),
+        ("*/records", inbox::record),
+    ] {
+        let mailbox = mailbox.clone();
+        session
+            .declare_subscriber(key)
+            .callback(move |sample| {
+                let event = read(sample.key_expr().as_str(), &sample.payload().to_bytes());
+                mailbox.ordinary(Mail::Event(event));
+            })
+            .background()
+            .wait()
+            .map_err(FleetError::zenoh)?;
+    }
+    Ok(())
+}
+
+/// Reads an answer of a cell: key and payload.
+type Read = fn(&str, &[u8]) -> Vec<Event>;
+
+/// The thread's own.
+struct Worker {
+    session: Session,
+    mailbox: Arc<Mailbox<Mail>>,
+    wall: Wall,
+    keeper: Option<Keeper>,
+    show: watch::Sender<Arc<Snapshot>>,
+    begin: Instant,
+    /// Whether it was said that nothing can be kept.
+    unkept: bool,
+}
+
+impl Worker {
+    fn work(mut self, stopped: &AtomicBool) {
+        let (mut ticked, mut shown) = (None::<Instant>, None::<Instant>);
+        while !stopped.load(Ordering::Relaxed) {
+            let (mail, overflowed) = self.mailbox.take(TICK);
+            for _ in 0..overflowed {
+                self.tell(Event::Refused("more messages than the fleet host takes"));
+            }
+            for mail in mail {
+                self.open(mail);
+            }
+            if ticked.is_none_or(|ticked| ticked.elapsed() >= TICK) {
+                ticked = Some(Instant::now());
+                let reached = self.reached();
+                self.tell(Event::Reached(reached));
+            }
+            if shown.is_none_or(|shown| shown.elapsed() >= SHOW_EVERY) {
+                shown = Some(Instant::now());
+                self.show();
+            }
+        }
+    }
+
+    fn open(&mut self, mail: Mail) {
+        let now_ns = unix_ns();
+        let kept = match (mail, &mut self.keeper) {
+            (Mail::Event(event), _) => return self.tell(event),
+            (_, None) => return,
+            (Mail::Acknowledged { cell, by }, Some(keeper)) => {
+                keeper.store().acknowledge(&cell, &by, now_ns)
+            }
+            (Mail::Noted { cell, note }, Some(keeper)) => {
+                let noted = keeper.store().note(&cell, &note);
+                noted.and_then(|()| keeper.learn(std::iter::once(cell.as_str()), now_ns))
+            }
+        };
+        self.note(kept);
+    }
+
+    fn tell(&mut self, event: Event) {
+        let now = self.now();
+        for effect in self.wall.take(event, now) {
+            self.ask(&effect);
+            if let Some(keeper) = &mut self.keeper {
+                let kept = keeper.keep(&self.wall, &effect, now.unix_ns);
+                self.note(kept);
+            }
+        }
+    }
+
+    fn show(&mut self) {
+        let mut snapshot = self.wall.snapshot();
+        if let Some(keeper) = &mut self.keeper {
+            keeper.compare(&mut snapshot);
+            let kept = keeper.tick(&snapshot);
+            self.note(kept);
+        }
+        // Nobody may look right now.
+        self.show.send_replace(Arc::new(snapshot));
+    }
+
+    /// Asks a cell for what was missed; the answer is mail.
+    fn ask(&self, effect: &Effect) {
+        let (selector, read): (String, Read) = match effect {
+            Effect::AskStatus { cell } => (format!("{cell}/status"), |key, payload| {
+                vec![inbox::status(key, payload)]
+            }),
+            Effect::AskRecords { cell, after } => {
+                (format!("{cell}/records?after={after}"), inbox::records)
+            }
+            _ => return,
+        };
+        let mailbox = self.mailbox.clone();
+        let asked = self
+            .session
+            .get(selector)
+            .timeout(ASK_WITHIN)
+            .callback(move |reply| {
+                let Ok(sample) = reply.result() else { return };
+                for event in read(sample.key_expr().as_str(), &sample.payload().to_bytes()) {
+                    mailbox.ordinary(Mail::Event(event));
+                }
+            })
+            .wait();
+        if let Err(error) = asked {
+            tracing::warn!("{}", FleetError::zenoh(error));
+        }
+    }
+
+    /// Sessions that this one is connected to.
+    fn reached(&self) -> usize {
+        let info = self.session.info();
+        info.routers_zid().wait().count() + info.peers_zid().wait().count()
+    }
+
+    fn now(&self) -> Now {
+        Now {
+            running_ms: u64::try_from(self.begin.elapsed().as_millis()).unwrap_or(u64::MAX),
+            unix_ns: unix_ns(),
+        }
+    }
+
+    /// The wall goes on where nothing can be kept; the first time is told of.
+    fn note(&mut self, kept: Result<(), StoreError>) {
+        if let Err(error) = kept
+            && !self.unkept
+        {
+            self.unkept = true;
+            tracing::warn!("incidents are not kept: {error}; further failures are not told");
+        }
+    }
+}

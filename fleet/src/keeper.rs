@@ -1,0 +1,286 @@
+//! From what the wall says to what is kept: incidents, contacts, minutes of the residual.
+
+use std::collections::BTreeMap;
+
+use tauscope_publish::message::{ContactMessage, Record, StatusMessage};
+
+use crate::store::{JointNormal, Kind, News, Store, StoreError};
+use crate::wall::{Effect, ResidualView, Severity, Snapshot, State, UnknownWhy, Wall};
+use crate::words;
+
+const MINUTE_NS: i64 = 60_000_000_000;
+const HOUR_NS: i64 = 60 * MINUTE_NS;
+const DAY_NS: i64 = 24 * HOUR_NS;
+/// Days of the curve on a tile. Resolution: six weeks, in which a gear wears.
+const TREND_DAYS: i64 = 42;
+
+/// Keeps what happens to the cells.
+#[derive(Debug)]
+pub struct Keeper {
+    store: Store,
+    normals: BTreeMap<String, Normal>,
+    minute: i64,
+    hour: i64,
+}
+
+/// What is normal for a cell, and how its residual went by day, as a share of that.
+#[derive(Debug, Default)]
+struct Normal {
+    joints: Vec<JointNormal>,
+    trend: Vec<f64>,
+}
+
+impl Keeper {
+    /// Keeps it in this file.
+    pub fn new(store: Store) -> Self {
+        Self {
+            store,
+            normals: BTreeMap::new(),
+            minute: 0,
+            hour: 0,
+        }
+    }
+
+    /// The file.
+    pub fn store(&self) -> &Store {
+        &self.store
+    }
+
+    /// The cells of earlier lives of this host.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn remembered(&self) -> Result<Vec<(String, i64)>, StoreError> {
+        self.store.cells()
+    }
+
+    /// Keeps what the wall says at `now_ns`.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn keep(&mut self, wall: &Wall, effect: &Effect, now_ns: i64) -> Result<(), StoreError> {
+        match effect {
+            Effect::Changed { cell, now, before } => self.changed(cell, *before, *now, now_ns),
+            Effect::Recorded {
+                cell,
+                instance,
+                told_ns,
+                record,
+            } => {
+                let status = wall.status_of(cell);
+                match record {
+                    Record::Contact(contact) => {
+                        self.contact(cell, instance, contact, *told_ns, status)
+                    }
+                    Record::Change(change) => {
+                        let unit = status.map_or("", |status| status.effort_unit.as_str());
+                        self.store.raise(&News {
+                            cell: cell.clone(),
+                            kind: Kind::Change,
+                            place: format!("{} {}", change.effect, change.joints.join(" ")),
+                            severity: Severity::Notice,
+                            words: words::change(change, unit),
+                            at_ns: *told_ns,
+                        })
+                    }
+                }
+            }
+            Effect::Lost {
+                cell,
+                stage,
+                samples,
+            } => {
+                self.store.raise(&News {
+                    cell: cell.clone(),
+                    kind: Kind::Loss,
+                    place: stage.clone(),
+                    severity: Severity::Notice,
+                    words: format!("{samples} samples lost before `{stage}`"),
+                    at_ns: now_ns,
+                })?;
+                // A loss is over when it is told.
+                self.store.close(cell, Kind::Loss, stage, now_ns)
+            }
+            Effect::AskRecords { .. } | Effect::AskStatus { .. } => Ok(()),
+        }
+    }
+
+    fn changed(
+        &self,
+        cell: &str,
+        before: State,
+        now: State,
+        now_ns: i64,
+    ) -> Result<(), StoreError> {
+        match now {
+            // On its way to something else.
+            State::Unknown { why } if why != UnknownWhy::TwoPublishers => Ok(()),
+            State::Stale { .. } | State::Unknown { .. } => {
+                let news = News {
+                    cell: cell.to_owned(),
+                    kind: Kind::Silence,
+                    place: String::new(),
+                    severity: now.severity(),
+                    words: format!("{}: {}", now.words(), now.reason()),
+                    at_ns: now_ns,
+                };
+                if matches!(before, State::Stale { .. }) {
+                    self.store.revise(&news)
+                } else {
+                    self.store.raise(&news)
+                }
+            }
+            _ => self.store.close(cell, Kind::Silence, "", now_ns),
+        }
+    }
+
+    fn contact(
+        &self,
+        cell: &str,
+        instance: &str,
+        contact: &ContactMessage,
+        told_ns: i64,
+        status: Option<&StatusMessage>,
+    ) -> Result<(), StoreError> {
+        let host = status.map_or("", |status| status.host.as_str());
+        let archive = status.and_then(|status| status.archive.as_deref());
+        let is_new = self.store.contact(cell, instance, contact, host, archive)?;
+        let mut text = words::contact(contact);
+        if let Some(status) = status
+            && let Some(change) = status.changes.first()
+        {
+            text += &format!(" ({})", words::change(change, &status.effort_unit));
+        }
+        // Contacts of ten minutes are one incident, wherever they are: the link is only sure when one has ended.
+        let place = contact.detector.clone();
+        let news = News {
+            cell: cell.to_owned(),
+            kind: Kind::Contact,
+            place,
+            severity: if contact.latched {
+                Severity::Critical
+            } else {
+                Severity::Notice
+            },
+            words: text,
+            at_ns: told_ns,
+        };
+        if is_new {
+            self.store.raise(&news)?;
+        } else {
+            self.store.revise(&news)?;
+        }
+        if let (Some(_), Some(by)) = (contact.acknowledged_ns, &contact.acknowledged_by) {
+            self.store.acknowledge(cell, by, told_ns)?;
+        }
+        let acknowledged = !contact.latched || contact.acknowledged_ns.is_some();
+        if contact.end_ns.is_some() && acknowledged {
+            self.store
+                .close(cell, Kind::Contact, &news.place, told_ns)?;
+        }
+        Ok(())
+    }
+
+    /// Keeps what is due by the clock: minutes, and once an hour what is normal.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn tick(&mut self, snapshot: &Snapshot) -> Result<(), StoreError> {
+        let now_ns = snapshot.now_ns;
+        let (minute, hour) = (now_ns / MINUTE_NS, now_ns / HOUR_NS);
+        if minute != self.minute {
+            // The first minute is not whole.
+            let first = self.minute == 0;
+            self.minute = minute;
+            if !first {
+                self.store.at_once(|store| minutes(store, snapshot))?;
+            }
+        }
+        if hour != self.hour {
+            self.hour = hour;
+            self.store.prune(now_ns)?;
+            self.learn(snapshot.cells.iter().map(|cell| cell.cell.as_str()), now_ns)?;
+        }
+        Ok(())
+    }
+
+    /// Reads again what is normal for these cells.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn learn<'a>(
+        &mut self,
+        cells: impl Iterator<Item = &'a str>,
+        now_ns: i64,
+    ) -> Result<(), StoreError> {
+        for cell in cells {
+            let joints = self.store.normals(cell)?;
+            let mut by_day: BTreeMap<i64, (f64, f64)> = BTreeMap::new();
+            for day in self.store.days(cell, now_ns - TREND_DAYS * DAY_NS)? {
+                let normal = joints.iter().find(|normal| normal.joint == day.joint);
+                if let Some(normal) = normal {
+                    let sums = by_day.entry(day.day_ns).or_default();
+                    sums.0 += day.rms * day.rms;
+                    sums.1 += normal.rms * normal.rms;
+                }
+            }
+            let ratios = by_day.values().filter(|(_, normal)| *normal > 0.0);
+            let trend = ratios.map(|(now, normal)| (now / normal).sqrt()).collect();
+            self.normals
+                .insert(cell.to_owned(), Normal { joints, trend });
+        }
+        Ok(())
+    }
+
+    /// Puts what is normal for the cells into a snapshot.
+    pub fn compare(&self, snapshot: &mut Snapshot) {
+        for view in &mut snapshot.cells {
+            let Some(normal) = self.normals.get(&view.cell) else {
+                continue;
+            };
+            view.trend.clone_from(&normal.trend);
+            let residual = view
+                .status
+                .as_ref()
+                .and_then(|status| status.residual.as_ref());
+            let joints = residual.iter().flat_map(|residual| &residual.joints);
+            let known = joints.filter_map(|joint| {
+                let normal = normal
+                    .joints
+                    .iter()
+                    .find(|normal| normal.joint == joint.name)?;
+                Some((joint.name.as_str(), joint.rms, normal.rms))
+            });
+            if let Some(against) = ResidualView::against(known, "history") {
+                view.residual = Some(against);
+            }
+        }
+    }
+}
+
+fn minutes(store: &Store, snapshot: &Snapshot) -> Result<(), StoreError> {
+    for view in &snapshot.cells {
+        let Some(status) = &view.status else { continue };
+        let is_there = !matches!(view.state, State::Stale { .. } | State::Ended { .. });
+        if is_there {
+            store.seen(&view.cell, snapshot.now_ns, &status.host, &status.robot)?;
+        }
+        let is_fresh = matches!(
+            view.state,
+            State::Running | State::Contact | State::Muted { .. } | State::Stopped { .. }
+        );
+        let Some(residual) = status.residual.as_ref().filter(|_| is_fresh) else {
+            continue;
+        };
+        for joint in &residual.joints {
+            store.minute(
+                &view.cell,
+                &joint.name,
+                snapshot.now_ns,
+                joint.rms,
+                joint.mean,
+            )?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,15 @@
+//! All cells at once: what each one tells, how fresh that is, its incidents, a page and metrics.
+
+#[cfg(test)]
+mod fixture;
+pub mod hub;
+mod inbox;
+mod keeper;
+mod mailbox;
+pub mod show;
+pub mod store;
+pub mod wall;
+pub mod web;
+mod words;
+
+pub use hub::{FleetError, Hub, Options};

@@ -1,0 +1,337 @@
+//! What a fleet host keeps: contacts, incidents, the residual over weeks, notes. A file of SQLite.
+//!
+//! All times are ns since the epoch. What is older than [`KEPT_NS`] is removed once an hour.
+
+mod history;
+mod incidents;
+#[cfg(test)]
+mod tests;
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use rusqlite::{Connection, OptionalExtension as _, params};
+use serde::Serialize;
+use tauscope_publish::message::ContactMessage;
+
+pub use history::{Day, JointNormal};
+pub use incidents::{Incident, Kind, News};
+
+/// How long contacts, incidents and history are kept \[ns\]. Resolution: a year and some, to compare seasons.
+pub const KEPT_NS: i64 = 400 * 86_400_000_000_000;
+/// Version of the tables. A file of another version is refused.
+const VERSION: i64 = 1;
+
+const TABLES: &str = "
+    CREATE TABLE cells (cell TEXT PRIMARY KEY, seen_ns INTEGER NOT NULL, host TEXT NOT NULL, robot TEXT NOT NULL);
+    CREATE TABLE contacts (
+        cell TEXT NOT NULL, instance TEXT NOT NULL, number INTEGER NOT NULL,
+        detector TEXT NOT NULL, kind TEXT NOT NULL, link TEXT,
+        begin_ns INTEGER NOT NULL, onset_ns INTEGER NOT NULL, end_ns INTEGER, peak_force_n REAL,
+        latched INTEGER NOT NULL, acknowledged_ns INTEGER, acknowledged_by TEXT, host TEXT, archive TEXT,
+        PRIMARY KEY (cell, instance, number));
+    CREATE INDEX contacts_by_time ON contacts (cell, onset_ns);
+    CREATE TABLE incidents (
+        id INTEGER PRIMARY KEY, cell TEXT NOT NULL, kind TEXT NOT NULL, place TEXT NOT NULL,
+        severity INTEGER NOT NULL, words TEXT NOT NULL,
+        opened_ns INTEGER NOT NULL, last_ns INTEGER NOT NULL, closed_ns INTEGER,
+        count INTEGER NOT NULL, reopened INTEGER NOT NULL, acknowledged_ns INTEGER, acknowledged_by TEXT);
+    CREATE INDEX incidents_by_cause ON incidents (cell, kind, place, last_ns);
+    CREATE INDEX incidents_open ON incidents (closed_ns, last_ns);
+    CREATE TABLE history (
+        cell TEXT NOT NULL, joint TEXT NOT NULL, hour_ns INTEGER NOT NULL,
+        minutes INTEGER NOT NULL, squares REAL NOT NULL, means REAL NOT NULL,
+        PRIMARY KEY (cell, joint, hour_ns)) WITHOUT ROWID;
+    CREATE TABLE notes (
+        id INTEGER PRIMARY KEY, cell TEXT NOT NULL, at_ns INTEGER NOT NULL, by TEXT NOT NULL, text TEXT NOT NULL,
+        baseline INTEGER NOT NULL);
+    CREATE INDEX notes_by_cell ON notes (cell, at_ns);
+";
+
+/// Why nothing can be kept.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// SQLite says no.
+    #[error("{path}: {source}")]
+    Sqlite {
+        /// The file.
+        path: PathBuf,
+        /// What it says.
+        source: rusqlite::Error,
+    },
+    /// It holds other tables.
+    #[error("{path} has the version {found}, this program reads {VERSION}; give another file")]
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        found: i64,
+    },
+}
+
+/// The file.
+#[derive(Debug)]
+pub struct Store {
+    connection: Connection,
+    path: PathBuf,
+}
+
+/// What somebody noted of a cell.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Note {
+    /// When \[ns since the epoch\].
+    pub at_ns: i64,
+    /// Who.
+    pub by: String,
+    /// What.
+    pub text: String,
+    /// Whether the cell's normal is learned anew from here on.
+    pub baseline: bool,
+}
+
+/// A contact as it is kept.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct KeptContact {
+    /// What the cell told of it.
+    #[serde(flatten)]
+    pub contact: ContactMessage,
+    /// The cell's computer then.
+    pub host: String,
+    /// Where its recorder wrote.
+    pub archive: Option<String>,
+}
+
+impl Store {
+    /// Opens the file, or makes it.
+    ///
+    /// # Errors
+    /// If it cannot be opened, or is none of ours.
+    pub fn open(path: &Path) -> Result<Self, StoreError> {
+        let failed = |source| StoreError::Sqlite {
+            path: path.to_owned(),
+            source,
+        };
+        let connection = Connection::open(path).map_err(failed)?;
+        connection
+            .busy_timeout(Duration::from_secs(2))
+            .map_err(failed)?;
+        let found: i64 = connection
+            .query_row("PRAGMA user_version", [], |row| row.get(0))
+            .map_err(failed)?;
+        let tables: i64 = connection
+            .query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get(0))
+            .map_err(failed)?;
+        if found == 0 && tables == 0 {
+            let made = format!("BEGIN; {TABLES} PRAGMA user_version = {VERSION}; COMMIT;");
+            connection.execute_batch(&made).map_err(failed)?;
+        } else if found != VERSION {
+            let path = path.to_owned();
+            return Err(StoreError::Version { path, found });
+        }
+        // A power cut may lose the last second, never the file.
+        connection
+            .execute_batch("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;")
+            .map_err(failed)?;
+        Ok(Self {
+            connection,
+            path: path.to_owned(),
+        })
+    }
+
+    /// The same file once more, for another thread.
+    ///
+    /// # Errors
+    /// If it cannot be opened.
+    pub fn again(&self) -> Result<Self, StoreError> {
+        Self::open(&self.path)
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn failed(&self, source: rusqlite::Error) -> StoreError {
+        let path = self.path.clone();
+        StoreError::Sqlite { path, source }
+    }
+
+    /// A cell was seen.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn seen(&self, cell: &str, at_ns: i64, host: &str, robot: &str) -> Result<(), StoreError> {
+        let text = "INSERT INTO cells VALUES (?1, ?2, ?3, ?4) ON CONFLICT (cell) DO UPDATE
+                    SET seen_ns = ?2, host = ?3, robot = ?4";
+        let done = self
+            .connection
+            .execute(text, params![cell, at_ns, host, robot]);
+        done.map(|_| ()).map_err(|error| self.failed(error))
+    }
+
+    /// The cells that were ever seen, and when last.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn cells(&self) -> Result<Vec<(String, i64)>, StoreError> {
+        self.rows("SELECT cell, seen_ns FROM cells ORDER BY cell", [], |row| {
+            Ok((row.get(0)?, row.get(1)?))
+        })
+    }
+
+    /// Keeps what is known of a contact. Whether it is a new one.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn contact(
+        &self,
+        cell: &str,
+        instance: &str,
+        contact: &ContactMessage,
+        host: &str,
+        archive: Option<&str>,
+    ) -> Result<bool, StoreError> {
+        let number = i64::try_from(contact.number).unwrap_or(i64::MAX);
+        let known = "SELECT 1 FROM contacts WHERE cell = ?1 AND instance = ?2 AND number = ?3";
+        let key = params![cell, instance, number];
+        let known: Option<i64> = self
+            .connection
+            .query_row(known, key, |row| row.get(0))
+            .optional()
+            .map_err(|error| self.failed(error))?;
+        let text =
+            "INSERT INTO contacts VALUES (?1,?2,?3,?4,?5,?6,?7,?8,?9,?10,?11,?12,?13,?14,?15)
+                    ON CONFLICT DO UPDATE SET kind = ?5, link = ?6, end_ns = coalesce(?9, end_ns),
+                    peak_force_n = ?10, latched = max(latched, ?11),
+                    acknowledged_ns = coalesce(?12, acknowledged_ns),
+                    acknowledged_by = coalesce(?13, acknowledged_by)";
+        let values = params![
+            cell,
+            instance,
+            number,
+            contact.detector,
+            contact.kind,
+            contact.link,
+            contact.begin_ns,
+            contact.onset_ns,
+            contact.end_ns,
+            contact.peak_force_n,
+            contact.latched,
+            contact.acknowledged_ns,
+            contact.acknowledged_by,
+            host,
+            archive,
+        ];
+        let done = self.connection.execute(text, values);
+        done.map(|_| known.is_none())
+            .map_err(|error| self.failed(error))
+    }
+
+    /// The newest contacts of a cell.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn contacts(&self, cell: &str, most: u32) -> Result<Vec<KeptContact>, StoreError> {
+        let text = "SELECT number, detector, kind, link, begin_ns, onset_ns, end_ns, peak_force_n, latched,
+                    acknowledged_ns, acknowledged_by, coalesce(host, ''), archive
+                    FROM contacts WHERE cell = ?1 ORDER BY onset_ns DESC LIMIT ?2";
+        self.rows(text, params![cell, most], |row| {
+            let number: i64 = row.get(0)?;
+            Ok(KeptContact {
+                contact: ContactMessage {
+                    number: u64::try_from(number).unwrap_or(0),
+                    detector: row.get(1)?,
+                    kind: row.get(2)?,
+                    link: row.get(3)?,
+                    begin_ns: row.get(4)?,
+                    onset_ns: row.get(5)?,
+                    end_ns: row.get(6)?,
+                    peak_force_n: row.get(7)?,
+                    latched: row.get(8)?,
+                    acknowledged_ns: row.get(9)?,
+                    acknowledged_by: row.get(10)?,
+                },
+                host: row.get(11)?,
+                archive: row.get(12)?,
+            })
+        })
+    }
+
+    /// Keeps a note.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn note(&self, cell: &str, note: &Note) -> Result<(), StoreError> {
+        let text =
+            "INSERT INTO notes (cell, at_ns, by, text, baseline) VALUES (?1, ?2, ?3, ?4, ?5)";
+        let values = params![cell, note.at_ns, note.by, note.text, note.baseline];
+        let done = self.connection.execute(text, values);
+        done.map(|_| ()).map_err(|error| self.failed(error))
+    }
+
+    /// The newest notes of a cell.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn notes(&self, cell: &str, most: u32) -> Result<Vec<Note>, StoreError> {
+        let text = "SELECT at_ns, by, text, baseline FROM notes WHERE cell = ?1 ORDER BY at_ns DESC LIMIT ?2";
+        self.rows(text, params![cell, most], |row| {
+            Ok(Note {
+                at_ns: row.get(0)?,
+                by: row.get(1)?,
+                text: row.get(2)?,
+                baseline: row.get(3)?,
+            })
+        })
+    }
+
+    /// Removes what is older than it is kept.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn prune(&self, now_ns: i64) -> Result<(), StoreError> {
+        let before = now_ns.saturating_sub(KEPT_NS);
+        let texts = [
+            "DELETE FROM contacts WHERE onset_ns < ?1",
+            "DELETE FROM incidents WHERE last_ns < ?1",
+            "DELETE FROM history WHERE hour_ns < ?1",
+            "DELETE FROM cells WHERE seen_ns < ?1",
+        ];
+        for text in texts {
+            let done = self.connection.execute(text, [before]);
+            done.map_err(|error| self.failed(error))?;
+        }
+        Ok(())
+    }
+
+    /// Does `work` as one transaction: all of it is kept, or nothing.
+    ///
+    /// # Errors
+    /// What `work` says, or if the file cannot be written.
+    pub fn at_once(
+        &self,
+        work: impl FnOnce(&Self) -> Result<(), StoreError>,
+    ) -> Result<(), StoreError> {
+        let transaction = self
+            .connection
+            .unchecked_transaction()
+            .map_err(|error| self.failed(error))?;
+        work(self)?;
+        transaction.commit().map_err(|error| self.failed(error))
+    }
+
+    fn rows<T>(
+        &self,
+        text: &str,
+        values: impl rusqlite::Params,
+        read: impl FnMut(&rusqlite::Row<'_>) -> rusqlite::Result<T>,
+    ) -> Result<Vec<T>, StoreError> {
+        let mut statement = self
+            .connection
+            .prepare(text)
+            .map_err(|error| self.failed(error))?;
+        let rows = statement.query_map(values, read);
+        let rows = rows.and_then(Iterator::collect);
+        rows.map_err(|error| self.failed(error))
+    }
+}

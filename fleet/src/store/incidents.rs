@@ -1,0 +1,207 @@
+//! Incidents: one for each cause, however often it comes.
+
+use rusqlite::{OptionalExtension as _, params};
+use serde::Serialize;
+
+use super::{Store, StoreError};
+use crate::wall::Severity;
+
+/// What comes again within this time is the same incident \[ns\]. Resolution: a shift looks at it once.
+pub const REOPEN_NS: i64 = 600_000_000_000;
+
+/// What kind of cause.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// Something touched the robot.
+    Contact,
+    /// The arm has changed.
+    Change,
+    /// The cell is stale or unknown.
+    Silence,
+    /// Samples were lost.
+    Loss,
+}
+
+impl Kind {
+    /// In a word, as in the file.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Contact => "contact",
+            Self::Change => "change",
+            Self::Silence => "silence",
+            Self::Loss => "loss",
+        }
+    }
+}
+
+/// Something that belongs to an incident.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct News {
+    /// The cell.
+    pub cell: String,
+    /// The kind of the cause.
+    pub kind: Kind,
+    /// What tells it from other causes of the kind: a link, a stage, a joint.
+    pub place: String,
+    /// How much it matters.
+    pub severity: Severity,
+    /// What has happened.
+    pub words: String,
+    /// When \[ns since the epoch\].
+    pub at_ns: i64,
+}
+
+/// An incident.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Incident {
+    /// Its number.
+    pub id: i64,
+    /// The cell.
+    pub cell: String,
+    /// The kind of the cause.
+    pub kind: String,
+    /// How much it matters.
+    pub severity: Severity,
+    /// What has happened.
+    pub words: String,
+    /// When it began \[ns since the epoch\].
+    pub opened_ns: i64,
+    /// When it came last \[ns since the epoch\].
+    pub last_ns: i64,
+    /// When it ended; `None` while it lasts \[ns since the epoch\].
+    pub closed_ns: Option<i64>,
+    /// How often it came.
+    pub count: i64,
+    /// How often it was opened again.
+    pub reopened: i64,
+    /// When somebody acknowledged it \[ns since the epoch\].
+    pub acknowledged_ns: Option<i64>,
+    /// Who.
+    pub acknowledged_by: Option<String>,
+}
+
+fn number(severity: Severity) -> i64 {
+    match severity {
+        Severity::Critical => 3,
+        Severity::Serious => 2,
+        Severity::Notice => 1,
+        Severity::Good => 0,
+    }
+}
+
+fn severity(number: i64) -> Severity {
+    match number {
+        3 => Severity::Critical,
+        2 => Severity::Serious,
+        1 => Severity::Notice,
+        _ => Severity::Good,
+    }
+}
+
+impl Store {
+    /// Adds to the open incident of this cause, opens one again that ended less than 10 minutes ago, or begins one.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn raise(&self, news: &News) -> Result<(), StoreError> {
+        let failed = |error| self.failed(error);
+        let text =
+            "SELECT id, closed_ns FROM incidents WHERE cell = ?1 AND kind = ?2 AND place = ?3
+                    ORDER BY last_ns DESC, id DESC LIMIT 1";
+        let cause = params![news.cell, news.kind.as_str(), news.place];
+        let last: Option<(i64, Option<i64>)> = self
+            .connection
+            .query_row(text, cause, |row| Ok((row.get(0)?, row.get(1)?)))
+            .optional()
+            .map_err(failed)?;
+        let same = last.filter(|(_, closed_ns)| {
+            closed_ns.is_none_or(|closed_ns| news.at_ns.saturating_sub(closed_ns) < REOPEN_NS)
+        });
+        if let Some((id, closed_ns)) = same {
+            let text = "UPDATE incidents SET count = count + 1, last_ns = max(last_ns, ?2), words = ?3,
+                            severity = max(severity, ?4), closed_ns = NULL, reopened = reopened + ?5,
+                            acknowledged_ns = NULL, acknowledged_by = NULL WHERE id = ?1";
+            let again = i64::from(closed_ns.is_some());
+            let values = params![id, news.at_ns, news.words, number(news.severity), again];
+            self.connection.execute(text, values).map_err(failed)?;
+        } else {
+            let text = "INSERT INTO incidents
+                            (cell, kind, place, severity, words, opened_ns, last_ns, count, reopened)
+                            VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?6, 1, 0)";
+            let values = params![
+                news.cell,
+                news.kind.as_str(),
+                news.place,
+                number(news.severity),
+                news.words,
+                news.at_ns
+            ];
+            self.connection.execute(text, values).map_err(failed)?;
+        }
+        Ok(())
+    }
+
+    /// More is known of the open incident of this cause: it did not come again.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn revise(&self, news: &News) -> Result<(), StoreError> {
+        let text = "UPDATE incidents SET words = ?4, severity = max(severity, ?5)
+                    WHERE cell = ?1 AND kind = ?2 AND place = ?3 AND closed_ns IS NULL";
+        let (kind, severity) = (news.kind.as_str(), number(news.severity));
+        let values = params![news.cell, kind, news.place, news.words, severity];
+        let done = self.connection.execute(text, values);
+        done.map(|_| ()).map_err(|error| self.failed(error))
+    }
+
+    /// The cause is over.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn close(&self, cell: &str, kind: Kind, place: &str, at_ns: i64) -> Result<(), StoreError> {
+        let text = "UPDATE incidents SET closed_ns = ?4
+                    WHERE cell = ?1 AND kind = ?2 AND place = ?3 AND closed_ns IS NULL";
+        let values = params![cell, kind.as_str(), place, at_ns];
+        let done = self.connection.execute(text, values);
+        done.map(|_| ()).map_err(|error| self.failed(error))
+    }
+
+    /// Somebody has seen what is open at a cell. A change of the arm ends with that: nothing else tells its end.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn acknowledge(&self, cell: &str, by: &str, at_ns: i64) -> Result<(), StoreError> {
+        let text = "UPDATE incidents SET acknowledged_ns = ?2, acknowledged_by = ?3,
+                    closed_ns = CASE kind WHEN 'change' THEN ?2 ELSE closed_ns END
+                    WHERE cell = ?1 AND acknowledged_ns IS NULL";
+        let done = self.connection.execute(text, params![cell, at_ns, by]);
+        done.map(|_| ()).map_err(|error| self.failed(error))
+    }
+
+    /// Incidents of a cell, or of all: the open ones first, then the newest.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn incidents(&self, cell: Option<&str>, most: u32) -> Result<Vec<Incident>, StoreError> {
+        let text = "SELECT id, cell, kind, severity, words, opened_ns, last_ns, closed_ns, count, reopened,
+                    acknowledged_ns, acknowledged_by FROM incidents WHERE ?1 IS NULL OR cell = ?1
+                    ORDER BY closed_ns IS NOT NULL, last_ns DESC LIMIT ?2";
+        self.rows(text, params![cell, most], |row| {
+            Ok(Incident {
+                id: row.get(0)?,
+                cell: row.get(1)?,
+                kind: row.get(2)?,
+                severity: severity(row.get(3)?),
+                words: row.get(4)?,
+                opened_ns: row.get(5)?,
+                last_ns: row.get(6)?,
+                closed_ns: row.get(7)?,
+                count: row.get(8)?,
+                reopened: row.get(9)?,
+                acknowledged_ns: row.get(10)?,
+                acknowledged_by: row.get(11)?,
+            })
+        })
+    }
+}

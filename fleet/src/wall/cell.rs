@@ -1,0 +1,305 @@
+//! What is known of one cell.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+use tauscope_publish::message::{AlarmState, RecordMessage, StatusMessage};
+
+use super::snapshot::{CellView, ResidualView};
+use super::state::{StaleWhy, State, UnknownWhy};
+use super::{Effect, Now, STALE_AFTER_MS};
+
+/// Lives of one cell that are followed at a time. Resolution: one is right, two are a fault; a stranger may not fill
+/// the memory.
+const MAX_LIVES: usize = 8;
+/// Minutes of the residual that are kept. Resolution: an hour on the small curve of a tile.
+const MINUTES: usize = 60;
+const NS_PER_MS: i64 = 1_000_000;
+
+/// A cell.
+#[derive(Debug, Default)]
+pub struct Watched {
+    /// Whether it was named at the start.
+    pub expected: bool,
+    /// When it was seen last, in an earlier life of the fleet host \[ns since the epoch\].
+    pub remembered_ns: Option<i64>,
+    lives: BTreeSet<String>,
+    /// When its last token went.
+    gone: Option<Now>,
+    status: Option<(StatusMessage, Now)>,
+    /// The last number of a record, of the life that the status tells of.
+    records: u64,
+    /// Lost samples by stage, as last told.
+    lost: BTreeMap<String, u64>,
+    /// Clock of the cell minus clock of this host by the fastest message of a minute \[ns\], and when the minute began.
+    clock_ahead: Option<(i64, u64)>,
+    minutes: VecDeque<f64>,
+    minute: Option<i64>,
+    /// The state as of the last settling, and since when \[ns since the epoch\].
+    settled: Option<(State, i64)>,
+}
+
+impl Watched {
+    /// A token is there; `false` where it is one too many.
+    pub fn alive(&mut self, instance: String) -> bool {
+        if self.lives.len() >= MAX_LIVES && !self.lives.contains(&instance) {
+            return false;
+        }
+        self.lives.insert(instance);
+        self.gone = None;
+        true
+    }
+
+    /// Whether it lives and nothing is known of that life.
+    pub fn awaits_status(&self) -> bool {
+        let known = self.newest().map(|status| &status.instance);
+        known.is_none_or(|known| !self.lives.contains(known))
+    }
+
+    /// A token is gone.
+    pub fn gone(&mut self, instance: &str, now: Now) {
+        if self.lives.remove(instance) && self.lives.is_empty() {
+            self.gone = Some(now);
+        }
+    }
+
+    /// The newest status.
+    pub fn newest(&self) -> Option<&StatusMessage> {
+        self.status.as_ref().map(|(status, _)| status)
+    }
+
+    /// Takes a status. One that answers a question late must not replace a newer one.
+    pub fn status(
+        &mut self,
+        name: &str,
+        status: StatusMessage,
+        now: Now,
+        effects: &mut Vec<Effect>,
+    ) {
+        let known = self
+            .newest()
+            .map(|known| (known.instance.clone(), known.sent_ns));
+        let same_life = known
+            .as_ref()
+            .is_some_and(|(life, _)| *life == status.instance);
+        if same_life && known.is_some_and(|(_, sent_ns)| status.sent_ns <= sent_ns) {
+            return;
+        }
+        if !same_life {
+            // Another publisher speaks: the one whose token is there is right.
+            let lives = &self.lives;
+            let ours = self
+                .newest()
+                .is_some_and(|known| lives.contains(&known.instance));
+            if ours && !lives.contains(&status.instance) {
+                return;
+            }
+            self.records = 0;
+            self.lost.clear();
+            self.clock_ahead = None;
+        }
+        let ahead_ns = status.sent_ns.saturating_sub(now.unix_ns);
+        // What is late looks like a clock that is behind: the message that was fastest tells best.
+        let of_minute =
+            |(_, since_ms): &(i64, u64)| now.running_ms.saturating_sub(*since_ms) < 60_000;
+        self.clock_ahead = Some(match self.clock_ahead.filter(of_minute) {
+            Some((best_ns, since_ms)) => (best_ns.max(ahead_ns), since_ms),
+            None => (ahead_ns, now.running_ms),
+        });
+        self.count_losses(name, &status, effects);
+        if status.last_record > self.records {
+            effects.push(Effect::AskRecords {
+                cell: name.to_owned(),
+                after: self.records,
+            });
+        }
+        self.note_residual(&status);
+        self.status = Some((status, now));
+    }
+
+    fn count_losses(&mut self, name: &str, status: &StatusMessage, effects: &mut Vec<Effect>) {
+        for stage in &status.stages {
+            let known = self.lost.entry(stage.stage.clone()).or_default();
+            // A stage that was started again counts from 0.
+            let more = stage.dropped.saturating_sub(*known);
+            *known = stage.dropped;
+            if more > 0 {
+                effects.push(Effect::Lost {
+                    cell: name.to_owned(),
+                    stage: stage.stage.clone(),
+                    samples: more,
+                });
+            }
+        }
+        let told = |stage: &String| status.stages.iter().any(|told| told.stage == *stage);
+        self.lost.retain(|stage, _| told(stage));
+    }
+
+    /// One value a minute, for the curve.
+    fn note_residual(&mut self, status: &StatusMessage) {
+        let Some(residual) = &status.residual else {
+            return;
+        };
+        let minute = residual.stamp_ns / 60_000_000_000;
+        if self.minute == Some(minute) || residual.joints.is_empty() {
+            return;
+        }
+        self.minute = Some(minute);
+        let squares = residual.joints.iter().map(|joint| joint.rms * joint.rms);
+        self.minutes.push_back(squares.sum::<f64>().sqrt());
+        if self.minutes.len() > MINUTES {
+            self.minutes.pop_front();
+        }
+    }
+
+    /// Takes a record.
+    pub fn record(&mut self, name: &str, message: RecordMessage, effects: &mut Vec<Effect>) {
+        let known = self.newest().map(|status| status.instance.as_str());
+        if known.is_some_and(|known| known != message.instance) {
+            // Of a life that is over, or about to begin: its status comes first.
+            return;
+        }
+        // With a hole before it, the status that follows makes somebody ask.
+        if message.number == self.records + 1 {
+            self.records = message.number;
+        }
+        effects.push(Effect::Recorded {
+            cell: name.to_owned(),
+            instance: message.instance,
+            told_ns: message.sent_ns,
+            record: message.record,
+        });
+    }
+
+    /// What is kept of the records has come; what is older is gone.
+    pub fn all_records(&mut self, instance: &str, number: u64) {
+        if self
+            .newest()
+            .is_some_and(|status| status.instance == instance)
+        {
+            self.records = self.records.max(number);
+        }
+    }
+
+    /// Where it stands.
+    pub fn state(&self, reached: usize, now: Now) -> State {
+        let Some((status, at)) = &self.status else {
+            return self.state_without_status();
+        };
+        let stale = |since_ns, why| State::Stale { since_ns, why };
+        if status.ended {
+            return State::Ended {
+                since_ns: at.unix_ns,
+            };
+        }
+        let age_ms = now.running_ms.saturating_sub(at.running_ms);
+        if reached == 0 && (self.gone.is_some() || age_ms > STALE_AFTER_MS) {
+            return stale(at.unix_ns, StaleWhy::Connection);
+        }
+        if let Some(gone) = self.gone {
+            return stale(gone.unix_ns, StaleWhy::Token);
+        }
+        let unknown = |why| State::Unknown { why };
+        if self.lives.len() > 1 {
+            return unknown(UnknownWhy::TwoPublishers);
+        }
+        if age_ms > STALE_AFTER_MS {
+            return stale(at.unix_ns, StaleWhy::Status);
+        }
+        if self.lives.is_empty() {
+            return unknown(UnknownWhy::NoToken);
+        }
+        if !self.lives.contains(&status.instance) {
+            return unknown(UnknownWhy::NoStatus);
+        }
+        let muted_ms = (status.alarm.muted_s * 1e3) as u64;
+        let muted = muted_ms
+            .checked_sub(age_ms)
+            .filter(|left| *left > 0)
+            .map(|_| State::Muted {
+                until_ns: at.unix_ns.saturating_add(muted_ms as i64 * NS_PER_MS),
+            });
+        match status.alarm.state {
+            AlarmState::Collision => State::Stopped {
+                acknowledged: false,
+            },
+            AlarmState::Acknowledged => State::Stopped { acknowledged: true },
+            // Samples come, and no detector has said anything of one yet.
+            AlarmState::Silent if status.alarm.stamp_ns == 0 => State::NotReady,
+            AlarmState::Silent => {
+                let age_ns = status
+                    .last_sample_age_ms
+                    .unwrap_or(0)
+                    .saturating_mul(1_000_000);
+                let age_ns = i64::try_from(age_ns).unwrap_or(i64::MAX);
+                stale(at.unix_ns.saturating_sub(age_ns), StaleWhy::Samples)
+            }
+            AlarmState::NotReady => State::NotReady,
+            AlarmState::Contact => muted.unwrap_or(State::Contact),
+            AlarmState::Free => muted.unwrap_or(State::Running),
+        }
+    }
+
+    fn state_without_status(&self) -> State {
+        if !self.lives.is_empty() {
+            return State::Unknown {
+                why: UnknownWhy::NoStatus,
+            };
+        }
+        let gone_ns = self.gone.map(|gone| gone.unix_ns);
+        match gone_ns.or(self.remembered_ns) {
+            Some(since_ns) => State::Stale {
+                since_ns,
+                why: StaleWhy::Token,
+            },
+            None => State::NeverSeen,
+        }
+    }
+
+    /// Notes a change of the state.
+    pub fn settle(&mut self, name: &str, reached: usize, now: Now) -> Option<Effect> {
+        let state = self.state(reached, now);
+        let before = self.settled.map(|(state, _)| state);
+        let changed = before.is_none_or(|before| !before.same_as(state));
+        if changed {
+            self.settled = Some((state, now.unix_ns));
+        }
+        let before = before.filter(|_| changed)?;
+        Some(Effect::Changed {
+            cell: name.to_owned(),
+            before,
+            now: state,
+        })
+    }
+
+    /// What is shown.
+    pub fn view(&self, name: &str, reached: usize, now: Now) -> CellView {
+        let state = self.state(reached, now);
+        let since_ns = match state {
+            State::Stale { since_ns, .. } => Some(since_ns),
+            _ => self.settled.map(|(_, since_ns)| since_ns),
+        };
+        let age_ms = |at: &Now| now.running_ms.saturating_sub(at.running_ms);
+        let status_age_ms = self.status.as_ref().map(|(_, at)| age_ms(at));
+        let sample_age_ms = self
+            .status
+            .as_ref()
+            .and_then(|(status, at)| Some(status.last_sample_age_ms?.saturating_add(age_ms(at))));
+        CellView {
+            cell: name.to_owned(),
+            state,
+            severity: state.severity(),
+            since_ns,
+            status_age_ms,
+            sample_age_ms,
+            clock_ahead_ms: self.clock_ahead.map(|(ns, _)| ns / NS_PER_MS),
+            lost_samples: self
+                .lost
+                .values()
+                .fold(0u64, |sum, lost| sum.saturating_add(*lost)),
+            residual: self.newest().and_then(ResidualView::of),
+            curve: self.minutes.iter().copied().collect(),
+            trend: Vec::new(),
+            status: self.newest().cloned(),
+        }
+    }
+}

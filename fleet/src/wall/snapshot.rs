@@ -1,0 +1,150 @@
+//! All cells at one instant, for page, terminal, JSON and metrics.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use tauscope_publish::message::StatusMessage;
+
+use super::Now;
+use super::state::{Severity, State};
+
+/// All cells at one instant.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Snapshot {
+    /// When, by the clock of the fleet host \[ns since the epoch\].
+    pub now_ns: i64,
+    /// Zenoh sessions that the fleet host reaches; with 0 nothing here is fresh.
+    pub sessions_reached: usize,
+    /// How many cells there are in each state.
+    pub totals: Totals,
+    /// Messages that were refused, by reason.
+    pub refused: BTreeMap<&'static str, u64>,
+    /// The worst first; of equals the one that is so for longest.
+    pub cells: Vec<CellView>,
+}
+
+/// How many cells are in each state, by its name.
+pub type Totals = BTreeMap<&'static str, usize>;
+
+/// One cell at one instant.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CellView {
+    /// The cell.
+    pub cell: String,
+    /// Where it stands.
+    #[serde(flatten)]
+    pub state: State,
+    /// How much that matters.
+    pub severity: Severity,
+    /// Since when it is in that state \[ns since the epoch\].
+    #[serde(rename = "state_since_ns")]
+    pub since_ns: Option<i64>,
+    /// Time since the newest status arrived \[ms\].
+    pub status_age_ms: Option<u64>,
+    /// Time since the newest sample arrived in the cell \[ms\].
+    pub sample_age_ms: Option<u64>,
+    /// How far the cell's clock is ahead of the fleet host's, and the way of the fastest message less \[ms\].
+    pub clock_ahead_ms: Option<i64>,
+    /// Samples that its stages have lost.
+    pub lost_samples: u64,
+    /// Its residual against its normal.
+    pub residual: Option<ResidualView>,
+    /// The residual's length in each of the last minutes \[effort unit\].
+    pub curve: Vec<f64>,
+    /// The residual's length by day over the last six weeks, as a share of the normal; empty without a history.
+    pub trend: Vec<f64>,
+    /// What it said last; as old as `status_age_ms`.
+    pub status: Option<StatusMessage>,
+}
+
+/// A cell's residual against its normal.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ResidualView {
+    /// Root mean square over all joints, over the same of the normal.
+    pub ratio: f64,
+    /// The joint whose residual grew most.
+    pub joint: String,
+    /// By how much.
+    pub joint_ratio: f64,
+    /// What is taken for normal: `calibration`, or `history` since the newest baseline.
+    pub normal: &'static str,
+}
+
+impl CellView {
+    /// Now, by the clock of the cell's samples: ages of what has a stamp are against this \[ns since the epoch\].
+    /// A recording that is played has another time than the fleet host.
+    pub fn stream_now_ns(&self) -> Option<i64> {
+        let newest_ns = self.status.as_ref()?.last_sample_ns?;
+        let age_ns = self.sample_age_ms?.saturating_mul(1_000_000);
+        Some(newest_ns.saturating_add(i64::try_from(age_ns).ok()?))
+    }
+}
+
+impl ResidualView {
+    /// Against the twin's calibration.
+    pub fn of(status: &StatusMessage) -> Option<Self> {
+        let joints = &status.residual.as_ref()?.joints;
+        let known = joints.iter();
+        let known =
+            known.filter_map(|joint| Some((joint.name.as_str(), joint.rms, joint.calibrated?)));
+        Self::against(known, "calibration")
+    }
+
+    /// Against a normal: joint, residual, normal \[effort unit\].
+    pub fn against<'a>(
+        joints: impl Iterator<Item = (&'a str, f64, f64)>,
+        normal: &'static str,
+    ) -> Option<Self> {
+        let (mut now, mut usual) = (0.0, 0.0);
+        let mut most: Option<(&str, f64)> = None;
+        for (name, rms, normal) in joints.filter(|(_, _, normal)| *normal > 0.0) {
+            now += rms * rms;
+            usual += normal * normal;
+            let ratio = rms / normal;
+            if most.is_none_or(|(_, most)| ratio > most) {
+                most = Some((name, ratio));
+            }
+        }
+        let (joint, joint_ratio) = most?;
+        Some(Self {
+            ratio: f64::sqrt(now / usual),
+            joint: joint.to_owned(),
+            joint_ratio,
+            normal,
+        })
+    }
+}
+
+impl Snapshot {
+    pub(super) fn new(
+        now: Now,
+        reached: usize,
+        refused: BTreeMap<&'static str, u64>,
+        mut cells: Vec<CellView>,
+    ) -> Self {
+        // Names keep equals in their places, so that the wall does not flicker.
+        cells.sort_by(|a, b| {
+            let key = |cell: &CellView| {
+                let good = cell.severity == Severity::Good;
+                (cell.severity, if good { None } else { cell.since_ns })
+            };
+            key(a).cmp(&key(b)).then_with(|| a.cell.cmp(&b.cell))
+        });
+        let mut totals: Totals = State::NAMES.iter().map(|name| (*name, 0)).collect();
+        for cell in &cells {
+            *totals.entry(cell.state.name()).or_default() += 1;
+        }
+        Self {
+            now_ns: now.unix_ns,
+            sessions_reached: reached,
+            totals,
+            refused,
+            cells,
+        }
+    }
+
+    /// The view of a cell.
+    pub fn cell(&self, name: &str) -> Option<&CellView> {
+        self.cells.iter().find(|cell| cell.cell == name)
+    }
+}

@@ -1,0 +1,315 @@
+//! What the wall says, as statements.
+
+use tauscope_publish::message::{AlarmState, StatusMessage};
+
+use super::*;
+use crate::fixture;
+
+struct Story {
+    wall: Wall,
+    now: Now,
+    effects: Vec<Effect>,
+}
+
+impl Story {
+    fn new(expected: &[&str]) -> Self {
+        let mut story = Self {
+            wall: Wall::new(expected.iter().map(|name| (*name).to_owned())),
+            now: Now {
+                running_ms: 0,
+                unix_ns: 1_000_000_000_000,
+            },
+            effects: Vec::new(),
+        };
+        story.tell(Event::Reached(1));
+        story
+    }
+
+    fn tell(&mut self, event: Event) -> &mut Self {
+        let effects = self.wall.take(event, self.now);
+        self.effects.extend(effects);
+        self
+    }
+
+    fn wait(&mut self, ms: u64) -> &mut Self {
+        self.now.running_ms += ms;
+        self.now.unix_ns += ms as i64 * 1_000_000;
+        let effects = self.wall.tick(self.now);
+        self.effects.extend(effects);
+        self
+    }
+
+    fn alive(&mut self, instance: &str) -> &mut Self {
+        let (cell, instance) = ("a".to_owned(), instance.to_owned());
+        self.tell(Event::Alive { cell, instance })
+    }
+
+    fn gone(&mut self, instance: &str) -> &mut Self {
+        let (cell, instance) = ("a".to_owned(), instance.to_owned());
+        self.tell(Event::Gone { cell, instance })
+    }
+
+    fn status(&mut self, change: impl FnOnce(&mut StatusMessage)) -> &mut Self {
+        let mut status = fixture::status("x", 0);
+        status.sent_ns = self.now.unix_ns;
+        change(&mut status);
+        let (cell, status) = ("a".to_owned(), Box::new(status));
+        self.tell(Event::Status { cell, status })
+    }
+
+    fn is(&mut self, words: &str) -> &mut Self {
+        let state = self.wall.state("a").unwrap();
+        assert_eq!(state.words(), words, "{state:?}");
+        self
+    }
+
+    fn because(&mut self, part: &str) -> &mut Self {
+        let reason = self.wall.state("a").unwrap().reason();
+        assert!(reason.contains(part), "{reason}");
+        self
+    }
+}
+
+#[test]
+fn a_cell_is_running_only_with_token_status_samples_and_a_detector_that_judges() {
+    let mut story = Story::new(&["a"]);
+    story.is("never seen");
+    story.alive("x").is("unknown");
+    story.status(|_| {}).is("running");
+    story.status(|status| status.alarm.state = AlarmState::NotReady);
+    // The same instant: an older or equal message replaces nothing.
+    story.is("running").wait(1);
+    story
+        .status(|status| status.alarm.state = AlarmState::NotReady)
+        .is("not ready");
+    story.wait(1).status(|status| {
+        status.alarm.state = AlarmState::Silent;
+        status.last_sample_age_ms = Some(5000);
+    });
+    story.is("stale").because("no samples");
+    story.wait(1).status(|status| {
+        status.alarm.state = AlarmState::Silent;
+        status.alarm.stamp_ns = 0;
+    });
+    story.is("not ready");
+    story.wait(1).status(|_| {}).is("running");
+}
+
+#[test]
+fn a_status_without_a_token_is_not_green() {
+    let mut story = Story::new(&[]);
+    story.status(|_| {}).is("unknown").because("token");
+    story.alive("x").is("running");
+}
+
+#[test]
+fn a_token_that_goes_is_known_at_once_and_a_cut_cell_within_five_seconds() {
+    let mut story = Story::new(&[]);
+    story.alive("x").status(|_| {}).is("running");
+    story.gone("x").is("stale").because("process is gone");
+    story.alive("x").wait(1).status(|_| {}).is("running");
+    story.wait(3000).is("running");
+    story.wait(1500).is("stale").because("no status");
+    let changed = |effect: &&Effect| matches!(effect, Effect::Changed { .. });
+    assert_eq!(story.effects.iter().filter(changed).count(), 4);
+}
+
+#[test]
+fn a_fleet_host_that_reaches_nobody_says_so_of_itself() {
+    let mut story = Story::new(&[]);
+    story.alive("x").status(|_| {});
+    story.tell(Event::Reached(0)).gone("x");
+    story.is("stale").because("this fleet host");
+    assert_eq!(story.wall.snapshot().sessions_reached, 0);
+}
+
+#[test]
+fn a_latched_alarm_stands_first_and_a_mute_ends_by_itself() {
+    let mut story = Story::new(&[]);
+    story.alive("x");
+    story.status(|status| status.alarm.state = AlarmState::Collision);
+    story.is("stopped by latch").wait(1);
+    story.status(|status| status.alarm.state = AlarmState::Acknowledged);
+    story.is("stopped, acknowledged").wait(1);
+    story
+        .status(|status| status.alarm.muted_s = 2.0)
+        .is("muted");
+    let State::Muted { until_ns } = story.wall.state("a").unwrap() else {
+        panic!();
+    };
+    assert_eq!(until_ns, story.now.unix_ns + 2_000_000_000);
+    story.wait(2001).is("running");
+    story.status(|status| {
+        status.alarm.state = AlarmState::Contact;
+        status.alarm.muted_s = 2.0;
+    });
+    story.is("muted").wait(2001).is("contact");
+}
+
+#[test]
+fn a_run_that_ended_in_order_is_no_failure() {
+    let mut story = Story::new(&[]);
+    story
+        .alive("x")
+        .status(|status| status.ended = true)
+        .gone("x");
+    story.wait(60_000).is("ended");
+    // Another run begins.
+    story.alive("y").wait(1);
+    story
+        .status(|status| status.instance = "y".to_owned())
+        .is("running");
+}
+
+#[test]
+fn two_publishers_of_one_name_are_a_fault_and_a_stranger_does_not_replace_the_status() {
+    let mut story = Story::new(&[]);
+    story.alive("x").status(|_| {}).wait(1);
+    story.status(|status| {
+        status.instance = "stranger".to_owned();
+        status.alarm.state = AlarmState::Collision;
+    });
+    story.is("running");
+    story
+        .alive("stranger")
+        .is("unknown")
+        .because("two publishers");
+    story.gone("stranger").is("running");
+}
+
+#[test]
+fn samples_that_are_lost_are_counted_over_restarts() {
+    let mut story = Story::new(&[]);
+    let lost = |dropped: u64| move |status: &mut StatusMessage| status.stages[0].dropped = dropped;
+    story.alive("x").status(lost(3)).wait(1);
+    story.status(lost(3)).wait(1);
+    story.status(lost(10));
+    let samples = story.effects.iter().filter_map(|effect| match effect {
+        Effect::Lost { samples, .. } => Some(*samples),
+        _ => None,
+    });
+    assert_eq!(samples.collect::<Vec<_>>(), [3, 7]);
+    assert_eq!(story.wall.snapshot().cells[0].lost_samples, 10);
+}
+
+#[test]
+fn records_that_were_missed_are_asked_for() {
+    let mut story = Story::new(&[]);
+    story
+        .alive("x")
+        .status(|status| status.last_record = 0)
+        .wait(1);
+    let record = |number| Event::Record {
+        cell: "a".to_owned(),
+        record: Box::new(fixture::record("x", number, fixture::contact(number, 5))),
+    };
+    story.tell(record(1)).tell(record(4));
+    let recorded = |effect: &&Effect| matches!(effect, Effect::Recorded { .. });
+    assert_eq!(story.effects.iter().filter(recorded).count(), 2);
+    story.status(|status| status.last_record = 4);
+    let asked = Effect::AskRecords {
+        cell: "a".to_owned(),
+        after: 1,
+    };
+    assert!(story.effects.contains(&asked), "{:?}", story.effects);
+    story
+        .tell(record(2))
+        .tell(record(3))
+        .tell(record(4))
+        .wait(1);
+    story.effects.clear();
+    story.status(|status| status.last_record = 4);
+    assert_eq!(story.effects, []);
+}
+
+#[test]
+fn a_cell_that_was_there_in_an_earlier_life_is_stale_since_then() {
+    let mut story = Story::new(&[]);
+    story.wall.remember("a", 5);
+    story.is("stale");
+    assert_eq!(story.wall.snapshot().cells[0].since_ns, Some(5));
+}
+
+#[test]
+fn the_worst_stands_first_and_then_the_longest() {
+    let mut story = Story::new(&["n"]);
+    for (cell, state) in [
+        ("good", AlarmState::Free),
+        ("late", AlarmState::Collision),
+        ("touched", AlarmState::Contact),
+    ] {
+        let (cell, instance) = (cell.to_owned(), cell.to_owned());
+        let mut status = fixture::status(&instance, 0);
+        status.alarm.state = state;
+        story.tell(Event::Alive {
+            cell: cell.clone(),
+            instance,
+        });
+        let status = Box::new(status);
+        story.tell(Event::Status { cell, status });
+    }
+    let snapshot = story.wall.snapshot();
+    let order: Vec<&str> = snapshot
+        .cells
+        .iter()
+        .map(|cell| cell.cell.as_str())
+        .collect();
+    assert_eq!(order, ["late", "n", "touched", "good"]);
+    assert_eq!(
+        (snapshot.totals["running"], snapshot.totals["stale"]),
+        (1, 0)
+    );
+}
+
+#[test]
+fn a_residual_is_compared_with_the_calibration_and_the_joint_that_grew_most_is_named() {
+    let mut story = Story::new(&[]);
+    story.alive("x").status(|_| {});
+    let snapshot = story.wall.snapshot();
+    let residual = snapshot.cells[0].residual.as_ref().unwrap();
+    assert_eq!(
+        (residual.joint.as_str(), residual.joint_ratio),
+        ("joint2", 3.0)
+    );
+    assert!((residual.ratio - 5f64.sqrt()).abs() < 1e-12);
+}
+
+#[test]
+fn memory_is_bounded_whoever_speaks() {
+    let mut story = Story::new(&[]);
+    for n in 0..MAX_CELLS + 5 {
+        let (cell, instance) = (format!("c{n}"), "x".to_owned());
+        story.tell(Event::Alive { cell, instance });
+    }
+    for n in 0..20 {
+        let (cell, instance) = ("c0".to_owned(), format!("y{n}"));
+        story.tell(Event::Alive { cell, instance });
+    }
+    let snapshot = story.wall.snapshot();
+    assert_eq!(snapshot.cells.len(), MAX_CELLS);
+    assert_eq!(snapshot.refused["too many cells"], 5);
+    assert_eq!(snapshot.refused["too many lives of one cell"], 13);
+}
+
+#[test]
+fn a_thousand_cells_pass_in_a_fraction_of_their_second() {
+    let mut story = Story::new(&[]);
+    let begin = std::time::Instant::now();
+    for round in 1..=10 {
+        for n in 0..1000 {
+            let (cell, instance) = (format!("c{n}"), "x".to_owned());
+            if round == 1 {
+                story.tell(Event::Alive {
+                    cell: cell.clone(),
+                    instance,
+                });
+            }
+            let status = Box::new(fixture::status("x", round));
+            story.tell(Event::Status { cell, status });
+        }
+        story.wait(1000);
+        assert_eq!(story.wall.snapshot().totals["running"], 1000);
+    }
+    // Ten seconds of a thousand cells. Measured: 0.2 s.
+    assert!(begin.elapsed().as_secs() < 10, "{:?}", begin.elapsed());
+}

@@ -1,0 +1,252 @@
+//! What users do: acknowledge, mute, label, note. Each answer leads back to the cell's page, which tells what came of it.
+
+use std::sync::Arc;
+
+use axum::extract::{Form, Path, State};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse as _, Redirect, Response};
+use serde::Deserialize;
+use tauscope_bus::command::{Answer, Request, Signed};
+
+use super::{App, Shared, page, pages};
+use crate::store::Note;
+use crate::wall::State as CellState;
+use crate::words;
+
+/// Resolution: a sentence or two.
+const MAX_NOTE_BYTES: usize = 400;
+
+/// A form with nothing but the session's secret.
+#[derive(Deserialize)]
+pub struct Bare {
+    csrf: String,
+}
+
+/// A token.
+#[derive(Deserialize)]
+pub struct Login {
+    token: String,
+}
+
+/// A lease.
+#[derive(Deserialize)]
+pub struct Mute {
+    csrf: String,
+    seconds: f64,
+}
+
+/// A label or a note.
+#[derive(Deserialize)]
+pub struct Written {
+    csrf: String,
+    text: String,
+    /// `on`: the cell's normal is learned anew.
+    baseline: Option<String>,
+}
+
+/// Why nothing is done.
+type Refused = (StatusCode, &'static str);
+
+pub async fn login(State(shared): App, headers: HeaderMap, Form(form): Form<Login>) -> Response {
+    let refused = |why: &str| {
+        let body = page(&shared, &headers, |viewer| pages::login(viewer, Some(why)));
+        (StatusCode::FORBIDDEN, body).into_response()
+    };
+    if !shared.sessions.may_try() {
+        let text = "too many tries; wait a few seconds\n";
+        return (StatusCode::TOO_MANY_REQUESTS, text).into_response();
+    }
+    let Some(user) = shared.users.of(&form.token) else {
+        return refused("this is nobody's token");
+    };
+    let secure = headers
+        .get("x-forwarded-proto")
+        .is_some_and(|proto| proto == "https");
+    let cookie = shared.sessions.begin(user, secure).ok();
+    let cookie = cookie.and_then(|cookie| HeaderValue::from_str(&cookie).ok());
+    let Some(cookie) = cookie else {
+        return refused("this host has no random numbers");
+    };
+    ([(header::SET_COOKIE, cookie)], Redirect::to("/")).into_response()
+}
+
+pub async fn logout(State(shared): App, headers: HeaderMap, Form(form): Form<Bare>) -> Response {
+    if shared.sessions.of_form(&headers, &form.csrf).is_some() {
+        shared.sessions.end(&headers);
+    }
+    Redirect::to("/").into_response()
+}
+
+pub async fn acknowledge(
+    State(shared): App,
+    Path(cell): Path<String>,
+    headers: HeaderMap,
+    Form(form): Form<Bare>,
+) -> Response {
+    let user = match may(&shared, &headers, &form.csrf, &cell) {
+        Ok(user) => user,
+        Err(refused) => return refused.into_response(),
+    };
+    let told = if hears(&shared, &cell) {
+        send(&shared, &cell, Request::Acknowledge, &user).await
+    } else {
+        Ok("noted here only: the cell takes no commands now".to_owned())
+    };
+    if told.is_ok() {
+        shared.hub.acknowledged(&cell, &user);
+    }
+    back(&shared, &headers, &cell, told)
+}
+
+pub async fn mute(
+    State(shared): App,
+    Path(cell): Path<String>,
+    headers: HeaderMap,
+    Form(form): Form<Mute>,
+) -> Response {
+    let seconds = form.seconds;
+    command(
+        &shared,
+        &headers,
+        &form.csrf,
+        &cell,
+        Request::Mute { seconds },
+    )
+    .await
+}
+
+pub async fn label(
+    State(shared): App,
+    Path(cell): Path<String>,
+    headers: HeaderMap,
+    Form(form): Form<Written>,
+) -> Response {
+    let text = form.text.trim().to_owned();
+    command(
+        &shared,
+        &headers,
+        &form.csrf,
+        &cell,
+        Request::Label { text },
+    )
+    .await
+}
+
+pub async fn note(
+    State(shared): App,
+    Path(cell): Path<String>,
+    headers: HeaderMap,
+    Form(form): Form<Written>,
+) -> Response {
+    let by = match may(&shared, &headers, &form.csrf, &cell) {
+        Ok(user) => user,
+        Err(refused) => return refused.into_response(),
+    };
+    let text = form.text.trim();
+    let sound = (1..=MAX_NOTE_BYTES).contains(&text.len()) && !text.chars().any(char::is_control);
+    let told = if sound {
+        let note = Note {
+            at_ns: shared.hub.snapshot().now_ns,
+            by,
+            text: text.to_owned(),
+            baseline: form.baseline.is_some(),
+        };
+        shared.hub.note(&cell, note);
+        Ok("noted".to_owned())
+    } else {
+        Err(format!(
+            "a note has 1 to {MAX_NOTE_BYTES} bytes of text on one line"
+        ))
+    };
+    back(&shared, &headers, &cell, told)
+}
+
+async fn command(
+    shared: &Arc<Shared>,
+    headers: &HeaderMap,
+    csrf: &str,
+    cell: &str,
+    request: Request,
+) -> Response {
+    let user = match may(shared, headers, csrf, cell) {
+        Ok(user) => user,
+        Err(refused) => return refused.into_response(),
+    };
+    let told = if hears(shared, cell) {
+        send(shared, cell, request, &user).await
+    } else {
+        Err("the cell takes no commands now".to_owned())
+    };
+    back(shared, headers, cell, told)
+}
+
+/// The user of the form, if the cell is known and the user does not flood it.
+fn may(shared: &Shared, headers: &HeaderMap, csrf: &str, cell: &str) -> Result<String, Refused> {
+    let user = shared.sessions.of_form(headers, csrf);
+    let user = user.ok_or((
+        StatusCode::FORBIDDEN,
+        "log in again: this form is too old\n",
+    ))?;
+    if shared.hub.snapshot().cell(cell).is_none() {
+        return Err((StatusCode::NOT_FOUND, "there is no such cell\n"));
+    }
+    if !shared.sessions.may_act(&user) {
+        let text = "too many commands at once; wait a few seconds\n";
+        return Err((StatusCode::TOO_MANY_REQUESTS, text));
+    }
+    Ok(user)
+}
+
+/// Whether the cell is there and its source takes commands.
+fn hears(shared: &Shared, cell: &str) -> bool {
+    let snapshot = shared.hub.snapshot();
+    let Some(view) = snapshot.cell(cell) else {
+        return false;
+    };
+    let is_gone = matches!(view.state, CellState::Ended { .. } | CellState::NeverSeen);
+    let takes = view
+        .status
+        .as_ref()
+        .is_some_and(|status| status.takes_commands);
+    takes && !is_gone
+}
+
+/// What came of a command, in words.
+async fn send(
+    shared: &Arc<Shared>,
+    cell: &str,
+    request: Request,
+    user: &str,
+) -> Result<String, String> {
+    let signed = Signed {
+        request,
+        by: Some(user.to_owned()),
+    };
+    signed.command().map_err(|refusal| refusal.to_string())?;
+    let (hub, asked) = (shared.hub.clone(), cell.to_owned());
+    let answer = tokio::task::spawn_blocking(move || hub.send(&asked, &signed)).await;
+    match answer.map_err(|_| "the command could not be sent".to_owned())? {
+        Ok(Answer::Taken { stamp_ns }) => Ok(format!(
+            "the cell has taken it; it holds from {} on",
+            words::time(stamp_ns)
+        )),
+        Ok(Answer::Refused { reason }) => Err(format!("the cell refuses: {reason}")),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+fn back(
+    shared: &Shared,
+    headers: &HeaderMap,
+    cell: &str,
+    told: Result<String, String>,
+) -> Response {
+    shared.sessions.tell(
+        headers,
+        match told {
+            Ok(told) => format!("Done: {told}."),
+            Err(why) => format!("Not done: {why}."),
+        },
+    );
+    Redirect::to(&format!("/cells/{cell}")).into_response()
+}

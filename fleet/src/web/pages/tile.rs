@@ -1,0 +1,158 @@
+//! A cell on the wall.
+
+use maud::{Markup, html};
+use tauscope_publish::message::{ContactMessage, StatusMessage};
+
+use super::chart;
+use crate::wall::{CellView, Severity, State};
+use crate::words;
+
+/// A cell's tile. It says of each value how old it is, and of a cell that is not there that all is old.
+pub fn tile(view: &CellView, now_ns: i64) -> Markup {
+    let status = view.status.as_ref();
+    let is_old = matches!(
+        view.state,
+        State::Stale { .. } | State::Unknown { .. } | State::Ended { .. }
+    );
+    html! {
+        article.tile.old[is_old] data-severity=(name(view.severity)) data-state=(view.state.name()) {
+            header {
+                h2 { a href={ "/cells/" (view.cell) } { (view.cell) } }
+                (badge(view.state))
+            }
+            p.reason { (reason(view, now_ns)) }
+            @if let Some(status) = status { (facts(view, status, view.stream_now_ns().unwrap_or(now_ns))) }
+        }
+    }
+}
+
+/// The state as shape, word and colour.
+pub fn badge(state: State) -> Markup {
+    html! {
+        p.badge data-severity=(name(state.severity())) {
+            (icon(state.severity())) " " (state.words())
+        }
+    }
+}
+
+/// A severity as a class.
+pub fn name(severity: Severity) -> &'static str {
+    match severity {
+        Severity::Critical => "critical",
+        Severity::Serious => "serious",
+        Severity::Notice => "notice",
+        Severity::Good => "good",
+    }
+}
+
+/// Each severity has a shape of its own, for who does not see its colour.
+fn icon(severity: Severity) -> Markup {
+    let path = match severity {
+        Severity::Critical => "M5 1h6l4 4v6l-4 4H5l-4-4V5z",
+        Severity::Serious => "M8 1.5L15.5 15h-15z",
+        Severity::Notice => "M8 1a7 7 0 1 0 0 14A7 7 0 1 0 8 1z",
+        Severity::Good => "M2 8.5l4 4 8-9-1.6-1.4L6 9.5 3.5 7z",
+    };
+    html! { svg.icon viewBox="0 0 16 16" aria-hidden="true" { path d=(path) {} } }
+}
+
+/// Since when, why, and until when.
+pub fn reason(view: &CellView, now_ns: i64) -> Markup {
+    let reason = view.state.reason();
+    html! {
+        @match view.state {
+            State::Muted { until_ns } => { "until " (stamp(until_ns, &words::time_of_day(until_ns))) ": " (reason) }
+            _ => {
+                @if let Some(since_ns) = view.since_ns {
+                    "for " (stamp(since_ns, &words::age_at(since_ns, now_ns)))
+                    @if !reason.is_empty() { ": " }
+                }
+                (reason)
+            }
+        }
+    }
+}
+
+/// A time, with the whole of it for machines and for who points at it.
+pub fn stamp(ns: i64, shown: &str) -> Markup {
+    html! { time datetime=(words::iso(ns)) title=(words::time(ns)) { (shown) } }
+}
+
+fn facts(view: &CellView, status: &StatusMessage, now_ns: i64) -> Markup {
+    html! {
+        dl {
+            dt { "Last sample" }
+            dd { (last_sample(view, status)) }
+            dt { "Last contact" }
+            dd { (last_contact(status.last_contact.as_ref(), now_ns)) }
+            dt { "Contacts today" }
+            dd { (contacts_today(status)) }
+            dt { "Lost samples" }
+            dd.warn[view.lost_samples > 0] { (view.lost_samples) }
+            dt { "Residual" }
+            dd { (residual(view)) }
+            @if let Some(residual) = &view.residual {
+                dt { "Drifts most" }
+                dd { (residual.joint) ", " (format!("{:.2}", residual.joint_ratio)) " × normal" }
+            }
+            @if let Some(change) = status.changes.first() {
+                dt { "Watch" }
+                dd.warn { (words::change(change, &status.effort_unit)) }
+            }
+            dt { "Twin, URDF" }
+            dd { code title=[status.twin_sha256.as_ref()] { (words::short_hash(status.twin_sha256.as_ref())) }
+                 ", " code title=[status.urdf_sha256.as_ref()] { (words::short_hash(status.urdf_sha256.as_ref())) } }
+        }
+    }
+}
+
+fn last_sample(view: &CellView, status: &StatusMessage) -> Markup {
+    html! {
+        @match (view.sample_age_ms, status.last_sample_ns) {
+            (Some(age_ms), Some(stamp_ns)) => { (stamp(stamp_ns, &words::age(age_ms))) " ago" }
+            _ => "none yet",
+        }
+    }
+}
+
+/// What, when and by whom it was acknowledged.
+pub fn last_contact(contact: Option<&ContactMessage>, now_ns: i64) -> Markup {
+    let Some(contact) = contact else {
+        return html! { "none" };
+    };
+    html! {
+        (words::contact(contact)) ", "
+        (stamp(contact.onset_ns, &words::age_at(contact.onset_ns, now_ns))) " ago"
+        @match (&contact.acknowledged_by, contact.acknowledged_ns) {
+            (Some(by), _) => { ", acknowledged by " (by) }
+            (None, Some(_)) => ", acknowledged",
+            (None, None) => @if contact.latched { strong { ", not acknowledged" } },
+        }
+    }
+}
+
+fn contacts_today(status: &StatusMessage) -> Markup {
+    let since_ns = status.contacts_since_ns;
+    html! {
+        (status.contacts_today)
+        @if since_ns > 0 { span.muted { " since " (stamp(since_ns, &words::time_of_day(since_ns))) } }
+    }
+}
+
+fn residual(view: &CellView) -> Markup {
+    let (curve, span) = if view.trend.len() > 2 {
+        (&view.trend, "six weeks")
+    } else {
+        (&view.curve, "last hour")
+    };
+    html! {
+        @match &view.residual {
+            Some(residual) => {
+                (format!("{:.2}", residual.ratio)) " × normal "
+                span.muted { "(" (residual.normal) ")" }
+            }
+            None => span.muted { "no normal to compare with" },
+        }
+        @if curve.len() > 2 { (chart::spark(curve, span)) }
+    }
+}

@@ -1,0 +1,197 @@
+//! What the fleet is told of the cell: once a second how it fares, and each contact as it comes.
+
+use std::os::unix::process::parent_id;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use tauscope_bus::{Command, Detection, Health, TwinState, flags};
+use zenoh::Session;
+
+use crate::alarm::State;
+use crate::error::PublishError;
+use crate::message::{AlarmMessage, HealthMessage, RecordMessage, STATUS_VERSION, StatusMessage};
+use crate::presence::Presence;
+use crate::report::{Report, Residual};
+
+/// How often the status is told. Resolution: a fleet host calls a cell stale after a few of them.
+const PERIOD: Duration = Duration::from_secs(1);
+
+/// What the fleet is told of a cell and its files.
+#[derive(Debug, Clone, Default)]
+pub struct Facts {
+    /// Unit of the measured effort.
+    pub effort_unit: String,
+    /// SHA-256 of the URDF.
+    pub urdf_sha256: Option<String>,
+    /// SHA-256 of the twin's file.
+    pub twin_sha256: Option<String>,
+    /// By joint, the residual's standard deviation when the twin was calibrated \[effort unit\].
+    pub calibrated: Vec<Option<f64>>,
+    /// Where the cell's recorder writes.
+    pub archive: Option<String>,
+}
+
+/// The cell's part in a fleet.
+pub struct Fleet {
+    presence: Presence,
+    report: Report,
+    residual: Residual,
+    /// What does not change.
+    status: StatusMessage,
+    told: Option<Instant>,
+    /// The newest sample: its stamp, and when it came.
+    newest: Option<(i64, Instant)>,
+    /// The supervisor. A run whose supervisor was killed ends as if in order, but did not.
+    supervisor: u32,
+}
+
+impl Fleet {
+    /// Announces the cell.
+    ///
+    /// # Errors
+    /// If Zenoh takes a key for none.
+    pub fn open(
+        session: &Session,
+        cell: &str,
+        robot: &str,
+        joints: &[String],
+        detectors: usize,
+        facts: Facts,
+        takes_commands: bool,
+    ) -> Result<Self, PublishError> {
+        // The session's id is another one in each process.
+        let instance = session.zid().to_string();
+        Ok(Self {
+            presence: Presence::open(session, cell, &instance)?,
+            report: Report::new(joints.to_vec(), detectors),
+            residual: Residual::new(joints.to_vec(), facts.calibrated),
+            status: StatusMessage {
+                version: STATUS_VERSION,
+                instance,
+                sent_ns: 0,
+                host: host(),
+                tauscope: env!("CARGO_PKG_VERSION").to_owned(),
+                robot: robot.to_owned(),
+                effort_unit: facts.effort_unit,
+                urdf_sha256: facts.urdf_sha256,
+                twin_sha256: facts.twin_sha256,
+                archive: facts.archive,
+                takes_commands,
+                ended: false,
+                alarm: AlarmMessage::silent(),
+                last_sample_ns: None,
+                last_sample_age_ms: None,
+                contacts_today: 0,
+                contacts_since_ns: 0,
+                last_contact: None,
+                last_record: 0,
+                stages: Vec::new(),
+                unsent: 0,
+                residual: None,
+                changes: Vec::new(),
+            },
+            told: None,
+            newest: None,
+            supervisor: parent_id(),
+        })
+    }
+
+    /// A sample with this stamp came.
+    pub fn sample(&mut self, stamp_ns: i64) {
+        self.newest = Some((stamp_ns, Instant::now()));
+    }
+
+    /// Takes what the twin made of a sample.
+    pub fn twin(&mut self, sample: &TwinState) {
+        self.residual.twin(sample);
+    }
+
+    /// Takes a command.
+    pub fn command(&mut self, stamp_ns: i64, command: &Command) {
+        self.report.command(stamp_ns, command);
+    }
+
+    /// Takes how a stage fares.
+    pub fn health(&mut self, health: &Health) {
+        self.report.take_health(HealthMessage::from(health));
+    }
+
+    /// Takes what detector number `at`, called `label`, says. `judges`: it tells of contacts; the alarm stands at `alarm`.
+    pub fn detection(
+        &mut self,
+        at: usize,
+        label: &str,
+        detection: &Detection,
+        judges: bool,
+        alarm: State,
+    ) {
+        if judges && detection.alarm() && !detection.header.has(flags::CHANGE) {
+            self.residual.touched(detection.header.stamp_ns);
+        }
+        self.report.detection(at, label, detection, judges, alarm);
+    }
+
+    /// Tells what is new, and the status if it is due or the run has `ended`.
+    ///
+    /// # Errors
+    /// If a message cannot be sent.
+    pub fn tell(
+        &mut self,
+        now: Instant,
+        alarm: &AlarmMessage,
+        unsent: u64,
+        ended: bool,
+    ) -> Result<(), PublishError> {
+        let news = self.report.news();
+        let has_news = !news.is_empty();
+        for record in news {
+            self.status.last_record += 1;
+            self.presence.record(&RecordMessage {
+                instance: self.status.instance.clone(),
+                number: self.status.last_record,
+                sent_ns: now_ns(),
+                record,
+            })?;
+        }
+        let is_due = self
+            .told
+            .is_none_or(|told| now.saturating_duration_since(told) >= PERIOD);
+        let changed = self.status.alarm.state != alarm.state;
+        if !(is_due || has_news || ended || changed) {
+            return Ok(());
+        }
+        self.told = Some(now);
+        let age = self
+            .newest
+            .map(|(_, came)| now.saturating_duration_since(came));
+        let (contacts_today, contacts_since_ns) = self.report.today();
+        self.status = StatusMessage {
+            sent_ns: now_ns(),
+            ended: ended && parent_id() == self.supervisor,
+            alarm: alarm.clone(),
+            last_sample_ns: self.newest.map(|(stamp_ns, _)| stamp_ns),
+            last_sample_age_ms: age.map(|age| u64::try_from(age.as_millis()).unwrap_or(u64::MAX)),
+            contacts_today,
+            contacts_since_ns,
+            last_contact: self.report.last().cloned(),
+            stages: self.report.health(),
+            unsent,
+            residual: self.residual.message(),
+            changes: self.report.changes(),
+            ..self.status.clone()
+        };
+        self.presence.status(&self.status)
+    }
+}
+
+/// The computer's name; empty where the system does not tell it.
+fn host() -> String {
+    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    name.trim().to_owned()
+}
+
+fn now_ns() -> i64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.map_or(0, |since| {
+        i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
+    })
+}

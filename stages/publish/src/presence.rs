@@ -1,0 +1,140 @@
+//! The cell's presence in a fleet: a liveliness token, the newest status and the newest records, over Zenoh.
+//!
+//! | key | what |
+//! | --- | --- |
+//! | `<cell>/@alive/<instance>` | liveliness token: gone as soon as the process is |
+//! | `<cell>/status` | [`StatusMessage`] once a second; a query is answered with the newest |
+//! | `<cell>/records` | [`RecordMessage`] as it comes; a query with `after=NUMBER` is answered with those behind it |
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use zenoh::bytes::Encoding;
+use zenoh::liveliness::LivelinessToken;
+use zenoh::pubsub::Publisher;
+use zenoh::qos::CongestionControl;
+use zenoh::query::{Query, Queryable};
+use zenoh::{Session, Wait as _};
+
+use crate::error::PublishError;
+use crate::message::{RecordMessage, StatusMessage};
+
+/// Records that are kept for who missed them. Resolution: hours of contacts, and an answer below 100 kB.
+const MAX_RECORDS: usize = 256;
+
+/// The key under which a cell's life is told.
+pub fn alive_key(cell: &str, instance: &str) -> String {
+    format!("{cell}/@alive/{instance}")
+}
+
+#[derive(Debug, Default)]
+struct Kept {
+    status: Option<String>,
+    /// Number and text.
+    records: VecDeque<(u64, String)>,
+}
+
+/// A cell's presence; it ends when this is dropped.
+pub struct Presence {
+    status: Publisher<'static>,
+    records: Publisher<'static>,
+    kept: Arc<Mutex<Kept>>,
+    _queryables: [Queryable<()>; 2],
+    _token: LivelinessToken,
+    /// It closes when nobody holds it.
+    _session: Session,
+}
+
+impl Presence {
+    /// Announces the life `instance` of a publisher of `cell`.
+    ///
+    /// # Errors
+    /// If Zenoh takes a key for none.
+    pub fn open(session: &Session, cell: &str, instance: &str) -> Result<Self, PublishError> {
+        let kept = Arc::new(Mutex::new(Kept::default()));
+        let (status, records) = (format!("{cell}/status"), format!("{cell}/records"));
+        let publisher = |key: &str| {
+            session
+                .declare_publisher(key.to_owned())
+                .congestion_control(CongestionControl::Drop)
+                .encoding(Encoding::APPLICATION_JSON)
+                .wait()
+                .map_err(PublishError::zenoh)
+        };
+        let answer = |key: &str, text: fn(&Kept, &Query) -> Option<String>| {
+            let (kept, own) = (kept.clone(), key.to_owned());
+            session
+                .declare_queryable(key.to_owned())
+                .callback(move |query| {
+                    let text = text(&lock(&kept), &query);
+                    if let Some(text) = text {
+                        // Who has asked may be gone.
+                        let _ = query
+                            .reply(own.clone(), text)
+                            .encoding(Encoding::APPLICATION_JSON)
+                            .wait();
+                    }
+                })
+                .wait()
+                .map_err(PublishError::zenoh)
+        };
+        Ok(Self {
+            status: publisher(&status)?,
+            records: publisher(&records)?,
+            _queryables: [
+                answer(&status, |kept, _| kept.status.clone())?,
+                answer(&records, |kept, query| Some(behind(kept, query)))?,
+            ],
+            kept: kept.clone(),
+            _token: session
+                .liveliness()
+                .declare_token(alive_key(cell, instance))
+                .wait()
+                .map_err(PublishError::zenoh)?,
+            _session: session.clone(),
+        })
+    }
+
+    /// Tells how the cell fares.
+    ///
+    /// # Errors
+    /// If the message cannot be sent.
+    pub fn status(&self, message: &StatusMessage) -> Result<(), PublishError> {
+        let text = serde_json::to_string(message)?;
+        lock(&self.kept).status = Some(text.clone());
+        self.status.put(text).wait().map_err(PublishError::zenoh)
+    }
+
+    /// Tells a record.
+    ///
+    /// # Errors
+    /// If the message cannot be sent; it is kept for a query nevertheless.
+    pub fn record(&self, message: &RecordMessage) -> Result<(), PublishError> {
+        let text = serde_json::to_string(message)?;
+        {
+            let mut kept = lock(&self.kept);
+            if kept.records.len() == MAX_RECORDS {
+                kept.records.pop_front();
+            }
+            kept.records.push_back((message.number, text.clone()));
+        }
+        self.records.put(text).wait().map_err(PublishError::zenoh)
+    }
+}
+
+/// The records behind the number that a query names, as a JSON array.
+fn behind(kept: &Kept, query: &Query) -> String {
+    let after: u64 = query
+        .parameters()
+        .get("after")
+        .and_then(|number| number.parse().ok())
+        .unwrap_or(0);
+    let behind = kept.records.iter().filter(|(number, _)| *number > after);
+    let texts: Vec<&str> = behind.map(|(_, text)| text.as_str()).collect();
+    format!("[{}]", texts.join(","))
+}
+
+/// Each of its values is whole at any time, so a panic elsewhere does not matter.
+fn lock(kept: &Mutex<Kept>) -> MutexGuard<'_, Kept> {
+    kept.lock().unwrap_or_else(PoisonError::into_inner)
+}

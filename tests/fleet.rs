@@ -1,0 +1,301 @@
+//! `tauscope fleet` beside cells that run: a router, pipelines, the page over HTTP, a cell that is killed.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+mod common;
+
+#[path = "common/live.rs"]
+mod live;
+
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::path::Path;
+use std::process::{Child, Stdio};
+use std::time::{Duration, Instant};
+
+use common::{Out, bundled, tauscope, write};
+use live::{Live, signal};
+use serde_json::Value;
+use tauscope_bus::{ZenohEndpoints, ZenohRouter};
+
+const PATIENCE: Duration = Duration::from_mins(1);
+
+/// An address that nobody listens at right now.
+fn free() -> SocketAddr {
+    let free = TcpListener::bind("127.0.0.1:0").unwrap();
+    free.local_addr().unwrap()
+}
+
+/// A router, and its endpoint.
+fn router() -> (ZenohRouter, String) {
+    let endpoint = format!("tcp/{}", free());
+    let endpoints = ZenohEndpoints {
+        listen: vec![endpoint.clone()],
+        connect: Vec::new(),
+    };
+    (ZenohRouter::open(&endpoints).unwrap(), endpoint)
+}
+
+/// A cell that plays the bundled recording at half its speed and meets the others at `router`.
+fn cell(folder: &Path, name: &str, router: &str) -> Live {
+    let data = bundled();
+    let data = data.display();
+    let folder = folder.join(name);
+    std::fs::create_dir(&folder).unwrap();
+    write(
+        &folder.join("pipeline.yaml"),
+        &format!(
+            "version: 1\ncells: {{{name}: {{robot: {data}/demo_arm.urdf}}}}\nstages:\n\
+             - {{name: ingest, ingest: {{file: {{path: {data}/demo.mcap}}, rate: 0.5, \
+             commands: {{connect: [{router}]}}}}}}\n\
+             - {{name: twin, input: ingest, twin: {{model: {data}/demo.twin.yaml}}}}\n\
+             - {{name: detect, input: twin, detect: {{twin_regression: {{}}}}}}\n\
+             - {{name: record, inputs: [ingest, twin, detect], record: {{mcap: x.mcap}}}}\n\
+             - {{name: publish, inputs: [ingest, twin, detect], publish: {{latch: contact, stop_after_s: 5, \
+             zenoh: {{connect: [{router}], json: false}}}}}}\n"
+        ),
+    );
+    Live::start(&folder, &[])
+}
+
+/// A fleet host with a page; it is ended whatever happens.
+struct Fleet {
+    child: Child,
+    address: SocketAddr,
+    cookie: String,
+}
+
+impl Drop for Fleet {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Fleet {
+    fn start(folder: &Path, router: &str, users: &Path) -> Self {
+        let mut command = tauscope();
+        command
+            .current_dir(folder)
+            .args(["fleet", "--serve", "127.0.0.1:0", "--expect", "paint"])
+            .args(["--connect", router, "--users"])
+            .arg(users);
+        let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
+        let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
+        let at = lines.find_map(|line| {
+            let line = line.unwrap();
+            let at = line
+                .strip_prefix("the wall is at http://")?
+                .strip_suffix('/')?;
+            Some(at.parse().unwrap())
+        });
+        std::thread::spawn(move || lines.map_while(Result::ok).for_each(drop));
+        Self {
+            child,
+            address: at.unwrap(),
+            cookie: String::new(),
+        }
+    }
+
+    /// What it answers: head and body.
+    fn ask(&self, method: &str, path: &str, headers: &str, form: &str) -> (String, String) {
+        let mut stream = TcpStream::connect(self.address).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        let kind = "Content-Type: application/x-www-form-urlencoded";
+        write!(
+            stream,
+            "{method} {path} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\nCookie: {}\r\n{headers}{kind}\r\n\
+             Content-Length: {}\r\n\r\n{form}",
+            self.address,
+            self.cookie,
+            form.len()
+        )
+        .unwrap();
+        let mut text = String::new();
+        stream.read_to_string(&mut text).unwrap();
+        let (head, body) = text.split_once("\r\n\r\n").unwrap();
+        (head.to_owned(), body.to_owned())
+    }
+
+    fn get(&self, path: &str) -> String {
+        let (head, body) = self.ask("GET", path, "", "");
+        assert!(head.starts_with("HTTP/1.1 200"), "{path}: {head}");
+        body
+    }
+
+    /// The code of an answer to a form.
+    fn post(&self, path: &str, headers: &str, form: &str) -> (u16, String) {
+        let (head, _) = self.ask("POST", path, headers, form);
+        (head[9..12].parse().unwrap(), head)
+    }
+
+    fn cell(&self, name: &str) -> Value {
+        let state: Value = serde_json::from_str(&self.get("/fleet.json")).unwrap();
+        let cells = state["cells"].as_array().unwrap();
+        let cell = cells.iter().find(|cell| cell["cell"] == name);
+        cell.cloned().unwrap_or(Value::Null)
+    }
+
+    /// Waits until a cell is as wanted; how long that took.
+    fn wait(&self, name: &str, what: &str, wanted: impl Fn(&Value) -> bool) -> Duration {
+        let begin = Instant::now();
+        loop {
+            let cell = self.cell(name);
+            if wanted(&cell) {
+                return begin.elapsed();
+            }
+            assert!(begin.elapsed() < PATIENCE, "{name} not {what}: {cell:#}");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// The first events of the wall, up to one that names `wanted`.
+    fn follow(&self, wanted: &str) -> String {
+        let mut stream = TcpStream::connect(self.address).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        write!(
+            stream,
+            "GET /events HTTP/1.1\r\nHost: {}\r\n\r\n",
+            self.address
+        )
+        .unwrap();
+        let mut heard = String::new();
+        let mut lines = BufReader::new(stream).lines();
+        while !heard.contains(wanted) {
+            heard += &lines.next().unwrap().unwrap();
+            heard.push('\n');
+        }
+        heard
+    }
+}
+
+#[test]
+fn cells_that_run_are_seen_acknowledged_from_the_page_and_missed_when_they_are_killed() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let (_router, endpoint) = router();
+    let users = folder.join("users");
+    let made = [
+        "fleet",
+        "--users",
+        users.to_str().unwrap(),
+        "--add-user",
+        "anna",
+    ];
+    let made = Out::answer(made);
+    assert_eq!(made.code, 0, "{}", made.stderr);
+    let token = made.stdout.trim();
+
+    let press = cell(folder, "press", &endpoint);
+    let weld = cell(folder, "weld", &endpoint);
+    let mut fleet = Fleet::start(folder, &endpoint, &users);
+    assert_eq!(fleet.cell("paint")["state"], "never_seen");
+    let lives = |cell: &Value| cell["status"]["residual"]["joints"].is_array();
+    fleet.wait("weld", "there", lives);
+    fleet.wait("press", "stopped by its latch", |cell| {
+        cell["state"] == "stopped"
+    });
+
+    let page = fleet.get("/");
+    for part in [
+        "stopped by latch",
+        "never seen",
+        "href=\"/cells/weld\"",
+        "at link",
+    ] {
+        assert!(page.contains(part), "{part}: {page}");
+    }
+    let events = fleet.follow("weld");
+    assert!(events.contains("event: wall"), "{events}");
+    assert!(
+        events.contains("content-security-policy: default-src 'none'"),
+        "{events}"
+    );
+    let metrics = fleet.get("/metrics");
+    assert!(
+        metrics.contains("tauscope_fleet_cell_state{cell=\"press\",state=\"stopped\"} 1"),
+        "{metrics}"
+    );
+    assert!(fleet.get("/healthz").starts_with("ok"));
+    assert_eq!(fleet.ask("GET", "/cells/nobody", "", "").0[9..12], *"404");
+
+    acknowledge(&mut fleet, token);
+    fleet.wait("press", "acknowledged by anna", |cell| {
+        cell["status"]["last_contact"]["acknowledged_by"] == "anna"
+    });
+    let page = fleet.get("/cells/press");
+    for part in [
+        "Contacts",
+        "x.mcap",
+        "joint7",
+        "Acknowledge</button>",
+        "acknowledged by anna",
+    ] {
+        assert!(page.contains(part), "{part}: {page}");
+    }
+    assert!(fleet.get("/incidents").contains("at link"));
+
+    signal(weld.id(), "KILL");
+    let known = fleet.wait("weld", "missed", |cell| cell["state"] == "stale");
+    // The token tells it: without it, the missing status would after 3.5 s.
+    assert_eq!(fleet.cell("weld")["why"], "token");
+    assert!(known < Duration::from_secs(3), "{known:?}");
+
+    // In order, a cell is no failure.
+    signal(press.id(), "INT");
+    fleet.wait("press", "ended", |cell| cell["state"] == "ended");
+    signal(fleet.child.id(), "INT");
+    assert!(fleet.child.wait().unwrap().success());
+}
+
+/// Acknowledges at the press; forms that are not the user's own are refused.
+fn acknowledge(fleet: &mut Fleet, token: &str) {
+    let to = "/cells/press/acknowledge";
+    assert_eq!(fleet.post(to, "", "csrf=").0, 403);
+    assert_eq!(fleet.post("/login", "", "token=1234").0, 403);
+    let (code, head) = fleet.post("/login", "", &format!("token={token}"));
+    assert_eq!(code, 303, "{head}");
+    let cookie = head
+        .lines()
+        .find_map(|line| line.strip_prefix("set-cookie: "));
+    let pair = cookie.unwrap().split(';').next();
+    fleet.cookie = pair.unwrap_or_default().into();
+    let page = fleet.get("/cells/press");
+    let secret = page.split("name=\"csrf\" value=\"").nth(1).unwrap();
+    let form = format!("csrf={}", secret.split('"').next().unwrap());
+    let elsewhere = "Origin: http://elsewhere.example\r\n";
+    assert_eq!(fleet.post(to, elsewhere, &form).0, 403);
+    assert_eq!(fleet.post(to, "", "csrf=00").0, 403);
+    let (code, head) = fleet.post(to, "", &form);
+    assert_eq!(code, 303, "{head}");
+    assert!(
+        fleet
+            .get("/cells/press")
+            .contains("Done: the cell has taken it")
+    );
+}
+
+#[test]
+fn the_document_says_what_is_missing_and_so_does_the_exit_code() {
+    let (_router, endpoint) = router();
+    let out = Out::answer([
+        "fleet",
+        "--json",
+        "--connect",
+        &endpoint,
+        "--expect",
+        "paint",
+    ]);
+    assert_eq!(out.code, 3, "{}", out.stderr);
+    let state: Value = serde_json::from_str(&out.stdout).unwrap();
+    assert_eq!(state["cells"][0]["state"], "never_seen");
+    assert_eq!(state["sessions_reached"], 1);
+    // The router need not be there yet.
+    let nobody = format!("tcp/{}", free());
+    let out = Out::answer(["fleet", "--json", "--connect", &nobody]);
+    assert_eq!(out.code, 1, "{}", out.stderr);
+    let out = Out::answer(["fleet", "--json", "--connect", "garbage"]);
+    assert_eq!(out.code, 2, "{}", out.stderr);
+    let out = Out::answer(["fleet", "--serve", "--users", "/nowhere/users"]);
+    assert_eq!(out.code, 2, "{}", out.stderr);
+}
