@@ -16,6 +16,9 @@ use super::{certificate, endpoint};
 /// Where shared memory lies.
 pub const SHARED_MEMORY: &str = "/dev/shm";
 
+/// From when to when a certificate holds \[s since the epoch\], or why that cannot be told.
+pub type Validity = Result<(i64, i64), String>;
+
 /// What was read; in words why not, where it could not be.
 #[derive(Debug, Clone, Default)]
 pub struct Facts {
@@ -36,7 +39,7 @@ pub struct Facts {
     /// Endpoints that stages listen on or connect to.
     pub endpoints: Vec<Endpoint>,
     /// Certificates, with the time they hold from and to \[s since the epoch\].
-    pub certificates: Vec<(PathBuf, Result<(i64, i64), String>)>,
+    pub certificates: Vec<(PathBuf, Validity)>,
     /// Now \[s since the epoch\].
     pub now_s: i64,
     /// The kernel's version.
@@ -64,7 +67,7 @@ pub struct Endpoint {
     /// The stage or host.
     pub of: String,
     /// As the file has it.
-    pub endpoint: String,
+    pub at: String,
     /// It is listened on there; else connected to.
     pub listens: bool,
     /// Whether that is possible, or why not.
@@ -227,6 +230,6 @@ fn tried((of, endpoint, listens): (String, String, bool)) -> Option<Endpoint> {
         of,
         listens,
         possible: tried.map_err(|error| error.to_string()),
-        endpoint,
+        at: endpoint,
     })
 }

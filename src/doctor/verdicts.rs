@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::facts::{Endpoint, Facts, Folder, SHARED_MEMORY};
+use super::facts::{Endpoint, Facts, Folder, SHARED_MEMORY, Validity};
 use super::{Level, Verdict};
 
 /// Shared memory without which no run is begun \[MB\]. The bundled pipeline, whose stages keep up, touches
@@ -180,12 +180,12 @@ fn folder(folder: &Folder) -> Verdict {
 fn endpoint(endpoint: &Endpoint) -> Verdict {
     let Endpoint {
         of,
-        endpoint,
+        at,
         listens,
         possible,
     } = endpoint;
     // Its settings may hold what is nobody's business.
-    let shown = endpoint.split(['?', '#']).next().unwrap_or(endpoint);
+    let shown = at.split(['?', '#']).next().unwrap_or(at);
     match (possible, listens) {
         (Ok(()), true) => Verdict::ok("port", format!("{of}: {shown} is free")),
         (Ok(()), false) => Verdict::ok("peer", format!("{of}: {shown} answers")),
@@ -205,7 +205,7 @@ fn endpoint(endpoint: &Endpoint) -> Verdict {
     }
 }
 
-fn certificate(path: &Path, valid: &Result<(i64, i64), String>, now_s: i64) -> Verdict {
+fn certificate(path: &Path, valid: &Validity, now_s: i64) -> Verdict {
     const CHECK: &str = "certificate";
     let path = path.display();
     let (from_s, to_s) = match valid {

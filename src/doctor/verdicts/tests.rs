@@ -71,7 +71,7 @@ fn a_port_that_is_taken_and_a_peer_that_is_away_are_errors() {
     let of = |listens, possible: Result<(), &str>| {
         endpoint(&Endpoint {
             of: "ingest".to_owned(),
-            endpoint: "tls/cell:7447#connect_private_key=secret.pem".to_owned(),
+            at: "tls/cell:7447#connect_private_key=secret.pem".to_owned(),
             listens,
             possible: possible.map_err(str::to_owned),
         })
