@@ -223,6 +223,9 @@ fn numbers(
     if effect.traits.cuts_off && is_clipped(problem, fit, active) {
         parameters.insert("mode".to_owned(), Value::from("sensor"));
     }
+    if effect.traits.is_off_list {
+        parameters.insert("kind".to_owned(), Value::from(effect.name));
+    }
     describe_curve(active, &mut parameters);
     (parameters, intervals)
 }

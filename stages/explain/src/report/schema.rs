@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use tauscope_dynamics::terms::words;
+use tauscope_dynamics::terms::{effect, words};
 
 use crate::report::sentences::in_amperes;
 
@@ -104,6 +104,13 @@ pub struct Finding {
 }
 
 impl Finding {
+    /// The effect, by the name that [`tauscope_dynamics::terms`] knows it by: that of an `unknown` with a law is its `kind`.
+    pub fn known_as(&self) -> &str {
+        let kind = self.parameters.get("kind").and_then(Value::as_str);
+        kind.filter(|kind| effect(kind).is_some_and(|e| e.said() == self.effect))
+            .unwrap_or(&self.effect)
+    }
+
     /// A parameter's name without its unit, and the unit that its number is in.
     pub fn label_and_unit<'n>(&self, name: &'n str) -> (&'n str, String) {
         match words::unit(name) {

@@ -1,5 +1,7 @@
 //! The verdict of an explanation.
 
+use tauscope_dynamics::terms::UNKNOWN;
+
 use crate::fit::fitted::Fit;
 use crate::physics::active::Active;
 use crate::report::holdout::Proof;
@@ -24,7 +26,8 @@ pub fn left_elsewhere(proof: &Proof, noise_floor: &[f64]) -> Vec<usize> {
 
 /// The verdict, given the joints at which the explanation does not carry over.
 pub fn verdict(found: &Fit, findings: &[Finding], left_elsewhere: &[usize]) -> Verdict {
-    let described = found.actives.iter().any(Active::is_unnamed);
+    let described = |active: &Active| active.hypothesis.said() == UNKNOWN.name;
+    let described = found.actives.iter().any(described);
     if described || !left_elsewhere.is_empty() {
         Verdict::UnknownRemains
     } else if findings.is_empty() {

@@ -329,6 +329,36 @@ mod tests {
     }
 
     #[test]
+    fn a_shifted_zero_is_found_with_its_number_and_beats_each_body() {
+        let model = crate::fixture::model();
+        let mut real = model.clone();
+        real.shift_zero(1, 0.03);
+        let mut noise = crate::fixture::Noise(9);
+        let recordings = [6, 7].map(|seed| {
+            crate::fixture::recording(&real, seed, |_, _, effort| {
+                effort.iter_mut().for_each(|x| *x += 0.02 * noise.next());
+            })
+        });
+        let problem = crate::fixture::problem(&model, &recordings);
+        let nothing = Fit::new(&problem, Vec::new());
+        let base = Base::new(&problem, &nothing, 40);
+        let found = base.propose(at_joint("joint_zero_offset", 1)).unwrap();
+        let evidence = found.evidence();
+        let fit = nothing.with(&problem, found.active).refined(&problem);
+        let offset = fit.actives[0].coordinates[0];
+        assert!((offset - 0.03).abs() < 1e-3, "{offset}");
+        for effect in ["link_com", "link_mass"] {
+            let mut body = at_joint(effect, 0);
+            body.place.link = model.joints()[1].child_link;
+            let other = base.propose(body);
+            assert!(
+                other.is_none_or(|other| other.evidence() < evidence),
+                "{effect}"
+            );
+        }
+    }
+
+    #[test]
     fn friction_is_not_negative() {
         let problem = problem_with(4, |_, qd, effort| effort[0] -= 0.8 * qd[0]);
         let nothing = Fit::new(&problem, Vec::new());

@@ -71,7 +71,10 @@ fn unknown_share(report: &Report) -> f64 {
         let beyond = (row.after.powi(2) - noise.powi(2)).max(0.0);
         (before + row.before.powi(2), left + beyond)
     });
-    let unnamed = report.findings.iter().filter(|f| f.effect == UNKNOWN.name);
+    let unnamed = report
+        .findings
+        .iter()
+        .filter(|f| f.known_as() == UNKNOWN.name);
     let described: f64 = unnamed.map(|finding| finding.explains).sum();
     if before > 0.0 {
         (described + left / before).min(1.0)
