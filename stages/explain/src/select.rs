@@ -9,6 +9,7 @@
 //! - `forward` adds the effect with the most evidence;
 //! - `prune` removes effects that are no longer needed;
 //! - `exchange` tries every rival in the place of each effect;
+//! - `one_zero` tries one shifted joint zero in the place of several bodies;
 //! - `nested` prefers the simpler of two nested effects;
 //! - `cross_validation` rejects effects that do not predict recordings left out of the fit (the book's section 7.10);
 //! - `curves` and `free_body` describe the residual where no effect of the library fits.
@@ -34,6 +35,7 @@ pub mod forward;
 pub mod free_body;
 pub mod grid;
 pub mod nested;
+pub mod one_zero;
 pub mod parallel;
 pub mod plausible;
 pub mod propose;

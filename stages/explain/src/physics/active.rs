@@ -145,6 +145,11 @@ impl Hypothesis {
         self.effect.is_plain_friction()
     }
 
+    /// Whether it shifts the zero of a joint.
+    pub fn is_zero_offset(&self) -> bool {
+        self.effect.family == Family::Mounting && self.effect.place == PlaceKind::Joint
+    }
+
     /// Whether it is a function of its joint's position alone.
     pub fn is_of_position(&self) -> bool {
         self.effect.traits.drawn_over == Some(Against::Position)
