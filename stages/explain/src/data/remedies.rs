@@ -107,7 +107,7 @@ pub fn remedy(problem: &Problem) -> Option<(Remedy, [f64; 2])> {
             Remedy::EffortTurned(a),
             &trial.left(&trial.own, |j| (j, sign(j))),
         );
-        let turned = trial.moved(|j| sign(j));
+        let turned = trial.moved(sign);
         consider(
             Remedy::JointTurned(a),
             &trial.left(&turned, |j| (j, sign(j))),

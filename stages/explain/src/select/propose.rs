@@ -39,6 +39,10 @@ const DEVIATION_TIME_S: f64 = 0.1;
 /// Resolution: keeps the ridge finite; far below any measured effort.
 const LEAST_EFFORT_NM: f64 = 1e-6;
 
+/// Penalty of an effect that the list of names lacks, because it is rarer than those of the list \[nats\].
+/// Statistical: odds of 150 to 1, so that a name of the list stands where both fit alike.
+const OFF_LIST: f64 = 5.0;
+
 /// A hypothesis with parameters, and its gain over leaving it out.
 #[derive(Debug, Clone)]
 pub struct Proposal {
@@ -266,10 +270,12 @@ impl<'a> Base<'a> {
             coordinates[i] = value;
         }
         let free = hypothesis.effect.coordinates.len();
+        let is_off_list = hypothesis.effect.traits.is_off_list;
+        let prior = if is_off_list { OFF_LIST } else { 0.0 };
         Some(Proposal {
             active: hypothesis.with(coordinates),
             gain,
-            penalty: self.penalty(free, hypothesis.only_joint()),
+            penalty: self.penalty(free, hypothesis.only_joint()) + prior,
             size,
         })
     }
