@@ -63,7 +63,7 @@ pub use expansion::Expansion;
 pub use payload::EFFECT as PAYLOAD;
 pub use physics::Physics;
 pub use spec::{TermError, TermSpec};
-pub use table::{Against, EFFECT as UNKNOWN, Table, TableSpec, table};
+pub use table::{Against, EFFECT as UNKNOWN, Gauge, Table, TableSpec, table};
 pub use torque_bias::EFFECT as TORQUE_BIAS;
 pub use torque_gain::EFFECT as TORQUE_GAIN;
 pub use viscous_friction::EFFECT as VISCOUS_FRICTION;

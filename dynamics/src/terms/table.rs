@@ -38,16 +38,18 @@ pub static EFFECT: Effect = Effect {
     },
     // Without a table there is nothing to describe.
     build: |site, _| {
+        let table = Table {
+            against: Against::Position,
+            of_joint: site.joint,
+            by_direction: false,
+            period: None,
+            knots: vec![0.0],
+            values: vec![0.0],
+        };
         Box::new(Curve {
             joint: site.joint,
-            table: Table {
-                against: Against::Position,
-                of_joint: site.joint,
-                by_direction: false,
-                period: None,
-                knots: vec![0.0],
-                values: vec![0.0],
-            },
+            gauge: table.gauge(),
+            table,
         })
     },
 };
@@ -64,6 +66,13 @@ pub enum Against {
     Acceleration,
     /// Effort that a joint's gear transmits \[N m or N\].
     Load,
+    /// The same times the direction of the joint's motion: above zero where the joint works against the load, below where
+    /// the load drives it \[N m or N\].
+    DrivenLoad,
+    /// How far a joint's load has changed since it last turned round, at most as far as the outer knots \[N m or N\].
+    LoadTurned,
+    /// Time since a joint last stood still \[s\].
+    SinceRest,
     /// Time since the start of the recording \[s\].
     RecordingTime,
     /// Time since the start of the session \[s\].
@@ -71,15 +80,87 @@ pub enum Against {
 }
 
 impl Against {
-    /// Its value at an instant; `joint` where it is one of a joint.
-    pub fn value(self, at: &MotionSample<'_>, joint: usize) -> f64 {
-        match self {
-            Self::Position => at.position[joint],
-            Self::Velocity => at.velocity[joint],
-            Self::Acceleration => at.acceleration[joint],
-            Self::Load => at.transmitted[joint],
-            Self::RecordingTime => at.recording_s,
-            Self::SessionTime => at.session_s,
+    /// Whether it depends on the effort that a joint's gear transmits.
+    pub fn is_of_load(self) -> bool {
+        matches!(self, Self::Load | Self::DrivenLoad | Self::LoadTurned)
+    }
+}
+
+/// A joint that stays below this is at rest \[rad/s or m/s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
+const REST_RAD_S: f64 = 0.01;
+/// For so long at least \[s\]: a joint that reverses does not rest.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const LEAST_REST_S: f64 = 0.1;
+
+/// A joint of which nothing is known yet has moved for so long \[s\].
+/// Physical: longer than any recording.
+const LONG_S: f64 = 1e7;
+
+/// Reads what a curve is drawn against, sample by sample.
+#[derive(Debug, Clone)]
+pub struct Gauge {
+    against: Against,
+    joint: usize,
+    /// Largest reading of [`Against::LoadTurned`] to either side.
+    band: f64,
+    rested_s: f64,
+    moved_s: f64,
+    turned: f64,
+    load: Option<f64>,
+}
+
+impl Gauge {
+    /// One for the joint of index `joint`. `band` is the largest reading of [`Against::LoadTurned`] to either side
+    /// \[N m or N\].
+    pub fn new(against: Against, joint: usize, band: f64) -> Self {
+        Self {
+            against,
+            joint,
+            band,
+            rested_s: 0.0,
+            moved_s: LONG_S,
+            turned: 0.0,
+            load: None,
+        }
+    }
+
+    /// Forgets what came before. A joint then counts as long in motion, and its load as half turned.
+    pub fn reset(&mut self) {
+        *self = Self::new(self.against, self.joint, self.band);
+    }
+
+    /// The reading at the next instant.
+    pub fn read(&mut self, at: &MotionSample<'_>) -> f64 {
+        let joint = self.joint;
+        match self.against {
+            Against::Position => at.position[joint],
+            Against::Velocity => at.velocity[joint],
+            Against::Acceleration => at.acceleration[joint],
+            Against::Load => at.transmitted[joint],
+            Against::DrivenLoad => at.transmitted[joint] * sign(at.velocity[joint]),
+            Against::LoadTurned => {
+                let load = at.transmitted[joint];
+                let before = self.load.replace(load).unwrap_or(load);
+                self.turned = (self.turned + load - before).clamp(-self.band, self.band);
+                self.turned
+            }
+            Against::SinceRest => {
+                if at.velocity[joint].abs() < REST_RAD_S {
+                    self.rested_s += at.dt_s;
+                    if self.rested_s >= LEAST_REST_S {
+                        self.moved_s = 0.0;
+                    }
+                } else {
+                    self.rested_s = 0.0;
+                }
+                if self.rested_s < LEAST_REST_S {
+                    self.moved_s += at.dt_s;
+                }
+                self.moved_s
+            }
+            Against::RecordingTime => at.recording_s,
+            Against::SessionTime => at.session_s,
         }
     }
 }
@@ -155,6 +236,16 @@ impl Table {
             Against::Velocity => format!("{of} velocity"),
             Against::Acceleration => format!("{of} acceleration"),
             Against::Load => "its load".to_owned(),
+            Against::DrivenLoad => {
+                "its load, and on whether the joint drives the load or the load the joint".to_owned()
+            }
+            Against::LoadTurned => {
+                "the way its load came: how far it has changed since it last turned round (hysteresis)".to_owned()
+            }
+            Against::SinceRest if self.of_joint == joint => {
+                "the time since the joint last stood still".to_owned()
+            }
+            Against::SinceRest => format!("the time since joint {} last stood still", joints[self.of_joint]),
             Against::RecordingTime => "the time since the start of the recording".to_owned(),
             Against::SessionTime => "the time since the start of the session".to_owned(),
         };
@@ -226,6 +317,7 @@ pub fn table(site: &Site<'_>, table: Table) -> Result<Box<dyn Term>, TermError> 
     }
     Ok(Box::new(Curve {
         joint: site.joint,
+        gauge: table.gauge(),
         table,
     }))
 }
@@ -233,10 +325,17 @@ pub fn table(site: &Site<'_>, table: Table) -> Result<Box<dyn Term>, TermError> 
 #[derive(Debug)]
 struct Curve {
     joint: usize,
+    gauge: Gauge,
     table: Table,
 }
 
 impl Table {
+    /// Reads what the curve is drawn against.
+    pub fn gauge(&self) -> Gauge {
+        let band = self.knots.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        Gauge::new(self.against, self.of_joint, band)
+    }
+
     /// The curve at `x`.
     fn at(&self, x: f64) -> f64 {
         let first = self.knots[0];
@@ -268,10 +367,12 @@ impl Term for Curve {
         &[]
     }
 
+    fn reset(&mut self) {
+        self.gauge.reset();
+    }
+
     fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
-        let value = self
-            .table
-            .at(self.table.against.value(at, self.table.of_joint));
+        let value = self.table.at(self.gauge.read(at));
         let direction = if self.table.by_direction {
             sign(at.velocity[self.joint])
         } else {

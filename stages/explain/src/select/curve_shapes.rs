@@ -1,11 +1,14 @@
 //! Curves over motion or time, for a residual that no effect of the library fits.
 
-use tauscope_dynamics::terms::{Against, MotionSample, Table, UNKNOWN};
+use tauscope_dynamics::terms::{Against, Gauge, MotionSample, Table, UNKNOWN};
 
 use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::data::track::FitTrack;
+use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis, Whereabouts, held_knots};
+use crate::select::carried::Carried;
+use crate::select::evidence::LEAST_SIZE;
 use crate::select::propose::Base;
 
 /// Knots of a curve.
@@ -36,6 +39,21 @@ const STEPS_OF_FREQUENCY: f64 = 4.0;
 /// A periodic effect is not looked for over a longer time span, over which it would lose phase \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LONGEST_IN_STEP_S: f64 = 1200.0;
+/// Bands of a hysteresis that are tried, in standard deviations of the load.
+/// Resolution: steps of about three; the knots resolve what lies between.
+const HYSTERESIS: [f64; 3] = [0.1, 0.3, 1.0];
+/// Knots of a hysteresis to either side of its middle.
+/// Resolution: straight in between, so half the band is resolved.
+const KNOTS_OF_SIDE: usize = 2;
+/// First knot after a standstill \[s\]; each further one comes after twice the time.
+/// Resolution: near the comparison's fastest response, 1 / (2 pi 8 Hz) = 0.02 s, and its spacing of 0.06 s.
+const FIRST_S: f64 = 0.1;
+/// What a standstill does has passed after this time \[s\].
+/// Physical: brakes, lubricants and springs settle within seconds; what takes longer is seen over the session.
+const SETTLED_S: f64 = 10.0;
+/// Share of the residual's squares that a curve must predict in recordings left out.
+/// Statistical: that of [`LEAST_SIZE`] in all that there was before.
+const LEAST_CARRIED: f64 = LEAST_SIZE / (1.0 + LEAST_SIZE);
 /// Values of a curve below this share of the largest are set to zero.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const EVIDENT: f64 = 0.2;
@@ -49,6 +67,11 @@ pub struct CurveProposal {
     pub gain: f64,
     /// Penalty for its free values and for the number of curves tried \[nats\].
     pub penalty: f64,
+    /// Share of the residual's squares that it predicts in recordings that it was not fitted on. `None` if there is only
+    /// one recording.
+    pub carried: Option<f64>,
+    /// Whether that share is larger than any curve would predict by chance, and worth mentioning.
+    pub repeats: bool,
 }
 
 impl CurveProposal {
@@ -56,31 +79,46 @@ impl CurveProposal {
     pub fn evidence(&self) -> f64 {
         self.gain - self.penalty
     }
+
+    /// Whether it is a curve over time, which can follow any slow noise, and there is more than one recording to show
+    /// that it does not repeat.
+    fn is_of_noise(&self) -> bool {
+        let of_time = |curve: &Table| {
+            let time = matches!(curve.against, Against::RecordingTime | Against::SessionTime);
+            time && curve.period.is_none()
+        };
+        self.carried.is_some() && !self.repeats && self.active.curve.as_ref().is_some_and(of_time)
+    }
 }
 
 impl Base<'_> {
-    /// The curve with the most evidence at a joint.
+    /// The curve that predicts most of the residual at a joint in recordings that it was not fitted on. If none predicts
+    /// more than chance, the curve with the most evidence.
     pub fn propose_curve(&self, joint: usize) -> Option<CurveProposal> {
         let mut candidates = curves(self.problem, joint);
         candidates.extend(self.repeated(joint));
         let count = candidates.len() as f64;
-        let mut best: Option<CurveProposal> = None;
-        for curve in candidates {
-            let Some(mut proposal) = self.try_curve(joint, &curve) else {
-                continue;
-            };
+        let tried: Vec<(CurveProposal, Option<Carried>)> = candidates
+            .iter()
+            .filter_map(|curve| self.try_curve(joint, curve))
+            .collect();
+        let by_chance = Carried::largest_by_chance(tried.iter().filter_map(|(_, c)| c.as_ref()));
+        let judged = tried.into_iter().map(|(mut proposal, carried)| {
             proposal.penalty += count.ln();
-            if best
-                .as_ref()
-                .is_none_or(|best| proposal.evidence() > best.evidence())
-            {
-                best = Some(proposal);
-            }
-        }
-        best
+            let share = carried.map(|carried| carried.share);
+            proposal.carried = share;
+            proposal.repeats = share.is_some_and(|s| s > by_chance.max(LEAST_CARRIED));
+            proposal
+        });
+        let able = judged.filter(|proposal| !proposal.is_of_noise());
+        able.max_by(|a, b| {
+            let carried = |p: &CurveProposal| p.carried.filter(|_| p.repeats).unwrap_or(0.0);
+            let by_share = carried(a).total_cmp(&carried(b));
+            by_share.then(a.evidence().total_cmp(&b.evidence()))
+        })
     }
 
-    fn try_curve(&self, joint: usize, curve: &Table) -> Option<CurveProposal> {
+    fn try_curve(&self, joint: usize, curve: &Table) -> Option<(CurveProposal, Option<Carried>)> {
         let hypothesis = Hypothesis {
             effect: &UNKNOWN,
             place: Whereabouts {
@@ -97,21 +135,43 @@ impl Base<'_> {
             coordinates: values,
             curve: Some(curve.clone()),
         };
-        let columns: Vec<Column> = (0..free)
-            .map(|k| {
-                let mut values = vec![0.0; free];
-                values[k] = 1.0;
-                self.fit.added(self.problem, &at(values))
-            })
-            .collect();
+        let columns = knot_columns(self.problem, self.fit, &at(vec![0.0; free]));
         let minimum = vec![f64::NEG_INFINITY; free];
         let (values, gain, _) = self.try_columns(None, &columns, &minimum)?;
-        Some(CurveProposal {
+        let proposal = CurveProposal {
             active: at(values),
             gain,
             penalty: self.penalty(free, Some(joint)),
-        })
+            carried: None,
+            repeats: false,
+        };
+        let carried = Carried::of(self.problem, &self.fit.residual, joint, &columns);
+        Some((proposal, carried))
     }
+}
+
+/// The effort of a unit at each free knot of a curve, in addition to the effects of `fit`.
+fn knot_columns(problem: &Problem, fit: &Fit, curve: &Active) -> Vec<Column> {
+    let free = curve.coordinates.len();
+    let unit = |k: usize| {
+        let mut unit = curve.clone();
+        unit.coordinates = (0..free)
+            .map(|other| f64::from(u8::from(other == k)))
+            .collect();
+        fit.added(problem, &unit)
+    };
+    (0..free).map(unit).collect()
+}
+
+/// Whether a curve predicts what `without` leaves in recordings that it was not fitted on.
+pub fn repeats(problem: &Problem, without: &Fit, curve: &Active) -> bool {
+    let joint = curve.hypothesis.place.joint;
+    let columns = knot_columns(problem, without, curve);
+    let carried = Carried::of(problem, &without.residual, joint, &columns);
+    carried.is_some_and(|carried| {
+        let by_chance = Carried::largest_by_chance(std::iter::once(&carried));
+        carried.share > by_chance.max(LEAST_CARRIED)
+    })
 }
 
 /// Sets the small values of a curve to zero: they are mostly noise, and beyond its ends a curve keeps its last value.
@@ -127,33 +187,14 @@ pub fn keep_what_is_evident(curve: &mut Active) {
     }
 }
 
-/// Curves to try in a joint, with knots at even quantiles of the samples.
+/// Curves to try in a joint.
 fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
     let mut all = Vec::new();
-    let mut add = |against: Against, of_joint: usize, count: usize| {
-        let mut values = Vec::new();
-        for track in &problem.tracks {
-            track
-                .track
-                .each(|_, at: &MotionSample<'_>| values.push(against.value(at, of_joint)));
-        }
-        values.sort_by(f64::total_cmp);
-        let last = values.len() - 1;
-        let mut knots: Vec<f64> = (0..count).map(|k| values[last * k / (count - 1)]).collect();
-        let least = LEAST_SPACING / count as f64 * (knots[count - 1] - knots[0]);
-        knots.dedup_by(|later, earlier| *later - *earlier <= least);
-        if knots.len() < LEAST_KNOTS {
+    let mut add = |against: Against, of_joint: usize, knots: Vec<f64>, signs: &[bool]| {
+        if knots.len() < LEAST_KNOTS && against != Against::SessionTime {
             return;
         }
-        // Friction jumps at standstill, so over the joint's own velocity only curves that change sign with the
-        // direction of motion are tried.
-        let own_velocity = against == Against::Velocity && of_joint == joint;
-        let either: &[bool] = if own_velocity {
-            &[true]
-        } else {
-            &[false, true]
-        };
-        for &by_direction in either {
+        for &by_direction in signs {
             all.push(Table {
                 against,
                 of_joint,
@@ -164,16 +205,97 @@ fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
             });
         }
     };
+    let even =
+        |against, of_joint, count| even_quantiles(readings(problem, against, of_joint), count);
     for of_joint in 0..problem.joints {
-        add(Against::Position, of_joint, KNOTS);
-        add(Against::Velocity, of_joint, KNOTS);
+        let position = even(Against::Position, of_joint, KNOTS);
+        add(Against::Position, of_joint, position, &[false, true]);
+        // Friction jumps at standstill, so over the joint's own velocity only curves that change sign with the
+        // direction of motion are tried.
+        let signs: &[bool] = if of_joint == joint {
+            &[true]
+        } else {
+            &[false, true]
+        };
+        let velocity = even(Against::Velocity, of_joint, KNOTS);
+        add(Against::Velocity, of_joint, velocity, signs);
     }
-    add(Against::Position, joint, MANY_KNOTS);
-    add(Against::Acceleration, joint, KNOTS);
-    add(Against::Load, joint, KNOTS);
-    add(Against::RecordingTime, joint, KNOTS);
-    add(Against::SessionTime, joint, KNOTS);
+    for (against, count) in [
+        (Against::Position, MANY_KNOTS),
+        (Against::Acceleration, KNOTS),
+        (Against::Load, KNOTS),
+        (Against::RecordingTime, KNOTS),
+    ] {
+        add(against, joint, even(against, joint, count), &[false, true]);
+    }
+    let driven = with_zero(even(Against::DrivenLoad, joint, KNOTS));
+    add(Against::DrivenLoad, joint, driven, &[true]);
+    let load = readings(problem, Against::Load, joint);
+    for share in HYSTERESIS {
+        let band = share * deviation(&load);
+        let knots = (0..=2 * KNOTS_OF_SIDE).map(|k| band * (k as f64 / KNOTS_OF_SIDE as f64 - 1.0));
+        if band > 0.0 {
+            add(Against::LoadTurned, joint, knots.collect(), &[false]);
+        }
+    }
+    let since_rest = readings(problem, Against::SinceRest, joint);
+    let longest = since_rest.iter().copied().filter(|t| *t < SETTLED_S);
+    let longest = longest.fold(0.0, f64::max);
+    let mut knots = vec![0.0];
+    let times = (0..).map(|k| FIRST_S * f64::from(1 << k));
+    knots.extend(times.take_while(|t| *t <= longest));
+    add(Against::SinceRest, joint, knots, &[false, true]);
+    // A straight line: what bends over the session cannot be told from slow noise.
+    let session = readings(problem, Against::SessionTime, joint);
+    let first = session.iter().copied().fold(f64::INFINITY, f64::min);
+    let last = session.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if first < last {
+        add(
+            Against::SessionTime,
+            joint,
+            vec![first, last],
+            &[false, true],
+        );
+    }
     all
+}
+
+/// What a curve could be drawn against, at all samples.
+fn readings(problem: &Problem, against: Against, of_joint: usize) -> Vec<f64> {
+    let mut values = Vec::new();
+    for track in &problem.tracks {
+        let mut gauge = Gauge::new(against, of_joint, 0.0);
+        let read = |_, at: &MotionSample<'_>| values.push(gauge.read(at));
+        track.track.each(read);
+    }
+    values
+}
+
+/// `count` even quantiles of `values`; those that are too near to each other are merged.
+fn even_quantiles(mut values: Vec<f64>, count: usize) -> Vec<f64> {
+    values.sort_by(f64::total_cmp);
+    let last = values.len() - 1;
+    let mut knots: Vec<f64> = (0..count).map(|k| values[last * k / (count - 1)]).collect();
+    let least = LEAST_SPACING / count as f64 * (knots[count - 1] - knots[0]);
+    knots.dedup_by(|later, earlier| *later - *earlier <= least);
+    knots
+}
+
+/// Knots of which the one nearest to zero is moved there.
+fn with_zero(mut knots: Vec<f64>) -> Vec<f64> {
+    let nearest = (0..knots.len()).min_by(|a, b| knots[*a].abs().total_cmp(&knots[*b].abs()));
+    if let Some(nearest) = nearest {
+        knots[nearest] = 0.0;
+    }
+    knots
+}
+
+/// Standard deviation.
+fn deviation(values: &[f64]) -> f64 {
+    let count = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares = values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>();
+    (squares / count).sqrt()
 }
 
 impl Base<'_> {

@@ -4,7 +4,7 @@ use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis, TimeKind};
 use crate::select::cross_validation::{carries_over, left_elsewhere};
 use crate::select::curve_shapes;
-use crate::select::evidence::{CURVE_EVIDENCE, CURVE_SIZE, is_drawn_already};
+use crate::select::evidence::{CURVE_EVIDENCE, CURVE_SIZE, LEAST_SIZE, is_drawn_already};
 use crate::select::evidence::{overwhelming, worse_joints};
 use crate::select::explanation::Explanation;
 use crate::select::plausible::is_open_wave;
@@ -73,14 +73,22 @@ impl Search<'_> {
         if excess(&best.fit) < CURVE_EXCESS {
             return None;
         }
+        let mut base = best.clone();
         let mut beside = self.with_curve(best, joint)?;
         let drawn = |i: &usize| is_drawn_already(&beside.fit, best.fit.actives[*i].hypothesis);
         let drawn: Vec<usize> = own.iter().copied().filter(drawn).collect();
         if !drawn.is_empty() {
-            beside = self.with_curve(&self.stripped(best, &drawn, joint), joint)?;
+            base = self.stripped(best, &drawn, joint);
+            beside = self.with_curve(&base, joint)?;
         }
         let less = best.fit.variance[joint] / beside.fit.variance[joint];
-        (beside.ahead_of(best, &white) > CURVE_EVIDENCE && less > CURVE_SIZE).then_some(beside)
+        let repeats = curve_shapes::repeats(self.problem, &base.fit, beside.fit.actives.last()?);
+        let least = if repeats {
+            1.0 + LEAST_SIZE
+        } else {
+            CURVE_SIZE
+        };
+        (beside.ahead_of(best, &white) > CURVE_EVIDENCE && less > least).then_some(beside)
     }
 
     /// The explanation with a curve in one joint in place of all effects that act once, if that does better. A residual
@@ -117,8 +125,10 @@ impl Search<'_> {
 
     /// Whether there is evidence for the curve that `with` has and `without` lacks.
     fn is_evident(&self, with: &Explanation, without: &Explanation) -> bool {
+        let curve = with.fit.actives.last();
         with.ahead_of(without, &self.problem.effective_samples) > CURVE_EVIDENCE
             || overwhelming(with, without)
+            || curve.is_some_and(|curve| curve_shapes::repeats(self.problem, &without.fit, curve))
     }
 
     /// The explanation with the best curve in a joint, if it predicts recordings left out.
