@@ -226,6 +226,14 @@ impl Table {
                 "The friction of joint {place} is more than a constant and a share of its velocity, and no effect of the library bends it so{peak} rad/s."
             );
         }
+        let on = self.depends_on(joint, joints);
+        format!(
+            "Joint {place} has an effort that no effect of the library explains: it depends on {on}{peak}."
+        )
+    }
+
+    /// What a curve in the joint of index `joint` depends on, in words; `joints` are the names of all.
+    pub fn depends_on(&self, joint: usize, joints: &[String]) -> String {
         let of = if self.of_joint == joint {
             "its own".to_owned()
         } else {
@@ -258,9 +266,7 @@ impl Table {
             let (period, rate) = (number(period_s), number(1.0 / period_s));
             format!(", and repeats every {period} s ({rate} Hz)")
         });
-        format!(
-            "Joint {place} has an effort that no effect of the library explains: it depends on {against}{direction}{repeated}{peak}."
-        )
+        format!("{against}{direction}{repeated}")
     }
 }
 

@@ -6,9 +6,10 @@ use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::data::track::FitTrack;
 use crate::fit::fitted::Fit;
+use crate::fit::least_squares::weighted_dot;
 use crate::physics::active::{Active, Hypothesis, Whereabouts, held_knots};
 use crate::select::carried::Carried;
-use crate::select::evidence::LEAST_SIZE;
+use crate::select::evidence::{FAIR_SHARE_OF_CURVE, LEAST_SIZE};
 use crate::select::propose::Base;
 
 /// Knots of a curve.
@@ -54,6 +55,9 @@ const SETTLED_S: f64 = 10.0;
 /// Share of the residual's squares that a curve must predict in recordings left out.
 /// Statistical: that of [`LEAST_SIZE`] in all that there was before.
 const LEAST_CARRIED: f64 = LEAST_SIZE / (1.0 + LEAST_SIZE);
+/// The same for a curve over the session.
+/// Statistical: as [`FAIR_SHARE_OF_CURVE`], what no slow noise does.
+const LEAST_OF_SESSION: f64 = 1.0 - 1.0 / FAIR_SHARE_OF_CURVE;
 /// Values of a curve below this share of the largest are set to zero.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const EVIDENT: f64 = 0.2;
@@ -80,14 +84,18 @@ impl CurveProposal {
         self.gain - self.penalty
     }
 
-    /// Whether it is a curve over time, which can follow any slow noise, and there is more than one recording to show
-    /// that it does not repeat.
+    /// Whether it may follow slow noise: a curve over time that does not repeat, although there are other recordings to
+    /// show it, or one over the session that takes no fair share of the variance. The few recordings of a session may
+    /// come in any order by chance.
     fn is_of_noise(&self) -> bool {
-        let of_time = |curve: &Table| {
-            let time = matches!(curve.against, Against::RecordingTime | Against::SessionTime);
-            time && curve.period.is_none()
+        let Some(curve) = self.active.curve.as_ref().filter(|c| c.period.is_none()) else {
+            return false;
         };
-        self.carried.is_some() && !self.repeats && self.active.curve.as_ref().is_some_and(of_time)
+        match curve.against {
+            Against::RecordingTime => self.carried.is_some() && !self.repeats,
+            Against::SessionTime => self.carried.is_none_or(|share| share < LEAST_OF_SESSION),
+            _ => false,
+        }
     }
 }
 
@@ -145,7 +153,7 @@ impl Base<'_> {
             carried: None,
             repeats: false,
         };
-        let carried = Carried::of(self.problem, &self.fit.residual, joint, &columns);
+        let carried = carried(self.problem, self.fit, curve, joint, &columns);
         Some((proposal, carried))
     }
 }
@@ -163,11 +171,74 @@ fn knot_columns(problem: &Problem, fit: &Fit, curve: &Active) -> Vec<Column> {
     (0..free).map(unit).collect()
 }
 
+/// What a curve with these columns predicts of the residual of `fit` in recordings left out. A hysteresis of the load must
+/// predict what a delay does not: both turn with the load's rate of change.
+fn carried(
+    problem: &Problem,
+    fit: &Fit,
+    curve: &Table,
+    joint: usize,
+    columns: &[Column],
+) -> Option<Carried> {
+    if curve.against != Against::LoadTurned {
+        return Carried::of(problem, &fit.residual, joint, columns);
+    }
+    let rate = load_rate(problem, fit, joint);
+    let own = problem.joint_rows(joint);
+    let weight = &problem.weight[own.clone()];
+    let product = |x: &[f64], y: &[f64]| weighted_dot(weight, x, y);
+    let square = product(&rate, &rate).max(f64::MIN_POSITIVE);
+    let less_delay = |values: &[f64]| -> Vec<f64> {
+        let delay = product(values, &rate) / square;
+        let each = values.iter().zip(&rate);
+        each.map(|(value, rate)| value - delay * rate).collect()
+    };
+    let mut residual = fit.residual.clone();
+    residual[own.clone()].copy_from_slice(&less_delay(&fit.residual[own]));
+    let columns: Vec<Column> = (columns.iter())
+        .map(|column| Column {
+            joint: Some(joint),
+            values: column
+                .of_joint(joint, problem.rows)
+                .map_or_else(|| vec![0.0; problem.rows], less_delay),
+        })
+        .collect();
+    Carried::of(problem, &residual, joint, &columns)
+}
+
+/// Rate of change of the load of a joint, as a signal of the joint.
+fn load_rate(problem: &Problem, fit: &Fit, joint: usize) -> Vec<f64> {
+    let n = problem.joints;
+    let load = fit.load(problem);
+    let of_track = |(track, load): (&FitTrack, &Vec<f64>)| {
+        let time = &track.track.time_s;
+        let mut rate = vec![0.0; load.len()];
+        for k in 1..time.len() {
+            let step_s = time[k] - time[k - 1];
+            let change = load[k * n + joint] - load[(k - 1) * n + joint];
+            if step_s > 0.0 {
+                rate[k * n + joint] = change / step_s;
+            }
+        }
+        rate
+    };
+    let rates: Vec<Vec<f64>> = problem
+        .tracks
+        .iter()
+        .zip(load.iter())
+        .map(of_track)
+        .collect();
+    problem.column(&rates, Some(joint)).values
+}
+
 /// Whether a curve predicts what `without` leaves in recordings that it was not fitted on.
 pub fn repeats(problem: &Problem, without: &Fit, curve: &Active) -> bool {
     let joint = curve.hypothesis.place.joint;
     let columns = knot_columns(problem, without, curve);
-    let carried = Carried::of(problem, &without.residual, joint, &columns);
+    let Some(table) = &curve.curve else {
+        return false;
+    };
+    let carried = carried(problem, without, table, joint, &columns);
     carried.is_some_and(|carried| {
         let by_chance = Carried::largest_by_chance(std::iter::once(&carried));
         carried.share > by_chance.max(LEAST_CARRIED)

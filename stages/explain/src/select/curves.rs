@@ -4,7 +4,7 @@ use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis, TimeKind};
 use crate::select::cross_validation::{carries_over, left_elsewhere};
 use crate::select::curve_shapes;
-use crate::select::evidence::{CURVE_EVIDENCE, CURVE_SIZE, LEAST_SIZE, is_drawn_already};
+use crate::select::evidence::{CURVE_EVIDENCE, CURVE_SIZE, LEAST_SIZE, PATCH, is_drawn_already};
 use crate::select::evidence::{overwhelming, worse_joints};
 use crate::select::explanation::Explanation;
 use crate::select::plausible::is_open_wave;
@@ -88,7 +88,18 @@ impl Search<'_> {
         } else {
             CURVE_SIZE
         };
+        let known = self.scaled(best).squares[joint] - best.fit.squares[joint];
+        if best.fit.squares[joint] - beside.fit.squares[joint] < PATCH * known {
+            return None;
+        }
         (beside.ahead_of(best, &white) > CURVE_EVIDENCE && less > least).then_some(beside)
+    }
+
+    /// The twin as it was, with the torque scales of an explanation.
+    fn scaled(&self, best: &Explanation) -> Fit {
+        let scales = best.fit.actives.iter();
+        let scales = scales.filter(|active| active.hypothesis.is_torque_scale());
+        Fit::new(self.problem, scales.cloned().collect())
     }
 
     /// The explanation with a curve in one joint in place of all effects that act once, if that does better. A residual

@@ -1,0 +1,228 @@
+//! What the corrected twin leaves beyond the noise, joint by joint, and what it goes with.
+//!
+//! The size of a remainder does not tell noise from physics: noise may be slow, and hundreds of times as large as its
+//! fastest changes. So a remainder counts as physics by what noise cannot do:
+//!
+//! - it follows the motion, and a curve of that predicts it in recordings that the curve was not fitted on;
+//! - it is far larger on held-out recordings than on fitted ones, although their efforts change no faster;
+//! - it stands out for moments.
+
+use crate::data::problem::Problem;
+use crate::fit::fitted::Fit;
+use crate::report::schema::Remaining;
+use crate::select::evidence::PATCH;
+use crate::select::propose::Base;
+use tauscope_dynamics::terms::words::number;
+
+/// An explanation does not carry over at a joint if its error on held-out recordings is this many times that on fitted
+/// ones, where both have the same rate of change of effort.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const WORSE: f64 = 2.0;
+/// The error on held-out recordings must also be this many times the measurement's white noise.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const ABOVE_NOISE: f64 = 3.0;
+/// A moment stands out if its error is this many standard deviations of the calm half of the time.
+/// Statistical: a normal variable exceeds 10 in none of 1e22 rows; slow noise is as normal as fast.
+const STANDS_OUT: f64 = 10.0;
+/// Median of the absolute value of a normal variable, in standard deviations.
+/// Statistical: the 75 % quantile of the standard normal distribution.
+const MEDIAN_OF_ABS_NORMAL: f64 = 0.6745;
+/// Stamps may be wrong by at least this much \[s\].
+/// Resolution: delays below this are not searched for.
+const CLOCK_S: f64 = 0.002;
+
+/// What a fit leaves in some recordings.
+#[derive(Clone, Copy)]
+pub struct Left<'a> {
+    /// The recordings.
+    pub problem: &'a Problem,
+    /// The fit, evaluated there.
+    pub fit: &'a Fit,
+}
+
+/// The remainders of an explanation.
+#[derive(Debug, Default)]
+pub struct Remainders {
+    /// One or none per joint.
+    pub all: Vec<Remaining>,
+    /// Joints at which the error is much larger on held-out recordings.
+    pub elsewhere: Vec<usize>,
+}
+
+impl Left<'_> {
+    /// RMS error of a joint \[N m or N\].
+    fn rms(&self, joint: usize) -> f64 {
+        (self.fit.squares[joint] / self.fit.count[joint].max(1.0)).sqrt()
+    }
+
+    /// Rows of a joint that count, with the rate at which the twin's effort changes there \[N m/s\].
+    fn rows(&self, joint: usize) -> Vec<Row> {
+        let problem = self.problem;
+        let first = problem.joint_rows(joint).start;
+        let mut rows = Vec::new();
+        for (recording, track) in problem.tracks.iter().enumerate() {
+            let own: Vec<usize> = track.rows().collect();
+            let time = |k: usize| track.track.time_s[track.compared[k]];
+            let twin = |k: usize| {
+                let at = first + own[k];
+                problem.measured[at] - self.fit.residual[at]
+            };
+            for k in 0..own.len() {
+                let at = first + own[k];
+                if problem.weight[at] <= 0.0 {
+                    continue;
+                }
+                let (before, after) = (k.saturating_sub(1), (k + 1).min(own.len() - 1));
+                let span_s = time(after) - time(before);
+                rows.push(Row {
+                    recording,
+                    time_s: time(k),
+                    error: self.fit.residual[at],
+                    rate: if span_s > 0.0 {
+                        (twin(after) - twin(before)) / span_s
+                    } else {
+                        0.0
+                    },
+                });
+            }
+        }
+        rows
+    }
+
+    /// The moment at which the error of a joint stands out most, if one does.
+    fn moment(&self, joint: usize) -> Option<Row> {
+        let rows = self.rows(joint);
+        let mut errors: Vec<f64> = rows.iter().map(|row| row.error.abs()).collect();
+        errors.sort_by(f64::total_cmp);
+        let calm = errors.get(errors.len() / 2)? / MEDIAN_OF_ABS_NORMAL;
+        let calm = calm.max(self.problem.white_noise[joint]);
+        let over = |row: &Row| {
+            let clock_s = clock_s(&self.problem.tracks[row.recording].track.time_s);
+            row.error.abs() - STANDS_OUT * calm - clock_s * row.rate.abs()
+        };
+        let out = rows.into_iter().filter(|row| over(row) > 0.0);
+        out.max_by(|a, b| over(a).total_cmp(&over(b)))
+    }
+}
+
+/// A row of a joint that counts.
+struct Row {
+    recording: usize,
+    time_s: f64,
+    error: f64,
+    rate: f64,
+}
+
+/// By how much a stamp may be wrong \[s\]: a sample.
+fn clock_s(time_s: &[f64]) -> f64 {
+    let span_s = time_s.last().unwrap_or(&0.0) - time_s.first().unwrap_or(&0.0);
+    (span_s / time_s.len().saturating_sub(1).max(1) as f64).max(CLOCK_S)
+}
+
+/// RMS of the rate of change of effort.
+fn rms_rate(rows: &[Row]) -> f64 {
+    let squares: f64 = rows.iter().map(|row| row.rate * row.rate).sum();
+    (squares / rows.len().max(1) as f64).sqrt()
+}
+
+/// The remainders of the explanation `found` on the fitted recordings, and on `held` out ones if their effort is known.
+/// `before` is the twin as it was; `unit_nm` turns the recordings' unit into N m, by joint.
+pub fn of(
+    found: Left<'_>,
+    before: &Fit,
+    held: Option<Left<'_>>,
+    unit_nm: &[f64],
+    joints: &[String],
+    unit: &str,
+) -> Remainders {
+    let problem = found.problem;
+    let mut remainders = Remainders::default();
+    for (j, joint) in joints.iter().enumerate() {
+        let (here, noise) = (found.rms(j), problem.white_noise[j]);
+        let told = |nm: f64| format!("{} {unit}", number(nm / unit_nm[j]));
+        let there = held.as_ref().map(|held| held.rms(j));
+        let mut sentences = Vec::new();
+        if let Some(with) = follows_motion(found, before, j) {
+            sentences.push(format!(
+                "{} remain at joint {joint}, and not as noise: {with}",
+                told(here)
+            ));
+        }
+        if let (Some(held), Some(there)) = (held, there)
+            && let Some(faster) = is_elsewhere(found, held, j)
+        {
+            remainders.elsewhere.push(j);
+            let times = number(there / here);
+            let than = if faster > 1.0 {
+                format!(
+                    ", although the effort changes only {} times as fast there",
+                    number(faster)
+                )
+            } else {
+                String::new()
+            };
+            sentences.push(format!(
+                "On the held-out recordings {} remain at joint {joint}, {times} times as much as on the fitted ones{than}: either \
+                 something acts on the held-out recordings only, or the correction does not carry over to them.",
+                told(there)
+            ));
+        }
+        let moments = [Some(found), held].into_iter().flatten();
+        let moment = moments.filter_map(|left| {
+            let moment = left.moment(j)?;
+            let name = left.problem.tracks[moment.recording].track.name.clone();
+            Some((name, moment))
+        });
+        let largest = moment.max_by(|(_, a), (_, b)| a.error.abs().total_cmp(&b.error.abs()));
+        if let Some((recording, moment)) = largest {
+            sentences.push(format!(
+                "At joint {joint} the error stands out for moments: {} in {recording} at {:.1} s, beside {} all the time. Look for a \
+                 contact or a disturbance there.",
+                told(moment.error.abs()),
+                moment.time_s,
+                told(here)
+            ));
+        }
+        if !sentences.is_empty() {
+            remainders.all.push(Remaining {
+                joint: joint.clone(),
+                rms: here / unit_nm[j],
+                holdout_rms: there.map(|there| there / unit_nm[j]),
+                noise: noise / unit_nm[j],
+                sentence: sentences.join(" "),
+            });
+        }
+    }
+    remainders
+}
+
+/// What the remainder of a joint goes with, if it follows the motion.
+fn follows_motion(found: Left<'_>, before: &Fit, joint: usize) -> Option<String> {
+    let (problem, fit) = (found.problem, found.fit);
+    if fit.squares[joint] <= 0.0 || problem.tracks.len() < 2 {
+        return None;
+    }
+    let curve = Base::new(problem, fit, 1).propose_curve(joint)?;
+    let share = curve.carried.filter(|_| curve.repeats)?;
+    // What effects are known to do is not known to the last percent.
+    let known = (before.squares[joint] - fit.squares[joint]).max(0.0);
+    if share * fit.squares[joint] < PATCH * known {
+        return None;
+    }
+    let table = curve.active.curve.as_ref()?;
+    let names: Vec<String> = problem.model.joint_names().map(str::to_owned).collect();
+    Some(format!(
+        "what remains depends on {}, and a curve of that predicts {:.0} % of its square in recordings that it was not fitted on.",
+        table.depends_on(joint, &names),
+        100.0 * share
+    ))
+}
+
+/// Whether the error of a joint is much larger on held-out recordings, and how many times as fast as on the fitted ones the
+/// effort changes there. The errors of clocks, filters and derivatives grow with that rate.
+fn is_elsewhere(found: Left<'_>, held: Left<'_>, joint: usize) -> Option<f64> {
+    let (here, there) = (found.rms(joint), held.rms(joint));
+    let faster = rms_rate(&held.rows(joint)) / rms_rate(&found.rows(joint)).max(f64::MIN_POSITIVE);
+    let more = there > WORSE * faster.max(1.0) * here;
+    (more && there > ABOVE_NOISE * found.problem.white_noise[joint]).then_some(faster)
+}
