@@ -27,6 +27,15 @@ const STANDS_OUT: f64 = 10.0;
 /// Median of the absolute value of a normal variable, in standard deviations.
 /// Statistical: the 75 % quantile of the standard normal distribution.
 const MEDIAN_OF_ABS_NORMAL: f64 = 0.6745;
+/// Fewer moments are the edges of an effect that acts once.
+/// Physical: it has two, its beginning and its end.
+const LEAST_MOMENTS: usize = 3;
+/// Moments nearer than this are one \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
+const APART_S: f64 = 0.5;
+/// Accelerations are uncertain within this time of either end of a recording \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
+const END_S: f64 = 0.25;
 /// Stamps may be wrong by at least this much \[s\].
 /// Resolution: delays below this are not searched for.
 const CLOCK_S: f64 = 0.002;
@@ -89,23 +98,47 @@ impl Left<'_> {
         rows
     }
 
-    /// The moment at which the error of a joint stands out most, if one does.
+    /// The moment at which the error of a joint stands out most, if the error is one of moments.
     fn moment(&self, joint: usize) -> Option<Row> {
-        let rows = self.rows(joint);
+        let mut rows = self.rows(joint);
         let mut errors: Vec<f64> = rows.iter().map(|row| row.error.abs()).collect();
         errors.sort_by(f64::total_cmp);
         let calm = errors.get(errors.len() / 2)? / MEDIAN_OF_ABS_NORMAL;
         let calm = calm.max(self.problem.white_noise[joint]);
-        let over = |row: &Row| {
-            let clock_s = clock_s(&self.problem.tracks[row.recording].track.time_s);
-            row.error.abs() - STANDS_OUT * calm - clock_s * row.rate.abs()
+        let end_s = |row: &Row| {
+            *self.problem.tracks[row.recording]
+                .track
+                .time_s
+                .last()
+                .unwrap_or(&0.0)
         };
-        let out = rows.into_iter().filter(|row| over(row) > 0.0);
-        out.max_by(|a, b| over(a).total_cmp(&over(b)))
+        rows.retain(|row| row.time_s > END_S && row.time_s < end_s(row) - END_S);
+        let clock_s = |row: &Row| clock_s(&self.problem.tracks[row.recording].track.time_s);
+        let stands_out =
+            |row: &&Row| row.error.abs() > STANDS_OUT * calm + clock_s(row) * row.rate.abs();
+        let squares = |rows: &mut dyn Iterator<Item = &Row>| {
+            rows.map(|row| row.error * row.error).sum::<f64>()
+        };
+        let all = squares(&mut rows.iter());
+        let of_moments = squares(&mut rows.iter().filter(stands_out));
+        let out: Vec<&Row> = rows.iter().filter(stands_out).collect();
+        let apart = |pair: &&[&Row]| {
+            let other = pair[0].recording != pair[1].recording;
+            other || pair[1].time_s - pair[0].time_s > APART_S
+        };
+        let moments = out.windows(2).filter(apart).count() + usize::from(!out.is_empty());
+        if moments < LEAST_MOMENTS || of_moments < 0.5 * all {
+            return None;
+        }
+        let largest = out
+            .into_iter()
+            .max_by(|a, b| a.error.abs().total_cmp(&b.error.abs()));
+        largest.cloned()
     }
 }
 
 /// A row of a joint that counts.
+#[derive(Debug, Clone)]
 struct Row {
     recording: usize,
     time_s: f64,

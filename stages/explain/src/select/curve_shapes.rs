@@ -172,7 +172,8 @@ fn knot_columns(problem: &Problem, fit: &Fit, curve: &Active) -> Vec<Column> {
 }
 
 /// What a curve with these columns predicts of the residual of `fit` in recordings left out. A hysteresis of the load must
-/// predict what a delay does not: both turn with the load's rate of change.
+/// predict what a delay does not: both turn with the load's rate of change. A periodic curve is not judged, because its
+/// period was chosen to suit all recordings.
 fn carried(
     problem: &Problem,
     fit: &Fit,
@@ -180,6 +181,9 @@ fn carried(
     joint: usize,
     columns: &[Column],
 ) -> Option<Carried> {
+    if curve.period.is_some() {
+        return None;
+    }
     if curve.against != Against::LoadTurned {
         return Carried::of(problem, &fit.residual, joint, columns);
     }
