@@ -17,8 +17,15 @@ pub fn not_carried(problem: &Problem, before: &Fit, found: &Fit) -> Vec<usize> {
     if problem.tracks.len() < 2 {
         return Vec::new();
     }
-    let changed = |&j: &usize| found.squares[j] != before.squares[j];
-    let worse = |&j: &usize| left_elsewhere(problem, found, j) > left_elsewhere(problem, before, j);
+    // What acts once is not part of the prediction of other recordings.
+    let lasts = |j: usize| {
+        let mut all = found.actives.iter().map(|active| &active.hypothesis);
+        all.any(|h| h.lasts() && !h.is_torque_scale() && h.only_joint().is_none_or(|own| own == j))
+    };
+    let changed = |&j: &usize| lasts(j) && found.squares[j] < UNCHANGED * before.squares[j];
+    let worse = |&j: &usize| {
+        UNCHANGED * left_elsewhere(problem, found, j) > left_elsewhere(problem, before, j)
+    };
     (0..problem.joints).filter(changed).filter(worse).collect()
 }
 
