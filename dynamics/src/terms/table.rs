@@ -433,6 +433,50 @@ mod tests {
         }
     }
 
+    /// Readings for the second joint of a robot at these velocities and loads, every 0.05 s.
+    fn readings(against: Against, motion: &[(f64, f64)]) -> Vec<f64> {
+        let mut gauge = Gauge::new(against, 1, 1.0);
+        let read = |&(velocity, load): &(f64, f64)| {
+            gauge.read(&MotionSample {
+                dt_s: 0.05,
+                recording_s: 0.0,
+                session_s: 0.0,
+                position: &[0.0; 2],
+                velocity: &[0.0, velocity],
+                acceleration: &[0.0; 2],
+                transmitted: &[0.0, load],
+            })
+        };
+        motion.iter().map(read).collect()
+    }
+
+    #[test]
+    fn a_load_turns_within_its_band() {
+        let turned = readings(
+            Against::LoadTurned,
+            &[(0.0, 2.0), (0.0, 2.5), (0.0, 9.0), (0.0, 8.5), (0.0, 3.0)],
+        );
+        assert_eq!(turned, [0.0, 0.5, 1.0, 0.5, -1.0]);
+    }
+
+    #[test]
+    fn a_joint_rests_when_it_stands_still_and_not_when_it_reverses() {
+        let since = |still: usize| {
+            let mut motion = vec![(1.0, 0.0)];
+            motion.extend(vec![(0.0, 0.0); still]);
+            motion.extend(vec![(-1.0, 0.0); 2]);
+            *readings(Against::SinceRest, &motion).last().unwrap()
+        };
+        assert!(since(1) > LONG_S);
+        assert!((since(4) - 0.1).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_joint_drives_its_load_or_is_driven_by_it() {
+        let driven = readings(Against::DrivenLoad, &[(0.5, 3.0), (-0.5, 3.0)]);
+        assert_eq!(driven, [3.0, -3.0]);
+    }
+
     #[test]
     fn a_spec_and_back() {
         let robot = TwoJoints::new();
