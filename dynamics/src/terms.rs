@@ -18,6 +18,7 @@ mod effect;
 mod expansion;
 mod external_push;
 mod friction_step;
+mod gauge;
 mod ghost;
 mod joint_elasticity;
 mod law;
@@ -60,10 +61,11 @@ pub use effect::{
     PlaceKind, Scale, Simpler, Simulated, Time, Traits,
 };
 pub use expansion::Expansion;
+pub use gauge::Gauge;
 pub use payload::EFFECT as PAYLOAD;
 pub use physics::Physics;
 pub use spec::{TermError, TermSpec};
-pub use table::{Against, EFFECT as UNKNOWN, Gauge, Table, TableSpec, table};
+pub use table::{Against, EFFECT as UNKNOWN, Table, TableSpec, table};
 pub use torque_bias::EFFECT as TORQUE_BIAS;
 pub use torque_gain::EFFECT as TORQUE_GAIN;
 pub use viscous_friction::EFFECT as VISCOUS_FRICTION;

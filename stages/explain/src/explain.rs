@@ -15,9 +15,8 @@ use crate::outcome::Outcome;
 use crate::read::audit;
 use crate::read::input::Input;
 use crate::read::start::Start;
-use crate::report::remainder::{self, Left, Remainders};
 use crate::report::schema::{Report, Verdict};
-use crate::report::{findings, locate, notes, verdict};
+use crate::report::{findings, locate, notes, summary, verdict};
 
 use judged::Judged;
 
@@ -101,17 +100,7 @@ fn conclude(
         .map(|j| white_noise(&input.fit, j, joints.len()))
         .collect();
     let unit = if input.effort_unit == "A" { "A" } else { "N m" };
-    let held = context.held(&rests_count, &found)?;
-    let remainders = if context.at_rest {
-        Remainders::default()
-    } else {
-        let here = Left {
-            problem: &problem,
-            fit: &found,
-        };
-        let there = held.as_ref().map(|(problem, fit)| Left { problem, fit });
-        remainder::of(here, &before, there, context.unit_nm, &joints, unit)
-    };
+    let remainders = context.remainders((&problem, &found), &before, &rests_count, unit)?;
     let verdict = verdict::verdict(&found, &named.findings, &remainders.all);
     if !remainders.elsewhere.is_empty() {
         findings::doubt_patches(&mut named.findings);
@@ -129,7 +118,7 @@ fn conclude(
         case: input.case.clone(),
         verdict,
         reason: None,
-        summary: findings::summary(
+        summary: summary::summary(
             verdict,
             &named.findings,
             &remainders.all,

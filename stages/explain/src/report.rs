@@ -16,6 +16,7 @@ pub(crate) mod notes;
 pub(crate) mod remainder;
 pub(crate) mod schema;
 pub(crate) mod sentences;
+pub(crate) mod summary;
 pub(crate) mod verdict;
 
 pub use next_motion::MOTION_PREFIX;

@@ -27,6 +27,7 @@
 pub mod candidates;
 pub mod carried;
 pub mod cross_validation;
+pub mod curve_axes;
 pub mod curve_shapes;
 pub mod curves;
 pub mod evidence;

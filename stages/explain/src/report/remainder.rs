@@ -7,11 +7,13 @@
 //! - it is far larger on held-out recordings than on fitted ones, although their efforts change no faster;
 //! - it stands out for moments.
 
+use crate::context::Context;
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::report::schema::Remaining;
 use crate::select::evidence::PATCH;
 use crate::select::propose::Base;
+use tauscope_dynamics::terms::TermError;
 use tauscope_dynamics::terms::words::number;
 
 /// An explanation does not carry over at a joint if its error on held-out recordings is this many times that on fitted
@@ -42,11 +44,11 @@ const CLOCK_S: f64 = 0.002;
 
 /// What a fit leaves in some recordings.
 #[derive(Clone, Copy)]
-pub struct Left<'a> {
+struct Left<'a> {
     /// The recordings.
-    pub problem: &'a Problem,
+    problem: &'a Problem,
     /// The fit, evaluated there.
-    pub fit: &'a Fit,
+    fit: &'a Fit,
 }
 
 /// The remainders of an explanation.
@@ -158,9 +160,32 @@ fn rms_rate(rows: &[Row]) -> f64 {
     (squares / rows.len().max(1) as f64).sqrt()
 }
 
+impl Context<'_> {
+    /// The remainders of the explanation `found`; those of an arm at rest are not judged.
+    ///
+    /// # Errors
+    /// If a term of the start cannot be built for the robot.
+    pub fn remainders(
+        &self,
+        (problem, fit): (&Problem, &Fit),
+        before: &Fit,
+        rests_count: &[bool],
+        unit: &str,
+    ) -> Result<Remainders, TermError> {
+        if self.at_rest {
+            return Ok(Remainders::default());
+        }
+        let joints: Vec<String> = problem.model.joint_names().map(str::to_owned).collect();
+        let held = self.held(rests_count, fit)?;
+        let held = held.as_ref().map(|(problem, fit)| Left { problem, fit });
+        let found = Left { problem, fit };
+        Ok(of(found, before, held, self.unit_nm, &joints, unit))
+    }
+}
+
 /// The remainders of the explanation `found` on the fitted recordings, and on `held` out ones if their effort is known.
 /// `before` is the twin as it was; `unit_nm` turns the recordings' unit into N m, by joint.
-pub fn of(
+fn of(
     found: Left<'_>,
     before: &Fit,
     held: Option<Left<'_>>,
@@ -186,28 +211,14 @@ pub fn of(
         {
             remainders.elsewhere.push(j);
             let times = number(there / here);
-            let than = if faster > 1.0 {
-                format!(
-                    ", although the effort changes only {} times as fast there",
-                    number(faster)
-                )
-            } else {
-                String::new()
-            };
+            let than = than(faster);
             sentences.push(format!(
                 "On the held-out recordings {} remain at joint {joint}, {times} times as much as on the fitted ones{than}: either \
                  something acts on the held-out recordings only, or the correction does not carry over to them.",
                 told(there)
             ));
         }
-        let moments = [Some(found), held].into_iter().flatten();
-        let moment = moments.filter_map(|left| {
-            let moment = left.moment(j)?;
-            let name = left.problem.tracks[moment.recording].track.name.clone();
-            Some((name, moment))
-        });
-        let largest = moment.max_by(|(_, a), (_, b)| a.error.abs().total_cmp(&b.error.abs()));
-        if let Some((recording, moment)) = largest {
+        if let Some((recording, moment)) = largest_moment([Some(found), held], j) {
             sentences.push(format!(
                 "At joint {joint} the error stands out for moments: {} in {recording} at {:.1} s, beside {} all the time. Look for a \
                  contact or a disturbance there.",
@@ -227,6 +238,25 @@ pub fn of(
         }
     }
     remainders
+}
+
+/// How many times as fast the effort changes on held-out recordings, in words.
+fn than(faster: f64) -> String {
+    if faster <= 1.0 {
+        return String::new();
+    }
+    let times = number(faster);
+    format!(", although the effort changes only {times} times as fast there")
+}
+
+/// The moment at which the error of a joint stands out most, and its recording.
+fn largest_moment(all: [Option<Left<'_>>; 2], joint: usize) -> Option<(String, Row)> {
+    let moments = all.into_iter().flatten().filter_map(|left| {
+        let moment = left.moment(joint)?;
+        let name = left.problem.tracks[moment.recording].track.name.clone();
+        Some((name, moment))
+    });
+    moments.max_by(|(_, a), (_, b)| a.error.abs().total_cmp(&b.error.abs()))
 }
 
 /// What the remainder of a joint goes with, if it follows the motion.
