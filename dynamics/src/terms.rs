@@ -19,6 +19,7 @@ mod effect;
 mod expansion;
 mod external_push;
 mod friction_step;
+mod gauge;
 mod gear_efficiency;
 mod ghost;
 mod joint_elasticity;
@@ -64,6 +65,7 @@ pub use effect::{
     PlaceKind, Scale, Simpler, Simulated, Time, Traits,
 };
 pub use expansion::Expansion;
+pub use gauge::Gauge;
 pub use payload::EFFECT as PAYLOAD;
 pub use physics::Physics;
 pub use spec::{TermError, TermSpec};

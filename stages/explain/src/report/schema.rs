@@ -32,6 +32,9 @@ pub struct Report {
     pub undetectable: Vec<Undetectable>,
     /// Motions that would tell apart what this data cannot.
     pub next_motions: Vec<NextMotion>,
+    /// What the corrected twin leaves beyond the noise, by joint.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub remaining: Vec<Remaining>,
     /// Notes: lost samples, gains that are not identifiable, standstill.
     pub notes: Vec<String>,
     /// The joints, in URDF order.
@@ -58,6 +61,22 @@ pub enum Verdict {
     UnknownRemains,
     /// The data does not allow a verdict.
     NotEvaluated,
+}
+
+/// What the corrected twin leaves at a joint beyond the noise. Efforts are compared below the cutoff of the fit, without the
+/// joint's standstills.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Remaining {
+    /// The joint.
+    pub joint: String,
+    /// RMS on the fitted recordings \[effort unit\].
+    pub rms: f64,
+    /// RMS on the held-out ones \[effort unit\].
+    pub holdout_rms: Option<f64>,
+    /// The measurement's white noise there \[effort unit\].
+    pub noise: f64,
+    /// What it goes with, when and where.
+    pub sentence: String,
 }
 
 /// An effect that the twin leaves out.
