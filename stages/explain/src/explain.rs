@@ -101,7 +101,8 @@ fn conclude(
         .collect();
     let unit = if input.effort_unit == "A" { "A" } else { "N m" };
     let remainders = context.remainders((&problem, &found), &before, &rests_count, unit)?;
-    let verdict = verdict::verdict(&found, &named.findings, &remainders.all);
+    let twin_is_topic = !input.bodies;
+    let verdict = verdict::verdict(&found, &named.findings, &remainders.all, twin_is_topic);
     if !remainders.elsewhere.is_empty() {
         findings::doubt_patches(&mut named.findings);
     }
