@@ -1,6 +1,6 @@
 //! The robot: its tree of links and joints, prepared for the algorithms.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use crate::inertia::Inertia;
 
@@ -218,6 +218,23 @@ impl Model {
     /// Sets gravity in the world frame \[m/s²\]; for a base that hangs or leans, gravity as it sees it.
     pub fn set_gravity(&mut self, gravity_m_s2: [f64; 3]) {
         self.gravity = gravity_m_s2.into();
+    }
+
+    /// Shifts the zero of `joint`: at the position q the robot then stands as it stood before at q + `offset`
+    /// \[rad or m\].
+    ///
+    /// # Panics
+    /// If `joint` is not an index into [`Model::joints`].
+    pub fn shift_zero(&mut self, joint: usize, offset: f64) {
+        assert!(joint < self.dof(), "the robot has no joint {joint}");
+        for body in self.bodies.iter_mut().filter(|body| body.joint == joint) {
+            if body.prismatic {
+                body.translation += body.rotation.column(2) * offset;
+            } else {
+                let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), offset);
+                body.rotation *= turn.matrix();
+            }
+        }
     }
 
     /// Makes `inertia`, in the frame of `link`, part of the robot for good, beside whatever tool is set.

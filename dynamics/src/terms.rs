@@ -14,17 +14,22 @@ mod concealed;
 mod contact_wall;
 mod coulomb_friction;
 mod counterbalance_spring;
+mod eccentric_gear;
 mod effect;
 mod expansion;
 mod external_push;
 mod friction_step;
+mod gauge;
+mod gear_efficiency;
 mod ghost;
 mod joint_elasticity;
+mod joint_zero_offset;
 mod law;
 mod link_com;
 mod link_inertia;
 mod link_mass;
 mod load_dependent_friction;
+mod load_squared_friction;
 mod payload;
 mod payload_pickup;
 mod physics;
@@ -60,6 +65,7 @@ pub use effect::{
     PlaceKind, Scale, Simpler, Simulated, Time, Traits,
 };
 pub use expansion::Expansion;
+pub use gauge::Gauge;
 pub use payload::EFFECT as PAYLOAD;
 pub use physics::Physics;
 pub use spec::{TermError, TermSpec};
@@ -76,6 +82,9 @@ pub static EFFECTS: &[&Effect] = &[
     &stribeck_friction::EFFECT,
     &asymmetric_coulomb::EFFECT,
     &load_dependent_friction::EFFECT,
+    &load_squared_friction::EFFECT,
+    &gear_efficiency::EFFECT,
+    &eccentric_gear::EFFECT,
     &presliding_hysteresis::EFFECT,
     &quadratic_drag::EFFECT,
     &temperature_viscous::EFFECT,
@@ -92,6 +101,7 @@ pub static EFFECTS: &[&Effect] = &[
     &link_com::EFFECT,
     &link_inertia::EFFECT,
     &base_tilt::EFFECT,
+    &joint_zero_offset::EFFECT,
     &external_push::EFFECT,
     &contact_wall::EFFECT,
     &payload_pickup::EFFECT,

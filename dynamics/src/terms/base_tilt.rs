@@ -39,7 +39,10 @@ pub(super) static EFFECT: Effect = Effect {
             vec![("roll_rad", angle * cos), ("pitch_rad", angle * sin)]
         })
     }),
-    traits: Traits::NONE,
+    traits: Traits {
+        bends: true,
+        ..Traits::NONE
+    },
     build: |site, values| {
         let mut model = site.model.clone();
         let level = Vector3::from(model.gravity());

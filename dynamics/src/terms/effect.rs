@@ -96,9 +96,9 @@ impl Effect {
         matches!(self.simulated, Simulated::Transmission(_))
     }
 
-    /// What it is called in reports: what only describes is `unknown`.
+    /// What it is called in reports: what only describes, and what the list of canonical names lacks, is `unknown`.
     pub fn said(&self) -> &'static str {
-        if self.traits.describes_only {
+        if self.traits.describes_only || self.traits.is_off_list {
             UNKNOWN.name
         } else {
             self.name
@@ -232,6 +232,11 @@ pub struct Traits {
     pub is_scale: bool,
     /// It describes what has no name.
     pub describes_only: bool,
+    /// It has a law and a name here, but the list of names that reports may use lacks it. A finding is an `unknown` whose
+    /// parameter `kind` is this name, so that who reads reports by that list sees an honest `unknown` with numbers.
+    pub is_off_list: bool,
+    /// Its effort is linear in its factors to first order only, so it is computed anew for each of their values.
+    pub bends: bool,
     /// Whether some gear makes it with these coordinates; what none makes only draws a curve.
     pub is_made_by_gears: fn(&[f64]) -> bool,
     /// By how much each of its coordinates may be off in a URDF that nobody has measured, of this link.
@@ -252,6 +257,8 @@ impl Traits {
         cuts_off: false,
         is_scale: false,
         describes_only: false,
+        is_off_list: false,
+        bends: false,
         is_made_by_gears: |_| true,
         off_in_urdf: None,
         smallest_told_as: None,

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::gauge::Gauge;
 use super::words::number;
 use super::{
     Effect, Excitation, Family, Layer, MotionSample, PlaceKind, Simulated, Site, Term, TermError,
@@ -38,16 +39,18 @@ pub static EFFECT: Effect = Effect {
     },
     // Without a table there is nothing to describe.
     build: |site, _| {
+        let table = Table {
+            against: Against::Position,
+            of_joint: site.joint,
+            by_direction: false,
+            period: None,
+            knots: vec![0.0],
+            values: vec![0.0],
+        };
         Box::new(Curve {
             joint: site.joint,
-            table: Table {
-                against: Against::Position,
-                of_joint: site.joint,
-                by_direction: false,
-                period: None,
-                knots: vec![0.0],
-                values: vec![0.0],
-            },
+            gauge: table.gauge(),
+            table,
         })
     },
 };
@@ -64,6 +67,13 @@ pub enum Against {
     Acceleration,
     /// Effort that a joint's gear transmits \[N m or N\].
     Load,
+    /// The same times the direction of the joint's motion: above zero where the joint works against the load, below where
+    /// the load drives it \[N m or N\].
+    DrivenLoad,
+    /// How far a joint's load has changed since it last turned round, at most as far as the outer knots \[N m or N\].
+    LoadTurned,
+    /// Time since a joint last stood still \[s\].
+    SinceRest,
     /// Time since the start of the recording \[s\].
     RecordingTime,
     /// Time since the start of the session \[s\].
@@ -71,16 +81,9 @@ pub enum Against {
 }
 
 impl Against {
-    /// Its value at an instant; `joint` where it is one of a joint.
-    pub fn value(self, at: &MotionSample<'_>, joint: usize) -> f64 {
-        match self {
-            Self::Position => at.position[joint],
-            Self::Velocity => at.velocity[joint],
-            Self::Acceleration => at.acceleration[joint],
-            Self::Load => at.transmitted[joint],
-            Self::RecordingTime => at.recording_s,
-            Self::SessionTime => at.session_s,
-        }
+    /// Whether it depends on the effort that a joint's gear transmits.
+    pub fn is_of_load(self) -> bool {
+        matches!(self, Self::Load | Self::DrivenLoad | Self::LoadTurned)
     }
 }
 
@@ -145,6 +148,14 @@ impl Table {
                 "The friction of joint {place} is more than a constant and a share of its velocity, and no effect of the library bends it so{peak} rad/s."
             );
         }
+        let on = self.depends_on(joint, joints);
+        format!(
+            "Joint {place} has an effort that no effect of the library explains: it depends on {on}{peak}."
+        )
+    }
+
+    /// What a curve in the joint of index `joint` depends on, in words; `joints` are the names of all.
+    pub fn depends_on(&self, joint: usize, joints: &[String]) -> String {
         let of = if self.of_joint == joint {
             "its own".to_owned()
         } else {
@@ -155,6 +166,16 @@ impl Table {
             Against::Velocity => format!("{of} velocity"),
             Against::Acceleration => format!("{of} acceleration"),
             Against::Load => "its load".to_owned(),
+            Against::DrivenLoad => {
+                "its load, and on whether the joint drives the load or the load the joint".to_owned()
+            }
+            Against::LoadTurned => {
+                "the way its load came: how far it has changed since it last turned round (hysteresis)".to_owned()
+            }
+            Against::SinceRest if self.of_joint == joint => {
+                "the time since the joint last stood still".to_owned()
+            }
+            Against::SinceRest => format!("the time since joint {} last stood still", joints[self.of_joint]),
             Against::RecordingTime => "the time since the start of the recording".to_owned(),
             Against::SessionTime => "the time since the start of the session".to_owned(),
         };
@@ -167,9 +188,7 @@ impl Table {
             let (period, rate) = (number(period_s), number(1.0 / period_s));
             format!(", and repeats every {period} s ({rate} Hz)")
         });
-        format!(
-            "Joint {place} has an effort that no effect of the library explains: it depends on {against}{direction}{repeated}{peak}."
-        )
+        format!("{against}{direction}{repeated}")
     }
 }
 
@@ -226,6 +245,7 @@ pub fn table(site: &Site<'_>, table: Table) -> Result<Box<dyn Term>, TermError> 
     }
     Ok(Box::new(Curve {
         joint: site.joint,
+        gauge: table.gauge(),
         table,
     }))
 }
@@ -233,10 +253,17 @@ pub fn table(site: &Site<'_>, table: Table) -> Result<Box<dyn Term>, TermError> 
 #[derive(Debug)]
 struct Curve {
     joint: usize,
+    gauge: Gauge,
     table: Table,
 }
 
 impl Table {
+    /// Reads what the curve is drawn against.
+    pub fn gauge(&self) -> Gauge {
+        let band = self.knots.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        Gauge::new(self.against, self.of_joint, band)
+    }
+
     /// The curve at `x`.
     fn at(&self, x: f64) -> f64 {
         let first = self.knots[0];
@@ -268,10 +295,12 @@ impl Term for Curve {
         &[]
     }
 
+    fn reset(&mut self) {
+        self.gauge.reset();
+    }
+
     fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
-        let value = self
-            .table
-            .at(self.table.against.value(at, self.table.of_joint));
+        let value = self.table.at(self.gauge.read(at));
         let direction = if self.table.by_direction {
             sign(at.velocity[self.joint])
         } else {

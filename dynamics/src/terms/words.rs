@@ -83,7 +83,7 @@ fn place(inner: &str) -> (&str, Told) {
 }
 
 /// Endings of canonical names and the units they stand for, longer ones before those they end in.
-const UNITS: [(&str, &str); 21] = [
+const UNITS: [(&str, &str); 22] = [
     ("_nms2_per_rad2", "N m s²/rad²"),
     ("_nms_per_rad", "N m s/rad"),
     ("_nm_per_rad", "N m/rad"),
@@ -92,6 +92,7 @@ const UNITS: [(&str, &str); 21] = [
     ("_a_per_rad", "A/rad"),
     ("_n_per_m", "N/m"),
     ("_per_rad", "1/rad"),
+    ("_per_nm", "1/(N m)"),
     ("_per_rev", "per turn"),
     ("_rad_s2", "rad/s²"),
     ("_rad_s", "rad/s"),

@@ -4,6 +4,7 @@ use tauscope_dynamics::terms::{TermError, TermSpec};
 
 use crate::data::problem::Problem;
 use crate::data::track::Track;
+use crate::fit::fitted::Fit;
 use crate::physics::active::Hypothesis;
 use crate::physics::library;
 use crate::read::input::Input;
@@ -107,6 +108,24 @@ impl Context<'_> {
             }
         }
         Ok(problem)
+    }
+
+    /// The held-out recordings and what the explanation `found` leaves there, if their efforts are known.
+    ///
+    /// # Errors
+    /// If a term of the start cannot be built for the robot.
+    pub fn held(
+        &self,
+        rests_count: &[bool],
+        found: &Fit,
+    ) -> Result<Option<(Problem, Fit)>, TermError> {
+        let held = &self.input.holdout;
+        if held.is_empty() || held.iter().any(|recording| recording.effort.is_empty()) {
+            return Ok(None);
+        }
+        let problem = self.problem(held, rests_count)?;
+        let fit = Fit::new(&problem, found.actives.clone());
+        Ok(Some((problem, fit)))
     }
 
     /// The gain of each joint's bodies that the fit starts from, from the model's unit into the recording's.

@@ -15,6 +15,7 @@ pub mod memo;
 pub mod noise;
 pub mod prepare;
 pub mod problem;
+pub mod remedies;
 pub mod same_robot;
 pub mod smoother;
 pub mod standstill;

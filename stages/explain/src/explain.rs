@@ -16,7 +16,7 @@ use crate::read::audit;
 use crate::read::input::Input;
 use crate::read::start::Start;
 use crate::report::schema::{Report, Verdict};
-use crate::report::{findings, locate, notes, verdict};
+use crate::report::{findings, locate, notes, summary, verdict};
 
 use judged::Judged;
 
@@ -99,26 +99,40 @@ fn conclude(
     let noise_floor: Vec<f64> = (0..joints.len())
         .map(|j| white_noise(&input.fit, j, joints.len()))
         .collect();
-    let left_elsewhere = verdict::left_elsewhere(&proof, &noise_floor);
-    let verdict = verdict::verdict(&found, &named.findings, &left_elsewhere);
-    if !left_elsewhere.is_empty() {
+    let unit = if input.effort_unit == "A" { "A" } else { "N m" };
+    let remainders = context.remainders((&problem, &found), &before, &rests_count, unit)?;
+    let twin_is_topic = !input.bodies;
+    let verdict = verdict::verdict(&found, &named.findings, &remainders.all, twin_is_topic);
+    if !remainders.elsewhere.is_empty() {
         findings::doubt_patches(&mut named.findings);
     }
     let mut notes = named.notes;
-    let unit = if input.effort_unit == "A" { "A" } else { "N m" };
-    notes.extend(verdict::note(&proof, &left_elsewhere, &joints, unit));
-    notes.extend(notes::notes(input, &problem, &found, &rests_count));
+    notes.extend(notes::not_handed_out(&proof, &found, &joints, unit));
+    notes.extend(notes::notes(
+        input,
+        &problem,
+        &found,
+        &rests_count,
+        &remainders.all,
+    ));
     let report = Report {
         case: input.case.clone(),
         verdict,
         reason: None,
-        summary: findings::summary(verdict, &named.findings, &proof.before, &proof.after),
+        summary: summary::summary(
+            verdict,
+            &named.findings,
+            &remainders.all,
+            &joints,
+            [&proof.before, &proof.after],
+        ),
         effort_unit: input.effort_unit.clone(),
         located: locate::located(&problem, &before, &joints),
         undetectable,
         findings: named.findings,
         rejected: named.rejected,
         next_motions: named.next_motions,
+        remaining: remainders.all,
         notes,
         joints,
         holdout_rms_before: proof.before,
@@ -130,7 +144,7 @@ fn conclude(
     let (gain, gain_deviation) = context.final_gains(&found, &named.gain_deviation);
     Ok(Outcome {
         report,
-        terms: context.lasting_terms(&found),
+        terms: context.lasting_terms(&found, &proof.withheld),
         gain,
         gain_deviation,
         predictions: proof.predictions,
@@ -163,6 +177,7 @@ fn not_evaluated(input: &Input, joints: Vec<String>, reason: String) -> Outcome 
             located: Vec::new(),
             undetectable: Vec::new(),
             next_motions: Vec::new(),
+            remaining: Vec::new(),
             notes: audit::losses(input),
             joints,
             holdout_rms_before: nan.clone(),

@@ -7,13 +7,16 @@
 
 pub(crate) mod corrected_twin;
 pub(crate) mod findings;
+pub(crate) mod handed_out;
 pub(crate) mod holdout;
 pub mod html;
 pub(crate) mod locate;
 pub(crate) mod next_motion;
 pub(crate) mod notes;
+pub(crate) mod remainder;
 pub(crate) mod schema;
 pub(crate) mod sentences;
+pub(crate) mod summary;
 pub(crate) mod verdict;
 
 pub use next_motion::MOTION_PREFIX;

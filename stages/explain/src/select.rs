@@ -9,9 +9,11 @@
 //! - `forward` adds the effect with the most evidence;
 //! - `prune` removes effects that are no longer needed;
 //! - `exchange` tries every rival in the place of each effect;
+//! - `one_zero` tries one shifted joint zero in the place of several bodies;
 //! - `nested` prefers the simpler of two nested effects;
 //! - `cross_validation` rejects effects that do not predict recordings left out of the fit (the book's section 7.10);
-//! - `curves` and `free_body` describe the residual where no effect of the library fits.
+//! - `curves` and `free_body` describe the residual where no effect of the library fits;
+//! - `carried` tells what carries over from one recording to the next from noise, however slow that is.
 //!
 //! Evidence is the gain of log-likelihood minus the penalty of the Bayesian information criterion (Schwarz, "Estimating
 //! the Dimension of a Model", *Annals of Statistics* 6, 1978) and minus the logarithm of the number of hypotheses.
@@ -24,7 +26,9 @@
 //! measures how much the answers depend on those marked `Tuned:`.
 
 pub mod candidates;
+pub mod carried;
 pub mod cross_validation;
+pub mod curve_axes;
 pub mod curve_shapes;
 pub mod curves;
 pub mod evidence;
@@ -34,6 +38,7 @@ pub mod forward;
 pub mod free_body;
 pub mod grid;
 pub mod nested;
+pub mod one_zero;
 pub mod parallel;
 pub mod plausible;
 pub mod propose;

@@ -1,14 +1,17 @@
 //! The search for an arm that moves.
 
-use tauscope_dynamics::terms::TermError;
+use tauscope_dynamics::terms::{PlaceKind, TermError};
 
 use crate::context::Context;
+use crate::data::problem::Problem;
+use crate::data::remedies::{self, Remedy};
 use crate::data::same_robot;
 use crate::explain::judged::Judged;
 use crate::fit::fitted::Fit;
-use crate::physics::active::Active;
+use crate::physics::active::{Active, Hypothesis};
 use crate::physics::{library, torque_scale};
 use crate::report::findings;
+use crate::select::propose::penalty;
 use crate::select::search::Search;
 
 impl Context<'_> {
@@ -21,9 +24,10 @@ impl Context<'_> {
         let input = self.input;
         let joints: Vec<String> = input.model.joint_names().map(str::to_owned).collect();
         let problem = self.problem(&input.fit, &vec![false; joints.len()])?;
-        if let Some(reason) = same_robot::reason_against(input, &problem) {
-            return Ok(Err(reason));
-        }
+        let turn = match self.remedied(&problem, &joints) {
+            Ok(turn) => turn,
+            Err(reason) => return Ok(Err(reason)),
+        };
         let hypotheses = self.hypotheses();
         let unnamed_bodies = if input.bodies {
             library::unnamed_bodies(&input.model, &input.without)
@@ -42,8 +46,8 @@ impl Context<'_> {
             unnamed_bodies: &unnamed_bodies,
             say: &say,
         };
-        let penalties = vec![0.0; scales().len()];
-        let moving = search.first_guess(scales(), penalties);
+        let (start, penalties) = started(&search, scales(), turn);
+        let moving = search.first_guess(start, penalties);
         // Without set-valued friction, standstills are as informative as motion.
         progress(0.3, "standstills");
         let dry = (input.start.as_ref()).map_or_else(
@@ -83,4 +87,34 @@ impl Context<'_> {
             problem,
         }))
     }
+    /// The turn of the base that the efforts ask for, if any; the reason if they allow no verdict.
+    fn remedied(&self, problem: &Problem, joints: &[String]) -> Result<Option<[f64; 2]>, String> {
+        let input = self.input;
+        // Where scales are not known, or the twin is corrected already, other remedies would be needed.
+        let is_plain = input.bodies && input.start.is_none() && self.unscaled.is_empty();
+        match is_plain.then(|| remedies::remedy(problem)).flatten() {
+            Some((Remedy::BaseTurned(turn), _)) => Ok(Some(turn)),
+            Some((remedy, _)) if remedy.is_physics() => Ok(None),
+            Some((remedy, left)) => Err(remedy.reason(joints, left)),
+            None => same_robot::reason_against(input, problem).map_or(Ok(None), Err),
+        }
+    }
+}
+
+/// The effects that a search starts from, with their penalties: a base that is turned so far that no search in small
+/// steps would find it is one of them.
+fn started(
+    search: &Search<'_>,
+    mut start: Vec<Active>,
+    turn: Option<[f64; 2]>,
+) -> (Vec<Active>, Vec<f64>) {
+    let mut penalties = vec![0.0; start.len()];
+    let of_base = |h: &&Hypothesis| h.effect.place == PlaceKind::Base;
+    if let (Some(turn), Some(tilt)) = (turn, search.hypotheses.iter().find(of_base)) {
+        let nothing = Fit::new(search.problem, start.clone());
+        let library = (search.hypotheses.len() as f64).ln();
+        penalties.push(penalty(&nothing, library, turn.len(), None));
+        start.push(tilt.with(turn.to_vec()));
+    }
+    (start, penalties)
 }

@@ -24,6 +24,20 @@ pub fn weighted_dot(weight: &[f64], x: &[f64], y: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + rest.map(|((w, x), y)| w * x * y).sum::<f64>()
 }
 
+/// Sum of `x * y`.
+pub fn dot(x: &[f64], y: &[f64]) -> f64 {
+    let mut sums = [0.0; LANES];
+    let (xs, x_rest) = x.as_chunks::<LANES>();
+    let (ys, y_rest) = y.as_chunks::<LANES>();
+    for (x, y) in xs.iter().zip(ys) {
+        for lane in 0..LANES {
+            sums[lane] += x[lane] * y[lane];
+        }
+    }
+    let rest = x_rest.iter().zip(y_rest);
+    sums.iter().sum::<f64>() + rest.map(|(x, y)| x * y).sum::<f64>()
+}
+
 /// Least share that is added to the diagonal, so that columns that are nearly dependent can be solved for.
 /// Resolution: columns count as dependent if their directions differ by less than about 1e-5 rad.
 const LEAST_DAMPING: f64 = 1e-10;

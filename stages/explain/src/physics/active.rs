@@ -145,6 +145,11 @@ impl Hypothesis {
         self.effect.is_plain_friction()
     }
 
+    /// Whether it shifts the zero of a joint.
+    pub fn is_zero_offset(&self) -> bool {
+        self.effect.family == Family::Mounting && self.effect.place == PlaceKind::Joint
+    }
+
     /// Whether it is a function of its joint's position alone.
     pub fn is_of_position(&self) -> bool {
         self.effect.traits.drawn_over == Some(Against::Position)
@@ -243,7 +248,7 @@ impl Active {
     /// Whether it depends on what the gear transmits.
     pub fn needs_load(&self) -> bool {
         match &self.curve {
-            Some(curve) => curve.against == Against::Load,
+            Some(curve) => curve.against.is_of_load(),
             None => self.hypothesis.needs_load(),
         }
     }
@@ -311,8 +316,19 @@ pub fn in_order(actives: &[Active]) -> Vec<&Active> {
 
 /// The knots of a joint's curve that are held at zero. A curve over the joint's own velocity is what remains beside Coulomb
 /// and viscous friction. These two make a straight line in each direction, so the slowest and the fastest knot of each
-/// direction are held at zero.
+/// direction are held at zero. So are those of the others where friction or an offset stands beside them: no load, the
+/// middle of a hysteresis, and long after a standstill.
 pub fn held_knots(curve: &Table, joint: usize) -> Vec<usize> {
+    let last = curve.knots.len() - 1;
+    match curve.against {
+        Against::DrivenLoad => {
+            let zero = curve.knots.iter().position(|knot| knot.abs() <= 0.0);
+            return zero.into_iter().collect();
+        }
+        Against::LoadTurned => return vec![last / 2],
+        Against::SinceRest => return vec![last],
+        _ => {}
+    }
     if !curve.is_friction_of(joint) {
         return Vec::new();
     }

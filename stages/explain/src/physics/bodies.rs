@@ -64,14 +64,13 @@ fn in_units(problem: &Problem, term: &dyn Term) -> Option<(Unit, Vec<f64>)> {
         return Some((Unit::Inertia(link), inertia.parameters().to_vec()));
     }
     let mut altered = problem.model.clone();
-    term.alter(&mut altered).then(|| {
-        let (before, after) = (problem.model.gravity(), altered.gravity());
-        let change = after
-            .iter()
-            .zip(before)
-            .map(|(after, before)| after - before);
-        (Unit::Gravity, change.collect())
-    })
+    let is_altered = term.alter(&mut altered);
+    let (before, after) = (problem.model.gravity(), altered.gravity());
+    let change = after.iter().zip(before);
+    let change: Vec<f64> = change.map(|(after, before)| after - before).collect();
+    // What alters the robot but not gravity is no combination of units.
+    let is_of_gravity = is_altered && change.iter().any(|change| *change != 0.0);
+    is_of_gravity.then_some((Unit::Gravity, change))
 }
 
 fn add_units(units: &[TrackEfforts], factors: &[f64], into: &mut [Vec<f64>]) {

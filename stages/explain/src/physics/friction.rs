@@ -1,7 +1,7 @@
 //! Friction that differs from the twin's: reported as a difference, stored as a sum.
 
 use tauscope_dynamics::Model;
-use tauscope_dynamics::terms::{Against, Effect, Layer, PlaceKind, TermSpec};
+use tauscope_dynamics::terms::{Effect, Layer, PlaceKind, TermSpec};
 
 use crate::data::problem::Problem;
 use crate::physics::active::Hypothesis;
@@ -76,7 +76,7 @@ pub fn in_recorded_units(term: &TermSpec, model: &Model, units_nm: &[f64]) -> Te
         for value in &mut table.values {
             *value /= units_nm[joint];
         }
-        if table.against == Against::Load {
+        if table.against.is_of_load() {
             for knot in &mut table.knots {
                 *knot /= units_nm[of_joint];
             }

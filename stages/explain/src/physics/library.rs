@@ -40,7 +40,9 @@ pub fn hypotheses(model: &Model, bodies: bool, without: &BTreeSet<String>) -> Ve
     let joints = 0..model.dof();
     let mut all = Vec::new();
     for &effect in EFFECTS {
-        if effect.traits.describes_only || without.contains(effect.name) {
+        // Where the twin is a topic, its own friction and load are not known, and imitate finer kinds of friction.
+        let is_blurred = effect.traits.is_off_list && !bodies;
+        if is_blurred || effect.traits.describes_only || without.contains(effect.name) {
             continue;
         }
         let mut add = |place: Whereabouts| all.push(Hypothesis { effect, place });

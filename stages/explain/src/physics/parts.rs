@@ -190,7 +190,8 @@ impl Parts {
     }
 }
 
-/// Whether the columns of an effect may be kept. Those with times are not: there are too many intervals.
+/// Whether the columns of an effect may be kept. Those with times are not: there are too many intervals; nor are those of
+/// an effect that is linear to first order only.
 pub fn is_kept(problem: &Problem, active: &Active) -> bool {
     let timeless = |c: &Coordinate| {
         matches!(
@@ -199,6 +200,7 @@ pub fn is_kept(problem: &Problem, active: &Active) -> bool {
         )
     };
     active.curve.is_none()
+        && !active.hypothesis.effect.traits.bends
         && active.hypothesis.effect.coordinates.iter().all(timeless)
         && problem.rows <= MOST_ROWS
 }

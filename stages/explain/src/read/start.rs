@@ -30,7 +30,7 @@ impl Start {
         let needs = |term: &TermSpec| {
             let against = term.table.as_ref().map(|table| table.against);
             let by_load = term.effect().is_ok_and(|effect| effect.traits.needs_load);
-            by_load || against == Some(Against::Load)
+            by_load || against.is_some_and(Against::is_of_load)
         };
         self.terms.iter().any(needs)
     }

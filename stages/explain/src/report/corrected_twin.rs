@@ -6,6 +6,7 @@ use crate::context::Context;
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, TimeKind};
 use crate::physics::{friction, torque_scale};
+use crate::report::handed_out::Withheld;
 
 impl Context<'_> {
     /// Gain of each joint's bodies in the corrected twin, and its standard deviation. `fitted` are the standard deviations
@@ -47,15 +48,16 @@ impl Context<'_> {
         bodies.map(|active| self.spec(active)).collect()
     }
 
-    /// The terms of the corrected twin: all but temporary effects.
-    pub fn lasting_terms(&self, found: &Fit) -> Vec<TermSpec> {
+    /// The terms of the corrected twin: all but temporary effects and those `withheld`.
+    pub fn lasting_terms(&self, found: &Fit, withheld: &[Withheld]) -> Vec<TermSpec> {
         let mut terms = self
             .input
             .start
             .as_ref()
             .map_or_else(Vec::new, |start| start.terms.clone());
-        for active in &found.actives {
-            if active.hypothesis.is_torque_scale() || !active.hypothesis.lasts() {
+        for (index, active) in found.actives.iter().enumerate() {
+            let is_withheld = withheld.iter().any(|withheld| withheld.effect == index);
+            if active.hypothesis.is_torque_scale() || !active.hypothesis.lasts() || is_withheld {
                 continue;
             }
             let term = self.spec(active);

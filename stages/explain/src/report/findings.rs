@@ -19,8 +19,7 @@ use crate::fit::interval::{covariance, half_width_95, parameter_deviations};
 use crate::physics::active::{Active, Hypothesis, TimeKind};
 use crate::physics::friction::least;
 use crate::read::input::Input;
-use crate::report::schema::{Finding, NextMotion, Rejected, Rival, Verdict};
-use crate::report::sentences::{UNCHANGED, error_left};
+use crate::report::schema::{Finding, NextMotion, Rejected, Rival};
 use crate::report::{next_motion, sentences};
 use crate::select::explanation::Explanation;
 use crate::select::search::Search;
@@ -223,6 +222,9 @@ fn numbers(
     if effect.traits.cuts_off && is_clipped(problem, fit, active) {
         parameters.insert("mode".to_owned(), Value::from("sensor"));
     }
+    if effect.traits.is_off_list {
+        parameters.insert("kind".to_owned(), Value::from(effect.name));
+    }
     describe_curve(active, &mut parameters);
     (parameters, intervals)
 }
@@ -349,44 +351,6 @@ fn when(
                 start: Some(start - track.session_s),
                 end: Some(end - track.session_s),
             }
-        }
-    }
-}
-
-/// The verdict in a sentence.
-pub fn summary(verdict: Verdict, findings: &[Finding], before: &[f64], after: &[f64]) -> String {
-    let left = error_left(before, after);
-    let proof = if !left.is_finite() {
-        String::new()
-    } else if left < 0.01 {
-        " On recordings that were not fitted the error falls to less than 1 %.".to_owned()
-    } else if left < UNCHANGED {
-        format!(
-            " On recordings that were not fitted the error falls to {:.0} %.",
-            100.0 * left
-        )
-    } else {
-        " On recordings that were not fitted it makes no difference.".to_owned()
-    };
-    match verdict {
-        Verdict::NothingMissing => {
-            "Nothing is missing: the twin's error is no larger than the measurement noise.".to_owned()
-        }
-        Verdict::NotEvaluated => "Nothing was evaluated.".to_owned(),
-        Verdict::UnknownRemains if findings.is_empty() => {
-            "Nothing is missing on the fitted recordings. The held-out recordings show a mismatch without a named cause.".to_owned()
-        }
-        Verdict::Explained | Verdict::UnknownRemains => {
-            // That with the largest effort, as far as sizes are known.
-            let larger = |a: &&Finding, b: &&Finding| a.effort_rms.total_cmp(&b.effort_rms);
-            let first = findings.iter().rev().max_by(larger);
-            let first = first.map_or("", |finding| finding.sentence.as_str());
-            let more = match findings.len() {
-                0 | 1 => String::new(),
-                2 => " One more effect was found.".to_owned(),
-                n => format!(" {} more effects were found.", n - 1),
-            };
-            format!("{first}{more}{proof}")
         }
     }
 }

@@ -1,7 +1,5 @@
 //! The error of the corrected twin on held-out recordings.
 
-use std::ops::RangeInclusive;
-
 use tauscope_dynamics::terms::{Physics, TermError};
 
 use crate::context::Context;
@@ -10,6 +8,7 @@ use crate::data::track::Track;
 use crate::fit::fitted::{Fit, LEAST_VARIANCE};
 use crate::physics::active::in_order;
 use crate::read::recording::Recording;
+use crate::report::handed_out::{self, HeldOut, Withheld};
 use crate::report::schema::{JointPicture, RecordingPicture};
 
 /// Cutoffs that are tried for the motion of a prediction, as shares of the fit's cutoff. The best on the fitted
@@ -23,9 +22,6 @@ const VELOCITY_CUTOFFS: [f64; 3] = [2.0, 4.0, 8.0];
 /// Highest cutoff of the velocity, as a share of the sample rate.
 /// Physical: below half the sample rate, the Nyquist frequency.
 const MOST_OF_RATE: f64 = 0.4;
-/// Accelerations are uncertain within this time of either end of a recording \[s\].
-/// Tuned: by hand, on no recorded seeds; not swept.
-const END_S: f64 = 0.25;
 /// Most samples of a picture.
 /// Resolution: about two per pixel of a plot; changes the file's size.
 const PICTURE_SAMPLES: usize = 2000;
@@ -36,8 +32,10 @@ pub struct Proof {
     pub before: Vec<f64>,
     /// The same of the corrected twin.
     pub after: Vec<f64>,
-    /// The same without the ends of the recordings, where accelerations are uncertain: on held-out and on fitted ones.
-    pub within: [Vec<f64>; 2],
+    /// Joints that keep the twin as it was, because their correction predicts no recording that it was not fitted on.
+    pub kept: Vec<usize>,
+    /// Effects that the written twin does not have.
+    pub withheld: Vec<Withheld>,
     /// The corrected twin's effort by hold-out recording.
     pub predictions: Vec<(String, Vec<f64>)>,
     /// The series of the pictures, held-out recordings first.
@@ -62,7 +60,7 @@ enum Velocity {
 
 impl Context<'_> {
     /// The corrected twin's effort over a track, in the recording's unit.
-    fn predict(&self, problem: &Problem, fit: &Fit, track: &Track) -> Vec<f64> {
+    pub fn predict(&self, problem: &Problem, fit: &Fit, track: &Track) -> Vec<f64> {
         let terms = in_order(&fit.actives)
             .into_iter()
             .map(|active| active.term(&problem.model))
@@ -156,20 +154,28 @@ impl Context<'_> {
         let names: Vec<&str> = self.input.model.joint_names().collect();
         let smoothing = self.best_smoothing(problem, found)?;
         let (mut before, mut after) = (Errors::new(n), Errors::new(n));
-        let mut within = [Errors::new(n), Errors::new(n)];
+        let kept = handed_out::not_carried(problem, scaled, found);
+        let mut held_out = HeldOut {
+            context: self,
+            problem,
+            tracks: Vec::new(),
+        };
         let (mut predictions, mut pictures) = (Vec::new(), Vec::new());
         let held = self.input.holdout.iter().map(|recording| (recording, true));
         let of_fit = self.input.fit.iter().map(|recording| (recording, false));
-        for (recording, held_out) in held.chain(of_fit) {
+        for (recording, is_held) in held.chain(of_fit) {
             let track = self.smoothed(recording, &smoothing)?;
-            let predicted = self.predict(problem, found, &track);
+            let mut predicted = self.predict(problem, found, &track);
             let rigid = self.predict(problem, scaled, &track);
-            let all = 0.0..=f64::INFINITY;
-            let end_s = recording.duration_s() - END_S;
-            within[usize::from(!held_out)].add(recording, &predicted, &(END_S..=end_s));
-            if held_out {
-                before.add(recording, &rigid, &all);
-                after.add(recording, &predicted, &all);
+            for &joint in &kept {
+                let own = predicted.iter_mut().skip(joint).step_by(n);
+                for (corrected, rigid) in own.zip(rigid.iter().skip(joint).step_by(n)) {
+                    *corrected = *rigid;
+                }
+            }
+            if is_held {
+                before.add(recording, &rigid);
+                after.add(recording, &predicted);
                 let rows = recording
                     .sample_of_row
                     .iter()
@@ -178,14 +184,24 @@ impl Context<'_> {
             }
             if !recording.effort.is_empty() {
                 pictures.push(picture(
-                    &names, recording, held_out, &track, &rigid, &predicted,
+                    &names, recording, is_held, &track, &rigid, &predicted,
                 ));
             }
+            if is_held && !recording.effort.is_empty() {
+                held_out.tracks.push((recording, track));
+            }
         }
+        let before = before.rms();
+        let withheld = if held_out.tracks.is_empty() {
+            Vec::new()
+        } else {
+            held_out.withheld(found, &before)
+        };
         Ok(Proof {
-            before: before.rms(),
+            before,
             after: after.rms(),
-            within: within.map(|errors| errors.rms()),
+            kept,
+            withheld,
             predictions,
             pictures,
         })
@@ -206,12 +222,11 @@ impl Errors {
         }
     }
 
-    /// Adds those of a recording between two times \[s\].
-    fn add(&mut self, recording: &Recording, twin: &[f64], during: &RangeInclusive<f64>) {
+    /// Adds those of a recording.
+    fn add(&mut self, recording: &Recording, twin: &[f64]) {
         let n = self.squares.len();
         let rows = recording.effort.chunks_exact(n).zip(twin.chunks_exact(n));
-        let timed = recording.time_s.iter().zip(rows);
-        for (_, (measured, twin)) in timed.filter(|(t, _)| during.contains(t)) {
+        for (measured, twin) in rows {
             for (sum, (measured, twin)) in self.squares.iter_mut().zip(measured.iter().zip(twin)) {
                 *sum += (measured - twin).powi(2);
             }

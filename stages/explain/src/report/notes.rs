@@ -4,21 +4,64 @@ use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::read::audit::losses;
 use crate::read::input::Input;
+use crate::report::holdout::Proof;
+use crate::report::schema::Remaining;
+use crate::report::sentences::UNCHANGED;
+use tauscope_dynamics::terms::words::number;
 
 /// A residual above this many times the white noise gets a note.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LOUD: f64 = 5.0;
 
+/// Notes on the joints whose correction is not handed out, or makes the error on the held-out recordings larger.
+pub fn not_handed_out(proof: &Proof, found: &Fit, names: &[String], unit: &str) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (joint, name) in names.iter().enumerate() {
+        if proof.kept.contains(&joint) {
+            notes.push(format!(
+                "The correction of joint {name} does not predict fitted recordings that were left out. So the predictions of the \
+                 held-out recordings keep the twin as it was at this joint."
+            ));
+        }
+        let own = proof.withheld.iter().filter(|w| w.joint == joint);
+        let effects = own.map(|w| found.actives[w.effect].hypothesis.effect.name);
+        let effects: Vec<&str> = effects.collect();
+        if !effects.is_empty() {
+            notes.push(format!(
+                "The error of joint {name} on the held-out recordings is smaller without {}. So twin.yaml leaves it out.",
+                effects.join(", ")
+            ));
+        }
+        let (before, after) = (proof.before[joint], proof.after[joint]);
+        if after * UNCHANGED > before {
+            notes.push(format!(
+                "The correction makes the error of joint {name} on the held-out recordings larger: {} {unit} after {} {unit}.",
+                number(after),
+                number(before)
+            ));
+        }
+    }
+    notes
+}
+
 /// The notes on an input and on the fit `found`.
-pub fn notes(input: &Input, problem: &Problem, found: &Fit, rests_count: &[bool]) -> Vec<String> {
+pub fn notes(
+    input: &Input,
+    problem: &Problem,
+    found: &Fit,
+    rests_count: &[bool],
+    remaining: &[Remaining],
+) -> Vec<String> {
     let mut notes = losses(input);
+    notes.extend(remaining.iter().map(|remaining| remaining.sentence.clone()));
     let names: Vec<&str> = input.model.joint_names().collect();
     for (j, name) in names.iter().enumerate() {
         let ratio = (found.variance[j].sqrt()) / problem.white_noise[j].max(1e-12);
-        if ratio > LOUD {
+        let is_told = remaining.iter().any(|remaining| remaining.joint == *name);
+        if ratio > LOUD && !is_told {
             notes.push(format!(
-                "The remaining error at joint {name} is {ratio:.0} times the measurement's white noise, and no effect explains it. It is \
-                 slow noise, or an effect that is not in the library and does not depend on the joint's motion or on time alone."
+                "The remaining error at joint {name} is {ratio:.0} times the measurement's white noise. No curve of the motion or of \
+                 time predicts it from one recording to the next, so it is slow noise, or an effect of something that was not recorded."
             ));
         }
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use tauscope_dynamics::terms::words;
+use tauscope_dynamics::terms::{effect, words};
 
 use crate::report::sentences::in_amperes;
 
@@ -32,6 +32,9 @@ pub struct Report {
     pub undetectable: Vec<Undetectable>,
     /// Motions that would tell apart what this data cannot.
     pub next_motions: Vec<NextMotion>,
+    /// What the corrected twin leaves beyond the noise, by joint.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub remaining: Vec<Remaining>,
     /// Notes: lost samples, gains that are not identifiable, standstill.
     pub notes: Vec<String>,
     /// The joints, in URDF order.
@@ -58,6 +61,22 @@ pub enum Verdict {
     UnknownRemains,
     /// The data does not allow a verdict.
     NotEvaluated,
+}
+
+/// What the corrected twin leaves at a joint beyond the noise. Efforts are compared below the cutoff of the fit, without the
+/// joint's standstills.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Remaining {
+    /// The joint.
+    pub joint: String,
+    /// RMS on the fitted recordings \[effort unit\].
+    pub rms: f64,
+    /// RMS on the held-out ones \[effort unit\].
+    pub holdout_rms: Option<f64>,
+    /// The measurement's white noise there \[effort unit\].
+    pub noise: f64,
+    /// What it goes with, when and where.
+    pub sentence: String,
 }
 
 /// An effect that the twin leaves out.
@@ -104,6 +123,13 @@ pub struct Finding {
 }
 
 impl Finding {
+    /// The effect, by the name that [`tauscope_dynamics::terms`] knows it by: that of an `unknown` with a law is its `kind`.
+    pub fn known_as(&self) -> &str {
+        let kind = self.parameters.get("kind").and_then(Value::as_str);
+        kind.filter(|kind| effect(kind).is_some_and(|e| e.said() == self.effect))
+            .unwrap_or(&self.effect)
+    }
+
     /// A parameter's name without its unit, and the unit that its number is in.
     pub fn label_and_unit<'n>(&self, name: &'n str) -> (&'n str, String) {
         match words::unit(name) {

@@ -34,6 +34,11 @@ impl Search<'_> {
         })
     }
 
+    /// Proposals of the hypotheses of one kind.
+    pub fn proposals_of(&self, fit: &Fit, is: impl Fn(&Hypothesis) -> bool) -> Vec<Proposal> {
+        self.proposals_for(fit, is)
+    }
+
     fn proposals_for(&self, fit: &Fit, touches: impl Fn(&Hypothesis) -> bool) -> Vec<Proposal> {
         let base = Base::new(self.problem, fit, self.hypotheses.len());
         let wanted: Vec<Hypothesis> = self

@@ -1,25 +1,18 @@
 //! Curves over motion or time, for a residual that no effect of the library fits.
 
-use tauscope_dynamics::terms::{Against, MotionSample, Table, UNKNOWN};
+use tauscope_dynamics::terms::{Against, Table, UNKNOWN};
 
 use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::data::track::FitTrack;
+use crate::fit::fitted::Fit;
+use crate::fit::least_squares::weighted_dot;
 use crate::physics::active::{Active, Hypothesis, Whereabouts, held_knots};
+use crate::select::carried::Carried;
+use crate::select::curve_axes::curves;
+use crate::select::evidence::{FAIR_SHARE_OF_CURVE, LEAST_SIZE};
 use crate::select::propose::Base;
 
-/// Knots of a curve.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const KNOTS: usize = 10;
-/// Knots of a curve over position that resolves a local defect, such as a worn segment of a gear.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const MANY_KNOTS: usize = 28;
-/// Knots that a curve must have at different places.
-/// Statistical: two knots are a straight line, which effects of the library already describe.
-const LEAST_KNOTS: usize = 3;
-/// Knots nearer than this share of their mean spacing are merged.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const LEAST_SPACING: f64 = 0.2;
 /// Knots of a periodic curve, per period.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const KNOTS_OF_PERIOD: usize = 8;
@@ -36,6 +29,12 @@ const STEPS_OF_FREQUENCY: f64 = 4.0;
 /// A periodic effect is not looked for over a longer time span, over which it would lose phase \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LONGEST_IN_STEP_S: f64 = 1200.0;
+/// Share of the residual's squares that a curve must predict in recordings left out.
+/// Statistical: that of [`LEAST_SIZE`] in all that there was before.
+const LEAST_CARRIED: f64 = LEAST_SIZE / (1.0 + LEAST_SIZE);
+/// The same for a curve over the session.
+/// Statistical: as [`FAIR_SHARE_OF_CURVE`], what no slow noise does.
+const LEAST_OF_SESSION: f64 = 1.0 - 1.0 / FAIR_SHARE_OF_CURVE;
 /// Values of a curve below this share of the largest are set to zero.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const EVIDENT: f64 = 0.2;
@@ -49,6 +48,11 @@ pub struct CurveProposal {
     pub gain: f64,
     /// Penalty for its free values and for the number of curves tried \[nats\].
     pub penalty: f64,
+    /// Share of the residual's squares that it predicts in recordings that it was not fitted on. `None` if there is only
+    /// one recording.
+    pub carried: Option<f64>,
+    /// Whether that share is larger than any curve would predict by chance, and worth mentioning.
+    pub repeats: bool,
 }
 
 impl CurveProposal {
@@ -56,31 +60,50 @@ impl CurveProposal {
     pub fn evidence(&self) -> f64 {
         self.gain - self.penalty
     }
+
+    /// Whether it may follow slow noise: a curve over time that does not repeat, although there are other recordings to
+    /// show it, or one over the session that takes no fair share of the variance. The few recordings of a session may
+    /// come in any order by chance.
+    fn is_of_noise(&self) -> bool {
+        let Some(curve) = self.active.curve.as_ref().filter(|c| c.period.is_none()) else {
+            return false;
+        };
+        match curve.against {
+            Against::RecordingTime => self.carried.is_some() && !self.repeats,
+            Against::SessionTime => self.carried.is_none_or(|share| share < LEAST_OF_SESSION),
+            _ => false,
+        }
+    }
 }
 
 impl Base<'_> {
-    /// The curve with the most evidence at a joint.
+    /// The curve that predicts most of the residual at a joint in recordings that it was not fitted on. If none predicts
+    /// more than chance, the curve with the most evidence.
     pub fn propose_curve(&self, joint: usize) -> Option<CurveProposal> {
         let mut candidates = curves(self.problem, joint);
         candidates.extend(self.repeated(joint));
         let count = candidates.len() as f64;
-        let mut best: Option<CurveProposal> = None;
-        for curve in candidates {
-            let Some(mut proposal) = self.try_curve(joint, &curve) else {
-                continue;
-            };
+        let tried: Vec<(CurveProposal, Option<Carried>)> = candidates
+            .iter()
+            .filter_map(|curve| self.try_curve(joint, curve))
+            .collect();
+        let by_chance = Carried::largest_by_chance(tried.iter().filter_map(|(_, c)| c.as_ref()));
+        let judged = tried.into_iter().map(|(mut proposal, carried)| {
             proposal.penalty += count.ln();
-            if best
-                .as_ref()
-                .is_none_or(|best| proposal.evidence() > best.evidence())
-            {
-                best = Some(proposal);
-            }
-        }
-        best
+            let share = carried.map(|carried| carried.share);
+            proposal.carried = share;
+            proposal.repeats = share.is_some_and(|s| s > by_chance.max(LEAST_CARRIED));
+            proposal
+        });
+        let able = judged.filter(|proposal| !proposal.is_of_noise());
+        able.max_by(|a, b| {
+            let carried = |p: &CurveProposal| p.carried.filter(|_| p.repeats).unwrap_or(0.0);
+            let by_share = carried(a).total_cmp(&carried(b));
+            by_share.then(a.evidence().total_cmp(&b.evidence()))
+        })
     }
 
-    fn try_curve(&self, joint: usize, curve: &Table) -> Option<CurveProposal> {
+    fn try_curve(&self, joint: usize, curve: &Table) -> Option<(CurveProposal, Option<Carried>)> {
         let hypothesis = Hypothesis {
             effect: &UNKNOWN,
             place: Whereabouts {
@@ -97,21 +120,110 @@ impl Base<'_> {
             coordinates: values,
             curve: Some(curve.clone()),
         };
-        let columns: Vec<Column> = (0..free)
-            .map(|k| {
-                let mut values = vec![0.0; free];
-                values[k] = 1.0;
-                self.fit.added(self.problem, &at(values))
-            })
-            .collect();
+        let columns = knot_columns(self.problem, self.fit, &at(vec![0.0; free]));
         let minimum = vec![f64::NEG_INFINITY; free];
         let (values, gain, _) = self.try_columns(None, &columns, &minimum)?;
-        Some(CurveProposal {
+        let proposal = CurveProposal {
             active: at(values),
             gain,
             penalty: self.penalty(free, Some(joint)),
-        })
+            carried: None,
+            repeats: false,
+        };
+        let carried = carried(self.problem, self.fit, curve, joint, &columns);
+        Some((proposal, carried))
     }
+}
+
+/// The effort of a unit at each free knot of a curve, in addition to the effects of `fit`.
+fn knot_columns(problem: &Problem, fit: &Fit, curve: &Active) -> Vec<Column> {
+    let free = curve.coordinates.len();
+    let unit = |k: usize| {
+        let mut unit = curve.clone();
+        unit.coordinates = (0..free)
+            .map(|other| f64::from(u8::from(other == k)))
+            .collect();
+        fit.added(problem, &unit)
+    };
+    (0..free).map(unit).collect()
+}
+
+/// What a curve with these columns predicts of the residual of `fit` in recordings left out. A hysteresis of the load must
+/// predict what a delay does not: both turn with the load's rate of change. A periodic curve is not judged, because its
+/// period was chosen to suit all recordings.
+fn carried(
+    problem: &Problem,
+    fit: &Fit,
+    curve: &Table,
+    joint: usize,
+    columns: &[Column],
+) -> Option<Carried> {
+    if curve.period.is_some() {
+        return None;
+    }
+    if curve.against != Against::LoadTurned {
+        return Carried::of(problem, &fit.residual, joint, columns);
+    }
+    let rate = load_rate(problem, fit, joint);
+    let own = problem.joint_rows(joint);
+    let weight = &problem.weight[own.clone()];
+    let product = |x: &[f64], y: &[f64]| weighted_dot(weight, x, y);
+    let square = product(&rate, &rate).max(f64::MIN_POSITIVE);
+    let less_delay = |values: &[f64]| -> Vec<f64> {
+        let delay = product(values, &rate) / square;
+        let each = values.iter().zip(&rate);
+        each.map(|(value, rate)| value - delay * rate).collect()
+    };
+    let mut residual = fit.residual.clone();
+    residual[own.clone()].copy_from_slice(&less_delay(&fit.residual[own]));
+    let columns: Vec<Column> = (columns.iter())
+        .map(|column| Column {
+            joint: Some(joint),
+            values: column
+                .of_joint(joint, problem.rows)
+                .map_or_else(|| vec![0.0; problem.rows], less_delay),
+        })
+        .collect();
+    Carried::of(problem, &residual, joint, &columns)
+}
+
+/// Rate of change of the load of a joint, as a signal of the joint.
+fn load_rate(problem: &Problem, fit: &Fit, joint: usize) -> Vec<f64> {
+    let n = problem.joints;
+    let load = fit.load(problem);
+    let of_track = |(track, load): (&FitTrack, &Vec<f64>)| {
+        let time = &track.track.time_s;
+        let mut rate = vec![0.0; load.len()];
+        for k in 1..time.len() {
+            let step_s = time[k] - time[k - 1];
+            let change = load[k * n + joint] - load[(k - 1) * n + joint];
+            if step_s > 0.0 {
+                rate[k * n + joint] = change / step_s;
+            }
+        }
+        rate
+    };
+    let rates: Vec<Vec<f64>> = problem
+        .tracks
+        .iter()
+        .zip(load.iter())
+        .map(of_track)
+        .collect();
+    problem.column(&rates, Some(joint)).values
+}
+
+/// Whether a curve predicts what `without` leaves in recordings that it was not fitted on.
+pub fn repeats(problem: &Problem, without: &Fit, curve: &Active) -> bool {
+    let joint = curve.hypothesis.place.joint;
+    let columns = knot_columns(problem, without, curve);
+    let Some(table) = &curve.curve else {
+        return false;
+    };
+    let carried = carried(problem, without, table, joint, &columns);
+    carried.is_some_and(|carried| {
+        let by_chance = Carried::largest_by_chance(std::iter::once(&carried));
+        carried.share > by_chance.max(LEAST_CARRIED)
+    })
 }
 
 /// Sets the small values of a curve to zero: they are mostly noise, and beyond its ends a curve keeps its last value.
@@ -125,55 +237,6 @@ pub fn keep_what_is_evident(curve: &mut Active) {
             *value = 0.0;
         }
     }
-}
-
-/// Curves to try in a joint, with knots at even quantiles of the samples.
-fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
-    let mut all = Vec::new();
-    let mut add = |against: Against, of_joint: usize, count: usize| {
-        let mut values = Vec::new();
-        for track in &problem.tracks {
-            track
-                .track
-                .each(|_, at: &MotionSample<'_>| values.push(against.value(at, of_joint)));
-        }
-        values.sort_by(f64::total_cmp);
-        let last = values.len() - 1;
-        let mut knots: Vec<f64> = (0..count).map(|k| values[last * k / (count - 1)]).collect();
-        let least = LEAST_SPACING / count as f64 * (knots[count - 1] - knots[0]);
-        knots.dedup_by(|later, earlier| *later - *earlier <= least);
-        if knots.len() < LEAST_KNOTS {
-            return;
-        }
-        // Friction jumps at standstill, so over the joint's own velocity only curves that change sign with the
-        // direction of motion are tried.
-        let own_velocity = against == Against::Velocity && of_joint == joint;
-        let either: &[bool] = if own_velocity {
-            &[true]
-        } else {
-            &[false, true]
-        };
-        for &by_direction in either {
-            all.push(Table {
-                against,
-                of_joint,
-                by_direction,
-                period: None,
-                values: vec![0.0; knots.len()],
-                knots: knots.clone(),
-            });
-        }
-    };
-    for of_joint in 0..problem.joints {
-        add(Against::Position, of_joint, KNOTS);
-        add(Against::Velocity, of_joint, KNOTS);
-    }
-    add(Against::Position, joint, MANY_KNOTS);
-    add(Against::Acceleration, joint, KNOTS);
-    add(Against::Load, joint, KNOTS);
-    add(Against::RecordingTime, joint, KNOTS);
-    add(Against::SessionTime, joint, KNOTS);
-    all
 }
 
 impl Base<'_> {

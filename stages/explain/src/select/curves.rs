@@ -4,7 +4,7 @@ use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis, TimeKind};
 use crate::select::cross_validation::{carries_over, left_elsewhere};
 use crate::select::curve_shapes;
-use crate::select::evidence::{CURVE_EVIDENCE, CURVE_SIZE, is_drawn_already};
+use crate::select::evidence::{CURVE_EVIDENCE, CURVE_SIZE, LEAST_SIZE, PATCH, is_drawn_already};
 use crate::select::evidence::{overwhelming, worse_joints};
 use crate::select::explanation::Explanation;
 use crate::select::plausible::is_open_wave;
@@ -73,14 +73,33 @@ impl Search<'_> {
         if excess(&best.fit) < CURVE_EXCESS {
             return None;
         }
+        let mut base = best.clone();
         let mut beside = self.with_curve(best, joint)?;
         let drawn = |i: &usize| is_drawn_already(&beside.fit, best.fit.actives[*i].hypothesis);
         let drawn: Vec<usize> = own.iter().copied().filter(drawn).collect();
         if !drawn.is_empty() {
-            beside = self.with_curve(&self.stripped(best, &drawn, joint), joint)?;
+            base = self.stripped(best, &drawn, joint);
+            beside = self.with_curve(&base, joint)?;
         }
         let less = best.fit.variance[joint] / beside.fit.variance[joint];
-        (beside.ahead_of(best, &white) > CURVE_EVIDENCE && less > CURVE_SIZE).then_some(beside)
+        let repeats = curve_shapes::repeats(self.problem, &base.fit, beside.fit.actives.last()?);
+        let least = if repeats {
+            1.0 + LEAST_SIZE
+        } else {
+            CURVE_SIZE
+        };
+        let known = self.scaled(best).squares[joint] - best.fit.squares[joint];
+        if best.fit.squares[joint] - beside.fit.squares[joint] < PATCH * known {
+            return None;
+        }
+        (beside.ahead_of(best, &white) > CURVE_EVIDENCE && less > least).then_some(beside)
+    }
+
+    /// The twin as it was, with the torque scales of an explanation.
+    fn scaled(&self, best: &Explanation) -> Fit {
+        let scales = best.fit.actives.iter();
+        let scales = scales.filter(|active| active.hypothesis.is_torque_scale());
+        Fit::new(self.problem, scales.cloned().collect())
     }
 
     /// The explanation with a curve in one joint in place of all effects that act once, if that does better. A residual
@@ -117,8 +136,10 @@ impl Search<'_> {
 
     /// Whether there is evidence for the curve that `with` has and `without` lacks.
     fn is_evident(&self, with: &Explanation, without: &Explanation) -> bool {
+        let curve = with.fit.actives.last();
         with.ahead_of(without, &self.problem.effective_samples) > CURVE_EVIDENCE
             || overwhelming(with, without)
+            || curve.is_some_and(|curve| curve_shapes::repeats(self.problem, &without.fit, curve))
     }
 
     /// The explanation with the best curve in a joint, if it predicts recordings left out.

@@ -39,7 +39,7 @@ const FAIR_SHARE: f64 = 1.8;
 const FAIR_SHARE_FOR_A_WHILE: f64 = 1.3;
 /// The same if it has more curves: these can follow any slow noise.
 /// Tuned: by hand, on no recorded seeds; not swept.
-const FAIR_SHARE_OF_CURVE: f64 = 3.0;
+pub const FAIR_SHARE_OF_CURVE: f64 = 3.0;
 /// Rivals nearer than this cannot be told apart \[nats\]: odds of 150 to 1.
 /// Tuned: by hand, on no recorded seeds; not swept.
 pub const TIE: f64 = 5.0;
@@ -59,6 +59,9 @@ pub const CURVE_EVIDENCE: f64 = 25.0;
 /// A curve must divide the variance at its joint by this.
 /// Tuned: by hand, on no recorded seeds; not swept.
 pub const CURVE_SIZE: f64 = 1.35;
+/// What explains less than this share of what larger effects do may only patch an error of those.
+/// Tuned: by hand, on no recorded seeds; not swept.
+pub const PATCH: f64 = 0.02;
 /// An effect that contains a simpler one must be ahead of it by this \[nats\].
 /// Statistical: ln 20, odds of twenty to one.
 pub const MORE_THAN_SIMPLE: f64 = 3.0;

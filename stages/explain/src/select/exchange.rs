@@ -1,6 +1,7 @@
 //! Removes each effect in turn and tries every rival in its place.
 
 use crate::physics::active::{Hypothesis, TimeKind};
+use crate::select::curve_shapes::repeats;
 use crate::select::evidence::LEAST_GAIN;
 use crate::select::explanation::{Explanation, describe};
 use crate::select::explanation::{Piece, pieces, place_of};
@@ -109,7 +110,14 @@ impl Search<'_> {
         without: &Explanation,
         index: usize,
     ) -> Option<Explanation> {
-        let effective = &self.problem.effective_samples;
+        // What carries over from one recording to the next is no slow noise.
+        let removed = &best.fit.actives[index];
+        let white = vec![1.0; self.problem.joints];
+        let effective = if removed.curve.is_some() && repeats(self.problem, &without.fit, removed) {
+            &white
+        } else {
+            &self.problem.effective_samples
+        };
         let proposals = self.rivals(&without.fit, &best.fit, &best.fit.actives[index]);
         let other = self.rival_of(best, without, &proposals)?;
         if other.ahead_of(best, effective) <= LEAST_GAIN {

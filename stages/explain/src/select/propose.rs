@@ -39,6 +39,10 @@ const DEVIATION_TIME_S: f64 = 0.1;
 /// Resolution: keeps the ridge finite; far below any measured effort.
 const LEAST_EFFORT_NM: f64 = 1e-6;
 
+/// Penalty of an effect that the list of names lacks, because it is rarer than those of the list \[nats\].
+/// Statistical: odds of 150 to 1, so that a name of the list stands where both fit alike.
+const OFF_LIST: f64 = 5.0;
+
 /// A hypothesis with parameters, and its gain over leaving it out.
 #[derive(Debug, Clone)]
 pub struct Proposal {
@@ -266,10 +270,12 @@ impl<'a> Base<'a> {
             coordinates[i] = value;
         }
         let free = hypothesis.effect.coordinates.len();
+        let is_off_list = hypothesis.effect.traits.is_off_list;
+        let prior = if is_off_list { OFF_LIST } else { 0.0 };
         Some(Proposal {
             active: hypothesis.with(coordinates),
             gain,
-            penalty: self.penalty(free, hypothesis.only_joint()),
+            penalty: self.penalty(free, hypothesis.only_joint()) + prior,
             size,
         })
     }
@@ -326,6 +332,36 @@ mod tests {
         assert!(found.evidence() > 100.0 && found.size > 1.0);
         let other = base.propose(at_joint("viscous_friction", 1));
         assert!(other.is_none_or(|other| other.evidence() < 0.0));
+    }
+
+    #[test]
+    fn a_shifted_zero_is_found_with_its_number_and_beats_each_body() {
+        let model = crate::fixture::model();
+        let mut real = model.clone();
+        real.shift_zero(1, 0.03);
+        let mut noise = crate::fixture::Noise(9);
+        let recordings = [6, 7].map(|seed| {
+            crate::fixture::recording(&real, seed, |_, _, effort| {
+                effort.iter_mut().for_each(|x| *x += 0.02 * noise.next());
+            })
+        });
+        let problem = crate::fixture::problem(&model, &recordings);
+        let nothing = Fit::new(&problem, Vec::new());
+        let base = Base::new(&problem, &nothing, 40);
+        let found = base.propose(at_joint("joint_zero_offset", 1)).unwrap();
+        let evidence = found.evidence();
+        let fit = nothing.with(&problem, found.active).refined(&problem);
+        let offset = fit.actives[0].coordinates[0];
+        assert!((offset - 0.03).abs() < 1e-3, "{offset}");
+        for effect in ["link_com", "link_mass"] {
+            let mut body = at_joint(effect, 0);
+            body.place.link = model.joints()[1].child_link;
+            let other = base.propose(body);
+            assert!(
+                other.is_none_or(|other| other.evidence() < evidence),
+                "{effect}"
+            );
+        }
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use crate::fit::fitted::Fit;
 use crate::physics::active::TimeKind;
+use crate::select::curve_shapes::repeats;
 use crate::select::evidence::{
     CURVE_EVIDENCE, CURVE_SIZE, LEAST_SIZE, matters, needs, overwhelming, wald,
 };
@@ -49,13 +50,17 @@ impl Search<'_> {
     /// Whether the effect at `index` is needed; `less` is the explanation without it.
     fn is_needed(&self, best: &Explanation, less: &Explanation, index: usize) -> bool {
         let active = &best.fit.actives[index];
-        let (evidence, least) = if active.is_unnamed() {
+        let repeats = active.curve.is_some() && repeats(self.problem, &less.fit, active);
+        let (evidence, least) = if repeats {
+            (CURVE_EVIDENCE, LEAST_SIZE)
+        } else if active.is_unnamed() {
             (CURVE_EVIDENCE, CURVE_SIZE - 1.0)
         } else {
             needs(active.hypothesis, &best.fit)
         };
         let effective = &self.problem.effective_samples;
-        let strong = best.ahead_of(less, effective) >= evidence || overwhelming(best, less);
+        let ahead = best.ahead_of(less, effective) >= evidence;
+        let strong = ahead || repeats || overwhelming(best, less);
         let matters = matters(self.problem, &best.fit, &less.fit, least, least);
         let possible = is_timely(self.problem, active) && plausible(active, &self.problem.model);
         possible && strong && matters

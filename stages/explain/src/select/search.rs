@@ -68,7 +68,11 @@ impl Search<'_> {
         for _ in 0..MOST_ROUNDS {
             best = self.forward(best);
             let effective = &self.problem.effective_samples;
-            let exchanged = self.exchange(best.clone());
+            let mut exchanged = self.exchange(best.clone());
+            if let Some(better) = self.with_one_zero(&exchanged) {
+                (self.say)(&format!("= {}", describe(&better)));
+                exchanged = better;
+            }
             let gained = exchanged.ahead_of(&best, effective) > LEAST_GAIN;
             best = exchanged;
             if !gained {

@@ -8,6 +8,7 @@ use tauscope_dynamics::terms::{Against, PlaceKind};
 use crate::data::problem::Problem;
 use crate::physics::active::{Active, Hypothesis, TimeKind};
 use crate::report::schema::Finding;
+use crate::select::evidence::PATCH;
 use tauscope_dynamics::kinematic_tree::bearing;
 
 use super::Named;
@@ -15,9 +16,6 @@ use super::Named;
 /// Highest confidence of a doubted finding.
 /// Statistical: even odds.
 const DOUBTED: f64 = 0.5;
-/// A finding that explains less than this share of what the largest one does may only patch an error of that one.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const PATCH: f64 = 0.02;
 /// Pushes in different recordings come at the same time if their times differ by less than this \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const SAME_TIME_S: f64 = 0.3;

@@ -45,7 +45,7 @@ pub(super) fn cards(report: &Report) -> Option<Markup> {
 }
 
 fn card(finding: &Finding, effort_unit: &str) -> Markup {
-    let kind = if finding.effect == UNKNOWN.name {
+    let kind = if finding.known_as() == UNKNOWN.name {
         "card unknown"
     } else {
         "card"
@@ -54,14 +54,14 @@ fn card(finding: &Finding, effort_unit: &str) -> Markup {
     html! {
         article class=(kind) {
             h3 {
-                (effect_title(&finding.effect))
+                (effect_title(finding.known_as()))
                 @if let Some(place) = place(finding.joint.as_deref(), finding.link.as_deref()) {
                     span.place { (place) }
                 }
             }
             div.halves { div {
             p.sentence { (finding.sentence) }
-            @if let Some(meaning) = effect_meaning(&finding.effect) { p.meaning { (meaning) } }
+            @if let Some(meaning) = effect_meaning(finding.known_as()) { p.meaning { (meaning) } }
             p.figures {
                 @if finding.effort_rms > 0.0 {
                     span { "Effort " b { (number_text(finding.effort_rms)) " " (effort_unit) } " RMS" }

@@ -234,7 +234,9 @@ fn leader(from: Point, to: Point) -> Markup {
 
 fn disc(at: Point, joint: usize, name: &str, group: Option<&Group<'_>>, largest: f64) -> Markup {
     let class = match group {
-        Some(group) if group.findings.iter().any(|f| f.effect == UNKNOWN.name) => "joint unknown",
+        Some(group) if group.findings.iter().any(|f| f.known_as() == UNKNOWN.name) => {
+            "joint unknown"
+        }
         Some(_) => "joint found",
         None => "joint",
     };
@@ -266,7 +268,7 @@ fn label(group: &Group<'_>, y: f64, unit: &str) -> Markup {
     let what: Vec<String> = group
         .findings
         .iter()
-        .map(|f| effect_title(&f.effect))
+        .map(|f| effect_title(f.known_as()))
         .collect();
     let mut what = what.join(", ");
     if what.chars().count() > LETTERS {

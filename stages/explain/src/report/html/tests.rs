@@ -21,6 +21,7 @@ fn empty(verdict: Verdict) -> Report {
         joints: vec!["joint1".to_owned(), "joint2".to_owned()],
         holdout_rms_before: vec![1.0, 0.1],
         holdout_rms_after: vec![0.11, 0.1],
+        remaining: Vec::new(),
         noise_floor: vec![0.1, 0.1],
         holdout_predictions: BTreeMap::new(),
     }

@@ -90,8 +90,13 @@ fn look_at(report: &Report) -> Markup {
     // Of each place the largest.
     let of_group = |group: &Group<'_>| {
         let mut findings = group.findings.iter();
-        findings
-            .find_map(|finding| Some((part(finding)?, finding.effect.clone(), finding.confidence)))
+        findings.find_map(|finding| {
+            Some((
+                part(finding)?,
+                finding.known_as().to_owned(),
+                finding.confidence,
+            ))
+        })
     };
     let parts: Vec<(String, String, f64)> = groups.iter().filter_map(of_group).collect();
     if parts.is_empty() {
@@ -117,7 +122,7 @@ fn look_at(report: &Report) -> Markup {
 
 /// What to look at for a finding; nothing where it is no fault.
 fn part(finding: &Finding) -> Option<String> {
-    let effect = effect(&finding.effect)?;
+    let effect = effect(finding.known_as())?;
     let template = effect.words.look_at;
     if template.is_empty() {
         return None;
@@ -156,7 +161,7 @@ fn record(report: &Report) -> Markup {
             "The same motion again, after what is said above is mended.".to_owned()
         }
         Verdict::UnknownRemains => {
-            let unknown = report.findings.iter().filter(|f| f.effect == UNKNOWN.name);
+            let unknown = (report.findings.iter()).filter(|f| f.known_as() == UNKNOWN.name);
             let mut joints: Vec<&str> = unknown.filter_map(|f| f.joint.as_deref()).collect();
             joints.extend(
                 left.iter()

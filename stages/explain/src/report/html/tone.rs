@@ -30,6 +30,8 @@ impl Tone {
             Verdict::Explained => ("explained", "✓"),
             Verdict::NothingMissing => ("nothing", "✓"),
             Verdict::NotEvaluated => ("none", "–"),
+            // A clear remainder at one joint is not averaged away by what is explained at others.
+            Verdict::UnknownRemains if !report.remaining.is_empty() => ("remains", "?"),
             Verdict::UnknownRemains => return Self::unknown(unknown_share(report)),
         };
         let text = verdict_text(report.verdict).to_owned();
@@ -71,7 +73,10 @@ fn unknown_share(report: &Report) -> f64 {
         let beyond = (row.after.powi(2) - noise.powi(2)).max(0.0);
         (before + row.before.powi(2), left + beyond)
     });
-    let unnamed = report.findings.iter().filter(|f| f.effect == UNKNOWN.name);
+    let unnamed = report
+        .findings
+        .iter()
+        .filter(|f| f.known_as() == UNKNOWN.name);
     let described: f64 = unnamed.map(|finding| finding.explains).sum();
     if before > 0.0 {
         (described + left / before).min(1.0)

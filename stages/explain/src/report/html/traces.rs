@@ -84,7 +84,7 @@ fn find<'a>(picture: &'a RecordingPicture, joint: &str) -> Option<&'a JointPictu
 fn joint(report: &Report, pictures: &[RecordingPicture], row: &Row<'_>, in_full: bool) -> Markup {
     let unit = effort_unit(&report.effort_unit);
     let named: Vec<_> = named_at(report, row.joint)
-        .map(|finding| effect_title(&finding.effect))
+        .map(|finding| effect_title(finding.known_as()))
         .collect();
     html! {
         div.joint {
@@ -178,7 +178,7 @@ fn spans(
         if finding.joint.as_deref().is_some_and(|at| at != joint) {
             return None;
         }
-        let title = effect_title(&finding.effect);
+        let title = effect_title(finding.known_as());
         if let Some(change_s) = finding.parameters.get("change_time_session_s") {
             let from_s = change_s.as_f64()? - since_session_s;
             return (0.0..end_s).contains(&from_s).then_some(Span {

@@ -1,0 +1,131 @@
+//! What a curve is drawn against, read sample by sample.
+
+use super::{Against, MotionSample, sign};
+
+/// A joint that stays below this is at rest \[rad/s or m/s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
+const REST_RAD_S: f64 = 0.01;
+/// For so long at least \[s\]: a joint that reverses does not rest.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const LEAST_REST_S: f64 = 0.1;
+
+/// A joint of which nothing is known yet has moved for so long \[s\].
+/// Physical: longer than any recording.
+const LONG_S: f64 = 1e7;
+
+/// Reads what a curve is drawn against, sample by sample.
+#[derive(Debug, Clone)]
+pub struct Gauge {
+    against: Against,
+    joint: usize,
+    /// Largest reading of [`Against::LoadTurned`] to either side.
+    band: f64,
+    rested_s: f64,
+    moved_s: f64,
+    turned: f64,
+    load: Option<f64>,
+}
+
+impl Gauge {
+    /// One for the joint of index `joint`. `band` is the largest reading of [`Against::LoadTurned`] to either side
+    /// \[N m or N\].
+    pub fn new(against: Against, joint: usize, band: f64) -> Self {
+        Self {
+            against,
+            joint,
+            band,
+            rested_s: 0.0,
+            moved_s: LONG_S,
+            turned: 0.0,
+            load: None,
+        }
+    }
+
+    /// Forgets what came before. A joint then counts as long in motion, and its load as half turned.
+    pub fn reset(&mut self) {
+        *self = Self::new(self.against, self.joint, self.band);
+    }
+
+    /// The reading at the next instant.
+    pub fn read(&mut self, at: &MotionSample<'_>) -> f64 {
+        let joint = self.joint;
+        match self.against {
+            Against::Position => at.position[joint],
+            Against::Velocity => at.velocity[joint],
+            Against::Acceleration => at.acceleration[joint],
+            Against::Load => at.transmitted[joint],
+            Against::DrivenLoad => at.transmitted[joint] * sign(at.velocity[joint]),
+            Against::LoadTurned => {
+                let load = at.transmitted[joint];
+                let before = self.load.replace(load).unwrap_or(load);
+                self.turned = (self.turned + load - before).clamp(-self.band, self.band);
+                self.turned
+            }
+            Against::SinceRest => {
+                if at.velocity[joint].abs() < REST_RAD_S {
+                    self.rested_s += at.dt_s;
+                    if self.rested_s >= LEAST_REST_S {
+                        self.moved_s = 0.0;
+                    }
+                } else {
+                    self.rested_s = 0.0;
+                }
+                if self.rested_s < LEAST_REST_S {
+                    self.moved_s += at.dt_s;
+                }
+                self.moved_s
+            }
+            Against::RecordingTime => at.recording_s,
+            Against::SessionTime => at.session_s,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Readings for the second joint of a robot at these velocities and loads, every 0.05 s.
+    fn readings(against: Against, motion: &[(f64, f64)]) -> Vec<f64> {
+        let mut gauge = Gauge::new(against, 1, 1.0);
+        let read = |&(velocity, load): &(f64, f64)| {
+            gauge.read(&MotionSample {
+                dt_s: 0.05,
+                recording_s: 0.0,
+                session_s: 0.0,
+                position: &[0.0; 2],
+                velocity: &[0.0, velocity],
+                acceleration: &[0.0; 2],
+                transmitted: &[0.0, load],
+            })
+        };
+        motion.iter().map(read).collect()
+    }
+
+    #[test]
+    fn a_load_turns_within_its_band() {
+        let turned = readings(
+            Against::LoadTurned,
+            &[(0.0, 2.0), (0.0, 2.5), (0.0, 9.0), (0.0, 8.5), (0.0, 3.0)],
+        );
+        assert_eq!(turned, [0.0, 0.5, 1.0, 0.5, -1.0]);
+    }
+
+    #[test]
+    fn a_joint_rests_when_it_stands_still_and_not_when_it_reverses() {
+        let since = |still: usize| {
+            let mut motion = vec![(1.0, 0.0)];
+            motion.extend(vec![(0.0, 0.0); still]);
+            motion.extend(vec![(-1.0, 0.0); 2]);
+            *readings(Against::SinceRest, &motion).last().unwrap()
+        };
+        assert!(since(1) > LONG_S);
+        assert!((since(4) - 0.1).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_joint_drives_its_load_or_is_driven_by_it() {
+        let driven = readings(Against::DrivenLoad, &[(0.5, 3.0), (-0.5, 3.0)]);
+        assert_eq!(driven, [3.0, -3.0]);
+    }
+}

@@ -1,0 +1,70 @@
+//! A gear whose loss differs by the direction of power: M. Gautier and W. Khalil, *Modeling, Identification and Control
+//! of Robots*, 2002, section 9.3; J. Wang and D. E. Whitney on worm and harmonic gears that drive back badly.
+
+use super::law::joint_law;
+use super::{
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simpler, Simulated,
+    Traits, Words, sign,
+};
+
+/// Below this share of the other direction's, one direction has no loss of its own: an effort that only looks so.
+/// Tuned: as the symmetry of Coulomb friction by direction; not swept.
+const LEAST_SHARE: f64 = 0.02;
+
+/// Effort μd max(τ sgn(qd), 0) sgn(qd) while the motor drives the load, μb max(-τ sgn(qd), 0) sgn(qd) while the load
+/// drives the motor; τ is the rigid body's effort without friction.
+pub(super) static EFFECT: Effect = Effect {
+    name: "gear_efficiency",
+    words: Words::new(
+        "Gear efficiency by direction of power",
+        "a gear loss that differs by the direction of power",
+        "The gear loses another share of the torque when it lifts than when it lets down.",
+        "Joint {place}: gear and lubricant; a worm, a spindle or a worn gear drives back worse than forth.",
+        "The gear of joint {place} loses {driving_coefficient:ratio} of the load when the motor drives it and \
+         {backdriving_coefficient:ratio} when the load drives the motor.",
+    ),
+    family: Family::Friction,
+    place: PlaceKind::Joint,
+    layer: Layer::Joint,
+    parameters: &[
+        Parameter::ratio("driving_coefficient", 0.0),
+        Parameter::ratio("backdriving_coefficient", 0.0),
+    ],
+    coordinates: &[
+        Coordinate::positive_factor("driving_coefficient"),
+        Coordinate::positive_factor("backdriving_coefficient"),
+    ],
+    to_parameters: <[f64]>::to_vec,
+    to_coordinates: <[f64]>::to_vec,
+    simpler: Some(Simpler {
+        effect: &super::load_dependent_friction::EFFECT,
+        numbers: &["driving_coefficient", "backdriving_coefficient"],
+    }),
+    limit: Some(|_, x| x[0].min(x[1]) >= LEAST_SHARE * x[0].max(x[1])),
+    excitation: Excitation::Speeds,
+    simulated: Simulated::Joint,
+    concealed: Some(|draw| {
+        let (mut drives, mut driven) = (1.0, 0.2 + 0.3 * draw.share);
+        if draw.chance.coin() {
+            std::mem::swap(&mut drives, &mut driven);
+        }
+        Drawn::new([1e-4, 0.5], move |loss| {
+            vec![
+                ("driving_coefficient", loss * drives),
+                ("backdriving_coefficient", loss * driven),
+            ]
+        })
+    }),
+    traits: Traits {
+        needs_load: true,
+        is_off_list: true,
+        ..Traits::NONE
+    },
+    build: |site, values| {
+        joint_law(&EFFECT, site, values, |[drives, driven], j, at| {
+            let direction = sign(at.velocity[j]);
+            let power = at.transmitted[j] * direction;
+            (drives * power.max(0.0) + driven * (-power).max(0.0)) * direction.signum()
+        })
+    },
+};

@@ -1,0 +1,146 @@
+//! A joint whose zero is not the model's: B. W. Mooring, Z. S. Roth and M. R. Driels, *Fundamentals of Manipulator
+//! Calibration*, 1991, chapter 2.
+
+use super::law::array;
+use super::{
+    Coordinate, CoordinateKind, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter,
+    PlaceKind, Simulated, Term, Traits, Words,
+};
+use crate::{Data, Model, rnea};
+
+/// A larger offset is no slip of a zero \[rad or m\].
+/// Physical: at arm's length such a joint misses by a hand's width, which nobody overlooks.
+const LARGEST: f64 = 0.2;
+
+/// The joint stands at the recorded position plus the offset: the effort of the robot there less that at the recorded
+/// position. To first order linear in the offset.
+pub(super) static EFFECT: Effect = Effect {
+    name: "joint_zero_offset",
+    words: Words::new(
+        "Joint zero offset",
+        "a joint zero that is off",
+        "The joint stands elsewhere than its recorded position says, by a constant: a crash, or a changed encoder or motor.",
+        "Joint {place}: master its zero anew; did the arm crash, or was an encoder, motor or belt changed?",
+        "The zero of joint {place} is off: the joint stands at its recorded position plus {offset_rad}. The corrected twin \
+         makes up for it; to mend it, master the joint anew.",
+    ),
+    family: Family::Mounting,
+    place: PlaceKind::Joint,
+    layer: Layer::Body,
+    parameters: &[Parameter::any("offset_rad")],
+    coordinates: &[Coordinate {
+        name: "offset_rad",
+        kind: CoordinateKind::Factor {
+            step: 1e-3,
+            minimum: f64::NEG_INFINITY,
+        },
+    }],
+    to_parameters: <[f64]>::to_vec,
+    to_coordinates: <[f64]>::to_vec,
+    simpler: None,
+    limit: Some(|_, x| x[0].abs() <= LARGEST),
+    excitation: Excitation::Poses,
+    simulated: Simulated::Model,
+    concealed: Some(|draw| {
+        let sign = if draw.chance.coin() { 1.0 } else { -1.0 };
+        Drawn::new([1e-3, 0.1], move |size| vec![("offset_rad", sign * size)])
+    }),
+    traits: Traits {
+        is_off_list: true,
+        bends: true,
+        smallest_told_as: Some("offset_rad"),
+        ..Traits::NONE
+    },
+    build: |site, values| {
+        let values = array(values);
+        let mut shifted = site.model.clone();
+        shifted.shift_zero(site.joint, values[0]);
+        Box::new(JointZeroOffset {
+            joint: site.joint,
+            values,
+            data: Data::new(site.model),
+            recorded: site.model.clone(),
+            shifted,
+        })
+    },
+};
+
+#[derive(Debug)]
+struct JointZeroOffset {
+    joint: usize,
+    values: [f64; 1],
+    data: Data,
+    /// The robot that stands where it is recorded.
+    recorded: Model,
+    /// The robot that stands where it is.
+    shifted: Model,
+}
+
+impl Term for JointZeroOffset {
+    fn effect(&self) -> &'static Effect {
+        &EFFECT
+    }
+
+    fn coordinates(&self) -> &[f64] {
+        &self.values
+    }
+
+    fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
+        if self.values[0] == 0.0 {
+            return;
+        }
+        for (model, share) in [(&self.shifted, 1.0), (&self.recorded, -1.0)] {
+            let of_robot = rnea(
+                model,
+                &mut self.data,
+                at.position,
+                at.velocity,
+                at.acceleration,
+            );
+            for (effort, of_robot) in effort.iter_mut().zip(of_robot) {
+                *effort += share * of_robot;
+            }
+        }
+    }
+
+    fn alter(&self, model: &mut Model) -> bool {
+        model.shift_zero(self.joint, self.values[0]);
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Site;
+    use super::super::tests::{TwoJoints, motion, run};
+    use super::*;
+
+    #[test]
+    fn it_costs_what_the_robot_costs_where_the_joint_truly_is() {
+        let robot = TwoJoints::new();
+        let motion = motion(&robot.model, 50);
+        let mut data = Data::new(&robot.model);
+        for joint in [0, 1] {
+            let site = Site {
+                joint,
+                ..robot.site()
+            };
+            let mut term = (EFFECT.build)(&site, &[0.15]);
+            for (at, added) in motion.iter().zip(run(&mut *term, &motion)) {
+                let mut position = at.position;
+                position[joint] += 0.15;
+                let there = rnea(
+                    &robot.model,
+                    &mut data,
+                    &position,
+                    &at.velocity,
+                    &at.acceleration,
+                );
+                for j in 0..2 {
+                    let expected = there[j] - at.transmitted[j];
+                    assert!((added[j] - expected).abs() < 1e-9, "joint {joint}");
+                }
+            }
+        }
+    }
+}

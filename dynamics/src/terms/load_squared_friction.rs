@@ -1,0 +1,48 @@
+//! Friction that grows with the square of what the gear transmits: K. A. Pasch and W. P. Seering, "On the Drive Systems
+//! for High-Performance Machines", Journal of Mechanisms 106(1), 1984; teeth and wave generators that deform rub so.
+
+use super::law::joint_law;
+use super::{
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated, Traits,
+    Words, sign,
+};
+
+/// Effort c τ² sgn(qd), τ being the rigid body's effort without friction.
+pub(super) static EFFECT: Effect = Effect {
+    name: "load_squared_friction",
+    words: Words::new(
+        "Friction by the square of the load",
+        "friction by the square of the load",
+        "Friction that grows faster than the torque through the gear: its parts bend under load and rub.",
+        "Joint {place}: the gear, for worn or bent teeth, too little preload, or lubricant that the load presses out.",
+        "The friction of joint {place} grows with the square of the load on its gear, by {coefficient_per_nm}.",
+    ),
+    family: Family::Friction,
+    place: PlaceKind::Joint,
+    layer: Layer::Joint,
+    parameters: &[Parameter::at_least("coefficient_per_nm", 0.0)],
+    coordinates: &[Coordinate::positive_factor("coefficient_per_nm")],
+    to_parameters: <[f64]>::to_vec,
+    to_coordinates: <[f64]>::to_vec,
+    simpler: None,
+    limit: None,
+    excitation: Excitation::Speeds,
+    simulated: Simulated::Joint,
+    concealed: Some(|draw| {
+        let largest = draw.largest_nm.max(1e-3);
+        Drawn::new([1e-4, 0.5], move |share| {
+            vec![("coefficient_per_nm", share / largest)]
+        })
+    }),
+    traits: Traits {
+        needs_load: true,
+        is_off_list: true,
+        smallest_told_as: Some("coefficient_per_nm"),
+        ..Traits::NONE
+    },
+    build: |site, values| {
+        joint_law(&EFFECT, site, values, |[c], j, at| {
+            c * at.transmitted[j] * at.transmitted[j] * sign(at.velocity[j])
+        })
+    },
+};

@@ -1,0 +1,103 @@
+//! Which corrections are handed out: none that makes a joint worse.
+//!
+//! The predictions of held-out recordings must not depend on their efforts. So there a joint keeps the twin as it was if its
+//! correction does worse than none on fitted recordings, each left out in turn. The written twin may be judged by the
+//! held-out recordings, too.
+
+use crate::context::Context;
+use crate::data::problem::Problem;
+use crate::data::track::Track;
+use crate::fit::fitted::Fit;
+use crate::read::recording::Recording;
+use crate::report::sentences::UNCHANGED;
+use crate::select::cross_validation::left_elsewhere;
+
+/// The joints whose correction predicts recordings left out of the fit no better than the twin `before` it.
+pub fn not_carried(problem: &Problem, before: &Fit, found: &Fit) -> Vec<usize> {
+    if problem.tracks.len() < 2 {
+        return Vec::new();
+    }
+    // What acts once is not part of the prediction of other recordings.
+    let lasts = |j: usize| {
+        let mut all = found.actives.iter().map(|active| &active.hypothesis);
+        all.any(|h| h.lasts() && !h.is_torque_scale() && h.only_joint().is_none_or(|own| own == j))
+    };
+    let changed = |&j: &usize| lasts(j) && found.squares[j] < UNCHANGED * before.squares[j];
+    let worse = |&j: &usize| {
+        UNCHANGED * left_elsewhere(problem, found, j) > left_elsewhere(problem, before, j)
+    };
+    (0..problem.joints).filter(changed).filter(worse).collect()
+}
+
+/// A correction that is left out of the written twin.
+pub struct Withheld {
+    /// Index of the effect in the fit.
+    pub effect: usize,
+    /// The joint that it makes worse.
+    pub joint: usize,
+}
+
+/// Errors on the held-out recordings, by effects that are kept.
+pub struct HeldOut<'a> {
+    /// The input and its units.
+    pub context: &'a Context<'a>,
+    /// The fitted recordings.
+    pub problem: &'a Problem,
+    /// The held-out recordings and their motion.
+    pub tracks: Vec<(&'a Recording, Track)>,
+}
+
+impl HeldOut<'_> {
+    /// RMS error by joint with some effects of `found` \[effort unit\].
+    fn rms(&self, found: &Fit, keep: &[bool]) -> Vec<f64> {
+        let n = self.problem.joints;
+        let mut fit = found.clone();
+        let kept = found.actives.iter().zip(keep).filter(|(_, keep)| **keep);
+        fit.actives = kept.map(|(active, _)| active.clone()).collect();
+        let (mut squares, mut count) = (vec![0.0; n], 0.0);
+        for (recording, track) in &self.tracks {
+            let twin = self.context.predict(self.problem, &fit, track);
+            for (k, (measured, twin)) in recording.effort.iter().zip(&twin).enumerate() {
+                squares[k % n] += (measured - twin) * (measured - twin);
+            }
+            count += recording.effort.len() as f64 / n as f64;
+        }
+        squares
+            .iter()
+            .map(|square| (square / count).sqrt())
+            .collect()
+    }
+
+    /// The effects that are withheld, so that no joint is worse than `before`. An effect on several joints stays if they
+    /// would lose more than the one gains.
+    pub fn withheld(&self, found: &Fit, before: &[f64]) -> Vec<Withheld> {
+        let mut keep = vec![true; found.actives.len()];
+        let mut withheld = Vec::new();
+        loop {
+            let now = self.rms(found, &keep);
+            let worse = |j: &usize| now[*j] * UNCHANGED > before[*j];
+            let best = (0..self.problem.joints).filter(worse).find_map(|joint| {
+                let without = |index: usize| {
+                    let mut fewer = keep.clone();
+                    fewer[index] = false;
+                    (index, self.rms(found, &fewer))
+                };
+                let free = (0..keep.len())
+                    .filter(|&i| keep[i] && !found.actives[i].hypothesis.is_torque_scale());
+                let helps = |(_, rms): &(usize, Vec<f64>)| {
+                    let change = rms.iter().zip(&now).map(|(rms, now)| (rms / now).ln());
+                    rms[joint] < now[joint] && change.sum::<f64>() < 0.0
+                };
+                let able = free.map(without).filter(helps);
+                let best = able.min_by(|(_, a), (_, b)| a[joint].total_cmp(&b[joint]));
+                best.map(|(index, _)| Withheld {
+                    effect: index,
+                    joint,
+                })
+            });
+            let Some(next) = best else { return withheld };
+            keep[next.effect] = false;
+            withheld.push(next);
+        }
+    }
+}

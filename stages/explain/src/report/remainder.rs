@@ -1,0 +1,374 @@
+//! What the corrected twin leaves beyond the noise, joint by joint, and what it goes with.
+//!
+//! The size of a remainder does not tell noise from physics: noise may be slow, and hundreds of times as large as its
+//! fastest changes. So a remainder counts as physics by what noise cannot do:
+//!
+//! - it follows the motion, and a curve of that predicts it in recordings that the curve was not fitted on;
+//! - it is far larger on held-out recordings than on fitted ones, although their efforts change no faster;
+//! - it stands out for moments.
+
+use crate::context::Context;
+use crate::data::problem::Problem;
+use crate::fit::fitted::Fit;
+use crate::report::schema::Remaining;
+use crate::select::evidence::PATCH;
+use crate::select::propose::Base;
+use tauscope_dynamics::terms::TermError;
+use tauscope_dynamics::terms::words::number;
+
+/// An explanation does not carry over at a joint if its error on held-out recordings is this many times that on fitted
+/// ones, where both have the same rate of change of effort.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const WORSE: f64 = 2.0;
+/// The error on held-out recordings must also be this many times the measurement's white noise.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const ABOVE_NOISE: f64 = 3.0;
+/// A moment stands out if its error is this many standard deviations of the calm half of the time.
+/// Statistical: a normal variable exceeds 10 in none of 1e22 rows; slow noise is as normal as fast.
+const STANDS_OUT: f64 = 10.0;
+/// Median of the absolute value of a normal variable, in standard deviations.
+/// Statistical: the 75 % quantile of the standard normal distribution.
+const MEDIAN_OF_ABS_NORMAL: f64 = 0.6745;
+/// Fewer moments are the edges of an effect that acts once.
+/// Physical: it has two, its beginning and its end.
+const LEAST_MOMENTS: usize = 3;
+/// Moments nearer than this are one \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
+const APART_S: f64 = 0.5;
+/// Accelerations are uncertain within this time of either end of a recording \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
+const END_S: f64 = 0.25;
+/// Stamps may be wrong by at least this much \[s\].
+/// Resolution: delays below this are not searched for.
+const CLOCK_S: f64 = 0.002;
+
+/// What a fit leaves in some recordings.
+#[derive(Clone, Copy)]
+struct Left<'a> {
+    /// The recordings.
+    problem: &'a Problem,
+    /// The fit, evaluated there.
+    fit: &'a Fit,
+}
+
+/// The remainders of an explanation.
+#[derive(Debug, Default)]
+pub struct Remainders {
+    /// One or none per joint.
+    pub all: Vec<Remaining>,
+    /// Joints at which the error is much larger on held-out recordings.
+    pub elsewhere: Vec<usize>,
+}
+
+impl Left<'_> {
+    /// RMS error of a joint \[N m or N\].
+    fn rms(&self, joint: usize) -> f64 {
+        (self.fit.squares[joint] / self.fit.count[joint].max(1.0)).sqrt()
+    }
+
+    /// Rows of a joint that count, with the rate at which the twin's effort changes there \[N m/s\].
+    fn rows(&self, joint: usize) -> Vec<Row> {
+        let problem = self.problem;
+        let first = problem.joint_rows(joint).start;
+        let mut rows = Vec::new();
+        for (recording, track) in problem.tracks.iter().enumerate() {
+            let own: Vec<usize> = track.rows().collect();
+            let time = |k: usize| track.track.time_s[track.compared[k]];
+            let twin = |k: usize| {
+                let at = first + own[k];
+                problem.measured[at] - self.fit.residual[at]
+            };
+            for k in 0..own.len() {
+                let at = first + own[k];
+                if problem.weight[at] <= 0.0 {
+                    continue;
+                }
+                let (before, after) = (k.saturating_sub(1), (k + 1).min(own.len() - 1));
+                let span_s = time(after) - time(before);
+                rows.push(Row {
+                    recording,
+                    time_s: time(k),
+                    error: self.fit.residual[at],
+                    rate: if span_s > 0.0 {
+                        (twin(after) - twin(before)) / span_s
+                    } else {
+                        0.0
+                    },
+                });
+            }
+        }
+        rows
+    }
+
+    /// The moment at which the error of a joint stands out most, if the error is one of moments.
+    fn moment(&self, joint: usize) -> Option<Row> {
+        let mut rows = self.rows(joint);
+        let mut errors: Vec<f64> = rows.iter().map(|row| row.error.abs()).collect();
+        errors.sort_by(f64::total_cmp);
+        let calm = errors.get(errors.len() / 2)? / MEDIAN_OF_ABS_NORMAL;
+        let calm = calm.max(self.problem.white_noise[joint]);
+        let end_s = |row: &Row| {
+            *self.problem.tracks[row.recording]
+                .track
+                .time_s
+                .last()
+                .unwrap_or(&0.0)
+        };
+        rows.retain(|row| row.time_s > END_S && row.time_s < end_s(row) - END_S);
+        let clock_s = |row: &Row| clock_s(&self.problem.tracks[row.recording].track.time_s);
+        let stands_out =
+            |row: &&Row| row.error.abs() > STANDS_OUT * calm + clock_s(row) * row.rate.abs();
+        let squares = |rows: &mut dyn Iterator<Item = &Row>| {
+            rows.map(|row| row.error * row.error).sum::<f64>()
+        };
+        let all = squares(&mut rows.iter());
+        let of_moments = squares(&mut rows.iter().filter(stands_out));
+        let out: Vec<&Row> = rows.iter().filter(stands_out).collect();
+        let apart = |pair: &&[&Row]| {
+            let other = pair[0].recording != pair[1].recording;
+            other || pair[1].time_s - pair[0].time_s > APART_S
+        };
+        let moments = out.windows(2).filter(apart).count() + usize::from(!out.is_empty());
+        if moments < LEAST_MOMENTS || of_moments < 0.5 * all {
+            return None;
+        }
+        let largest = out
+            .into_iter()
+            .max_by(|a, b| a.error.abs().total_cmp(&b.error.abs()));
+        largest.cloned()
+    }
+}
+
+/// A row of a joint that counts.
+#[derive(Debug, Clone)]
+struct Row {
+    recording: usize,
+    time_s: f64,
+    error: f64,
+    rate: f64,
+}
+
+/// By how much a stamp may be wrong \[s\]: a sample.
+fn clock_s(time_s: &[f64]) -> f64 {
+    let span_s = time_s.last().unwrap_or(&0.0) - time_s.first().unwrap_or(&0.0);
+    (span_s / time_s.len().saturating_sub(1).max(1) as f64).max(CLOCK_S)
+}
+
+/// RMS of the rate of change of effort.
+fn rms_rate(rows: &[Row]) -> f64 {
+    let squares: f64 = rows.iter().map(|row| row.rate * row.rate).sum();
+    (squares / rows.len().max(1) as f64).sqrt()
+}
+
+impl Context<'_> {
+    /// The remainders of the explanation `found`; those of an arm at rest are not judged.
+    ///
+    /// # Errors
+    /// If a term of the start cannot be built for the robot.
+    pub fn remainders(
+        &self,
+        (problem, fit): (&Problem, &Fit),
+        before: &Fit,
+        rests_count: &[bool],
+        unit: &str,
+    ) -> Result<Remainders, TermError> {
+        if self.at_rest {
+            return Ok(Remainders::default());
+        }
+        let joints: Vec<String> = problem.model.joint_names().map(str::to_owned).collect();
+        let held = self.held(rests_count, fit)?;
+        let held = held.as_ref().map(|(problem, fit)| Left { problem, fit });
+        let found = Left { problem, fit };
+        Ok(of(found, before, held, self.unit_nm, &joints, unit))
+    }
+}
+
+/// The remainders of the explanation `found` on the fitted recordings, and on `held` out ones if their effort is known.
+/// `before` is the twin as it was; `unit_nm` turns the recordings' unit into N m, by joint.
+fn of(
+    found: Left<'_>,
+    before: &Fit,
+    held: Option<Left<'_>>,
+    unit_nm: &[f64],
+    joints: &[String],
+    unit: &str,
+) -> Remainders {
+    let problem = found.problem;
+    let mut remainders = Remainders::default();
+    for (j, joint) in joints.iter().enumerate() {
+        let (here, noise) = (found.rms(j), problem.white_noise[j]);
+        let told = |nm: f64| format!("{} {unit}", number(nm / unit_nm[j]));
+        let there = held.as_ref().map(|held| held.rms(j));
+        let mut sentences = Vec::new();
+        if let Some(with) = follows_motion(found, before, j) {
+            sentences.push(format!(
+                "{} remain at joint {joint}, and not as noise: {with}",
+                told(here)
+            ));
+        }
+        if let (Some(held), Some(there)) = (held, there)
+            && let Some(faster) = is_elsewhere(found, held, j)
+        {
+            remainders.elsewhere.push(j);
+            let times = number(there / here);
+            let than = than(faster);
+            sentences.push(format!(
+                "On the held-out recordings {} remain at joint {joint}, {times} times as much as on the fitted ones{than}: either \
+                 something acts on the held-out recordings only, or the correction does not carry over to them.",
+                told(there)
+            ));
+        }
+        if let Some((recording, moment)) = largest_moment([Some(found), held], j) {
+            sentences.push(format!(
+                "At joint {joint} the error stands out for moments: {} in {recording} at {:.1} s, beside {} all the time. Look for a \
+                 contact or a disturbance there.",
+                told(moment.error.abs()),
+                moment.time_s,
+                told(here)
+            ));
+        }
+        if !sentences.is_empty() {
+            remainders.all.push(Remaining {
+                joint: joint.clone(),
+                rms: here / unit_nm[j],
+                holdout_rms: there.map(|there| there / unit_nm[j]),
+                noise: noise / unit_nm[j],
+                sentence: sentences.join(" "),
+            });
+        }
+    }
+    remainders
+}
+
+/// How many times as fast the effort changes on held-out recordings, in words.
+fn than(faster: f64) -> String {
+    if faster <= 1.0 {
+        return String::new();
+    }
+    let times = number(faster);
+    format!(", although the effort changes only {times} times as fast there")
+}
+
+/// The moment at which the error of a joint stands out most, and its recording.
+fn largest_moment(all: [Option<Left<'_>>; 2], joint: usize) -> Option<(String, Row)> {
+    let moments = all.into_iter().flatten().filter_map(|left| {
+        let moment = left.moment(joint)?;
+        let name = left.problem.tracks[moment.recording].track.name.clone();
+        Some((name, moment))
+    });
+    moments.max_by(|(_, a), (_, b)| a.error.abs().total_cmp(&b.error.abs()))
+}
+
+/// What the remainder of a joint goes with, if it follows the motion.
+fn follows_motion(found: Left<'_>, before: &Fit, joint: usize) -> Option<String> {
+    let (problem, fit) = (found.problem, found.fit);
+    if fit.squares[joint] <= 0.0 || problem.tracks.len() < 2 {
+        return None;
+    }
+    let curve = Base::new(problem, fit, 1).propose_curve(joint)?;
+    let share = curve.carried.filter(|_| curve.repeats)?;
+    // What effects are known to do is not known to the last percent.
+    let known = (before.squares[joint] - fit.squares[joint]).max(0.0);
+    if share * fit.squares[joint] < PATCH * known {
+        return None;
+    }
+    let table = curve.active.curve.as_ref()?;
+    let names: Vec<String> = problem.model.joint_names().map(str::to_owned).collect();
+    Some(format!(
+        "what remains depends on {}, and a curve of that predicts {:.0} % of its square in recordings that it was not fitted on.",
+        table.depends_on(joint, &names),
+        100.0 * share
+    ))
+}
+
+/// Whether the error of a joint is much larger on held-out recordings, and how many times as fast as on the fitted ones the
+/// effort changes there. The errors of clocks, filters and derivatives grow with that rate.
+fn is_elsewhere(found: Left<'_>, held: Left<'_>, joint: usize) -> Option<f64> {
+    let (here, there) = (found.rms(joint), held.rms(joint));
+    let faster = rms_rate(&held.rows(joint)) / rms_rate(&found.rows(joint)).max(f64::MIN_POSITIVE);
+    let more = there > WORSE * faster.max(1.0) * here;
+    (more && there > ABOVE_NOISE * found.problem.white_noise[joint]).then_some(faster)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{Noise, model, problem, recording};
+
+    /// What is said of recordings of two joints in which `add` is added to the first joint's effort, given the number of
+    /// the recording, its sample and the joint's position. The last recording is held out.
+    fn remainders(mut add: impl FnMut(u64, usize, f64) -> f64) -> Remainders {
+        let model = model();
+        let mut noise = Noise(11);
+        let mut of = |seed: u64| {
+            let mut k = 0;
+            recording(&model, seed, |q, _, effort| {
+                effort[0] += add(seed, k, q[0]) + 0.05 * noise.next();
+                effort[1] += 0.05 * noise.next();
+                k += 1;
+            })
+        };
+        let fitted = problem(&model, &[of(1), of(2), of(3)]);
+        let held = problem(&model, &[of(4)]);
+        let (here, there) = (Fit::new(&fitted, Vec::new()), Fit::new(&held, Vec::new()));
+        let left = |problem, fit| Left { problem, fit };
+        let joints = ["shoulder".to_owned(), "elbow".to_owned()];
+        let (found, held) = (left(&fitted, &here), left(&held, &there));
+        of_all(found, held, &here, &joints)
+    }
+
+    fn of_all(found: Left<'_>, held: Left<'_>, before: &Fit, joints: &[String]) -> Remainders {
+        of(found, before, Some(held), &[1.0, 1.0], joints, "N m")
+    }
+
+    #[test]
+    fn slow_noise_is_no_remainder_however_large() {
+        let mut noise = Noise(5);
+        let mut slow = 0.0;
+        let found = remainders(|_, _, _| {
+            slow = 0.99 * slow + 0.14 * noise.next();
+            2.0 * slow
+        });
+        assert!(found.all.is_empty(), "{:?}", found.all);
+    }
+
+    #[test]
+    fn what_follows_the_motion_is_a_remainder_and_is_told_with_what_it_goes() {
+        let found = remainders(|_, _, q| 0.8 * (4.0 * q).sin());
+        let [one] = &found.all[..] else {
+            panic!("{:?}", found.all)
+        };
+        assert_eq!(one.joint, "shoulder");
+        assert!(
+            one.sentence.contains("its own position"),
+            "{}",
+            one.sentence
+        );
+        assert!(one.rms > 5.0 * one.noise);
+    }
+
+    #[test]
+    fn what_is_larger_on_held_out_recordings_alone_is_a_remainder() {
+        let mut noise = Noise(7);
+        let mut slow = 0.0;
+        let found = remainders(|recording, _, _| {
+            slow = 0.99 * slow + 0.14 * noise.next();
+            if recording == 4 {
+                3.0 * slow
+            } else {
+                0.1 * slow
+            }
+        });
+        assert_eq!(found.elsewhere, [0]);
+        let said = &found.all[0].sentence;
+        assert!(said.contains("On the held-out recordings"), "{said}");
+    }
+
+    #[test]
+    fn knocks_are_told_with_their_time() {
+        let knocked = |k: usize| (200..230).contains(&(k % 400));
+        let found = remainders(|_, k, _| if knocked(k) { 9.0 } else { 0.0 });
+        let said = &found.all[0].sentence;
+        assert!(said.contains("stands out for moments"), "{said}");
+    }
+}

@@ -1,0 +1,75 @@
+//! The verdict in a sentence.
+
+use crate::report::schema::{Finding, Remaining, Verdict};
+use crate::report::sentences::{UNCHANGED, error_left};
+
+/// The verdict in a sentence. `errors` are those on held-out recordings by joint, before and after.
+pub fn summary(
+    verdict: Verdict,
+    findings: &[Finding],
+    remaining: &[Remaining],
+    joints: &[String],
+    errors: [&[f64]; 2],
+) -> String {
+    let proof = proof(joints, errors);
+    let remains = remaining.iter().max_by(|a, b| {
+        let loud = |r: &Remaining| r.rms.max(r.holdout_rms.unwrap_or(0.0)) / r.noise.max(1e-12);
+        loud(a).total_cmp(&loud(b))
+    });
+    let remains = remains.map_or("", |remaining| remaining.sentence.as_str());
+    match verdict {
+        Verdict::NothingMissing => {
+            "Nothing is missing: what the twin leaves does not follow the motion. It is the noise of the measurement.".to_owned()
+        }
+        Verdict::NotEvaluated => "Nothing was evaluated.".to_owned(),
+        Verdict::UnknownRemains if findings.is_empty() => {
+            format!("Something remains without a named cause. {remains}")
+        }
+        Verdict::Explained | Verdict::UnknownRemains => {
+            // That with the largest effort, as far as sizes are known.
+            let larger = |a: &&Finding, b: &&Finding| a.effort_rms.total_cmp(&b.effort_rms);
+            let first = findings.iter().rev().max_by(larger);
+            let first = first.map_or("", |finding| finding.sentence.as_str());
+            let more = match findings.len() {
+                0 | 1 => String::new(),
+                2 => " One more effect was found.".to_owned(),
+                n => format!(" {} more effects were found.", n - 1),
+            };
+            let remains = if remains.is_empty() {
+                String::new()
+            } else {
+                format!(" {remains}")
+            };
+            format!("{first}{more}{proof}{remains}")
+        }
+    }
+}
+
+/// What the correction does to the error on held-out recordings: over all joints, and at a joint that it makes worse.
+fn proof(joints: &[String], [before, after]: [&[f64]; 2]) -> String {
+    let left = error_left(before, after);
+    if !left.is_finite() {
+        return String::new();
+    }
+    let all = if left < 0.01 {
+        " On recordings that were not fitted the error falls to less than 1 %.".to_owned()
+    } else if left < UNCHANGED {
+        format!(
+            " On recordings that were not fitted the error falls to {:.0} %.",
+            100.0 * left
+        )
+    } else {
+        " On recordings that were not fitted it makes no difference.".to_owned()
+    };
+    let times = |j: usize| after[j] / before[j];
+    let worse = (0..joints.len()).filter(|&j| times(j) * UNCHANGED > 1.0);
+    let worst = worse.max_by(|&a, &b| times(a).total_cmp(&times(b)));
+    let worse = worst.map_or_else(String::new, |j| {
+        format!(
+            " But at joint {} it rises to {:.0} %.",
+            joints[j],
+            100.0 * times(j)
+        )
+    });
+    all + &worse
+}

@@ -1,0 +1,141 @@
+//! What a curve in a joint is tried against, and where its knots are.
+
+use tauscope_dynamics::terms::{Against, Gauge, MotionSample, Table};
+
+use crate::data::problem::Problem;
+
+/// Knots of a curve.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const KNOTS: usize = 10;
+/// Knots of a curve over position that resolves a local defect, such as a worn segment of a gear.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const MANY_KNOTS: usize = 28;
+/// Knots that a curve must have at different places.
+/// Statistical: two knots are a straight line, which effects of the library already describe.
+const LEAST_KNOTS: usize = 3;
+/// Knots nearer than this share of their mean spacing are merged.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const LEAST_SPACING: f64 = 0.2;
+/// Bands of a hysteresis that are tried, in standard deviations of the load.
+/// Resolution: steps of about three; the knots resolve what lies between.
+const HYSTERESIS: [f64; 3] = [0.1, 0.3, 1.0];
+/// Knots of a hysteresis to either side of its middle.
+/// Resolution: straight in between, so half the band is resolved.
+const KNOTS_OF_SIDE: usize = 2;
+/// First knot after a standstill \[s\]; each further one comes after twice the time.
+/// Resolution: near the comparison's fastest response, 1 / (2 pi 8 Hz) = 0.02 s, and its spacing of 0.06 s.
+const FIRST_S: f64 = 0.1;
+/// What a standstill does has passed after this time \[s\].
+/// Physical: brakes, lubricants and springs settle within seconds; what takes longer is seen over the session.
+const SETTLED_S: f64 = 10.0;
+
+/// Curves to try in a joint.
+pub fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
+    let mut all = Vec::new();
+    let mut add = |against: Against, of_joint: usize, knots: Vec<f64>, signs: &[bool]| {
+        if knots.len() < LEAST_KNOTS && against != Against::SessionTime {
+            return;
+        }
+        for &by_direction in signs {
+            all.push(Table {
+                against,
+                of_joint,
+                by_direction,
+                period: None,
+                values: vec![0.0; knots.len()],
+                knots: knots.clone(),
+            });
+        }
+    };
+    let even =
+        |against, of_joint, count| even_quantiles(readings(problem, against, of_joint), count);
+    for of_joint in 0..problem.joints {
+        let position = even(Against::Position, of_joint, KNOTS);
+        add(Against::Position, of_joint, position, &[false, true]);
+        // Friction jumps at standstill, so over the joint's own velocity only curves that change sign with the
+        // direction of motion are tried.
+        let signs: &[bool] = if of_joint == joint {
+            &[true]
+        } else {
+            &[false, true]
+        };
+        let velocity = even(Against::Velocity, of_joint, KNOTS);
+        add(Against::Velocity, of_joint, velocity, signs);
+    }
+    for (against, count) in [
+        (Against::Position, MANY_KNOTS),
+        (Against::Acceleration, KNOTS),
+        (Against::Load, KNOTS),
+        (Against::RecordingTime, KNOTS),
+    ] {
+        add(against, joint, even(against, joint, count), &[false, true]);
+    }
+    let driven = with_zero(even(Against::DrivenLoad, joint, KNOTS));
+    add(Against::DrivenLoad, joint, driven, &[true]);
+    let load = readings(problem, Against::Load, joint);
+    for share in HYSTERESIS {
+        let band = share * deviation(&load);
+        let knots = (0..=2 * KNOTS_OF_SIDE).map(|k| band * (k as f64 / KNOTS_OF_SIDE as f64 - 1.0));
+        if band > 0.0 {
+            add(Against::LoadTurned, joint, knots.collect(), &[false]);
+        }
+    }
+    let since_rest = readings(problem, Against::SinceRest, joint);
+    let longest = since_rest.iter().copied().filter(|t| *t < SETTLED_S);
+    let longest = longest.fold(0.0, f64::max);
+    let mut knots = vec![0.0];
+    let times = (0..).map(|k| FIRST_S * f64::from(1 << k));
+    knots.extend(times.take_while(|t| *t <= longest));
+    add(Against::SinceRest, joint, knots, &[false, true]);
+    // A straight line: what bends over the session cannot be told from slow noise.
+    let session = readings(problem, Against::SessionTime, joint);
+    let first = session.iter().copied().fold(f64::INFINITY, f64::min);
+    let last = session.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if first < last {
+        add(
+            Against::SessionTime,
+            joint,
+            vec![first, last],
+            &[false, true],
+        );
+    }
+    all
+}
+
+/// What a curve could be drawn against, at all samples.
+fn readings(problem: &Problem, against: Against, of_joint: usize) -> Vec<f64> {
+    let mut values = Vec::new();
+    for track in &problem.tracks {
+        let mut gauge = Gauge::new(against, of_joint, 0.0);
+        let read = |_, at: &MotionSample<'_>| values.push(gauge.read(at));
+        track.track.each(read);
+    }
+    values
+}
+
+/// `count` even quantiles of `values`; those that are too near to each other are merged.
+fn even_quantiles(mut values: Vec<f64>, count: usize) -> Vec<f64> {
+    values.sort_by(f64::total_cmp);
+    let last = values.len() - 1;
+    let mut knots: Vec<f64> = (0..count).map(|k| values[last * k / (count - 1)]).collect();
+    let least = LEAST_SPACING / count as f64 * (knots[count - 1] - knots[0]);
+    knots.dedup_by(|later, earlier| *later - *earlier <= least);
+    knots
+}
+
+/// Knots of which the one nearest to zero is moved there.
+fn with_zero(mut knots: Vec<f64>) -> Vec<f64> {
+    let nearest = (0..knots.len()).min_by(|a, b| knots[*a].abs().total_cmp(&knots[*b].abs()));
+    if let Some(nearest) = nearest {
+        knots[nearest] = 0.0;
+    }
+    knots
+}
+
+/// Standard deviation.
+fn deviation(values: &[f64]) -> f64 {
+    let count = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares = values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>();
+    (squares / count).sqrt()
+}
