@@ -246,10 +246,13 @@ fn a_pipeline_without_end_is_refused_with_the_limit() {
         Out::answer([Path::new("check"), &file]).stderr
     };
     refused_soon("more than 20000 mappings, which is the limit", || {
-        let cells: String = (0..120_000)
-            .map(|n| format!(" c{n}: {{robot: a.urdf}}\n"))
+        let cells: Vec<_> = (0..120_000)
+            .map(|n| format!(" c{n}: {{robot: a.urdf}}"))
             .collect();
-        check(&format!("version: 1\ncells:\n{cells}stages: []\n"))
+        check(&format!(
+            "version: 1\ncells:\n{}\nstages: []\n",
+            cells.join("\n")
+        ))
     });
     refused_soon("more than 20000 mappings, which is the limit", || {
         check(&format!(

@@ -1,0 +1,170 @@
+//! The router file that `deploy/zenoh/secure.sh` writes, in a real router with live sessions: who holds which
+//! certificate decides who is heard.
+#![allow(clippy::unwrap_used, reason = "only tests are in here")]
+
+mod common;
+#[path = "common/robot.rs"]
+mod robot;
+
+use std::path::Path;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use zenoh::handlers::FifoChannelHandler;
+use zenoh::sample::{Sample, SampleKind};
+use zenoh::{Session, Wait as _};
+
+/// By then what is let through has come.
+const SOON: Duration = Duration::from_secs(10);
+
+/// Certificates for two cells, and the router that they meet at. Where there is no `openssl`, none.
+fn router(folder: &Path, test: &str) -> Option<(Session, String)> {
+    if Command::new("openssl").arg("version").output().is_err() {
+        common::skipped(test, "openssl is absent");
+        return None;
+    }
+    secure(folder);
+    let mut config = zenoh::Config::from_file(folder.join("router.json5")).unwrap();
+    let endpoint = robot::endpoint().replace("tcp/", "tls/");
+    let listen = format!("[\"{endpoint}\"]");
+    config.insert_json5("listen/endpoints", &listen).unwrap();
+    Some((zenoh::open(config).wait().unwrap(), endpoint))
+}
+
+fn secure(folder: &Path) {
+    let script = common::root().join("deploy/zenoh/secure.sh");
+    let made = Command::new(script)
+        .arg(folder)
+        .args(["127.0.0.1", "press-1", "press-2"])
+        .output()
+        .unwrap();
+    assert!(made.status.success(), "{made:?}");
+}
+
+/// A client that trusts the authority of `authority` and shows the certificate `name` of `own`, if any.
+fn client(endpoint: &str, authority: &Path, own: Option<(&Path, &str)>) -> zenoh::Result<Session> {
+    let file = |folder: &Path, name: &str| folder.join(name).display().to_string();
+    let mut endpoint = format!(
+        "{endpoint}#root_ca_certificate_file={}",
+        file(authority, "ca.pem")
+    );
+    if let Some((folder, name)) = own {
+        endpoint += &format!(
+            ";enable_mtls=true;connect_certificate_file={};connect_private_key_file={}",
+            file(folder, &format!("{name}.pem")),
+            file(folder, &format!("{name}.key"))
+        );
+    }
+    let mut config = zenoh::Config::default();
+    for (key, value) in [
+        ("mode", "\"client\"".to_owned()),
+        ("connect/endpoints", format!("[{endpoint:?}]")),
+        ("connect/timeout_ms", "2000".to_owned()),
+        ("connect/exit_on_failure", "true".to_owned()),
+        ("scouting/multicast/enabled", "false".to_owned()),
+    ] {
+        config.insert_json5(key, &value)?;
+    }
+    zenoh::open(config).wait()
+}
+
+fn next(from: &FifoChannelHandler<Sample>, begin: &str) -> Sample {
+    let deadline = Instant::now() + SOON;
+    while let Some(sample) = from.recv_deadline(deadline).unwrap() {
+        if sample.key_expr().as_str().starts_with(begin) {
+            return sample;
+        }
+    }
+    panic!("nothing under {begin}");
+}
+
+#[test]
+fn a_cell_speaks_and_hears_under_its_own_name_only() {
+    let test = "a_cell_speaks_and_hears_under_its_own_name_only";
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let Some((_router, endpoint)) = router(folder, test) else {
+        return;
+    };
+    let open = |name| client(&endpoint, folder, Some((folder, name))).unwrap();
+    let (fleet, one, two) = (open("fleet"), open("press-1"), open("press-2"));
+
+    let fleet_hears = fleet.declare_subscriber("*/**").wait().unwrap();
+    let two_hears = two.declare_subscriber("**").wait().unwrap();
+    let one_hears = one.declare_subscriber("press-1/**").wait().unwrap();
+    std::thread::sleep(Duration::from_secs(1));
+
+    // The stranger's word comes first, so its absence is not its lateness.
+    two.put("press-1/status", "forged").wait().unwrap();
+    two.put("press-2/status", "second").wait().unwrap();
+    let heard = next(&fleet_hears, "");
+    assert_eq!(heard.key_expr().as_str(), "press-2/status");
+    one.put("press-1/status", "first").wait().unwrap();
+    let heard = next(&fleet_hears, "press-1");
+    assert_eq!(heard.payload().try_to_string().unwrap(), "first");
+    let heard = next(&one_hears, "press-1");
+    assert_eq!(heard.payload().try_to_string().unwrap(), "first");
+    // Whatever it asks for, another cell hears none of it; what it said itself it hears without the router.
+    let mut overheard = Vec::new();
+    while let Some(sample) = two_hears.recv_timeout(Duration::from_secs(1)).unwrap() {
+        overheard.push(sample.payload().try_to_string().unwrap().into_owned());
+    }
+    assert_eq!(overheard, ["forged", "second"]);
+}
+
+#[test]
+fn only_the_fleet_host_commands_a_cell_and_sees_that_it_is_there() {
+    let test = "only_the_fleet_host_commands_a_cell_and_sees_that_it_is_there";
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let Some((_router, endpoint)) = router(folder, test) else {
+        return;
+    };
+    let open = |name| client(&endpoint, folder, Some((folder, name))).unwrap();
+    let (fleet, one, two) = (open("fleet"), open("press-1"), open("press-2"));
+
+    let tokens = fleet.liveliness().declare_subscriber("*/@alive/*");
+    let tokens = tokens.history(true).wait().unwrap();
+    let token = one.liveliness().declare_token("press-1/@alive/7");
+    let token = token.wait().unwrap();
+    let there = next(&tokens, "press-1/@alive/7");
+    assert_eq!(there.kind(), SampleKind::Put);
+
+    let commands = one.declare_queryable("press-1/commands").callback(|query| {
+        query.reply("press-1/commands", "taken").wait().unwrap();
+    });
+    let _commands = commands.wait().unwrap();
+    std::thread::sleep(Duration::from_secs(1));
+    let ask = |session: &Session| {
+        let answers = session.get("press-1/commands").timeout(SOON).wait();
+        let answers = answers.unwrap();
+        answers
+            .into_iter()
+            .filter(|answer| answer.result().is_ok())
+            .count()
+    };
+    assert_eq!(ask(&two), 0, "another cell");
+    assert_eq!(ask(&fleet), 1, "the fleet host");
+
+    token.undeclare().wait().unwrap();
+    let gone = next(&tokens, "press-1/@alive/7");
+    assert_eq!(gone.kind(), SampleKind::Delete);
+}
+
+#[test]
+fn who_has_no_certificate_of_the_plant_does_not_get_in() {
+    let test = "who_has_no_certificate_of_the_plant_does_not_get_in";
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let Some((_router, endpoint)) = router(folder, test) else {
+        return;
+    };
+    let elsewhere = folder.join("elsewhere");
+    secure(&elsewhere);
+    assert!(client(&endpoint, folder, None).is_err(), "none");
+    let stranger = client(&endpoint, folder, Some((&elsewhere, "press-1")));
+    assert!(stranger.is_err(), "a certificate of another authority");
+    let plain = endpoint.replace("tls/", "tcp/");
+    assert!(client(&plain, folder, None).is_err(), "no TLS at all");
+    assert!(client(&endpoint, folder, Some((folder, "press-1"))).is_ok());
+}
