@@ -242,7 +242,7 @@ mod tests {
             "list too long"
         );
         assert_eq!(
-            refused(status("c/status", &[b' '; MAX_STATUS_BYTES + 1])),
+            refused(status("c/status", &vec![b' '; MAX_STATUS_BYTES + 1])),
             "too long"
         );
         assert_eq!(

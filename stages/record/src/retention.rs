@@ -94,7 +94,7 @@ mod tests {
     }
 
     fn gone(keep: Keep, days: &[u64]) -> Vec<PathBuf> {
-        let now = SystemTime::UNIX_EPOCH + Duration::from_secs(86_400 * 1000);
+        let now = SystemTime::UNIX_EPOCH + Duration::from_hours(24 * 1000);
         beyond(&keep, &files(days), now)
     }
 

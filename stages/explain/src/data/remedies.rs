@@ -177,7 +177,9 @@ mod tests {
         assert!(matches!(turned(0, true), Some(Remedy::JointTurned(_))));
         let degrees = remedy_of(|recording| {
             for all in [&mut recording.position, &mut recording.velocity] {
-                all.iter_mut().for_each(|x| *x = x.to_degrees());
+                for x in all.iter_mut() {
+                    *x = x.to_degrees();
+                }
             }
         });
         assert_eq!(degrees, Some(Remedy::Degrees));

@@ -342,7 +342,9 @@ mod tests {
         let mut noise = crate::fixture::Noise(9);
         let recordings = [6, 7].map(|seed| {
             crate::fixture::recording(&real, seed, |_, _, effort| {
-                effort.iter_mut().for_each(|x| *x += 0.02 * noise.next());
+                for x in effort.iter_mut() {
+                    *x += 0.02 * noise.next();
+                }
             })
         });
         let problem = crate::fixture::problem(&model, &recordings);
