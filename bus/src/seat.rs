@@ -3,6 +3,7 @@
 //! The program works it out from the pipeline file and hands it to the process as JSON; see
 //! [`shell::child`](crate::shell::child) for how.
 
+use std::path::PathBuf;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
@@ -12,6 +13,7 @@ use crate::link::{
     Audience, Domain, Keep, MAX_RECEIVERS, PATIENCE, Position, SpillSettings, ZenohEndpoints,
 };
 use crate::sample::SampleKind;
+use crate::shell::Ledger;
 
 mod links;
 
@@ -53,6 +55,10 @@ pub struct Seat {
     /// How long a sender waits for a keep-all receiver that takes nothing \[ms\].
     #[serde(default = "Seat::default_patience_ms")]
     pub patience_ms: u64,
+    /// A file in which it keeps its counts ([`Ledger`](crate::shell::Ledger)), if its supervisor wants to know them after
+    /// its death.
+    #[serde(default)]
+    pub ledger: Option<PathBuf>,
     /// What else the stage needs, in the stage's own words.
     #[serde(default)]
     pub config: serde_json::Value,
@@ -85,8 +91,21 @@ impl Seat {
             health: None,
             start_within_ms: Self::default_start_within_ms(),
             patience_ms: Self::default_patience_ms(),
+            ledger: None,
             config: serde_json::Value::Null,
         }
+    }
+
+    /// Where it keeps its counts. Without it a supervisor knows less, and the stage does its work.
+    pub fn ledger(&self) -> Ledger {
+        let Some(path) = &self.ledger else {
+            return Ledger::default();
+        };
+        Ledger::open(path).unwrap_or_else(|error| {
+            let stage = &self.stage;
+            tracing::warn!(stage, %error, "the counts of this stage do not outlive it");
+            Ledger::default()
+        })
     }
 
     /// How long it waits for its receivers before it begins without them.

@@ -8,6 +8,7 @@ use tauscope_bus::{SampleKind, Seat, Trouble};
 use tokio::time::Instant;
 
 use super::flow::Flow;
+use super::ledger::Kept;
 use super::patience::{Overdue, Patience};
 use super::restart::Deaths;
 use super::silence::Silence;
@@ -42,6 +43,10 @@ pub struct Local {
     killed: bool,
     /// By when it should have ended by itself.
     finish_by: Option<Instant>,
+    /// Whether it is a source that loses what comes while it is dead.
+    live: bool,
+    /// What it keeps beyond its death; without it, its reports must do.
+    kept: Option<Kept>,
 }
 
 #[derive(Debug)]
@@ -74,8 +79,10 @@ pub enum Reported<'a> {
 
 impl Local {
     /// A stage that is to be started.
-    pub fn new(at: usize, seat: Seat, crew: usize, root: usize) -> Self {
+    pub fn new(at: usize, mut seat: Seat, crew: usize, root: usize, live: bool) -> Self {
         let now = Instant::now();
+        let kept = Kept::new(seat.inputs.len()).ok();
+        seat.ledger = kept.as_ref().map(Kept::path);
         Self {
             at,
             seat,
@@ -91,12 +98,19 @@ impl Local {
             patience: None,
             killed: false,
             finish_by: None,
+            live,
+            kept,
         }
     }
 
     /// Whether it listens to nobody.
     pub fn is_source(&self) -> bool {
         self.seat.inputs.is_empty()
+    }
+
+    /// Whether it listens to a robot, which does not wait for it; what an outside program does is not known.
+    pub fn is_live_source(&self) -> bool {
+        self.live
     }
 
     /// Whether it runs and has said that it begins.
@@ -231,6 +245,7 @@ impl Local {
 
     /// It died, and is started again after this time, if it is.
     pub fn die(&mut self, again: Option<Duration>) {
+        self.settle();
         self.state = match again {
             Some(wait) => {
                 self.next_life();
@@ -238,6 +253,21 @@ impl Local {
             }
             None => State::Lost,
         };
+    }
+
+    /// Takes over what it has noted since its last report, and makes room for the next life. One that has said itself how
+    /// it ended has counted all.
+    fn settle(&mut self) {
+        let Some(kept) = &self.kept else { return };
+        if let (false, Ok(account)) = (self.is_done(), kept.account()) {
+            let from = self.seat.inputs.iter().map(|input| input.from.as_str());
+            self.tally.settle(&account, from);
+        }
+        // What cannot be cleared is not to be read any more.
+        if kept.clear().is_err() {
+            self.kept = None;
+            self.seat.ledger = None;
+        }
     }
 
     /// Makes the seat of the next life out of what the last one has said.

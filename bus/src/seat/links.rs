@@ -94,14 +94,12 @@ impl Links {
                 }
             }
             (TransportKind::Zenoh, spill) => {
-                let inner = self.zenoh()?.sender(stream, audience)?;
-                ways.push(match spill {
-                    Some(spill) => {
-                        let receivers = audience.keep_all;
-                        Box::new(Spill::new(inner, spill, self.patience, receivers))
-                    }
-                    None => inner,
-                });
+                let zenoh = self.zenoh()?;
+                let zenoh = match spill {
+                    Some(spill) => zenoh.with_spill(spill),
+                    None => zenoh,
+                };
+                ways.push(zenoh.sender(stream, audience)?);
             }
         }
         Ok(())

@@ -144,6 +144,7 @@ impl Child {
                 restarts: seat.restarts,
                 from: input.from.clone(),
                 health: health_sender(&links, seat)?,
+                ledger: seat.ledger(),
             };
             let first = branch(&turn, post, Box::new(stage), out);
             let open = Box::new(|| Ok(links.receiver::<I>(input)? as Box<dyn Receiver<I>>));

@@ -240,7 +240,13 @@ fn sink_here(
         })
     });
     let inputs = inputs.collect::<Result<_, LinkError>>()?;
-    Ok(run_sink(context, sink, inputs, &mut *health))
+    Ok(run_sink(
+        context,
+        sink,
+        inputs,
+        &mut *health,
+        &seat.ledger(),
+    ))
 }
 
 fn shape(seat: &Seat, expected: &'static str) -> ChildError {
@@ -301,6 +307,7 @@ impl<'a> Grower<'a> {
                 .first()
                 .map_or_else(String::new, |input| input.from.clone()),
             health: health_sender(&links, seat)?,
+            ledger: seat.ledger(),
         };
         let Some(output) = &seat.output else {
             return Err(shape(seat, "an output"));

@@ -1,6 +1,6 @@
 //! A tree of one stage, over links that are open.
 
-use super::Context;
+use super::{Context, Ledger};
 use super::report::{Outcome, Report};
 use super::tree::{Outlet, Post, Tree, Turn, branch};
 use crate::link::{Receiver, Sender};
@@ -48,6 +48,7 @@ fn post<'a>(context: &Context, from: &str, health: &'a mut dyn Sender<Health>) -
         restarts: context.restarts,
         from: from.to_owned(),
         health: Box::new(health),
+        ledger: Ledger::default(),
     }
 }
 
