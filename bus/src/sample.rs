@@ -13,8 +13,9 @@ use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
-use check::Values as _;
+pub(crate) use check::MOST_SAMPLES;
 pub use check::Unsound;
+use check::Values as _;
 pub use command::{Command, Verb};
 pub use name::Name;
 

@@ -173,6 +173,9 @@ pub struct Output {
     pub stream: String,
     /// What it carries.
     pub kind: SampleKind,
+    /// How many samples earlier lives of the stage have put out.
+    #[serde(default)]
+    pub former: u64,
     /// The ways it leaves its tree; none if nobody listens elsewhere.
     #[serde(default)]
     pub links: Vec<OutputLink>,

@@ -59,7 +59,7 @@ fn state(stamp: i64) -> JointState {
 
 /// What goes beside a sample of that sender.
 fn beside(instance: u64) -> Vec<u8> {
-    [instance, 0, 0].map(u64::to_le_bytes).concat()
+    [instance, 0, 0, 0].map(u64::to_le_bytes).concat()
 }
 
 impl Scene {

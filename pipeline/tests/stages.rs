@@ -9,8 +9,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use tauscope_bus::link::FanOut;
-use tauscope_bus::shell::{Context, Ledger};
 use tauscope_bus::shell::tree::{Outlet, Post, Tree, Turn, branch};
+use tauscope_bus::shell::{Context, Ledger};
 use tauscope_bus::{
     Detection, EffortUnit, Emit, JointState, LinkError, Progress, Sample, Source, Stage,
     StageError, TwinState, flags,

@@ -274,6 +274,9 @@ impl Local {
     fn next_life(&mut self) {
         let last: Report = self.tally.end_life();
         self.seat.restarts += 1;
+        if let Some(output) = &mut self.seat.output {
+            output.former = self.tally.sums().emitted;
+        }
         for (input, report) in self.seat.inputs.iter_mut().zip(&last.inputs) {
             input.resume = report.position.or(input.resume);
         }

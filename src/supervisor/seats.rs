@@ -208,6 +208,7 @@ impl Planner<'_> {
         Output {
             stream: self.pipeline.stages[at].stream(),
             kind,
+            former: 0,
             links: self.ways(at, kind, &listeners),
         }
     }
@@ -220,6 +221,7 @@ impl Planner<'_> {
         Output {
             stream: health_stream(&self.pipeline.stages[at].stream()),
             kind: SampleKind::Health,
+            former: 0,
             links: self.ways(at, SampleKind::Health, &listeners),
         }
     }

@@ -104,7 +104,11 @@ mod tests {
     use super::*;
 
     fn report(received: u64, lost: u64) -> Report {
-        let counts = ReceiverCounts { received, lost, ..ReceiverCounts::default() };
+        let counts = ReceiverCounts {
+            received,
+            lost,
+            ..ReceiverCounts::default()
+        };
         let input = InputReport {
             counts,
             ..InputReport::default()
@@ -142,7 +146,10 @@ mod tests {
         // One that died before it could report.
         tally.settle(&account, ["twin"].into_iter());
         assert_eq!(tally.newest().inputs[0].from, "twin");
-        assert_eq!((tally.sums().emitted, tally.sums().inputs[0].received), (24, 26));
+        assert_eq!(
+            (tally.sums().emitted, tally.sums().inputs[0].received),
+            (24, 26)
+        );
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Holes in a stream, over the lives of its sender.
 
 use super::{Position, Received, ReceiverCounts};
-use crate::sample::{Sample, Unsound, flags};
+use crate::sample::{MOST_SAMPLES, Sample, Unsound, flags};
 
 /// Follows the sequence numbers that a receiver hears, and lets no sample through that a stage must not see.
 ///
@@ -13,6 +13,8 @@ pub(crate) struct Tracker {
     present: Option<Position>,
     former: Option<Position>,
     counts: ReceiverCounts,
+    /// An earlier life of this receiver has counted, too.
+    resumed: bool,
 }
 
 impl Tracker {
@@ -54,7 +56,7 @@ impl Tracker {
     /// did not hear from there on is lost.
     fn came_in(&mut self, begin: Option<Position>) {
         if let (None, Some(begin)) = (self.present, begin) {
-            self.counts.before = begin.next;
+            self.counts.before = self.counts.before.saturating_add(begin.next);
             self.present = Some(begin);
         }
     }
@@ -94,7 +96,9 @@ impl Tracker {
     fn refuse(&mut self, why: &Unsound) {
         if self.counts.refused == 0 {
             let stream = &self.stream;
-            tracing::warn!("stream `{stream}`: a sample with {why} is refused; further ones are only counted");
+            tracing::warn!(
+                "stream `{stream}`: a sample with {why} is refused; further ones are only counted"
+            );
         }
         self.counts.refused += 1;
     }
@@ -107,7 +111,23 @@ impl Tracker {
         self.present
     }
 
+    /// A life of the sender that is new to this receiver has had so many samples in all lives before it: of those, what
+    /// was not heard is lost, or, if nothing was heard yet, was sent before this receiver came in.
+    pub(crate) fn hears_of_former_lives(&mut self, samples: u64) {
+        let samples = samples.min(MOST_SAMPLES);
+        let counts = &mut self.counts;
+        let known = counts.received.saturating_add(counts.dropped());
+        let missing = samples.saturating_sub(known);
+        match self.present {
+            None => counts.before = counts.before.saturating_add(missing),
+            Some(_) if !self.resumed => counts.lost = counts.lost.saturating_add(missing),
+            // What the earlier life of this receiver has counted is not known here.
+            Some(_) => {}
+        }
+    }
+
     pub(crate) fn resume(&mut self, position: Position) {
+        self.resumed = true;
         self.present = Some(position);
     }
 }
@@ -173,6 +193,30 @@ mod tests {
         let counts = tracker.counts();
         assert_eq!((seen, counts.received), (2, 2));
         assert_eq!((counts.refused, counts.lost), (2, 0));
+    }
+
+    #[test]
+    fn what_a_dead_sender_had_sent_is_known_from_its_next_life() {
+        let mut tracker = Tracker::default();
+        let hear = |tracker: &mut Tracker, instance, sequence| {
+            let mut sample = crate::JointState::default();
+            sample.header.sequence = sequence;
+            let begin = Position {
+                instance,
+                next: sequence,
+            };
+            tracker.take(Some(begin), instance, &sample, &mut |_| {})
+        };
+        // Ten were sent before this receiver came in, and four died with their sender.
+        tracker.hears_of_former_lives(8);
+        hear(&mut tracker, 1, 2);
+        hear(&mut tracker, 1, 3);
+        tracker.hears_of_former_lives(16);
+        hear(&mut tracker, 2, 0);
+        let counts = tracker.counts();
+        assert_eq!((counts.before, counts.received, counts.lost), (10, 3, 4));
+        tracker.hears_of_former_lives(u64::MAX);
+        tracker.hears_of_former_lives(u64::MAX);
     }
 
     #[test]

@@ -17,9 +17,10 @@
 //! - encoding `zenoh/bytes;tauscope/JointState/2`, the type name of the sample after the semicolon;
 //! - payload: one or more samples, one after the other, as they lie in memory, little-endian, without a frame: see
 //!   [`wire`](super::wire) for the offsets;
-//! - attachment: three little-endian `u64`: the sender's instance, another one after each restart, while
+//! - attachment: four little-endian `u64`: the sender's instance, another one after each restart, while
 //!   the sequence number in the sample's header counts from 0 again; the number of the oldest sample that can still be
-//!   had; how many numbers right before the first sample are lost for good;
+//!   had; how many numbers right before the first sample are lost for good; how many samples all earlier lives of the
+//!   sender had;
 //! - congestion control `drop`: nothing ever waits for a link that is full, so that a frozen or distant receiver holds up
 //!   neither other streams nor the stage.
 //!
@@ -125,6 +126,8 @@ pub struct Zenoh {
     session: zenoh::Session,
     patience: Duration,
     spill: SpillSettings,
+    /// How many samples the earlier lives of a sender had.
+    former: u64,
     /// Ends of this session so far, so that each has a number.
     ends: Arc<AtomicU64>,
 }
@@ -139,6 +142,7 @@ impl Zenoh {
             session: open_session("peer", endpoints, patience)?,
             patience,
             spill: SPILL,
+            former: 0,
             ends: Arc::default(),
         })
     }
@@ -147,6 +151,13 @@ impl Zenoh {
     #[must_use]
     pub fn with_spill(mut self, spill: SpillSettings) -> Self {
         self.spill = spill;
+        self
+    }
+
+    /// The same for a sender whose earlier lives had so many samples: its receivers then know what died with those.
+    #[must_use]
+    pub fn with_former(mut self, samples: u64) -> Self {
+        self.former = samples;
         self
     }
 

@@ -8,7 +8,7 @@ use super::{Command, Detection, Header, Health, JointState, MAX_JOINTS, TwinStat
 const LATEST_NS: i64 = i32::MAX as i64 * 1_000_000_000 + 999_999_999;
 /// No stream has as many samples; above it, counting could overflow.
 /// Resolution: 285 000 years at 1 kHz.
-const MOST_SAMPLES: u64 = 1 << 53;
+pub(crate) const MOST_SAMPLES: u64 = 1 << 53;
 
 /// Why a sample is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

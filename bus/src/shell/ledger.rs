@@ -105,7 +105,16 @@ impl Account {
         let (own, inputs) = words.split_at(OWN.min(words.len()));
         let inputs = inputs.as_chunks::<EACH>().0.iter();
         let inputs = inputs.map(|words| {
-            let [received, lost, refused, before, foreign, heard, instance, next] = *words;
+            let [
+                received,
+                lost,
+                refused,
+                before,
+                foreign,
+                heard,
+                instance,
+                next,
+            ] = *words;
             let counts = ReceiverCounts {
                 received,
                 lost,
@@ -170,6 +179,6 @@ mod tests {
     #[test]
     fn a_stage_without_a_supervisor_notes_nothing() {
         Ledger::default().emitted(1, &Header::default());
-        assert_eq!(Account::read(&[]).inputs, []);
+        assert!(Account::read(&[]).inputs.is_empty());
     }
 }

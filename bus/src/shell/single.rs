@@ -1,8 +1,8 @@
 //! A tree of one stage, over links that are open.
 
-use super::{Context, Ledger};
 use super::report::{Outcome, Report};
 use super::tree::{Outlet, Post, Tree, Turn, branch};
+use super::{Context, Ledger};
 use crate::link::{Receiver, Sender};
 use crate::sample::{Health, Sample};
 use crate::stage::{Source, Stage};

@@ -7,8 +7,7 @@ use std::time::{Duration, Instant};
 
 use tauscope_bus::{
     Audience, Domain, Header, InProcess, JointState, Keep, LinkError, Received, Receiver, Sender,
-    SharedMemory, Transport, TwinState, Zenoh, ZenohEndpoints, ZenohRouter,
-    link::SpillSettings,
+    SharedMemory, Transport, TwinState, Zenoh, ZenohEndpoints, ZenohRouter, link::SpillSettings,
 };
 
 mod promises;
@@ -127,7 +126,9 @@ impl Sides for ZenohHostSides {
         Self {
             _routers: [router_a, router_b],
             sides: ZenohSides {
-                sending: Zenoh::open(&connect(&a), patience).unwrap().with_spill(SPILL),
+                sending: Zenoh::open(&connect(&a), patience)
+                    .unwrap()
+                    .with_spill(SPILL),
                 receiving: Zenoh::open(&connect(&b), patience).unwrap(),
             },
         }

@@ -259,7 +259,10 @@ pub fn another_type_is_refused<S: Sides>() {
         .sending()
         .sender::<JointState>(STREAM, audience(1, 0))
         .unwrap();
-    let mut receiver = match sides.receiving().receiver::<TwinState>(STREAM, Keep::All, 8) {
+    let mut receiver = match sides
+        .receiving()
+        .receiver::<TwinState>(STREAM, Keep::All, 8)
+    {
         Ok(receiver) => receiver,
         Err(LinkError::TypeMismatch {
             stream,

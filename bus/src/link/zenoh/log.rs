@@ -231,13 +231,7 @@ impl<T: Copy> Log<T> {
     }
 
     /// A receiver has taken all before `next` but for those it has found lost; whether it misses what was sent already.
-    pub(super) fn taken(
-        &mut self,
-        id: &str,
-        (next, lost): (u64, u64),
-        misses: bool,
-        now: Instant,
-    ) {
+    pub(super) fn taken(&mut self, id: &str, (next, lost): (u64, u64), misses: bool, now: Instant) {
         let Some(reader) = self.readers.get_mut(id) else {
             return;
         };
@@ -305,7 +299,9 @@ impl<T: Copy> Log<T> {
         let limit = self.limit(now);
         let since = self.entries.front()?.sequence;
         self.cursor = self.cursor.max(since);
-        let from = self.entries.partition_point(|entry| entry.sequence < self.cursor);
+        let from = self
+            .entries
+            .partition_point(|entry| entry.sequence < self.cursor);
         let mut batch = Batch {
             since,
             gap: self.entries.get(from)?.gap,
@@ -350,7 +346,9 @@ impl<T: Copy> Log<T> {
         let mut from = self.cursor;
         for reader in self.readers.values_mut() {
             let waits = reader.there && !reader.given_up && reader.next < self.cursor;
-            let ends = self.end.is_some_and(|end| reader.next <= end && end < self.cursor);
+            let ends = self
+                .end
+                .is_some_and(|end| reader.next <= end && end < self.cursor);
             if !waits || (self.keep == Keep::Newest && !ends) {
                 reader.again = reader.again.max(reader.moved);
                 continue;
@@ -409,7 +407,7 @@ mod tests {
         assert_eq!(out(&mut log, now), [4, 5, 6, 7, 8, 9]);
         // Nothing is said of the last ones.
         log.look_back(now + AGAIN_AFTER / 2);
-        assert_eq!(out(&mut log, now), []);
+        assert!(out(&mut log, now).is_empty());
         log.look_back(now + AGAIN_AFTER);
         assert_eq!(out(&mut log, now), [4, 5, 6, 7, 8, 9]);
     }
@@ -481,7 +479,7 @@ mod tests {
         push(&mut log, 0..20);
         assert_eq!(out(&mut log, now).len(), 4);
         log.taken("a", (4, 0), false, now);
-        assert_eq!(out(&mut log, now), []);
+        assert!(out(&mut log, now).is_empty());
         assert_eq!(out(&mut log, now + PATIENCE), [4, 5, 6, 7]);
         // It comes to its senses.
         log.taken("b", (4, 0), false, now + PATIENCE);

@@ -11,19 +11,22 @@ pub(super) struct Beside {
     pub since: u64,
     /// How many were lost right before the first one.
     pub gap: u64,
+    /// How many samples all earlier lives of the sender had.
+    pub former: u64,
 }
 
 impl Beside {
-    pub(super) fn bytes(self) -> [u8; 24] {
-        bytes([self.instance, self.since, self.gap])
+    pub(super) fn bytes(self) -> [u8; 32] {
+        bytes([self.instance, self.since, self.gap, self.former])
     }
 
     pub(super) fn read(bytes: &[u8]) -> Option<Self> {
-        let [instance, since, gap] = numbers(bytes)?;
+        let [instance, since, gap, former] = numbers(bytes)?;
         Some(Self {
             instance,
             since,
             gap,
+            former,
         })
     }
 }
@@ -107,6 +110,7 @@ mod tests {
             instance: 7,
             since: 1 << 40,
             gap: 3,
+            former: 5,
         };
         assert_eq!(Beside::read(&beside.bytes()), Some(beside));
         assert_eq!(Beside::read(&[0; 8]), None);

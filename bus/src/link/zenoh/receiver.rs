@@ -44,6 +44,7 @@ pub(super) struct ZenohReceiver<T: Sample> {
 struct Incoming<T> {
     since: u64,
     gap: u64,
+    former: u64,
     sample: T,
 }
 
@@ -72,6 +73,7 @@ impl<T: Sample> Heard<T> {
             instance,
             since,
             mut gap,
+            former,
         }) = beside
         else {
             if self.foreign.fetch_add(1, Ordering::Relaxed) == 0 {
@@ -104,7 +106,12 @@ impl<T: Sample> Heard<T> {
             let message = Message {
                 instance,
                 sequence: sample.header().sequence,
-                payload: Incoming { since, gap, sample },
+                payload: Incoming {
+                    since,
+                    gap,
+                    former,
+                    sample,
+                },
             };
             gap = 0;
             // What has no room is asked for again, or, where the newest are kept, counted as lost.
@@ -278,7 +285,8 @@ impl<T: Sample> Receiver<T> for ZenohReceiver<T> {
                 Keep::Newest => self.heard.queue.begin(),
             };
             let present = self.tracker.position().map(|it| it.instance);
-            if present.is_some_and(|present| present != instance) {
+            if present != Some(instance) {
+                self.tracker.hears_of_former_lives(message.payload.former);
                 self.lost_before = self.tracker.counts().lost;
             }
             let sample = &message.payload.sample;

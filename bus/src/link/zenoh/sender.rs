@@ -39,6 +39,7 @@ pub(super) struct ZenohSender<T: Sample> {
 struct Wire {
     publisher: Publisher<'static>,
     instance: u64,
+    former: u64,
     _tokens: Subscriber<()>,
     _taken: Subscriber<()>,
 }
@@ -136,6 +137,7 @@ impl<T: Sample> ZenohSender<T> {
             wire: Some(Wire {
                 publisher,
                 instance,
+                former: transport.former,
                 _tokens: tokens,
                 _taken: taken,
             }),
@@ -278,6 +280,7 @@ impl<T: Sample> Shared<T> {
                 instance: wire.instance,
                 since: batch.since,
                 gap: batch.gap,
+                former: wire.former,
             };
             wire.publisher
                 .put(bytemuck::cast_slice::<T, u8>(&batch.samples))
@@ -300,7 +303,8 @@ impl<T: Sample> Shared<T> {
                 return Some(batch);
             }
             let leaves = state.closed;
-            if leaves.is_some_and(|at| state.log.is_empty() || at.elapsed() >= crate::link::PATIENCE)
+            if leaves
+                .is_some_and(|at| state.log.is_empty() || at.elapsed() >= crate::link::PATIENCE)
             {
                 return None;
             }
