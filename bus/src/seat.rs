@@ -13,7 +13,6 @@ use crate::link::{
     Audience, Domain, Keep, MAX_RECEIVERS, PATIENCE, Position, SpillSettings, ZenohEndpoints,
 };
 use crate::sample::SampleKind;
-use crate::shell::Ledger;
 
 mod links;
 
@@ -94,18 +93,6 @@ impl Seat {
             ledger: None,
             config: serde_json::Value::Null,
         }
-    }
-
-    /// Where it keeps its counts. Without it a supervisor knows less, and the stage does its work.
-    pub fn ledger(&self) -> Ledger {
-        let Some(path) = &self.ledger else {
-            return Ledger::default();
-        };
-        Ledger::open(path).unwrap_or_else(|error| {
-            let stage = &self.stage;
-            tracing::warn!(stage, %error, "the counts of this stage do not outlive it");
-            Ledger::default()
-        })
     }
 
     /// How long it waits for its receivers before it begins without them.

@@ -143,32 +143,36 @@ fn free() -> String {
     format!("tcp/{}", port.local_addr().unwrap())
 }
 
+/// A router there; the port may still be taken by what another one left.
+fn router(listen: &str, connect: &[String]) -> ZenohRouter {
+    let endpoints = ZenohEndpoints {
+        listen: vec![listen.to_owned()],
+        connect: connect.to_vec(),
+    };
+    let mut attempts = (0..100).map(|_| {
+        let router = ZenohRouter::open(&endpoints);
+        if router.is_err() {
+            std::thread::sleep(Duration::from_millis(100));
+        }
+        router
+    });
+    attempts.find_map(Result::ok).expect("a router")
+}
+
+/// Two hosts, each with a router of its own, that meet at a third one.
 #[test]
 fn a_router_that_is_started_again_costs_nothing() {
-    let endpoint = free();
-    let router = || {
-        let listen = vec![endpoint.clone()];
-        let connect = Vec::new();
+    let between = free();
+    let first = router(&between, &[]);
+    let host = || {
+        let here = free();
+        let router = router(&here, std::slice::from_ref(&between));
+        let listen = Vec::new();
+        let connect = vec![here];
         let endpoints = ZenohEndpoints { listen, connect };
-        // The port may still be taken by what the last one left.
-        let mut attempts = (0..100).map(|_| {
-            let router = ZenohRouter::open(&endpoints);
-            if router.is_err() {
-                std::thread::sleep(Duration::from_millis(100));
-            }
-            router
-        });
-        attempts.find_map(Result::ok).expect("a router")
+        (router, Zenoh::open(&endpoints, LONG).unwrap())
     };
-    let there = ZenohEndpoints {
-        listen: Vec::new(),
-        connect: vec![endpoint.clone()],
-    };
-    let first = router();
-    let (a, b) = (
-        Zenoh::open(&there, LONG).unwrap(),
-        Zenoh::open(&there, LONG).unwrap(),
-    );
+    let ((_near, a), (_far, b)) = (host(), host());
     let mut sender: Box<dyn Sender<JointState>> =
         a.sender("c/s", Audience::of(Keep::All, 1)).unwrap();
     let mut receiver: Box<dyn Receiver<JointState>> = b.receiver("c/s", Keep::All, 64).unwrap();
@@ -185,7 +189,7 @@ fn a_router_that_is_started_again_costs_nothing() {
     drop(first);
     missing_becomes(&mut *sender, 1);
     send(&mut *sender, 50);
-    let _second = router();
+    let _second = router(&between, &[]);
     missing_becomes(&mut *sender, 0);
     send(&mut *sender, 50);
     sender.end().unwrap();

@@ -21,6 +21,8 @@ struct Scene {
     sender: Box<dyn Sender<JointState>>,
     receiver: Box<dyn Receiver<JointState>>,
     stranger: zenoh::Session,
+    /// A session ends with its last transport.
+    _links: [Zenoh; 2],
 }
 
 fn scene(keep: Keep) -> Scene {
@@ -48,6 +50,7 @@ fn scene(keep: Keep) -> Scene {
         sender,
         receiver,
         stranger: there.session().unwrap(),
+        _links: [links, other],
     }
 }
 

@@ -24,7 +24,7 @@ use super::child::{
 };
 use super::report::text_of;
 use super::tree::{Branch, Opening, Outlet, Post, Tree, Turn, branch, fell, words_of};
-use super::{Board, Context, Outcome, Report, SinkInput, Stop, run_sink};
+use super::{Board, Context, Ledger, Outcome, Report, SinkInput, Stop, run_sink};
 use crate::link::{LinkError, Receiver};
 use crate::sample::{Detection, JointState, Sample, TwinState};
 use crate::seat::{Input, Links, Output, Seat, TransportKind, Transports};
@@ -245,7 +245,7 @@ fn sink_here(
         sink,
         inputs,
         &mut *health,
-        &seat.ledger(),
+        &Ledger::of(seat),
     ))
 }
 
@@ -307,7 +307,7 @@ impl<'a> Grower<'a> {
                 .first()
                 .map_or_else(String::new, |input| input.from.clone()),
             health: health_sender(&links, seat)?,
-            ledger: seat.ledger(),
+            ledger: Ledger::of(seat),
         };
         let Some(output) = &seat.output else {
             return Err(shape(seat, "an output"));

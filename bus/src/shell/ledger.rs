@@ -14,6 +14,7 @@ use memmap2::MmapRaw;
 
 use crate::link::{Position, ReceiverCounts};
 use crate::sample::Header;
+use crate::seat::Seat;
 
 /// Numbers of the stage itself: emitted, stamp of the newest sample.
 const OWN: usize = 2;
@@ -28,6 +29,18 @@ impl Ledger {
     /// Length of the file for a stage with so many inputs \[bytes\].
     pub fn length(inputs: usize) -> usize {
         (OWN + EACH * inputs) * size_of::<u64>()
+    }
+
+    /// Where the seat says. Without it a supervisor knows less, and the stage does its work.
+    pub fn of(seat: &Seat) -> Self {
+        let Some(path) = &seat.ledger else {
+            return Self::default();
+        };
+        Self::open(path).unwrap_or_else(|error| {
+            let stage = &seat.stage;
+            tracing::warn!(stage, %error, "the counts of this stage do not outlive it");
+            Self::default()
+        })
     }
 
     /// In a file of that length.

@@ -116,21 +116,7 @@ impl<T: Sample> ZenohSender<T> {
             .declare_token(format!("{stream}/@from/{instance:016x}"))
             .wait()
             .map_err(failed)?;
-        let theirs = Arc::clone(&shared);
-        let tokens = session
-            .liveliness()
-            .declare_subscriber(format!("{stream}/{}/*", policy(keep)))
-            .history(true)
-            .callback(move |token| {
-                let id = last_chunk(token.key_expr());
-                let room = id.rsplit('.').next().and_then(|room| room.parse().ok());
-                theirs.change(|log, now| match token.kind() {
-                    Change::Put => log.join(id, room.unwrap_or(1), now),
-                    Change::Delete => log.lose(id, now),
-                });
-            })
-            .wait()
-            .map_err(failed)?;
+        let tokens = presence(session, stream, keep, &shared).map_err(failed)?;
         Ok(Self {
             stream: stream.to_owned(),
             shared,
@@ -194,6 +180,29 @@ impl<T: Sample> ZenohSender<T> {
             state = wait(&self.shared.changed, state, left);
         }
     }
+}
+
+/// Hears who listens.
+fn presence<T: Sample>(
+    session: &zenoh::Session,
+    stream: &str,
+    keep: Keep,
+    shared: &Arc<Shared<T>>,
+) -> zenoh::Result<Subscriber<()>> {
+    let theirs = Arc::clone(shared);
+    session
+        .liveliness()
+        .declare_subscriber(format!("{stream}/{}/*", policy(keep)))
+        .history(true)
+        .callback(move |token| {
+            let id = last_chunk(token.key_expr());
+            let room = id.rsplit('.').next().and_then(|room| room.parse().ok());
+            theirs.change(|log, now| match token.kind() {
+                Change::Put => log.join(id, room.unwrap_or(1), now),
+                Change::Delete => log.lose(id, now),
+            });
+        })
+        .wait()
 }
 
 impl<T: Sample> Sender<T> for ZenohSender<T> {
