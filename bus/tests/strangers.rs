@@ -187,7 +187,7 @@ fn messages_of_a_wrong_type_or_length_end_no_run() {
 #[test]
 fn a_flood_of_a_stranger_keeps_nobody_from_hearing_the_sender() {
     let mut scene = scene(Keep::All);
-    let mut forged = [state(999); 40];
+    let mut forged = vec![state(999); 40];
     for (number, state) in (0..).zip(&mut forged) {
         state.header.sequence = number;
         state.header.joint_count = 4_000_000_000;

@@ -8,7 +8,6 @@ use std::time::Duration;
 use serde::Deserialize;
 use tauscope_bus::Seat;
 use tauscope_pipeline::pipeline::{Pipeline, Role};
-use tauscope_pipeline::settings::Settings;
 use tokio::time::Instant;
 
 use super::Supervisor;
@@ -41,13 +40,7 @@ pub(super) fn crews(
         crews[place].stages.push(index);
         // A tree is on one host.
         let root = here.get(&roots[at]).copied().unwrap_or(index);
-        let live = match &stage.settings {
-            Settings::Ingest(config) => config
-                .source()
-                .is_ok_and(|(_, source)| source.file().is_none()),
-            _ => false,
-        };
-        stages.push(Local::new(at, seat, place, root, live));
+        stages.push(Local::new(at, seat, place, root));
     }
     (stages, crews)
 }

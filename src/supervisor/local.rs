@@ -43,8 +43,6 @@ pub struct Local {
     killed: bool,
     /// By when it should have ended by itself.
     finish_by: Option<Instant>,
-    /// Whether it is a source that loses what comes while it is dead.
-    live: bool,
     /// What it keeps beyond its death; without it, its reports must do.
     kept: Option<Kept>,
 }
@@ -79,7 +77,7 @@ pub enum Reported<'a> {
 
 impl Local {
     /// A stage that is to be started.
-    pub fn new(at: usize, mut seat: Seat, crew: usize, root: usize, live: bool) -> Self {
+    pub fn new(at: usize, mut seat: Seat, crew: usize, root: usize) -> Self {
         let now = Instant::now();
         let kept = Kept::new(seat.inputs.len()).ok();
         seat.ledger = kept.as_ref().map(Kept::path);
@@ -98,7 +96,6 @@ impl Local {
             patience: None,
             killed: false,
             finish_by: None,
-            live,
             kept,
         }
     }
@@ -106,11 +103,6 @@ impl Local {
     /// Whether it listens to nobody.
     pub fn is_source(&self) -> bool {
         self.seat.inputs.is_empty()
-    }
-
-    /// Whether it listens to a robot, which does not wait for it; what an outside program does is not known.
-    pub fn is_live_source(&self) -> bool {
-        self.live
     }
 
     /// Whether it runs and has said that it begins.

@@ -6,6 +6,7 @@ use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
 use tauscope_bus::{ReceiverCounts, SampleKind, Trouble};
 use tauscope_pipeline::pipeline::Pipeline;
+use tauscope_pipeline::settings::Settings;
 
 use super::local::Local;
 use crate::exit::Exit;
@@ -103,7 +104,9 @@ impl Summary {
         let mut summary = Self {
             ended,
             links: Vec::new(),
-            stages: stages.iter().map(StageSummary::new).collect(),
+            stages: (stages.iter())
+                .map(|stage| StageSummary::new(stage, &pipeline.stages[stage.at].settings))
+                .collect(),
         };
         for link in links {
             let books = Books {
@@ -298,7 +301,7 @@ impl Books<'_> {
 }
 
 impl StageSummary {
-    fn new(stage: &Local) -> Self {
+    fn new(stage: &Local, settings: &Settings) -> Self {
         let sums = stage.tally.sums();
         let inputs = stage.seat.inputs.iter().zip(&sums.inputs);
         // Health reports come along with what is recorded; they are not what is asked for here.
@@ -317,11 +320,22 @@ impl StageSummary {
             restarts: stage.seat.restarts,
             failed: stage.is_lost(),
             killed: stage.was_killed(),
-            unknown_loss: stage.is_live_source() && stage.seat.restarts > 0,
+            unknown_loss: is_live_source(settings) && stage.seat.restarts > 0,
             trouble: stage.silence.trouble().cloned(),
             files: stage.tally.newest().files.clone(),
             files_completed: sums.files_completed,
         }
+    }
+}
+
+/// Whether it listens to a robot, which does not wait for it; what an outside program does is not known.
+fn is_live_source(settings: &Settings) -> bool {
+    match settings {
+        Settings::Ingest(config) => {
+            let source = config.source();
+            source.is_ok_and(|(_, source)| source.file().is_none())
+        }
+        _ => false,
     }
 }
 

@@ -8,6 +8,7 @@ was lost, what was said. `--short` kills and cuts less often and for less long. 
 network namespaces or a mounted disk need root and are skipped, visibly, without.
 """
 import argparse
+import contextlib
 import json
 import os
 import shutil
@@ -254,6 +255,8 @@ class Hosts:
         return ["ip", "netns", "exec", self.names[place]]
 
     def close(self):
+        # A namespace whose processes still end keeps its interfaces for a while.
+        subprocess.run(["ip", "link", "delete", self.ends[1]], capture_output=True, check=False)
         for name in self.names:
             subprocess.run(["ip", "netns", "delete", name], capture_output=True, check=False)
 
@@ -354,7 +357,7 @@ def fleet(program, folder, fault):
     users = folder / "users"
     subprocess.run([program, "fleet", "--users", users, "--add-user", "anna"], capture_output=True, check=True)
     wall = subprocess.Popen([program, "fleet", "--serve", "127.0.0.1:0", "--users", users, "--expect", "demo",
-                             "--listen", "tcp/10.231.9.2:7450"], cwd=folder, stderr=subprocess.PIPE, text=True)
+                             "--listen", "tcp/10.231.9.2:7450"], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     cell = None
     try:
         address = next((line.split()[-1] for line in wall.stderr if "the wall is at" in line), None)
@@ -377,7 +380,11 @@ def fleet(program, folder, fault):
         wait(lambda seen: seen == "running", 30)
         time.sleep(3.0)
         if fault == "killed":
-            # The supervisor takes its stages with it.
+            # All at once, as its computer would go; a supervisor that is killed alone lets its stages end in order.
+            cell.process.send_signal(signal.SIGSTOP)
+            for process in cell.ids.values():
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(process, signal.SIGKILL)
             cell.process.kill()
         else:
             hosts.cut()

@@ -87,6 +87,10 @@ impl Ledger {
     }
 
     #[allow(unsafe_code)]
+    #[expect(
+        clippy::cast_ptr_alignment,
+        reason = "a mapping begins at a page, and a place is a multiple of eight bytes from there"
+    )]
     fn put(&self, place: usize, number: u64) {
         let Some(map) = &self.0 else { return };
         if (place + 1) * size_of::<u64>() > map.len() {
