@@ -260,8 +260,8 @@ impl SampleKind {
 
 /// A type that can travel on a link.
 ///
-/// It is plain old data: every bit pattern is a value. Whether it makes sense is another question, which the receiving end of
-/// a link asks with [`Sample::check`] before a stage sees it.
+/// It is plain old data: every bit pattern is a value. Whether it makes sense is another question, which the receiving
+/// end of a link asks with [`Sample::check`] before a stage sees it.
 pub trait Sample: Pod + Default + std::fmt::Debug + Send + Sync + ZeroCopySend + 'static {
     /// Which type this is.
     const KIND: SampleKind;

@@ -54,8 +54,8 @@ pub struct Seat {
     /// How long a sender waits for a keep-all receiver that takes nothing \[ms\].
     #[serde(default = "Seat::default_patience_ms")]
     pub patience_ms: u64,
-    /// A file in which it keeps its counts ([`Ledger`](crate::shell::Ledger)), if its supervisor wants to know them after
-    /// its death.
+    /// A file in which it keeps its counts ([`Ledger`](crate::shell::Ledger)), if its supervisor wants to know them
+    /// after its death.
     #[serde(default)]
     pub ledger: Option<PathBuf>,
     /// What else the stage needs, in the stage's own words.

@@ -1,5 +1,5 @@
-//! Somebody on the network who is no stage of the pipeline, through a real session: nothing that he says is heard, ends a
-//! stream or stops a stage.
+//! Somebody on the network who is no stage of the pipeline, through a real session: nothing that he says is heard, ends
+//! a stream or stops a stage.
 
 // Helpers outside a test function.
 #![allow(clippy::unwrap_used)]

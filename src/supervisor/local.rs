@@ -247,8 +247,8 @@ impl Local {
         };
     }
 
-    /// Takes over what it has noted since its last report, and makes room for the next life. One that has said itself how
-    /// it ended has counted all.
+    /// Takes over what it has noted since its last report, and makes room for the next life. One that has said itself
+    /// how it ended has counted all.
     fn settle(&mut self) {
         let Some(kept) = &self.kept else { return };
         if let (false, Ok(account)) = (self.is_done(), kept.account()) {

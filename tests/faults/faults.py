@@ -3,9 +3,9 @@
 
     tests/faults/faults.py PROGRAM [--short] [--only NAME]...
 
-PROGRAM is the built tauscope. Every scenario runs a robot of 7 joints at 1 kHz and ends with one line: what was done, what
-was lost, what was said. `--short` kills and cuts less often and for less long. Needs Linux and Python 3.10; scenarios with
-network namespaces or a mounted disk need root and are skipped, visibly, without.
+PROGRAM is the built tauscope. Every scenario runs a robot of 7 joints at 1 kHz and ends with one line: what was done,
+what was lost, what was said. `--short` kills and cuts less often and for less long. Needs Linux and Python 3.10;
+scenarios with network namespaces or a mounted disk need root and are skipped, visibly, without.
 """
 import argparse
 import contextlib
@@ -20,6 +20,8 @@ import threading
 import time
 import urllib.request
 from pathlib import Path
+
+from hosts import Hosts, Skipped
 
 HERE = Path(__file__).resolve().parent
 DATA = HERE.parent / "data"
@@ -41,10 +43,6 @@ cells: {{demo: {{robot: {data}/demo_arm.urdf}}}}
 - {{name: detect, {b}process: detect, input: twin, detect: {{naive_difference: {{}}, threshold: {{score: 1000.0}}}}}}
 - {{name: record, {b}inputs: [ingest, twin, detect], record: {{mcap: {out}/out.mcap, min_free_mb: {free}}}}}
 """
-
-
-class Skipped(Exception):
-    """The machine does not allow it."""
 
 
 class Failed(Exception):
@@ -220,47 +218,6 @@ def full_disk(program, folder, seconds):
         subprocess.run(["umount", "-l", disk], check=False)
 
 
-class Hosts:
-    """Two network namespaces joined by a veth pair; `alone`, the second host is this one."""
-
-    def __init__(self, alone=False):
-        number = os.getpid()
-        self.names = [f"ts_fault_{side}_{number}" for side in ("a" if alone else "ab")]
-        self.ends = [f"tsf{side}{number}" for side in "ab"]
-        if not shutil.which("ip"):
-            raise Skipped("network namespaces need `ip`")
-        for name in self.names:
-            self.ip("netns", "add", name)
-        self.ip("link", "add", self.ends[0], "netns", self.names[0], "type", "veth", "peer", "name", self.ends[1],
-                *(() if alone else ("netns", self.names[1])))
-        for place, end in enumerate(self.ends):
-            there = ("-n", self.names[place]) if place < len(self.names) else ()
-            self.ip(*there, "address", "add", f"10.231.9.{place + 1}/24", "dev", end)
-            self.ip(*there, "link", "set", "lo", "up")
-            self.ip(*there, "link", "set", end, "up")
-
-    def ip(self, *words):
-        done = subprocess.run(["ip", *words], capture_output=True, text=True, check=False)
-        if done.returncode:
-            self.close()
-            raise Skipped(f"ip {' '.join(words)}: {done.stderr.strip()}")
-
-    def cut(self):
-        self.ip("-n", self.names[0], "link", "set", self.ends[0], "down")
-
-    def mend(self):
-        self.ip("-n", self.names[0], "link", "set", self.ends[0], "up")
-
-    def enter(self, place):
-        return ["ip", "netns", "exec", self.names[place]]
-
-    def close(self):
-        # A namespace whose processes still end keeps its interfaces for a while.
-        subprocess.run(["ip", "link", "delete", self.ends[1]], capture_output=True, check=False)
-        for name in self.names:
-            subprocess.run(["ip", "netns", "delete", name], capture_output=True, check=False)
-
-
 def across(program, folder, hosts, seconds, fault, connect="10.231.9.1:7447"):
     """Source and twin on one host, detector and recorder on the other; what both say, and what is in the archive."""
     listed = f'hosts: {{a: {{listen: "tcp/10.231.9.1:7447"}}, b: {{connect: "tcp/{connect}"}}}}\n'
@@ -282,7 +239,8 @@ def across(program, folder, hosts, seconds, fault, connect="10.231.9.1:7447"):
     check(far == (3 if balance(got) else 0), "exit code", far, "of the far host with", balance(got), "lost")
     counts = archived(program, folder)
     check(counts[TOPICS["ingest"]] == taken["received"], counts, taken)
-    return f"{whole} samples, {taken['dropped']} of {whole} joint states lost and counted, exits {near} and {far}, {lost} in all"
+    return (f"{whole} joint states emitted, {taken['dropped']} lost and counted, {lost} samples of all streams; "
+            f"exits {near} and {far}")
 
 
 def cut(program, folder, pause, seconds):
@@ -345,19 +303,21 @@ stages:
 - {{name: ingest, ingest: {{simulate: {{scenario: scenario.yaml}}, rate: realtime}}}}
 - {{name: twin, input: ingest, twin: {{}}}}
 - {{name: detect, input: twin, detect: {{naive_difference: {{}}, threshold: {{score: 1000.0}}}}}}
-- {{name: publish, inputs: [ingest, twin, detect], publish: {{zenoh: {{connect: ["tcp/10.231.9.2:7450"], json: false}}}}}}
+- {{name: publish, inputs: [ingest, twin, detect], publish: {{zenoh: {{connect: ["{fleet}"], json: false}}}}}}
 """
+FLEET = "tcp/10.231.9.2:7450"
 
 
 def fleet(program, folder, fault):
     """How soon the fleet host knows of a cell that is killed or cut off."""
     hosts = Hosts(alone=True)
     (folder / "scenario.yaml").write_text(SCENARIO.format(data=DATA, seconds=120))
-    (folder / "pipeline.yaml").write_text(FLEET_CELL.format(data=DATA))
+    (folder / "pipeline.yaml").write_text(FLEET_CELL.format(data=DATA, fleet=FLEET))
     users = folder / "users"
     subprocess.run([program, "fleet", "--users", users, "--add-user", "anna"], capture_output=True, check=True)
-    wall = subprocess.Popen([program, "fleet", "--serve", "127.0.0.1:0", "--users", users, "--expect", "demo",
-                             "--listen", "tcp/10.231.9.2:7450"], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    command = [program, "fleet", "--serve", "127.0.0.1:0", "--users", users, "--expect", "demo", "--listen", FLEET]
+    wall = subprocess.Popen(
+        command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     cell = None
     try:
         address = next((line.split()[-1] for line in wall.stderr if "the wall is at" in line), None)
@@ -404,7 +364,8 @@ def scenarios(short):
     times, pause = (2, 3) if short else (100, 10)
     length = 15 if short else 320
     for victim in STAGES:
-        yield f"kill -9 of {victim}", lambda program, folder, victim=victim: kill(program, folder, victim, times, length)
+        yield f"kill -9 of {victim}", lambda program, folder, victim=victim: kill(
+            program, folder, victim, times, length)
     for victim in ("record", "twin"):
         yield f"SIGSTOP of {victim}", lambda program, folder, victim=victim: freeze(
             program, folder, victim, pause, pause + 8)

@@ -21,25 +21,25 @@
 //!   the sequence number in the sample's header counts from 0 again; the number of the oldest sample that can still be
 //!   had; how many numbers right before the first sample are lost for good; how many samples all earlier lives of the
 //!   sender had;
-//! - congestion control `drop`: nothing ever waits for a link that is full, so that a frozen or distant receiver holds up
-//!   neither other streams nor the stage.
+//! - congestion control `drop`: nothing ever waits for a link that is full, so that a frozen or distant receiver holds
+//!   up neither other streams nor the stage.
 //!
 //! A receiver says how far it has come with four little-endian `u64`: the instance that it hears, the number of the
-//! sample that it waits for, how many before that were lost for good, and 0, or 1 where samples are missing, or 2 where it
-//! leaves.
+//! sample that it waits for, how many before that were lost for good, and 0, or 1 where samples are missing, or 2 where
+//! it leaves.
 //!
 //! # Nothing is lost
 //!
-//! The sender keeps every sample until all receivers that keep all have taken it, within a bound of memory (`log.rs`). What
-//! did not arrive goes out again, also after the network was cut, and to a receiver that was started again. If the memory
-//! is full, a source that reads a file waits; else the oldest sample gives way. Its number is then lost for good: both
-//! ends count it.
+//! The sender keeps every sample until all receivers that keep all have taken it, within a bound of memory (`log.rs`).
+//! What did not arrive goes out again, also after the network was cut, and to a receiver that was started again. If the
+//! memory is full, a source that reads a file waits; else the oldest sample gives way. Its number is then lost for
+//! good: both ends count it.
 //!
 //! # Who is heard
 //!
-//! Samples and ends of a stream count only from its sender: the one that shows a token, and no other while that one lives.
-//! The rest is refused, counted, and said once. This keeps out what strays; a network on which somebody may lie needs
-//! mutual TLS and access rules at its router (`deploy/zenoh`).
+//! Samples and ends of a stream count only from its sender: the one that shows a token, and no other while that one
+//! lives. The rest is refused, counted, and said once. This keeps out what strays; a network on which somebody may lie
+//! needs mutual TLS and access rules at its router (`deploy/zenoh`).
 //!
 //! Nothing is discovered: sessions meet at the endpoints that they are given, and nowhere else.
 

@@ -1,5 +1,5 @@
-//! What a sample from another process must be before a stage may see it: any bit pattern is a sample, not every one makes
-//! sense.
+//! What a sample from another process must be before a stage may see it: any bit pattern is a sample, not every one
+//! makes sense.
 
 use super::{Command, Detection, Header, Health, JointState, MAX_JOINTS, TwinState, flags};
 

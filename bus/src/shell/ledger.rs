@@ -1,8 +1,8 @@
 //! What a stage has done so far, where its death does not reach it.
 //!
 //! A report is up to a tenth of a second old when a stage is killed. So each stage also keeps its counts in a file that
-//! its supervisor has made and that lies in memory: the kernel keeps what was written there, whatever kills the writer. A
-//! sample is noted before it is sent, so that a link has never brought more than was noted.
+//! its supervisor has made and that lies in memory: the kernel keeps what was written there, whatever kills the writer.
+//! A sample is noted before it is sent, so that a link has never brought more than was noted.
 
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -96,8 +96,8 @@ impl Ledger {
         if (place + 1) * size_of::<u64>() > map.len() {
             return;
         }
-        // SAFETY: the place is within the mapping, which lives as long as `map`; a mapping begins at a page, so that the
-        // number is aligned; this process reaches the memory through atomics only, and others map or read it apart.
+        // SAFETY: the place is within the mapping, which lives as long as `map`; a mapping begins at a page, so that
+        // the number is aligned; this process reaches the memory through atomics only, and others map or read it apart.
         let word = unsafe { AtomicU64::from_ptr(map.as_mut_ptr().cast::<u64>().add(place)) };
         word.store(number, Ordering::Release);
     }

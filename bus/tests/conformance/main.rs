@@ -213,7 +213,8 @@ macro_rules! conforms {
                 slow_reader_that_keeps_the_newest_loses_the_oldest, stuck_reader_is_given_up_and_counted,
                 receiver_gone_and_back, sender_gone_and_back, end_comes_last_and_once, end_is_waited_for,
                 missing_receivers_are_told, another_type_is_refused, loss_over_a_restart_of_the_receiver_is_counted,
-                what_is_skipped_is_lost, what_no_stage_may_see_is_refused_and_counted, what_a_late_joiner_missed_is_known);
+                what_is_skipped_is_lost,
+                what_no_stage_may_see_is_refused_and_counted, what_a_late_joiner_missed_is_known);
         }
     };
     (@ $sides:ty: $($promise:ident),+) => {$(

@@ -1,8 +1,9 @@
-//! What a sender keeps until its receivers have taken it: who has come how far, what goes out next, what goes out again.
+//! What a sender keeps until its receivers have taken it: who has come how far, what goes out next, what goes out
+//! again.
 //!
-//! Go-back-N, as in data links (Tanenbaum, Computer Networks, section 3.4): a receiver takes samples in their order only and
-//! says how far it has come and how much room it has; what does not arrive goes out again from there. No I/O and no
-//! clock in here.
+//! Go-back-N, as in data links (Tanenbaum, Computer Networks, section 3.4): a receiver takes samples in their order
+//! only and says how far it has come and how much room it has; what does not arrive goes out again from there. No I/O
+//! and no clock in here.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
@@ -176,8 +177,8 @@ impl<T: Copy> Log<T> {
         *gap += oldest.gap + 1;
     }
 
-    /// A receiver is there, or there again, with room for `room` samples. One that has come for another that was lost goes
-    /// on where that was.
+    /// A receiver is there, or there again, with room for `room` samples. One that has come for another that was lost
+    /// goes on where that was.
     pub(super) fn join(&mut self, id: &str, room: u64, now: Instant) {
         if let Some(reader) = self.readers.get_mut(id) {
             reader.there = true;
