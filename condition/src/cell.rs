@@ -4,9 +4,10 @@
 use serde::{Deserialize, Serialize};
 
 use crate::forecast::{Forecast, forecast};
+use crate::robust::median;
 use crate::series::{Covariate, Quantity, Series, Warmth};
 use crate::shape::Shape;
-use crate::watch::{Event, Watched, watch};
+use crate::watch::{Event, watch};
 use crate::words;
 
 /// Changes that begin within so many days of each other may have one cause.
@@ -97,11 +98,14 @@ pub fn assess(all: &[Series], baselines: &[f64]) -> Vec<Finding> {
     let mut warm = Vec::new();
     for (series, warmth) in all.iter().zip(&warmths) {
         let warmth = warmth.as_ref();
-        let Watched { events, .. } = watch(&series.estimates, series.quantity, warmth);
-        if let Some(warmth) = warmth.filter(|_| events.is_empty() && series.quantity.is_friction())
+        let watched = watch(&series.estimates, series.quantity, warmth);
+        if let Some(warmth) = warmth
+            && watched.events.is_empty()
+            && series.quantity.is_friction()
         {
-            warm.extend(explained(series, warmth));
+            warm.extend(explained(series, warmth, watched.slope));
         }
+        let events = watched.events;
         told.extend(events.into_iter().map(|event| Told {
             series,
             warmth,
@@ -250,12 +254,23 @@ fn finding(cause: Cause, told: &Told<'_>) -> Finding {
     finding
 }
 
-/// A change of friction that warmth explains: who does not look at it would tell the change.
-fn explained(series: &Series, warmth: &Warmth) -> Option<Finding> {
+/// A change of friction that warmth explains: who does not look at it would tell the change. `slope` is that against what
+/// it goes with, and where that is centred.
+fn explained(series: &Series, warmth: &Warmth, [slope, centre]: [f64; 2]) -> Option<Finding> {
     let blind = watch(&series.estimates, series.quantity, None).events;
+    let by_warmth = |event: &Event| {
+        let end = event.until.unwrap_or(f64::INFINITY);
+        let nights = series.estimates.iter().zip(&warmth.values);
+        let during = nights.filter(|(one, _)| (event.from..end).contains(&one.day));
+        slope * (median(during.filter_map(|(_, value)| *value).collect()) - centre)
+    };
     let most = blind
         .into_iter()
-        .filter(|event| event.size.abs() >= WARM_SHARE * event.level.abs())
+        .filter(|event| {
+            let least = WARM_SHARE * event.level.abs();
+            let by_warmth = by_warmth(event) * event.size.signum();
+            event.size.abs() >= least && by_warmth >= least.max(0.5 * event.size.abs())
+        })
         .max_by(|a, b| a.size.abs().total_cmp(&b.size.abs()))?;
     let of_others = warmth.covariate == Covariate::OtherJoints;
     let cause = if of_others {

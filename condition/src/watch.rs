@@ -55,6 +55,8 @@ pub struct Watched {
     pub events: Vec<Event>,
     /// Nights that stand alone, far from all others \[days\].
     pub outliers: Vec<f64>,
+    /// Change of the value by unit of what it goes with, and where that is centred.
+    pub slope: [f64; 2],
 }
 
 /// The estimates that count, each with its covariate, and the least change that is told.
@@ -118,6 +120,7 @@ pub fn watch(estimates: &[Estimate], quantity: Quantity, warmth: Option<&Warmth>
     let mut watched = Watched {
         events: Vec::new(),
         outliers: Vec::new(),
+        slope: [0.0, nights.centre],
     };
     if count <= LEARNED {
         return watched;
@@ -167,6 +170,7 @@ pub fn watch(estimates: &[Estimate], quantity: Quantity, warmth: Option<&Warmth>
             sums = Cusum::default();
         }
     }
+    watched.slope[0] = reference.coefficients().map_or(0.0, |[_, slope]| slope);
     if let Some(Open {
         begin,
         told: Some(told),
