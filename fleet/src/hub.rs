@@ -1,6 +1,6 @@
 //! The fleet host: one Zenoh session, one thread that keeps the wall, and snapshots for all who look.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -16,13 +16,16 @@ use zenoh::sample::SampleKind;
 use crate::inbox;
 use crate::keeper::Keeper;
 use crate::mailbox::Mailbox;
-use crate::store::{Note, Store, StoreError};
+use crate::physics::{self, CellPhysics};
+use crate::store::{KEPT_NS, Note, Store, StoreError};
 use crate::wall::{Effect, Event, Now, Snapshot, Wall};
 
 /// How often those who look are told. Resolution: a person sees no more.
 const SHOW_EVERY: Duration = Duration::from_millis(250);
 /// How often the wall's clock ticks. Resolution: a cell that is gone is known within 1 s.
 const TICK: Duration = Duration::from_millis(250);
+/// How often the nightly tables are read again. Resolution: they come once a night, and a note counts within minutes.
+const PHYSICS_EVERY: Duration = Duration::from_secs(300);
 /// How long a question to a cell may take.
 const ASK_WITHIN: Duration = Duration::from_secs(5);
 /// How long a cell has to take a command; it refuses by itself after 1 s.
@@ -37,6 +40,8 @@ pub struct Options {
     pub expected: Vec<String>,
     /// Where incidents and history are kept; `None` to keep none.
     pub store: Option<PathBuf>,
+    /// The folder of the nightly tables of `tauscope physics`.
+    pub physics: Option<PathBuf>,
 }
 
 /// Why there is no fleet host.
@@ -80,6 +85,7 @@ pub struct Hub {
     mailbox: Arc<Mailbox<Mail>>,
     snapshots: watch::Receiver<Arc<Snapshot>>,
     store: Option<Mutex<Store>>,
+    physics: Arc<Mutex<Vec<CellPhysics>>>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
@@ -111,11 +117,19 @@ impl Hub {
         listen(&session, &mailbox)?;
         let (show, snapshots) = watch::channel(Arc::new(wall.snapshot()));
         let stop = Arc::new(AtomicBool::new(false));
+        let physics = Arc::new(Mutex::new(Vec::new()));
+        if let Some(folder) = options.physics.clone() {
+            let notes = reader.as_ref().map(Store::again).transpose()?;
+            let (physics, stop) = (physics.clone(), stop.clone());
+            let thread = std::thread::Builder::new().name("fleet-physics".to_owned());
+            thread.spawn(move || follow_physics(&folder, notes.as_ref(), &physics, &stop))?;
+        }
         let worker = Worker {
             session: session.clone(),
             mailbox: mailbox.clone(),
             wall,
             keeper,
+            physics: physics.clone(),
             show,
             begin,
             unkept: false,
@@ -128,6 +142,7 @@ impl Hub {
             mailbox,
             snapshots,
             store: reader.map(Mutex::new),
+            physics,
             stop,
             thread: Some(thread),
         })
@@ -152,6 +167,12 @@ impl Hub {
         // A reader that panicked has changed nothing.
         let store = store.lock().unwrap_or_else(PoisonError::into_inner);
         Some(read(&store))
+    }
+
+    /// The physics of a cell's arm over weeks, if its nightly numbers are followed.
+    pub fn physics(&self, cell: &str) -> Option<CellPhysics> {
+        let known = self.physics.lock().unwrap_or_else(PoisonError::into_inner);
+        known.iter().find(|physics| physics.cell == cell).cloned()
     }
 
     /// Sends a command to a cell, as `tauscope send` does, and waits for its answer.
@@ -192,6 +213,40 @@ fn unix_ns() -> i64 {
     since.map_or(0, |since| {
         i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
     })
+}
+
+/// Reads the nightly tables again and again until the fleet host ends.
+fn follow_physics(
+    folder: &Path,
+    notes: Option<&Store>,
+    known: &Mutex<Vec<CellPhysics>>,
+    stop: &AtomicBool,
+) {
+    let mut told = false;
+    while !stop.load(Ordering::Relaxed) {
+        let since_day = unix_ns().saturating_sub(KEPT_NS) as f64 / 86_400e9;
+        let of_cell = |cell: &str| notes.and_then(|store| store.notes(cell, u32::MAX).ok());
+        let baselines =
+            |cell: &str| of_cell(cell).map_or_else(Vec::new, |notes| physics::baselines(&notes));
+        match physics::read(folder, since_day, &baselines) {
+            Ok((cells, unread)) => {
+                if let Some(error) = unread.first().filter(|_| !told) {
+                    told = true;
+                    tracing::warn!("{error}; {} tables are left out", unread.len());
+                }
+                *known.lock().unwrap_or_else(PoisonError::into_inner) = cells;
+            }
+            Err(error) if !told => {
+                told = true;
+                tracing::warn!("nightly physics: {error}");
+            }
+            Err(_) => {}
+        }
+        let read = Instant::now();
+        while read.elapsed() < PHYSICS_EVERY && !stop.load(Ordering::Relaxed) {
+            std::thread::sleep(TICK);
+        }
+    }
 }
 
 /// Hears tokens, statuses and records of all cells.
@@ -239,6 +294,7 @@ struct Worker {
     mailbox: Arc<Mailbox<Mail>>,
     wall: Wall,
     keeper: Option<Keeper>,
+    physics: Arc<Mutex<Vec<CellPhysics>>>,
     show: watch::Sender<Arc<Snapshot>>,
     begin: Instant,
     /// Whether it was said that nothing can be kept.
@@ -302,6 +358,12 @@ impl Worker {
             let kept = keeper.tick(&snapshot);
             self.note(kept);
         }
+        let known = self.physics.lock().unwrap_or_else(PoisonError::into_inner);
+        for view in &mut snapshot.cells {
+            let own = known.iter().find(|physics| physics.cell == view.cell);
+            view.drift = own.and_then(CellPhysics::drift);
+        }
+        drop(known);
         // Nobody may look right now.
         self.show.send_replace(Arc::new(snapshot));
     }

@@ -94,12 +94,14 @@ pub enum RecordingError {
 }
 
 /// Topics to read.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct RecordingTopics {
     /// Measured joint states.
     pub state: String,
     /// Another twin's efforts.
     pub reference: Option<String>,
+    /// How much of a recording is read, from its first sample on \[s\]; infinite for all of it.
+    pub longest_s: f64,
 }
 
 impl Recording {
@@ -144,6 +146,9 @@ impl Recording {
         let mut damage = archive.damage().to_vec();
         let mut states = archive.joint_states(&topics.state)?;
         while let Some(state) = states.next_state() {
+            if reader.recording.duration_s() >= topics.longest_s {
+                break;
+            }
             match state {
                 Ok(stamped) => reader.take(stamped.message),
                 Err(ArchiveError::Damaged(part)) => {
