@@ -98,12 +98,13 @@ mod tests {
         let after = behind(20.0, 0.5, 20_000).doubt(0.0);
         assert!(soon > 5.0, "{soon}");
         assert!(later > 2.0 && later < soon, "{later}");
-        assert_eq!(after, 1.0);
+        assert!(after < 1.001, "{after}");
     }
 
     #[test]
     fn a_joint_that_moves_is_not_doubted() {
-        assert_eq!(behind(20.0, 2.0, 50).doubt(0.1), 1.0);
+        let doubt = behind(20.0, 2.0, 50).doubt(0.1);
+        assert!(doubt < 1.001, "{doubt}");
     }
 
     #[test]
