@@ -46,11 +46,27 @@ fn scene(keep: Keep) -> Scene {
     let other = Zenoh::open(&there, LONG).unwrap();
     let mut sender = other.sender("cell/ingest", Audience::of(keep, 1)).unwrap();
     assert_eq!(sender.wait_for_receivers(LONG).unwrap(), 0);
+    let stranger = there.session().unwrap();
+    reaches(&stranger, keep);
     Scene {
         sender,
         receiver,
-        stranger: there.session().unwrap(),
+        stranger,
         _links: [links, other],
+    }
+}
+
+/// Waits until the stranger's session knows who listens.
+fn reaches(stranger: &zenoh::Session, keep: Keep) {
+    let key = match keep {
+        Keep::All => "cell/ingest",
+        Keep::Newest => "cell/ingest/@newest",
+    };
+    let publisher = stranger.declare_publisher(key).wait().unwrap();
+    let deadline = Instant::now() + LONG;
+    while !publisher.matching_status().wait().unwrap().matching() {
+        assert!(Instant::now() < deadline, "nobody listens");
+        std::thread::sleep(Duration::from_millis(10));
     }
 }
 
