@@ -117,11 +117,6 @@ impl Reference {
         (self.squares / self.count as f64).max(1e-12).sqrt()
     }
 
-    /// Nights that were learned.
-    pub fn learned(&self) -> usize {
-        self.learned
-    }
-
     /// Learns a night.
     pub fn learn(&mut self, estimate: &Estimate, covariate: f64) {
         let deviation = estimate.deviation();

@@ -44,8 +44,8 @@ pub fn week(physics: &CellPhysics, notes: &[Note], now_ns: i64, style: Option<&s
                 meta name="color-scheme" content="light dark";
                 title { (physics.cell) ", the week" }
                 @match style {
-                    Some(style) => style { (PreEscaped(style)) },
-                    None => link rel="stylesheet" href="/style.css",
+                    Some(style) => { style { (PreEscaped(style)) } }
+                    None => { link rel="stylesheet" href="/style.css"; }
                 }
             }
             body {
