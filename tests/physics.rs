@@ -147,7 +147,9 @@ fn a_page_of_the_week_stands_alone_and_no_table_is_replaced_without_force() {
     );
 }
 
-/// Two real geared motors through a day, seven captures each: one stays as it is, the other loses 7 % while it warms.
+/// Two real geared motors through a day, seven captures each: one stays as it is, the other loses friction while it
+/// warms: some 4 % of its Coulomb friction in a fit of all moving samples (7 % at even speeds, which holds viscous
+/// friction as well).
 #[test]
 fn of_two_real_motors_one_is_stable_and_the_others_loss_is_warmth() {
     let Some(shared) = shared("of_two_real_motors_one_is_stable_and_the_others_loss_is_warmth")
@@ -191,5 +193,10 @@ fn of_two_real_motors_one_is_stable_and_the_others_loss_is_warmth() {
     assert_eq!(warming["so_far"], "warmth", "{warming}");
     let of = values(&warming);
     let loss = 1.0 - of[6] / of[0];
-    assert!((0.05..0.10).contains(&loss), "{loss}");
+    assert!((0.02..0.10).contains(&loss), "{loss}");
+    let of = values(&steady);
+    assert!(
+        of.iter().all(|value| (value / of[0] - 1.0).abs() < 0.02),
+        "{of:?}"
+    );
 }
