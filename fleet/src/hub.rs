@@ -25,7 +25,7 @@ const SHOW_EVERY: Duration = Duration::from_millis(250);
 /// How often the wall's clock ticks. Resolution: a cell that is gone is known within 1 s.
 const TICK: Duration = Duration::from_millis(250);
 /// How often the nightly tables are read again. Resolution: they come once a night, and a note counts within minutes.
-const PHYSICS_EVERY: Duration = Duration::from_secs(300);
+const PHYSICS_EVERY: Duration = Duration::from_mins(5);
 /// How long a question to a cell may take.
 const ASK_WITHIN: Duration = Duration::from_secs(5);
 /// How long a cell has to take a command; it refuses by itself after 1 s.
