@@ -15,12 +15,10 @@ use tauscope_condition::{Cause, Estimate, Finding, Quantity, Series, assess, pee
 
 pub use table::{Column, Row, TABLE, folder_of};
 
-use crate::store::Note;
-
 /// Nights whose median is the state now. Resolution: a week has each day's work once.
 const NEWEST: usize = 7;
 /// Nights whose median is the state at first, the same as are learned.
-const FIRST: usize = tauscope_condition::watch::LEARNED;
+const FIRST: usize = tauscope_condition::series::LEARNED;
 /// Days of a curve on the wall. Resolution: six weeks, in which a gear wears.
 const CURVE_D: f64 = 42.0;
 
@@ -43,12 +41,6 @@ pub enum PhysicsError {
         /// What is wrong.
         reason: String,
     },
-}
-
-/// The days of the notes that begin a new baseline.
-pub fn baselines(notes: &[Note]) -> Vec<f64> {
-    let begins = notes.iter().filter(|note| note.baseline);
-    begins.map(|note| note.at_ns as f64 / 86_400e9).collect()
 }
 
 /// One number's series, and where it stands.

@@ -9,7 +9,8 @@ truth of each night and the table the script prints, by quantity:
 
     coverage    share of the 95 % intervals that hold the truth
     scatter     standard deviation of (estimate - truth) over that of the interval; 1 is honest, more is too narrow
-    lag 1       correlation of that error with the one of the night before; white errors have none
+    lag 1       correlation of that error, less its mean over the nights, with the one of the night before; white errors
+                have none. A constant error hides no change
     wild        share of nights beyond 3 standard deviations; a normal variable has 0.3 %
     share       median half width of the interval over the true value
 
@@ -128,10 +129,13 @@ def main():
         every = [error for one in series for error in one]
         if not every:
             continue
-        pairs = [(a, b) for one in series for a, b in zip(one, one[1:])]
+        means = [statistics.mean(one) for one in series]
+        centred = [[error - mean for error in one] for one, mean in zip(series, means)]
+        pairs = [(a, b) for one in centred for a, b in zip(one, one[1:])]
         held = sum(abs(error) <= 1.96 for error in every) / len(every)
         square = sum(error * error for error in every) / len(every)
-        lag = sum(a * b for a, b in pairs) / max(len(pairs), 1) / square
+        spread = sum(error * error for one in centred for error in one) / len(every)
+        lag = sum(a * b for a, b in pairs) / max(len(pairs), 1) / spread
         wild = sum(abs(error) > 3.0 * math.sqrt(square) for error in every) / len(every)
         share = [one for one in shares[quantity] if math.isfinite(one)]
         share = f"{100 * statistics.median(share):.1f} %" if share else "-"
