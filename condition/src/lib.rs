@@ -2,6 +2,7 @@
 
 pub mod cell;
 pub mod cusum;
+mod finding;
 pub mod forecast;
 pub mod peers;
 mod reference;
@@ -12,6 +13,7 @@ pub mod short;
 pub mod watch;
 mod words;
 
-pub use cell::{Cause, Finding, assess};
+pub use cell::assess;
+pub use finding::{Cause, Finding};
 pub use forecast::Forecast;
 pub use series::{Covariate, Estimate, Quantity, Series, Warmth};

@@ -117,16 +117,11 @@ impl Reference {
         (self.squares / self.count as f64).max(1e-12).sqrt()
     }
 
-    /// Nights that were learned.
-    pub fn learned(&self) -> usize {
-        self.learned
-    }
-
     /// Learns a night.
     pub fn learn(&mut self, estimate: &Estimate, covariate: f64) {
         let deviation = estimate.deviation();
         // With the prior alone, the first two nights tell no scatter.
-        if self.learned >= 1 + usize::from(self.has_slope)
+        if self.learned > usize::from(self.has_slope)
             && let Some(expected) = self.expects(covariate, deviation)
         {
             let off = (estimate.value - expected.value) / expected.deviation;

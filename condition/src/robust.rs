@@ -41,7 +41,7 @@ pub fn theil_sen(points: &[(f64, f64)]) -> Option<(f64, [f64; 2])> {
     let rank = |rank: f64| slopes[(rank.max(0.0) as usize).min(slopes.len() - 1)];
     let interval = [
         rank(((count - spread) / 2.0).floor() - 1.0),
-        rank(((count + spread) / 2.0).ceil()),
+        rank(f64::midpoint(count, spread).ceil()),
     ];
     Some((median(slopes.clone()), interval))
 }

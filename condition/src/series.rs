@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::robust::median;
-use crate::watch::LEARNED;
 
+/// Nights that are learned before anything is told. Resolution: two weeks have every day's work twice.
+pub const LEARNED: usize = 14;
 /// Half width of a 95 % interval of a normal variable, in standard deviations.
 /// Statistical: the 97.5 % quantile of the standard normal distribution.
 const HALF_WIDTH_95: f64 = 1.96;
@@ -73,8 +74,8 @@ impl Quantity {
             Self::Viscous => "viscous friction",
             Self::Gain => "gain",
             Self::Offset => "offset",
-            Self::Backlash => "backlash",
-            Self::Payload => "payload",
+            Self::Backlash => "play of the gear",
+            Self::Payload => "mass on the tool",
         }
     }
 
@@ -94,15 +95,16 @@ impl Quantity {
         matches!(self, Self::Coulomb | Self::Viscous)
     }
 
-    /// The smallest change that is told, as a share of the level.
-    /// Resolution: 5 % of friction is what 5 K change on many gears; below it no mechanic finds anything. An offset and a
-    /// payload have no level of their own: what is certain is told.
-    pub(crate) fn relevant_share(self) -> f64 {
+    /// The smallest change that is told, at this level.
+    /// Resolution: 5 % of friction is what 5 K change on many gears, and below it no mechanic finds anything; 50 g are less
+    /// than any tool. An offset has no level of its own: what is certain is told.
+    pub(crate) fn relevant(self, level: f64) -> f64 {
         match self {
-            Self::Coulomb | Self::Viscous => 0.05,
-            Self::Gain => 0.01,
-            Self::Backlash => 0.2,
-            Self::Offset | Self::Payload => 0.0,
+            Self::Coulomb | Self::Viscous => 0.05 * level.abs(),
+            Self::Gain => 0.01 * level.abs(),
+            Self::Backlash => 0.2 * level.abs(),
+            Self::Offset => 0.0,
+            Self::Payload => 0.05,
         }
     }
 

@@ -3,11 +3,9 @@
 use crate::cusum::Cusum;
 use crate::reference::Reference;
 use crate::robust::median;
-use crate::series::{Covariate, Estimate, Quantity, Warmth};
+use crate::series::{Covariate, Estimate, LEARNED, Quantity, Warmth};
 use crate::shape::{self, Point, Shape};
 
-/// Nights that are learned before anything is told. Resolution: two weeks have every day's work twice.
-pub const LEARNED: usize = 14;
 /// A night that is further off than this is not learned \[standard deviations\].
 /// Statistical: a normal variable is so in 4 of 1e8 nights.
 const WILD: f64 = 5.5;
@@ -221,7 +219,7 @@ fn told(nights: &Nights<'_>, reference: &Reference, open: &mut Option<Open>, nig
     let newest = change.begin.max((night + 1).saturating_sub(NEWEST))..night + 1;
     let off = nights.mean_off(reference, newest);
     let level = reference.coefficients().map_or(0.0, |[level, _]| level);
-    if off.abs() >= nights.quantity.relevant_share() * level.abs() {
+    if off.abs() >= nights.quantity.relevant(level) {
         change.told = Some(night);
     }
 }

@@ -2,7 +2,7 @@
 
 use jiff::Timestamp;
 
-use crate::cell::{Cause, Finding};
+use crate::finding::{Cause, Finding};
 use crate::series::Covariate;
 use crate::shape::Shape;
 

@@ -184,7 +184,7 @@ impl Cell {
     }
 }
 
-/// Seeds that nothing was developed with; `TAUSCOPE_YEAR_SEEDS=a..b` would be a hidden interface, so they stand here.
+/// Years that are looked at.
 const SEEDS: [u64; 3] = [1, 2, 3];
 
 fn fleet(seed: u64, fates: &[Fate], has_sensor: impl Fn(usize) -> bool) -> Vec<Vec<Finding>> {

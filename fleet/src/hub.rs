@@ -1,6 +1,8 @@
 //! The fleet host: one Zenoh session, one thread that keeps the wall, and snapshots for all who look.
 
-use std::path::{Path, PathBuf};
+mod physics;
+
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -16,16 +18,14 @@ use zenoh::sample::SampleKind;
 use crate::inbox;
 use crate::keeper::Keeper;
 use crate::mailbox::Mailbox;
-use crate::physics::{self, CellPhysics};
-use crate::store::{KEPT_NS, Note, Store, StoreError};
+use crate::physics::CellPhysics;
+use crate::store::{Note, Store, StoreError};
 use crate::wall::{Effect, Event, Now, Snapshot, Wall};
 
 /// How often those who look are told. Resolution: a person sees no more.
 const SHOW_EVERY: Duration = Duration::from_millis(250);
 /// How often the wall's clock ticks. Resolution: a cell that is gone is known within 1 s.
 const TICK: Duration = Duration::from_millis(250);
-/// How often the nightly tables are read again. Resolution: they come once a night, and a note counts within minutes.
-const PHYSICS_EVERY: Duration = Duration::from_secs(300);
 /// How long a question to a cell may take.
 const ASK_WITHIN: Duration = Duration::from_secs(5);
 /// How long a cell has to take a command; it refuses by itself after 1 s.
@@ -122,7 +122,7 @@ impl Hub {
             let notes = reader.as_ref().map(Store::again).transpose()?;
             let (physics, stop) = (physics.clone(), stop.clone());
             let thread = std::thread::Builder::new().name("fleet-physics".to_owned());
-            thread.spawn(move || follow_physics(&folder, notes.as_ref(), &physics, &stop))?;
+            thread.spawn(move || physics::follow(&folder, notes.as_ref(), &physics, &stop))?;
         }
         let worker = Worker {
             session: session.clone(),
@@ -213,40 +213,6 @@ fn unix_ns() -> i64 {
     since.map_or(0, |since| {
         i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
     })
-}
-
-/// Reads the nightly tables again and again until the fleet host ends.
-fn follow_physics(
-    folder: &Path,
-    notes: Option<&Store>,
-    known: &Mutex<Vec<CellPhysics>>,
-    stop: &AtomicBool,
-) {
-    let mut told = false;
-    while !stop.load(Ordering::Relaxed) {
-        let since_day = unix_ns().saturating_sub(KEPT_NS) as f64 / 86_400e9;
-        let of_cell = |cell: &str| notes.and_then(|store| store.notes(cell, u32::MAX).ok());
-        let baselines =
-            |cell: &str| of_cell(cell).map_or_else(Vec::new, |notes| physics::baselines(&notes));
-        match physics::read(folder, since_day, &baselines) {
-            Ok((cells, unread)) => {
-                if let Some(error) = unread.first().filter(|_| !told) {
-                    told = true;
-                    tracing::warn!("{error}; {} tables are left out", unread.len());
-                }
-                *known.lock().unwrap_or_else(PoisonError::into_inner) = cells;
-            }
-            Err(error) if !told => {
-                told = true;
-                tracing::warn!("nightly physics: {error}");
-            }
-            Err(_) => {}
-        }
-        let read = Instant::now();
-        while read.elapsed() < PHYSICS_EVERY && !stop.load(Ordering::Relaxed) {
-            std::thread::sleep(TICK);
-        }
-    }
 }
 
 /// Hears tokens, statuses and records of all cells.

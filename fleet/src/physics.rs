@@ -11,16 +11,14 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use tauscope_condition::robust::median;
 use tauscope_condition::short::{SoFar, so_far};
-use tauscope_condition::{Estimate, Finding, Quantity, Series, assess, peers};
+use tauscope_condition::{Cause, Estimate, Finding, Quantity, Series, assess, peers};
 
-pub use table::{Row, TABLE, folder_of};
-
-use crate::store::Note;
+pub use table::{Column, Row, TABLE, folder_of};
 
 /// Nights whose median is the state now. Resolution: a week has each day's work once.
 const NEWEST: usize = 7;
 /// Nights whose median is the state at first, the same as are learned.
-const FIRST: usize = tauscope_condition::watch::LEARNED;
+const FIRST: usize = tauscope_condition::series::LEARNED;
 /// Days of a curve on the wall. Resolution: six weeks, in which a gear wears.
 const CURVE_D: f64 = 42.0;
 
@@ -43,12 +41,6 @@ pub enum PhysicsError {
         /// What is wrong.
         reason: String,
     },
-}
-
-/// The days of the notes that begin a new baseline.
-pub fn baselines(notes: &[Note]) -> Vec<f64> {
-    let begins = notes.iter().filter(|note| note.baseline);
-    begins.map(|note| note.at_ns as f64 / 86_400e9).collect()
 }
 
 /// One number's series, and where it stands.
@@ -82,8 +74,10 @@ pub struct Drift {
     pub share: f64,
     /// The last six weeks, as shares of the baseline.
     pub curve: Vec<f64>,
-    /// What is found, if anything is.
+    /// What is found of the arm, if anything is.
     pub finding: Option<String>,
+    /// Whether the change is warmth.
+    pub is_warmth: bool,
 }
 
 /// The physics of one cell's arm.
@@ -135,27 +129,23 @@ pub fn read(
 }
 
 fn of_cell(cell: &str, newest: &Row, rows: &[&Row], baselines: &[f64]) -> CellPhysics {
-    let mut units: BTreeMap<(Option<&str>, Quantity), (&str, Vec<Estimate>)> = BTreeMap::new();
+    let mut numbers: BTreeMap<(Option<&str>, Quantity), Vec<&Row>> = BTreeMap::new();
     for row in rows {
         if let Some(quantity) = Quantity::of_name(&row.quantity) {
             let joint = (!row.joint.is_empty()).then_some(row.joint.as_str());
-            let (unit, all) = units.entry((joint, quantity)).or_default();
-            *unit = &row.unit;
-            all.push(row.estimate());
+            numbers.entry((joint, quantity)).or_default().push(row);
         }
     }
     let since = baselines.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let followed = units
-        .into_iter()
-        .map(|((joint, quantity), (unit, mut estimates))| {
-            estimates.sort_by(|a, b| a.day.total_cmp(&b.day));
-            let series = Series {
-                joint: joint.map(str::to_owned),
-                quantity,
-                estimates,
-            };
-            followed(series, unit, since)
-        });
+    let followed = numbers.into_iter().map(|((joint, quantity), mut rows)| {
+        rows.sort_by_key(|row| row.stamp_ns);
+        let series = Series {
+            joint: joint.map(str::to_owned),
+            quantity,
+            estimates: rows.iter().map(|row| row.estimate()).collect(),
+        };
+        followed(series, rows.last().map_or("", |row| &row.unit), since)
+    });
     let followed: Vec<Followed> = followed.collect();
     let series: Vec<Series> = followed.iter().map(|one| one.series.clone()).collect();
     CellPhysics {
@@ -225,6 +215,13 @@ fn beside_peers(cells: &mut [CellPhysics]) {
 }
 
 impl CellPhysics {
+    /// Whether something is found of this number.
+    pub fn is_found(&self, one: &Followed) -> bool {
+        let series = &one.series;
+        let of = |found: &Finding| found.quantity == series.quantity && found.joint == series.joint;
+        self.findings.iter().any(of)
+    }
+
     /// The joint whose friction has changed most: one that is found first.
     pub fn drift(&self) -> Option<Drift> {
         let found = self
@@ -255,6 +252,10 @@ impl CellPhysics {
             quantity: one.series.quantity,
             share: share(one),
             curve: newest.map(|estimate| estimate.value / one.first).collect(),
+            is_warmth: self
+                .findings
+                .iter()
+                .any(|found| found.cause == Cause::Warmth && found.joint == one.series.joint),
             finding: self
                 .findings
                 .iter()

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::Context as _;
 use tauscope_archive::whole_file::{self, Existing};
 use tauscope_fleet::physics::{self, CellPhysics};
-use tauscope_fleet::store::{KEPT_NS, Store};
+use tauscope_fleet::store::{self, KEPT_NS, Store};
 use tauscope_fleet::web::week_page;
 
 use crate::existing::Force;
@@ -55,7 +55,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let mut unkept = None;
     let mut wanted: BTreeSet<&str> = args.cell.iter().map(String::as_str).collect();
     let baselines = |cell: &str| match notes(cell) {
-        Some(Ok(notes)) => physics::baselines(&notes),
+        Some(Ok(notes)) => store::baselines(&notes),
         _ => Vec::new(),
     };
     let since_day = ((now_ns - KEPT_NS) / NS_A_DAY) as f64;

@@ -9,8 +9,8 @@ use super::open;
 /// Most recordings of a night. Resolution: twelve spread over a day have its cold and its warm hours.
 const MOST: usize = 12;
 /// A recording is measured for so long from its beginning \[s\], so that the work is bounded.
-/// Resolution: a minute has several cycles of most programs.
-pub const LONGEST_S: f64 = 60.0;
+/// Resolution: two minutes have several cycles of most programs.
+pub const LONGEST_S: f64 = 120.0;
 /// A pause between two recordings that is longer is a robot that was switched off \[ns\].
 /// Resolution: a joint cools down within an hour.
 const PAUSE_NS: i64 = 3_600_000_000_000;

@@ -173,7 +173,7 @@ fn numbers(context: &Context<'_>, problem: &Problem, fit: &Fit) -> Vec<Number> {
             interval,
         });
     }
-    all.sort_by(|a, b| (a.joint.is_none(), a.joint).cmp(&(b.joint.is_none(), b.joint)));
+    all.sort_by_key(|one: &Number| (one.joint.is_none(), one.joint));
     all
 }
 

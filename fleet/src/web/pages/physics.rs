@@ -27,7 +27,7 @@ pub fn section(physics: Option<&CellPhysics>, notes: &[Note]) -> Markup {
             ". Bars: 95 % intervals. Dashed: the first two weeks since the baseline. Peers: arms of the same robot." }
         (findings(physics, f64::NEG_INFINITY))
         (table(physics))
-        div.curves { @for one in &physics.followed { (figure(one, notes, physics.newest_day)) } }
+        (curves(physics, notes))
         p { a href={ "/cells/" (physics.cell) "/week" } { "The page of the week" } }
     }
 }
@@ -44,8 +44,8 @@ pub fn week(physics: &CellPhysics, notes: &[Note], now_ns: i64, style: Option<&s
                 meta name="color-scheme" content="light dark";
                 title { (physics.cell) ", the week" }
                 @match style {
-                    Some(style) => style { (PreEscaped(style)) },
-                    None => link rel="stylesheet" href="/style.css",
+                    Some(style) => { style { (PreEscaped(style)) } }
+                    None => { link rel="stylesheet" href="/style.css"; }
                 }
             }
             body {
@@ -60,6 +60,11 @@ fn week_content(physics: &CellPhysics, notes: &[Note], now_ns: i64) -> Markup {
     let week = physics.newest_day - DAYS_OF_A_WEEK;
     let is_new = |one: &Finding| one.told >= week || one.until.is_some_and(|until| until >= week);
     let new = physics.findings.iter().filter(|one| is_new(one)).count();
+    let open = physics
+        .findings
+        .iter()
+        .filter(|one| one.is_alarm() && one.until.is_none())
+        .count();
     let of_week = notes
         .iter()
         .filter(|note| note.at_ns as f64 / NS_A_DAY >= week);
@@ -68,13 +73,14 @@ fn week_content(physics: &CellPhysics, notes: &[Note], now_ns: i64) -> Markup {
         p.summary {
             span { "Arm " (physics.arm) ", robot " (physics.robot) }
             @if new > 0 { span.count data-severity="serious" { strong { (new) } " new this week" } }
-            @else { span.count data-severity="good" { "nothing new this week" } }
+            @else { span.count data-severity="notice" { "nothing new this week" } }
+            @if open > 0 { span.count data-severity="serious" { strong { (open) } " lasting" } }
         }
         h2 { "What has changed" }
         (findings(physics, week))
         h2 { "Numbers" }
         (table(physics))
-        div.curves { @for one in &physics.followed { (figure(one, notes, physics.newest_day)) } }
+        (curves(physics, notes))
         h2 { "Notes of the week" }
         @let of_week: Vec<&Note> = of_week.collect();
         @if of_week.is_empty() { p.muted { "none" } }
@@ -136,6 +142,17 @@ fn change(one: &Followed) -> String {
             format!("{:+.1} %", 100.0 * (one.now / one.first - 1.0))
         }
         _ => format!("{:+.3} {}", one.now - one.first, one.unit),
+    }
+}
+
+/// The curves, those of which something is found first.
+fn curves(physics: &CellPhysics, notes: &[Note]) -> Markup {
+    let (found, others): (Vec<&Followed>, Vec<&Followed>) = physics
+        .followed
+        .iter()
+        .partition(|one| physics.is_found(one));
+    html! {
+        div.curves { @for one in found.into_iter().chain(others) { (figure(one, notes, physics.newest_day)) } }
     }
 }
 

@@ -96,9 +96,10 @@ fn facts(view: &CellView, status: &StatusMessage, now_ns: i64) -> Markup {
                 dd { (residual.joint) ", " (format!("{:.2}", residual.joint_ratio)) " × normal" }
             }
             @if let Some(drift) = &view.drift {
-                dt { "Wears most" }
+                dt { "Friction" }
                 dd.warn[drift.finding.is_some()] title=[drift.finding.as_ref()] {
                     (drift.joint) ", " (drift.quantity.words()) " " (format!("{:+.0} %", 100.0 * drift.share))
+                    @if drift.is_warmth { " (warmth)" }
                     @if drift.curve.len() > 2 { (chart::spark("friction over its first", &drift.curve, "six weeks")) }
                 }
             }
