@@ -230,9 +230,9 @@ mod tests {
         let mut noise = Noise(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
         let mut add = |_: &[f64], qd: &[f64], effort: &mut [f64]| {
             effort[1] += coulomb_nm * qd[1].signum() + 0.4 * qd[1];
-            effort
-                .iter_mut()
-                .for_each(|effort| *effort += 0.05 * noise.next());
+            for effort in effort.iter_mut() {
+                *effort += 0.05 * noise.next();
+            }
         };
         let model = model();
         let fit = vec![
