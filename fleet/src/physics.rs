@@ -13,7 +13,7 @@ use tauscope_condition::robust::median;
 use tauscope_condition::short::{SoFar, so_far};
 use tauscope_condition::{Cause, Estimate, Finding, Quantity, Series, assess, peers};
 
-pub use table::{Column, Row, TABLE, folder_of};
+pub use table::{Column, Row, TABLE, TextColumn, folder_of};
 
 /// Nights whose median is the state now. Resolution: a week has each day's work once.
 const NEWEST: usize = 7;

@@ -1,12 +1,12 @@
 //! `tauscope weeks`.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use anyhow::Context as _;
 use tauscope_archive::whole_file::{self, Existing};
 use tauscope_fleet::physics::{self, CellPhysics};
-use tauscope_fleet::store::{self, KEPT_NS, Store};
+use tauscope_fleet::store::{self, KEPT_NS, Note, Store, StoreError};
 use tauscope_fleet::web::week_page;
 
 use crate::existing::Force;
@@ -41,39 +41,23 @@ pub struct Args {
 
 /// Says it.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
-    if let Some(missing) = args.store.as_ref().filter(|path| !path.exists()) {
-        return Err(Failure::rejected(format!(
-            "there is no store {}",
-            missing.display()
-        )));
-    }
-    let store = args.store.as_deref().map(Store::open).transpose();
-    let store = store.map_err(|error| Failure::rejected(error.to_string()))?;
+    let notes = notes(args)?;
+    let of_cell = |cell: &str| notes.get(cell).map_or(&[][..], Vec::as_slice);
+    let baselines = |cell: &str| store::baselines(of_cell(cell));
     let now_ns = jiff::Timestamp::now().as_nanosecond();
     let now_ns = i64::try_from(now_ns).unwrap_or(i64::MAX);
-    let notes = |cell: &str| store.as_ref().map(|store| store.notes(cell, u32::MAX));
-    let mut unkept = None;
-    let mut wanted: BTreeSet<&str> = args.cell.iter().map(String::as_str).collect();
-    let baselines = |cell: &str| match notes(cell) {
-        Some(Ok(notes)) => store::baselines(&notes),
-        _ => Vec::new(),
-    };
     let since_day = ((now_ns - KEPT_NS) / NS_A_DAY) as f64;
     let read = physics::read(&args.history, since_day, &baselines);
     let (mut cells, unread) = read.map_err(|error| Failure::rejected(error.to_string()))?;
     for error in &unread {
         out.say(&format!("warning: {error}"));
     }
-    if !wanted.is_empty() {
-        cells.retain(|cell| args.cell.contains(&cell.cell));
-        cells.iter().for_each(|cell| {
-            wanted.remove(cell.cell.as_str());
-        });
-        if let Some(missing) = wanted.first() {
-            let title = format!("{} has no cell `{missing}`", args.history.display());
-            return Err(Failure::rejected(title));
-        }
+    let is_known = |name: &&String| cells.iter().any(|cell| cell.cell == **name);
+    if let Some(missing) = args.cell.iter().find(|name| !is_known(name)) {
+        let title = format!("{} has no cell `{missing}`", args.history.display());
+        return Err(Failure::rejected(title));
     }
+    cells.retain(|cell| args.cell.is_empty() || args.cell.contains(&cell.cell));
     if let Some(folder) = &args.out {
         let path = |cell: &CellPhysics| folder.join(format!("{}.html", cell.cell));
         args.force.check(cells.iter().map(path))?;
@@ -82,21 +66,10 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         })?;
         let _hold = interrupt::hold();
         for cell in &cells {
-            let notes = match notes(&cell.cell) {
-                Some(Err(error)) => {
-                    unkept = Some(error);
-                    Vec::new()
-                }
-                Some(Ok(notes)) => notes,
-                None => Vec::new(),
-            };
-            let page = week_page(cell, &notes, now_ns);
+            let page = week_page(cell, of_cell(&cell.cell), now_ns);
             whole_file::write(&path(cell), page.as_bytes(), Existing::Replace)
                 .context("the page")?;
         }
-    }
-    if let Some(error) = unkept {
-        out.say(&format!("warning: {error}"));
     }
     if args.json {
         out.print(&serde_json::to_string_pretty(&cells).map_err(anyhow::Error::from)?)?;
@@ -104,6 +77,24 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         out.print(&text(&cells))?;
     }
     Ok(Exit::from_loss(!unread.is_empty()))
+}
+
+/// The maintenance notes of all cells, newest first.
+fn notes(args: &Args) -> Result<BTreeMap<String, Vec<Note>>, Failure> {
+    let Some(path) = &args.store else {
+        return Ok(BTreeMap::new());
+    };
+    if !path.exists() {
+        let title = format!("there is no store {}", path.display());
+        return Err(Failure::rejected(title));
+    }
+    let read = || {
+        let store = Store::open(path)?;
+        let cells = store.cells()?.into_iter();
+        let notes = cells.map(|(cell, _)| Ok((cell.clone(), store.notes(&cell, u32::MAX)?)));
+        notes.collect::<Result<_, StoreError>>()
+    };
+    read().map_err(|error: StoreError| Failure::rejected(error.to_string()))
 }
 
 fn text(cells: &[CellPhysics]) -> String {

@@ -22,8 +22,8 @@ pub fn follow(
     while !stop.load(Ordering::Relaxed) {
         let since_day = unix_ns().saturating_sub(KEPT_NS) as f64 / 86_400e9;
         let of_cell = |cell: &str| notes.and_then(|store| store.notes(cell, u32::MAX).ok());
-        let baselines = |cell: &str| of_cell(cell).map_or_else(Vec::new, |notes| baselines(&notes));
-        match physics::read(folder, since_day, &baselines) {
+        let begins = |cell: &str| of_cell(cell).map_or_else(Vec::new, |notes| baselines(&notes));
+        match physics::read(folder, since_day, &begins) {
             Ok((cells, unread)) => {
                 if let Some(error) = unread.first().filter(|_| !told) {
                     told = true;

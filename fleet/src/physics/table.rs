@@ -16,7 +16,9 @@ const NS_A_DAY: f64 = 86_400e9;
 const MOST_BYTES: u64 = 16 << 20;
 
 /// A column: its name, and its value of a row.
-pub type Column<T> = (&'static str, T);
+pub type Column<T> = (&'static str, fn(&Row) -> T);
+/// A column of texts.
+pub type TextColumn = (&'static str, fn(&Row) -> &String);
 
 /// A number of one night.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -53,7 +55,7 @@ pub struct Row {
 
 impl Row {
     /// The columns of texts: name, and the row's value.
-    pub const TEXTS: [Column<fn(&Self) -> &String>; 7] = [
+    pub const TEXTS: [TextColumn; 7] = [
         ("cell", |row| &row.cell),
         ("robot", |row| &row.robot),
         ("arm", |row| &row.arm),
@@ -63,12 +65,12 @@ impl Row {
         ("twin_sha256", |row| &row.twin_sha256),
     ];
     /// The columns of counts.
-    pub const COUNTS: [Column<fn(&Self) -> u64>; 2] = [
+    pub const COUNTS: [Column<u64>; 2] = [
         ("stamp_ns", |row| row.stamp_ns),
         ("recordings", |row| row.recordings),
     ];
     /// The columns of numbers.
-    pub const NUMBERS: [Column<fn(&Self) -> f64>; 5] = [
+    pub const NUMBERS: [Column<f64>; 5] = [
         ("value", |row| row.value),
         ("low_95", |row| row.low_95),
         ("high_95", |row| row.high_95),
