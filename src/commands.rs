@@ -10,6 +10,7 @@ pub mod fleet;
 pub mod info;
 pub mod init;
 pub mod man;
+pub mod manifest;
 pub mod repair;
 pub mod replay;
 pub mod run;
