@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    calibrate, check, completions, doctor, evaluate, explain, fleet, info, init, man, manifest,
-    repair, replay, run, schema, send, simulate, stage,
+    calibrate, check, completions, diff, doctor, evaluate, explain, fleet, info, init, man,
+    manifest, repair, replay, run, schema, send, simulate, stage,
 };
 
 /// A robot's measured effort beside its digital twin's: stream, detect, record.
@@ -27,6 +27,7 @@ pub enum Command {
     Schema(schema::Args),
     Replay(replay::Args),
     Manifest(manifest::Args),
+    Diff(diff::Args),
     Calibrate(calibrate::Args),
     Explain(explain::Args),
     Evaluate(evaluate::Args),

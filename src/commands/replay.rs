@@ -1,6 +1,6 @@
 //! `tauscope replay`.
 
-mod archive;
+pub mod archive;
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

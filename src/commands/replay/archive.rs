@@ -290,7 +290,12 @@ fn sum(ends: Vec<End>) -> Summary {
 /// Writes the list of failures, a line of JSON each; empty where there is none. Gives its name.
 fn put_failures(job: &Job<'_>, shelf: &Folder, failed: &[Failed]) -> anyhow::Result<String> {
     let Shard { index, of } = job.shard.unwrap_or(Shard { index: 0, of: 1 });
-    let name = format!("failed/{index}-of-{of}.jsonl");
+    let manifest = job
+        .manifest
+        .file_stem()
+        .unwrap_or_default()
+        .to_string_lossy();
+    let name = format!("failed/{manifest}-{index}-of-{of}.jsonl");
     let mut text = String::new();
     for one in failed {
         text += &serde_json::to_string(one).context("the list of failures")?;
