@@ -4,9 +4,9 @@
     tests/faults/faults.py PROGRAM [--short] [--only NAME]...
 
 PROGRAM is the built tauscope. Every scenario runs a robot of 7 joints at 1 kHz and ends with one line: what was done,
-what was lost, what was said. `--short` kills and cuts less often and for less long,
-and holds no tight bound on time. Needs Linux and Python 3.10;
-scenarios with network namespaces or a mounted disk need root and are skipped, visibly, without.
+what was lost, what was said. `--short` kills and cuts less often and for less long, and
+holds no tight bound on time. Needs Linux and Python 3.10; scenarios with network namespaces or a mounted disk need root
+and are skipped, visibly, without.
 """
 import argparse
 import contextlib
