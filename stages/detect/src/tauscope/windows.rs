@@ -50,6 +50,8 @@ pub(crate) struct Windows {
     settled: Option<Settled>,
     /// What friction may hold behind a contact, if it is heeded.
     recovery: Option<Recovery>,
+    /// By joint, how many times larger that makes the noise now.
+    doubt: JointArray,
     /// By window and joint, the noise at the present speed and unrest.
     noise: [JointArray; WINDOWS_S.len()],
     /// By window and joint, the mean residual as far as the newest samples bear it out.
@@ -73,6 +75,7 @@ impl Windows {
             end: End::default(),
             settled: None,
             recovery: None,
+            doubt: [1.0; MAX_JOINTS],
             noise: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
             borne_out: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
             held: [0.0; MAX_JOINTS],
@@ -102,6 +105,7 @@ impl Windows {
         if let Some(recovery) = &mut self.recovery {
             recovery.reset();
         }
+        self.doubt = [1.0; MAX_JOINTS];
         self.score = 0.0;
     }
 
@@ -121,11 +125,14 @@ impl Windows {
             }
         }
         let now_ns = sample.header.stamp_ns;
+        self.doubt = [1.0; MAX_JOINTS];
         self.score = self.most_unusual();
         if let Some(recovery) = &mut self.recovery {
             recovery.step(now_ns, self.score.sqrt(), usual.is_none());
             if recovery.doubts() {
-                self.doubt();
+                for (doubt, slow) in self.doubt.iter_mut().zip(&self.means.slow) {
+                    *doubt = recovery.doubt(*slow);
+                }
                 self.score = self.most_unusual();
             }
         }
@@ -143,23 +150,10 @@ impl Windows {
     fn most_unusual(&mut self) -> f64 {
         let windows = self.learnt.windows.len();
         self.borne_out = borne_out(self.means.all(), windows, self.joints(), |w, j| {
-            self.noise[w][j]
+            self.doubted(w, j)
         });
         let scores = (0..windows).map(|w| self.length(w) / self.learnt.windows[w].usual);
         scores.fold(0.0, f64::max)
-    }
-
-    /// Takes what friction may hold behind a contact for noise.
-    fn doubt(&mut self) {
-        let Some(recovery) = &self.recovery else {
-            return;
-        };
-        for j in 0..self.learnt.joints.len() {
-            let doubt = recovery.doubt(self.means.slow[j]);
-            for noise in &mut self.noise {
-                noise[j] *= doubt;
-            }
-        }
     }
 
     /// By how much a score is less, for creep behind a contact with a standing arm.
@@ -230,7 +224,7 @@ impl Windows {
         let n = self.learnt.joints.len();
         let mut z = [0.0; MAX_JOINTS];
         for (j, z) in z.iter_mut().enumerate().take(n) {
-            *z = mean(j) / self.noise(window, j);
+            *z = mean(j) / self.doubted(window, j);
         }
         let inverse = &self.learnt.windows[window].inverse_correlation;
         // Symmetric: a row is a column.
@@ -295,7 +289,7 @@ impl Windows {
         let n = self.joints();
         let (mut change, mut held) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
         for j in 0..n {
-            let noise = self.noise(MIDDLE, j);
+            let noise = self.doubted(MIDDLE, j);
             change[j] = (self.mean(MIDDLE, j) - self.held[j]) / noise;
             held[j] = self.held[j] / noise;
         }
@@ -316,6 +310,12 @@ impl Windows {
     /// Its usual size at the joint's present speed and unrest \[effort unit\].
     pub fn noise(&self, window: usize, joint: usize) -> f64 {
         self.noise[window][joint]
+    }
+
+    /// The same where what friction may hold behind a contact is taken for noise, too. It says whether there is a contact; where one is and
+    /// whether the arm has come to rest are no matter of it.
+    fn doubted(&self, window: usize, joint: usize) -> f64 {
+        self.noise[window][joint] * self.doubt[joint]
     }
 
     /// Inverse of the correlation of the joints' means over a window, row by row.
