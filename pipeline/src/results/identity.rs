@@ -79,7 +79,7 @@ impl Identity {
     /// the recording's first message, in UTC.
     pub fn name(&self, wanted: &Wanted, cell: &str) -> String {
         let day = jiff::Timestamp::from_nanosecond(i128::from(wanted.start_ns)).map_or_else(
-            |_| "unknown".to_owned(),
+            |_| "none".to_owned(),
             |at| at.strftime("%Y-%m-%d").to_string(),
         );
         format!("cell={cell}/day={day}/{}.parquet", self.key(wanted))
