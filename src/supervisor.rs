@@ -11,6 +11,7 @@
 
 mod crew;
 mod flow;
+mod liveness;
 mod lives;
 mod local;
 mod patience;
@@ -18,6 +19,7 @@ mod process;
 mod restart;
 mod router;
 mod seats;
+mod service;
 mod silence;
 mod summary;
 mod tally;
@@ -37,6 +39,7 @@ use crew::Crew;
 use local::{Local, Reported};
 use process::Event;
 use router::Router;
+use service::Service;
 pub use seats::Instructions;
 pub use summary::{Ended, Summary};
 use tauscope_pipeline::pipeline::{Pipeline, Role};
@@ -124,6 +127,7 @@ async fn supervise(
         stopping: false,
         ended: Ended::Completed,
         view: View::new(care.verbosity, now.into_std()),
+        service: Service::new(),
         care,
         began: now,
         told_unready: false,
@@ -145,6 +149,7 @@ struct Supervisor<'a> {
     /// Why it ends.
     ended: Ended,
     view: View,
+    service: Service,
     care: Care,
     began: Instant,
     /// It was told which stages do not begin.
@@ -182,7 +187,7 @@ impl Supervisor<'_> {
             Event::Reported(line) => self.hear(crew, &line),
             Event::Exited(status) => {
                 self.crews[crew].exited();
-                self.process_ended(crew, &status);
+                self.process_ended(crew, status);
                 self.settle();
             }
         }
@@ -246,6 +251,7 @@ impl Supervisor<'_> {
     /// Ends the stages that listen to nobody here; the others follow as their inputs end.
     fn stop(&mut self) {
         self.stopping = true;
+        self.service.ends();
         for stage in &mut self.stages {
             stage.no_restart();
         }
