@@ -25,7 +25,9 @@ fn yaml(text: &str) -> Value {
 
 fn words(list: &Value) -> Vec<String> {
     let words = list.as_array().unwrap().iter();
-    words.map(|word| word.as_str().unwrap().to_owned()).collect()
+    words
+        .map(|word| word.as_str().unwrap().to_owned())
+        .collect()
 }
 
 /// The fleet's set and service.
@@ -50,11 +52,16 @@ fn every_command_line_is_one() {
         is_command_line(&words(&compose["services"][service]["command"]));
     }
     let [set, _] = kubernetes();
-    is_command_line(&words(&set["spec"]["template"]["spec"]["containers"][0]["args"]));
+    is_command_line(&words(
+        &set["spec"]["template"]["spec"]["containers"][0]["args"],
+    ));
     let unit = text("systemd/tauscope@.service");
     let mut commands = 0;
     for line in unit.lines() {
-        let Some(line) = line.strip_prefix("Exec").and_then(|line| line.split_once('=')) else {
+        let Some(line) = line
+            .strip_prefix("Exec")
+            .and_then(|line| line.split_once('='))
+        else {
             continue;
         };
         let mut command = line.1.split(' ').map(str::to_owned);
@@ -117,7 +124,10 @@ fn every_port_is_the_one_that_is_listened_on() {
 #[test]
 fn every_file_that_is_mounted_is_there_or_made() {
     if Command::new("openssl").arg("version").output().is_err() {
-        skipped("every_file_that_is_mounted_is_there_or_made", "openssl is absent");
+        skipped(
+            "every_file_that_is_mounted_is_there_or_made",
+            "openssl is absent",
+        );
         return;
     }
     let folder = tempfile::tempdir().unwrap();
@@ -131,7 +141,11 @@ fn every_file_that_is_mounted_is_there_or_made() {
         fs::copy(deploy("container").join(name), folder.path().join(name)).unwrap();
     }
     // The plant's own.
-    fs::copy(bundled().join("demo_arm.urdf"), folder.path().join("robot.urdf")).unwrap();
+    fs::copy(
+        bundled().join("demo_arm.urdf"),
+        folder.path().join("robot.urdf"),
+    )
+    .unwrap();
 
     let compose = yaml(&text("container/compose.yaml"));
     let mut endpoints = text("container/cell7.yaml");
@@ -169,7 +183,11 @@ fn every_file_that_is_mounted_is_there_or_made() {
 #[test]
 fn the_cell_of_the_containers_is_a_pipeline() {
     let folder = tempfile::tempdir().unwrap();
-    fs::copy(bundled().join("demo_arm.urdf"), folder.path().join("robot.urdf")).unwrap();
+    fs::copy(
+        bundled().join("demo_arm.urdf"),
+        folder.path().join("robot.urdf"),
+    )
+    .unwrap();
     let there = format!("{}/", folder.path().display());
     let text = text("container/cell7.yaml").replace("/var/lib/tauscope/", &there);
     let file = write(&folder.path().join("cell7.yaml"), &text);

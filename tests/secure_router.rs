@@ -27,7 +27,11 @@ fn router(folder: &Path, test: &str) -> Option<(Session, String)> {
     let mut config = zenoh::Config::from_file(folder.join("router.json5")).unwrap();
     let endpoint = robot::endpoint().replace("tcp/", "tls/");
     // The file names them as they are beside it; this test runs elsewhere.
-    for key in ["root_ca_certificate", "listen_private_key", "listen_certificate"] {
+    for key in [
+        "root_ca_certificate",
+        "listen_private_key",
+        "listen_certificate",
+    ] {
         let key = format!("transport/link/tls/{key}");
         let name = config.get_json(&key).unwrap();
         let path = folder.join(name.trim_matches('"'));

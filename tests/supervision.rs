@@ -43,7 +43,10 @@ fn a_stage_that_hangs_is_named_and_goes_on() {
     std::thread::sleep(Duration::from_secs(1));
     signal(twin, "STOP");
     let line = live.wait_for("warning: stage `twin` hangs: nothing was heard of it for 3 s");
-    assert!(line.contains(&format!("process {twin} is killed")), "{line}");
+    assert!(
+        line.contains(&format!("process {twin} is killed")),
+        "{line}"
+    );
     signal(twin, "CONT");
     live.wait_for("note: stage `twin` goes on");
     assert!(is_alive(twin), "it is the same process");

@@ -245,7 +245,9 @@ impl Local {
 
     /// Whether it is started again although it ended in order.
     pub fn returns_always(&self) -> bool {
-        let always = self.policy.is_some_and(|policy| policy.when == When::Always);
+        let always = self
+            .policy
+            .is_some_and(|policy| policy.when == When::Always);
         always && !self.last_life && self.patience.is_none()
     }
 

@@ -39,7 +39,10 @@ impl Service {
             self.status = status;
         }
         let Some(every) = self.beat_every else { return };
-        if self.beat.is_none_or(|beat| now.duration_since(beat) >= every) {
+        if self
+            .beat
+            .is_none_or(|beat| now.duration_since(beat) >= every)
+        {
             self.beat = Some(now);
             send(&[NotifyState::Watchdog]);
         }

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::cell::{EffortUnit, ToolEntry};
 use super::restart::RestartEntry;
+use crate::cell::{EffortUnit, ToolEntry};
 use crate::settings::OutsideEntry;
 use crate::yaml::Place;
 

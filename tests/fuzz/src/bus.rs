@@ -16,12 +16,7 @@ use crate::files::DATA;
 /// More samples make an input slow, not wild.
 const MOST_SAMPLES: usize = 64;
 /// Detectors that need no training.
-const DETECTORS: [&str; 4] = [
-    "naive_difference",
-    "momentum_observer",
-    "twin_regression",
-    "tauscope",
-];
+const DETECTORS: [&str; 3] = ["naive_difference", "momentum_observer", "twin_regression"];
 
 struct Kept<T>(Vec<T>);
 

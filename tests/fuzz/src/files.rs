@@ -94,7 +94,9 @@ pub fn twin(bytes: &[u8]) {
         tool_link: None,
     };
     let config = tauscope_twin::Config::default();
-    let config = config.clone().with(config.filters(Some(file.value.filters)));
+    let config = config
+        .clone()
+        .with(config.filters(Some(file.value.filters)));
     let _ = tauscope_twin::Twin::new(&config, setup, correction);
 }
 

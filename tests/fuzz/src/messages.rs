@@ -63,7 +63,9 @@ pub fn command(bytes: &[u8]) {
 pub fn modbus(bytes: &[u8]) {
     let mut plc = connect();
     // The server may hang up in the middle of it.
-    let _ = plc.write_all(bytes).and_then(|()| plc.shutdown(Shutdown::Write));
+    let _ = plc
+        .write_all(bytes)
+        .and_then(|()| plc.shutdown(Shutdown::Write));
     let mut answer = Vec::new();
     let _ = plc.read_to_end(&mut answer);
     drop(plc);

@@ -74,7 +74,9 @@ impl Change {
 }
 
 fn corpus(name: &str) -> Vec<Vec<u8>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(name);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("corpus")
+        .join(name);
     let mut paths: Vec<_> = fs::read_dir(&folder)
         .unwrap_or_else(|error| panic!("{}: {error}", folder.display()))
         .map(|entry| entry.unwrap().path())
@@ -89,7 +91,10 @@ fn survives(name: &str, take: Take) {
     for input in &corpus {
         take(input);
     }
-    let mutated = (prop::sample::select(corpus), prop::collection::vec(change(), 1..6));
+    let mutated = (
+        prop::sample::select(corpus),
+        prop::collection::vec(change(), 1..6),
+    );
     let mutated = mutated.prop_map(|(mut bytes, changes)| {
         for change in &changes {
             change.apply(&mut bytes);
@@ -123,4 +128,15 @@ macro_rules! short {
     };
 }
 
-short!(bus_samples, cdr, command, csv, mcap, modbus, pipeline, status, twin, urdf);
+short!(
+    bus_samples,
+    cdr,
+    command,
+    csv,
+    mcap,
+    modbus,
+    pipeline,
+    status,
+    twin,
+    urdf
+);
