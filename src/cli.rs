@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    calibrate, check, completions, doctor, evaluate, explain, fleet, info, init, man, repair,
-    replay, run, schema, send, simulate, stage,
+    calibrate, check, completions, doctor, evaluate, explain, fleet, info, init, man, physics,
+    repair, replay, run, schema, send, simulate, stage, weeks,
 };
 
 /// A robot's measured effort beside its digital twin's: stream, detect, record.
@@ -31,6 +31,8 @@ pub enum Command {
     Evaluate(evaluate::Args),
     Send(send::Args),
     Fleet(fleet::Args),
+    Physics(physics::Args),
+    Weeks(weeks::Args),
     Simulate(simulate::Args),
     Init(init::Args),
     Info(info::Args),

@@ -10,6 +10,7 @@ pub mod fleet;
 pub mod info;
 pub mod init;
 pub mod man;
+pub mod physics;
 pub mod repair;
 pub mod replay;
 pub mod run;
@@ -17,6 +18,7 @@ pub mod schema;
 pub mod send;
 pub mod simulate;
 pub mod stage;
+pub mod weeks;
 
 use std::path::{Path, PathBuf};
 

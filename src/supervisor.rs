@@ -11,6 +11,7 @@
 
 mod crew;
 mod flow;
+mod ledger;
 mod liveness;
 mod lives;
 mod local;
