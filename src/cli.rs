@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    calibrate, check, completions, doctor, evaluate, explain, fleet, info, init, man, physics,
-    repair, replay, run, schema, send, simulate, stage, weeks,
+    calibrate, check, completions, diff, doctor, evaluate, explain, fleet, info, init, man,
+    manifest, physics, repair, replay, run, schema, send, simulate, stage, weeks,
 };
 
 /// A robot's measured effort beside its digital twin's: stream, detect, record.
@@ -26,6 +26,8 @@ pub enum Command {
     Check(check::Args),
     Schema(schema::Args),
     Replay(replay::Args),
+    Manifest(manifest::Args),
+    Diff(diff::Args),
     Calibrate(calibrate::Args),
     Explain(explain::Args),
     Evaluate(evaluate::Args),

@@ -3,6 +3,7 @@
 pub mod calibrate;
 pub mod check;
 pub mod completions;
+pub mod diff;
 pub mod doctor;
 pub mod evaluate;
 pub mod explain;
@@ -10,6 +11,7 @@ pub mod fleet;
 pub mod info;
 pub mod init;
 pub mod man;
+pub mod manifest;
 pub mod physics;
 pub mod repair;
 pub mod replay;

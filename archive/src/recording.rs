@@ -6,6 +6,7 @@ mod open;
 mod several;
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -180,13 +181,26 @@ impl Recording {
     /// # Errors
     /// [`ArchiveError::NoSuchTopic`], or if the recording can no longer be opened.
     pub fn messages(&self, topics: &[&str]) -> Result<Messages, ArchiveError> {
+        self.messages_within(topics, i64::MIN..=i64::MAX)
+    }
+
+    /// As [`Recording::messages`], but only those whose log time lies in `within_ns` \[ns since the epoch\]. Chunks of an
+    /// MCAP file that lie outside are not read, and what is damaged in them is not told.
+    ///
+    /// # Errors
+    /// As [`Recording::messages`].
+    pub fn messages_within(
+        &self,
+        topics: &[&str],
+        within_ns: RangeInclusive<i64>,
+    ) -> Result<Messages, ArchiveError> {
         let mut wanted = vec![false; self.topics.list.len()];
         for name in topics {
             for index in self.topic_indexes(name)? {
                 wanted[index] = true;
             }
         }
-        self.read(&wanted)
+        self.read(&wanted, within_ns)
     }
 
     /// All messages in the order of their log times.
@@ -194,7 +208,7 @@ impl Recording {
     /// # Errors
     /// If the recording can no longer be opened.
     pub fn all_messages(&self) -> Result<Messages, ArchiveError> {
-        self.read(&vec![true; self.topics.list.len()])
+        self.read(&vec![true; self.topics.list.len()], i64::MIN..=i64::MAX)
     }
 
     /// The joint states on `topic`, decoded, in the order of their log times.
@@ -206,16 +220,25 @@ impl Recording {
         Ok(JointStates::new(self.messages(&[topic])?))
     }
 
-    fn read(&self, wanted: &[bool]) -> Result<Messages, ArchiveError> {
+    fn read(
+        &self,
+        wanted: &[bool],
+        within_ns: RangeInclusive<i64>,
+    ) -> Result<Messages, ArchiveError> {
         Ok(Messages::new(
             &self.path,
             Arc::clone(&self.topics),
-            self.cursor(wanted)?,
+            self.cursor(wanted, &within_ns)?,
+            within_ns,
         ))
     }
 
     /// Over the topics marked in `wanted`, by their place in [`Recording::topics`].
-    fn cursor(&self, wanted: &[bool]) -> Result<Box<dyn Cursor>, ArchiveError> {
+    fn cursor(
+        &self,
+        wanted: &[bool],
+        within_ns: &RangeInclusive<i64>,
+    ) -> Result<Box<dyn Cursor>, ArchiveError> {
         match &self.store {
             Store::Mcap(layout) => {
                 let topic = |channel| {
@@ -223,13 +246,17 @@ impl Recording {
                     wanted[topic].then_some(topic)
                 };
                 let cursor = McapCursor::new(Arc::clone(layout), Order::LogTime, topic)?;
-                Ok(Box::new(cursor))
+                Ok(Box::new(cursor.within(within_ns)))
             }
             Store::Sqlite { file, numbers } => {
                 let topic = |id| numbers.get(&id).copied().filter(|&topic| wanted[topic]);
                 Ok(Box::new(file.cursor(topic)?))
             }
-            Store::Several(parts) => Ok(Box::new(SeveralCursor::new(Arc::clone(parts), wanted))),
+            Store::Several(parts) => Ok(Box::new(SeveralCursor::new(
+                Arc::clone(parts),
+                wanted,
+                within_ns.clone(),
+            ))),
             Store::Csv(table) => Ok(Box::new(table.cursor()?)),
         }
     }

@@ -9,8 +9,9 @@ pub const FALSE_ALARMS_A_NIGHT: f64 = 1e-7;
 /// Statistical: half of the smallest lasting change that is looked for, which is 1 (Page's k).
 const ALLOWANCE: f64 = 0.5;
 /// No night adds more than one of so many deviations.
-/// Statistical: so two wild nights in a row are no change, and three equal ones are.
-const MOST: f64 = 6.0;
+/// Tuned: on simulated years with seeds 101 to 110, `cargo test -p tauscope-condition --test year`: with 6, a single wild
+/// night behind some chance ones was a change in two of 1,000 cell years. Five nights far off are a change, four are none.
+const MOST: f64 = 4.0;
 
 /// Sums of what exceeds the expected, upwards and downwards.
 #[derive(Debug, Clone)]
@@ -82,10 +83,11 @@ mod tests {
     }
 
     #[test]
-    fn two_wild_nights_are_no_change_and_three_are() {
+    fn four_wild_nights_are_no_change_and_five_are() {
         let mut sums = Cusum::default();
-        assert_eq!(sums.take(50.0, 0), None);
-        assert_eq!(sums.take(50.0, 1), None);
-        assert_eq!(sums.take(50.0, 2), Some(0));
+        for night in 0..4 {
+            assert_eq!(sums.take(50.0, night), None);
+        }
+        assert_eq!(sums.take(50.0, 4), Some(0));
     }
 }

@@ -214,6 +214,16 @@ enum Place {
 }
 
 impl<'a> Graph<'a> {
+    /// How many sources, stages and sinks there are.
+    pub fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
     /// Adds a source.
     ///
     /// # Errors

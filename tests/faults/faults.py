@@ -4,8 +4,9 @@
     tests/faults/faults.py PROGRAM [--short] [--only NAME]...
 
 PROGRAM is the built tauscope. Every scenario runs a robot of 7 joints at 1 kHz and ends with one line: what was done,
-what was lost, what was said. `--short` kills and cuts less often and for less long. Needs Linux and Python 3.10;
-scenarios with network namespaces or a mounted disk need root and are skipped, visibly, without.
+what was lost, what was said. `--short` kills and cuts less often and for less long, and
+holds no tight bound on time. Needs Linux and Python 3.10; scenarios with network namespaces or a mounted disk need root
+and are skipped, visibly, without.
 """
 import argparse
 import contextlib
@@ -22,6 +23,12 @@ import urllib.request
 from pathlib import Path
 
 from hosts import Hosts, Skipped
+
+# A killed stage is back, a killed cell and one that was cut off are known, within so long on a quiet machine.
+BACK_S, KILLED_IS_KNOWN_S, CUT_IS_KNOWN_S = 1.0, 1.0, 5.0
+# The short form may run beside others, which make everything later; it tells whether, not how soon.
+BUSY = 10.0
+slack = 1.0
 
 HERE = Path(__file__).resolve().parent
 DATA = HERE.parent / "data"
@@ -168,7 +175,7 @@ def kill(program, folder, victim, times, seconds):
     code, summary = run.end()
     lost = balance(summary)
     check(code == (3 if lost else 0), "exit code", code, "with", lost, "lost")
-    check(slowest < 1.0, f"{victim} was back after {slowest:.2f} s")
+    check(slowest < BACK_S * slack, f"{victim} was back after {slowest:.2f} s")
     whole = seconds * 1000
     check(abs(emitted(summary, "ingest") - whole) <= 2, emitted(summary, "ingest"), "of", whole, "samples emitted")
     # What the recorder has taken is in the archive, but for what died with it.
@@ -349,7 +356,7 @@ def fleet(program, folder, fault):
         else:
             hosts.cut()
         took = wait(lambda seen: seen == "stale", 30)
-        limit = 1.0 if fault == "killed" else 5.0
+        limit = (KILLED_IS_KNOWN_S if fault == "killed" else CUT_IS_KNOWN_S) * slack
         check(took < limit, f"known after {took:.2f} s, not within {limit} s")
         return f"known after {took:.2f} s"
     finally:
@@ -387,6 +394,8 @@ def main():
     parser.add_argument("--short", action="store_true")
     parser.add_argument("--only", action="append", help="scenarios whose name has this in it")
     args = parser.parse_args()
+    global slack
+    slack = BUSY if args.short else 1.0
     program = str(args.program.resolve())
     failed = False
     for name, scenario in scenarios(args.short):

@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use mcap::records::op;
@@ -120,6 +121,16 @@ impl McapCursor {
             spare: None,
             layout,
         })
+    }
+
+    /// Without the extents that hold nothing of these log times \[ns since the epoch\]; those at the edges hold more.
+    pub(crate) fn within(mut self, within_ns: &RangeInclusive<i64>) -> Self {
+        let of = |ns: i64| u64::try_from(ns).unwrap_or(0);
+        let (from_ns, to_ns) = (of(*within_ns.start()), of(*within_ns.end()));
+        let extents = &self.layout.extents;
+        self.extents
+            .retain(|&i| extents[i].start_ns <= to_ns && extents[i].end_ns >= from_ns);
+        self
     }
 
     /// The loaded extent whose next message comes first.

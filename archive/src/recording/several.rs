@@ -1,5 +1,6 @@
 //! The messages of several recordings as if they were one.
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use super::Recording;
@@ -17,6 +18,7 @@ pub(super) struct Part {
 pub(super) struct SeveralCursor {
     parts: Arc<Vec<Part>>,
     wanted: Vec<bool>,
+    within_ns: RangeInclusive<i64>,
     /// Parts not opened yet; the last one begins first.
     waiting: Vec<usize>,
     open: Vec<Open>,
@@ -32,8 +34,12 @@ struct Open {
 }
 
 impl SeveralCursor {
-    /// Over the topics marked in `wanted`, by their place in the whole.
-    pub(super) fn new(parts: Arc<Vec<Part>>, wanted: &[bool]) -> Self {
+    /// Over the topics marked in `wanted`, by their place in the whole. What lies outside `within_ns` may be left out.
+    pub(super) fn new(
+        parts: Arc<Vec<Part>>,
+        wanted: &[bool],
+        within_ns: RangeInclusive<i64>,
+    ) -> Self {
         let start_ns = |&part: &usize| parts[part].recording.start_ns();
         let mut waiting: Vec<_> = (0..parts.len())
             .filter(|part| start_ns(part).is_some())
@@ -42,6 +48,7 @@ impl SeveralCursor {
         Self {
             parts,
             wanted: wanted.to_vec(),
+            within_ns,
             waiting,
             open: Vec::new(),
             current: None,
@@ -78,7 +85,7 @@ impl SeveralCursor {
         let wanted: Vec<_> = topics.iter().map(|&topic| self.wanted[topic]).collect();
         self.open.push(Open {
             part,
-            cursor: recording.cursor(&wanted)?,
+            cursor: recording.cursor(&wanted, &self.within_ns)?,
             ready: false,
         });
         Ok(())

@@ -230,7 +230,7 @@ mod tests {
         let mut noise = Noise(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
         let mut add = |_: &[f64], qd: &[f64], effort: &mut [f64]| {
             effort[1] += coulomb_nm * qd[1].signum() + 0.4 * qd[1];
-            for effort in effort.iter_mut() {
+            for effort in effort {
                 *effort += 0.05 * noise.next();
             }
         };
@@ -289,7 +289,7 @@ mod tests {
     fn an_arm_that_stands_has_no_numbers() {
         let mut input = night(1, 1.0);
         for recording in &mut input.fit {
-            recording.position.iter_mut().for_each(|q| *q = 0.3);
+            recording.position.fill(0.3);
         }
         assert!(
             measure(&input)
