@@ -12,6 +12,7 @@
 mod crew;
 mod flow;
 mod ledger;
+mod liveness;
 mod lives;
 mod local;
 mod patience;
@@ -19,6 +20,7 @@ mod process;
 mod restart;
 mod router;
 mod seats;
+mod service;
 mod silence;
 mod summary;
 mod tally;
@@ -39,6 +41,7 @@ use local::{Local, Reported};
 use process::Event;
 use router::Router;
 pub use seats::Instructions;
+use service::Service;
 pub use summary::{Ended, Summary};
 use tauscope_pipeline::pipeline::{Pipeline, Role};
 pub use view::Verbosity;
@@ -125,6 +128,7 @@ async fn supervise(
         stopping: false,
         ended: Ended::Completed,
         view: View::new(care.verbosity, now.into_std()),
+        service: Service::new(),
         care,
         began: now,
         told_unready: false,
@@ -146,6 +150,7 @@ struct Supervisor<'a> {
     /// Why it ends.
     ended: Ended,
     view: View,
+    service: Service,
     care: Care,
     began: Instant,
     /// It was told which stages do not begin.
@@ -183,7 +188,7 @@ impl Supervisor<'_> {
             Event::Reported(line) => self.hear(crew, &line),
             Event::Exited(status) => {
                 self.crews[crew].exited();
-                self.process_ended(crew, &status);
+                self.process_ended(crew, status);
                 self.settle();
             }
         }
@@ -247,6 +252,7 @@ impl Supervisor<'_> {
     /// Ends the stages that listen to nobody here; the others follow as their inputs end.
     fn stop(&mut self) {
         self.stopping = true;
+        self.service.ends();
         for stage in &mut self.stages {
             stage.no_restart();
         }

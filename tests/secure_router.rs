@@ -28,6 +28,17 @@ fn router(folder: &Path, test: &str) -> Option<(Session, String)> {
     secure(folder);
     let mut config = zenoh::Config::from_file(folder.join("router.json5")).unwrap();
     let endpoint = robot::endpoint().replace("tcp/", "tls/");
+    // The file names them as they are beside it; this test runs elsewhere.
+    for key in [
+        "root_ca_certificate",
+        "listen_private_key",
+        "listen_certificate",
+    ] {
+        let key = format!("transport/link/tls/{key}");
+        let name = config.get_json(&key).unwrap();
+        let path = folder.join(name.trim_matches('"'));
+        config.insert_json5(&key, &format!("{path:?}")).unwrap();
+    }
     let listen = format!("[\"{endpoint}\"]");
     config.insert_json5("listen/endpoints", &listen).unwrap();
     Some((zenoh::open(config).wait().unwrap(), endpoint))

@@ -79,9 +79,9 @@ RULE
     shared_memory: { enabled: false },
     link: {
       tls: {
-        root_ca_certificate: "$PWD/ca.pem",
-        listen_private_key: "$PWD/router.key",
-        listen_certificate: "$PWD/router.pem",
+        root_ca_certificate: "ca.pem",
+        listen_private_key: "router.key",
+        listen_certificate: "router.pem",
         enable_mtls: true,
         close_link_on_expiration: true,
       },
@@ -104,6 +104,5 @@ HEAD
     echo '  },'
     echo '}'
 } >router.json5
-# The router's host copies the folder's files elsewhere: then the paths in router.json5 change.
 echo "$PWD/router.json5: ${#cells[@]} cells. An endpoint of the cell \`${cells[0]}\`:"
 echo "tls/$router:7448#root_ca_certificate_file=ca.pem;enable_mtls=true;connect_certificate_file=${cells[0]}.pem;connect_private_key_file=${cells[0]}.key"

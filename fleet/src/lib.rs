@@ -3,7 +3,7 @@
 #[cfg(test)]
 mod fixture;
 pub mod hub;
-mod inbox;
+pub mod inbox;
 mod keeper;
 mod mailbox;
 pub mod physics;

@@ -42,6 +42,12 @@ pub(super) fn crews(
         let root = here.get(&roots[at]).copied().unwrap_or(index);
         stages.push(Local::new(at, seat, place, root));
     }
+    // They die together: of what they say of another life, the strictest holds.
+    for index in 0..stages.len() {
+        let policy = pipeline.stages[stages[index].at].restart;
+        let root = stages[index].root;
+        stages[root].restart_by(policy);
+    }
     (stages, crews)
 }
 
@@ -131,11 +137,12 @@ impl Supervisor<'_> {
     }
 
     /// A process has ended, and all that it said was heard.
-    pub(super) fn process_ended(&mut self, crew: usize, status: &std::io::Result<ExitStatus>) {
+    pub(super) fn process_ended(&mut self, crew: usize, status: std::io::Result<ExitStatus>) {
         let stages = self.crews[crew].stages.clone();
         let in_order = status.as_ref().is_ok_and(ExitStatus::success);
         if let ([only], true, true) = (stages.as_slice(), self.crews[crew].outside, in_order)
             && !self.stages[*only].was_killed()
+            && !self.stages[*only].returns_always()
         {
             self.stages[*only].end();
             return;
@@ -143,7 +150,7 @@ impl Supervisor<'_> {
         for root in stages {
             if self.stages[root].root == root && self.stages[root].is_running() {
                 let tree = self.tree(root);
-                self.over(&tree, Some(status));
+                self.over(&tree, Some(&status));
             }
         }
     }

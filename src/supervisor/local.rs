@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use tauscope_bus::shell::{Line, Outcome, Report};
 use tauscope_bus::{SampleKind, Seat, Trouble};
+use tauscope_pipeline::pipeline::{Restart, When};
 use tokio::time::Instant;
 
 use super::flow::Flow;
@@ -29,6 +30,12 @@ pub struct Local {
     pub tally: Tally,
     state: State,
     deaths: Deaths,
+    /// When it is started again; of a tree its first stage knows.
+    policy: Option<Restart>,
+    /// When it last said how it fares, in this life.
+    heard: Option<Instant>,
+    /// It was told that it hangs.
+    hangs: bool,
     /// No life follows this one.
     last_life: bool,
     /// It has said in this life that it begins.
@@ -89,6 +96,9 @@ impl Local {
             tally: Tally::default(),
             state: State::Waiting(now),
             deaths: Deaths::default(),
+            policy: None,
+            heard: None,
+            hangs: false,
             last_life: false,
             ready: false,
             flow: Flow::new(now.into_std()),
@@ -134,6 +144,7 @@ impl Local {
     pub fn started(&mut self) {
         self.state = State::Running;
         self.ready = false;
+        (self.heard, self.hangs) = (None, false);
         self.patience = None;
     }
 
@@ -183,6 +194,7 @@ impl Local {
             Err(_) => return Reported::Other(line),
         }
         let now = Instant::now();
+        self.heard = Some(now);
         let moved = self.flow.note(self.samples(), now.into_std());
         if let Some(patience) = self.patience.as_mut().filter(|_| moved) {
             patience.extend(now);
@@ -227,7 +239,39 @@ impl Local {
 
     /// Notes a death of its tree, and says after what time it is started again, if it is.
     pub fn note_death(&mut self) -> Option<Duration> {
-        self.deaths.note(std::time::Instant::now())
+        let policy = self.policy.unwrap_or_default();
+        self.deaths.note(&policy, std::time::Instant::now())
+    }
+
+    /// Its tree is started again by this policy, too.
+    pub fn restart_by(&mut self, policy: Restart) {
+        let policy = self.policy.map_or(policy, |own| own.strictest(policy));
+        self.policy = Some(policy);
+    }
+
+    /// Whether it is started again although it ended in order.
+    pub fn returns_always(&self) -> bool {
+        let always = self
+            .policy
+            .is_some_and(|policy| policy.when == When::Always);
+        always && !self.last_life && self.patience.is_none()
+    }
+
+    /// For how long it has not said how it fares, which a stage does ten times a second while it runs. Not of one that
+    /// has never said it in this life: it waits for others, or does not speak.
+    pub fn unheard_for(&self, now: Instant) -> Option<Duration> {
+        let heard = self.heard.filter(|_| self.is_running() && !self.is_done());
+        heard.map(|heard| now.duration_since(heard))
+    }
+
+    /// Notes whether it hangs; true if that is new.
+    pub fn note_hangs(&mut self, hangs: bool) -> bool {
+        std::mem::replace(&mut self.hangs, hangs) != hangs
+    }
+
+    /// Whether it hangs, as far as was noted.
+    pub fn hangs(&self) -> bool {
+        self.hangs
     }
 
     /// It has ended in order.

@@ -23,10 +23,12 @@ impl Supervisor<'_> {
         if !self.stopping {
             self.tell_who_does_not_begin(now);
             self.tell_who_is_silent(now);
+            self.tell_who_hangs(now);
             self.end_without_data(now);
             self.end_in_time(now);
         }
         self.tell_who_does_not_end(now);
+        self.tell_service(now);
         let stages = &self.stages;
         self.view.show(now.into_std(), || {
             stages.iter().map(|stage| row(stage, now)).collect()
