@@ -188,7 +188,7 @@ impl Supervisor<'_> {
             Event::Reported(line) => self.hear(crew, &line),
             Event::Exited(status) => {
                 self.crews[crew].exited();
-                self.process_ended(crew, status);
+                self.process_ended(crew, &status);
                 self.settle();
             }
         }
@@ -252,7 +252,7 @@ impl Supervisor<'_> {
     /// Ends the stages that listen to nobody here; the others follow as their inputs end.
     fn stop(&mut self) {
         self.stopping = true;
-        self.service.ends();
+        service::ends();
         for stage in &mut self.stages {
             stage.no_restart();
         }

@@ -37,7 +37,9 @@ fn router(folder: &Path, test: &str) -> Option<(Session, String)> {
         let key = format!("transport/link/tls/{key}");
         let name = config.get_json(&key).unwrap();
         let path = folder.join(name.trim_matches('"'));
-        config.insert_json5(&key, &format!("{path:?}")).unwrap();
+        config
+            .insert_json5(&key, &serde_json::json!(path).to_string())
+            .unwrap();
     }
     let listen = format!("[\"{endpoint}\"]");
     config.insert_json5("listen/endpoints", &listen).unwrap();

@@ -7,6 +7,7 @@ use tokio::time::Instant;
 
 use super::Supervisor;
 use super::local::Local;
+use super::process::Process;
 
 /// A stage that has said nothing for so long hangs.
 /// Resolution: thirty reports are missing; a busy machine delays a few.
@@ -25,8 +26,8 @@ impl Supervisor<'_> {
             let name = &stage.seat.stage;
             let seconds = unheard_for.as_secs();
             if hangs && is_new {
-                let left = (KILLED_AFTER - HANGS_AFTER).as_secs();
-                let id = self.crews[crew].process().map_or(0, |process| process.id());
+                let left = KILLED_AFTER.saturating_sub(HANGS_AFTER).as_secs();
+                let id = self.crews[crew].process().map_or(0, Process::id);
                 self.view.warn(&format!(
                     "warning: stage `{name}` hangs: nothing was heard of it for {seconds} s; its process {id} is \
                      killed in {left} s"

@@ -137,7 +137,7 @@ impl Supervisor<'_> {
     }
 
     /// A process has ended, and all that it said was heard.
-    pub(super) fn process_ended(&mut self, crew: usize, status: std::io::Result<ExitStatus>) {
+    pub(super) fn process_ended(&mut self, crew: usize, status: &std::io::Result<ExitStatus>) {
         let stages = self.crews[crew].stages.clone();
         let in_order = status.as_ref().is_ok_and(ExitStatus::success);
         if let ([only], true, true) = (stages.as_slice(), self.crews[crew].outside, in_order)
@@ -150,7 +150,7 @@ impl Supervisor<'_> {
         for root in stages {
             if self.stages[root].root == root && self.stages[root].is_running() {
                 let tree = self.tree(root);
-                self.over(&tree, Some(&status));
+                self.over(&tree, Some(status));
             }
         }
     }

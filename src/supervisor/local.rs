@@ -32,10 +32,7 @@ pub struct Local {
     deaths: Deaths,
     /// When it is started again; of a tree its first stage knows.
     policy: Option<Restart>,
-    /// When it last said how it fares, in this life.
-    heard: Option<Instant>,
-    /// It was told that it hangs.
-    hangs: bool,
+    pulse: Pulse,
     /// No life follows this one.
     last_life: bool,
     /// It has said in this life that it begins.
@@ -52,6 +49,15 @@ pub struct Local {
     finish_by: Option<Instant>,
     /// What it keeps beyond its death; without it, its reports must do.
     kept: Option<Kept>,
+}
+
+/// Whether it lives, in this life.
+#[derive(Debug, Default)]
+struct Pulse {
+    /// When it last said how it fares.
+    heard: Option<Instant>,
+    /// It was told that it hangs.
+    hangs: bool,
 }
 
 #[derive(Debug)]
@@ -97,8 +103,7 @@ impl Local {
             state: State::Waiting(now),
             deaths: Deaths::default(),
             policy: None,
-            heard: None,
-            hangs: false,
+            pulse: Pulse::default(),
             last_life: false,
             ready: false,
             flow: Flow::new(now.into_std()),
@@ -144,7 +149,7 @@ impl Local {
     pub fn started(&mut self) {
         self.state = State::Running;
         self.ready = false;
-        (self.heard, self.hangs) = (None, false);
+        self.pulse = Pulse::default();
         self.patience = None;
     }
 
@@ -194,7 +199,7 @@ impl Local {
             Err(_) => return Reported::Other(line),
         }
         let now = Instant::now();
-        self.heard = Some(now);
+        self.pulse.heard = Some(now);
         let moved = self.flow.note(self.samples(), now.into_std());
         if let Some(patience) = self.patience.as_mut().filter(|_| moved) {
             patience.extend(now);
@@ -260,18 +265,21 @@ impl Local {
     /// For how long it has not said how it fares, which a stage does ten times a second while it runs. Not of one that
     /// has never said it in this life: it waits for others, or does not speak.
     pub fn unheard_for(&self, now: Instant) -> Option<Duration> {
-        let heard = self.heard.filter(|_| self.is_running() && !self.is_done());
+        let heard = self
+            .pulse
+            .heard
+            .filter(|_| self.is_running() && !self.is_done());
         heard.map(|heard| now.duration_since(heard))
     }
 
     /// Notes whether it hangs; true if that is new.
     pub fn note_hangs(&mut self, hangs: bool) -> bool {
-        std::mem::replace(&mut self.hangs, hangs) != hangs
+        std::mem::replace(&mut self.pulse.hangs, hangs) != hangs
     }
 
     /// Whether it hangs, as far as was noted.
     pub fn hangs(&self) -> bool {
-        self.hangs
+        self.pulse.hangs
     }
 
     /// It has ended in order.

@@ -47,11 +47,11 @@ impl Service {
             send(&[NotifyState::Watchdog]);
         }
     }
+}
 
-    /// The run ends.
-    pub fn ends(&self) {
-        send(&[NotifyState::Stopping]);
-    }
+/// The run ends.
+pub fn ends() {
+    send(&[NotifyState::Stopping]);
 }
 
 fn send(state: &[NotifyState<'_>]) {
