@@ -97,7 +97,11 @@ pub fn answer(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> Answe
             (exit::code(outcome, &mut output), errors)
         }
         Err(error) => {
-            output.say(&error.to_string());
+            if error.use_stderr() {
+                output.say(&error.to_string());
+            } else if let Output::Memory(stdout, _) = &mut output {
+                stdout.push_str(&error.to_string());
+            }
             (
                 u8::try_from(error.exit_code()).unwrap_or(u8::MAX),
                 no_errors,

@@ -42,7 +42,12 @@ fn is_command_line(arguments: &[String]) {
     let help = "--help".to_owned();
     let out = Out::answer(arguments.iter().chain([&help]));
     assert_eq!(out.code, 0, "{arguments:?}: {}", out.stderr);
-    assert!(out.stdout.contains("Usage: tauscope "), "{arguments:?}");
+    assert!(
+        out.stdout.contains("Usage: tauscope "),
+        "{arguments:?}: {} {}",
+        out.stdout,
+        out.stderr
+    );
 }
 
 #[test]

@@ -16,6 +16,9 @@ use tauscope_publish::message::{
 
 fn main() -> Result<(), Box<dyn Error>> {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus");
+    for target in ["mcap", "status"] {
+        fs::create_dir_all(corpus.join(target))?;
+    }
     for (name, compression) in [("plain", Compression::None), ("lz4", Compression::Lz4)] {
         archive(&corpus.join("mcap").join(name), compression)?;
     }

@@ -38,13 +38,14 @@ fn read<T: Sample>(bytes: &[u8]) -> impl Iterator<Item = T> {
     })
 }
 
-/// Gives the samples to the stage; what it refuses ends it, as in a run.
+/// Gives the samples to the stage as the receiving end of a link does: unsound ones are refused. What the stage refuses
+/// ends it, as in a run.
 fn through<I: Sample, O: Sample>(
     stage: &mut dyn Stage<I, O>,
     samples: impl Iterator<Item = I>,
 ) -> Vec<O> {
     let mut out = Kept(Vec::new());
-    for sample in samples {
+    for sample in samples.filter(|sample| sample.check().is_ok()) {
         if stage.accept(&sample, &mut out).is_err() {
             break;
         }
@@ -105,7 +106,8 @@ pub fn samples(bytes: &[u8]) {
         return;
     };
     let detections: Vec<Detection> = if kind % 3 == 2 {
-        read(bytes).collect()
+        let detections = read::<Detection>(bytes);
+        detections.filter(|it| it.check().is_ok()).collect()
     } else {
         ROBOT.with(|model| {
             let twin_states: Vec<TwinState> = if kind % 3 == 1 {

@@ -6,10 +6,11 @@ use std::sync::OnceLock;
 use std::time::Duration;
 
 use tauscope_archive::ros::{self, JointStateDecoder};
+use tauscope_bus::SampleKind;
 use tauscope_bus::command::{Request, Signed};
 use tauscope_fleet::inbox;
 use tauscope_fleet::wall::{Now, Wall};
-use tauscope_publish::{Config, Facts, Publisher, Setup};
+use tauscope_publish::{Config, Facts, Publisher, Setup, StreamInfo};
 
 /// A message of ROS 2, as each type that is read.
 pub fn cdr(bytes: &[u8]) {
@@ -96,7 +97,12 @@ fn server() -> SocketAddr {
             cell: "press-1".to_owned(),
             joint_names: vec!["hinge".to_owned()],
             model: None,
-            streams: Vec::new(),
+            streams: vec![StreamInfo {
+                stage: "detect".to_owned(),
+                kind: SampleKind::Detection,
+                detector: None,
+                judges_contact: true,
+            }],
             commands: None,
             facts: Facts::default(),
             restarted: false,
