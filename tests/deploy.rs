@@ -186,18 +186,24 @@ fn every_file_that_is_mounted_is_there_or_made() {
 }
 
 #[test]
-fn the_cell_of_the_containers_is_a_pipeline() {
-    let folder = tempfile::tempdir().unwrap();
-    fs::copy(
-        bundled().join("demo_arm.urdf"),
-        folder.path().join("robot.urdf"),
-    )
-    .unwrap();
-    let there = format!("{}/", folder.path().display());
-    let text = text("container/cell7.yaml").replace("/var/lib/tauscope/", &there);
-    let file = write(&folder.path().join("cell7.yaml"), &text);
-    let out = Out::answer([Path::new("check"), &file]);
-    assert_eq!(out.code, 0, "{}", out.stderr);
+fn the_cells_of_the_containers_and_of_the_plants_page_are_pipelines() {
+    let page = fs::read_to_string(root().join("docs/plant.md")).unwrap();
+    let (_, rest) = page.split_once("```yaml\n").unwrap();
+    let (plant, _) = rest.split_once("```").unwrap();
+    let plant = plant.replace("demo_arm.urdf", "robot.urdf");
+    for text in [text("container/cell7.yaml"), plant] {
+        let folder = tempfile::tempdir().unwrap();
+        fs::copy(
+            bundled().join("demo_arm.urdf"),
+            folder.path().join("robot.urdf"),
+        )
+        .unwrap();
+        let there = format!("{}/", folder.path().display());
+        let text = text.replace("/var/lib/tauscope/", &there);
+        let file = write(&folder.path().join("cell.yaml"), &text);
+        let out = Out::answer([Path::new("check"), &file]);
+        assert_eq!(out.code, 0, "{}", out.stderr);
+    }
 }
 
 #[test]
