@@ -13,6 +13,7 @@ pub mod effective_samples;
 pub mod efforts;
 pub mod memo;
 pub mod noise;
+pub mod other_simulation;
 pub mod prepare;
 pub mod problem;
 pub mod remedies;
