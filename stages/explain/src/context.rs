@@ -101,6 +101,7 @@ impl Context<'_> {
             rests_count,
         );
         if !self.input.bodies && !self.at_rest {
+            problem.is_foreign = true;
             leave_out_other_states(&mut problem);
             // Nobody knows how much friction the other simulation has.
             problem.known_friction = vec![library::any_plain_friction(); problem.joints];
