@@ -5,15 +5,16 @@
 //! holds or creeps. Spikes are taken out, the effort is put on the clock of the recording, and rows where the two are in
 //! different states of friction are left out.
 
-use nalgebra::{DMatrix, DVector};
-use tauscope_dynamics::terms::sign;
+mod regression;
+mod states;
 
-use crate::data::effective_samples::per_row;
 use crate::data::problem::Problem;
 use crate::data::track::{FitTrack, Track};
-use crate::fit::least_squares::weighted_dot;
 use crate::read::input::Input;
 use crate::read::recording::Recording;
+
+use regression::{factors, median, plain_columns, range, regressed, rich_columns};
+pub use states::leave_out_other_states;
 
 /// Samples to either side of one whose median tells a spike.
 /// Resolution: a spike of up to two samples is seen, and a step in the effort stays as it is.
@@ -38,36 +39,6 @@ const TAPS: usize = 4;
 /// Times at which the other simulation's effort is weighed, to follow a joint that follows its command \[s\].
 /// Resolution: twice the comparison's fastest response, 1 / (2 pi 8 Hz) = 0.02 s, in steps of that.
 const TAPS_S: [f64; TAPS] = [-0.04, -0.02, 0.02, 0.04];
-/// Time over which the other simulation's effort jumps when its friction turns \[s\].
-/// Tuned: by hand, on no recorded seeds; not swept.
-const JUMP_S: f64 = 0.06;
-/// A jump is this many times what the effort changes just before and after.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const JUMP_TIMES: f64 = 3.0;
-/// And at least this share of the range of the joint's effort.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const JUMP_SHARE: f64 = 0.02;
-/// The real joint follows the command within this time \[s\].
-/// Physical: a controller without integral part creeps for a second at most.
-const FOLLOWS_S: f64 = 1.0;
-/// A row is left out if its error is this many standard deviations of the calm half of the rows.
-/// Statistical: a normal variable exceeds that once in 16 000 rows.
-const LEFT_OUT: f64 = 4.0;
-/// Median of the absolute value of a normal variable, in standard deviations.
-/// Statistical: the 75 % quantile of the standard normal distribution.
-const MEDIAN_OF_ABS_NORMAL: f64 = 0.6745;
-/// A joint is fast above this share of its 90 % quantile of speed: there its friction and the command's have one sign.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const FAST: f64 = 0.3;
-/// No row is left out where the joint is faster than this share of that quantile.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const NEVER: f64 = 0.6;
-/// Rounds of the regression without the rows that it left out.
-/// Resolution: further rounds change no row.
-const ROUNDS: usize = 4;
-/// Added to the diagonal of the scaled normal equations, which is 1.
-/// Resolution: guards the inverse of dependent columns.
-const RIDGE: f64 = 1e-6;
 
 /// Takes the spikes out of the other simulation's effort.
 fn take_out_spikes(recording: &mut Recording, joints: usize) {
@@ -272,175 +243,82 @@ fn earlier(time_s: &[f64], effort: &[f64], joints: usize, late_s: f64) -> Vec<f6
     out
 }
 
-/// Leaves out the rows at which the other simulation's friction acts in another direction than the real one: near one of
-/// its jumps, where the real joint is slow, and where no function of the joint's own state explains the error.
-pub fn leave_out_other_states(problem: &mut Problem) {
-    let columns = rich_columns(problem);
-    let left: Vec<f64> = (problem.measured.iter())
-        .zip(problem.rigid())
-        .map(|(measured, twin)| measured - twin)
-        .collect();
-    let mut kept = problem.weight.clone();
-    for joint in 0..problem.joints {
-        let rows = problem.joint_rows(joint);
-        let counted = problem.weight[rows.clone()].to_vec();
-        let slow = slow_near_jumps(problem, joint);
-        let fast = slow.speed.iter().zip(&counted);
-        let mut weight: Vec<f64> = fast
-            .map(|(speed, counts)| counts * f64::from(*speed > FAST * slow.usual))
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{Noise, model, problem, recording};
+
+    /// Recordings whose twin is another simulation: late, with friction of its own and a spike.
+    fn recordings(late: usize) -> Vec<Recording> {
+        let model = model();
+        let mut noise = Noise(3);
+        let mut all: Vec<Recording> = (1..4)
+            .map(|seed| recording(&model, seed, |_, _, _| {}))
             .collect();
-        for _ in 0..ROUNDS {
-            let own = regressed(problem, &columns, &left, joint, &weight);
-            let used = own.iter().zip(&weight).filter(|(_, weight)| **weight > 0.0);
-            let calm = median(used.map(|(error, _)| error.abs()).collect()) / MEDIAN_OF_ABS_NORMAL;
-            let most = LEFT_OUT * calm.max(problem.white_noise[joint]);
-            for (row, weight) in weight.iter_mut().enumerate() {
-                let out = slow.near[row] && own[row].abs() > most;
-                *weight = if out { 0.0 } else { counted[row] };
+        for recording in &mut all {
+            let exact = recording.effort.clone();
+            let last = recording.len() - 1;
+            recording.reference = (0..exact.len())
+                .map(|at| {
+                    let (k, joint) = (at / 2, at % 2);
+                    let then = k.saturating_sub(late).min(last);
+                    exact[then * 2 + joint] + 0.4 * recording.velocity[then * 2 + joint].signum()
+                })
+                .collect();
+            for effort in &mut recording.effort {
+                *effort += 0.02 * noise.next();
             }
         }
-        kept[rows].copy_from_slice(&weight);
+        all
     }
-    problem.weight = kept;
-    problem.effective_samples = per_row(problem);
-}
 
-/// The rows of a joint near jumps of the other simulation's effort.
-struct Slow {
-    /// Whether a row is near a jump, and the joint not fast there.
-    near: Vec<bool>,
-    /// Speed by row \[rad/s\].
-    speed: Vec<f64>,
-    /// The 90 % quantile of speed where rows count \[rad/s\].
-    usual: f64,
-}
+    fn foreign(recordings: &[Recording]) -> Problem {
+        let mut problem = problem(&model(), recordings);
+        for (track, recording) in problem.tracks.iter_mut().zip(recordings) {
+            assert_eq!(track.track.rigid.len(), recording.reference.len());
+            track.track.rigid.clone_from(&recording.reference);
+        }
+        problem
+    }
 
-fn slow_near_jumps(problem: &Problem, joint: usize) -> Slow {
-    let n = problem.joints;
-    let (mut near, mut speed) = (vec![false; problem.rows], vec![0.0; problem.rows]);
-    for track in &problem.tracks {
-        let jumps = jumps_s(&track.track, joint, n);
-        for (row, &k) in track.rows().zip(&track.compared) {
-            let t = track.track.time_s[k];
-            near[row] = jumps.iter().any(|jump| (jump - t).abs() < FOLLOWS_S);
-            speed[row] = track.track.velocity[k * n + joint].abs();
+    #[test]
+    fn the_lateness_of_another_simulation_is_found_and_none_where_there_is_none() {
+        for late in [0, 2] {
+            let found = lateness_s(&foreign(&recordings(late)));
+            let true_s = 0.01 * late as f64;
+            assert!((found - true_s).abs() < 0.002, "{found} s for {true_s} s");
         }
     }
-    let weight = &problem.weight[problem.joint_rows(joint)];
-    let counted = speed
-        .iter()
-        .zip(weight)
-        .filter(|(_, weight)| **weight > 0.0);
-    let mut sorted: Vec<f64> = counted.map(|(speed, _)| *speed).collect();
-    sorted.sort_by(f64::total_cmp);
-    let usual = sorted.get(sorted.len() * 9 / 10).copied().unwrap_or(0.0);
-    for (near, speed) in near.iter_mut().zip(&speed) {
-        *near &= *speed < NEVER * usual;
+
+    #[test]
+    fn a_spike_is_taken_out_and_a_step_stays() {
+        let mut recording = recordings(0).remove(0);
+        let exact = recording.reference.clone();
+        recording.reference[2 * 700] += 60.0;
+        take_out_spikes(&mut recording, 2);
+        let changed = exact.iter().zip(&recording.reference);
+        let most = changed.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(most < 1.0, "{most} N m");
     }
-    Slow { near, speed, usual }
-}
 
-/// When the other simulation's effort of a joint jumps \[s\].
-fn jumps_s(track: &Track, joint: usize, n: usize) -> Vec<f64> {
-    let own: Vec<f64> = track.rigid.iter().skip(joint).step_by(n).copied().collect();
-    let least = JUMP_SHARE * range(&own);
-    let time = &track.time_s;
-    let at = |t: f64| own[time.partition_point(|x| *x < t).min(own.len() - 1)];
-    let change = |t: f64| (at(t + 0.5 * JUMP_S) - at(t - 0.5 * JUMP_S)).abs();
-    let jumps = |t: &f64| {
-        let beside = change(t - JUMP_S).max(change(t + JUMP_S));
-        change(*t) > JUMP_TIMES * beside + least
-    };
-    time.iter().copied().filter(jumps).collect()
-}
-
-/// A number of each sample and joint as a signal.
-fn signal_of(problem: &Problem, value: impl Fn(&Track, usize) -> f64) -> Vec<f64> {
-    let n = problem.joints;
-    let of = |track: &Track| (0..n * track.len()).map(|at| value(track, at)).collect();
-    let all: Vec<Vec<f64>> = problem.tracks.iter().map(|t| of(&t.track)).collect();
-    problem.signal(&all)
-}
-
-/// What two simulations of one arm may differ by at a joint: an offset, Coulomb and viscous friction.
-fn plain_columns(problem: &Problem) -> Vec<Vec<f64>> {
-    vec![
-        signal_of(problem, |_, _| 1.0),
-        signal_of(problem, |track, at| sign(track.velocity[at])),
-        signal_of(problem, |track, at| track.velocity[at]),
-    ]
-}
-
-/// The same with what effects in a joint depend on: acceleration, position and the twin's effort.
-fn rich_columns(problem: &Problem) -> Vec<Vec<f64>> {
-    let mut columns = plain_columns(problem);
-    columns.push(signal_of(problem, |track, at| track.acceleration[at]));
-    columns.push(signal_of(problem, |track, at| track.position[at]));
-    columns.push(problem.rigid().to_vec());
-    columns
-}
-
-/// What a regression on `columns` with these weights leaves of `signal` at a joint, at all rows.
-fn regressed(
-    problem: &Problem,
-    columns: &[Vec<f64>],
-    signal: &[f64],
-    joint: usize,
-    weight: &[f64],
-) -> Vec<f64> {
-    let rows = problem.joint_rows(joint);
-    let mut left = signal[rows.clone()].to_vec();
-    let factors = factors(problem, columns, signal, joint, weight);
-    for (factor, column) in factors.into_iter().zip(columns) {
-        for (left, value) in left.iter_mut().zip(&column[rows.clone()]) {
-            *left -= factor * value;
+    #[test]
+    fn rows_where_only_the_command_has_turned_are_left_out() {
+        let mut all = recordings(0);
+        for recording in &mut all {
+            // The real friction turns a quarter of a second after that of the command.
+            for k in 25..recording.len() {
+                let then = recording.velocity[2 * (k - 25)].signum();
+                recording.effort[2 * k] += 2.0 * then;
+                recording.reference[2 * k] += 2.0 * recording.velocity[2 * k].signum();
+            }
         }
+        let mut data = foreign(&all);
+        let before: f64 = data.weight.iter().sum();
+        leave_out_other_states(&mut data);
+        let after: f64 = data.weight.iter().sum();
+        assert!(
+            after < 0.98 * before && after > 0.6 * before,
+            "{after} of {before}"
+        );
     }
-    left
-}
-
-/// The factors of that regression; none if the columns are dependent.
-fn factors(
-    problem: &Problem,
-    columns: &[Vec<f64>],
-    signal: &[f64],
-    joint: usize,
-    weight: &[f64],
-) -> Vec<f64> {
-    let rows = problem.joint_rows(joint);
-    let own: Vec<&[f64]> = columns.iter().map(|column| &column[rows.clone()]).collect();
-    let signal = &signal[rows];
-    let dot = |x: &[f64], y: &[f64]| weighted_dot(weight, x, y);
-    let p = own.len();
-    let scale: Vec<f64> = own
-        .iter()
-        .map(|x| dot(x, x).max(f64::MIN_POSITIVE.sqrt()).sqrt())
-        .collect();
-    let mut gram = DMatrix::from_fn(p, p, |a, b| dot(own[a], own[b]) / (scale[a] * scale[b]));
-    for a in 0..p {
-        gram[(a, a)] += RIDGE;
-    }
-    let right = DVector::from_fn(p, |a, _| dot(own[a], signal) / scale[a]);
-    let Some(factored) = gram.cholesky() else {
-        return Vec::new();
-    };
-    let theta = factored.solve(&right);
-    (0..p).map(|a| theta[a] / scale[a]).collect()
-}
-
-/// The middle one; 0 of none.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
-}
-
-/// From the 1 % to the 99 % quantile.
-fn range(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let at = |share: f64| {
-        let last = sorted.len().saturating_sub(1) as f64;
-        sorted.get((share * last) as usize).copied().unwrap_or(0.0)
-    };
-    at(0.99) - at(0.01)
 }

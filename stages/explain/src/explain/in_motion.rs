@@ -38,8 +38,6 @@ impl Context<'_> {
         let scales = || torque_scale::unknown_scales(&self.unscaled);
         let say = |text: &str| {
             // The number of rounds is not known, so the share stays.
-            if std::env::var("TS_SAY").is_ok() {
-                eprintln!("{text}");
             progress(0.1, text);
         };
         let search = Search {
