@@ -272,19 +272,10 @@ mod tests {
         all
     }
 
-    fn foreign(recordings: &[Recording]) -> Problem {
-        let mut problem = problem(&model(), recordings);
-        for (track, recording) in problem.tracks.iter_mut().zip(recordings) {
-            assert_eq!(track.track.rigid.len(), recording.reference.len());
-            track.track.rigid.clone_from(&recording.reference);
-        }
-        problem
-    }
-
     #[test]
     fn the_lateness_of_another_simulation_is_found_and_none_where_there_is_none() {
         for late in [0, 2] {
-            let found = lateness_s(&foreign(&recordings(late)));
+            let found = lateness_s(&problem(&model(), &recordings(late)));
             let true_s = 0.01 * late as f64;
             assert!((found - true_s).abs() < 0.002, "{found} s for {true_s} s");
         }
@@ -301,18 +292,21 @@ mod tests {
         assert!(most < 1.0, "{most} N m");
     }
 
+    /// Friction that is large beside how fast gravity's effort changes \[N m\].
+    const FRICTION_NM: f64 = 15.0;
+
     #[test]
     fn rows_where_only_the_command_has_turned_are_left_out() {
         let mut all = recordings(0);
         for recording in &mut all {
-            // The real friction turns a quarter of a second after that of the command.
-            for k in 25..recording.len() {
-                let then = recording.velocity[2 * (k - 25)].signum();
-                recording.effort[2 * k] += 2.0 * then;
-                recording.reference[2 * k] += 2.0 * recording.velocity[2 * k].signum();
+            // The real friction turns a tenth of a second after that of the command.
+            for k in 10..recording.len() {
+                let then = recording.velocity[2 * (k - 10)].signum();
+                recording.effort[2 * k] += FRICTION_NM * then;
+                recording.reference[2 * k] += FRICTION_NM * recording.velocity[2 * k].signum();
             }
         }
-        let mut data = foreign(&all);
+        let mut data = problem(&model(), &all);
         let before: f64 = data.weight.iter().sum();
         leave_out_other_states(&mut data);
         let after: f64 = data.weight.iter().sum();
