@@ -16,6 +16,7 @@ pub mod noise;
 pub mod other_simulation;
 pub mod prepare;
 pub mod problem;
+pub mod quiet_start;
 pub mod remedies;
 pub mod same_robot;
 pub mod smoother;
