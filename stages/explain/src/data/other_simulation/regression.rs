@@ -5,7 +5,6 @@ use tauscope_dynamics::terms::sign;
 
 use crate::data::problem::Problem;
 use crate::data::track::Track;
-use crate::fit::least_squares::weighted_dot;
 
 /// Added to the diagonal of the scaled normal equations, which is 1.
 /// Resolution: guards the inverse of dependent columns.
@@ -67,7 +66,10 @@ pub fn factors(
     let rows = problem.joint_rows(joint);
     let own: Vec<&[f64]> = columns.iter().map(|column| &column[rows.clone()]).collect();
     let signal = &signal[rows];
-    let dot = |x: &[f64], y: &[f64]| weighted_dot(weight, x, y);
+    let dot = |x: &[f64], y: &[f64]| -> f64 {
+        let each = x.iter().zip(y).zip(weight);
+        each.map(|((x, y), w)| w * x * y).sum()
+    };
     let p = own.len();
     let scale: Vec<f64> = own
         .iter()
