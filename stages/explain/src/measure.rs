@@ -80,6 +80,7 @@ pub fn measure(input: &Input) -> Result<Result<Measured, String>, TermError> {
         loads: Vec::new(),
         session_start_ns: begins.min().unwrap_or(0),
         at_rest: false,
+        twin_late_s: 0.0,
     };
     let problem = context.problem(&input.fit, &vec![false; n])?;
     let count = |joint: usize| {
