@@ -20,8 +20,9 @@ mkdir -p "$out"
     skip "Pinocchio cannot be fetched from PyPI"
 prefix=$(echo "$out"/venv/lib/python3*/site-packages/cmeel.prefix)
 source=benches/pinocchio/per_call.cpp
+# Aligned as the library from PyPI is, which fills the model.
 if [ ! -x "$out/per_call" ] || [ "$source" -nt "$out/per_call" ]; then
-    g++ -std=c++17 -O3 -march=native -DNDEBUG \
+    g++ -std=c++17 -O3 -march=native -DNDEBUG -DEIGEN_MAX_ALIGN_BYTES=16 \
         -DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS -DBOOST_MPL_LIMIT_LIST_SIZE=30 -DBOOST_MPL_LIMIT_VECTOR_SIZE=30 -DBOOST_FUSION_INVOKE_MAX_ARITY=10 \
         -isystem "$prefix/include" -isystem "$prefix/include/eigen3" -isystem "$prefix/include/urdfdom_headers" \
         "$source" -o "$out/per_call" -L"$prefix/lib" -Wl,-rpath,"$prefix/lib" \
