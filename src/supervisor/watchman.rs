@@ -87,10 +87,18 @@ impl Supervisor<'_> {
             )
         });
         let file = self.pipeline.path.display();
+        let mut endpoints = (self.pipeline.hosts.values())
+            .flat_map(|host| host.listen.0.iter().chain(&host.connect.0));
+        let certificates = if endpoints.any(|endpoint| endpoint.starts_with("tls/")) {
+            "; or one of the hosts shows a certificate of another cell, and the router lets none of this cell's \
+             streams through"
+        } else {
+            ""
+        };
         let remedy = hosts.first().map(|host| {
             format!(
                 "{} not running (`tauscope run {file} --host {host}`), without data of its own, or not \
-                 reachable at the addresses under `hosts`",
+                 reachable at the addresses under `hosts`{certificates}",
                 suggest::list(hosts.iter().copied())
             )
         });

@@ -78,8 +78,8 @@ impl<T: Sample> Heard<T> {
         else {
             if self.foreign.fetch_add(1, Ordering::Relaxed) == 0 {
                 tracing::warn!(
-                    "stream `{stream}`: somebody who is not its sender puts messages there: they are refused and
-                    counted"
+                    "stream `{stream}`: somebody who is not its sender puts messages there: they are refused and \
+                     counted"
                 );
             }
             return;
