@@ -217,18 +217,35 @@ impl Packer {
     /// Gives out the next sample that need not wait any longer; `now_ns` is the present on the clock
     /// of reception (the time of the newest message, where nothing is live).
     pub fn pop(&mut self, now_ns: i64) -> Option<JointState> {
-        let front = self.pending.front()?;
+        if !self.is_due(now_ns) {
+            return None;
+        }
+        let mut sample = JointState::default();
+        self.pop_into(&mut sample);
+        Some(sample)
+    }
+
+    /// Whether [`Packer::pop`] has one.
+    pub fn is_due(&self, now_ns: i64) -> bool {
+        let Some(front) = self.pending.front() else {
+            return false;
+        };
         let stamp_ns = front.header.stamp_ns;
         let complete = (!self.settings.expects_command || self.commands.reaches(stamp_ns))
             && (!self.settings.expects_reference || self.references.reaches(stamp_ns));
         let waited = now_ns - front.header.received_ns >= self.settings.wait_ns;
-        if !(complete || waited || self.flushed || self.pending.len() >= MAX_PENDING) {
-            return None;
-        }
-        let mut sample = self.pending.pop_front()?;
-        self.attach(&mut sample);
+        complete || waited || self.flushed || self.pending.len() >= MAX_PENDING
+    }
+
+    /// Gives out the sample that is due, in its place.
+    pub fn pop_into(&mut self, sample: &mut JointState) {
+        let Some(front) = self.pending.front() else {
+            return;
+        };
+        *sample = *front;
+        self.pending.pop_front();
+        self.attach(sample);
         self.counts.packed += 1;
-        Some(sample)
     }
 
     /// Whether a sample waits.
