@@ -145,7 +145,7 @@ impl<T: Sample> Node for SourceNode<T> {
     }
 }
 
-struct StageNode<I, O> {
+struct StageNode<I: Sample, O: Sample> {
     name: String,
     stage: Box<dyn Stage<I, O>>,
     input: Reader<I>,

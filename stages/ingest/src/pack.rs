@@ -19,7 +19,7 @@ use tauscope_bus::{Header, JointArray, JointState, MAX_JOINTS, flags};
 use crate::config::ConfigError;
 use crate::setup::{Setup, Tool};
 use differentiate::Differentiator;
-use gather::{Gather, Gathered};
+use gather::{Gather, Gathered, stamp_of};
 use layout::Layouts;
 pub use outcome::{PackCounts, PackError};
 use side::Side;
@@ -217,12 +217,11 @@ impl Packer {
     /// Gives out the next sample that need not wait any longer; `now_ns` is the present on the clock
     /// of reception (the time of the newest message, where nothing is live).
     pub fn pop(&mut self, now_ns: i64) -> Option<JointState> {
-        if !self.is_due(now_ns) {
-            return None;
-        }
         let mut sample = JointState::default();
-        self.pop_into(&mut sample);
-        Some(sample)
+        self.is_due(now_ns).then(|| {
+            self.pop_into(&mut sample);
+            sample
+        })
     }
 
     /// Whether [`Packer::pop`] has one.
@@ -396,14 +395,6 @@ impl Packer {
             sample.tool_inertia_kgm2 = tool.inertia_kgm2;
             sample.header.flags |= flags::TOOL;
         }
-    }
-}
-
-/// The header's stamp, or the time of reception where the publisher left it at zero.
-fn stamp_of(header: &ros::Header, received_ns: i64) -> i64 {
-    match header.stamp.ns() {
-        0 => received_ns,
-        stamp_ns => stamp_ns,
     }
 }
 
