@@ -217,8 +217,8 @@ impl Packer {
     /// Gives out the next sample that need not wait any longer; `now_ns` is the present on the clock
     /// of reception (the time of the newest message, where nothing is live).
     pub fn pop(&mut self, now_ns: i64) -> Option<JointState> {
-        let mut sample = JointState::default();
         self.is_due(now_ns).then(|| {
+            let mut sample = JointState::default();
             self.pop_into(&mut sample);
             sample
         })
@@ -226,25 +226,23 @@ impl Packer {
 
     /// Whether [`Packer::pop`] has one.
     pub fn is_due(&self, now_ns: i64) -> bool {
-        let Some(front) = self.pending.front() else {
-            return false;
-        };
-        let stamp_ns = front.header.stamp_ns;
-        let complete = (!self.settings.expects_command || self.commands.reaches(stamp_ns))
-            && (!self.settings.expects_reference || self.references.reaches(stamp_ns));
-        let waited = now_ns - front.header.received_ns >= self.settings.wait_ns;
-        complete || waited || self.flushed || self.pending.len() >= MAX_PENDING
+        self.pending.front().is_some_and(|front| {
+            let stamp_ns = front.header.stamp_ns;
+            let complete = (!self.settings.expects_command || self.commands.reaches(stamp_ns))
+                && (!self.settings.expects_reference || self.references.reaches(stamp_ns));
+            let waited = now_ns - front.header.received_ns >= self.settings.wait_ns;
+            complete || waited || self.flushed || self.pending.len() >= MAX_PENDING
+        })
     }
 
     /// Gives out the sample that is due, in its place.
     pub fn pop_into(&mut self, sample: &mut JointState) {
-        let Some(front) = self.pending.front() else {
-            return;
-        };
-        *sample = *front;
-        self.pending.pop_front();
-        self.attach(sample);
-        self.counts.packed += 1;
+        if let Some(front) = self.pending.front() {
+            *sample = *front;
+            self.pending.pop_front();
+            self.attach(sample);
+            self.counts.packed += 1;
+        }
     }
 
     /// Whether a sample waits.
