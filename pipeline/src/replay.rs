@@ -176,7 +176,7 @@ impl<'a> Replay<'a> {
             let stream = match (&stage.settings, input) {
                 (Settings::Ingest(config), _) => {
                     let source = Commanded::archived(self.open(config, recording)?);
-                    Some(graph.source(&stage.name, Box::new(source))?)
+                    Some(graph.source(&stage.name, Box::new(source)))
                 }
                 (Settings::Twin { config, model }, Some(input)) => {
                     let model = model.as_ref();
@@ -218,12 +218,12 @@ impl<'a> Replay<'a> {
                 streams.insert(index, stream);
             }
         }
-        let inputs = self.inputs(&mut graph, streams.keys().copied(), &streams)?;
+        let inputs = self.inputs(&graph, streams.keys().copied(), &streams)?;
         // The observer and what is beside it are no stages of the pipeline.
         let stage_count = graph.len();
         graph.sink("observer", Box::new(&mut observer), inputs);
         if let Some(beside) = beside {
-            let inputs = self.inputs(&mut graph, streams.keys().copied(), &streams)?;
+            let inputs = self.inputs(&graph, streams.keys().copied(), &streams)?;
             graph.sink("beside", beside, inputs);
         }
         let mut stages = graph.run(progress)?.ok_or(ReplayError::Interrupted)?;
@@ -306,7 +306,7 @@ impl<'a> Replay<'a> {
                 let twin = build::twin(config, model, self.cell())?;
                 graph.stage(&stage.name, Box::new(twin), input)?
             }
-            TwinChoice::Keep => graph.source(&stage.name, Box::new(self.open_twin(recording)?))?,
+            TwinChoice::Keep => graph.source(&stage.name, Box::new(self.open_twin(recording)?)),
         })
     }
 
@@ -326,7 +326,7 @@ impl<'a> Replay<'a> {
         let recorder = self.pipeline.recorder(config, &listened)?;
         let mut inputs = self.inputs(graph, listened.iter().copied(), streams)?;
         for index in listened {
-            inputs.push(graph.listen_to_health(&streams[&index])?);
+            inputs.push(graph.listen_to_health(&streams[&index]));
         }
         graph.sink(&stage.name, Box::new(recorder), inputs);
         Ok(())
@@ -335,7 +335,7 @@ impl<'a> Replay<'a> {
     /// Receiving ends of these stages' streams.
     fn inputs(
         &self,
-        graph: &mut Graph<'_>,
+        graph: &Graph<'_>,
         stages: impl Iterator<Item = usize>,
         streams: &BTreeMap<usize, Stream>,
     ) -> Result<Vec<SinkInput>, ReplayError> {

@@ -3,7 +3,7 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::health::HealthClock;
+use super::health::HealthSender;
 use super::report::{InputReport, Outcome, Poster, Report};
 use super::{Context, Ledger, Stop, TAKEN_WITHIN, TICK};
 use crate::link::{MAX_DEPTH, Received, Sender};
@@ -33,7 +33,7 @@ pub fn run_sink(
         ..InputReport::default()
     });
     let shared = Mutex::new(SinkShell {
-        health: HealthClock::new(health, &context.stage, context.restarts),
+        health: HealthSender::new(health, &context.stage, context.restarts),
         poster: Poster::new(context.board.clone()),
         report: Report {
             stage: context.stage.clone(),
@@ -69,7 +69,7 @@ pub fn run_sink(
 }
 
 struct SinkShell<'a> {
-    health: HealthClock<&'a mut dyn Sender<Health>>,
+    health: HealthSender<&'a mut dyn Sender<Health>>,
     poster: Poster,
     report: Report,
     sink: &'a mut dyn Sink,

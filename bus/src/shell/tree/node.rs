@@ -6,7 +6,7 @@ use super::{Post, Turn};
 use crate::link::{LinkError, Sender, SenderCounts};
 use crate::sample::{Header, Health, Sample};
 use crate::shell::Ledger;
-use crate::shell::health::HealthClock;
+use crate::shell::health::HealthSender;
 use crate::shell::report::{InputReport, Report};
 use crate::stage::{Emit, Stage, StageError};
 
@@ -188,7 +188,7 @@ pub(super) struct Frame<'a, O: Sample> {
     pub place: usize,
     pub turn: Turn,
     pub out: Outlet<'a, O>,
-    pub health: HealthClock<Box<dyn Sender<Health> + 'a>>,
+    pub health: HealthSender<Box<dyn Sender<Health> + 'a>>,
     pub report: Report,
     /// A health report is due.
     pub due: bool,
@@ -210,7 +210,7 @@ impl<'a, O: Sample> Frame<'a, O> {
             place: turn.place(&post.stage),
             turn: turn.clone(),
             out,
-            health: HealthClock::new(post.health, &post.stage, post.restarts),
+            health: HealthSender::new(post.health, &post.stage, post.restarts),
             report: Report {
                 stage: post.stage,
                 inputs,
