@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::commands::{
     calibrate, check, completions, diff, doctor, evaluate, explain, fleet, info, init, man,
-    manifest, repair, replay, run, schema, send, simulate, stage,
+    manifest, query, repair, replay, run, schema, send, simulate, stage,
 };
 
 /// A robot's measured effort beside its digital twin's: stream, detect, record.
@@ -28,6 +28,7 @@ pub enum Command {
     Replay(replay::Args),
     Manifest(manifest::Args),
     Diff(diff::Args),
+    Query(query::Args),
     Calibrate(calibrate::Args),
     Explain(explain::Args),
     Evaluate(evaluate::Args),

@@ -12,6 +12,7 @@ pub mod info;
 pub mod init;
 pub mod man;
 pub mod manifest;
+pub mod query;
 pub mod repair;
 pub mod replay;
 pub mod run;

@@ -137,6 +137,7 @@ fn outcome(command: &Command, out: &mut Output) -> Result<exit::Exit, exit::Fail
         Command::Schema(args) => commands::schema::run(args, out),
         Command::Replay(args) => commands::replay::run(args, out),
         Command::Diff(args) => commands::diff::run(args, out),
+        Command::Query(args) => commands::query::run(args, out),
         Command::Manifest(args) => commands::manifest::run(args, out),
         Command::Calibrate(args) => commands::calibrate::run(args, out),
         Command::Explain(args) => commands::explain::run(args, out),

@@ -3,13 +3,13 @@
 
 mod error;
 mod observe;
+mod redirect;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use tauscope_bus::{Detection, JointState, SampleKind, Sink, Source, TwinState};
 use tauscope_ingest::{ArchivedTwin, Commanded, RecordedSource};
-use tauscope_record::{Existing, FileName};
 use tauscope_twin::TwinFile;
 
 use crate::build;
@@ -18,6 +18,8 @@ use crate::graph::{Graph, SinkInput, StageCounts, Stream};
 use crate::pipeline::{Pipeline, Stage};
 use crate::settings::Settings;
 use crate::tally::{DetectionTally, TwinTally};
+
+use redirect::redirect;
 
 pub use error::ReplayError;
 pub use observe::Observer;
@@ -390,45 +392,4 @@ fn file_config(config: &tauscope_ingest::Config, recording: &Path) -> tauscope_i
         path: recording.to_owned(),
         topics: topics.cloned().unwrap_or_else(simulated),
     }
-}
-
-/// A recorder's configuration for a replay: the same kinds of file, into `out`, named after the
-/// recording; no live picture. Nothing if there is no `out`.
-fn redirect(
-    config: &tauscope_record::Config,
-    out: Option<&Path>,
-    stem: &str,
-    files: &mut Vec<PathBuf>,
-) -> Option<tauscope_record::Config> {
-    let out = out?;
-    let mut config = tauscope_record::Config {
-        // One result for each recording, again and again.
-        split: None,
-        keep: None,
-        existing: Existing::Replace,
-        // What is lost in a power cut is replayed again.
-        sync_s: 0.0,
-        ..config.clone()
-    };
-    if let Some(around) = &mut config.around_alarms {
-        for (path, kind) in [(&mut around.mcap, "mcap"), (&mut around.rerun, "rrd")] {
-            let stem = FileName::literal(&out.join(stem));
-            let name = format!("{}.alarm-{{date}}-{{time}}.{kind}", stem.display());
-            *path = path.take().map(|_| name.into());
-        }
-    }
-    if config.mcap.is_some() {
-        let path = out.join(format!("{stem}.mcap"));
-        config.mcap = Some(FileName::literal(&path));
-        files.push(path);
-    }
-    if let Some(rerun) = &mut config.rerun {
-        rerun.connect = None;
-        if rerun.file.is_some() {
-            let path = out.join(format!("{stem}.rrd"));
-            rerun.file = Some(FileName::literal(&path));
-            files.push(path);
-        }
-    }
-    config.writes_something().then_some(config)
 }

@@ -27,7 +27,7 @@ use crate::terminal;
 
 /// Time between two lines that say how far it is, where no bar can be drawn.
 /// Resolution: lines in a log, against how soon one sees that it goes on.
-const TOLD_EVERY: Duration = Duration::from_secs(60);
+const TOLD_EVERY: Duration = Duration::from_mins(1);
 
 /// Failures that are told; all are in the list of failures.
 const MAX_TOLD: usize = 10;
