@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::commands::{
     calibrate, check, completions, diff, doctor, evaluate, explain, fleet, info, init, man,
-    manifest, query, repair, replay, run, schema, send, simulate, stage,
+    manifest, physics, query, repair, replay, run, schema, send, simulate, stage, weeks,
 };
 
 /// A robot's measured effort beside its digital twin's: stream, detect, record.
@@ -34,6 +34,8 @@ pub enum Command {
     Evaluate(evaluate::Args),
     Send(send::Args),
     Fleet(fleet::Args),
+    Physics(physics::Args),
+    Weeks(weeks::Args),
     Simulate(simulate::Args),
     Init(init::Args),
     Info(info::Args),

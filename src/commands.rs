@@ -12,6 +12,7 @@ pub mod info;
 pub mod init;
 pub mod man;
 pub mod manifest;
+pub mod physics;
 pub mod query;
 pub mod repair;
 pub mod replay;
@@ -20,6 +21,7 @@ pub mod schema;
 pub mod send;
 pub mod simulate;
 pub mod stage;
+pub mod weeks;
 
 use std::path::{Path, PathBuf};
 

@@ -13,6 +13,7 @@ mod explain;
 mod init;
 mod interrupt;
 mod output;
+mod physics;
 mod plan;
 mod progress;
 mod supervisor;
@@ -144,6 +145,8 @@ fn outcome(command: &Command, out: &mut Output) -> Result<exit::Exit, exit::Fail
         Command::Evaluate(args) => commands::evaluate::run(args, out),
         Command::Send(args) => commands::send::run(args, out),
         Command::Fleet(args) => commands::fleet::run(args, out),
+        Command::Physics(args) => commands::physics::run(args, out),
+        Command::Weeks(args) => commands::weeks::run(args, out),
         Command::Simulate(args) => commands::simulate::run(args, out),
         Command::Init(args) => commands::init::run(args, out),
         Command::Info(args) => commands::info::run(args, out),

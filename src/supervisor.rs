@@ -11,6 +11,7 @@
 
 mod crew;
 mod flow;
+mod ledger;
 mod lives;
 mod local;
 mod patience;

@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 mod common;
+#[path = "common/live.rs"]
+mod live;
 #[path = "common/robot.rs"]
 mod robot;
 
@@ -167,4 +169,47 @@ fn who_has_no_certificate_of_the_plant_does_not_get_in() {
     let plain = endpoint.replace("tls/", "tcp/");
     assert!(client(&plain, folder, None).is_err(), "no TLS at all");
     assert!(client(&endpoint, folder, Some((folder, "press-1"))).is_ok());
+}
+
+/// A cell that publishes at that endpoint; what it says of it.
+fn said_of(endpoint: &str, folder: &Path) -> String {
+    let data = common::bundled();
+    let data = data.display();
+    let text = format!(
+        "version: 1
+cells: {{demo: {{robot: {data}/demo_arm.urdf}}}}
+stages:
+- {{name: ingest, ingest: {{file: {{path: {data}/demo.mcap}}, rate: 0.5}}}}
+- {{name: twin, input: ingest, twin: {{model: {data}/demo.twin.yaml}}}}
+- {{name: detect, input: twin, detect: {{twin_regression: {{}}}}}}
+- {{name: publish, inputs: [ingest, twin, detect], publish: {{zenoh: {{connect: [\"{endpoint}\"]}}}}}}
+"
+    );
+    common::write(&folder.join("pipeline.yaml"), &text);
+    live::Live::start(folder, &[]).wait_for_part("no session with ")
+}
+
+#[test]
+fn a_session_that_cannot_open_is_told_with_its_reason() {
+    let test = "a_session_that_cannot_open_is_told_with_its_reason";
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let nobody = robot::endpoint();
+    let said = said_of(&nobody, folder);
+    assert!(said.contains("nobody answers there"), "{said}");
+    let Some((_router, endpoint)) = router(folder, test) else {
+        return;
+    };
+    let elsewhere = folder.join("elsewhere");
+    secure(&elsewhere);
+    let file = |folder: &Path, name: &str| folder.join(name).display().to_string();
+    let refused = format!(
+        "{endpoint}#root_ca_certificate_file={};enable_mtls=true;connect_certificate_file={};\
+         connect_private_key_file={}",
+        file(folder, "ca.pem"),
+        file(&elsewhere, "press-1.pem"),
+        file(&elsewhere, "press-1.key")
+    );
+    let said = said_of(&refused, folder);
+    assert!(said.contains("lets no session open"), "{said}");
 }

@@ -54,10 +54,13 @@ for file in *.pem; do
     case ${file%.pem} in ca | router | fleet) ;; *) cells+=("${file%.pem}") ;; esac
 done
 
-# Wildcards match no chunk that begins with `@`: the cell's presence and the ends of its streams are named.
+# Wildcards match no chunk that begins with `@`: the cell's presence and what its streams need are named.
 every='"put", "delete", "declare_subscriber", "query", "declare_queryable", "reply", "liveliness_token",
         "declare_liveliness_subscriber", "liveliness_query"'
-keys() { echo "\"$1/**\", \"$1/@alive/**\", \"$1/**/@all/**\", \"$1/**/@newest/**\", \"$1/**/@end/**\""; }
+keys() {
+    echo -n "\"$1/**\", \"$1/@alive/**\", \"$1/**/@all/**\", \"$1/**/@newest/**\","
+    echo " \"$1/**/@from/**\", \"$1/**/@taken/**\""
+}
 rule() {
     cat <<RULE
       { id: "$1", permission: "allow", flows: ["ingress", "egress"], key_exprs: [$(keys "$2")],

@@ -6,6 +6,7 @@ pub mod hub;
 mod inbox;
 mod keeper;
 mod mailbox;
+pub mod physics;
 pub mod show;
 pub mod store;
 pub mod wall;

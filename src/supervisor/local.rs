@@ -8,6 +8,7 @@ use tauscope_bus::{SampleKind, Seat, Trouble};
 use tokio::time::Instant;
 
 use super::flow::Flow;
+use super::ledger::Kept;
 use super::patience::{Overdue, Patience};
 use super::restart::Deaths;
 use super::silence::Silence;
@@ -42,6 +43,8 @@ pub struct Local {
     killed: bool,
     /// By when it should have ended by itself.
     finish_by: Option<Instant>,
+    /// What it keeps beyond its death; without it, its reports must do.
+    kept: Option<Kept>,
 }
 
 #[derive(Debug)]
@@ -74,8 +77,10 @@ pub enum Reported<'a> {
 
 impl Local {
     /// A stage that is to be started.
-    pub fn new(at: usize, seat: Seat, crew: usize, root: usize) -> Self {
+    pub fn new(at: usize, mut seat: Seat, crew: usize, root: usize) -> Self {
         let now = Instant::now();
+        let kept = Kept::new(seat.inputs.len()).ok();
+        seat.ledger = kept.as_ref().map(Kept::path);
         Self {
             at,
             seat,
@@ -91,6 +96,7 @@ impl Local {
             patience: None,
             killed: false,
             finish_by: None,
+            kept,
         }
     }
 
@@ -231,6 +237,7 @@ impl Local {
 
     /// It died, and is started again after this time, if it is.
     pub fn die(&mut self, again: Option<Duration>) {
+        self.settle();
         self.state = match again {
             Some(wait) => {
                 self.next_life();
@@ -240,10 +247,28 @@ impl Local {
         };
     }
 
+    /// Takes over what it has noted since its last report, and makes room for the next life. One that has said itself
+    /// how it ended has counted all.
+    fn settle(&mut self) {
+        let Some(kept) = &self.kept else { return };
+        if let (false, Ok(account)) = (self.is_done(), kept.account()) {
+            let from = self.seat.inputs.iter().map(|input| input.from.as_str());
+            self.tally.settle(&account, from);
+        }
+        // What cannot be cleared is not to be read any more.
+        if kept.clear().is_err() {
+            self.kept = None;
+            self.seat.ledger = None;
+        }
+    }
+
     /// Makes the seat of the next life out of what the last one has said.
     fn next_life(&mut self) {
         let last: Report = self.tally.end_life();
         self.seat.restarts += 1;
+        if let Some(output) = &mut self.seat.output {
+            output.former = self.tally.sums().emitted;
+        }
         for (input, report) in self.seat.inputs.iter_mut().zip(&last.inputs) {
             input.resume = report.position.or(input.resume);
         }

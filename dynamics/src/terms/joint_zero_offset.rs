@@ -1,5 +1,5 @@
 //! A joint whose zero is not the model's: B. W. Mooring, Z. S. Roth and M. R. Driels, *Fundamentals of Manipulator
-//! Calibration*, 1991, chapter 2.
+//! Calibration*, 1991.
 
 use super::law::array;
 use super::{
