@@ -1,115 +1,163 @@
-//! `replay('pipeline.yaml', 'archive/*.mcap')`: events of recordings that are replayed as the query asks.
+//! `replay('pipeline.yaml', 'archive/*.mcap')`: recordings replayed as the query asks.
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use async_trait::async_trait;
-use datafusion::catalog::{Session, TableFunctionArgs, TableFunctionImpl, TableProvider};
-use datafusion::common::ScalarValue;
-use datafusion::error::{DataFusionError, Result};
-use datafusion::logical_expr::{Expr, TableType, col, lit};
-use datafusion::physical_plan::ExecutionPlan;
-use datafusion::prelude::{ParquetReadOptions, SessionContext};
-use tauscope_pipeline::parallel;
+use arrow::array::RecordBatch;
+use datafusion::catalog::{TableFunctionArgs, TableFunctionImpl, TableProvider};
+use datafusion::common::plan_err;
+use datafusion::error::Result;
+use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use tauscope_pipeline::pipeline::Pipeline;
 use tauscope_pipeline::replay::{Replay, TwinChoice};
 use tauscope_pipeline::results::{Folder, Identity, Unit, Wanted, parquet_files, schema};
 
-/// The table function.
+use crate::asked::literal;
+use crate::exec::{Counts, Scan, external, open};
+use crate::sources;
+use crate::table::{ArchiveTable, Kind, Listed};
+
+/// The table function. Its arguments: pipeline file, recordings, and where the pipeline has several sources, the one
+/// whose place they take.
 #[derive(Debug)]
 pub struct ReplayFunction;
 
 impl TableFunctionImpl for ReplayFunction {
     fn call_with_args(&self, args: TableFunctionArgs) -> Result<Arc<dyn TableProvider>> {
-        let texts: Option<Vec<String>> = args.exprs().iter().map(text).collect();
-        let Some([pipeline, pattern]) = texts.as_deref() else {
-            return Err(DataFusionError::Plan(
-                "replay takes a pipeline file and recordings: replay('pipeline.yaml', 'archive/*.mcap')"
-                    .to_owned(),
-            ));
+        let texts: Option<Vec<String>> = args.exprs().iter().map(literal).collect();
+        let (pipeline, pattern, source) = match texts.as_deref() {
+            Some([pipeline, pattern]) => (pipeline, pattern, None),
+            Some([pipeline, pattern, source]) => (pipeline, pattern, Some(source.clone())),
+            _ => {
+                return plan_err!(
+                    "replay takes a pipeline file and recordings: replay('pipeline.yaml', '*.mcap')"
+                );
+            }
         };
-        Ok(Arc::new(Replayed {
-            pipeline: pipeline.into(),
-            recordings: crate::expand(&[PathBuf::from(pattern)]).map_err(failed)?,
+        let path = std::path::absolute(pipeline)?;
+        let loaded = Loaded::load(Path::new(pipeline))?;
+        // Told before anything is read.
+        loaded.replay(source.as_deref())?;
+        Ok(Arc::new(ArchiveTable {
+            kind: Kind::Replay {
+                pipeline: path,
+                source,
+                identity: loaded.identity.hash(),
+            },
+            recordings: sources::recordings(pattern)
+                .map_err(|report| external(report.to_string()))?,
         }))
     }
 }
 
-fn text(expr: &Expr) -> Option<String> {
-    match expr {
-        Expr::Literal(ScalarValue::Utf8(text) | ScalarValue::Utf8View(text), _) => text.clone(),
-        _ => None,
+/// A pipeline, and what its results depend on.
+struct Loaded {
+    pipeline: Pipeline,
+    identity: Identity,
+}
+
+impl Loaded {
+    fn load(path: &Path) -> Result<Self> {
+        let failed = |report: tauscope_pipeline::report::Report| external(report.to_string());
+        let pipeline = Pipeline::load(path, None).map_err(failed)?;
+        let identity = Identity::of(&pipeline, TwinChoice::Recompute, false).map_err(failed)?;
+        Ok(Self { pipeline, identity })
+    }
+
+    fn replay(&self, source: Option<&str>) -> Result<Replay<'_>> {
+        Replay::new(&self.pipeline, source, TwinChoice::Recompute).map_err(external)
     }
 }
 
-fn failed(error: impl std::fmt::Display) -> DataFusionError {
-    DataFusionError::External(error.to_string().into())
-}
-
-/// The rows of the results: those of events and changes of the arm.
-#[derive(Debug)]
-struct Replayed {
-    pipeline: PathBuf,
-    recordings: Vec<PathBuf>,
-}
-
-#[async_trait]
-impl TableProvider for Replayed {
-    fn schema(&self) -> arrow::datatypes::SchemaRef {
-        schema()
-    }
-
-    fn table_type(&self) -> TableType {
-        TableType::Temporary
-    }
-
-    /// Replays into a folder that is gone with the plan, and scans that.
-    async fn scan(
-        &self,
-        state: &dyn Session,
-        projection: Option<&Vec<usize>>,
-        filters: &[Expr],
-        limit: Option<usize>,
-    ) -> Result<Arc<dyn ExecutionPlan>> {
-        let (pipeline, recordings) = (self.pipeline.clone(), self.recordings.clone());
-        let folder = std::env::temp_dir().join(format!("tauscope-query-{}", std::process::id()));
-        let out = folder.clone();
-        let replayed = tokio::task::spawn_blocking(move || replay_all(&pipeline, &recordings, &out));
-        let files = replayed.await.map_err(failed)??;
-        let context = SessionContext::new();
-        let schema = schema();
-        let options = ParquetReadOptions::default().schema(&schema);
-        let frame = context.read_parquet(files, options).await?;
-        let events = col("row").eq(lit("event")).or(col("row").eq(lit("physics")));
-        let batches = frame.filter(events)?.collect().await;
-        // The events are in memory by now, and nothing else is needed.
-        let _ = std::fs::remove_dir_all(&folder);
-        let table = datafusion::catalog::MemTable::try_new(schema, vec![batches?])?;
-        table.scan(state, projection, filters, limit).await
-    }
-}
-
-/// The files of the results.
-fn replay_all(pipeline: &Path, recordings: &[PathBuf], out: &Path) -> Result<Vec<String>> {
-    let pipeline = Pipeline::load(pipeline, None).map_err(failed)?;
-    let replay = Replay::new(&pipeline, None, TwinChoice::Recompute).map_err(failed)?;
-    let identity = Identity::of(&pipeline, TwinChoice::Recompute, false).map_err(failed)?;
-    let shelf = Folder::open(out).map_err(failed)?;
-    let unit = Unit {
-        replay: &replay,
-        identity: &identity,
-        shelf: &shelf,
-        with_scores: false,
+/// Replays recordings one after the other and gives their rows. `gone` tells that nobody wants them any more.
+pub(crate) fn read(
+    listed: &[Listed],
+    scan: &Scan,
+    counts: &Counts,
+    gone: &dyn Fn() -> bool,
+    give: &mut dyn FnMut(RecordBatch) -> bool,
+) -> Result<()> {
+    let Kind::Replay {
+        pipeline: path,
+        source,
+        identity,
+    } = &scan.kind
+    else {
+        return Ok(());
     };
-    let jobs = std::thread::available_parallelism().map_or(1, usize::from);
-    let done = parallel::map(jobs, recordings.iter().collect(), |recording: &PathBuf| {
-        let wanted = Wanted::of(recording, None)?;
-        unit.run(&wanted, &mut |_| true)
-            .map_err(|error| error.to_string())
-    });
-    for (recording, done) in recordings.iter().zip(done) {
-        done.map_err(|error| failed(format!("{}: {error}", recording.display())))?;
+    let loaded = Loaded::load(path)?;
+    if loaded.identity.hash() != *identity {
+        let path = path.display();
+        return Err(external(format!(
+            "{path}: this machine has another pipeline, URDF, twin or weights, or another version of tauscope, than the \
+             query was planned with: copy them from there"
+        )));
     }
-    let files = parquet_files(out).map_err(failed)?;
-    Ok(files.iter().map(|path| path.display().to_string()).collect())
+    let replay = loaded.replay(source.as_deref())?;
+    let folder = tempfile::Builder::new()
+        .prefix("tauscope-query-")
+        .tempdir()?;
+    for (number, one) in listed.iter().enumerate() {
+        open(one, counts)?;
+        let failed = |error: String| external(format!("{}: {error}", one.path.display()));
+        let wanted = Wanted::of(&one.path, source.as_deref()).map_err(failed)?;
+        // One folder for each, so that what lies in it is this recording's.
+        let out = folder.path().join(number.to_string());
+        let unit = Unit {
+            replay: &replay,
+            identity: &loaded.identity,
+            shelf: &Folder::open(&out)?,
+            with_scores: false,
+        };
+        match unit.run(&wanted, &mut |_| !gone()) {
+            Ok(_) => {}
+            Err(_) if gone() => return Ok(()),
+            Err(error) => return Err(failed(error.to_string())),
+        }
+        for file in parquet_files(&out).map_err(external)? {
+            if !give_file(&file, scan, give)? {
+                return Ok(());
+            }
+        }
+        std::fs::remove_dir_all(&out)?;
+    }
+    Ok(())
+}
+
+/// Whether more is wanted.
+fn give_file(
+    path: &PathBuf,
+    scan: &Scan,
+    give: &mut dyn FnMut(RecordBatch) -> bool,
+) -> Result<bool> {
+    let builder = ParquetRecordBatchReaderBuilder::try_new(File::open(path)?)?;
+    let mask = match &scan.projection {
+        Some(columns) => ProjectionMask::roots(builder.parquet_schema(), columns.iter().copied()),
+        None => ProjectionMask::all(),
+    };
+    // The file has its columns in their own order, the query may want another.
+    let order = scan.projection.as_ref().map(|columns| {
+        let mut sorted = columns.clone();
+        sorted.sort_unstable();
+        let place = |column| {
+            sorted
+                .iter()
+                .position(|other| other == column)
+                .unwrap_or_default()
+        };
+        columns.iter().map(place).collect::<Vec<_>>()
+    });
+    for batch in builder.with_projection(mask).build()? {
+        let batch = batch?;
+        let batch = match &order {
+            Some(order) => batch.project(order)?,
+            None => batch,
+        };
+        if !give(batch) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
 }

@@ -1,12 +1,16 @@
 //! The tables of results: views over one table of all their rows.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use datafusion::error::Result;
 use datafusion::prelude::{ParquetReadOptions, SessionContext};
-use tauscope_pipeline::results::{parquet_files, schema};
+use tauscope_pipeline::report::{Problem, Report};
+use tauscope_pipeline::results::schema;
 
-/// Each table: its name, the value of the column `row`, and its columns.
+/// The table of all rows.
+const ALL: &str = "results";
+
+/// Each view: its name, the value of the column `row`, and its columns.
 const VIEWS: [(&str, &str, &str); 5] = [
     (
         "replays",
@@ -39,38 +43,35 @@ const VIEWS: [(&str, &str, &str); 5] = [
     ),
 ];
 
-/// Registers the tables over these folders and files.
+/// The names of the tables.
+pub(crate) fn names() -> impl Iterator<Item = &'static str> {
+    VIEWS.iter().map(|(name, ..)| *name).chain([ALL])
+}
+
+/// Registers the tables over these files.
 ///
 /// # Errors
-/// If a folder cannot be read.
-pub async fn register(context: &SessionContext, paths: &[PathBuf]) -> anyhow::Result<()> {
-    let mut files = Vec::new();
-    for path in paths {
-        files.extend(parquet_files(path)?);
-    }
+/// If one cannot be read.
+pub(crate) async fn register(context: &SessionContext, files: &[PathBuf]) -> Result<(), Report> {
     if files.is_empty() {
         return Ok(());
     }
-    let paths: Vec<String> = files.iter().map(|path| url(path)).collect();
+    let registered = over(context, files).await;
+    registered.map_err(|error| Problem::new(format!("the results cannot be read: {error}")).into())
+}
+
+async fn over(context: &SessionContext, files: &[PathBuf]) -> Result<()> {
+    let paths: Vec<String> = files
+        .iter()
+        .map(|path| path.display().to_string())
+        .collect();
     let schema = schema();
     let options = ParquetReadOptions::default().schema(&schema);
     let all = context.read_parquet(paths, options).await?;
-    context.register_table("results", all.into_view())?;
+    context.register_table(ALL, all.into_view())?;
     for (name, row, columns) in VIEWS {
-        let sql = format!("CREATE VIEW {name} AS SELECT {columns} FROM results WHERE row = '{row}'");
-        run(context, &sql).await?;
+        let sql = format!("CREATE VIEW {name} AS SELECT {columns} FROM {ALL} WHERE row = '{row}'");
+        context.sql(&sql).await?.collect().await?;
     }
-    Ok(())
-}
-
-fn url(path: &Path) -> String {
-    std::path::absolute(path)
-        .unwrap_or_else(|_| path.to_owned())
-        .display()
-        .to_string()
-}
-
-async fn run(context: &SessionContext, sql: &str) -> Result<()> {
-    context.sql(sql).await?.collect().await?;
     Ok(())
 }

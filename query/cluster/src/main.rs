@@ -1,0 +1,2 @@
+//! Queries on several machines.
+fn main() {}
