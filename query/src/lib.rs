@@ -8,7 +8,7 @@ mod asked;
 mod exec;
 mod joints;
 pub mod output;
-mod problem;
+pub mod problem;
 mod recordings;
 mod replay;
 mod results;
@@ -48,5 +48,5 @@ pub async fn register(context: &SessionContext, paths: &[PathBuf]) -> Result<(),
 /// What is wrong with the query, where, and what would mend it.
 pub async fn plan(context: &SessionContext, sql: &str) -> Result<DataFrame, Report> {
     let frame = context.sql(sql).await;
-    frame.map_err(|error| problem::of_query(context, sql, &error).into())
+    frame.map_err(|error| problem::of_query(context, sql, &error))
 }

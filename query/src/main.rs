@@ -57,7 +57,7 @@ async fn run(args: &Args) -> ExitCode {
     match args.answer.write(frame).await {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            eprintln!("error: {}", tauscope_query::problem::of_answer(&error));
             ExitCode::FAILURE
         }
     }

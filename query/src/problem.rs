@@ -6,7 +6,7 @@ use std::path::Path;
 use datafusion::common::SchemaError;
 use datafusion::error::DataFusionError;
 use datafusion::prelude::SessionContext;
-use tauscope_pipeline::report::{Problem, Source};
+use tauscope_pipeline::report::{Problem, Report, Source};
 use tauscope_pipeline::suggest;
 
 use crate::results;
@@ -15,34 +15,52 @@ use crate::results;
 const OF_ARCHIVES: [&str; 2] = ["recordings", "joints"];
 
 /// In the words of the query's author.
-pub fn of_query(context: &SessionContext, sql: &str, error: &DataFusionError) -> Problem {
+pub(crate) fn of_query(context: &SessionContext, sql: &str, error: &DataFusionError) -> Report {
+    // Wrong files, which a table function was given.
+    if let Some(report) = report_in(error) {
+        return report.clone();
+    }
     let text = error.strip_backtrace();
     let text = text.lines().next().unwrap_or_default();
     if let Some(name) = missing_table(text) {
         let title = format!("there is no table `{name}`");
-        return at(sql, place_of_word(sql, name), title).help(remedy(context, name));
+        return at(sql, place_of_table(sql, name), title)
+            .help(remedy(context, name))
+            .into();
     }
-    let unknown = match error.find_root() {
-        DataFusionError::SchemaError(of, _) => match &**of {
-            SchemaError::FieldNotFound {
-                field,
-                valid_fields,
-            } => Some((field, valid_fields)),
-            _ => None,
-        },
-        _ => None,
-    };
-    if let Some((field, valid)) = unknown {
-        let names: Vec<&str> = valid.iter().map(|column| column.name()).collect();
+    if let DataFusionError::SchemaError(of, _) = error.find_root()
+        && let SchemaError::FieldNotFound {
+            field,
+            valid_fields,
+        } = &**of
+    {
+        let names: Vec<&str> = valid_fields.iter().map(|column| column.name()).collect();
         let title = format!("there is no column `{}`", field.name());
         let help = suggest::help(field.name(), "the columns are", names);
-        return at(sql, place_of_word(sql, field.name()), title).maybe_help(help);
+        return at(sql, place_of_word(sql, field.name()), title)
+            .maybe_help(help)
+            .into();
     }
     let (title, place) = match text.split_once(" at Line: ") {
         Some((title, place)) => (title, place_of_line(sql, place)),
         None => (text, None),
     };
-    at(sql, place, plain(title))
+    at(sql, place, plain(title)).into()
+}
+
+/// Why an answer broke off, in one line.
+pub fn of_answer(error: &anyhow::Error) -> String {
+    match error.downcast_ref::<DataFusionError>() {
+        Some(inner) => plain(&inner.strip_backtrace()),
+        None => format!("{error:#}"),
+    }
+}
+
+fn report_in(error: &DataFusionError) -> Option<&Report> {
+    match error.find_root() {
+        DataFusionError::External(inner) => inner.downcast_ref(),
+        _ => None,
+    }
 }
 
 fn at(sql: &str, place: Option<Range<usize>>, title: impl Into<String>) -> Problem {
@@ -58,16 +76,20 @@ fn at(sql: &str, place: Option<Range<usize>>, title: impl Into<String>) -> Probl
 
 /// The message without the names of `DataFusion`'s types around it.
 fn plain(title: &str) -> String {
-    let title = [
+    let wrappers = [
         "Error during planning: ",
         "SQL error: ",
         "External error: ",
+        "Arrow error: ",
         "Schema error: ",
-    ]
-    .iter()
-    .fold(title, |title, wrapper| {
-        title.strip_prefix(wrapper).unwrap_or(title)
-    });
+    ];
+    let mut title = title;
+    while let Some(inner) = wrappers
+        .iter()
+        .find_map(|wrapper| title.strip_prefix(wrapper))
+    {
+        title = inner;
+    }
     let inner = title
         .strip_prefix("ParserError(\"")
         .or_else(|| title.strip_prefix("TokenizerError(\""));
@@ -110,17 +132,33 @@ fn remedy(context: &SessionContext, name: &str) -> String {
     }
 }
 
-/// Where `word` stands in the query, as a word of its own.
+/// Where `name` stands in the query as a table: behind FROM or JOIN, else anywhere.
+fn place_of_table(sql: &str, name: &str) -> Option<Range<usize>> {
+    let behind = |place: &Range<usize>| {
+        let before = sql[..place.start].trim_end().to_ascii_lowercase();
+        before.ends_with("from") || before.ends_with("join")
+    };
+    places_of_word(sql, name)
+        .find(behind)
+        .or_else(|| place_of_word(sql, name))
+}
+
 fn place_of_word(sql: &str, word: &str) -> Option<Range<usize>> {
+    places_of_word(sql, word).next()
+}
+
+/// Where `word` stands in the query as a word of its own.
+fn places_of_word(sql: &str, word: &str) -> impl Iterator<Item = Range<usize>> {
     let is_part = |c: char| c.is_alphanumeric() || c == '_';
     let lower = sql.to_ascii_lowercase();
     let word = word.to_ascii_lowercase();
-    lower
+    let places: Vec<_> = lower
         .match_indices(&word)
         .map(|(at, found)| at..at + found.len())
-        .find(|place| {
-            !lower[..place.start].ends_with(is_part) && !lower[place.end..].starts_with(is_part)
-        })
+        .collect();
+    places.into_iter().filter(move |place| {
+        !lower[..place.start].ends_with(is_part) && !lower[place.end..].starts_with(is_part)
+    })
 }
 
 /// Of `1, Column: 8`.

@@ -46,8 +46,7 @@ impl TableFunctionImpl for ReplayFunction {
                 source,
                 identity: loaded.identity.hash(),
             },
-            recordings: sources::recordings(pattern)
-                .map_err(|report| external(report.to_string()))?,
+            recordings: sources::recordings(pattern).map_err(external)?,
         }))
     }
 }
@@ -60,9 +59,8 @@ struct Loaded {
 
 impl Loaded {
     fn load(path: &Path) -> Result<Self> {
-        let failed = |report: tauscope_pipeline::report::Report| external(report.to_string());
-        let pipeline = Pipeline::load(path, None).map_err(failed)?;
-        let identity = Identity::of(&pipeline, TwinChoice::Recompute, false).map_err(failed)?;
+        let pipeline = Pipeline::load(path, None).map_err(external)?;
+        let identity = Identity::of(&pipeline, TwinChoice::Recompute, false).map_err(external)?;
         Ok(Self { pipeline, identity })
     }
 
