@@ -5,56 +5,35 @@ use std::sync::Arc;
 use arrow::datatypes::SchemaRef;
 use arrow::record_batch::RecordBatch;
 use datafusion::common::internal_err;
-use datafusion::error::{DataFusionError, Result};
+use datafusion::error::Result;
 use datafusion::execution::{SendableRecordBatchStream, TaskContext};
 use datafusion::physical_expr::EquivalenceProperties;
 use datafusion::physical_plan::execution_plan::{Boundedness, EmissionType};
 use datafusion::physical_plan::metrics::{
-    BaselineMetrics, Count, ExecutionPlanMetricsSet, MetricBuilder, MetricsSet,
+    BaselineMetrics, ExecutionPlanMetricsSet, MetricBuilder, MetricsSet,
 };
 use datafusion::physical_plan::stream::RecordBatchReceiverStreamBuilder;
 use datafusion::physical_plan::{
     DisplayAs, DisplayFormatType, ExecutionPlan, Partitioning, PlanProperties,
 };
-use serde::{Deserialize, Serialize};
-use tauscope_archive::Recording;
+use tauscope_pipeline::results;
 
 use crate::asked::Asked;
-use crate::table::{Kind, Listed};
+use crate::scan::{Counts, Kind, Scan};
 use crate::{joints, recordings, replay};
 
 /// Batches that wait for whoever asked.
 /// Resolution: memory, against threads that wait for each other.
 const WAITING: usize = 2;
 
-/// What is read of which recordings: plain data, which a plan carries to another machine.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Scan {
-    /// What is read.
-    pub kind: Kind,
-    /// The recordings of each partition.
-    pub partitions: Vec<Vec<Listed>>,
-    /// Recordings of the table that the query does not ask for.
-    pub skipped: usize,
-    /// What the query asks for.
-    pub asked: Asked,
-    /// The columns, by their place; `None` for all.
-    pub projection: Option<Vec<usize>>,
-    /// Rows of a partition after which no more are wanted.
-    pub limit: Option<usize>,
-}
-
-impl Scan {
-    /// The columns of the rows.
-    ///
-    /// # Errors
-    /// If there is no such column.
-    pub fn schema(&self) -> Result<SchemaRef> {
-        let all = self.kind.schema();
-        Ok(match &self.projection {
-            Some(columns) => Arc::new(all.project(columns)?),
-            None => all,
-        })
+impl Kind {
+    /// The columns.
+    pub fn schema(&self) -> SchemaRef {
+        match self {
+            Self::Recordings => recordings::schema(),
+            Self::Joints => joints::schema(),
+            Self::Replay { .. } => results::schema(),
+        }
     }
 }
 
@@ -66,16 +45,6 @@ pub struct ArchiveExec {
     metrics: ExecutionPlanMetricsSet,
 }
 
-/// What `EXPLAIN ANALYZE` counts.
-pub(crate) struct Counts {
-    /// Recordings that were opened.
-    pub(crate) opened: Count,
-    /// Chunks that were read and unpacked.
-    pub(crate) chunks_read: Count,
-    /// Chunks of the opened recordings that were not.
-    pub(crate) chunks_skipped: Count,
-}
-
 impl ArchiveExec {
     /// The plan of a scan.
     ///
@@ -83,7 +52,7 @@ impl ArchiveExec {
     /// If there is no such column.
     pub fn new(scan: Scan) -> Result<Self> {
         let properties = PlanProperties::new(
-            EquivalenceProperties::new(scan.schema()?),
+            EquivalenceProperties::new(scan.projected(&scan.kind.schema())?),
             Partitioning::UnknownPartitioning(scan.partitions.len()),
             EmissionType::Incremental,
             Boundedness::Bounded,
@@ -172,7 +141,8 @@ impl ExecutionPlan for ArchiveExec {
             chunks_skipped: counter("chunks_skipped"),
         };
         let baseline = BaselineMetrics::new(&self.metrics, partition);
-        let mut builder = RecordBatchReceiverStreamBuilder::new(scan.schema()?, WAITING);
+        let mut builder =
+            RecordBatchReceiverStreamBuilder::new(scan.projected(&scan.kind.schema())?, WAITING);
         let sender = builder.tx();
         builder.spawn_blocking(move || {
             let timer = baseline.elapsed_compute().timer();
@@ -201,29 +171,4 @@ impl ExecutionPlan for ArchiveExec {
     fn metrics(&self) -> Option<MetricsSet> {
         Some(self.metrics.clone_inner())
     }
-}
-
-/// Opens a recording that is still what the plan names.
-///
-/// # Errors
-/// If it cannot be opened, or has another size by now.
-pub(crate) fn open(listed: &Listed, counts: &Counts) -> Result<Recording> {
-    let recording = Recording::open(&listed.path).map_err(external)?;
-    if listed.bytes != 0 && recording.bytes() != listed.bytes {
-        let path = listed.path.display();
-        return Err(external(format!(
-            "{path}: it has {} bytes, and had {} when the query was planned: ask again",
-            recording.bytes(),
-            listed.bytes
-        )));
-    }
-    counts.opened.add(1);
-    Ok(recording)
-}
-
-/// An error that `DataFusion` hands on.
-pub(crate) fn external(
-    error: impl Into<Box<dyn std::error::Error + Send + Sync>>,
-) -> DataFusionError {
-    DataFusionError::External(error.into())
 }

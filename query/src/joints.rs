@@ -12,8 +12,7 @@ use tauscope_archive::Recording;
 use tauscope_archive::ros::{JointState, JointStateDecoder};
 use tauscope_pipeline::replay::stem;
 
-use crate::exec::{Counts, Scan, external, open};
-use crate::table::Listed;
+use crate::scan::{Counts, Listed, Scan, external, open};
 
 /// Rows of a batch.
 /// Resolution: memory, against the cost of a batch.
@@ -155,7 +154,7 @@ impl Rows {
         Ok(Self {
             recording: String::new(),
             count: 0,
-            schema: scan.schema()?,
+            schema: scan.projected(&all)?,
             columns: places.iter().map(column).collect(),
         })
     }

@@ -6,12 +6,14 @@
 
 mod asked;
 mod exec;
+mod function;
 mod joints;
 pub mod output;
 pub mod problem;
 mod recordings;
 mod replay;
 mod results;
+mod scan;
 mod sources;
 mod table;
 
@@ -24,10 +26,11 @@ use datafusion::prelude::SessionContext;
 use tauscope_pipeline::report::Report;
 
 pub use asked::Asked;
-pub use exec::{ArchiveExec, Scan};
-pub use replay::ReplayFunction;
+pub use exec::ArchiveExec;
+pub use function::ReplayFunction;
+pub use scan::{Kind, Listed, Scan};
 pub use sources::Sources;
-pub use table::{ArchiveTable, Kind, Listed};
+pub use table::ArchiveTable;
 
 /// Registers the tables over `paths` and the function `replay` in a session.
 ///

@@ -8,8 +8,7 @@ use datafusion::error::Result;
 use tauscope_archive::Recording;
 use tauscope_pipeline::replay::stem;
 
-use crate::exec::{Counts, Scan, open};
-use crate::table::Listed;
+use crate::scan::{Counts, Listed, Scan, open};
 
 /// Rows of a batch.
 /// Resolution: how soon the first come, against the cost of a batch.

@@ -1,70 +1,32 @@
-//! `replay('pipeline.yaml', 'archive/*.mcap')`: recordings replayed as the query asks.
+//! Recordings replayed as a query asks: the rows that `tauscope replay --manifest` writes.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use arrow::array::RecordBatch;
-use datafusion::catalog::{TableFunctionArgs, TableFunctionImpl, TableProvider};
-use datafusion::common::plan_err;
 use datafusion::error::Result;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use tauscope_pipeline::pipeline::Pipeline;
 use tauscope_pipeline::replay::{Replay, TwinChoice};
-use tauscope_pipeline::results::{Folder, Identity, Unit, Wanted, parquet_files, schema};
+use tauscope_pipeline::results::{Folder, Identity, Unit, Wanted, parquet_files};
 
-use crate::asked::literal;
-use crate::exec::{Counts, Scan, external, open};
-use crate::sources;
-use crate::table::{ArchiveTable, Kind, Listed};
-
-/// The table function. Its arguments: pipeline file, recordings, and where the pipeline has several sources, the one
-/// whose place they take.
-#[derive(Debug)]
-pub struct ReplayFunction;
-
-impl TableFunctionImpl for ReplayFunction {
-    fn call_with_args(&self, args: TableFunctionArgs) -> Result<Arc<dyn TableProvider>> {
-        let texts: Option<Vec<String>> = args.exprs().iter().map(literal).collect();
-        let (pipeline, pattern, source) = match texts.as_deref() {
-            Some([pipeline, pattern]) => (pipeline, pattern, None),
-            Some([pipeline, pattern, source]) => (pipeline, pattern, Some(source.clone())),
-            _ => {
-                return plan_err!(
-                    "replay takes a pipeline file and recordings: replay('pipeline.yaml', '*.mcap')"
-                );
-            }
-        };
-        let path = std::path::absolute(pipeline)?;
-        let loaded = Loaded::load(Path::new(pipeline))?;
-        // Told before anything is read.
-        loaded.replay(source.as_deref())?;
-        Ok(Arc::new(ArchiveTable {
-            kind: Kind::Replay {
-                pipeline: path,
-                source,
-                identity: loaded.identity.hash(),
-            },
-            recordings: sources::recordings(pattern).map_err(external)?,
-        }))
-    }
-}
+use crate::scan::{Counts, Kind, Listed, Scan, external, open};
 
 /// A pipeline, and what its results depend on.
-struct Loaded {
+pub(crate) struct Loaded {
     pipeline: Pipeline,
-    identity: Identity,
+    pub(crate) identity: Identity,
 }
 
 impl Loaded {
-    fn load(path: &Path) -> Result<Self> {
+    pub(crate) fn load(path: &Path) -> Result<Self> {
         let pipeline = Pipeline::load(path, None).map_err(external)?;
         let identity = Identity::of(&pipeline, TwinChoice::Recompute, false).map_err(external)?;
         Ok(Self { pipeline, identity })
     }
 
-    fn replay(&self, source: Option<&str>) -> Result<Replay<'_>> {
+    pub(crate) fn replay(&self, source: Option<&str>) -> Result<Replay<'_>> {
         Replay::new(&self.pipeline, source, TwinChoice::Recompute).map_err(external)
     }
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use tauscope_pipeline::report::{Problem, Report};
 use tauscope_pipeline::results::{Manifest, parquet_files};
 
-use crate::table::Listed;
+use crate::scan::Listed;
 
 /// What a query is about.
 #[derive(Debug, Default)]

@@ -1,6 +1,5 @@
 //! The tables that are read from recordings.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use arrow::datatypes::SchemaRef;
@@ -14,50 +13,10 @@ use datafusion::prelude::SessionContext;
 use serde::{Deserialize, Serialize};
 use tauscope_pipeline::replay::stem;
 use tauscope_pipeline::report::{Problem, Report};
-use tauscope_pipeline::results;
 
 use crate::asked::Asked;
-use crate::exec::{ArchiveExec, Scan};
-use crate::{joints, recordings};
-
-/// What is read from recordings.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Kind {
-    /// A row for each recording.
-    Recordings,
-    /// A row for each joint of each joint state.
-    Joints,
-    /// The rows of `docs/results.md`.
-    Replay {
-        /// The pipeline file.
-        pipeline: PathBuf,
-        /// The stage whose place the recordings take, where the pipeline has several sources.
-        source: Option<String>,
-        /// Hash of all that the results depend on but for the recording
-        /// ([`Identity::hash`](results::Identity::hash)): whoever replays checks that it has the same.
-        identity: String,
-    },
-}
-
-impl Kind {
-    /// The columns.
-    pub fn schema(&self) -> SchemaRef {
-        match self {
-            Self::Recordings => recordings::schema(),
-            Self::Joints => joints::schema(),
-            Self::Replay { .. } => results::schema(),
-        }
-    }
-}
-
-/// A recording as a plan names it.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Listed {
-    /// From the root of the file system.
-    pub path: PathBuf,
-    /// Its size when the query was planned, checked where it is read; 0 for a folder, of which it is not.
-    pub bytes: u64,
-}
+use crate::exec::ArchiveExec;
+use crate::scan::{Kind, Listed, Scan};
 
 /// A table over recordings. It holds names alone.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -134,7 +93,9 @@ impl TableProvider for ArchiveTable {
             limit,
         };
         if count == 0 {
-            return Ok(Arc::new(EmptyExec::new(scan.schema()?)));
+            return Ok(Arc::new(EmptyExec::new(
+                scan.projected(&scan.kind.schema())?,
+            )));
         }
         Ok(Arc::new(ArchiveExec::new(scan)?))
     }
