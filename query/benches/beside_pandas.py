@@ -30,15 +30,14 @@ TOPIC = "/joint_states"
 COLUMNS = ["recording", "topic", "log_ns", "joint", "position_rad", "velocity_rad_s", "effort"]
 
 
-def frame(files, start_ns=None, end_ns=None):
-    """Joint states as the table `joints`."""
+def frame(files, **within):
+    """Joint states as the table `joints`; `within` bounds their log times."""
     rows = []
     for path in files:
         name = pathlib.Path(path).stem
         with open(path, "rb") as file:
             reader = make_reader(file, decoder_factories=[DecoderFactory()])
-            messages = reader.iter_decoded_messages([TOPIC], start_time=start_ns, end_time=end_ns)
-            for _, _, message, state in messages:
+            for _, _, message, state in reader.iter_decoded_messages([TOPIC], **within):
                 at = message.log_time
                 for joint, *values in zip(state.name, state.position, state.velocity, state.effort):
                     rows.append((name, TOPIC, at, joint, *values))
@@ -70,7 +69,7 @@ def overview():
 
 
 def window(files):
-    """A second of each recording."""
+    """One second of the archive: most files are opened only."""
     with open(files[0], "rb") as file:
         start_ns = make_reader(file).get_summary().statistics.message_start_time
     low, high = start_ns, start_ns + 1_000_000_000
@@ -79,7 +78,7 @@ def window(files):
     )
 
     def in_pandas(files):
-        efforts = frame(files, low, high + 1)["effort"]
+        efforts = frame(files, starting_at=low, ending_at=high)["effort"]
         return [{"n": len(efforts), "highest": efforts.max()}]
 
     return sql, {"pandas": in_pandas}
