@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    calibrate, check, completions, diff, doctor, evaluate, explain, fleet, info, init, man,
-    manifest, physics, repair, replay, run, schema, send, simulate, stage, weeks,
+    calibrate, check, cluster, completions, diff, doctor, evaluate, explain, fleet, info, init,
+    man, manifest, physics, query, repair, replay, run, schema, send, simulate, stage, weeks,
 };
 
 /// A robot's measured effort beside its digital twin's: stream, detect, record.
@@ -28,6 +28,8 @@ pub enum Command {
     Replay(replay::Args),
     Manifest(manifest::Args),
     Diff(diff::Args),
+    Query(query::Args),
+    Cluster(cluster::Args),
     Calibrate(calibrate::Args),
     Explain(explain::Args),
     Evaluate(evaluate::Args),

@@ -2,6 +2,7 @@
 
 pub mod calibrate;
 pub mod check;
+pub mod cluster;
 pub mod completions;
 pub mod diff;
 pub mod doctor;
@@ -13,6 +14,7 @@ pub mod init;
 pub mod man;
 pub mod manifest;
 pub mod physics;
+pub mod query;
 pub mod repair;
 pub mod replay;
 pub mod run;

@@ -15,6 +15,7 @@ mod interrupt;
 mod output;
 mod physics;
 mod plan;
+mod program_beside;
 mod progress;
 mod supervisor;
 mod terminal;
@@ -142,6 +143,8 @@ fn outcome(command: &Command, out: &mut Output) -> Result<exit::Exit, exit::Fail
         Command::Schema(args) => commands::schema::run(args, out),
         Command::Replay(args) => commands::replay::run(args, out),
         Command::Diff(args) => commands::diff::run(args, out),
+        Command::Query(args) => commands::query::run(args, out),
+        Command::Cluster(args) => commands::cluster::run(args, out),
         Command::Manifest(args) => commands::manifest::run(args, out),
         Command::Calibrate(args) => commands::calibrate::run(args, out),
         Command::Explain(args) => commands::explain::run(args, out),

@@ -176,6 +176,15 @@ impl Recording {
         Ok(topic)
     }
 
+    /// Chunks of an MCAP file, counted as [`Messages::chunks_read`] does; 0 where the format has none.
+    pub fn chunks(&self) -> u64 {
+        match &self.store {
+            Store::Mcap(layout) => layout.chunks(),
+            Store::Several(parts) => parts.iter().map(|part| part.recording.chunks()).sum(),
+            Store::Sqlite { .. } | Store::Csv(_) => 0,
+        }
+    }
+
     /// The messages of these topics in the order of their log times.
     ///
     /// # Errors

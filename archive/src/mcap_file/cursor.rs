@@ -330,4 +330,8 @@ impl Cursor for McapCursor {
             body: &loaded.records[message.body_at..message.body_at + message.body_len],
         })
     }
+
+    fn chunks_read(&self) -> u64 {
+        self.next_extent as u64
+    }
 }

@@ -126,6 +126,12 @@ impl Messages {
         None
     }
 
+    /// Chunks of an MCAP file that have been read so far. Messages that lie in it without a chunk count as one, up to the
+    /// next chunk.
+    pub fn chunks_read(&self) -> u64 {
+        self.cursor.chunks_read()
+    }
+
     fn message(&self) -> Option<Message<'_>> {
         let raw = self.cursor.current()?;
         Some(Message {

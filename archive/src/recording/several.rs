@@ -24,6 +24,8 @@ pub(super) struct SeveralCursor {
     open: Vec<Open>,
     /// Index into `open`: whose message was given last.
     current: Option<usize>,
+    /// Chunks read in the parts that are done.
+    chunks_before: u64,
 }
 
 struct Open {
@@ -52,6 +54,7 @@ impl SeveralCursor {
             waiting,
             open: Vec::new(),
             current: None,
+            chunks_before: 0,
         }
     }
 
@@ -63,7 +66,8 @@ impl SeveralCursor {
                 open.ready = true;
                 i += 1;
             } else {
-                self.open.swap_remove(i);
+                let done = self.open.swap_remove(i);
+                self.chunks_before += done.cursor.chunks_read();
             }
         }
         Ok(())
@@ -120,5 +124,10 @@ impl Cursor for SeveralCursor {
             topic: self.parts[open.part].topics[message.topic],
             ..message
         })
+    }
+
+    fn chunks_read(&self) -> u64 {
+        let open = self.open.iter().map(|open| open.cursor.chunks_read());
+        self.chunks_before + open.sum::<u64>()
     }
 }

@@ -68,11 +68,12 @@ impl Identity {
 
     /// The name of the result of `wanted`, 64 hexadecimal digits: SHA-256 over [`facts`](Self::facts).
     pub fn key(&self, wanted: &Wanted) -> String {
-        let mut text = String::new();
-        for (name, value) in self.facts(wanted) {
-            text += &format!("{name}={value}\n");
-        }
-        sha256(text.as_bytes())
+        hash(&self.facts(wanted))
+    }
+
+    /// SHA-256 over all that results depend on but for the recording: runners with the same hash give the same results.
+    pub fn hash(&self) -> String {
+        hash(&self.facts)
     }
 
     /// Where the result of `wanted`, recorded in `cell`, lies: `cell=CELL/day=YYYY-MM-DD/KEY.parquet`. The day is that of
@@ -84,6 +85,14 @@ impl Identity {
         );
         format!("cell={cell}/day={day}/{}.parquet", self.key(wanted))
     }
+}
+
+fn hash(facts: &BTreeMap<String, String>) -> String {
+    let mut text = String::new();
+    for (name, value) in facts {
+        text += &format!("{name}={value}\n");
+    }
+    sha256(text.as_bytes())
 }
 
 #[cfg(test)]
