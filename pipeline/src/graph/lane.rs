@@ -177,8 +177,8 @@ mod tests {
     fn what_no_stage_may_see_is_kept_back_and_keeps_its_number() {
         let lane = Lane::of("in");
         let mut reader = lane.reader();
-        lane.write(&mut |sample| sample.position[0] = f64::NAN);
-        lane.write(&mut |sample| sample.header.joint_count = u32::MAX);
+        lane.write(&mut |sample: &mut JointState| sample.position[0] = f64::NAN);
+        lane.write(&mut |sample: &mut JointState| sample.header.joint_count = u32::MAX);
         write(&lane, 30);
         assert_eq!(read(&mut reader), Some((30, 2)));
         assert_eq!(reader.received(), 1);

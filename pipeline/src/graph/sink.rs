@@ -1,6 +1,6 @@
 //! The end of a graph: streams of any type into one sink.
 
-use tauscope_bus::{Received, Sample, SampleRef, Sink, StageError};
+use tauscope_bus::{Received, Sample, Sink, StageError};
 
 use super::lane::Reader;
 use super::{Node, StageCounts};
