@@ -187,8 +187,8 @@ class Plant:
         if self.args.pictures is None or not shutil.which("chromium"):
             return
         self.args.pictures.mkdir(parents=True, exist_ok=True)
-        for width, scheme in (("1920", "light"), ("390", "light"), ("1920", "dark")):
-            to = self.args.pictures / f"{name}_{width}_{scheme}.png"
+        for width, scheme in (("1920", "light"), ("390", "dark")):
+            to = self.args.pictures / f"{name}_{width}.png"
             taken = subprocess.run([sys.executable, PAGE, self.address, to, width, scheme, height],
                                    capture_output=True, text=True, check=False)
             check(taken.returncode == 0, taken.stderr)
@@ -251,7 +251,7 @@ def harm(plant, victims, slack):
 
     def back(cell):
         took = plant.wait(f"{cell} back", lambda wall: wall[cell]["state"] in ALIVE, BACK_ON_WALL_S * slack)
-        told.append(f"back after {took:.1f} s")
+        told.append(f"the cell that was {cell}: back after {took:.1f} s")
 
     begin = time.monotonic()
     signal_all(victims["killed"], signal.SIGSTOP)
@@ -274,17 +274,17 @@ def harm(plant, victims, slack):
 
 
 def judge(plant, name, run, begun):
-    """The books of a computer's run, and when it ended."""
+    """The books of a computer's run: what its detectors judged, what was lost, and how late it ended [s]."""
     code, summary = run.end(plant.args.seconds * 2 + 120)
     late = time.monotonic() - begun - plant.args.seconds
     lost = balance(summary)
-    dropped = sum(stage["dropped"] for stage in summary["stages"])
-    check(code == 0 and lost == 0 and dropped == 0, name, "ended with", code, "and lost", lost, dropped, run.text())
+    check(code == (3 if lost else 0), name, "ended with", code, "and lost", lost)
     whole = plant.args.seconds * plant.args.rate_hz
     for stage in summary["stages"]:
         if not stage["stage"].startswith("tell_"):
             check(abs(stage["emitted"] - whole) <= 2, stage, "of", whole)
-    return sum(stage["emitted"] for stage in summary["stages"] if stage["stage"].startswith("detect_")), late
+    judged = sum(stage["emitted"] for stage in summary["stages"] if stage["stage"].startswith("detect_"))
+    return judged, lost, late
 
 
 def contacts(plant, cells):
@@ -315,7 +315,7 @@ class Bystanders:
         while not self.over.is_set():
             wall = self.plant.wall()
             self.wrong += [(cell, wall[cell]["state"]) for cell in self.cells if wall[cell]["state"] not in ALIVE]
-            self.oldest_ms = max(self.oldest_ms, *(wall[cell]["sample_age_ms"] for cell in self.cells))
+            self.oldest_ms = max(self.oldest_ms, *(wall[cell]["sample_age_ms"] or 0 for cell in self.cells))
             self.load.append(os.getloadavg()[0])
             self.over.wait(1.0)
 
@@ -355,19 +355,21 @@ def plant_of(program, folder, args, slack):
         print(f"all on the wall after {begun - begin:.1f} s", flush=True)
         bystanders = Bystanders(plant, names, run)
         plant.ended.callback(bystanders.stop)
-        time.sleep(args.seconds / 6)
-        plant.picture("running")
+        time.sleep(min(20.0, args.seconds / 6))
         told = harm(plant, victims, slack)
-        print("; ".join(told), flush=True)
         time.sleep(max(0.0, begin + args.seconds - 2 - time.monotonic()))
         bystanders.end()
-        judged, late = judge(plant, "the computer with all cells", run, begun)
+        judged, lost, late = judge(plant, "the computer with all cells", run, begun)
+        check(lost == 0, lost, "samples lost by cells that nobody harmed")
         check(late < LATE_S * slack, f"it ended {late:.1f} s late: the machine does not bear so many cells")
         survivors = [name for name in victims if name != "killed"]
         for name in survivors:
-            judge(plant, name, victims[name], begun)
+            _, lost, _ = judge(plant, name, victims[name], begun)
+            check(lost == 0 or name == "stopped", lost, "samples lost by the cell that was", name)
+            told.append(f"the cell that was {name}: {lost} samples not told, all counted")
         plant.wait("all ended", lambda wall: all(
             wall[cell]["state"] == "ended" for cell in [*names, *survivors]), 30)
+        print("; ".join(told), flush=True)
         kept = contacts(plant, names)
         print(f"{judged} samples judged, 0 lost, {max(late, 0):.1f} s late; {kept} contacts told and kept", flush=True)
         document(plant)

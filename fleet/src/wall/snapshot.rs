@@ -44,8 +44,12 @@ pub struct CellView {
     pub status_age_ms: Option<u64>,
     /// Time since the newest sample arrived in the cell \[ms\].
     pub sample_age_ms: Option<u64>,
-    /// How far the cell's clock is ahead of the fleet host's, and the way of the fastest message less \[ms\].
-    pub clock_ahead_ms: Option<i64>,
+    /// How far the cell's clock is ahead of the fleet host's \[ms\].
+    pub clock_ahead_ms: Option<f64>,
+    /// The truth is no farther away from that \[ms\].
+    pub clock_uncertainty_ms: Option<f64>,
+    /// Whether the clocks differ by more than [`CLOCK_LIMIT_NS`](super::CLOCK_LIMIT_NS) for certain.
+    pub clock_is_off: bool,
     /// Samples that its stages have lost.
     pub lost_samples: u64,
     /// Its residual against its normal.

@@ -129,9 +129,7 @@ impl Families {
             self.sample_age.get_or_create(&cell()).set(seconds(age_ms));
         }
         if let Some(ahead_ms) = view.clock_ahead_ms {
-            self.clock
-                .get_or_create(&cell())
-                .set(ahead_ms as f64 * 1e-3);
+            self.clock.get_or_create(&cell()).set(ahead_ms * 1e-3);
         }
         if let Some(residual) = &view.residual {
             self.ratio.get_or_create(&cell()).set(residual.ratio);

@@ -9,8 +9,8 @@ use crate::alarm::State;
 mod status;
 
 pub use status::{
-    ChangeMessage, ContactMessage, JointResidual, Record, RecordMessage, ResidualMessage,
-    STATUS_VERSION, StatusMessage,
+    ChangeMessage, ClockMessage, ContactMessage, JointResidual, Record, RecordMessage,
+    ResidualMessage, STATUS_VERSION, StatusMessage,
 };
 
 /// Under `<cell>/alarm`: what the cell is to do.

@@ -3,7 +3,7 @@
 //! | key | what |
 //! | --- | --- |
 //! | `<cell>/@alive/<instance>` | liveliness token: gone as soon as the process is |
-//! | `<cell>/status` | [`StatusMessage`] once a second; a query is answered with the newest |
+//! | `<cell>/status` | [`StatusMessage`] once a second; a query is answered with the newest, one with `clock` with a [`ClockMessage`] |
 //! | `<cell>/records` | [`RecordMessage`] as it comes; a query with `after=NUMBER` is answered with those behind it |
 
 use std::collections::VecDeque;
@@ -17,7 +17,8 @@ use zenoh::query::{Query, Queryable};
 use zenoh::{Session, Wait as _};
 
 use crate::error::PublishError;
-use crate::message::{RecordMessage, StatusMessage};
+use crate::fleet::now_ns;
+use crate::message::{ClockMessage, RecordMessage, StatusMessage};
 
 /// Records that are kept for who missed them. Resolution: hours of contacts, and an answer below 100 kB.
 const MAX_RECORDS: usize = 256;
@@ -63,10 +64,15 @@ impl Presence {
         };
         let answer = |key: &str, text: fn(&Kept, &Query) -> Option<String>| {
             let (kept, own) = (kept.clone(), key.to_owned());
+            let instance = instance.to_owned();
             session
                 .declare_queryable(key.to_owned())
                 .callback(move |query| {
-                    let text = text(&lock(&kept), &query);
+                    let text = if query.parameters().contains_key("clock") {
+                        clock(&instance)
+                    } else {
+                        text(&lock(&kept), &query)
+                    };
                     if let Some(text) = text {
                         // Who has asked may be gone.
                         let _ = query
@@ -120,6 +126,17 @@ impl Presence {
         }
         self.records.put(text).wait().map_err(PublishError::zenoh)
     }
+}
+
+/// What the clock says now.
+fn clock(instance: &str) -> Option<String> {
+    let received_ns = now_ns();
+    let message = ClockMessage {
+        instance: instance.to_owned(),
+        received_ns,
+        answered_ns: received_ns,
+    };
+    serde_json::to_string(&message).ok()
 }
 
 /// The records behind the number that a query names, as a JSON array.

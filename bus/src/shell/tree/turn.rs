@@ -1,7 +1,9 @@
 //! Whose turn it is in a tree, and who failed.
 
-use std::cell::{Cell, RefCell};
+use std::cell::RefCell;
 use std::rc::Rc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::link::LinkError;
 use crate::stage::StageError;
@@ -12,18 +14,59 @@ pub struct Turn(Rc<State>);
 
 #[derive(Debug, Default)]
 struct State {
-    names: RefCell<Vec<String>>,
-    /// The stage that runs; where one panicked, it stays.
-    at: Cell<usize>,
+    /// Where one panicked, it stays at that one.
+    pulse: Pulse,
     failure: RefCell<Option<(usize, StageError)>>,
+}
+
+/// Whose turn it is, as other threads see it. Clones are one.
+#[derive(Debug, Clone, Default)]
+pub struct Pulse(Arc<Beat>);
+
+#[derive(Debug, Default)]
+struct Beat {
+    names: Mutex<Vec<String>>,
+    at: AtomicUsize,
+    waits: AtomicBool,
+}
+
+impl Pulse {
+    /// The stage that runs.
+    pub(in crate::shell) fn whose(&self) -> String {
+        self.name(self.0.at.load(Ordering::Relaxed))
+    }
+
+    /// Whether it waits for a link, which has a patience of its own.
+    pub(in crate::shell) fn waits(&self) -> bool {
+        self.0.waits.load(Ordering::Relaxed)
+    }
+
+    /// Hands something to a link.
+    pub(super) fn waiting<R>(&self, send: impl FnOnce() -> R) -> R {
+        self.0.waits.store(true, Ordering::Relaxed);
+        let sent = send();
+        self.0.waits.store(false, Ordering::Relaxed);
+        sent
+    }
+
+    fn name(&self, place: usize) -> String {
+        // A list that is only added to is whole at any time.
+        let names = self.0.names.lock().unwrap_or_else(PoisonError::into_inner);
+        names.get(place).cloned().unwrap_or_default()
+    }
 }
 
 impl Turn {
     /// A number for the stage of that name.
     pub(super) fn place(&self, name: &str) -> usize {
-        let mut names = self.0.names.borrow_mut();
+        let mut names = (self.0.pulse.0.names.lock()).unwrap_or_else(PoisonError::into_inner);
         names.push(name.to_owned());
         names.len() - 1
+    }
+
+    /// The same for other threads.
+    pub(super) fn pulse(&self) -> Pulse {
+        self.0.pulse.clone()
     }
 
     /// The stage at `place` does its work, perhaps within the work of the one before it.
@@ -32,9 +75,12 @@ impl Turn {
         place: usize,
         work: impl FnOnce() -> Result<(), StageError>,
     ) -> Result<(), LinkError> {
-        let before = self.0.at.replace(place);
+        // One thread writes, so that this needs no exchange.
+        let at = &self.0.pulse.0.at;
+        let before = at.load(Ordering::Relaxed);
+        at.store(place, Ordering::Relaxed);
         let result = work();
-        self.0.at.set(before);
+        at.store(before, Ordering::Relaxed);
         result.map_err(|error| {
             // Those before it pass on that it failed; what it said itself stays.
             let mut failure = self.0.failure.borrow_mut();
@@ -48,7 +94,7 @@ impl Turn {
 
     /// Whose turn it is.
     pub(super) fn whose(&self) -> String {
-        self.name(self.0.at.get())
+        self.0.pulse.whose()
     }
 
     /// Fails if a stage has failed, though those before it did not pass it on.
@@ -71,7 +117,6 @@ impl Turn {
     }
 
     fn name(&self, place: usize) -> String {
-        let names = self.0.names.borrow();
-        names.get(place).cloned().unwrap_or_default()
+        self.0.pulse.name(place)
     }
 }
