@@ -10,6 +10,7 @@ and are skipped, visibly, without.
 """
 import argparse
 import contextlib
+import ctypes
 import importlib.util
 import json
 import os
@@ -241,6 +242,64 @@ def freeze(program, folder, victim, pause, seconds):
     return f"stopped for {pause} s, {lost} samples lost and counted, exit {code}"
 
 
+SHARED = """version: 1
+process: cells
+cells: {{a: {{robot: {data}/demo_arm.urdf}}, b: {{robot: {data}/demo_arm.urdf}}}}
+stages:
+"""
+SHARED_CELL = """- {{name: in_{cell}, cell: {cell}, ingest: {{simulate: {{scenario: scenario.yaml}}, rate: realtime}}}}
+- {{name: twin_{cell}, input: in_{cell}, twin: {{}}}}
+- {{name: detect_{cell}, input: twin_{cell}, detect: {{naive_difference: {{}}, threshold: {{score: 1000.0}}}}}}
+"""
+# A stage that hangs is named after 3 s of silence, and its silence noticed after 1 s.
+HANG_IS_NAMED_S = 5.0
+PTRACE_DETACH, PTRACE_SEIZE, PTRACE_INTERRUPT = 17, 0x4206, 0x4207
+
+
+class Held:
+    """A thread that does not go on, while the others of its process do: it is traced."""
+
+    def __init__(self, process, name):
+        self.libc = ctypes.CDLL(None, use_errno=True)
+        self.libc.ptrace.argtypes = [ctypes.c_long, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p]
+        tasks = Path(f"/proc/{process}/task").iterdir()
+        self.thread = next(int(task.name) for task in tasks if (task / "comm").read_text().strip() == name)
+        if self.libc.ptrace(PTRACE_SEIZE, self.thread, None, None) != 0:
+            raise Skipped(f"a thread cannot be traced: {os.strerror(ctypes.get_errno())}")
+        self.libc.ptrace(PTRACE_INTERRUPT, self.thread, None, None)
+        # `__WALL`: threads as well.
+        os.waitpid(self.thread, 0x40000000)
+
+    def go_on(self):
+        self.libc.ptrace(PTRACE_DETACH, self.thread, None, None)
+
+
+def hang(program, folder, pause, seconds):
+    """The thread of one of two cells in one process hangs: it is named, and the other cell does not notice."""
+    (folder / "scenario.yaml").write_text(SCENARIO.format(data=DATA, seconds=seconds))
+    cells = "".join(SHARED_CELL.format(cell=cell) for cell in "ab")
+    (folder / "pipeline.yaml").write_text(SHARED.format(data=DATA) + cells)
+    run = Run(program, folder)
+    try:
+        run.wait_for("stage `in_a` runs as process")
+        time.sleep(4.0)
+        begin = time.monotonic()
+        held = Held(run.ids["in_a"], "in_a")
+        time.sleep(pause)
+        held.go_on()
+        named = run.wait_for("stage `in_a` hangs") - begin
+        run.wait_for("stage `in_a` goes on")
+        code, summary = run.end()
+    finally:
+        run.process.kill()
+    others = [line for _, line in run.lines if " hangs: " in line and "`in_a`" not in line]
+    check(not others, "others were named:", others)
+    check(named < HANG_IS_NAMED_S * slack, f"it was named after {named:.1f} s")
+    check(balance(summary) == 0 and code == 0, "exit code", code, summary["links"])
+    check(all(stage["restarts"] == 0 for stage in summary["stages"]), "one was started again:", summary["stages"])
+    return f"held for {pause} s, named after {named:.1f} s, no other stage named, 0 lost, exit {code}"
+
+
 def full_disk(program, folder, seconds):
     disk = folder / "disk"
     disk.mkdir()
@@ -416,6 +475,7 @@ def scenarios(short, kills):
     for victim in ("record", "twin"):
         yield f"SIGSTOP of {victim}", lambda program, folder, victim=victim: freeze(
             program, folder, victim, pause, pause + 8)
+    yield "a thread that hangs", lambda program, folder: hang(program, folder, max(pause, 7), 25)
     yield "full disk", lambda program, folder: full_disk(program, folder, 15)
     for gap in (12,) if short else (12, 30):
         yield f"network cut for {gap} s", lambda program, folder, gap=gap: cut(program, folder, gap, gap + 15)

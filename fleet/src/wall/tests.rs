@@ -362,3 +362,19 @@ fn a_thousand_cells_pass_in_a_fraction_of_their_second() {
     // Ten seconds of a thousand cells. Measured: 0.2 s.
     assert!(begin.elapsed().as_secs() < 10, "{:?}", begin.elapsed());
 }
+
+#[test]
+fn equals_stand_in_the_order_in_which_people_count() {
+    let names = [
+        "press-10", "weld", "press-2", "press-02", "press", "press-2b",
+    ];
+    let wall = Wall::new(names.map(str::to_owned));
+    let cells = wall.snapshot().cells;
+    let shown: Vec<&str> = cells.iter().map(|view| view.cell.as_str()).collect();
+    assert_eq!(
+        shown,
+        [
+            "press", "press-2", "press-2b", "press-02", "press-10", "weld"
+        ]
+    );
+}

@@ -230,6 +230,8 @@ pub struct Messages {
     pub health: HealthMessage,
     /// `<cell>/status`.
     pub status: StatusMessage,
+    /// What the query `<cell>/status?clock` is answered with.
+    pub clock: ClockMessage,
     /// `<cell>/records`.
     pub records: RecordMessage,
     /// What `<cell>/commands` takes.
