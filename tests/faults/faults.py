@@ -188,12 +188,13 @@ def kill(program, folder, victim, times, seconds):
     unkept = 0
     for stage, topic in TOPICS.items():
         missing = link(summary, stage, "record")["received"] - counts.get(topic, 0)
-        most = times * UNKEPT_S * 1000 * slack if victim == "record" else 0
+        # On average: a few kills have none.
+        most = times * UNKEPT_S * 1000 * (slack if times < 10 else 1) if victim == "record" else 0
         check(0 <= missing <= most, missing, "of", topic, "were taken and are not there:", counts, summary["links"])
         unkept = max(unkept, missing)
     told = f"{times} kills, back within {slowest * 1000:.0f} ms, {lost} samples lost, {lost} counted, exit {code}"
     if victim == "record":
-        told += f"; of a stream at most {unkept / times:.0f} samples a kill were taken and not kept; "
+        told += f"; of a stream {unkept / times:.0f} samples a kill were taken and not kept; "
         told += repaired(program, folder, counts)
     return told
 

@@ -60,7 +60,7 @@ STAGES = """- {{name: in_{cell}, cell: {cell}, ingest: {{file: {{path: {recordin
 - {{name: twin_{cell}, input: in_{cell}, twin: {{model: {data}/demo.twin.yaml}}}}
 - {{name: detect_{cell}, input: twin_{cell}, detect: {{twin_regression: {{}}, threshold: {{score: {threshold}}}}}}}
 - {{name: tell_{cell}, process: {process}, inputs: [in_{cell}, twin_{cell}, detect_{cell}],
-   publish: {{zenoh: {{connect: ["{router}"], json: false}}}}}}
+   publish: {{stop_after_s: 5, zenoh: {{connect: ["{router}"], json: false}}}}}}
 """
 # What a cell may be that nobody harmed.
 ALIVE = ("running", "contact", "not_ready", "ended")
@@ -314,7 +314,10 @@ class Bystanders:
     def follow(self):
         while not self.over.is_set():
             wall = self.plant.wall()
-            self.wrong += [(cell, wall[cell]["state"]) for cell in self.cells if wall[cell]["state"] not in ALIVE]
+            at = f"{time.monotonic() - self.since:.0f} s"
+            for view in (wall[cell] for cell in self.cells):
+                if view["state"] not in ALIVE:
+                    self.wrong.append((at, view["cell"], view["state"], view.get("why"), view["status_age_ms"]))
             self.oldest_ms = max(self.oldest_ms, *(wall[cell]["sample_age_ms"] or 0 for cell in self.cells))
             self.load.append(os.getloadavg()[0])
             self.over.wait(1.0)
@@ -389,7 +392,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("program", type=Path)
     parser.add_argument("--cells", type=int, default=100)
-    parser.add_argument("--rate-hz", type=int, default=1000)
+    parser.add_argument("--rate-hz", type=int, default=1000, help="25 or more: below that, touches are not felt")
     parser.add_argument("--seconds", type=int, default=600)
     parser.add_argument("--processes", choices=["cell", "one"], default="cell")
     parser.add_argument("--pictures", type=Path)
