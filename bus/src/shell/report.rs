@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
 use crate::link::{Position, ReceiverCounts, SenderCounts};
-use crate::shell::tree::Pulse;
+use crate::shell::pulse::Pulse;
 use crate::stage::StageError;
 use crate::trouble::Trouble;
 

@@ -18,7 +18,7 @@ use crate::sample::{Health, Sample};
 use crate::stage::{Source, StageError};
 
 pub use node::{Branch, Outlet, branch};
-pub use turn::{Pulse, Turn};
+pub use turn::Turn;
 
 use node::walk;
 use root::{Linked, Root, SourceRoot};

@@ -8,6 +8,7 @@
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use zenoh::bytes::Encoding;
 use zenoh::liveliness::LivelinessToken;
@@ -17,7 +18,6 @@ use zenoh::query::{Query, Queryable};
 use zenoh::{Session, Wait as _};
 
 use crate::error::PublishError;
-use crate::fleet::now_ns;
 use crate::message::{ClockMessage, RecordMessage, StatusMessage};
 
 /// Records that are kept for who missed them. Resolution: hours of contacts, and an answer below 100 kB.
@@ -126,6 +126,14 @@ impl Presence {
         }
         self.records.put(text).wait().map_err(PublishError::zenoh)
     }
+}
+
+/// By the clock of this computer \[ns since the epoch\].
+pub fn now_ns() -> i64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.map_or(0, |since| {
+        i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
+    })
 }
 
 /// What the clock says now.

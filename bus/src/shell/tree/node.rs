@@ -2,11 +2,12 @@
 
 use std::time::{Duration, Instant};
 
-use super::{Post, Pulse, Turn};
+use super::{Post, Turn};
 use crate::link::{LinkError, Sender, SenderCounts};
 use crate::sample::{Header, Health, Sample};
 use crate::shell::Ledger;
 use crate::shell::health::HealthSender;
+use crate::shell::pulse::Pulse;
 use crate::shell::report::{InputReport, Report};
 use crate::stage::{Emit, Stage, StageError};
 

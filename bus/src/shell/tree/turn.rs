@@ -2,10 +2,9 @@
 
 use std::cell::RefCell;
 use std::rc::Rc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::link::LinkError;
+use crate::shell::pulse::Pulse;
 use crate::stage::StageError;
 
 /// Shared by the stages of one tree, which run in one thread.
@@ -19,49 +18,10 @@ struct State {
     failure: RefCell<Option<(usize, StageError)>>,
 }
 
-/// Whose turn it is, as other threads see it. Clones are one.
-#[derive(Debug, Clone, Default)]
-pub struct Pulse(Arc<Beat>);
-
-#[derive(Debug, Default)]
-struct Beat {
-    names: Mutex<Vec<String>>,
-    at: AtomicUsize,
-    waits: AtomicBool,
-}
-
-impl Pulse {
-    /// The stage that runs.
-    pub(in crate::shell) fn whose(&self) -> String {
-        self.name(self.0.at.load(Ordering::Relaxed))
-    }
-
-    /// Whether it waits for a link, which has a patience of its own.
-    pub(in crate::shell) fn waits(&self) -> bool {
-        self.0.waits.load(Ordering::Relaxed)
-    }
-
-    /// Hands something to a link.
-    pub(super) fn waiting<R>(&self, send: impl FnOnce() -> R) -> R {
-        self.0.waits.store(true, Ordering::Relaxed);
-        let sent = send();
-        self.0.waits.store(false, Ordering::Relaxed);
-        sent
-    }
-
-    fn name(&self, place: usize) -> String {
-        // A list that is only added to is whole at any time.
-        let names = self.0.names.lock().unwrap_or_else(PoisonError::into_inner);
-        names.get(place).cloned().unwrap_or_default()
-    }
-}
-
 impl Turn {
     /// A number for the stage of that name.
     pub(super) fn place(&self, name: &str) -> usize {
-        let mut names = (self.0.pulse.0.names.lock()).unwrap_or_else(PoisonError::into_inner);
-        names.push(name.to_owned());
-        names.len() - 1
+        self.0.pulse.place(name)
     }
 
     /// The same for other threads.
@@ -75,12 +35,7 @@ impl Turn {
         place: usize,
         work: impl FnOnce() -> Result<(), StageError>,
     ) -> Result<(), LinkError> {
-        // One thread writes, so that this needs no exchange.
-        let at = &self.0.pulse.0.at;
-        let before = at.load(Ordering::Relaxed);
-        at.store(place, Ordering::Relaxed);
-        let result = work();
-        at.store(before, Ordering::Relaxed);
+        let result = self.0.pulse.turn_of(place, work);
         result.map_err(|error| {
             // Those before it pass on that it failed; what it said itself stays.
             let mut failure = self.0.failure.borrow_mut();
