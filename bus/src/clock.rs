@@ -47,7 +47,7 @@ impl RoundTrip {
             return None;
         }
         Some(Offset {
-            ahead_ns: i64::try_from(((t2 - t1) + (t3 - t4)) / 2).ok()?,
+            ahead_ns: i64::try_from(i128::midpoint(t2 - t1, t3 - t4)).ok()?,
             uncertainty_ns: i64::try_from((way + 1) / 2).ok()?,
         })
     }
