@@ -137,7 +137,7 @@ mod tests {
                 let offset = trip(ahead, there, 7 * MS, back).offset().unwrap();
                 let error = offset.ahead_ns.abs_diff(ahead);
                 assert!(error <= offset.uncertainty_ns.unsigned_abs(), "{offset:?}");
-                assert_eq!(offset.uncertainty_ns, (there + back) / 2);
+                assert_eq!(offset.uncertainty_ns, i64::midpoint(there, back));
             }
         }
     }
