@@ -47,7 +47,7 @@ impl RoundTrip {
             return None;
         }
         Some(Offset {
-            ahead_ns: i64::try_from(((t2 - t1) + (t3 - t4)) / 2).ok()?,
+            ahead_ns: i64::try_from(i128::midpoint(t2 - t1, t3 - t4)).ok()?,
             uncertainty_ns: i64::try_from((way + 1) / 2).ok()?,
         })
     }
@@ -137,7 +137,7 @@ mod tests {
                 let offset = trip(ahead, there, 7 * MS, back).offset().unwrap();
                 let error = offset.ahead_ns.abs_diff(ahead);
                 assert!(error <= offset.uncertainty_ns.unsigned_abs(), "{offset:?}");
-                assert_eq!(offset.uncertainty_ns, (there + back) / 2);
+                assert_eq!(offset.uncertainty_ns, i64::midpoint(there, back));
             }
         }
     }
