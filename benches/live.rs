@@ -289,6 +289,7 @@ fn bare_chain(hops: usize, seconds: u32) -> Vec<u64> {
     for mut process in processes {
         process.wait().expect("a process that ends");
     }
+    drop(end);
     domain.remove().expect("an empty folder");
     latencies_ns
 }
