@@ -38,11 +38,6 @@ fn router() -> (ZenohRouter, String) {
 
 /// A cell that plays the bundled recording at half its speed and meets the others at `router`.
 fn cell(folder: &Path, name: &str, router: &str) -> Live {
-    cell_as(tauscope(), folder, name, router)
-}
-
-/// The same, of a program with an environment of its own.
-fn cell_as(command: Command, folder: &Path, name: &str, router: &str) -> Live {
     let data = bundled();
     let data = data.display();
     let folder = folder.join(name);
@@ -60,7 +55,7 @@ fn cell_as(command: Command, folder: &Path, name: &str, router: &str) -> Live {
              zenoh: {{connect: [{router}], json: false}}}}}}\n"
         ),
     );
-    Live::start_as(command, &folder, &[])
+    Live::start(&folder, &[])
 }
 
 /// A fleet host with a page; it is ended whatever happens.
@@ -79,7 +74,11 @@ impl Drop for Fleet {
 
 impl Fleet {
     fn start(folder: &Path, router: &str, users: &Path) -> Self {
-        let mut command = tauscope();
+        Self::start_as(tauscope(), folder, router, users)
+    }
+
+    /// The same, of a program with an environment of its own.
+    fn start_as(mut command: Command, folder: &Path, router: &str, users: &Path) -> Self {
         command
             .current_dir(folder)
             .args(["fleet", "--serve", "127.0.0.1:0", "--expect", "paint"])
@@ -264,18 +263,21 @@ fn the_clock_of_a_cell_is_measured_and_told_of_where_it_is_off() {
     let (_router, endpoint) = router();
     let users = folder.join("users");
     write(&users, "");
+    let _cell = cell(folder, "press", &endpoint);
+    let measured = |fleet: &Fleet, ahead_ms: f64| {
+        fleet.wait("press", "measured", |cell| {
+            cell["clock_ahead_ms"].is_number()
+        });
+        let cell = fleet.cell("press");
+        let error_ms = cell["clock_ahead_ms"].as_f64().unwrap() - ahead_ms;
+        let most_ms = cell["clock_uncertainty_ms"].as_f64().unwrap();
+        assert!(error_ms.abs() <= most_ms, "{cell:#}");
+        cell["clock_is_off"].clone()
+    };
+    // It is this computer's clock.
     let fleet = Fleet::start(folder, &endpoint, &users);
-    let _here = cell(folder, "here", &endpoint);
-    let is_measured = |cell: &Value| cell["clock_ahead_ms"].is_number();
-    fleet.wait("here", "measured", is_measured);
-    // It is this computer's clock: the truth is 0.
-    let here = fleet.cell("here");
-    let ahead_ms = here["clock_ahead_ms"].as_f64().unwrap();
-    assert!(
-        ahead_ms.abs() <= here["clock_uncertainty_ms"].as_f64().unwrap(),
-        "{here:#}"
-    );
-    assert_eq!(here["clock_is_off"], false);
+    assert_eq!(measured(&fleet, 0.0), false);
+    drop(fleet);
 
     let Some(library) = shifts else {
         return common::skipped(test, "a clock is shifted by libfaketime, which is absent");
@@ -285,19 +287,13 @@ fn the_clock_of_a_cell_is_measured_and_told_of_where_it_is_off() {
         .env("LD_PRELOAD", library)
         .env("FAKETIME", "-340")
         .env("DONT_FAKE_MONOTONIC", "1");
-    let _past = cell_as(command, folder, "past", &endpoint);
-    fleet.wait("past", "measured", is_measured);
-    fleet.wait("past", "off", |cell| cell["clock_is_off"] == true);
-    let past = fleet.cell("past");
-    let ahead_ms = past["clock_ahead_ms"].as_f64().unwrap();
-    let most_ms = past["clock_uncertainty_ms"].as_f64().unwrap();
-    assert!((ahead_ms + 340_000.0).abs() <= most_ms, "{past:#}");
-    assert!(fleet.get("/").contains("340 s behind"), "{past:#}");
-    assert!(
-        fleet
-            .get("/metrics")
-            .contains("clock_ahead_seconds{cell=\"past\"} -3")
-    );
+    let fleet = Fleet::start_as(command, folder, &endpoint, &users);
+    assert_eq!(measured(&fleet, 340_000.0), true);
+    let page = fleet.get("/");
+    assert!(page.contains("340 s ahead"), "{page}");
+    let metrics = fleet.get("/metrics");
+    let metric = "clock_ahead_seconds{cell=\"press\"} 3";
+    assert!(metrics.contains(metric), "{metrics}");
 }
 
 /// Acknowledges at the press; forms that are not the user's own are refused.

@@ -250,7 +250,16 @@ mod tests {
         // What a stranger calls itself must not break a line.
         status.robot = "arm\"\\ {x}".to_owned();
         let status = Box::new(status);
+        let clock = Event::Clock {
+            cell: cell.clone(),
+            instance: "x".to_owned(),
+            offset: tauscope_bus::clock::Offset {
+                ahead_ns: -340_000_000,
+                uncertainty_ns: 2_000_000,
+            },
+        };
         wall.take(Event::Status { cell, status }, now);
+        wall.take(clock, now);
         wall.take(Event::Refused("too long"), now);
         text(&wall.snapshot()).unwrap()
     }
@@ -265,6 +274,8 @@ mod tests {
             "tauscope_fleet_lost_samples{cell=\"a\",stage=\"twin\"} 0",
             "tauscope_fleet_residual_rms{cell=\"a\",joint=\"joint2\",unit=\"Nm\"} 1.5",
             "tauscope_fleet_refused_messages{reason=\"too long\"} 1",
+            "tauscope_fleet_clock_ahead_seconds{cell=\"a\"} -0.34",
+            "tauscope_fleet_clock_uncertainty_seconds{cell=\"a\"} 0.002",
             "tauscope_fleet_sessions 1",
         ] {
             assert!(text.lines().any(|shown| shown == line), "{line} in\n{text}");

@@ -166,7 +166,7 @@ impl Fleet {
         let (contacts_today, contacts_since_ns) = self.report.today();
         self.status = StatusMessage {
             sent_ns: now_ns(),
-            ended: ended && parent_id() == self.supervisor,
+            ended: ended && parent_id() == self.supervisor && !is_exiting(self.supervisor),
             alarm: alarm.clone(),
             last_sample_ns: self.newest.map(|(stamp_ns, _)| stamp_ns),
             last_sample_age_ms: age.map(|age| u64::try_from(age.as_millis()).unwrap_or(u64::MAX)),
@@ -183,8 +183,46 @@ impl Fleet {
     }
 }
 
+/// Whether a process of this host is ending or has ended: it closes its pipes, by which its children learn of it, before
+/// they get another parent. False where the system does not tell.
+fn is_exiting(process: u32) -> bool {
+    // Field 9 of the line are the kernel's flags (proc(5)), of which PF_EXITING is this one (linux/sched.h).
+    const PF_EXITING: u64 = 0x4;
+    let line = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+    // The name before may have spaces and brackets in it.
+    let behind = line.rsplit(')').next().unwrap_or_default();
+    let flags = behind.split_whitespace().nth(6);
+    flags.is_some_and(|flags| {
+        flags
+            .parse::<u64>()
+            .is_ok_and(|flags| flags & PF_EXITING != 0)
+    })
+}
+
 /// The computer's name; empty where the system does not tell it.
 fn host() -> String {
     let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
     name.trim().to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_process_that_was_killed_is_seen_to_end_before_anybody_has_waited_for_it() {
+        assert!(!is_exiting(std::process::id()));
+        let mut child = std::process::Command::new("sleep")
+            .arg("60")
+            .spawn()
+            .unwrap();
+        assert!(!is_exiting(child.id()));
+        child.kill().unwrap();
+        let begin = Instant::now();
+        while !is_exiting(child.id()) {
+            assert!(begin.elapsed() < Duration::from_mins(1));
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        child.wait().unwrap();
+    }
 }
