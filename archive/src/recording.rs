@@ -11,13 +11,15 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
+use crate::chunks::Order;
 use crate::csv_file::CsvTable;
 use crate::cursor::Cursor;
 use crate::damage::Damage;
 use crate::error::ArchiveError;
-use crate::mcap_file::{Layout, McapCursor, Order};
+use crate::mcap_file::{Layout, mcap_cursor};
 use crate::mcap_write::PROVENANCE;
 use crate::ros;
+use crate::ros1_bag::{Ros1Bag, ros1_cursor};
 use crate::sqlite_file::SqliteFile;
 use crate::topic::{Topic, Topics};
 
@@ -35,6 +37,8 @@ pub enum RecordingKind {
     Sqlite,
     /// The folder of a rosbag2 bag.
     Rosbag2,
+    /// A bag of ROS 1.
+    Ros1Bag,
     /// A table of numbers.
     Csv,
 }
@@ -45,6 +49,7 @@ impl std::fmt::Display for RecordingKind {
             Self::Mcap => "MCAP file",
             Self::Sqlite => "SQLite file of rosbag2",
             Self::Rosbag2 => "rosbag2 bag",
+            Self::Ros1Bag => "bag of ROS 1",
             Self::Csv => "CSV table",
         })
     }
@@ -68,6 +73,11 @@ enum Store {
         file: Box<SqliteFile>,
         /// The place in the list of topics of each topic's number in the database.
         numbers: BTreeMap<i64, usize>,
+    },
+    Ros1 {
+        bag: Arc<Ros1Bag>,
+        /// The place in the list of topics of each connection's topic.
+        topics: BTreeMap<u32, usize>,
     },
     Several(Arc<Vec<Part>>),
     Csv(Box<CsvTable>),
@@ -222,12 +232,16 @@ impl Recording {
                     let topic = self.topics.of_channel(channel)?;
                     wanted[topic].then_some(topic)
                 };
-                let cursor = McapCursor::new(Arc::clone(layout), Order::LogTime, topic)?;
+                let cursor = mcap_cursor(Arc::clone(layout), Order::LogTime, topic)?;
                 Ok(Box::new(cursor))
             }
             Store::Sqlite { file, numbers } => {
                 let topic = |id| numbers.get(&id).copied().filter(|&topic| wanted[topic]);
                 Ok(Box::new(file.cursor(topic)?))
+            }
+            Store::Ros1 { bag, topics } => {
+                let topic = |number| topics.get(&number).copied().filter(|&topic| wanted[topic]);
+                Ok(Box::new(ros1_cursor(Arc::clone(bag), topic)?))
             }
             Store::Several(parts) => Ok(Box::new(SeveralCursor::new(Arc::clone(parts), wanted))),
             Store::Csv(table) => Ok(Box::new(table.cursor()?)),

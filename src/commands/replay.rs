@@ -26,7 +26,7 @@ use crate::progress::Progress;
 /// every time. The recordings take the place of the pipeline's own source.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// MCAP files, rosbag2 folders, `.db3` bags, or tables (`.csv`, if the pipeline's source is one).
+    /// MCAP files, rosbag2 folders, `.db3` bags, ROS 1 bags, or tables (`.csv`, if the pipeline's source is one).
     #[arg(required = true)]
     recordings: Vec<PathBuf>,
     /// The pipeline file.
