@@ -72,7 +72,8 @@ completion() { # SHELL FILE
 completion bash share/bash-completion/completions/tauscope
 completion zsh share/zsh/vendor-completions/_tauscope
 completion fish share/fish/vendor_completions.d/tauscope.fish
-install -Dm644 -t "$root/lib/systemd/system" deploy/systemd/tauscope@.service
+install -Dm644 -t "$root/lib/systemd/system" deploy/systemd/tauscope@.service \
+    deploy/systemd/tauscope-physics@.service deploy/systemd/tauscope-physics@.timer
 install -Dm644 deploy/systemd/sysusers.conf "$root/lib/sysusers.d/tauscope.conf"
 install -Dm644 -t "$root/share/doc/tauscope" README.md CHANGELOG.md LICENSE-APACHE LICENSE-MIT docs/*.md docs/*.png docs/*.svg
 install -Dm644 -t "$root/share/doc/tauscope/examples" pipeline.yaml tests/data/demo_arm.urdf tests/data/demo.mcap \

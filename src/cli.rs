@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    calibrate, check, completions, doctor, evaluate, explain, fleet, info, init, man, repair,
-    replay, run, schema, send, simulate, stage,
+    calibrate, check, cluster, completions, diff, doctor, evaluate, explain, fleet, info, init,
+    man, manifest, physics, query, repair, replay, run, schema, send, simulate, stage, weeks,
 };
 
 /// A robot's measured effort beside its digital twin's: stream, detect, record.
@@ -26,11 +26,17 @@ pub enum Command {
     Check(check::Args),
     Schema(schema::Args),
     Replay(replay::Args),
+    Manifest(manifest::Args),
+    Diff(diff::Args),
+    Query(query::Args),
+    Cluster(cluster::Args),
     Calibrate(calibrate::Args),
     Explain(explain::Args),
     Evaluate(evaluate::Args),
     Send(send::Args),
     Fleet(fleet::Args),
+    Physics(physics::Args),
+    Weeks(weeks::Args),
     Simulate(simulate::Args),
     Init(init::Args),
     Info(info::Args),

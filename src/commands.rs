@@ -2,7 +2,9 @@
 
 pub mod calibrate;
 pub mod check;
+pub mod cluster;
 pub mod completions;
+pub mod diff;
 pub mod doctor;
 pub mod evaluate;
 pub mod explain;
@@ -10,6 +12,9 @@ pub mod fleet;
 pub mod info;
 pub mod init;
 pub mod man;
+pub mod manifest;
+pub mod physics;
+pub mod query;
 pub mod repair;
 pub mod replay;
 pub mod run;
@@ -17,6 +22,7 @@ pub mod schema;
 pub mod send;
 pub mod simulate;
 pub mod stage;
+pub mod weeks;
 
 use std::path::{Path, PathBuf};
 

@@ -13,7 +13,9 @@ mod explain;
 mod init;
 mod interrupt;
 mod output;
+mod physics;
 mod plan;
+mod program_beside;
 mod progress;
 mod supervisor;
 mod terminal;
@@ -96,7 +98,11 @@ pub fn answer(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> Answe
             (exit::code(outcome, &mut output), errors)
         }
         Err(error) => {
-            output.say(&error.to_string());
+            if error.use_stderr() {
+                output.say(&error.to_string());
+            } else if let Output::Memory(stdout, _) = &mut output {
+                stdout.push_str(&error.to_string());
+            }
             (
                 u8::try_from(error.exit_code()).unwrap_or(u8::MAX),
                 no_errors,
@@ -136,11 +142,17 @@ fn outcome(command: &Command, out: &mut Output) -> Result<exit::Exit, exit::Fail
         Command::Check(args) => commands::check::run(args, out),
         Command::Schema(args) => commands::schema::run(args, out),
         Command::Replay(args) => commands::replay::run(args, out),
+        Command::Diff(args) => commands::diff::run(args, out),
+        Command::Query(args) => commands::query::run(args, out),
+        Command::Cluster(args) => commands::cluster::run(args, out),
+        Command::Manifest(args) => commands::manifest::run(args, out),
         Command::Calibrate(args) => commands::calibrate::run(args, out),
         Command::Explain(args) => commands::explain::run(args, out),
         Command::Evaluate(args) => commands::evaluate::run(args, out),
         Command::Send(args) => commands::send::run(args, out),
         Command::Fleet(args) => commands::fleet::run(args, out),
+        Command::Physics(args) => commands::physics::run(args, out),
+        Command::Weeks(args) => commands::weeks::run(args, out),
         Command::Simulate(args) => commands::simulate::run(args, out),
         Command::Init(args) => commands::init::run(args, out),
         Command::Info(args) => commands::info::run(args, out),

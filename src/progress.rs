@@ -13,8 +13,15 @@ const STEPS: f64 = 10_000.0;
 #[derive(Debug)]
 pub struct Progress {
     bar: ProgressBar,
-    /// By recording, from 0 to 1.
-    done: Mutex<Vec<f64>>,
+    done: Mutex<Parts>,
+}
+
+/// How far each recording is.
+#[derive(Debug)]
+struct Parts {
+    /// From 0 to 1.
+    fractions: Vec<f64>,
+    sum: f64,
 }
 
 /// Standard error, where it can redraw.
@@ -34,7 +41,10 @@ impl Progress {
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         Self {
             bar,
-            done: Mutex::new(vec![0.0; count]),
+            done: Mutex::new(Parts {
+                fractions: vec![0.0; count],
+                sum: 0.0,
+            }),
         }
     }
 
@@ -54,7 +64,7 @@ impl Progress {
         const CREEP: f64 = 0.02;
         let shown = {
             let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
-            let Some(shown) = done.first_mut() else {
+            let Some(shown) = done.fractions.first_mut() else {
                 return;
             };
             *shown = fraction.max(*shown + CREEP * (1.0 - *shown)).min(1.0);
@@ -69,11 +79,12 @@ impl Progress {
     /// Recording `index` has come to `fraction`.
     pub fn set(&self, index: usize, fraction: f64) {
         let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
-        let Some(own) = done.get_mut(index) else {
+        let Some(own) = done.fractions.get_mut(index) else {
             return;
         };
-        *own = fraction;
-        let mean = done.iter().sum::<f64>() / done.len() as f64;
+        let more = fraction - std::mem::replace(own, fraction);
+        done.sum += more;
+        let mean = done.sum / done.fractions.len() as f64;
         interrupt::far(mean);
         self.bar.set_position((mean * STEPS) as u64);
     }

@@ -11,6 +11,8 @@
 
 mod crew;
 mod flow;
+mod ledger;
+mod liveness;
 mod lives;
 mod local;
 mod patience;
@@ -18,6 +20,7 @@ mod process;
 mod restart;
 mod router;
 mod seats;
+mod service;
 mod silence;
 mod summary;
 mod tally;
@@ -38,6 +41,7 @@ use local::{Local, Reported};
 use process::Event;
 use router::Router;
 pub use seats::Instructions;
+use service::Service;
 pub use summary::{Ended, Summary};
 use tauscope_pipeline::pipeline::{Pipeline, Role};
 pub use view::Verbosity;
@@ -124,6 +128,7 @@ async fn supervise(
         stopping: false,
         ended: Ended::Completed,
         view: View::new(care.verbosity, now.into_std()),
+        service: Service::new(),
         care,
         began: now,
         told_unready: false,
@@ -145,6 +150,7 @@ struct Supervisor<'a> {
     /// Why it ends.
     ended: Ended,
     view: View,
+    service: Service,
     care: Care,
     began: Instant,
     /// It was told which stages do not begin.
@@ -246,6 +252,7 @@ impl Supervisor<'_> {
     /// Ends the stages that listen to nobody here; the others follow as their inputs end.
     fn stop(&mut self) {
         self.stopping = true;
+        service::ends();
         for stage in &mut self.stages {
             stage.no_restart();
         }

@@ -270,6 +270,33 @@ error: the stages run in a circle: record -> record
 }
 
 #[test]
+fn what_is_no_endpoint_is_refused_wherever_it_stands() {
+    let text = errors(
+        "version: 1
+cells: {demo: {robot: arm.urdf}}
+hosts: {here: {listen: garbage}, there: {connect: [\"udp/10.0.0.1:7447\"]}}
+stages:
+- {name: a, host: here, ingest: {zenoh: {connect: [tcp/here]}, commands: {connect: [nonsense]}}}
+- {name: b, host: here, input: a, twin: {}}
+- {name: c, host: there, input: b, detect: {naive_difference: {}, threshold: {score: 1}}}
+- {name: d, host: here, inputs: [a, c], publish: {zenoh: {listen: [tcp/x:99999]}}}
+",
+    );
+    for part in [
+        "`garbage` is no endpoint: it has the form `tcp/HOST:PORT`",
+        "`udp/10.0.0.1:7447`: there is no transport `udp`, only tcp and tls",
+        "`tcp/here` names no host and port",
+        "`nonsense` is no endpoint",
+        "`tcp/x:99999` names no host and port",
+        "--> pipeline.yaml:3:",
+        "--> pipeline.yaml:5:",
+        "--> pipeline.yaml:8:",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+}
+
+#[test]
 fn a_cycle_is_named() {
     let text = errors(&stages(
         "- {name: a, input: c, outside: {command: [cat], output: detection}}

@@ -20,7 +20,7 @@ fn a_taken_port_and_a_peer_that_is_away_are_errors_with_a_remedy() {
         "version: 1
 cells: {{demo: {{robot: {robot}}}}}
 stages:
-- {{name: ingest, ingest: {{zenoh: {{connect: [\"tls/{away_at}#root_ca_certificate=ca.pem\"]}}}}}}
+- {{name: ingest, ingest: {{zenoh: {{connect: [\"tls/{away_at}#root_ca_certificate_file=ca.pem\"]}}}}}}
 - {{name: twin, input: ingest, twin: {{}}}}
 - {{name: detect, input: twin, detect: {{naive_difference: {{}}, threshold: {{score: 9}}}}}}
 - {{name: record, inputs: [ingest, detect], record: {{mcap: out/a.mcap, min_free_mb: 1}}}}

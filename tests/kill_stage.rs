@@ -50,8 +50,9 @@ fn kill_and_watch(victim: &str) {
     ));
     let again = live.wait_for_stage(victim);
     let took = at.elapsed();
+    // On a quiet machine within a second, which `tests/faults/faults.py` holds; here others run beside it.
     assert!(
-        took < Duration::from_secs(1),
+        took < Duration::from_secs(10),
         "{victim} was back after {took:?}"
     );
     assert!(is_alive(again), "{victim}");
@@ -73,20 +74,35 @@ fn kill_and_watch(victim: &str) {
         );
         assert_eq!(stage(&summary, name)["failed"], false, "{name}: {summary}");
     }
-    // A source goes on where it was, so nothing need be lost; every other stage misses what was on
-    // its way to it, and that is said.
+    // A stage misses what was on its way to it; with a source dies what was on its way from it. That is said.
     let dropped = stage(&summary, victim)["dropped"].as_u64().unwrap();
-    if victim == "ingest" {
-        assert_eq!((code, dropped), (0, 0), "{summary}");
-    } else {
-        assert_eq!(code, 3, "{victim}: {summary}");
-        assert!(dropped > 0, "{victim}: {summary}");
-    }
+    assert!(victim == "ingest" || dropped > 0, "{victim}: {summary}");
+    let lost = books_balance(&summary);
+    assert_eq!(code, if lost > 0 { 3 } else { 0 }, "{victim}: {summary}");
+    // A source goes on where it was: nothing twice.
+    let whole = stage(&summary, "ingest")["emitted"].as_u64().unwrap();
+    assert!((3_000..=3_001).contains(&whole), "{victim}: {summary}");
     let out = folder.path().join("out.mcap");
     assert!(
         out.exists() && !part.exists(),
         "{victim}: the archive is not whole"
     );
+}
+
+/// On every link all that was emitted was received or dropped; how much was dropped in all.
+fn books_balance(summary: &serde_json::Value) -> u64 {
+    let mut lost = 0;
+    for link in summary["links"].as_array().unwrap() {
+        let count = |key: &str| link[key].as_u64().unwrap();
+        assert_eq!(
+            count("emitted"),
+            count("received") + count("dropped"),
+            "{link}"
+        );
+        assert_eq!(count("surplus"), 0, "{link}");
+        lost += count("dropped");
+    }
+    lost
 }
 
 #[test]

@@ -120,14 +120,20 @@ fn a_killed_process_comes_back_with_all_its_stages() {
     let again = live.wait_for_stage("ingest");
     assert!(again != ids[0] && is_alive(again) && is_alive(recorder));
     let (code, summary) = live.end();
-    assert_eq!(code, 0, "{summary}");
+    // What was on its way out of the process died with it, and that is said.
+    let count = |link: &serde_json::Value, key: &str| link[key].as_u64().unwrap();
+    let mut lost = 0;
+    for link in summary["links"].as_array().unwrap() {
+        let got = count(link, "received") + count(link, "dropped");
+        assert_eq!(count(link, "emitted"), got, "{summary}");
+        lost += count(link, "dropped");
+    }
+    assert_eq!(code, if lost > 0 { 3 } else { 0 }, "{summary}");
+    assert_eq!(stage(&summary, "ingest")["emitted"], 3001, "{summary}");
     for name in ["ingest", "twin", "one", "two"] {
         assert_eq!(stage(&summary, name)["restarts"], 1, "{name}: {summary}");
     }
     assert_eq!(stage(&summary, "record")["restarts"], 0, "{summary}");
-    for link in links(&summary, "in_process") {
-        assert_eq!(link["received"], link["emitted"], "{summary}");
-    }
 }
 
 /// Two cells in one process, one of which cannot write what it learns.

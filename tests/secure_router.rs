@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 mod common;
+#[path = "common/live.rs"]
+mod live;
 #[path = "common/robot.rs"]
 mod robot;
 
@@ -26,6 +28,19 @@ fn router(folder: &Path, test: &str) -> Option<(Session, String)> {
     secure(folder);
     let mut config = zenoh::Config::from_file(folder.join("router.json5")).unwrap();
     let endpoint = robot::endpoint().replace("tcp/", "tls/");
+    // The file names them as they are beside it; this test runs elsewhere.
+    for key in [
+        "root_ca_certificate",
+        "listen_private_key",
+        "listen_certificate",
+    ] {
+        let key = format!("transport/link/tls/{key}");
+        let name = config.get_json(&key).unwrap();
+        let path = folder.join(name.trim_matches('"'));
+        config
+            .insert_json5(&key, &serde_json::json!(path).to_string())
+            .unwrap();
+    }
     let listen = format!("[\"{endpoint}\"]");
     config.insert_json5("listen/endpoints", &listen).unwrap();
     Some((zenoh::open(config).wait().unwrap(), endpoint))
@@ -39,6 +54,18 @@ fn secure(folder: &Path) {
         .output()
         .unwrap();
     assert!(made.status.success(), "{made:?}");
+}
+
+/// The endpoint as the file of a pipeline has it, with the certificate `name` of that folder.
+fn with_certificate(endpoint: &str, folder: &Path, name: &str) -> String {
+    let file = |name: String| folder.join(name).display().to_string();
+    format!(
+        "{endpoint}#root_ca_certificate_file={};enable_mtls=true;connect_certificate_file={};\
+         connect_private_key_file={}",
+        file("ca.pem".to_owned()),
+        file(format!("{name}.pem")),
+        file(format!("{name}.key"))
+    )
 }
 
 /// A client that trusts the authority of `authority` and shows the certificate `name` of `own`, if any.
@@ -167,4 +194,113 @@ fn who_has_no_certificate_of_the_plant_does_not_get_in() {
     let plain = endpoint.replace("tls/", "tcp/");
     assert!(client(&plain, folder, None).is_err(), "no TLS at all");
     assert!(client(&endpoint, folder, Some((folder, "press-1"))).is_ok());
+}
+
+/// A cell that publishes at that endpoint; what it says of it.
+fn said_of(endpoint: &str, folder: &Path) -> String {
+    let data = common::bundled();
+    let data = data.display();
+    let text = format!(
+        "version: 1
+cells: {{demo: {{robot: {data}/demo_arm.urdf}}}}
+stages:
+- {{name: ingest, ingest: {{file: {{path: {data}/demo.mcap}}, rate: 0.5}}}}
+- {{name: twin, input: ingest, twin: {{model: {data}/demo.twin.yaml}}}}
+- {{name: detect, input: twin, detect: {{twin_regression: {{}}}}}}
+- {{name: publish, inputs: [ingest, twin, detect], publish: {{zenoh: {{connect: [\"{endpoint}\"]}}}}}}
+"
+    );
+    common::write(&folder.join("pipeline.yaml"), &text);
+    live::Live::start(folder, &[]).wait_for_part("no session with ")
+}
+
+#[test]
+fn a_session_that_cannot_open_is_told_with_its_reason() {
+    let test = "a_session_that_cannot_open_is_told_with_its_reason";
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let nobody = robot::endpoint();
+    let said = said_of(&nobody, folder);
+    assert!(said.contains("nobody answers there"), "{said}");
+    let Some((_router, endpoint)) = router(folder, test) else {
+        return;
+    };
+    let elsewhere = folder.join("elsewhere");
+    secure(&elsewhere);
+    let file = |folder: &Path, name: &str| folder.join(name).display().to_string();
+    let refused = format!(
+        "{endpoint}#root_ca_certificate_file={};enable_mtls=true;connect_certificate_file={};\
+         connect_private_key_file={}",
+        file(folder, "ca.pem"),
+        file(&elsewhere, "press-1.pem"),
+        file(&elsewhere, "press-1.key")
+    );
+    let said = said_of(&refused, folder);
+    assert!(said.contains("lets no session open"), "{said}");
+}
+
+/// A cell on two hosts that meet at that router; the second one shows the certificate `desk`.
+fn two_hosts(endpoint: &str, folder: &Path, desk: &str) -> (live::Live, live::Live) {
+    let data = common::bundled();
+    let data = data.display();
+    let robot = with_certificate(endpoint, folder, "press-1");
+    let desk = with_certificate(endpoint, folder, desk);
+    let text = format!(
+        "version: 1
+cells: {{press-1: {{robot: {data}/demo_arm.urdf}}}}
+hosts: {{robot: {{connect: \"{robot}\"}}, desk: {{connect: \"{desk}\"}}}}
+stages:
+- {{name: ingest, host: robot, ingest: {{file: {{path: {data}/demo.mcap}}, rate: 4}}}}
+- {{name: twin, host: robot, input: ingest, twin: {{}}}}
+- {{name: detect, host: desk, input: twin, detect: {{naive_difference: {{}}, threshold: {{score: 1000}}}}}}
+- {{name: record, host: desk, inputs: [ingest, twin, detect], record: {{mcap: out.mcap}}}}
+"
+    );
+    common::write(&folder.join("pipeline.yaml"), &text);
+    let robot = live::Live::start(folder, &["--host", "robot"]);
+    (robot, live::Live::start(folder, &["--host", "desk"]))
+}
+
+#[test]
+fn two_hosts_of_a_cell_share_its_streams_through_the_router() {
+    let test = "two_hosts_of_a_cell_share_its_streams_through_the_router";
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let Some((_router, endpoint)) = router(folder, test) else {
+        return;
+    };
+    let (robot, desk) = two_hosts(&endpoint, folder, "press-1");
+    let (code, there) = robot.end();
+    assert_eq!(code, 0, "{there}");
+    let (code, here) = desk.end();
+    assert_eq!(code, 0, "{here}");
+    let sent = live::stage(&there, "ingest")["emitted"].as_u64().unwrap();
+    assert!(sent > 1000, "{there}");
+    assert_eq!(live::stage(&here, "detect")["received"], sent, "{here}");
+    assert_eq!(live::stage(&here, "record")["received"], 3 * sent, "{here}");
+}
+
+#[test]
+fn a_host_with_the_certificate_of_another_cell_gets_nothing_and_says_why_that_may_be() {
+    let test = "a_host_with_the_certificate_of_another_cell_gets_nothing_and_says_why_that_may_be";
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let Some((_router, endpoint)) = router(folder, test) else {
+        return;
+    };
+    let (mut robot, mut desk) = two_hosts(&endpoint, folder, "press-2");
+    robot.wait_for_part("it waits for `detect` on host `desk`");
+    desk.wait_for("warning: stage `detect`: no usable sample");
+    let likely = desk.wait_for("  likely: ");
+    assert!(likely.contains("a certificate of another cell"), "{likely}");
+    for host in [robot, desk] {
+        live::signal(host.id(), "INT");
+        live::signal(host.id(), "INT");
+        let (_, summary) = host.end();
+        let stages = summary["stages"].as_array().unwrap();
+        assert!(
+            stages.iter().all(|stage| stage["received"] == 0),
+            "{summary}"
+        );
+    }
 }

@@ -64,3 +64,25 @@ fn every_command_has_a_manual_page() {
     // The program's own, and none for what only the program calls.
     assert_eq!(std::fs::read_dir(&out).unwrap().count(), commands.len() + 1);
 }
+
+#[test]
+fn a_program_that_is_built_apart_and_is_not_there_is_told_with_what_builds_it() {
+    let empty = tempfile::tempdir().unwrap();
+    for (command, program) in [("query", "tauscope-query"), ("cluster", "tauscope-cluster")] {
+        let mut asked = common::tauscope();
+        let beside = std::path::Path::new(asked.get_program()).with_file_name(program);
+        if beside.exists() {
+            common::skipped(
+                "a missing program",
+                &format!("{} is there", beside.display()),
+            );
+            continue;
+        }
+        let out = Out::of({
+            asked.arg(command).arg("--help").env("PATH", empty.path());
+            asked
+        });
+        assert_eq!(out.code, 2, "{out:?}");
+        assert!(out.stderr.contains(&format!("-p {program}")), "{out:?}");
+    }
+}

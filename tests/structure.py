@@ -77,7 +77,7 @@ def functions(code):
 def crates(root):
     """Name and source folder of each crate of the workspace."""
     for folder, folders, files in os.walk(root):
-        folders[:] = sorted(d for d in folders if d not in ("target", ".git", "out", "examples", "node_modules"))
+        folders[:] = sorted(d for d in folders if d not in ("target", ".git", "out", "examples", "node_modules", "vendor"))
         if "Cargo.toml" in files and os.path.isdir(os.path.join(folder, "src")):
             with open(os.path.join(folder, "Cargo.toml"), encoding="utf-8") as file:
                 name = re.search(r'^name = "([^"]+)"', file.read(), re.M)

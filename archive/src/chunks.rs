@@ -6,6 +6,7 @@
 use crate::cursor::{Cursor, RawMessage};
 use crate::damage::{Damage, DamageKind};
 use crate::error::ArchiveError;
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 /// Longest chunk, packed or unpacked, and most unpacked chunks held at a time \[bytes\].
@@ -21,13 +22,16 @@ pub(crate) enum Order {
     File,
 }
 
-/// Where a chunk lies in its file, and when it begins.
+/// Where a chunk lies in its file, and in time.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Place {
     /// What its format calls it.
     pub(crate) number: usize,
     pub(crate) at: u64,
+    /// Log time of its first message.
     pub(crate) start_ns: u64,
+    /// Log time of its last message.
+    pub(crate) end_ns: u64,
 }
 
 /// A chunk in memory.
@@ -106,6 +110,15 @@ impl<C: Chunks> ChunkCursor<C> {
             damage: None,
             spare: None,
         }
+    }
+
+    /// Without the chunks that hold nothing of these log times \[ns since the epoch\]; those at the edges hold more.
+    pub(crate) fn within(mut self, within_ns: &RangeInclusive<i64>) -> Self {
+        let of = |ns: i64| u64::try_from(ns).unwrap_or(0);
+        let (from_ns, to_ns) = (of(*within_ns.start()), of(*within_ns.end()));
+        self.places
+            .retain(|place| place.start_ns <= to_ns && place.end_ns >= from_ns);
+        self
     }
 
     /// The loaded chunk whose next message comes first.
@@ -196,6 +209,10 @@ impl<C: Chunks> Cursor for ChunkCursor<C> {
             at: loaded.at,
             body: &loaded.records[message.body_at..message.body_at + message.body_len],
         })
+    }
+
+    fn chunks_read(&self) -> u64 {
+        self.next_place as u64
     }
 }
 

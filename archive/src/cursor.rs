@@ -12,6 +12,11 @@ pub(crate) trait Cursor: Send {
 
     /// The message it stands on, if any.
     fn current(&self) -> Option<RawMessage<'_>>;
+
+    /// Chunks that have been read so far; 0 where the format has none.
+    fn chunks_read(&self) -> u64 {
+        0
+    }
 }
 
 /// A message as a [`Cursor`] gives it.

@@ -6,6 +6,7 @@ mod open;
 mod several;
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -185,18 +186,41 @@ impl Recording {
         Ok(topic)
     }
 
+    /// Chunks of an MCAP file or a bag of ROS 1, counted as [`Messages::chunks_read`] does; 0 where the format has none.
+    pub fn chunks(&self) -> u64 {
+        match &self.store {
+            Store::Mcap(layout) => layout.chunks(),
+            Store::Several(parts) => parts.iter().map(|part| part.recording.chunks()).sum(),
+            Store::Ros1 { bag, .. } => bag.chunks(),
+            Store::Sqlite { .. } | Store::Csv(_) => 0,
+        }
+    }
+
     /// The messages of these topics in the order of their log times.
     ///
     /// # Errors
     /// [`ArchiveError::NoSuchTopic`], or if the recording can no longer be opened.
     pub fn messages(&self, topics: &[&str]) -> Result<Messages, ArchiveError> {
+        self.messages_within(topics, i64::MIN..=i64::MAX)
+    }
+
+    /// As [`Recording::messages`], but only those whose log time lies in `within_ns` \[ns since the epoch\]. Chunks
+    /// that lie outside are not read, and what is damaged in them is not told.
+    ///
+    /// # Errors
+    /// As [`Recording::messages`].
+    pub fn messages_within(
+        &self,
+        topics: &[&str],
+        within_ns: RangeInclusive<i64>,
+    ) -> Result<Messages, ArchiveError> {
         let mut wanted = vec![false; self.topics.list.len()];
         for name in topics {
             for index in self.topic_indexes(name)? {
                 wanted[index] = true;
             }
         }
-        self.read(&wanted)
+        self.read(&wanted, within_ns)
     }
 
     /// All messages in the order of their log times.
@@ -204,7 +228,7 @@ impl Recording {
     /// # Errors
     /// If the recording can no longer be opened.
     pub fn all_messages(&self) -> Result<Messages, ArchiveError> {
-        self.read(&vec![true; self.topics.list.len()])
+        self.read(&vec![true; self.topics.list.len()], i64::MIN..=i64::MAX)
     }
 
     /// The joint states on `topic`, decoded, in the order of their log times.
@@ -216,16 +240,25 @@ impl Recording {
         Ok(JointStates::new(self.messages(&[topic])?))
     }
 
-    fn read(&self, wanted: &[bool]) -> Result<Messages, ArchiveError> {
+    fn read(
+        &self,
+        wanted: &[bool],
+        within_ns: RangeInclusive<i64>,
+    ) -> Result<Messages, ArchiveError> {
         Ok(Messages::new(
             &self.path,
             Arc::clone(&self.topics),
-            self.cursor(wanted)?,
+            self.cursor(wanted, &within_ns)?,
+            within_ns,
         ))
     }
 
     /// Over the topics marked in `wanted`, by their place in [`Recording::topics`].
-    fn cursor(&self, wanted: &[bool]) -> Result<Box<dyn Cursor>, ArchiveError> {
+    fn cursor(
+        &self,
+        wanted: &[bool],
+        within_ns: &RangeInclusive<i64>,
+    ) -> Result<Box<dyn Cursor>, ArchiveError> {
         match &self.store {
             Store::Mcap(layout) => {
                 let topic = |channel| {
@@ -233,7 +266,7 @@ impl Recording {
                     wanted[topic].then_some(topic)
                 };
                 let cursor = mcap_cursor(Arc::clone(layout), Order::LogTime, topic)?;
-                Ok(Box::new(cursor))
+                Ok(Box::new(cursor.within(within_ns)))
             }
             Store::Sqlite { file, numbers } => {
                 let topic = |id| numbers.get(&id).copied().filter(|&topic| wanted[topic]);
@@ -241,9 +274,14 @@ impl Recording {
             }
             Store::Ros1 { bag, topics } => {
                 let topic = |number| topics.get(&number).copied().filter(|&topic| wanted[topic]);
-                Ok(Box::new(ros1_cursor(Arc::clone(bag), topic)?))
+                let cursor = ros1_cursor(Arc::clone(bag), topic)?;
+                Ok(Box::new(cursor.within(within_ns)))
             }
-            Store::Several(parts) => Ok(Box::new(SeveralCursor::new(Arc::clone(parts), wanted))),
+            Store::Several(parts) => Ok(Box::new(SeveralCursor::new(
+                Arc::clone(parts),
+                wanted,
+                within_ns.clone(),
+            ))),
             Store::Csv(table) => Ok(Box::new(table.cursor()?)),
         }
     }

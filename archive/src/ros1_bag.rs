@@ -143,6 +143,11 @@ impl Ros1Bag {
         Ok(Ok(()))
     }
 
+    /// How many chunks it has.
+    pub(crate) fn chunks(&self) -> u64 {
+        self.chunks.len() as u64
+    }
+
     /// The topics, and the place among them of each connection.
     pub(crate) fn topics(&self) -> (Topics, BTreeMap<u32, usize>) {
         let mut topics = Topics::default();

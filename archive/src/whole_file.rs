@@ -52,6 +52,16 @@ pub fn remove_unfinished() {
     }
 }
 
+/// Removes `part`, which this process has begun and does not need any more.
+///
+/// # Errors
+/// If it cannot be removed.
+pub fn discard(part: &Path) -> io::Result<()> {
+    let removed = fs::remove_file(part);
+    end(part);
+    removed
+}
+
 /// What a file is called until it is whole: `a.mcap.part` for `a.mcap`.
 pub fn part_of(path: &Path) -> PathBuf {
     let mut part = path.as_os_str().to_owned();

@@ -95,6 +95,29 @@ fn joint_states_and_flags_come_out_of_every_compression_in_order_of_time() {
 }
 
 #[test]
+fn chunks_outside_the_time_that_is_asked_for_are_not_read() {
+    for name in ["none.bag", "lz4.bag"] {
+        let recording = Recording::open(golden(name)).unwrap();
+        let read = |within_ns| {
+            let topics = ["/joint_states"];
+            let mut messages = recording.messages_within(&topics, within_ns).unwrap();
+            let mut times = Vec::new();
+            while let Some(message) = messages.next_message() {
+                times.push(message.unwrap().log_time_ns);
+            }
+            (times, messages.chunks_read())
+        };
+        let at = |i: i64| START_NS + i * PERIOD_NS + 5;
+        let (all, chunks) = read(i64::MIN..=i64::MAX);
+        assert_eq!((all.len(), chunks), (50, recording.chunks()), "{name}");
+        let (some, fewer) = read(at(10)..=at(12));
+        assert_eq!(some, [at(10), at(11), at(12)]);
+        assert!(0 < fewer && fewer < chunks, "{name}: {fewer} of {chunks}");
+        assert_eq!(read(at(60)..=at(70)), (Vec::new(), 0));
+    }
+}
+
+#[test]
 fn info_tells_what_is_in_a_bag() {
     let recording = Recording::open(golden("lz4.bag")).unwrap();
     let info = Info::read(&recording).unwrap();
@@ -255,7 +278,7 @@ fn no_changed_byte_makes_the_reader_panic() {
 #[test]
 fn another_version_or_definition_is_named() {
     let folder = tempfile::tempdir().unwrap();
-    let path = changed(folder.path(), |bytes| bytes[8] = b'1');
+    let path = changed(folder.path(), |bytes| bytes[9] = b'1');
     let error = Recording::open(&path).err().unwrap().to_string();
     assert!(error.contains("only version 2.0 can be read"), "{error}");
 

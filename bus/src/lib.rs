@@ -19,7 +19,7 @@ pub use link::{
 };
 pub use sample::{
     Command, Detection, EventKind, Header, Health, JointArray, JointState, MAX_JOINTS, Name,
-    Sample, SampleKind, SampleRef, TwinState, Verb, flags,
+    Sample, SampleKind, SampleRef, TwinState, Unsound, Verb, flags,
 };
 pub use seat::Seat;
 pub use stage::{Emit, Progress, Sink, Source, Stage, StageError};

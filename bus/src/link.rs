@@ -152,6 +152,23 @@ pub struct ReceiverCounts {
     pub received: u64,
     /// Samples known to be lost: holes in the sequence.
     pub lost: u64,
+    /// Samples that no stage may see ([`Sample::check`]).
+    #[serde(default)]
+    pub refused: u64,
+    /// Samples sent before this end came in.
+    #[serde(default)]
+    pub before: u64,
+    /// Messages of somebody who is not the stream's sender, or that are no samples of it: not part of the books.
+    #[serde(default)]
+    pub foreign: u64,
+}
+
+impl ReceiverCounts {
+    /// Samples of the stream that did not get through; the stream has these and those received.
+    pub fn dropped(&self) -> u64 {
+        let lost = self.lost.saturating_add(self.refused);
+        lost.saturating_add(self.before)
+    }
 }
 
 /// What a receiving end got.

@@ -5,6 +5,7 @@
 //! [`Header::joint_count`] on are zero. Angles are rad (or m for a prismatic joint), velocities
 //! rad/s, efforts N m (N) or A, as the cell declares.
 
+mod check;
 mod command;
 mod name;
 
@@ -12,6 +13,9 @@ use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
+pub(crate) use check::MOST_SAMPLES;
+pub use check::Unsound;
+use check::Values as _;
 pub use command::{Command, Verb};
 pub use name::Name;
 
@@ -256,8 +260,8 @@ impl SampleKind {
 
 /// A type that can travel on a link.
 ///
-/// It is plain old data: every bit pattern is a value, so bytes from another process or machine are
-/// read without a check of each field.
+/// It is plain old data: every bit pattern is a value. Whether it makes sense is another question, which the receiving
+/// end of a link asks with [`Sample::check`] before a stage sees it.
 pub trait Sample: Pod + Default + std::fmt::Debug + Send + Sync + ZeroCopySend + 'static {
     /// Which type this is.
     const KIND: SampleKind;
@@ -267,6 +271,12 @@ pub trait Sample: Pod + Default + std::fmt::Debug + Send + Sync + ZeroCopySend +
     fn header_mut(&mut self) -> &mut Header;
     /// This sample where the type was only known at run time.
     fn as_ref(&self) -> SampleRef<'_>;
+    /// Whether a stage may see it: nothing in it may make one panic or spoil its state. Of an end mark only the header
+    /// counts.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    fn check(&self) -> Result<(), Unsound>;
 }
 
 /// A sample whose type is known at run time only.
@@ -316,6 +326,13 @@ macro_rules! samples {
             }
             fn as_ref(&self) -> SampleRef<'_> {
                 SampleRef::$name(self)
+            }
+            fn check(&self) -> Result<(), Unsound> {
+                self.header.check()?;
+                if self.header.has(flags::END) {
+                    return Ok(());
+                }
+                self.check_values()
             }
         }
     )+};

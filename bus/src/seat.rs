@@ -3,6 +3,7 @@
 //! The program works it out from the pipeline file and hands it to the process as JSON; see
 //! [`shell::child`](crate::shell::child) for how.
 
+use std::path::PathBuf;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
@@ -53,6 +54,10 @@ pub struct Seat {
     /// How long a sender waits for a keep-all receiver that takes nothing \[ms\].
     #[serde(default = "Seat::default_patience_ms")]
     pub patience_ms: u64,
+    /// A file in which it keeps its counts ([`Ledger`](crate::shell::Ledger)), if its supervisor wants to know them
+    /// after its death.
+    #[serde(default)]
+    pub ledger: Option<PathBuf>,
     /// What else the stage needs, in the stage's own words.
     #[serde(default)]
     pub config: serde_json::Value,
@@ -85,6 +90,7 @@ impl Seat {
             health: None,
             start_within_ms: Self::default_start_within_ms(),
             patience_ms: Self::default_patience_ms(),
+            ledger: None,
             config: serde_json::Value::Null,
         }
     }
@@ -154,6 +160,9 @@ pub struct Output {
     pub stream: String,
     /// What it carries.
     pub kind: SampleKind,
+    /// How many samples earlier lives of the stage have put out.
+    #[serde(default)]
+    pub former: u64,
     /// The ways it leaves its tree; none if nobody listens elsewhere.
     #[serde(default)]
     pub links: Vec<OutputLink>,

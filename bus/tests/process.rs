@@ -69,6 +69,7 @@ impl Around {
         let output = |stream: &str, kind| Output {
             stream: stream.to_owned(),
             kind,
+            former: 0,
             links: vec![OutputLink {
                 transport: TransportKind::Iceoryx2,
                 audience: Audience::of(Keep::All, 1),

@@ -7,7 +7,9 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use tauscope_bus::link::FanOut;
-use tauscope_bus::shell::{Context, Outcome, Report, SinkInput, run_sink, run_source, run_stage};
+use tauscope_bus::shell::{
+    Context, Ledger, Outcome, Report, SinkInput, run_sink, run_source, run_stage,
+};
 use tauscope_bus::{
     Audience, Detection, Emit, Health, InProcess, JointState, Keep, Progress, Receiver, SampleRef,
     Sender, Sink, Source, Stage, StageError, Transport, TwinState,
@@ -170,6 +172,7 @@ fn run_chain(length: i64, stop_after: Option<Duration>) -> Chain {
                 &mut Keeper(Arc::clone(&seen)),
                 inputs,
                 &mut nowhere(),
+                &Ledger::default(),
             )
         });
         if let Some(time) = stop_after {
@@ -311,6 +314,7 @@ fn a_sink_that_is_stopped_deals_with_what_has_arrived_and_flushes_while_idle() {
                 &mut Keeper(Arc::clone(&seen)),
                 inputs,
                 &mut nowhere(),
+                &Ledger::default(),
             )
         });
         while seen.lock().unwrap().idle == 0 {

@@ -6,7 +6,7 @@
 use std::sync::{Arc, Mutex};
 
 use tauscope_bus::shell::tree::{Branch, Outlet, Post, Tree, Turn, branch};
-use tauscope_bus::shell::{Context, Outcome, Report};
+use tauscope_bus::shell::{Context, Ledger, Outcome, Report};
 use tauscope_bus::{
     Audience, Detection, Emit, InProcess, JointState, Keep, Progress, Received, Receiver, Source,
     Stage, StageError, Transport, TwinState,
@@ -84,6 +84,7 @@ fn post(links: &InProcess, stage: &str, from: &str) -> Post<'static> {
         restarts: 0,
         from: from.to_owned(),
         health: health.unwrap(),
+        ledger: Ledger::default(),
     }
 }
 

@@ -54,10 +54,13 @@ for file in *.pem; do
     case ${file%.pem} in ca | router | fleet) ;; *) cells+=("${file%.pem}") ;; esac
 done
 
-# Wildcards match no chunk that begins with `@`: the cell's presence and the ends of its streams are named.
+# Wildcards match no chunk that begins with `@`: the cell's presence and what its streams need are named.
 every='"put", "delete", "declare_subscriber", "query", "declare_queryable", "reply", "liveliness_token",
         "declare_liveliness_subscriber", "liveliness_query"'
-keys() { echo "\"$1/**\", \"$1/@alive/**\", \"$1/**/@all/**\", \"$1/**/@newest/**\", \"$1/**/@end/**\""; }
+keys() {
+    echo -n "\"$1/**\", \"$1/@alive/**\", \"$1/**/@all/**\", \"$1/**/@newest/**\","
+    echo " \"$1/**/@from/**\", \"$1/**/@taken/**\""
+}
 rule() {
     cat <<RULE
       { id: "$1", permission: "allow", flows: ["ingress", "egress"], key_exprs: [$(keys "$2")],
@@ -76,9 +79,9 @@ RULE
     shared_memory: { enabled: false },
     link: {
       tls: {
-        root_ca_certificate: "$PWD/ca.pem",
-        listen_private_key: "$PWD/router.key",
-        listen_certificate: "$PWD/router.pem",
+        root_ca_certificate: "ca.pem",
+        listen_private_key: "router.key",
+        listen_certificate: "router.pem",
         enable_mtls: true,
         close_link_on_expiration: true,
       },
@@ -101,6 +104,5 @@ HEAD
     echo '  },'
     echo '}'
 } >router.json5
-# The router's host copies the folder's files elsewhere: then the paths in router.json5 change.
 echo "$PWD/router.json5: ${#cells[@]} cells. An endpoint of the cell \`${cells[0]}\`:"
 echo "tls/$router:7448#root_ca_certificate_file=ca.pem;enable_mtls=true;connect_certificate_file=${cells[0]}.pem;connect_private_key_file=${cells[0]}.key"

@@ -1,5 +1,7 @@
 //! The fleet host: one Zenoh session, one thread that keeps the wall, and snapshots for all who look.
 
+mod physics;
+
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -16,6 +18,7 @@ use zenoh::sample::SampleKind;
 use crate::inbox;
 use crate::keeper::Keeper;
 use crate::mailbox::Mailbox;
+use crate::physics::CellPhysics;
 use crate::store::{Note, Store, StoreError};
 use crate::wall::{Effect, Event, Now, Snapshot, Wall};
 
@@ -37,6 +40,8 @@ pub struct Options {
     pub expected: Vec<String>,
     /// Where incidents and history are kept; `None` to keep none.
     pub store: Option<PathBuf>,
+    /// The folder of the nightly tables of `tauscope physics`.
+    pub physics: Option<PathBuf>,
 }
 
 /// Why there is no fleet host.
@@ -80,6 +85,7 @@ pub struct Hub {
     mailbox: Arc<Mailbox<Mail>>,
     snapshots: watch::Receiver<Arc<Snapshot>>,
     store: Option<Mutex<Store>>,
+    physics: Arc<Mutex<Vec<CellPhysics>>>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
@@ -111,11 +117,19 @@ impl Hub {
         listen(&session, &mailbox)?;
         let (show, snapshots) = watch::channel(Arc::new(wall.snapshot()));
         let stop = Arc::new(AtomicBool::new(false));
+        let physics = Arc::new(Mutex::new(Vec::new()));
+        if let Some(folder) = options.physics.clone() {
+            let notes = reader.as_ref().map(Store::again).transpose()?;
+            let (physics, stop) = (physics.clone(), stop.clone());
+            let thread = std::thread::Builder::new().name("fleet-physics".to_owned());
+            thread.spawn(move || physics::follow(&folder, notes.as_ref(), &physics, &stop))?;
+        }
         let worker = Worker {
             session: session.clone(),
             mailbox: mailbox.clone(),
             wall,
             keeper,
+            physics: physics.clone(),
             show,
             begin,
             unkept: false,
@@ -128,6 +142,7 @@ impl Hub {
             mailbox,
             snapshots,
             store: reader.map(Mutex::new),
+            physics,
             stop,
             thread: Some(thread),
         })
@@ -152,6 +167,12 @@ impl Hub {
         // A reader that panicked has changed nothing.
         let store = store.lock().unwrap_or_else(PoisonError::into_inner);
         Some(read(&store))
+    }
+
+    /// The physics of a cell's arm over weeks, if its nightly numbers are followed.
+    pub fn physics(&self, cell: &str) -> Option<CellPhysics> {
+        let known = self.physics.lock().unwrap_or_else(PoisonError::into_inner);
+        known.iter().find(|physics| physics.cell == cell).cloned()
     }
 
     /// Sends a command to a cell, as `tauscope send` does, and waits for its answer.
@@ -239,6 +260,7 @@ struct Worker {
     mailbox: Arc<Mailbox<Mail>>,
     wall: Wall,
     keeper: Option<Keeper>,
+    physics: Arc<Mutex<Vec<CellPhysics>>>,
     show: watch::Sender<Arc<Snapshot>>,
     begin: Instant,
     /// Whether it was said that nothing can be kept.
@@ -302,6 +324,12 @@ impl Worker {
             let kept = keeper.tick(&snapshot);
             self.note(kept);
         }
+        let known = self.physics.lock().unwrap_or_else(PoisonError::into_inner);
+        for view in &mut snapshot.cells {
+            let own = known.iter().find(|physics| physics.cell == view.cell);
+            view.drift = own.and_then(CellPhysics::drift);
+        }
+        drop(known);
         // Nobody may look right now.
         self.show.send_replace(Arc::new(snapshot));
     }

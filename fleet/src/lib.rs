@@ -3,9 +3,10 @@
 #[cfg(test)]
 mod fixture;
 pub mod hub;
-mod inbox;
+pub mod inbox;
 mod keeper;
 mod mailbox;
+pub mod physics;
 pub mod show;
 pub mod store;
 pub mod wall;

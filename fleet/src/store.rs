@@ -89,6 +89,12 @@ pub struct Note {
     pub baseline: bool,
 }
 
+/// When notes begin a new baseline \[days since 1970-01-01 UTC\].
+pub fn baselines(notes: &[Note]) -> Vec<f64> {
+    let begins = notes.iter().filter(|note| note.baseline);
+    begins.map(|note| note.at_ns as f64 / 86_400e9).collect()
+}
+
 /// A contact as it is kept.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct KeptContact {

@@ -26,10 +26,14 @@ use tokio::sync::{Semaphore, oneshot};
 pub use users::{NewUser, Users, UsersError};
 
 use crate::hub::Hub;
+use crate::physics::CellPhysics;
+use crate::store::Note;
 use sessions::Sessions;
 
 /// No form is longer \[bytes\].
 const MAX_BODY_BYTES: usize = 4096;
+/// Notes that are shown at most.
+const MOST_NOTES: u32 = 50;
 /// Pages that may follow the wall at a time. Resolution: every screen of a plant, and some.
 const MAX_FOLLOWERS: usize = 64;
 
@@ -135,6 +139,8 @@ fn router(shared: Arc<Shared>) -> Router {
     Router::new()
         .route("/", get(wall))
         .route("/cells/{cell}", get(cell))
+        .route("/cells/{cell}/week", get(week))
+        .route("/cells/{cell}/week.json", get(week_json))
         .route("/incidents", get(incidents))
         .route("/events", get(events::all))
         .route("/cells/{cell}/events", get(events::one))
@@ -197,6 +203,41 @@ async fn cell(State(shared): App, Path(name): Path<String>, headers: HeaderMap) 
     page(&shared, &headers, |viewer| {
         pages::cell::page(viewer, &snapshot, &name, &kept)
     })
+}
+
+/// The page of a cell's week.
+async fn week(State(shared): App, Path(name): Path<String>, headers: HeaderMap) -> Response {
+    let reading = shared.clone();
+    let asked = name.clone();
+    let read = tokio::task::spawn_blocking(move || {
+        let physics = reading.hub.physics(&asked)?;
+        let notes = reading.hub.kept(|store| store.notes(&asked, MOST_NOTES));
+        Some((physics, notes.and_then(Result::ok).unwrap_or_default()))
+    });
+    let Ok(Some((physics, notes))) = read.await else {
+        return no_physics(&shared, &headers, &name);
+    };
+    let now_ns = shared.hub.snapshot().now_ns;
+    Html(pages::physics::week(&physics, &notes, now_ns, None).into_string()).into_response()
+}
+
+async fn week_json(State(shared): App, Path(name): Path<String>, headers: HeaderMap) -> Response {
+    match shared.hub.physics(&name) {
+        Some(physics) => axum::Json(physics).into_response(),
+        None => no_physics(&shared, &headers, &name),
+    }
+}
+
+fn no_physics(shared: &Shared, headers: &HeaderMap, cell: &str) -> Response {
+    let text = format!("there are no nightly numbers of a cell `{cell}` here");
+    let body = page(shared, headers, |viewer| pages::not_found(viewer, &text));
+    (StatusCode::NOT_FOUND, body).into_response()
+}
+
+/// The page of a cell's week as a file that stands alone.
+pub fn week_page(physics: &CellPhysics, notes: &[Note], now_ns: i64) -> String {
+    let style = include_str!("web/style.css");
+    pages::physics::week(physics, notes, now_ns, Some(style)).into_string()
 }
 
 async fn incidents(State(shared): App, headers: HeaderMap) -> Response {

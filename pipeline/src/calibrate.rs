@@ -228,7 +228,7 @@ impl Job<'_> {
             let source = RecordedSource::open_file(&file, &config, &setup)?;
             let twin = build::twin(self.twin, model, self.cell)?;
             let mut graph = Graph::default();
-            let states = graph.source("ingest", Box::new(source))?;
+            let states = graph.source("ingest", Box::new(source));
             let twins = graph.stage("twin", Box::new(twin), &states)?;
             let input = graph.listen::<TwinState>(&twins)?;
             graph.sink(

@@ -4,44 +4,57 @@
 //! pipeline (each stage after those it listens to) until nothing is left, then the sinks, before the next step. So
 //! stages that listen to one stream go through it side by side, as those that share what they derive must, and the
 //! order of everything that is written is a function of the pipeline and the recording alone.
+//!
+//! No sample is copied on its way: the stages behind read it where its maker wrote it (`lane.rs`). A transport of the
+//! bus would do the same with a lock and a wake-up a sample, which one thread needs neither of.
 
+mod lane;
 mod sink;
 
-use std::time::Duration;
+use std::any::Any;
+use std::rc::Rc;
 
 use serde::Serialize;
 use tauscope_bus::shell::{HealthClock, Report};
 use tauscope_bus::{
-    Audience, Emit, Header, InProcess, Keep, LinkError, Progress, Received, Receiver, Sample,
-    Sender, Sink, Source, Stage, StageError, Transport,
+    Emit, Header, Health, LinkError, Progress, Received, Sample, SampleKind, Sink, Source, Stage,
+    StageError,
 };
 
+use self::lane::{Lane, Reader, Tidy};
 pub use self::sink::SinkInput;
 use self::sink::SinkNode;
 
-/// Samples a stage may leave unread. A source gives out at most a few in a step, and they are all
-/// taken before its next one.
-/// Resolution: memory.
-const DEPTH: usize = 1024;
-
 /// Where a stage's output goes, and the header of what went out last.
-struct Outlet<T: Sample> {
-    link: Box<dyn Sender<T>>,
+struct Outlet<T> {
+    lane: Rc<Lane<T>>,
     newest: Option<Header>,
 }
 
 impl<T: Sample> Emit<T> for Outlet<T> {
     fn emit(&mut self, write: &mut dyn FnMut(&mut T)) -> Result<(), LinkError> {
-        let newest = &mut self.newest;
-        self.link.send_with(&mut |slot| {
-            write(slot);
-            *newest = Some(*slot.header());
-        })
+        self.newest = Some(self.lane.write(write));
+        Ok(())
     }
 }
 
 /// A stage's health reports, by the stream's own clock.
-type Health = HealthClock<Box<dyn Sender<tauscope_bus::Health>>>;
+struct HealthOutlet {
+    clock: HealthClock,
+    lane: Rc<Lane<Health>>,
+}
+
+impl HealthOutlet {
+    fn send(&mut self, report: &Report) {
+        let clock = &self.clock;
+        self.lane.write(&mut |health| clock.fill(report, health));
+    }
+
+    fn end(&mut self, report: &Report) {
+        self.send(report);
+        self.lane.end();
+    }
+}
 
 /// What a stage has counted.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -84,7 +97,7 @@ struct SourceNode<T: Sample> {
     name: String,
     source: Box<dyn Source<T>>,
     out: Outlet<T>,
-    health: Health,
+    health: HealthOutlet,
     ended: bool,
 }
 
@@ -98,14 +111,14 @@ impl<T: Sample> Node for SourceNode<T> {
             .out
             .newest
             .take()
-            .is_some_and(|newest| self.health.note(&newest))
+            .is_some_and(|newest| self.health.clock.note(&newest))
         {
-            self.health.send(&self.counts().report())?;
+            self.health.send(&self.counts().report());
         }
         if progress == Progress::End {
             self.ended = true;
-            self.out.link.end()?;
-            self.health.end(&self.counts().report())?;
+            self.out.lane.end();
+            self.health.end(&self.counts().report());
         }
         Ok(true)
     }
@@ -118,7 +131,7 @@ impl<T: Sample> Node for SourceNode<T> {
         StageCounts {
             stage: self.name.clone(),
             received: 0,
-            emitted: self.out.link.counts().sent,
+            emitted: self.out.lane.sent(),
             dropped: self.source.dropped(),
         }
     }
@@ -135,9 +148,9 @@ impl<T: Sample> Node for SourceNode<T> {
 struct StageNode<I: Sample, O: Sample> {
     name: String,
     stage: Box<dyn Stage<I, O>>,
-    input: Box<dyn Receiver<I>>,
+    input: Reader<I>,
     out: Outlet<O>,
-    health: Health,
+    health: HealthOutlet,
     ended: bool,
 }
 
@@ -146,21 +159,21 @@ impl<I: Sample, O: Sample> Node for StageNode<I, O> {
         if self.ended {
             return Ok(false);
         }
-        let (mut result, mut due) = (Ok(()), false);
-        let (stage, out, health) = (&mut self.stage, &mut self.out, &mut self.health);
-        let received = self.input.receive(Duration::ZERO, &mut |sample| {
-            due = health.note(sample.header());
-            result = stage.accept(sample, out);
-        })?;
-        result?;
+        let (stage, out, clock) = (&mut self.stage, &mut self.out, &mut self.health.clock);
+        let (received, accepted) = self.input.receive(|sample| {
+            let due = clock.note(sample.header());
+            stage.accept(sample, out).map(|()| due)
+        });
+        if accepted.transpose()?.unwrap_or(false) {
+            self.health.send(&self.counts().report());
+        }
         match received {
-            Received::Sample if due => self.health.send(&self.counts().report())?,
             Received::Sample => {}
             Received::Nothing => return Ok(false),
             Received::End => {
                 self.stage.finish(&mut self.out)?;
-                self.out.link.end()?;
-                self.health.end(&self.counts().report())?;
+                self.out.lane.end();
+                self.health.end(&self.counts().report());
                 self.ended = true;
             }
         }
@@ -172,36 +185,44 @@ impl<I: Sample, O: Sample> Node for StageNode<I, O> {
     }
 
     fn counts(&self) -> StageCounts {
-        let input = self.input.counts();
         StageCounts {
             stage: self.name.clone(),
-            received: input.received,
-            emitted: self.out.link.counts().sent,
-            dropped: input.lost + self.stage.dropped(),
+            received: self.input.received(),
+            emitted: self.out.lane.sent(),
+            dropped: self.stage.dropped(),
         }
     }
 }
 
-/// A stream of a [`Graph`], by the stage that makes it.
+/// A stream of a [`Graph`].
 #[derive(Debug, Clone)]
 pub struct Stream {
     stage: String,
+    kind: SampleKind,
+    /// A `Lane` of the type that `kind` names.
+    lane: Rc<dyn Any>,
+    health: Rc<Lane<Health>>,
 }
 
 impl Stream {
-    fn key(&self) -> &str {
-        &self.stage
+    fn reader<T: Sample>(&self) -> Result<Reader<T>, LinkError> {
+        let lane = Rc::clone(&self.lane).downcast::<Lane<T>>();
+        Ok(lane.map_err(|_| self.mismatch(T::KIND))?.reader())
     }
 
-    fn health_key(&self) -> String {
-        format!("{}/health", self.stage)
+    fn mismatch(&self, expected: SampleKind) -> LinkError {
+        LinkError::TypeMismatch {
+            stream: self.stage.clone(),
+            expected: expected.type_name().to_owned(),
+            found: self.kind.type_name().to_owned(),
+        }
     }
 }
 
 /// Stages in one thread, in the order in which they were added.
 #[derive(Default)]
 pub struct Graph<'a> {
-    links: InProcess,
+    lanes: Vec<Rc<dyn Tidy>>,
     nodes: Vec<(Place, Box<dyn Node + 'a>)>,
 }
 
@@ -214,16 +235,19 @@ enum Place {
 }
 
 impl<'a> Graph<'a> {
+    /// How many sources, stages and sinks there are.
+    pub fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
     /// Adds a source.
-    ///
-    /// # Errors
-    /// If its link cannot be opened.
-    pub fn source<T: Sample>(
-        &mut self,
-        name: &str,
-        source: Box<dyn Source<T>>,
-    ) -> Result<Stream, LinkError> {
-        let (stream, out, health) = self.outlets(name)?;
+    pub fn source<T: Sample>(&mut self, name: &str, source: Box<dyn Source<T>>) -> Stream {
+        let (stream, out, health) = self.outlets(name);
         let name = name.to_owned();
         let node = SourceNode {
             name,
@@ -233,21 +257,21 @@ impl<'a> Graph<'a> {
             ended: false,
         };
         self.nodes.push((Place::Source, Box::new(node)));
-        Ok(stream)
+        stream
     }
 
     /// Adds a stage that listens to `input`.
     ///
     /// # Errors
-    /// If a link cannot be opened, or `input` carries another type.
+    /// If `input` carries another type.
     pub fn stage<I: Sample, O: Sample>(
         &mut self,
         name: &str,
         stage: Box<dyn Stage<I, O>>,
         input: &Stream,
     ) -> Result<Stream, LinkError> {
-        let input = self.links.receiver(input.key(), Keep::All, DEPTH)?;
-        let (stream, out, health) = self.outlets(name)?;
+        let input = input.reader()?;
+        let (stream, out, health) = self.outlets(name);
         let name = name.to_owned();
         let node = StageNode {
             name,
@@ -264,22 +288,14 @@ impl<'a> Graph<'a> {
     /// A receiving end of `stream` for a sink.
     ///
     /// # Errors
-    /// If the link cannot be opened, or the stream carries another type.
-    pub fn listen<T: Sample>(&mut self, stream: &Stream) -> Result<SinkInput, LinkError> {
-        self.input::<T>(stream, stream.key())
+    /// If the stream carries another type.
+    pub fn listen<T: Sample>(&self, stream: &Stream) -> Result<SinkInput, LinkError> {
+        Ok(SinkInput::new::<T>(&stream.stage, stream.reader()?))
     }
 
     /// A receiving end of the health reports of the stage that makes `stream`, for a sink.
-    ///
-    /// # Errors
-    /// If the link cannot be opened.
-    pub fn listen_to_health(&mut self, stream: &Stream) -> Result<SinkInput, LinkError> {
-        self.input::<tauscope_bus::Health>(stream, &stream.health_key())
-    }
-
-    fn input<T: Sample>(&mut self, stream: &Stream, key: &str) -> Result<SinkInput, LinkError> {
-        let receiver: Box<dyn Receiver<T>> = self.links.receiver(key, Keep::All, DEPTH)?;
-        Ok(SinkInput::new(&stream.stage, receiver))
+    pub fn listen_to_health(&self, stream: &Stream) -> SinkInput {
+        SinkInput::new(&stream.stage, stream.health.reader())
     }
 
     /// Adds a sink.
@@ -288,19 +304,23 @@ impl<'a> Graph<'a> {
         self.nodes.push((Place::Sink, Box::new(node)));
     }
 
-    fn outlets<T: Sample>(&mut self, name: &str) -> Result<(Stream, Outlet<T>, Health), LinkError> {
+    fn outlets<T: Sample>(&mut self, name: &str) -> (Stream, Outlet<T>, HealthOutlet) {
+        let (lane, health) = (Lane::<T>::of(name), Lane::of(name));
+        let tidied: [Rc<dyn Tidy>; 2] = [lane.clone(), health.clone()];
+        self.lanes.extend(tidied);
         let stream = Stream {
             stage: name.to_owned(),
+            kind: T::KIND,
+            lane: lane.clone(),
+            health: Rc::clone(&health),
         };
-        let link = self.links.sender(stream.key(), Audience::default())?;
-        let health = self
-            .links
-            .sender(&stream.health_key(), Audience::default())?;
-        Ok((
-            stream,
-            Outlet { link, newest: None },
-            HealthClock::new(health, name, 0),
-        ))
+        let clock = HealthClock::new(name, 0);
+        let outlet = Outlet { lane, newest: None };
+        let health = HealthOutlet {
+            clock,
+            lane: health,
+        };
+        (stream, outlet, health)
     }
 
     /// Runs until every source has ended and everything has passed through. `progress` is told how
@@ -317,6 +337,7 @@ impl<'a> Graph<'a> {
             self.turn(Place::Source)?;
             while self.turn(Place::Stage)? {}
             self.turn(Place::Sink)?;
+            self.lanes.iter().for_each(|lane| lane.tidy());
             let nodes = || self.nodes.iter().map(|(_, node)| node);
             let done = nodes().filter_map(|node| node.fraction_done());
             let goes_on = progress(done.fold(1.0, f64::min));

@@ -15,6 +15,7 @@ pub mod pipeline;
 pub mod provenance;
 pub mod replay;
 pub mod report;
+pub mod results;
 pub mod scenario;
 pub mod settings;
 pub mod suggest;

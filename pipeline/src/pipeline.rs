@@ -4,6 +4,7 @@ mod cells;
 mod entries;
 mod file;
 mod recorded;
+mod restart;
 mod role;
 mod wiring;
 
@@ -13,6 +14,7 @@ use std::path::{Path, PathBuf};
 use tauscope_bus::Keep;
 
 pub use file::{HostEntry, KeepEntry, PipelineFile};
+pub use restart::{Restart, When};
 pub use role::{ROLE_KEYS, Role, words_for};
 
 use crate::cell::Cell;
@@ -56,6 +58,8 @@ pub struct Stage {
     pub inputs: Vec<usize>,
     /// What becomes of samples that it has no time for.
     pub keep: Keep,
+    /// When it is started again.
+    pub restart: Restart,
     /// Its own part of the file, paths resolved, files read.
     pub settings: Settings,
     /// What a simulated source simulates.
@@ -116,6 +120,7 @@ impl Pipeline {
                     None if wiring.roles[index] == Role::Publish => Keep::Newest,
                     Some(KeepEntry::All) | None => Keep::All,
                 },
+                restart: entry.restart.map_or_else(Restart::default, Restart::from),
                 settings,
                 scenario: files.scenarios.remove(&index),
             });

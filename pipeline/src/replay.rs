@@ -3,13 +3,13 @@
 
 mod error;
 mod observe;
+mod redirect;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use tauscope_bus::{Detection, JointState, SampleKind, Source, TwinState};
+use tauscope_bus::{Detection, JointState, SampleKind, Sink, Source, TwinState};
 use tauscope_ingest::{ArchivedTwin, Commanded, RecordedSource};
-use tauscope_record::{Existing, FileName};
 use tauscope_twin::TwinFile;
 
 use crate::build;
@@ -18,6 +18,8 @@ use crate::graph::{Graph, SinkInput, StageCounts, Stream};
 use crate::pipeline::{Pipeline, Stage};
 use crate::settings::Settings;
 use crate::tally::{DetectionTally, TwinTally};
+
+use redirect::redirect;
 
 pub use error::ReplayError;
 pub use observe::Observer;
@@ -45,6 +47,8 @@ pub struct Outcome {
     pub joint_names: Vec<String>,
     /// From the first to the last sample \[s\].
     pub duration_s: f64,
+    /// Stamps of the first and the last sample \[ns since the epoch\].
+    pub stamps_ns: (i64, i64),
     /// Samples that were lost or refused, over all stages.
     pub lost: u64,
     /// By twin stage.
@@ -131,6 +135,29 @@ impl<'a> Replay<'a> {
         out: Option<&Path>,
         progress: &mut dyn FnMut(f64) -> bool,
     ) -> Result<Outcome, ReplayError> {
+        self.run_with(recording, out, None, progress)
+    }
+
+    /// As [`run`](Self::run), into no folder: `beside`, if there is one, is given the samples of every stage.
+    ///
+    /// # Errors
+    /// If the recording cannot be read, or `beside` fails.
+    pub fn run_beside(
+        &self,
+        recording: &Path,
+        beside: Option<Box<dyn Sink + '_>>,
+        progress: &mut dyn FnMut(f64) -> bool,
+    ) -> Result<Outcome, ReplayError> {
+        self.run_with(recording, None, beside, progress)
+    }
+
+    fn run_with(
+        &self,
+        recording: &Path,
+        out: Option<&Path>,
+        beside: Option<Box<dyn Sink + '_>>,
+        progress: &mut dyn FnMut(f64) -> bool,
+    ) -> Result<Outcome, ReplayError> {
         let cell = self.cell();
         let stem = stem(recording);
         let mut observer = Observer::new(&cell.facts.joint_names);
@@ -149,7 +176,7 @@ impl<'a> Replay<'a> {
             let stream = match (&stage.settings, input) {
                 (Settings::Ingest(config), _) => {
                     let source = Commanded::archived(self.open(config, recording)?);
-                    Some(graph.source(&stage.name, Box::new(source))?)
+                    Some(graph.source(&stage.name, Box::new(source)))
                 }
                 (Settings::Twin { config, model }, Some(input)) => {
                     let model = model.as_ref();
@@ -191,11 +218,16 @@ impl<'a> Replay<'a> {
                 streams.insert(index, stream);
             }
         }
-        let inputs = self.inputs(&mut graph, streams.keys().copied(), &streams)?;
+        let inputs = self.inputs(&graph, streams.keys().copied(), &streams)?;
+        // The observer and what is beside it are no stages of the pipeline.
+        let stage_count = graph.len();
         graph.sink("observer", Box::new(&mut observer), inputs);
+        if let Some(beside) = beside {
+            let inputs = self.inputs(&graph, streams.keys().copied(), &streams)?;
+            graph.sink("beside", beside, inputs);
+        }
         let mut stages = graph.run(progress)?.ok_or(ReplayError::Interrupted)?;
-        // The observer is no stage of the pipeline.
-        stages.pop();
+        stages.truncate(stage_count);
         drop(graph);
         Ok(observer.observed.into_outcome(cell, stem, stages, files))
     }
@@ -209,6 +241,11 @@ impl<'a> Replay<'a> {
             }
         }
         files
+    }
+
+    /// The name of the cell whose recordings are replayed.
+    pub fn cell_name(&self) -> &'a str {
+        &self.cell().facts.name
     }
 
     fn cell(&self) -> &'a Cell {
@@ -269,7 +306,7 @@ impl<'a> Replay<'a> {
                 let twin = build::twin(config, model, self.cell())?;
                 graph.stage(&stage.name, Box::new(twin), input)?
             }
-            TwinChoice::Keep => graph.source(&stage.name, Box::new(self.open_twin(recording)?))?,
+            TwinChoice::Keep => graph.source(&stage.name, Box::new(self.open_twin(recording)?)),
         })
     }
 
@@ -289,7 +326,7 @@ impl<'a> Replay<'a> {
         let recorder = self.pipeline.recorder(config, &listened)?;
         let mut inputs = self.inputs(graph, listened.iter().copied(), streams)?;
         for index in listened {
-            inputs.push(graph.listen_to_health(&streams[&index])?);
+            inputs.push(graph.listen_to_health(&streams[&index]));
         }
         graph.sink(&stage.name, Box::new(recorder), inputs);
         Ok(())
@@ -298,7 +335,7 @@ impl<'a> Replay<'a> {
     /// Receiving ends of these stages' streams.
     fn inputs(
         &self,
-        graph: &mut Graph<'_>,
+        graph: &Graph<'_>,
         stages: impl Iterator<Item = usize>,
         streams: &BTreeMap<usize, Stream>,
     ) -> Result<Vec<SinkInput>, ReplayError> {
@@ -355,45 +392,4 @@ fn file_config(config: &tauscope_ingest::Config, recording: &Path) -> tauscope_i
         path: recording.to_owned(),
         topics: topics.cloned().unwrap_or_else(simulated),
     }
-}
-
-/// A recorder's configuration for a replay: the same kinds of file, into `out`, named after the
-/// recording; no live picture. Nothing if there is no `out`.
-fn redirect(
-    config: &tauscope_record::Config,
-    out: Option<&Path>,
-    stem: &str,
-    files: &mut Vec<PathBuf>,
-) -> Option<tauscope_record::Config> {
-    let out = out?;
-    let mut config = tauscope_record::Config {
-        // One result for each recording, again and again.
-        split: None,
-        keep: None,
-        existing: Existing::Replace,
-        // What is lost in a power cut is replayed again.
-        sync_s: 0.0,
-        ..config.clone()
-    };
-    if let Some(around) = &mut config.around_alarms {
-        for (path, kind) in [(&mut around.mcap, "mcap"), (&mut around.rerun, "rrd")] {
-            let stem = FileName::literal(&out.join(stem));
-            let name = format!("{}.alarm-{{date}}-{{time}}.{kind}", stem.display());
-            *path = path.take().map(|_| name.into());
-        }
-    }
-    if config.mcap.is_some() {
-        let path = out.join(format!("{stem}.mcap"));
-        config.mcap = Some(FileName::literal(&path));
-        files.push(path);
-    }
-    if let Some(rerun) = &mut config.rerun {
-        rerun.connect = None;
-        if rerun.file.is_some() {
-            let path = out.join(format!("{stem}.rrd"));
-            rerun.file = Some(FileName::literal(&path));
-            files.push(path);
-        }
-    }
-    config.writes_something().then_some(config)
 }

@@ -141,6 +141,11 @@ impl DetectionTally {
         self
     }
 
+    /// The stamp that seconds count from \[ns since the epoch\], once there was a sample.
+    pub fn start_ns(&self) -> Option<i64> {
+        self.start_ns
+    }
+
     /// Adds a sample: an event begins, goes on or ends.
     pub fn add(&mut self, sample: &Detection) {
         let start_ns = *self.start_ns.get_or_insert(sample.header.stamp_ns);

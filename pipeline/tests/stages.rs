@@ -9,8 +9,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use tauscope_bus::link::FanOut;
-use tauscope_bus::shell::Context;
 use tauscope_bus::shell::tree::{Outlet, Post, Tree, Turn, branch};
+use tauscope_bus::shell::{Context, Ledger};
 use tauscope_bus::{
     Detection, EffortUnit, Emit, JointState, LinkError, Progress, Sample, Source, Stage,
     StageError, TwinState, flags,
@@ -302,6 +302,7 @@ fn from_source_to_alarm_nothing_is_allocated_for_a_sample() {
         restarts: 0,
         from: from.to_owned(),
         health: Box::new(FanOut::new(Vec::new())),
+        ledger: Ledger::default(),
     };
     let turn = Turn::default();
     let detect: Box<dyn Stage<TwinState, Detection>> =

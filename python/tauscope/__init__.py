@@ -8,7 +8,7 @@ Recordings and results are tables in Arrow's memory layout. pyarrow, polars, pan
 Nothing is printed. Errors are exceptions: `InputError` names file, line and column where they are known.
 """
 
-from ._commands import check, evaluate, explain, info, init, replay, simulate
+from ._commands import check, evaluate, explain, info, init, query, replay, simulate
 from ._errors import InputError, Problem, TauscopeError
 from ._recording import Recording, read
 from ._results import Evaluation, Explanation, Finding, InitResult, Replay, ScoreTable, Simulation
@@ -33,6 +33,7 @@ __all__ = [
     "explain",
     "info",
     "init",
+    "query",
     "read",
     "replay",
     "simulate",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -73,6 +74,14 @@ def replay(
     folder = Path(out)
     summary, events = (read_parquet(folder / name) for name in ("summary.parquet", "events.parquet"))
     return Replay(answer.lost, answer.messages, folder, answer.json(), summary, events)
+
+
+def query(sql: str, paths: PathLike | Sequence[PathLike] = ()) -> Table:
+    """The answer to a query over recordings, manifests and folders of results; needs the program `tauscope-query`."""
+    with tempfile.TemporaryDirectory() as folder:
+        answer = Path(folder, "answer.parquet")
+        run(["query", sql, *_list(paths), f"--out={answer}", "--format=parquet"])
+        return read_parquet(answer)
 
 
 def explain(

@@ -131,3 +131,9 @@ def test_explain_finds_what_was_concealed(concealed: tauscope.Simulation, tmp_pa
     page = result._repr_html_()
     assert page is not None and page.startswith("<iframe srcdoc=") and "<html" not in page
     assert result.report_path.exists() and result.twin_path.exists()
+
+
+def test_a_query_without_its_program_says_what_builds_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(tauscope.InputError, match="tauscope-query"):
+        tauscope.query("select 1")

@@ -1,8 +1,10 @@
 //! `tauscope explain`.
 
-use std::path::PathBuf;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
 
 use tauscope_pipeline::cell::EffortUnit;
+use tauscope_pipeline::report::Problem;
 
 use super::effort_unit;
 use crate::existing::Force;
@@ -20,30 +22,24 @@ const EXPLAINED: f64 = 0.95;
 /// error falls.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A case: robot and recordings. Or name them with the options.
-    #[arg(
-        value_name = "CASE",
-        required_unless_present = "fit",
-        conflicts_with_all = [
-            "robot", "fit", "holdout", "effort_unit", "torque_constant", "twin", "twin_topic", "state_topic"
-        ]
-    )]
-    case: Option<PathBuf>,
+    /// A case, which is a YAML file that names robot and recordings; or recordings that may be fitted.
+    #[arg(value_name = "CASE|RECORDING", required_unless_present = "fit")]
+    inputs: Vec<PathBuf>,
     /// The folder that the report, the corrected twin and the predictions go to.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// The robot's URDF.
     #[arg(long, value_name = "URDF")]
     robot: Option<PathBuf>,
-    /// Recordings that may be fitted.
+    /// Recordings that may be fitted, as those without an option.
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     fit: Vec<PathBuf>,
     /// Recordings that nothing is fitted on; without them some of those to fit are held out.
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     holdout: Vec<PathBuf>,
-    /// Unit of the measured effort.
-    #[arg(long, value_parser = effort_unit(), default_value_t)]
-    effort_unit: EffortUnit,
+    /// Unit of the measured effort; N m without it.
+    #[arg(long, value_parser = effort_unit())]
+    effort_unit: Option<EffortUnit>,
     /// Torque constant of a joint in N m/A, for efforts in A; for all joints or for none.
     #[arg(long, value_name = "JOINT=CONSTANT", value_parser = super::calibrate::joint_constant)]
     torque_constant: Vec<(String, f64)>,
@@ -53,9 +49,9 @@ pub struct Args {
     /// Topic of another twin's effort, which takes the place of the URDF's.
     #[arg(long, value_name = "TOPIC")]
     twin_topic: Option<String>,
-    /// Topic of the measured joint states.
-    #[arg(long, value_name = "TOPIC", default_value = "/joint_states")]
-    state_topic: String,
+    /// Topic of the measured joint states; `/joint_states` without it.
+    #[arg(long, value_name = "TOPIC")]
+    state_topic: Option<String>,
     /// An effect that is left out of the library; may be given several times.
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
@@ -67,22 +63,58 @@ pub struct Args {
 }
 
 impl Args {
+    /// The case, if one is named.
+    ///
+    /// # Errors
+    /// Something beside it that the case itself says.
+    fn case(&self) -> Result<Option<&Path>, Failure> {
+        let is_case = |path: &PathBuf| {
+            let extension = path.extension().and_then(OsStr::to_str);
+            extension.is_some_and(|extension| matches!(extension, "yaml" | "yml"))
+        };
+        let Some(case) = self.inputs.iter().find(|path| is_case(path)) else {
+            return Ok(None);
+        };
+        let beside = [
+            ("--robot", self.robot.is_some()),
+            ("--fit", !self.fit.is_empty()),
+            ("--holdout", !self.holdout.is_empty()),
+            ("--effort-unit", self.effort_unit.is_some()),
+            ("--torque-constant", !self.torque_constant.is_empty()),
+            ("--twin", self.twin.is_some()),
+            ("--twin-topic", self.twin_topic.is_some()),
+            ("--state-topic", self.state_topic.is_some()),
+            ("another file", self.inputs.len() > 1),
+        ];
+        if let Some((what, _)) = beside.iter().find(|(_, given)| *given) {
+            let title = format!(
+                "{}: {what} goes with recordings, not with a case",
+                case.display()
+            );
+            let help = "a case names robot and recordings itself: leave the rest out, or name the \
+                        recordings in place of the case";
+            return Err(Failure::Rejected(Problem::new(title).help(help).into()));
+        }
+        Ok(Some(case))
+    }
+
     fn request(&self) -> Result<Request, Failure> {
         let without = explain::without(&self.without)?;
-        let Some(case) = &self.case else {
-            let arguments = Arguments {
-                robot: self.robot.as_deref(),
-                effort_unit: self.effort_unit,
-                torque_constants_nm_per_a: self.torque_constant.iter().cloned().collect(),
-                twin: self.twin.as_deref(),
-                twin_topic: self.twin_topic.as_deref(),
-                state_topic: &self.state_topic,
-                fit: &self.fit,
-                holdout: &self.holdout,
-            };
-            return Ok(explain::from_arguments(&arguments, without)?);
+        if let Some(case) = self.case()? {
+            return Ok(explain::from_case(case, without)?);
+        }
+        let fit: Vec<PathBuf> = self.inputs.iter().chain(&self.fit).cloned().collect();
+        let arguments = Arguments {
+            robot: self.robot.as_deref(),
+            effort_unit: self.effort_unit.unwrap_or_default(),
+            torque_constants_nm_per_a: self.torque_constant.iter().cloned().collect(),
+            twin: self.twin.as_deref(),
+            twin_topic: self.twin_topic.as_deref(),
+            state_topic: self.state_topic.as_deref().unwrap_or("/joint_states"),
+            fit: &fit,
+            holdout: &self.holdout,
         };
-        Ok(explain::from_case(case, without)?)
+        Ok(explain::from_arguments(&arguments, without)?)
     }
 }
 

@@ -61,6 +61,9 @@ pub struct Args {
     /// Where contacts, incidents and history are kept (SQLite); with `--serve` fleet.sqlite if nothing else is given.
     #[arg(long, value_name = "FILE")]
     store: Option<PathBuf>,
+    /// The folder of the nightly tables of `tauscope physics`: the page shows each arm's physics over weeks.
+    #[arg(long, value_name = "DIR")]
+    physics: Option<PathBuf>,
     /// End after so many seconds.
     #[arg(long, value_name = "SECONDS")]
     seconds: Option<u64>,
@@ -107,6 +110,7 @@ fn options(args: &Args) -> Options {
         },
         expected: args.expect.clone(),
         store: args.store.clone().or(by_default),
+        physics: args.physics.clone(),
     }
 }
 

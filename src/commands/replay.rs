@@ -1,5 +1,7 @@
 //! `tauscope replay`.
 
+pub mod archive;
+
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -27,13 +29,24 @@ use crate::progress::Progress;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// MCAP files, rosbag2 folders, `.db3` bags, ROS 1 bags, or tables (`.csv`, if the pipeline's source is one).
-    #[arg(required = true)]
+    #[arg(required_unless_present = "manifest", conflicts_with = "manifest")]
     recordings: Vec<PathBuf>,
+    /// Instead of recordings: a file of `tauscope manifest`. Each of its recordings becomes one Parquet file in --out, named
+    /// by the hash of all that it depends on. What is there is not done again.
+    #[arg(long, value_name = "FILE", requires = "out", conflicts_with_all = ["force", "source"])]
+    manifest: Option<PathBuf>,
+    /// The part of the manifest to work on: 0/16 to 15/16.
+    #[arg(long, value_name = "INDEX/COUNT", requires = "manifest")]
+    shard: Option<archive::Shard>,
+    /// With --manifest: also a row for each sample that a detector judged.
+    #[arg(long, requires = "manifest")]
+    scores: bool,
     /// The pipeline file.
     #[arg(long, default_value = "pipeline.yaml")]
     pipeline: PathBuf,
     /// Folder for the results: an archive (and picture) per recording as the pipeline's recorder says,
-    /// `summary.parquet` and `events.parquet` over all. Without it nothing is written.
+    /// `summary.parquet` and `events.parquet` over all. Without it nothing is written. With --manifest, a folder or its
+    /// URL: `cell=CELL/day=DAY/HASH.parquet` (docs/results.md).
     #[arg(long)]
     out: Option<PathBuf>,
     /// How many recordings are worked on at once.
@@ -71,6 +84,18 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     check_names(args)?;
     for warning in pipeline.warnings(None) {
         out.say(&format!("warning: {warning}"));
+    }
+    if let (Some(manifest), Some(folder)) = (&args.manifest, &args.out) {
+        let job = archive::Job {
+            manifest,
+            shard: args.shard,
+            out: &folder.to_string_lossy(),
+            jobs: args.jobs,
+            twin: args.twin,
+            with_scores: args.scores,
+            json: args.json,
+        };
+        return archive::run(&job, &pipeline, out);
     }
     let replay = Replay::new(&pipeline, args.source.as_deref(), args.twin)
         .map_err(|error| Failure::rejected(error.to_string()))?;

@@ -23,7 +23,8 @@ pub(super) fn certificates(endpoint: &str) -> Vec<PathBuf> {
         .split_once('#')
         .map_or("", |(_, settings)| settings);
     let pairs = settings.split(';').filter_map(|pair| pair.split_once('='));
-    let files = pairs.filter(|(key, _)| key.ends_with("certificate"));
+    let files =
+        pairs.filter(|(key, _)| key.ends_with("certificate") || key.ends_with("certificate_file"));
     files.map(|(_, path)| PathBuf::from(path)).collect()
 }
 
@@ -50,7 +51,8 @@ mod tests {
 
     #[test]
     fn an_endpoint_names_an_address_and_certificates() {
-        let endpoint = "tls/cell:7447?prio=1#root_ca_certificate=ca.pem;connect_private_key=k.pem;\
+        // Inline certificates have a key without `_file`; a path under either is looked at.
+        let endpoint = "tls/cell:7447?prio=1#root_ca_certificate_file=ca.pem;connect_private_key_file=k.pem;\
                         connect_certificate=own.pem";
         assert_eq!(address(endpoint), Some("cell:7447"));
         assert_eq!(

@@ -30,6 +30,8 @@ pub struct Facts {
     pub clock_source: Option<String>,
     /// Whether something keeps the clock with that of others.
     pub clock_synchronised: Option<bool>,
+    /// By how much the clock may be wrong at most \[s\], as chrony says.
+    pub clock_error_s: Option<f64>,
     /// Files a process may have open; `None` for any number.
     pub open_files: Option<u64>,
     /// Memory a process may lock \[bytes\]; `None` for all.
@@ -68,10 +70,21 @@ pub struct Endpoint {
     pub of: String,
     /// As the file has it.
     pub at: String,
-    /// It is listened on there; else connected to.
-    pub listens: bool,
+    /// What it is to the stage.
+    pub is: Way,
     /// Whether that is possible, or why not.
     pub possible: Result<(), String>,
+}
+
+/// What an endpoint is to a stage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Way {
+    /// It is listened on there.
+    Listen,
+    /// A router or another host is connected to.
+    Connect,
+    /// The robot's controller is.
+    Controller,
 }
 
 /// Reads the machine, and what `pipeline` needs of it on `host`.
@@ -86,6 +99,7 @@ pub fn read(pipeline: Option<&Pipeline>, host: Option<&str>) -> Facts {
         ),
         clock_source: line_of("/sys/devices/system/clocksource/clocksource0/current_clocksource"),
         clock_synchronised: clock_synchronised(),
+        clock_error_s: clock_error_s(),
         open_files: getrlimit(Resource::Nofile).current,
         locked_bytes: getrlimit(Resource::Memlock).current,
         now_s: now.map_or(0, |since| since.as_secs() as i64),
@@ -114,14 +128,14 @@ pub fn read(pipeline: Option<&Pipeline>, host: Option<&str>) -> Facts {
                     .listen
                     .0
                     .iter()
-                    .map(|at| (name.clone(), at.clone(), true)),
+                    .map(|at| (name.clone(), at.clone(), Way::Listen)),
             );
             endpoints.extend(
                 entry
                     .connect
                     .0
                     .iter()
-                    .map(|at| (name.clone(), at.clone(), false)),
+                    .map(|at| (name.clone(), at.clone(), Way::Connect)),
             );
         }
     }
@@ -146,6 +160,22 @@ pub(super) fn shared_memory() -> Result<u64, String> {
 
 fn line_of(path: &str) -> Option<String> {
     Some(fs::read_to_string(path).ok()?.trim().to_owned())
+}
+
+/// What chrony's manual gives as the bound: the offset, the root dispersion and half of the root delay.
+fn clock_error_s() -> Option<f64> {
+    let asked = Command::new("chronyc").args(["-c", "tracking"]).output();
+    let said = asked.ok().filter(|asked| asked.status.success())?;
+    tracked_error_s(&String::from_utf8_lossy(&said.stdout))
+}
+
+/// The bound from a line of `chronyc -c tracking`.
+pub(super) fn tracked_error_s(line: &str) -> Option<f64> {
+    let fields: Vec<&str> = line.trim().split(',').collect();
+    let number = |at: usize| fields.get(at)?.parse::<f64>().ok();
+    // Stratum 0 follows nobody.
+    (number(2)? > 0.0).then_some(())?;
+    Some(number(4)?.abs() + number(11)? + 0.5 * number(10)?)
 }
 
 /// As systemd says it, or the file that its client leaves; nothing where neither is there.
@@ -189,46 +219,48 @@ fn bytes_a_day(folder: &Path) -> Option<f64> {
     (seconds > 1.0).then(|| recording.bytes() as f64 / seconds * 86_400.0)
 }
 
-/// Adds the endpoints of a stage: its name, the endpoint, and whether it is listened on.
-fn endpoints_of(stage: &Stage, endpoints: &mut Vec<(String, String, bool)>) {
-    let mut add = |at: &[String], listens| {
-        let of = |at: &String| (stage.name.clone(), at.clone(), listens);
+/// Adds the endpoints of a stage: its name, the endpoint, and what that is to it.
+fn endpoints_of(stage: &Stage, endpoints: &mut Vec<(String, String, Way)>) {
+    let mut add = |at: &[String], is| {
+        let of = |at: &String| (stage.name.clone(), at.clone(), is);
         endpoints.extend(at.iter().map(of));
     };
     match &stage.settings {
         Settings::Ingest(config) => {
             if let Some(zenoh) = &config.zenoh {
-                add(&zenoh.listen, true);
-                add(&zenoh.connect, false);
+                add(&zenoh.listen, Way::Listen);
+                add(&zenoh.connect, Way::Connect);
+            }
+            if let Some(ur) = &config.ur_rtde {
+                add(&[format!("tcp/{}:{}", ur.host, ur.port)], Way::Controller);
             }
             if let Some(commands) = &config.commands {
-                add(&commands.listen, true);
-                add(&commands.connect, false);
+                add(&commands.listen, Way::Listen);
+                add(&commands.connect, Way::Connect);
             }
         }
         Settings::Publish { config, .. } => {
             if let Some(zenoh) = &config.zenoh {
-                add(&zenoh.listen, true);
-                add(&zenoh.connect, false);
+                add(&zenoh.listen, Way::Listen);
+                add(&zenoh.connect, Way::Connect);
             }
             if let Some(modbus) = &config.modbus {
-                add(&[format!("tcp/{}", modbus.listen)], true);
+                add(&[format!("tcp/{}", modbus.listen)], Way::Listen);
             }
         }
         _ => {}
     }
 }
 
-fn tried((of, endpoint, listens): (String, String, bool)) -> Option<Endpoint> {
+fn tried((of, endpoint, is): (String, String, Way)) -> Option<Endpoint> {
     let address = endpoint::address(&endpoint)?;
-    let tried = if listens {
-        endpoint::is_free(address)
-    } else {
-        endpoint::answers(address)
+    let tried = match is {
+        Way::Listen => endpoint::is_free(address),
+        Way::Connect | Way::Controller => endpoint::answers(address),
     };
     Some(Endpoint {
         of,
-        listens,
+        is,
         possible: tried.map_err(|error| error.to_string()),
         at: endpoint,
     })

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::facts::{Endpoint, Facts, Folder, SHARED_MEMORY, Validity};
+use super::facts::{Endpoint, Facts, Folder, SHARED_MEMORY, Validity, Way};
 use super::{Level, Verdict};
 
 /// Shared memory without which no run is begun \[MB\]. The bundled pipeline, whose stages keep up, touches
@@ -21,6 +21,10 @@ const SOON_DAYS: i64 = 30;
 /// A disk that lasts for fewer days is told of.
 /// Resolution: time to notice over a weekend.
 const FEW_DAYS: f64 = 3.0;
+/// A clock that may be wrong by more is told of \[s\]: two hosts that are wrong by as much each are told apart by less
+/// than two samples at 100 Hz.
+/// Resolution: the rate of the slowest usual robot.
+const CLOCK_ERROR_S: f64 = 0.01;
 /// Clock sources that are slow to read.
 const SLOW_CLOCKS: [&str; 4] = ["acpi_pm", "hpet", "jiffies", "pit"];
 
@@ -38,6 +42,7 @@ pub fn all(facts: &Facts) -> Vec<Verdict> {
     verdicts.extend(facts.left_behind.as_ref().map(left_behind));
     verdicts.push(clock_source(facts.clock_source.as_deref()));
     verdicts.push(clock_synchronised(facts.clock_synchronised));
+    verdicts.extend(facts.clock_error_s.map(clock_offset));
     verdicts.push(open_files(facts.open_files));
     verdicts.push(locked(facts.locked_bytes));
     verdicts.extend(facts.folders.iter().map(folder));
@@ -116,6 +121,21 @@ fn clock_synchronised(synchronised: Option<bool>) -> Verdict {
     }
 }
 
+/// Two hosts that keep to one time differ by no more than both are wrong.
+fn clock_offset(error_s: f64) -> Verdict {
+    const CHECK: &str = "clock offset";
+    let found = format!(
+        "at most {:.3} ms from that of the time servers",
+        error_s * 1e3
+    );
+    if error_s <= CLOCK_ERROR_S {
+        return Verdict::ok(CHECK, found);
+    }
+    let remedy = "wait until chrony has settled (`chronyc tracking`), or give it a nearer server, the same \
+                  one on all hosts; PTP where that is not enough";
+    Verdict::bad(CHECK, Level::Warning, found, remedy)
+}
+
 fn open_files(limit: Option<u64>) -> Verdict {
     const CHECK: &str = "open files";
     match limit {
@@ -181,22 +201,30 @@ fn endpoint(endpoint: &Endpoint) -> Verdict {
     let Endpoint {
         of,
         at,
-        listens,
+        is,
         possible,
     } = endpoint;
     // Its settings may hold what is nobody's business.
     let shown = at.split(['?', '#']).next().unwrap_or(at);
-    match (possible, listens) {
-        (Ok(()), true) => Verdict::ok("port", format!("{of}: {shown} is free")),
-        (Ok(()), false) => Verdict::ok("peer", format!("{of}: {shown} answers")),
-        (Err(error), true) => Verdict::bad(
+    match (possible, is) {
+        (Ok(()), Way::Listen) => Verdict::ok("port", format!("{of}: {shown} is free")),
+        (Ok(()), Way::Connect) => Verdict::ok("peer", format!("{of}: {shown} answers")),
+        (Ok(()), Way::Controller) => Verdict::ok("controller", format!("{of}: {shown} answers")),
+        (Err(error), Way::Controller) => Verdict::bad(
+            "controller",
+            Level::Error,
+            format!("{of} cannot reach the robot's controller at {shown}: {error}"),
+            "switch it on, compare `host` with the address that it shows, allow RTDE in its settings \
+             (Security, Services), and look at cable and firewall",
+        ),
+        (Err(error), Way::Listen) => Verdict::bad(
             "port",
             Level::Error,
             format!("{of} cannot listen on {shown}: {error}"),
             "end the program that listens there (`ss -ltnp` names it; it may be this pipeline), or \
              give another port",
         ),
-        (Err(error), false) => Verdict::bad(
+        (Err(error), Way::Connect) => Verdict::bad(
             "peer",
             Level::Error,
             format!("{of} cannot reach {shown}: {error}"),

@@ -36,6 +36,37 @@ pub struct Request {
     pub holdout: Vec<Named>,
     /// Effects that are left out of the library.
     pub without: BTreeSet<String>,
+    /// How much of each recording is read \[s\].
+    pub longest_s: f64,
+}
+
+impl Request {
+    /// Recordings of a cell, beside its twin if it has one.
+    ///
+    /// # Errors
+    /// Everything that is wrong with the files.
+    pub fn of_cell(
+        cell: Cell,
+        state_topic: &str,
+        twin: Option<PathBuf>,
+        recordings: &[PathBuf],
+    ) -> Result<Self, Report> {
+        let assembly = Assembly {
+            robot: None,
+            effort_unit: cell.facts.effort_unit,
+            constants: None,
+            joint_names: Some(cell.facts.joint_names.clone()),
+            twin,
+            twin_topic: None,
+            state_topic: state_topic.to_owned(),
+            fit: recordings.to_vec(),
+            holdout: Vec::new(),
+            problem: &|_, title| Problem::new(title),
+        };
+        let name = cell.facts.name.clone();
+        let request = assembly.request(Some(name), BTreeSet::new())?;
+        Ok(Self { cell, ..request })
+    }
 }
 
 /// A recording and the name it goes by, which no other has.

@@ -55,6 +55,7 @@ pub fn read(request: &Request, progress: &dyn Fn(f64, &str)) -> Result<Input, Re
     let topics = RecordingTopics {
         state: request.state_topic.clone(),
         reference: request.twin_topic.clone(),
+        longest_s: request.longest_s,
     };
     let count = (request.fit.len() + request.holdout.len()) as f64;
     let mut report = Report::default();

@@ -42,6 +42,12 @@ pub(super) fn crews(
         let root = here.get(&roots[at]).copied().unwrap_or(index);
         stages.push(Local::new(at, seat, place, root));
     }
+    // They die together: of what they say of another life, the strictest holds.
+    for index in 0..stages.len() {
+        let policy = pipeline.stages[stages[index].at].restart;
+        let root = stages[index].root;
+        stages[root].restart_by(policy);
+    }
     (stages, crews)
 }
 
@@ -136,6 +142,7 @@ impl Supervisor<'_> {
         let in_order = status.as_ref().is_ok_and(ExitStatus::success);
         if let ([only], true, true) = (stages.as_slice(), self.crews[crew].outside, in_order)
             && !self.stages[*only].was_killed()
+            && !self.stages[*only].returns_always()
         {
             self.stages[*only].end();
             return;

@@ -5,9 +5,11 @@ use std::time::Duration;
 
 use tauscope_bus::shell::{Line, Outcome, Report};
 use tauscope_bus::{SampleKind, Seat, Trouble};
+use tauscope_pipeline::pipeline::{Restart, When};
 use tokio::time::Instant;
 
 use super::flow::Flow;
+use super::ledger::Kept;
 use super::patience::{Overdue, Patience};
 use super::restart::Deaths;
 use super::silence::Silence;
@@ -28,6 +30,9 @@ pub struct Local {
     pub tally: Tally,
     state: State,
     deaths: Deaths,
+    /// When it is started again; of a tree its first stage knows.
+    policy: Option<Restart>,
+    pulse: Pulse,
     /// No life follows this one.
     last_life: bool,
     /// It has said in this life that it begins.
@@ -42,6 +47,17 @@ pub struct Local {
     killed: bool,
     /// By when it should have ended by itself.
     finish_by: Option<Instant>,
+    /// What it keeps beyond its death; without it, its reports must do.
+    kept: Option<Kept>,
+}
+
+/// Whether it lives, in this life.
+#[derive(Debug, Default)]
+struct Pulse {
+    /// When it last said how it fares.
+    heard: Option<Instant>,
+    /// It was told that it hangs.
+    hangs: bool,
 }
 
 #[derive(Debug)]
@@ -74,8 +90,10 @@ pub enum Reported<'a> {
 
 impl Local {
     /// A stage that is to be started.
-    pub fn new(at: usize, seat: Seat, crew: usize, root: usize) -> Self {
+    pub fn new(at: usize, mut seat: Seat, crew: usize, root: usize) -> Self {
         let now = Instant::now();
+        let kept = Kept::new(seat.inputs.len()).ok();
+        seat.ledger = kept.as_ref().map(Kept::path);
         Self {
             at,
             seat,
@@ -84,6 +102,8 @@ impl Local {
             tally: Tally::default(),
             state: State::Waiting(now),
             deaths: Deaths::default(),
+            policy: None,
+            pulse: Pulse::default(),
             last_life: false,
             ready: false,
             flow: Flow::new(now.into_std()),
@@ -91,6 +111,7 @@ impl Local {
             patience: None,
             killed: false,
             finish_by: None,
+            kept,
         }
     }
 
@@ -128,6 +149,7 @@ impl Local {
     pub fn started(&mut self) {
         self.state = State::Running;
         self.ready = false;
+        self.pulse = Pulse::default();
         self.patience = None;
     }
 
@@ -177,6 +199,7 @@ impl Local {
             Err(_) => return Reported::Other(line),
         }
         let now = Instant::now();
+        self.pulse.heard = Some(now);
         let moved = self.flow.note(self.samples(), now.into_std());
         if let Some(patience) = self.patience.as_mut().filter(|_| moved) {
             patience.extend(now);
@@ -221,7 +244,42 @@ impl Local {
 
     /// Notes a death of its tree, and says after what time it is started again, if it is.
     pub fn note_death(&mut self) -> Option<Duration> {
-        self.deaths.note(std::time::Instant::now())
+        let policy = self.policy.unwrap_or_default();
+        self.deaths.note(&policy, std::time::Instant::now())
+    }
+
+    /// Its tree is started again by this policy, too.
+    pub fn restart_by(&mut self, policy: Restart) {
+        let policy = self.policy.map_or(policy, |own| own.strictest(policy));
+        self.policy = Some(policy);
+    }
+
+    /// Whether it is started again although it ended in order.
+    pub fn returns_always(&self) -> bool {
+        let always = self
+            .policy
+            .is_some_and(|policy| policy.when == When::Always);
+        always && !self.last_life && self.patience.is_none()
+    }
+
+    /// For how long it has not said how it fares, which a stage does ten times a second while it runs. Not of one that
+    /// has never said it in this life: it waits for others, or does not speak.
+    pub fn unheard_for(&self, now: Instant) -> Option<Duration> {
+        let heard = self
+            .pulse
+            .heard
+            .filter(|_| self.is_running() && !self.is_done());
+        heard.map(|heard| now.duration_since(heard))
+    }
+
+    /// Notes whether it hangs; true if that is new.
+    pub fn note_hangs(&mut self, hangs: bool) -> bool {
+        std::mem::replace(&mut self.pulse.hangs, hangs) != hangs
+    }
+
+    /// Whether it hangs, as far as was noted.
+    pub fn hangs(&self) -> bool {
+        self.pulse.hangs
     }
 
     /// It has ended in order.
@@ -231,6 +289,7 @@ impl Local {
 
     /// It died, and is started again after this time, if it is.
     pub fn die(&mut self, again: Option<Duration>) {
+        self.settle();
         self.state = match again {
             Some(wait) => {
                 self.next_life();
@@ -240,10 +299,28 @@ impl Local {
         };
     }
 
+    /// Takes over what it has noted since its last report, and makes room for the next life. One that has said itself
+    /// how it ended has counted all.
+    fn settle(&mut self) {
+        let Some(kept) = &self.kept else { return };
+        if let (false, Ok(account)) = (self.is_done(), kept.account()) {
+            let from = self.seat.inputs.iter().map(|input| input.from.as_str());
+            self.tally.settle(&account, from);
+        }
+        // What cannot be cleared is not to be read any more.
+        if kept.clear().is_err() {
+            self.kept = None;
+            self.seat.ledger = None;
+        }
+    }
+
     /// Makes the seat of the next life out of what the last one has said.
     fn next_life(&mut self) {
         let last: Report = self.tally.end_life();
         self.seat.restarts += 1;
+        if let Some(output) = &mut self.seat.output {
+            output.former = self.tally.sums().emitted;
+        }
         for (input, report) in self.seat.inputs.iter_mut().zip(&last.inputs) {
             input.resume = report.position.or(input.resume);
         }

@@ -66,6 +66,8 @@ impl Process {
         events: mpsc::Sender<(M, Event)>,
     ) -> anyhow::Result<Self> {
         let mut child = command
+            // The run speaks for itself to whoever started it as a service.
+            .env_remove("NOTIFY_SOCKET")
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())

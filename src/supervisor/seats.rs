@@ -24,6 +24,9 @@ const DEPTH_TOLD: usize = 256;
 /// Most memory of the samples that wait for slow listeners, by stream \[bytes\]: 17 s of joint states at 1 kHz.
 /// Resolution: memory, against the pause of a recorder that costs nothing.
 const SPILL_BYTES: usize = 16 << 20;
+/// The same where they listen on other hosts: 60 s of twin states at 1 kHz.
+/// Resolution: memory, against the cut of a network that costs nothing.
+const SPILL_ACROSS_HOSTS_BYTES: usize = 64 << 20;
 /// Samples for recorders and publishers are sent together so often \[ms\].
 /// Resolution: how often a process wakes up, against the delay of a recording.
 const SPILL_LINGER_MS: u64 = 5;
@@ -205,6 +208,7 @@ impl Planner<'_> {
         Output {
             stream: self.pipeline.stages[at].stream(),
             kind,
+            former: 0,
             links: self.ways(at, kind, &listeners),
         }
     }
@@ -217,6 +221,7 @@ impl Planner<'_> {
         Output {
             stream: health_stream(&self.pipeline.stages[at].stream()),
             kind: SampleKind::Health,
+            former: 0,
             links: self.ways(at, SampleKind::Health, &listeners),
         }
     }
@@ -240,7 +245,10 @@ impl Planner<'_> {
             };
             let ours = !matches!(self.pipeline.stages[at].settings, Settings::Outside(_));
             let spill = (may_block && ours).then(|| SpillSettings {
-                bytes: SPILL_BYTES,
+                bytes: match over {
+                    Over::Zenoh => SPILL_ACROSS_HOSTS_BYTES,
+                    Over::InProcess | Over::SharedMemory => SPILL_BYTES,
+                },
                 linger_ms: if all_take { SPILL_LINGER_MS } else { 0 },
                 waits: self.source_can_wait(at),
             });

@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
-use tauscope_bus::{SampleKind, Trouble};
+use tauscope_bus::{ReceiverCounts, SampleKind, Trouble};
 use tauscope_pipeline::pipeline::Pipeline;
+use tauscope_pipeline::settings::Settings;
 
 use super::local::Local;
 use crate::exit::Exit;
@@ -61,6 +62,8 @@ pub struct StageSummary {
     pub failed: bool,
     /// Whether it did not end when it was told to, and was killed.
     pub killed: bool,
+    /// Whether it is a live source that died and came back: what its robot said meanwhile, nobody counted.
+    pub unknown_loss: bool,
     /// What kept it from getting anything it could use, to the end.
     pub trouble: Option<Trouble>,
     /// The files that a recorder completed last.
@@ -69,7 +72,7 @@ pub struct StageSummary {
     pub files_completed: u64,
 }
 
-/// One link.
+/// One link. Its books balance: what was emitted was received or dropped, to the sample.
 #[derive(Debug, Clone, Serialize)]
 pub struct LinkSummary {
     /// The stage it comes from.
@@ -78,105 +81,52 @@ pub struct LinkSummary {
     pub to: String,
     /// What it ran over.
     pub over: Over,
-    /// Samples sent, where the sender is here.
+    /// Samples sent; where the sender is on another host, as far as the receiver knows.
     pub emitted: Option<u64>,
     /// Samples received, where the receiver is here.
     pub received: Option<u64>,
-    /// Samples that did not arrive.
+    /// Samples that did not arrive, or that the receiver had to refuse.
     pub dropped: u64,
+    /// Whether the receiver, where it is here, has heard the end of the stream: without it nobody knows what else was
+    /// sent.
+    pub ended: Option<bool>,
+    /// Messages of somebody who is not the sender; they were refused.
+    pub foreign: u64,
+    /// Samples that were received and never sent. There can be none: the counts are wrong then.
+    pub surplus: u64,
 }
 
 impl Summary {
     /// Adds up what the stages have reported.
     pub fn new(pipeline: &Pipeline, links: &[Link], stages: &[Local], ended: Ended) -> Self {
-        let mut summary = Self::reported(pipeline, links, stages, ended);
-        summary.count_what_was_missed();
-        for at in 0..summary.stages.len() {
-            summary.count_unreported(at);
+        let here = |at: usize| stages.iter().find(|stage| stage.at == at);
+        let name = |at: usize| pipeline.stages[at].name.clone();
+        let mut summary = Self {
+            ended,
+            links: Vec::new(),
+            stages: (stages.iter())
+                .map(|stage| StageSummary::new(stage, &pipeline.stages[stage.at].settings))
+                .collect(),
+        };
+        for link in links {
+            let books = Books {
+                sender: here(link.from),
+                receiver: here(link.to),
+                link,
+            };
+            let counted = books.balance();
+            summary.links.extend(counted.map(|counted| LinkSummary {
+                from: name(link.from),
+                to: name(link.to),
+                over: link.over,
+                ..counted
+            }));
+        }
+        for stage in &mut summary.stages {
+            let mine = summary.links.iter().filter(|link| link.to == stage.stage);
+            stage.dropped += mine.map(|link| link.dropped).sum::<u64>();
         }
         summary
-    }
-
-    /// A stage that was killed has sent more than it lived to report, as its listeners know. Those in its process heard
-    /// each sample before anybody else did, and died with it.
-    fn count_unreported(&mut self, at: usize) {
-        let Self { stages, links, .. } = self;
-        let StageSummary {
-            restarts, failed, ..
-        } = stages[at];
-        if restarts == 0 && !failed {
-            return;
-        }
-        let name = stages[at].stage.clone();
-        let mine = |link: &&mut LinkSummary| link.from == name;
-        let known = links.iter_mut().filter(mine);
-        let known = known.map(|link| link.received.map_or(0, |received| received + link.dropped));
-        let emitted = stages[at].emitted.max(known.max().unwrap_or(0));
-        stages[at].emitted = emitted;
-        for link in links.iter_mut().filter(mine) {
-            link.emitted = Some(emitted);
-            if link.over != Over::InProcess {
-                continue;
-            }
-            link.received = Some(emitted - link.dropped.min(emitted));
-            let listener = stages.iter_mut().find(|stage| stage.stage == link.to);
-            if let (Some(listener), Some(received)) = (listener, link.received) {
-                listener.received = received;
-            }
-        }
-    }
-
-    /// What went to a stage while it was not there is lost, too, though nobody has seen a hole: it died and was not back
-    /// yet, or had no further life, or came later than the one it hears would wait.
-    fn count_what_was_missed(&mut self) {
-        for stage in self.stages.iter_mut().filter(|stage| stage.reported) {
-            for link in self.links.iter_mut().filter(|link| link.to == stage.stage) {
-                // Nothing is on its way there, and both ends live and die together.
-                if link.over == Over::InProcess {
-                    continue;
-                }
-                let (Some(emitted), Some(received)) = (link.emitted, link.received) else {
-                    continue;
-                };
-                let missed = emitted.saturating_sub(received + link.dropped);
-                link.dropped += missed;
-                stage.dropped += missed;
-            }
-        }
-    }
-
-    fn reported(pipeline: &Pipeline, links: &[Link], stages: &[Local], ended: Ended) -> Self {
-        let here = |at: usize| stages.iter().find(|stage| stage.at == at);
-        let links = links.iter().filter_map(|link| {
-            let (sender, receiver) = (here(link.from), here(link.to));
-            if sender.is_none() && receiver.is_none() {
-                return None;
-            }
-            let emitted = sender.map(|stage| stage.tally.sums().emitted);
-            let counts = receiver.map(|stage| {
-                let is_it = |input: &tauscope_bus::seat::Input| input.stream == link.stream;
-                let place = stage.seat.inputs.iter().position(is_it);
-                let counts = stage.tally.sums().inputs;
-                place
-                    .and_then(|place| counts.get(place).copied())
-                    .unwrap_or_default()
-            });
-            // What another host received is known there; here, what its stages were not there for.
-            let undelivered = || sender.map_or(0, |stage| stage.tally.sums().undelivered);
-            Some(LinkSummary {
-                from: pipeline.stages[link.from].name.clone(),
-                to: pipeline.stages[link.to].name.clone(),
-                over: link.over,
-                emitted,
-                received: counts.map(|counts| counts.received),
-                dropped: counts.map_or_else(undelivered, |counts| counts.lost),
-            })
-        });
-        Self {
-            ended,
-            links: links.collect(),
-            stages: stages.iter().map(StageSummary::new).collect(),
-        }
     }
 
     /// How the run ended.
@@ -184,8 +134,11 @@ impl Summary {
         if self.ended == Ended::NoData || self.stages.iter().any(|stage| stage.failed) {
             return Exit::Failed;
         }
-        let dropped = self.stages.iter().any(|stage| stage.dropped > 0);
-        Exit::from_loss(dropped || self.links.iter().any(|link| link.dropped > 0))
+        let stages = &self.stages;
+        let dropped = stages.iter().any(|it| it.dropped > 0 || it.unknown_loss);
+        let balances = |link: &LinkSummary| link.dropped == 0 && link.surplus == 0;
+        let whole = |link: &LinkSummary| balances(link) && link.ended != Some(false);
+        Exit::from_loss(dropped || !self.links.iter().all(whole))
     }
 
     /// As tables.
@@ -250,21 +203,110 @@ impl Summary {
                 None => {}
             }
         }
+        for line in self.warnings() {
+            text += &format!("\n\nwarning: {line}");
+        }
         text
+    }
+
+    /// What else nobody should miss.
+    fn warnings(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        for stage in self.stages.iter().filter(|stage| stage.unknown_loss) {
+            let name = &stage.stage;
+            lines.push(format!(
+                "stage `{name}` died and came back: what its robot said meanwhile is lost, and not counted"
+            ));
+        }
+        for link in &self.links {
+            let LinkSummary { from, to, .. } = link;
+            if link.ended == Some(false) {
+                lines.push(format!(
+                    "stage `{to}` has not heard the end of the stream of `{from}`: more may have been sent"
+                ));
+            }
+            if link.foreign > 0 {
+                let foreign = link.foreign;
+                lines.push(format!(
+                    "{foreign} messages in the stream of `{from}` to `{to}` were not from `{from}`, and were refused"
+                ));
+            }
+            if link.surplus > 0 {
+                let surplus = link.surplus;
+                lines.push(format!(
+                    "stage `{to}` has received {surplus} samples more than `{from}` has sent: the counts are wrong"
+                ));
+            }
+        }
+        lines
+    }
+}
+
+/// The two ends of a link, as far as they are here.
+struct Books<'a> {
+    sender: Option<&'a Local>,
+    receiver: Option<&'a Local>,
+    link: &'a Link,
+}
+
+impl Books<'_> {
+    /// What became of the samples; none for a link between other hosts.
+    fn balance(&self) -> Option<LinkSummary> {
+        let sender = self.sender.filter(|stage| stage.tally.is_known());
+        let receiver = self.receiver.filter(|stage| stage.tally.is_known());
+        if self.sender.is_none() && self.receiver.is_none() {
+            return None;
+        }
+        let sent = sender.map(|stage| stage.tally.sums());
+        let heard = receiver.map(|stage| self.heard(stage));
+        let (counts, ended) = heard.unwrap_or_default();
+        let emitted = match &sent {
+            Some(sums) => Some(sums.emitted),
+            None => heard.map(|_| counts.received.saturating_add(counts.dropped())),
+        };
+        let dropped = match (&sent, heard) {
+            (Some(sums), Some(_)) => sums.emitted.saturating_sub(counts.received),
+            // What another host received is known there; here, what it has not taken.
+            (Some(sums), None) => sums.undelivered.min(sums.emitted),
+            _ => counts.dropped(),
+        };
+        let surplus = match &sent {
+            Some(sums) => counts.received.saturating_sub(sums.emitted),
+            None => 0,
+        };
+        Some(LinkSummary {
+            from: String::new(),
+            to: String::new(),
+            over: self.link.over,
+            emitted,
+            received: heard.map(|_| counts.received),
+            dropped,
+            ended: heard.map(|_| ended),
+            foreign: counts.foreign,
+            surplus,
+        })
+    }
+
+    /// What the receiver has counted, and whether the stream has ended.
+    fn heard(&self, receiver: &Local) -> (ReceiverCounts, bool) {
+        let is_it = |input: &tauscope_bus::seat::Input| input.stream == self.link.stream;
+        let Some(place) = receiver.seat.inputs.iter().position(is_it) else {
+            return <_>::default();
+        };
+        let counts = receiver.tally.sums().inputs;
+        let newest = receiver.tally.newest().inputs.get(place);
+        let counts = counts.get(place).copied().unwrap_or_default();
+        (counts, newest.is_some_and(|input| input.ended))
     }
 }
 
 impl StageSummary {
-    fn new(stage: &Local) -> Self {
+    fn new(stage: &Local, settings: &Settings) -> Self {
         let sums = stage.tally.sums();
         let inputs = stage.seat.inputs.iter().zip(&sums.inputs);
         // Health reports come along with what is recorded; they are not what is asked for here.
         let data = inputs.filter(|(input, _)| input.kind != SampleKind::Health);
-        let (mut received, mut lost) = (0, 0);
-        for (_, counts) in data {
-            received += counts.received;
-            lost += counts.lost;
-        }
+        let mut received = data.map(|(_, counts)| counts.received).sum();
         if stage.seat.inputs.is_empty() {
             received = sums.emitted + sums.refused;
         }
@@ -274,14 +316,26 @@ impl StageSummary {
             reported: stage.tally.is_known(),
             received,
             emitted: sums.emitted,
-            dropped: lost + sums.refused,
+            dropped: sums.refused,
             restarts: stage.seat.restarts,
             failed: stage.is_lost(),
             killed: stage.was_killed(),
+            unknown_loss: is_live_source(settings) && stage.seat.restarts > 0,
             trouble: stage.silence.trouble().cloned(),
             files: stage.tally.newest().files.clone(),
             files_completed: sums.files_completed,
         }
+    }
+}
+
+/// Whether it listens to a robot, which does not wait for it; what an outside program does is not known.
+fn is_live_source(settings: &Settings) -> bool {
+    match settings {
+        Settings::Ingest(config) => {
+            let source = config.source();
+            source.is_ok_and(|(_, source)| source.file().is_none())
+        }
+        _ => false,
     }
 }
 

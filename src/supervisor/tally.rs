@@ -1,7 +1,7 @@
 //! What a stage has done over all its lives.
 
 use tauscope_bus::ReceiverCounts;
-use tauscope_bus::shell::Report;
+use tauscope_bus::shell::{Account, InputReport, Report};
 
 /// The sum of the reports of all lives.
 #[derive(Debug, Default)]
@@ -36,6 +36,29 @@ impl Tally {
         self.heard = true;
     }
 
+    /// Takes what a stage that died had noted beyond its last report; its inputs come from these stages.
+    pub fn settle<'a>(&mut self, account: &Account, from: impl Iterator<Item = &'a str>) {
+        let Self { newest, heard, .. } = self;
+        *heard |= account.emitted > 0 || account.inputs.iter().any(|(it, _)| it.received > 0);
+        newest.emitted = newest.emitted.max(account.emitted);
+        if account.emitted > 0 {
+            newest.stamp_ns = account.stamp_ns;
+        }
+        if newest.inputs.is_empty() {
+            let input = |from: &str| InputReport {
+                from: from.to_owned(),
+                ..InputReport::default()
+            };
+            newest.inputs = from.map(input).collect();
+        }
+        for (input, (counts, position)) in newest.inputs.iter_mut().zip(&account.inputs) {
+            if counts.received >= input.counts.received {
+                input.counts = *counts;
+                input.position = position.or(input.position);
+            }
+        }
+    }
+
     /// The newest report of this life.
     pub fn newest(&self) -> &Report {
         &self.newest
@@ -65,8 +88,12 @@ impl Tally {
             ReceiverCounts::default(),
         );
         for (sum, input) in sums.inputs.iter_mut().zip(inputs) {
-            sum.received += input.counts.received;
-            sum.lost += input.counts.lost;
+            let counts = input.counts;
+            sum.received += counts.received;
+            sum.lost = sum.lost.saturating_add(counts.lost);
+            sum.refused += counts.refused;
+            sum.before += counts.before;
+            sum.foreign += counts.foreign;
         }
         sums
     }
@@ -74,12 +101,14 @@ impl Tally {
 
 #[cfg(test)]
 mod tests {
-    use tauscope_bus::shell::InputReport;
-
     use super::*;
 
     fn report(received: u64, lost: u64) -> Report {
-        let counts = ReceiverCounts { received, lost };
+        let counts = ReceiverCounts {
+            received,
+            lost,
+            ..ReceiverCounts::default()
+        };
         let input = InputReport {
             counts,
             ..InputReport::default()
@@ -90,6 +119,37 @@ mod tests {
             inputs: vec![input],
             ..Report::default()
         }
+    }
+
+    #[test]
+    fn what_a_dead_stage_had_noted_beyond_its_last_report_counts() {
+        let mut tally = Tally::default();
+        tally.note(report(10, 1));
+        let position = tauscope_bus::Position {
+            instance: 5,
+            next: 14,
+        };
+        let counts = ReceiverCounts {
+            received: 13,
+            lost: 1,
+            ..ReceiverCounts::default()
+        };
+        let account = Account {
+            emitted: 12,
+            stamp_ns: 77,
+            inputs: vec![(counts, Some(position))],
+        };
+        tally.settle(&account, ["twin"].into_iter());
+        let last = tally.end_life();
+        assert_eq!((last.emitted, last.stamp_ns), (12, 77));
+        assert_eq!(last.inputs[0].position, Some(position));
+        // One that died before it could report.
+        tally.settle(&account, ["twin"].into_iter());
+        assert_eq!(tally.newest().inputs[0].from, "twin");
+        assert_eq!(
+            (tally.sums().emitted, tally.sums().inputs[0].received),
+            (24, 26)
+        );
     }
 
     #[test]
@@ -106,7 +166,8 @@ mod tests {
             sums.inputs,
             [ReceiverCounts {
                 received: 13,
-                lost: 3
+                lost: 3,
+                ..ReceiverCounts::default()
             }]
         );
     }

@@ -23,10 +23,12 @@ impl Supervisor<'_> {
         if !self.stopping {
             self.tell_who_does_not_begin(now);
             self.tell_who_is_silent(now);
+            self.tell_who_hangs(now);
             self.end_without_data(now);
             self.end_in_time(now);
         }
         self.tell_who_does_not_end(now);
+        self.tell_service(now);
         let stages = &self.stages;
         self.view.show(now.into_std(), || {
             stages.iter().map(|stage| row(stage, now)).collect()
@@ -85,10 +87,18 @@ impl Supervisor<'_> {
             )
         });
         let file = self.pipeline.path.display();
+        let mut endpoints = (self.pipeline.hosts.values())
+            .flat_map(|host| host.listen.0.iter().chain(&host.connect.0));
+        let certificates = if endpoints.any(|endpoint| endpoint.starts_with("tls/")) {
+            "; or one of the hosts shows a certificate of another cell, and the router lets none of this cell's \
+             streams through"
+        } else {
+            ""
+        };
         let remedy = hosts.first().map(|host| {
             format!(
                 "{} not running (`tauscope run {file} --host {host}`), without data of its own, or not \
-                 reachable at the addresses under `hosts`",
+                 reachable at the addresses under `hosts`{certificates}",
                 suggest::list(hosts.iter().copied())
             )
         });

@@ -24,7 +24,11 @@ pub struct Live {
 impl Live {
     /// Runs `pipeline.yaml` in `folder`.
     pub fn start(folder: &Path, more: &[&str]) -> Self {
-        let mut command = tauscope();
+        Self::start_as(tauscope(), folder, more)
+    }
+
+    /// The same, of a program with an environment of its own.
+    pub fn start_as(mut command: Command, folder: &Path, more: &[&str]) -> Self {
         command
             .current_dir(folder)
             .args(["run", "--json"])

@@ -45,7 +45,9 @@ def options():
     a.add_argument("--seconds", default="8.5,10", help="range of a recording's length")
     a.add_argument("--several", type=float, default=0., help="probability that an effect of a combination comes on a second joint too")
     a.add_argument("--no-constants", type=float, default=0., help="share of the cases in A that do not give torque constants")
-    a.add_argument("--twin-topic", action="store_true", help="the twin is a topic in the recordings: the nominal arm from the encoder's derivatives")
+    a.add_argument("--twin-topic", nargs="?", const="encoder", choices=["encoder", "foreign"], help="the twin is a topic in the recordings: "
+                   "the nominal arm from the encoder's derivatives, or another simulation of the command, late, with friction and spikes of its own")
+    a.add_argument("--beside", default="", help="what the arm has beside the effects, and the answers list as `background`: friction, bodies or both, separated by commas")
     a.add_argument("--followed", action="store_true", help="no plant: every command is followed exactly. Not for gears, nor for what cuts a motor")
     a.add_argument("--prefix", default="c")
     return a.parse_args()
@@ -123,6 +125,31 @@ def concealed(o, kind, names, c, rng):
     return effects
 
 
+def background(o, c, rng):
+    """What the arm has beside what is concealed in it: friction on every joint, and bodies a little off the URDF."""
+    beside, out = [x for x in o.beside.split(",") if x], []
+    if "friction" in beside:
+        for name in (f"{kind}_friction@{j}" for j in range(c.robot.n) for kind in ("coulomb", "viscous")):
+            e = draws.draw(name, c, rng, float(np.exp(rng.uniform(np.log(5.), np.log(30.)))))
+            out += [e] if e else []
+    return out + ([draws.bodies_off(c, rng)] if "bodies" in beside else [])
+
+
+def foreign(robot, effects, m, rng):
+    """(times, efforts) of another simulation of the arm: it follows the command exactly, has friction of its own, and is late.
+    `m` is the commanded motion. One row in 400 has a spike on some joints."""
+    friction = [e for e in effects if e["effect"] in ("coulomb_friction", "viscous_friction")]
+    _, parts = truth.contributions(robot, friction, m)
+    effort = robot.nominal.rnea(m.q, m.v, m.a) + sum((float(rng.uniform(0.85, 1.15)) * p for p in parts), np.zeros(m.q.shape))
+    return m.t + float(rng.uniform(0.005, 0.02)), effort
+
+
+def spikes(x, rng):
+    """Efforts with spikes of a single row."""
+    hit = (rng.random(len(x)) < 1. / 400.)[:, None] & (rng.random(x.shape) < 0.4)
+    return x + hit * rng.normal(size=x.shape) * 3. * rms(x)
+
+
 def stamps(o, rng, seconds, rate):
     """Times [s] of a recording's rows, and how each row repeats an earlier one (index into itself)."""
     t = np.arange(int(seconds * rate)) / rate
@@ -189,6 +216,7 @@ def attempt(o, ident, kind, names, robot, rng, folder, rejected):
     if effects is None:
         rejected.append("no place to show an effect")
         return None
+    asked, effects = len(effects), effects + background(o, c, rng)
     logs, trouble = (followed if o.followed else simulate)(robot, effects, recs, commands, starts)
     if trouble:
         rejected.append(trouble)
@@ -203,7 +231,8 @@ def attempt(o, ident, kind, names, robot, rng, folder, rejected):
         shown[r] = (m, rigid, parts, clean)
         gap = (clean - rigid - sum(parts)) / sigma
         closure = max(closure, float(rms(gap).max()))
-    views = [truth.visibility(robot, e, [(shown[r][0], shown[r][1], shown[r][2][k]) for r in fit], sigma) for k, e in enumerate(effects)]
+    views = [truth.visibility(robot, e, [(shown[r][0], shown[r][1], shown[r][2][k]) for r in fit], sigma)
+             for k, e in enumerate(effects[:asked])]
     if closure > 0.25:
         rejected.append(f"does not close: {closure:.2f} of the noise")
         return None
@@ -236,8 +265,12 @@ def attempt(o, ident, kind, names, robot, rng, folder, rejected):
         ns = epoch * 10**9 + np.round((start + t) * 1e9).astype(np.int64)
         pick = lambda x: x[rows][:, order]
         practical = robot.nominal.rnea(*truth.estimated(t, q))
+        twin = practical
+        if o.twin_topic == "foreign":
+            late, effort = foreign(robot, effects, truth.of_command(r, start, command), np.random.default_rng(epoch))
+            twin = spikes(np.stack([np.interp(t, late, column) for column in effort.T], 1), rng)
         files.append((r, ns[rows], pick(q), pick(v) if has_speed else None, pick(measured / constant),
-                      pick(at(command)) if has_command else None, pick(practical / constant) if o.twin_topic else None))
+                      pick(at(command)) if has_command else None, pick(twin / constant) if o.twin_topic else None))
         if r in held:
             cut = int(len(t) / (t[-1] - t[0]) * truth.CUT)
             within = slice(cut, -cut)
@@ -247,7 +280,7 @@ def attempt(o, ident, kind, names, robot, rng, folder, rejected):
     pooled = {k: rms(np.concatenate([figures[r][k] for r in held])).tolist() for k in figures[held[0]]}
     over = lambda k: float(((np.array(pooled[k]) * constant / sigma)**2).sum())
     extra = over("floor_practical") - over("floor")
-    if extra > max(0.4 * (over("before") - over("floor")), 0.8 * robot.n):
+    if not o.beside and extra > max(0.4 * (over("before") - over("floor")), 0.8 * robot.n):
         rejected.append(f"chatter: estimated derivatives miss {extra:.1f} squared noises")
         return None
 
@@ -271,7 +304,7 @@ def attempt(o, ident, kind, names, robot, rng, folder, rejected):
             "noise_correlation_s": correlation, "motions": dict(zip(recs, kinds)), "session_start": dict(zip(recs, starts)),
             "duration": {r: len(x) / motion.RATE for r, x in zip(recs, commands)}, "fit": fit, "holdout_names": held,
             "holdout": pooled, "per_recording": {r: {k: rms(x).tolist() for k, x in figures[r].items()} for r in held},
-            "closure_sigma": closure, "rejected": rejected}
+            "closure_sigma": closure, "rejected": rejected} | ({"background": effects[asked:]} if o.beside else {})
 
 
 def main():

@@ -62,7 +62,7 @@ def plan(seed, joints, rng):
     slow, plant = rng.random() < 0.4, rng.random() < 0.25
     followed = kind == "arm" or not plant and not {"joint_elasticity", "backlash", "torque_saturation"} & set(names)
     around = argparse.Namespace(
-        seed=seed, strength=1., snr="6,50", several=0.2, no_constants=0.3, twin_topic=False, followed=followed, recordings="3,1",
+        seed=seed, strength=1., snr="6,50", several=0.2, no_constants=0.3, twin_topic=None, beside="", followed=followed, recordings="3,1",
         seconds="4.5,6.5", rates=str(rng.choice([100, 125, 200])), clock=str(rng.choice(["even", "uneven"], p=[0.7, 0.3])),
         noise_correlation="0.02,0.9" if slow else "0,0", white_share=float(rng.uniform(0.2, 0.7)) if slow else 0.)
     return kind, names, around

@@ -69,6 +69,16 @@ const SLIPS: &[Slip] = &[
         says: &["--robot URDF"],
     },
     Slip {
+        typed: "explain @demo.mcap @demo_validation.mcap --out @x",
+        code: 2,
+        says: &["--robot URDF"],
+    },
+    Slip {
+        typed: "explain @case.yaml --robot @demo_arm.urdf --out @x",
+        code: 2,
+        says: &["--robot goes with recordings, not with a case"],
+    },
+    Slip {
         typed: "init --robot @demo_arm.urdf",
         code: 2,
         says: &["<RECORDING>"],

@@ -91,7 +91,7 @@ const SLIPS: &[Slip] = &[
     Slip {
         typed: "explain @demo.mcap --out @x",
         code: 2,
-        says: &["an MCAP recording"],
+        says: &["neither a robot", "--robot"],
     },
     Slip {
         typed: "explain @nowhere.yaml --out @x",

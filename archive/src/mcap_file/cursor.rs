@@ -60,6 +60,7 @@ pub(crate) fn mcap_cursor(
         number,
         at: extent.at,
         start_ns: extent.start_ns,
+        end_ns: extent.end_ns,
     });
     let places = places.collect();
     let unpacker = Unpacker::new().map_err(ArchiveError::io(&layout.path))?;

@@ -78,6 +78,11 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
+    /// Chunks, and runs of messages without one.
+    pub(crate) fn chunks(&self) -> u64 {
+        self.extents.len() as u64
+    }
+
     pub(super) fn empty(path: &Path, file_bytes: u64) -> Self {
         Self {
             path: path.to_owned(),

@@ -1,5 +1,6 @@
 //! Messages as they come out of a recording, whatever its format.
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -80,15 +81,23 @@ pub struct Messages {
     path: PathBuf,
     topics: Arc<Topics>,
     cursor: Box<dyn Cursor>,
+    /// Log times of the messages that are given.
+    within_ns: RangeInclusive<i64>,
     ended: bool,
 }
 
 impl Messages {
-    pub(super) fn new(path: &Path, topics: Arc<Topics>, cursor: Box<dyn Cursor>) -> Self {
+    pub(super) fn new(
+        path: &Path,
+        topics: Arc<Topics>,
+        cursor: Box<dyn Cursor>,
+        within_ns: RangeInclusive<i64>,
+    ) -> Self {
         Self {
             path: path.to_owned(),
             topics,
             cursor,
+            within_ns,
             ended: false,
         }
     }
@@ -98,20 +107,29 @@ impl Messages {
     /// [`ArchiveError::Damaged`] stands in the place of what cannot be read: whoever asks again is
     /// given what comes behind it. After any other error there is nothing more.
     pub fn next_message(&mut self) -> Option<Result<Message<'_>, ArchiveError>> {
-        if self.ended {
-            return None;
-        }
-        match self.cursor.advance() {
-            Ok(true) => self.message().map(Ok),
-            Ok(false) => {
-                self.ended = true;
-                None
+        while !self.ended {
+            match self.cursor.advance() {
+                Ok(true) => {
+                    let log_time_ns = self.cursor.current()?.log_time_ns;
+                    if self.within_ns.contains(&log_time_ns) {
+                        return self.message().map(Ok);
+                    }
+                    self.ended = log_time_ns > *self.within_ns.end();
+                }
+                Ok(false) => self.ended = true,
+                Err(error) => {
+                    self.ended = error.damage().is_none();
+                    return Some(Err(error));
+                }
             }
-            Err(error) => {
-                self.ended = error.damage().is_none();
-                Some(Err(error))
-            }
         }
+        None
+    }
+
+    /// Chunks of an MCAP file or a bag of ROS 1 that have been read so far. Messages of an MCAP file that lie in no chunk
+    /// count as one, up to the next chunk.
+    pub fn chunks_read(&self) -> u64 {
+        self.cursor.chunks_read()
     }
 
     fn message(&self) -> Option<Message<'_>> {

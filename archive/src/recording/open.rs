@@ -21,11 +21,11 @@ use crate::topic::{Topic, Topics};
 
 impl Recording {
     /// Opens the recording at `path`: an MCAP file (also an unfinished `.part`), the folder of a
-    /// rosbag2 bag with MCAP or SQLite files, one such SQLite file, a bag of ROS 1 (`.bag`), or a table (`.csv`) whose columns its header or a
-    /// file beside it tells.
+    /// rosbag2 bag with MCAP or SQLite files, one such SQLite file, a bag of ROS 1 (`.bag`), or a
+    /// table (`.csv`) whose columns its header or a file beside it tells.
     ///
-    /// Of an MCAP file, only the index is read if it has a sound one; else all of it, once. A
-    /// database is counted through once.
+    /// Of an MCAP file or a bag of ROS 1, only the index is read if it has a sound one; else all of
+    /// it, once. A database is counted through once.
     ///
     /// # Errors
     /// [`ArchiveError::Io`]; [`ArchiveError::UnknownFormat`]; [`ArchiveError::Unreadable`] if not

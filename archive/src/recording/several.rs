@@ -1,5 +1,6 @@
 //! The messages of several recordings as if they were one.
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use super::Recording;
@@ -17,11 +18,14 @@ pub(super) struct Part {
 pub(super) struct SeveralCursor {
     parts: Arc<Vec<Part>>,
     wanted: Vec<bool>,
+    within_ns: RangeInclusive<i64>,
     /// Parts not opened yet; the last one begins first.
     waiting: Vec<usize>,
     open: Vec<Open>,
     /// Index into `open`: whose message was given last.
     current: Option<usize>,
+    /// Chunks read in the parts that are done.
+    chunks_before: u64,
 }
 
 struct Open {
@@ -32,8 +36,12 @@ struct Open {
 }
 
 impl SeveralCursor {
-    /// Over the topics marked in `wanted`, by their place in the whole.
-    pub(super) fn new(parts: Arc<Vec<Part>>, wanted: &[bool]) -> Self {
+    /// Over the topics marked in `wanted`, by their place in the whole. What lies outside `within_ns` may be left out.
+    pub(super) fn new(
+        parts: Arc<Vec<Part>>,
+        wanted: &[bool],
+        within_ns: RangeInclusive<i64>,
+    ) -> Self {
         let start_ns = |&part: &usize| parts[part].recording.start_ns();
         let mut waiting: Vec<_> = (0..parts.len())
             .filter(|part| start_ns(part).is_some())
@@ -42,9 +50,11 @@ impl SeveralCursor {
         Self {
             parts,
             wanted: wanted.to_vec(),
+            within_ns,
             waiting,
             open: Vec::new(),
             current: None,
+            chunks_before: 0,
         }
     }
 
@@ -56,7 +66,8 @@ impl SeveralCursor {
                 open.ready = true;
                 i += 1;
             } else {
-                self.open.swap_remove(i);
+                let done = self.open.swap_remove(i);
+                self.chunks_before += done.cursor.chunks_read();
             }
         }
         Ok(())
@@ -78,7 +89,7 @@ impl SeveralCursor {
         let wanted: Vec<_> = topics.iter().map(|&topic| self.wanted[topic]).collect();
         self.open.push(Open {
             part,
-            cursor: recording.cursor(&wanted)?,
+            cursor: recording.cursor(&wanted, &self.within_ns)?,
             ready: false,
         });
         Ok(())
@@ -113,5 +124,10 @@ impl Cursor for SeveralCursor {
             topic: self.parts[open.part].topics[message.topic],
             ..message
         })
+    }
+
+    fn chunks_read(&self) -> u64 {
+        let open = self.open.iter().map(|open| open.cursor.chunks_read());
+        self.chunks_before + open.sum::<u64>()
     }
 }

@@ -10,7 +10,7 @@ use super::Message;
 const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
 /// Middlewares pad a payload to four or eight bytes.
 /// Physical: one byte less than the largest alignment.
-const MAX_PADDING: usize = 7;
+pub(super) const MAX_PADDING: usize = 7;
 
 /// Why the bytes are not the message they should be.
 #[derive(Debug, thiserror::Error)]
@@ -95,6 +95,7 @@ pub fn decode_into<M: Message>(body: &[u8], message: &mut M) -> Result<(), Decod
     };
     match [header[0], header[1]] {
         [0, 0] => read::<M, BigEndian>(fields, message)?,
+        [0, 1] if message.read_alike(fields) => {}
         [0, 1] => read::<M, LittleEndian>(fields, message)?,
         id => return Err(DecodeError::Encapsulation { id }),
     }

@@ -8,7 +8,7 @@ use sha2::{Digest, Sha256};
 
 use super::{
     Bool, DiagnosticArray, DynamicJointState, Float64, InertiaStamped, JointState, Message,
-    WrenchStamped,
+    Temperature, WrenchStamped,
 };
 
 /// `type_id` of `type_description_interfaces/msg/FieldType`.
@@ -110,4 +110,5 @@ fn the_type_hashes_follow_from_the_texts() {
     assert_eq!(hash::<DynamicJointState>(), DynamicJointState::TYPE_HASH);
     assert_eq!(hash::<Bool>(), Bool::TYPE_HASH);
     assert_eq!(hash::<Float64>(), Float64::TYPE_HASH);
+    assert_eq!(hash::<Temperature>(), Temperature::TYPE_HASH);
 }

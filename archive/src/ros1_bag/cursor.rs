@@ -46,6 +46,7 @@ pub(crate) fn ros1_cursor(
         number,
         at: chunk.at,
         start_ns: chunk.start_ns,
+        end_ns: chunk.end_ns,
     });
     let places = places.collect();
     let chunks = Ros1Chunks {

@@ -29,8 +29,7 @@ impl<'a> Header<'a> {
         let mut fields = Fields(self.0);
         loop {
             let field = fields.bytes()?;
-            let (found, value) = field.split_at_checked(name.len())?;
-            if let (true, [b'=', value @ ..]) = (found == name.as_bytes(), value) {
+            if let Some([b'=', value @ ..]) = field.strip_prefix(name.as_bytes()) {
                 return Some(value);
             }
         }

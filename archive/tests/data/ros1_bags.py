@@ -1,11 +1,12 @@
-"""Writes the bags of ROS 1 beside this file: none.bag, bz2.bag, lz4.bag.
+"""Writes bags of ROS 1: none.bag, bz2.bag, lz4.bag, beside this file or in the folder named.
 
 They hold the joint states and flags of `write` in ../common/mod.rs, and a text with every fifth. The later half is
 written first, in chunks of 2 kB.
 
-    pip install rosbags==0.11.9 && python ros1_bags.py
+    pip install rosbags==0.11.9 && python ros1_bags.py [FOLDER [COUNT]]
 """
 
+import sys
 from math import nan
 from pathlib import Path
 
@@ -14,7 +15,8 @@ from rosbags.typesys import Stores, get_typestore
 
 START_NS = 1_700_000_000_000_000_000
 PERIOD_NS = 10_000_000
-COUNT = 50
+COUNT = int(sys.argv[2]) if len(sys.argv) > 2 else 50
+FOLDER = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
 
 store = get_typestore(Stores.ROS1_NOETIC)
 types = store.types
@@ -40,7 +42,7 @@ def state(i: int):
 
 
 for compression in ["none", "bz2", "lz4"]:
-    path = Path(__file__).with_name(f"{compression}.bag")
+    path = FOLDER / f"{compression}.bag"
     path.unlink(missing_ok=True)
     writer = Writer(path)
     writer.chunk_threshold = 2000

@@ -108,7 +108,7 @@ impl Transport for InProcess {
         channel.joined.notify_all();
         Ok(Box::new(InProcessReceiver {
             queue,
-            tracker: Tracker::default(),
+            tracker: Tracker::of(stream),
         }))
     }
 }

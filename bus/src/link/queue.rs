@@ -44,6 +44,14 @@ struct State<P> {
     closed: bool,
     /// Patience has run out and the reader has taken nothing since.
     stuck: bool,
+    /// Readers and writers that sleep: nobody else is woken, for a wake-up is a system call even where nobody sleeps.
+    sleeping: Sleeping,
+}
+
+#[derive(Debug, Default)]
+struct Sleeping {
+    readers: usize,
+    writers: usize,
 }
 
 impl<P> Queue<P> {
@@ -56,6 +64,7 @@ impl<P> Queue<P> {
                 begin: None,
                 closed: false,
                 stuck: false,
+                sleeping: Sleeping::default(),
             }),
             filled: Condvar::new(),
             emptied: Condvar::new(),
@@ -75,11 +84,15 @@ impl<P> Queue<P> {
         });
         if self.keep == Keep::All && !state.stuck {
             let full = |s: &mut State<P>| s.entries.len() >= self.depth && !s.closed;
-            state = self
-                .emptied
-                .wait_timeout_while(state, patience, full)
-                .unwrap_or_else(PoisonError::into_inner)
-                .0;
+            if full(&mut state) {
+                state.sleeping.writers += 1;
+                state = self
+                    .emptied
+                    .wait_timeout_while(state, patience, full)
+                    .unwrap_or_else(PoisonError::into_inner)
+                    .0;
+                state.sleeping.writers -= 1;
+            }
         }
         if state.closed {
             return Pushed::Closed;
@@ -105,8 +118,11 @@ impl<P> Queue<P> {
 
     fn append(&self, mut state: MutexGuard<'_, State<P>>, entry: Message<P>) {
         state.entries.push_back(entry);
+        let wake = state.sleeping.readers > 0;
         drop(state);
-        self.filled.notify_one();
+        if wake {
+            self.filled.notify_one();
+        }
     }
 
     /// Takes the oldest entry, waiting at most `timeout` for one.
@@ -116,19 +132,24 @@ impl<P> Queue<P> {
         loop {
             if let Some(entry) = state.entries.pop_front() {
                 state.stuck = false;
+                let wake = state.sleeping.writers > 0;
                 drop(state);
-                self.emptied.notify_one();
+                if wake {
+                    self.emptied.notify_one();
+                }
                 return Some(entry);
             }
             let left = deadline.saturating_duration_since(Instant::now());
             if left.is_zero() {
                 return None;
             }
+            state.sleeping.readers += 1;
             state = self
                 .filled
                 .wait_timeout(state, left)
                 .unwrap_or_else(PoisonError::into_inner)
                 .0;
+            state.sleeping.readers -= 1;
         }
     }
 
@@ -206,6 +227,28 @@ mod tests {
         queue.push(message(0), NOW);
         queue.push_over(message(1));
         assert_eq!((pop(&queue), pop(&queue)), (Some(0), Some(1)));
+    }
+
+    #[test]
+    fn who_sleeps_is_woken() {
+        let (begin, minute) = (Instant::now(), Duration::from_mins(1));
+        let queue = Queue::new(Keep::All, 1);
+        std::thread::scope(|scope| {
+            let reader = scope.spawn(|| queue.pop(minute).map(|message| message.sequence));
+            while queue.lock().sleeping.readers == 0 {
+                std::thread::yield_now();
+            }
+            queue.push(message(0), NOW);
+            assert_eq!(reader.join().unwrap(), Some(0));
+            queue.push(message(1), NOW);
+            let writer = scope.spawn(|| queue.push(message(2), minute));
+            while queue.lock().sleeping.writers == 0 {
+                std::thread::yield_now();
+            }
+            assert_eq!(pop(&queue), Some(1));
+            assert_eq!(writer.join().unwrap(), Pushed::Taken);
+        });
+        assert!(begin.elapsed() < minute);
     }
 
     #[test]

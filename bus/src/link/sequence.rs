@@ -1,56 +1,68 @@
 //! Holes in a stream, over the lives of its sender.
 
 use super::{Position, Received, ReceiverCounts};
-use crate::sample::{Sample, flags};
+use crate::sample::{MOST_SAMPLES, Sample, Unsound, flags};
 
-/// Follows the sequence numbers that a receiver hears.
+/// Follows the sequence numbers that a receiver hears, and lets no sample through that a stage must not see.
 ///
 /// The life before the present one is remembered as well: what a sender that died left behind may
 /// be read when its successor has already spoken.
 #[derive(Debug, Default)]
 pub(crate) struct Tracker {
+    stream: String,
     present: Option<Position>,
     former: Option<Position>,
     counts: ReceiverCounts,
+    /// An earlier life of this receiver has counted, too.
+    resumed: bool,
 }
 
 impl Tracker {
+    pub(crate) fn of(stream: &str) -> Self {
+        Self {
+            stream: stream.to_owned(),
+            ..Self::default()
+        }
+    }
+
     /// Takes note of a sample. Returns false if it is older than one already heard and so must not
     /// be handed on: it has been counted as lost.
     fn note(&mut self, instance: u64, sequence: u64) -> bool {
+        // No number of a sound sample is as large.
+        let Some(next) = sequence.checked_add(1) else {
+            return false;
+        };
         let known = [&mut self.present, &mut self.former]
             .into_iter()
             .flatten()
             .find(|position| position.instance == instance);
         if let Some(position) = known {
-            if sequence < position.next {
+            let Some(hole) = sequence.checked_sub(position.next) else {
                 return false;
-            }
-            self.counts.lost += sequence - position.next;
-            position.next = sequence + 1;
+            };
+            self.counts.lost = self.counts.lost.saturating_add(hole);
+            position.next = next;
             return true;
         }
         if self.present.is_some() {
             // A new life counts from 0, and this receiver was there: what it did not hear is lost.
-            self.counts.lost += sequence;
+            self.counts.lost = self.counts.lost.saturating_add(sequence);
         }
-        self.former = self.present.replace(Position {
-            instance,
-            next: sequence + 1,
-        });
+        self.former = self.present.replace(Position { instance, next });
         true
     }
 
     /// The receiver's place in the stream when it came in, if this is the first it hears: what it
     /// did not hear from there on is lost.
     fn came_in(&mut self, begin: Option<Position>) {
-        if self.present.is_none() {
-            self.present = begin;
+        if let (None, Some(begin)) = (self.present, begin) {
+            self.counts.before = self.counts.before.saturating_add(begin.next);
+            self.present = Some(begin);
         }
     }
 
     /// Takes a message of the sender's life `instance` and hands its sample to `read`, unless it is the end of the
-    /// stream; `None` if it has been heard before. `begin` is where the receiver came in.
+    /// stream; `None` if it has been heard before or is refused. `begin` is where the receiver came in.
     pub(crate) fn take<T: Sample>(
         &mut self,
         begin: Option<Position>,
@@ -58,9 +70,18 @@ impl Tracker {
         sample: &T,
         read: &mut dyn FnMut(&T),
     ) -> Option<Received> {
-        self.came_in(begin);
         let header = sample.header();
+        let soundness = sample.check();
+        if let Err(why @ Unsound::Sequence(_)) = soundness {
+            self.refuse(&why);
+            return None;
+        }
+        self.came_in(begin);
         if !self.note(instance, header.sequence) {
+            return None;
+        }
+        if let Err(why) = soundness {
+            self.refuse(&why);
             return None;
         }
         if header.has(flags::END) {
@@ -71,6 +92,17 @@ impl Tracker {
         Some(Received::Sample)
     }
 
+    /// Counts a sample that no stage may see, and says so once.
+    fn refuse(&mut self, why: &Unsound) {
+        if self.counts.refused == 0 {
+            let stream = &self.stream;
+            tracing::warn!(
+                "stream `{stream}`: a sample with {why} is refused; further ones are only counted"
+            );
+        }
+        self.counts.refused += 1;
+    }
+
     pub(crate) fn counts(&self) -> ReceiverCounts {
         self.counts
     }
@@ -79,7 +111,23 @@ impl Tracker {
         self.present
     }
 
+    /// A life of the sender that is new to this receiver has had so many samples in all lives before it: of those, what
+    /// was not heard is lost, or, if nothing was heard yet, was sent before this receiver came in.
+    pub(crate) fn hears_of_former_lives(&mut self, samples: u64) {
+        let samples = samples.min(MOST_SAMPLES);
+        let counts = &mut self.counts;
+        let known = counts.received.saturating_add(counts.dropped());
+        let missing = samples.saturating_sub(known);
+        match self.present {
+            None => counts.before = counts.before.saturating_add(missing),
+            Some(_) if !self.resumed => counts.lost = counts.lost.saturating_add(missing),
+            // What the earlier life of this receiver has counted is not known here.
+            Some(_) => {}
+        }
+    }
+
     pub(crate) fn resume(&mut self, position: Position) {
+        self.resumed = true;
         self.present = Some(position);
     }
 }
@@ -113,6 +161,72 @@ mod tests {
         tracker.came_in(Some(begin));
         tracker.note(1, 71);
         assert_eq!(tracker.counts().lost, 30);
+    }
+
+    #[test]
+    fn what_was_sent_before_it_came_in_is_known() {
+        let mut tracker = Tracker::default();
+        let begin = Position {
+            instance: 1,
+            next: 40,
+        };
+        tracker.came_in(Some(begin));
+        tracker.came_in(Some(begin));
+        assert_eq!((tracker.counts().before, tracker.counts().lost), (40, 0));
+    }
+
+    #[test]
+    fn a_sample_that_no_stage_may_see_is_counted_and_no_hole() {
+        let mut tracker = Tracker::of("c/s");
+        let mut seen = 0;
+        for sequence in 0..3 {
+            let mut sample = crate::JointState::default();
+            sample.header.sequence = sequence;
+            if sequence == 1 {
+                sample.header.joint_count = u32::MAX;
+            }
+            tracker.take(None, 7, &sample, &mut |_| seen += 1);
+        }
+        let mut far = crate::JointState::default();
+        far.header.sequence = u64::MAX;
+        assert_eq!(tracker.take(None, 7, &far, &mut |_| seen += 1), None);
+        let counts = tracker.counts();
+        assert_eq!((seen, counts.received), (2, 2));
+        assert_eq!((counts.refused, counts.lost), (2, 0));
+    }
+
+    #[test]
+    fn what_a_dead_sender_had_sent_is_known_from_its_next_life() {
+        let mut tracker = Tracker::default();
+        let hear = |tracker: &mut Tracker, instance, sequence| {
+            let mut sample = crate::JointState::default();
+            sample.header.sequence = sequence;
+            let begin = Position {
+                instance,
+                next: sequence,
+            };
+            tracker.take(Some(begin), instance, &sample, &mut |_| {})
+        };
+        // Ten were sent before this receiver came in, and four died with their sender.
+        tracker.hears_of_former_lives(8);
+        hear(&mut tracker, 1, 2);
+        hear(&mut tracker, 1, 3);
+        tracker.hears_of_former_lives(16);
+        hear(&mut tracker, 2, 0);
+        let counts = tracker.counts();
+        assert_eq!((counts.before, counts.received, counts.lost), (10, 3, 4));
+        tracker.hears_of_former_lives(u64::MAX);
+        tracker.hears_of_former_lives(u64::MAX);
+    }
+
+    #[test]
+    fn numbers_at_their_limit_do_not_overflow() {
+        let mut tracker = Tracker::default();
+        assert!(!tracker.note(1, u64::MAX));
+        assert!(tracker.note(1, u64::MAX - 1));
+        assert!(tracker.note(2, u64::MAX - 1));
+        assert!(tracker.note(3, u64::MAX - 1));
+        assert_eq!(tracker.counts().lost, u64::MAX);
     }
 
     #[test]

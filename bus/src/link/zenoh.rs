@@ -4,27 +4,42 @@
 //!
 //! | key | what |
 //! | --- | --- |
-//! | `<stream>`, that is `<cell>/<stage>` or `<cell>/<stage>/health` | samples |
-//! | `<stream>/@all/<id>`, `<stream>/@newest/<id>` | a liveliness token of each receiver |
-//! | `<stream>/@end/<id>` | the receiver of that id has taken the end of the stream; payload: the sender's instance |
+//! | `<stream>`, that is `<cell>/<stage>` or `<cell>/<stage>/health` | samples for those who keep all |
+//! | `<stream>/@newest` | samples for those who keep the newest |
+//! | `<stream>/@all/<id>.<depth>`, `<stream>/@newest/<id>.<depth>` | a liveliness token of each receiver, with how many samples it has room for |
+//! | `<stream>/@from/<instance>` | a liveliness token of the sender |
+//! | `<stream>/@taken/<id>.<depth>` | how far a receiver has come |
 //!
 //! (Chunks that begin with `@` are matched by no wildcard, so `<cell>/**` gives samples alone.)
 //!
-//! A sample is put with
+//! Samples are put with
 //!
 //! - encoding `zenoh/bytes;tauscope/JointState/2`, the type name of the sample after the semicolon;
-//! - payload: the sample as it lies in memory, little-endian, without a frame: see [`wire`](super::wire)
-//!   for the offsets;
-//! - attachment: the sender's instance, a little-endian `u64`, another one after each restart, while
-//!   the sequence number in the sample's header counts from 0 again;
-//! - congestion control `block`, no express: nothing is dropped on the way unless a link breaks.
+//! - payload: one or more samples, one after the other, as they lie in memory, little-endian, without a frame: see
+//!   [`wire`](super::wire) for the offsets;
+//! - attachment: four little-endian `u64`: the sender's instance, another one after each restart, while
+//!   the sequence number in the sample's header counts from 0 again; the number of the oldest sample that can still be
+//!   had; how many numbers right before the first sample are lost for good; how many samples all earlier lives of the
+//!   sender had;
+//! - congestion control `drop`: nothing ever waits for a link that is full, so that a frozen or distant receiver holds
+//!   up neither other streams nor the stage.
 //!
-//! # What is counted
+//! A receiver says how far it has come with four little-endian `u64`: the instance that it hears, the number of the
+//! sample that it waits for, how many before that were lost for good, and 0, or 1 where samples are missing, or 2 where
+//! it leaves.
 //!
-//! A put that a broken link swallows gives no error: the receiver sees the hole in the sequence. The
-//! sender sees by the tokens which of its receivers are connected, and counts what it sends while
-//! one is missing as undelivered. A receiver that takes nothing holds up its session's other streams
-//! for the patience of its end, then drops what comes until it reads again, and counts that.
+//! # Nothing is lost
+//!
+//! The sender keeps every sample until all receivers that keep all have taken it, within a bound of memory (`log.rs`).
+//! What did not arrive goes out again, also after the network was cut, and to a receiver that was started again. If the
+//! memory is full, a source that reads a file waits; else the oldest sample gives way. Its number is then lost for
+//! good: both ends count it.
+//!
+//! # Who is heard
+//!
+//! Samples and ends of a stream count only from its sender: the one that shows a token, and no other while that one
+//! lives. The rest is refused, counted, and said once. This keeps out what strays; a network on which somebody may lie
+//! needs mutual TLS and access rules at its router (`deploy/zenoh`).
 //!
 //! Nothing is discovered: sessions meet at the endpoints that they are given, and nowhere else.
 
@@ -37,13 +52,31 @@ use serde::{Deserialize, Serialize};
 use zenoh::Wait as _;
 use zenoh::bytes::Encoding;
 
-use super::{Audience, Keep, LinkError, PATIENCE, Receiver, Sender, Transport};
+use super::{
+    Audience, FanOut, Keep, LinkError, PATIENCE, Receiver, Sender, SpillSettings, Transport,
+};
 use crate::sample::{Sample, SampleKind};
 
+mod endpoint;
+mod log;
+mod message;
 mod receiver;
 mod sender;
+mod speaker;
+
+pub use endpoint::{EndpointError, check_endpoint};
 
 const TRANSPORT: &str = "zenoh";
+/// What a sender may take that nobody has told it.
+/// Resolution: memory.
+const SPILL: SpillSettings = SpillSettings {
+    bytes: 1 << 20,
+    linger_ms: 0,
+    waits: true,
+};
+/// Batches of 64 kB that may wait in a session for one peer.
+/// Resolution: memory; the most that Zenoh takes.
+const QUEUE: usize = 16;
 
 /// Where Zenoh sessions of this host meet others, e.g. `tcp/10.0.0.1:7447`.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -92,6 +125,9 @@ impl ZenohEndpoints {
 pub struct Zenoh {
     session: zenoh::Session,
     patience: Duration,
+    spill: SpillSettings,
+    /// How many samples the earlier lives of a sender had.
+    former: u64,
     /// Ends of this session so far, so that each has a number.
     ends: Arc<AtomicU64>,
 }
@@ -105,8 +141,24 @@ impl Zenoh {
         Ok(Self {
             session: open_session("peer", endpoints, patience)?,
             patience,
+            spill: SPILL,
+            former: 0,
             ends: Arc::default(),
         })
+    }
+
+    /// The same with other bounds for what waits to be taken.
+    #[must_use]
+    pub fn with_spill(mut self, spill: SpillSettings) -> Self {
+        self.spill = spill;
+        self
+    }
+
+    /// The same for a sender whose earlier lives had so many samples: its receivers then know what died with those.
+    #[must_use]
+    pub fn with_former(mut self, samples: u64) -> Self {
+        self.former = samples;
+        self
     }
 
     /// A number for an end, unlike any other session's: their random ids differ.
@@ -124,9 +176,17 @@ impl Transport for Zenoh {
         stream: &str,
         audience: Audience,
     ) -> Result<Box<dyn Sender<T>>, LinkError> {
-        Ok(Box::new(sender::ZenohSender::<T>::open(
-            self, stream, audience,
-        )?))
+        let mut links: Vec<Box<dyn Sender<T>>> = Vec::new();
+        for keep in [Keep::Newest, Keep::All] {
+            if audience.count(keep) > 0 {
+                let sender = sender::ZenohSender::<T>::open(self, stream, keep, audience)?;
+                links.push(Box::new(sender));
+            }
+        }
+        match links.len() {
+            1 => Ok(links.remove(0)),
+            _ => Ok(Box::new(FanOut::new(links))),
+        }
     }
 
     fn receiver<T: Sample>(
@@ -184,11 +244,20 @@ fn open_session(
     endpoints: &ZenohEndpoints,
     patience: Duration,
 ) -> Result<zenoh::Session, LinkError> {
-    let failed = |error: zenoh::Error| LinkError::Open {
-        stream: "*".to_owned(),
-        transport: TRANSPORT,
-        reason: zenoh_reason(&error),
-    };
+    let session = config(mode, endpoints, patience, &[])
+        .and_then(|config| zenoh::open(config).wait())
+        .map_err(|error| open_error("*", &error))?;
+    endpoint::watch(&session, &endpoints.connect);
+    Ok(session)
+}
+
+/// The settings of a session, and more, which go before those.
+fn config(
+    mode: &str,
+    endpoints: &ZenohEndpoints,
+    patience: Duration,
+    more: &[(&str, String)],
+) -> zenoh::Result<zenoh::Config> {
     // A receiver gives out before the link is closed over it.
     let close_after_us = (patience * 2).as_micros().to_string();
     let quoted = |text: &str| format!("{text:?}");
@@ -206,16 +275,17 @@ fn open_session(
         ("scouting/gossip/enabled", "false".to_owned()),
         ("open/return_conditions/connect_scouted", "false".to_owned()),
         ("transport/shared_memory/enabled", "false".to_owned()),
+        ("transport/link/tx/queue/size/data", QUEUE.to_string()),
         (
             "transport/link/tx/queue/congestion_control/block/wait_before_close",
             close_after_us,
         ),
     ];
     let mut config = zenoh::Config::default();
-    for (key, value) in &settings {
-        config.insert_json5(key, value).map_err(failed)?;
+    for (key, value) in settings.iter().chain(more) {
+        config.insert_json5(key, value)?;
     }
-    zenoh::open(config).wait().map_err(failed)
+    Ok(config)
 }
 
 fn open_error(stream: &str, error: &zenoh::Error) -> LinkError {
@@ -228,6 +298,23 @@ fn open_error(stream: &str, error: &zenoh::Error) -> LinkError {
 
 fn encoding(kind: SampleKind) -> Encoding {
     Encoding::ZENOH_BYTES.with_schema(kind.type_name())
+}
+
+/// Where the samples are put for receivers of that kind.
+fn data_key(stream: &str, keep: Keep) -> String {
+    match keep {
+        Keep::All => stream.to_owned(),
+        Keep::Newest => format!("{stream}/@newest"),
+    }
+}
+
+fn last_chunk<'a>(key: &'a zenoh::key_expr::KeyExpr<'_>) -> &'a str {
+    key.as_str().rsplit('/').next().unwrap_or_default()
+}
+
+/// The sender that a token is of.
+fn instance_of(key: &zenoh::key_expr::KeyExpr<'_>) -> Option<u64> {
+    u64::from_str_radix(last_chunk(key), 16).ok()
 }
 
 fn policy(keep: Keep) -> &'static str {

@@ -55,7 +55,7 @@ impl Links {
         check::<T>(&output.stream, output.kind)?;
         let mut ways = Vec::new();
         for link in &output.links {
-            self.way(&output.stream, link, &mut ways)?;
+            self.way(output, link, &mut ways)?;
         }
         match ways.len() {
             1 => Ok(ways.remove(0)),
@@ -65,10 +65,11 @@ impl Links {
 
     fn way<T: Sample>(
         &self,
-        stream: &str,
+        output: &Output,
         link: &OutputLink,
         ways: &mut Vec<Box<dyn Sender<T>>>,
     ) -> Result<(), LinkError> {
+        let stream = output.stream.as_str();
         let OutputLink {
             transport,
             audience,
@@ -94,14 +95,12 @@ impl Links {
                 }
             }
             (TransportKind::Zenoh, spill) => {
-                let inner = self.zenoh()?.sender(stream, audience)?;
-                ways.push(match spill {
-                    Some(spill) => {
-                        let receivers = audience.keep_all;
-                        Box::new(Spill::new(inner, spill, self.patience, receivers))
-                    }
-                    None => inner,
-                });
+                let zenoh = self.zenoh()?.with_former(output.former);
+                let zenoh = match spill {
+                    Some(spill) => zenoh.with_spill(spill),
+                    None => zenoh,
+                };
+                ways.push(zenoh.sender(stream, audience)?);
             }
         }
         Ok(())

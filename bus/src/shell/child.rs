@@ -25,7 +25,7 @@ use tokio::signal::unix::{SignalKind, signal};
 
 use super::report::text_of;
 use super::tree::{Outlet, Post, Tree, Turn, branch};
-use super::{Board, Context, Outcome, Report, Stop};
+use super::{Board, Context, Ledger, Outcome, Report, Stop};
 use crate::link::{FanOut, LinkError, Receiver, Sender};
 use crate::sample::{Health, Sample};
 use crate::seat::{Links, Seat, Transports};
@@ -144,6 +144,7 @@ impl Child {
                 restarts: seat.restarts,
                 from: input.from.clone(),
                 health: health_sender(&links, seat)?,
+                ledger: Ledger::of(seat),
             };
             let first = branch(&turn, post, Box::new(stage), out);
             let open = Box::new(|| Ok(links.receiver::<I>(input)? as Box<dyn Receiver<I>>));

@@ -24,7 +24,7 @@ use super::child::{
 };
 use super::report::text_of;
 use super::tree::{Branch, Opening, Outlet, Post, Tree, Turn, branch, fell, words_of};
-use super::{Board, Context, Outcome, Report, SinkInput, Stop, run_sink};
+use super::{Board, Context, Ledger, Outcome, Report, SinkInput, Stop, run_sink};
 use crate::link::{LinkError, Receiver};
 use crate::sample::{Detection, JointState, Sample, TwinState};
 use crate::seat::{Input, Links, Output, Seat, TransportKind, Transports};
@@ -240,7 +240,13 @@ fn sink_here(
         })
     });
     let inputs = inputs.collect::<Result<_, LinkError>>()?;
-    Ok(run_sink(context, sink, inputs, &mut *health))
+    Ok(run_sink(
+        context,
+        sink,
+        inputs,
+        &mut *health,
+        &Ledger::of(seat),
+    ))
 }
 
 fn shape(seat: &Seat, expected: &'static str) -> ChildError {
@@ -301,6 +307,7 @@ impl<'a> Grower<'a> {
                 .first()
                 .map_or_else(String::new, |input| input.from.clone()),
             health: health_sender(&links, seat)?,
+            ledger: Ledger::of(seat),
         };
         let Some(output) = &seat.output else {
             return Err(shape(seat, "an output"));

@@ -8,9 +8,8 @@ use crate::sample::{Header, Health, Name};
 /// Resolution: size of the archive, against how soon a loss is seen.
 const SECOND_NS: i64 = 1_000_000_000;
 
-/// Sends a [`Health`] sample once a second of stream time and at the end.
-pub struct HealthClock<S> {
-    out: S,
+/// Says when a stage owes a [`Health`] sample, and fills it.
+pub struct HealthClock {
     stage: Name,
     restarts: u64,
     /// The second of stream time that the last report stood in.
@@ -18,11 +17,10 @@ pub struct HealthClock<S> {
     newest: Header,
 }
 
-impl<S: Sender<Health>> HealthClock<S> {
+impl HealthClock {
     /// For the stage of that name, which has been started again `restarts` times.
-    pub fn new(out: S, stage: &str, restarts: u64) -> Self {
+    pub fn new(stage: &str, restarts: u64) -> Self {
         Self {
-            out,
             stage: Name::new(stage),
             restarts,
             second: None,
@@ -39,8 +37,38 @@ impl<S: Sender<Health>> HealthClock<S> {
         before.is_some_and(|before| before != second)
     }
 
+    /// Writes what `report` says.
+    pub fn fill(&self, report: &Report, health: &mut Health) {
+        health.header.stamp_ns = self.newest.stamp_ns;
+        health.header.received_ns = self.newest.received_ns;
+        health.stage = self.stage;
+        health.received = report.received;
+        health.emitted = report.emitted;
+        health.dropped = report.dropped();
+        health.restarts = self.restarts;
+    }
+}
+
+/// Sends a [`Health`] sample once a second of stream time and at the end.
+pub(super) struct HealthSender<S> {
+    clock: HealthClock,
+    out: S,
+}
+
+impl<S: Sender<Health>> HealthSender<S> {
+    /// For the stage of that name, which has been started again `restarts` times.
+    pub fn new(out: S, stage: &str, restarts: u64) -> Self {
+        let clock = HealthClock::new(stage, restarts);
+        Self { clock, out }
+    }
+
+    /// As [`HealthClock::note`].
+    pub fn note(&mut self, header: &Header) -> bool {
+        self.clock.note(header)
+    }
+
     pub(super) fn stamp_ns(&self) -> i64 {
-        self.newest.stamp_ns
+        self.clock.newest.stamp_ns
     }
 
     /// Sends a report.
@@ -48,16 +76,8 @@ impl<S: Sender<Health>> HealthClock<S> {
     /// # Errors
     /// What the link says.
     pub fn send(&mut self, report: &Report) -> Result<(), LinkError> {
-        let (stage, restarts, newest) = (self.stage, self.restarts, self.newest);
-        self.out.send_with(&mut |health| {
-            health.header.stamp_ns = newest.stamp_ns;
-            health.header.received_ns = newest.received_ns;
-            health.stage = stage;
-            health.received = report.received;
-            health.emitted = report.emitted;
-            health.dropped = report.dropped();
-            health.restarts = restarts;
-        })
+        let clock = &self.clock;
+        self.out.send_with(&mut |health| clock.fill(report, health))
     }
 
     /// Sends the last report, and the end of the stream.

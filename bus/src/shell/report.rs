@@ -19,7 +19,7 @@ pub struct Report {
     pub received: u64,
     /// Samples that went out.
     pub emitted: u64,
-    /// Holes in the inputs.
+    /// Holes in the inputs, and what had to be refused there.
     pub lost: u64,
     /// Samples the stage itself had to drop.
     pub refused: u64,
@@ -64,7 +64,9 @@ impl Report {
 
     pub(super) fn count_inputs(&mut self) {
         self.received = self.inputs.iter().map(|input| input.counts.received).sum();
-        self.lost = self.inputs.iter().map(|input| input.counts.lost).sum();
+        let missing = |input: &InputReport| input.counts.lost.saturating_add(input.counts.refused);
+        let missing = self.inputs.iter().map(missing);
+        self.lost = missing.fold(0, u64::saturating_add);
     }
 }
 

@@ -1,8 +1,8 @@
 //! A tree of one stage, over links that are open.
 
-use super::Context;
 use super::report::{Outcome, Report};
 use super::tree::{Outlet, Post, Tree, Turn, branch};
+use super::{Context, Ledger};
 use crate::link::{Receiver, Sender};
 use crate::sample::{Health, Sample};
 use crate::stage::{Source, Stage};
@@ -48,6 +48,7 @@ fn post<'a>(context: &Context, from: &str, health: &'a mut dyn Sender<Health>) -
         restarts: context.restarts,
         from: from.to_owned(),
         health: Box::new(health),
+        ledger: Ledger::default(),
     }
 }
 

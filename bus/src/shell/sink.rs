@@ -3,9 +3,9 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::health::HealthClock;
+use super::health::HealthSender;
 use super::report::{InputReport, Outcome, Poster, Report};
-use super::{Context, Stop, TAKEN_WITHIN, TICK};
+use super::{Context, Ledger, Stop, TAKEN_WITHIN, TICK};
 use crate::link::{MAX_DEPTH, Received, Sender};
 use crate::sample::{Health, SampleRef};
 use crate::seat::AnyReceiver;
@@ -26,13 +26,14 @@ pub fn run_sink(
     sink: &mut dyn Sink,
     inputs: Vec<SinkInput>,
     health: &mut dyn Sender<Health>,
+    ledger: &Ledger,
 ) -> Report {
     let reports = inputs.iter().map(|input| InputReport {
         from: input.from.clone(),
         ..InputReport::default()
     });
     let shared = Mutex::new(SinkShell {
-        health: HealthClock::new(health, &context.stage, context.restarts),
+        health: HealthSender::new(health, &context.stage, context.restarts),
         poster: Poster::new(context.board.clone()),
         report: Report {
             stage: context.stage.clone(),
@@ -42,6 +43,7 @@ pub fn run_sink(
         sink,
         active: Instant::now(),
         failure: None,
+        ledger,
     });
     // One input's failure ends the others too; the caller's own stop is not touched.
     let broken = Stop::new();
@@ -67,13 +69,14 @@ pub fn run_sink(
 }
 
 struct SinkShell<'a> {
-    health: HealthClock<&'a mut dyn Sender<Health>>,
+    health: HealthSender<&'a mut dyn Sender<Health>>,
     poster: Poster,
     report: Report,
     sink: &'a mut dyn Sink,
     /// When the sink was last given something.
     active: Instant,
     failure: Option<StageError>,
+    ledger: &'a Ledger,
 }
 
 /// Hears one input to its end.
@@ -90,13 +93,16 @@ fn hear(
         let timeout = if stopped { Duration::ZERO } else { TICK };
         let mut accepted = Ok(());
         let received = input.receiver.receive(timeout, &mut |sample| {
-            accepted = lock(shared).accept(&input.from, sample);
+            accepted = lock(shared).accept(index, &input.from, sample);
         })?;
         accepted?;
         let mut shell = lock(shared);
         let report = &mut shell.report.inputs[index];
         report.counts = input.receiver.counts();
         report.position = input.receiver.position();
+        let (counts, position) = (report.counts, report.position);
+        shell.ledger.heard(index, &counts, position);
+        let report = &mut shell.report.inputs[index];
         match received {
             Received::End => {
                 report.ended = true;
@@ -112,7 +118,14 @@ fn hear(
 }
 
 impl SinkShell<'_> {
-    fn accept(&mut self, from: &str, sample: SampleRef<'_>) -> Result<(), StageError> {
+    fn accept(
+        &mut self,
+        input: usize,
+        from: &str,
+        sample: SampleRef<'_>,
+    ) -> Result<(), StageError> {
+        let received = self.report.inputs[input].counts.received + 1;
+        self.ledger.takes(input, received, sample.header());
         self.active = Instant::now();
         self.sink.accept(from, sample)?;
         let due = self.health.note(sample.header());

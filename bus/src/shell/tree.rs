@@ -12,7 +12,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
 use super::report::{Outcome, Poster, Report};
-use super::{Context, TAKEN_WITHIN};
+use super::{Context, Ledger, TAKEN_WITHIN};
 use crate::link::{LinkError, Receiver, Sender};
 use crate::sample::{Health, Sample};
 use crate::stage::{Source, StageError};
@@ -37,6 +37,8 @@ pub struct Post<'a> {
     pub from: String,
     /// Where its health reports go.
     pub health: Box<dyn Sender<Health> + 'a>,
+    /// Where it keeps its counts.
+    pub ledger: Ledger,
 }
 
 /// Opens the link that the first stage of a tree hears, once all who hear the tree are there.

@@ -6,8 +6,8 @@
 use std::time::{Duration, Instant};
 
 use tauscope_bus::{
-    Audience, Domain, Header, InProcess, JointState, Keep, LinkError, Received, Receiver, Sample,
-    Sender, SharedMemory, Transport, TwinState, Zenoh, ZenohEndpoints, ZenohRouter,
+    Audience, Domain, Header, InProcess, JointState, Keep, LinkError, Received, Receiver, Sender,
+    SharedMemory, Transport, TwinState, Zenoh, ZenohEndpoints, ZenohRouter, link::SpillSettings,
 };
 
 mod promises;
@@ -19,8 +19,8 @@ const STREAM: &str = "cell/stage";
 /// Both sides of a transport, on their own as far as it goes.
 trait Sides: Sized {
     type Transport: Transport;
-    /// Whether a sender learns what a receiver refuses (else only the receiver counts it).
-    const SENDER_SEES_REFUSALS: bool;
+    /// Whether a sender keeps for later what a receiver has no room for.
+    const REMEMBERS: bool;
     fn new(patience: Duration) -> Self;
     fn sending(&self) -> &Self::Transport;
     fn receiving(&self) -> &Self::Transport;
@@ -30,7 +30,7 @@ struct InProcessSides(InProcess);
 
 impl Sides for InProcessSides {
     type Transport = InProcess;
-    const SENDER_SEES_REFUSALS: bool = true;
+    const REMEMBERS: bool = false;
     fn new(patience: Duration) -> Self {
         Self(InProcess::new().with_patience(patience))
     }
@@ -50,7 +50,7 @@ struct SharedMemorySides {
 
 impl Sides for SharedMemorySides {
     type Transport = SharedMemory;
-    const SENDER_SEES_REFUSALS: bool = true;
+    const REMEMBERS: bool = false;
     fn new(patience: Duration) -> Self {
         let domain = Domain::unique();
         let open = || Some(SharedMemory::open(&domain).unwrap().with_patience(patience));
@@ -75,6 +75,13 @@ impl Drop for SharedMemorySides {
     }
 }
 
+/// Room for more samples than receivers have.
+const SPILL: SpillSettings = SpillSettings {
+    bytes: 1000 * size_of::<JointState>(),
+    linger_ms: 0,
+    waits: true,
+};
+
 /// Two sessions that meet directly.
 struct ZenohSides {
     sending: Zenoh,
@@ -83,11 +90,11 @@ struct ZenohSides {
 
 impl Sides for ZenohSides {
     type Transport = Zenoh;
-    const SENDER_SEES_REFUSALS: bool = false;
+    const REMEMBERS: bool = true;
     fn new(patience: Duration) -> Self {
         let (sending, endpoint) = listening(|endpoints| Zenoh::open(endpoints, patience));
         Self {
-            sending,
+            sending: sending.with_spill(SPILL),
             receiving: Zenoh::open(&connect(&endpoint), patience).unwrap(),
         }
     }
@@ -107,7 +114,7 @@ struct ZenohHostSides {
 
 impl Sides for ZenohHostSides {
     type Transport = Zenoh;
-    const SENDER_SEES_REFUSALS: bool = false;
+    const REMEMBERS: bool = true;
     fn new(patience: Duration) -> Self {
         let (router_a, a) = listening(ZenohRouter::open);
         let (router_b, b) = listening(|endpoints| {
@@ -119,7 +126,9 @@ impl Sides for ZenohHostSides {
         Self {
             _routers: [router_a, router_b],
             sides: ZenohSides {
-                sending: Zenoh::open(&connect(&a), patience).unwrap(),
+                sending: Zenoh::open(&connect(&a), patience)
+                    .unwrap()
+                    .with_spill(SPILL),
                 receiving: Zenoh::open(&connect(&b), patience).unwrap(),
             },
         }
@@ -204,7 +213,8 @@ macro_rules! conforms {
                 slow_reader_that_keeps_the_newest_loses_the_oldest, stuck_reader_is_given_up_and_counted,
                 receiver_gone_and_back, sender_gone_and_back, end_comes_last_and_once, end_is_waited_for,
                 missing_receivers_are_told, another_type_is_refused, loss_over_a_restart_of_the_receiver_is_counted,
-                what_is_skipped_is_lost);
+                what_is_skipped_is_lost,
+                what_no_stage_may_see_is_refused_and_counted, what_a_late_joiner_missed_is_known);
         }
     };
     (@ $sides:ty: $($promise:ident),+) => {$(
@@ -219,17 +229,3 @@ conforms!(in_process, InProcessSides);
 conforms!(shared_memory, SharedMemorySides);
 conforms!(zenoh, ZenohSides);
 conforms!(zenoh_between_hosts, ZenohHostSides);
-
-/// What a link that carries `T` says when it is opened or used for a stream that carries `JointState`.
-fn refusal<S: Sides, T: Sample>(sides: &S, sender: &mut dyn Sender<JointState>) -> LinkError {
-    let mut receiver = match sides.receiving().receiver::<T>(STREAM, Keep::All, 8) {
-        Ok(receiver) => receiver,
-        Err(error) => return error,
-    };
-    sender.wait_for_receivers(Duration::from_secs(1)).unwrap();
-    send(sender, 0, 1);
-    match receiver.receive(LONG, &mut |_| {}) {
-        Ok(received) => panic!("{received:?}"),
-        Err(error) => error,
-    }
-}

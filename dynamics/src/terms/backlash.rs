@@ -66,6 +66,7 @@ pub(super) static EFFECT: Effect = Effect {
     }),
     traits: Traits {
         is_fast: true,
+        is_followed: true,
         ..Traits::NONE
     },
     build: |site, values| {

@@ -32,6 +32,7 @@ pub static EFFECT: Effect = Effect {
     simulated: Simulated::Joint,
     concealed: Some(|draw| Drawn::new(draw.efforts_nm(), |f| vec![("coulomb_nm", f)])),
     traits: Traits {
+        is_followed: true,
         smallest_told_as: Some("coulomb_nm"),
         ..Traits::NONE
     },

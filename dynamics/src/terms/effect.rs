@@ -241,6 +241,8 @@ pub struct Traits {
     pub is_made_by_gears: fn(&[f64]) -> bool,
     /// By how much each of its coordinates may be off in a URDF that nobody has measured, of this link.
     pub off_in_urdf: Option<fn(&Link) -> f64>,
+    /// It is estimated every night, whether it is there or not, and followed over weeks.
+    pub is_followed: bool,
     /// What the smallest size that would have been found is told as: its first factor. `None` if that does not make it.
     pub smallest_told_as: Option<&'static str>,
 }
@@ -261,6 +263,7 @@ impl Traits {
         bends: false,
         is_made_by_gears: |_| true,
         off_in_urdf: None,
+        is_followed: false,
         smallest_told_as: None,
     };
 }

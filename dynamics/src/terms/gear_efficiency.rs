@@ -1,5 +1,6 @@
-//! A gear whose loss differs by the direction of power: M. Gautier and W. Khalil, *Modeling, Identification and Control
-//! of Robots*, 2002, section 9.3; J. Wang and D. E. Whitney on worm and harmonic gears that drive back badly.
+//! A gear whose loss differs by the direction of power: P. Hamon, M. Gautier and P. Garrec, "Dynamic Identification of
+//! Robots with a Dry Friction Model Depending on Load and Velocity", IROS 2010, whose friction is linear in the load with a
+//! factor of its own in each quadrant of torque and speed.
 
 use super::law::joint_law;
 use super::{

@@ -1,5 +1,5 @@
 //! A joint whose zero is not the model's: B. W. Mooring, Z. S. Roth and M. R. Driels, *Fundamentals of Manipulator
-//! Calibration*, 1991, chapter 2.
+//! Calibration*, 1991.
 
 use super::law::array;
 use super::{
@@ -11,6 +11,10 @@ use crate::{Data, Model, rnea};
 /// A larger offset is no slip of a zero \[rad or m\].
 /// Physical: at arm's length such a joint misses by a hand's width, which nobody overlooks.
 const LARGEST: f64 = 0.2;
+
+/// A smaller offset is how zeros are set \[rad or m\]; bodies that are off by a few millimetres imitate it.
+/// Physical: a third of a degree, as marks and notches of joints are read.
+const LEAST: f64 = 0.006;
 
 /// The joint stands at the recorded position plus the offset: the effort of the robot there less that at the recorded
 /// position. To first order linear in the offset.
@@ -38,7 +42,7 @@ pub(super) static EFFECT: Effect = Effect {
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
-    limit: Some(|_, x| x[0].abs() <= LARGEST),
+    limit: Some(|_, x| (LEAST..=LARGEST).contains(&x[0].abs())),
     excitation: Excitation::Poses,
     simulated: Simulated::Model,
     concealed: Some(|draw| {

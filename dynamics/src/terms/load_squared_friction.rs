@@ -1,5 +1,6 @@
-//! Friction that grows with the square of what the gear transmits: K. A. Pasch and W. P. Seering, "On the Drive Systems
-//! for High-Performance Machines", Journal of Mechanisms 106(1), 1984; teeth and wave generators that deform rub so.
+//! Friction that grows with the square of what the gear transmits: the next term of the series in the load, after the
+//! friction that is linear in it (P. Hamon, M. Gautier and P. Garrec, "Dynamic Identification of Robots with a Dry
+//! Friction Model Depending on Load and Velocity", IROS 2010). Parts that deform under load rub so.
 
 use super::law::joint_law;
 use super::{

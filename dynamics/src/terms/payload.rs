@@ -33,6 +33,7 @@ pub static EFFECT: Effect = Effect {
     simulated: Simulated::Model,
     concealed: Some(|draw| drawn(draw, None)),
     traits: Traits {
+        is_followed: true,
         smallest_told_as: Some("mass_kg"),
         ..Traits::NONE
     },

@@ -33,6 +33,7 @@ pub static EFFECT: Effect = Effect {
     }),
     traits: Traits {
         only_adds: true,
+        is_followed: true,
         smallest_told_as: Some("bias_nm"),
         ..Traits::NONE
     },

@@ -37,6 +37,7 @@ pub static EFFECT: Effect = Effect {
         })
     }),
     traits: Traits {
+        is_followed: true,
         smallest_told_as: Some("viscous_nms_per_rad"),
         ..Traits::NONE
     },

@@ -299,6 +299,7 @@ impl Watched {
             residual: self.newest().and_then(ResidualView::of),
             curve: self.minutes.iter().copied().collect(),
             trend: Vec::new(),
+            drift: None,
             status: self.newest().cloned(),
         }
     }

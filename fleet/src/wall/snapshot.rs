@@ -7,6 +7,7 @@ use tauscope_publish::message::StatusMessage;
 
 use super::Now;
 use super::state::{Severity, State};
+use crate::physics::Drift;
 
 /// All cells at one instant.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -53,6 +54,8 @@ pub struct CellView {
     pub curve: Vec<f64>,
     /// The residual's length by day over the last six weeks, as a share of the normal; empty without a history.
     pub trend: Vec<f64>,
+    /// The joint whose friction has changed most over weeks; `None` where no nightly numbers are followed.
+    pub drift: Option<Drift>,
     /// What it said last; as old as `status_age_ms`.
     pub status: Option<StatusMessage>,
 }

@@ -3,6 +3,7 @@
 pub mod cell;
 mod chart;
 pub mod incidents;
+pub mod physics;
 pub mod tile;
 pub mod wall;
 

@@ -1,34 +1,29 @@
 //! The end of a graph: streams of any type into one sink.
 
-use std::time::Duration;
+use tauscope_bus::{Received, Sample, Sink, StageError};
 
-use tauscope_bus::{Received, Receiver, Sample, SampleRef, Sink, StageError};
-
+use super::lane::Reader;
 use super::{Node, StageCounts};
 
-/// A receiver whose sample type is known at run time only.
+/// A reader whose sample type is known at run time only.
 trait AnyInput {
-    fn take(
-        &mut self,
-        read: &mut dyn FnMut(SampleRef<'_>) -> Result<(), StageError>,
-    ) -> Result<Received, StageError>;
-    fn counts(&self) -> tauscope_bus::ReceiverCounts;
+    /// Hands `sink` all samples of the stage `from` that there are; false once no more can come.
+    fn take_all(&mut self, from: &str, sink: &mut dyn Sink) -> Result<bool, StageError>;
+    fn received(&self) -> u64;
 }
 
-impl<T: Sample> AnyInput for Box<dyn Receiver<T>> {
-    fn take(
-        &mut self,
-        read: &mut dyn FnMut(SampleRef<'_>) -> Result<(), StageError>,
-    ) -> Result<Received, StageError> {
-        let mut result = Ok(());
-        let received =
-            self.receive(Duration::ZERO, &mut |sample| result = read(sample.as_ref()))?;
-        result?;
-        Ok(received)
+impl<T: Sample> AnyInput for Reader<T> {
+    fn take_all(&mut self, from: &str, sink: &mut dyn Sink) -> Result<bool, StageError> {
+        loop {
+            match self.receive(|sample| sink.accept(from, sample.as_ref())) {
+                (_, Some(accepted)) => accepted?,
+                (received, None) => return Ok(received != Received::End),
+            }
+        }
     }
 
-    fn counts(&self) -> tauscope_bus::ReceiverCounts {
-        (**self).counts()
+    fn received(&self) -> u64 {
+        self.received()
     }
 }
 
@@ -41,7 +36,7 @@ pub struct SinkInput {
 
 impl SinkInput {
     /// The stream of the stage `from`.
-    pub(super) fn new<T: Sample>(from: &str, receiver: Box<dyn Receiver<T>>) -> Self {
+    pub(super) fn new<T: Sample>(from: &str, receiver: Reader<T>) -> Self {
         Self {
             from: from.to_owned(),
             receiver: Box::new(receiver),
@@ -74,19 +69,8 @@ impl Node for SinkNode<'_> {
         if self.ended {
             return Ok(false);
         }
-        for SinkInput {
-            from,
-            receiver,
-            open,
-        } in &mut self.inputs
-        {
-            while *open {
-                match receiver.take(&mut |sample| self.sink.accept(from, sample))? {
-                    Received::Sample => {}
-                    Received::Nothing => break,
-                    Received::End => *open = false,
-                }
-            }
+        for input in self.inputs.iter_mut().filter(|input| input.open) {
+            input.open = input.receiver.take_all(&input.from, &mut *self.sink)?;
         }
         if self.inputs.iter().all(|input| !input.open) {
             self.sink.finish()?;
@@ -100,13 +84,15 @@ impl Node for SinkNode<'_> {
     }
 
     fn counts(&self) -> StageCounts {
-        let counts = self.inputs.iter().map(|input| input.receiver.counts());
-        let (received, lost) = counts.fold((0, 0), |(r, l), c| (r + c.received, l + c.lost));
         StageCounts {
             stage: self.name.clone(),
-            received,
+            received: self
+                .inputs
+                .iter()
+                .map(|input| input.receiver.received())
+                .sum(),
             emitted: 0,
-            dropped: lost + self.sink.dropped(),
+            dropped: self.sink.dropped(),
         }
     }
 }

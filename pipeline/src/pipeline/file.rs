@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::restart::RestartEntry;
 use crate::cell::{EffortUnit, ToolEntry};
 use crate::settings::OutsideEntry;
 use crate::yaml::Place;
@@ -129,6 +130,9 @@ pub struct StageEntry {
     /// What becomes of samples that it has no time for.
     #[serde(default)]
     pub keep: Option<KeepEntry>,
+    /// When it is started again after it died. Left out: `on_failure`.
+    #[serde(default)]
+    pub restart: Option<RestartEntry>,
     /// A source: where joint states come from.
     #[serde(default)]
     pub ingest: Option<tauscope_ingest::Config>,

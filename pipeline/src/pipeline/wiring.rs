@@ -1,5 +1,6 @@
 //! Who listens to whom, and whether that makes a pipeline.
 
+mod endpoints;
 mod inputs;
 mod order;
 mod processes;
@@ -42,6 +43,7 @@ pub fn check(file: &Located<PipelineFile>, report: &mut Report) -> Option<Wiring
     checker.names();
     let roles = checker.roles();
     let hosts = checker.hosts();
+    checker.endpoints();
     let by_name = checker.stages_by_name();
     let inputs = checker.inputs(&roles, &by_name);
     checker.kinds(&roles, &inputs);

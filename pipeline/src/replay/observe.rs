@@ -37,6 +37,7 @@ impl Observed {
             effort_unit: cell.facts.effort_unit.as_str().to_owned(),
             joint_names: cell.facts.joint_names.clone(),
             duration_s: (last_ns - first_ns) as f64 * 1e-9,
+            stamps_ns: (first_ns, last_ns),
             lost: stages.iter().map(|stage| stage.dropped).sum(),
             twins: self.twins.into_values().collect(),
             detectors: self.detectors.into_values().collect(),

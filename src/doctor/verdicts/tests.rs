@@ -1,3 +1,4 @@
+use super::super::facts;
 use super::*;
 
 fn level(verdict: &Verdict) -> Level {
@@ -37,6 +38,8 @@ fn leftovers_clock_and_limits_warn() {
     assert_eq!(level(&clock_source(Some("tsc"))), Level::Ok);
     assert_eq!(level(&clock_source(Some("hpet"))), Level::Warning);
     assert_eq!(level(&clock_synchronised(Some(false))), Level::Warning);
+    assert_eq!(level(&clock_offset(0.001)), Level::Ok);
+    assert_eq!(level(&clock_offset(0.02)), Level::Warning);
     assert_eq!(level(&open_files(Some(256))), Level::Warning);
     assert_eq!(level(&open_files(None)), Level::Ok);
 }
@@ -68,18 +71,20 @@ fn a_disk_is_judged_by_the_days_it_lasts() {
 
 #[test]
 fn a_port_that_is_taken_and_a_peer_that_is_away_are_errors() {
-    let of = |listens, possible: Result<(), &str>| {
+    let of = |is, possible: Result<(), &str>| {
         endpoint(&Endpoint {
             of: "ingest".to_owned(),
             at: "tls/cell:7447#connect_private_key=secret.pem".to_owned(),
-            listens,
+            is,
             possible: possible.map_err(str::to_owned),
         })
     };
-    assert_eq!(level(&of(true, Ok(()))), Level::Ok);
-    assert_eq!(level(&of(true, Err("in use"))), Level::Error);
-    let away = of(false, Err("refused"));
+    assert_eq!(level(&of(Way::Listen, Ok(()))), Level::Ok);
+    assert_eq!(level(&of(Way::Listen, Err("in use"))), Level::Error);
+    let away = of(Way::Connect, Err("refused"));
     assert_eq!(level(&away), Level::Error);
+    let controller = of(Way::Controller, Err("refused"));
+    assert_eq!(level(&controller), Level::Error);
     assert!(!away.found.contains("secret"), "{}", away.found);
 }
 
@@ -100,4 +105,14 @@ fn a_certificate_is_told_of_before_it_runs_out() {
         level(&certificate(Path::new("c.pem"), &unreadable, 0)),
         Level::Error
     );
+}
+
+#[test]
+fn the_bound_of_a_clock_is_read_from_what_chrony_tracks() {
+    let line = "C0A80001,192.168.0.1,3,1700000000.1,-0.000100,0.00002,0.00003,-7.5,0.001,0.02,0.004,0.0005,64.2,Normal\n";
+    let error_s = facts::tracked_error_s(line).unwrap();
+    assert!((error_s - 0.0026).abs() < 1e-12, "{error_s}");
+    let alone = "7F7F0101,,0,0.0,0.0,0.0,0.0,0.0,0.0,0.0,1.0,1.0,0.0,Not synchronised\n";
+    assert_eq!(facts::tracked_error_s(alone), None);
+    assert_eq!(facts::tracked_error_s("506 Cannot talk to daemon\n"), None);
 }

@@ -99,6 +99,7 @@ impl Assembly<'_> {
             fit,
             holdout,
             without,
+            longest_s: f64::INFINITY,
         })
     }
 

@@ -34,6 +34,7 @@ mod noise;
 mod pieces;
 mod place;
 mod points;
+mod recovery;
 mod rest;
 mod ring;
 mod smallest;
@@ -294,7 +295,7 @@ impl Tauscope {
         let per_hour = settings.false_alarms_per_hour;
         let threshold = learnt.tail.threshold(per_hour);
         let mut windows = Windows::new(learnt, settings.follow());
-        windows.heed_rest(threshold, per_hour);
+        windows.seek(threshold, per_hour);
         Self {
             rate: Rate::new(learnt.rate_hz),
             late: Late::new(setup),

@@ -2,6 +2,7 @@
 
 use tauscope_dynamics::terms::{TermError, TermSpec};
 
+use crate::data::other_simulation::leave_out_other_states;
 use crate::data::problem::Problem;
 use crate::data::track::Track;
 use crate::fit::fitted::Fit;
@@ -26,6 +27,8 @@ pub struct Context<'a> {
     pub session_start_ns: i64,
     /// Whether no joint moves.
     pub at_rest: bool,
+    /// By how much another simulation's effort was late before it was put on the recordings' clock \[s\].
+    pub twin_late_s: f64,
 }
 
 impl Context<'_> {
@@ -97,6 +100,12 @@ impl Context<'_> {
             self.unit_nm,
             rests_count,
         );
+        if !self.input.bodies && !self.at_rest {
+            problem.is_foreign = true;
+            leave_out_other_states(&mut problem);
+            // Nobody knows how much friction the other simulation has.
+            problem.known_friction = vec![library::any_plain_friction(); problem.joints];
+        }
         if let Some(start) = &self.input.start {
             problem.known_friction = start.friction(&self.input.model);
             if self.input.torque_constants_nm_per_a.is_none() {

@@ -10,6 +10,7 @@ use tauscope_dynamics::terms::TermError;
 
 use crate::context::Context;
 use crate::data::noise::white_noise;
+use crate::data::other_simulation;
 use crate::data::units::scales;
 use crate::outcome::Outcome;
 use crate::read::audit;
@@ -49,6 +50,11 @@ pub fn explain(
         .map(|recording| recording.start_ns)
         .min()
         .unwrap_or(0);
+    let twin_late_s = if input.bodies || at_rest {
+        0.0
+    } else {
+        other_simulation::put_on_clock(&mut input, &constants, &unit_nm)
+    };
     let mut context = Context {
         input: &input,
         constants: &constants,
@@ -57,6 +63,7 @@ pub fn explain(
         loads: Vec::new(),
         session_start_ns,
         at_rest,
+        twin_late_s,
     };
     let mut judged = if at_rest {
         context.at_rest(progress)?
@@ -107,6 +114,7 @@ fn conclude(
         findings::doubt_patches(&mut named.findings);
     }
     let mut notes = named.notes;
+    notes.extend(notes::late_twin(context.twin_late_s));
     notes.extend(notes::not_handed_out(&proof, &found, &joints, unit));
     notes.extend(notes::notes(
         input,

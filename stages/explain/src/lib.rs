@@ -7,6 +7,7 @@ mod fit;
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod fixture;
+mod measure;
 mod outcome;
 mod physics;
 mod read;
@@ -14,6 +15,7 @@ pub mod report;
 mod select;
 
 pub use explain::explain;
+pub use measure::{Measured, Number, measure};
 pub use outcome::Outcome;
 pub use read::input::Input;
 pub use read::recording::{Losses, Recording, RecordingError, RecordingTopics};

@@ -37,6 +37,7 @@ pub mod explanation;
 pub mod forward;
 pub mod free_body;
 pub mod grid;
+pub mod listed;
 pub mod nested;
 pub mod one_zero;
 pub mod parallel;

@@ -19,7 +19,7 @@ use tauscope_bus::{Header, JointArray, JointState, MAX_JOINTS, flags};
 use crate::config::ConfigError;
 use crate::setup::{Setup, Tool};
 use differentiate::Differentiator;
-use gather::{Gather, Gathered};
+use gather::{Gather, Gathered, stamp_of};
 use layout::Layouts;
 pub use outcome::{PackCounts, PackError};
 use side::Side;
@@ -217,18 +217,32 @@ impl Packer {
     /// Gives out the next sample that need not wait any longer; `now_ns` is the present on the clock
     /// of reception (the time of the newest message, where nothing is live).
     pub fn pop(&mut self, now_ns: i64) -> Option<JointState> {
-        let front = self.pending.front()?;
-        let stamp_ns = front.header.stamp_ns;
-        let complete = (!self.settings.expects_command || self.commands.reaches(stamp_ns))
-            && (!self.settings.expects_reference || self.references.reaches(stamp_ns));
-        let waited = now_ns - front.header.received_ns >= self.settings.wait_ns;
-        if !(complete || waited || self.flushed || self.pending.len() >= MAX_PENDING) {
-            return None;
+        self.is_due(now_ns).then(|| {
+            let mut sample = JointState::default();
+            self.pop_into(&mut sample);
+            sample
+        })
+    }
+
+    /// Whether [`Packer::pop`] has one.
+    pub fn is_due(&self, now_ns: i64) -> bool {
+        self.pending.front().is_some_and(|front| {
+            let stamp_ns = front.header.stamp_ns;
+            let complete = (!self.settings.expects_command || self.commands.reaches(stamp_ns))
+                && (!self.settings.expects_reference || self.references.reaches(stamp_ns));
+            let waited = now_ns - front.header.received_ns >= self.settings.wait_ns;
+            complete || waited || self.flushed || self.pending.len() >= MAX_PENDING
+        })
+    }
+
+    /// Gives out the sample that is due, in its place.
+    pub fn pop_into(&mut self, sample: &mut JointState) {
+        if let Some(front) = self.pending.front() {
+            *sample = *front;
+            self.pending.pop_front();
+            self.attach(sample);
+            self.counts.packed += 1;
         }
-        let mut sample = self.pending.pop_front()?;
-        self.attach(&mut sample);
-        self.counts.packed += 1;
-        Some(sample)
     }
 
     /// Whether a sample waits.
@@ -379,14 +393,6 @@ impl Packer {
             sample.tool_inertia_kgm2 = tool.inertia_kgm2;
             sample.header.flags |= flags::TOOL;
         }
-    }
-}
-
-/// The header's stamp, or the time of reception where the publisher left it at zero.
-fn stamp_of(header: &ros::Header, received_ns: i64) -> i64 {
-    match header.stamp.ns() {
-        0 => received_ns,
-        stamp_ns => stamp_ns,
     }
 }
 

@@ -175,15 +175,20 @@ impl RecordedSource {
         }
     }
 
-    /// Reads at most `limit` messages on to the next sample.
     fn next_sample(&mut self, limit: usize) -> Result<Option<JointState>, IngestError> {
+        self.read_on(limit)?;
+        Ok(self.packer.pop(self.now_ns))
+    }
+
+    /// Reads at most `limit` messages on to the next sample; whether there is one.
+    fn read_on(&mut self, limit: usize) -> Result<bool, IngestError> {
         let mut read = 0;
         loop {
-            if let Some(sample) = self.packer.pop(self.now_ns) {
-                return Ok(Some(sample));
+            if self.packer.is_due(self.now_ns) {
+                return Ok(true);
             }
             if self.ended || read >= limit {
-                return Ok(None);
+                return Ok(false);
             }
             self.read_message()?;
             read += 1;
@@ -291,17 +296,20 @@ fn roles<'a>(
 impl Source<JointState> for RecordedSource {
     fn step(&mut self, out: &mut dyn Emit<JointState>) -> Result<Progress, StageError> {
         for _ in 0..SAMPLES_PER_STEP {
-            let sample = match self.first.take() {
-                Some(first) => Some(first),
-                None => self
-                    .next_sample(MESSAGES_PER_STEP)
-                    .map_err(StageError::failed)?,
-            };
-            match sample {
-                Some(sample) => out.emit(&mut |slot| *slot = sample)?,
-                None if self.ended => return Ok(Progress::End),
-                None => return Ok(Progress::More),
+            if let Some(first) = self.first.take() {
+                out.emit(&mut |slot| *slot = first)?;
+                continue;
             }
+            let due = self.read_on(MESSAGES_PER_STEP);
+            if !due.map_err(StageError::failed)? {
+                return Ok(if self.ended {
+                    Progress::End
+                } else {
+                    Progress::More
+                });
+            }
+            let packer = &mut self.packer;
+            out.emit(&mut |slot| packer.pop_into(slot))?;
         }
         Ok(Progress::More)
     }

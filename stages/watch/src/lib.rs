@@ -20,7 +20,7 @@ use tauscope_dynamics::Model;
 
 pub use config::Config;
 pub use finding::{Cause, Finding};
-pub use messages::{amount, in_words};
+pub use messages::{amount, in_words, size_unit};
 
 use monitor::{Monitor, News};
 use rows::Rows;

@@ -33,21 +33,22 @@ pub fn in_words(detection: &Detection, joints: &[String], effort_unit: &str) -> 
 /// The size of a change with its unit, e.g. `+1.02 N m` or `x 1.08`. The unit is that of the effect's first parameter,
 /// with `effort_unit` in place of N m.
 pub fn amount(state: &str, size: f64, effort_unit: &str) -> String {
-    let of_effort = |unit: &str| {
-        unit.replace(
-            "N m",
-            if effort_unit == "Nm" {
-                "N m"
-            } else {
-                effort_unit
-            },
-        )
-    };
-    let first = effect(state).and_then(|effect| effect.parameters.first());
-    match first.map_or("N m", |parameter| parameter.unit) {
+    match &size_unit(state, effort_unit)[..] {
         "" => format!("x {size:.3}"),
-        unit => format!("{size:+.2} {}", of_effort(unit)),
+        unit => format!("{size:+.2} {unit}"),
     }
+}
+
+/// The unit of the size of a change of the kind `state`; empty for a factor.
+pub fn size_unit(state: &str, effort_unit: &str) -> String {
+    let first = effect(state).and_then(|effect| effect.parameters.first());
+    let unit = first.map_or("N m", |parameter| parameter.unit);
+    let effort = if effort_unit == "Nm" {
+        "N m"
+    } else {
+        effort_unit
+    };
+    unit.replace("N m", effort)
 }
 
 fn list(names: &[&str]) -> String {

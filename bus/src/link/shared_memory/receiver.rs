@@ -54,7 +54,7 @@ impl<T: Sample> SharedMemoryReceiver<T> {
             woken,
             back,
             greeted: Vec::with_capacity(MAX_SENDERS),
-            tracker: Tracker::default(),
+            tracker: Tracker::of(stream),
         };
         receiver.greet()?;
         Ok(receiver)

@@ -1,32 +1,125 @@
 //! The receiving end over Zenoh.
 
-use std::sync::Arc;
-use std::time::Duration;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use zenoh::Wait as _;
 use zenoh::liveliness::LivelinessToken;
-use zenoh::pubsub::Subscriber;
+use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::CongestionControl;
+use zenoh::sample::SampleKind as Change;
 
-use super::{Zenoh, encoding, open_error, policy, zenoh_reason};
+use super::message::{Beside, Taken, Why, samples};
+use super::speaker::Speakers;
+use super::{Zenoh, data_key, encoding, instance_of, open_error, policy, zenoh_reason};
 use crate::link::queue::{Message, Queue};
 use crate::link::sequence::Tracker;
 use crate::link::{Keep, LinkError, MAX_DEPTH, Position, Received, Receiver, ReceiverCounts};
-use crate::sample::{Sample, flags};
+use crate::sample::Sample;
 
-pub(super) struct ZenohReceiver<T> {
+/// A receiver says so often how far it has come, at most.
+/// Resolution: the sender's memory, against the traffic.
+const TELL_EVERY: Duration = Duration::from_millis(20);
+/// One that hears nothing repeats it so often.
+const TELL_AGAIN: Duration = Duration::from_secs(1);
+
+pub(super) struct ZenohReceiver<T: Sample> {
     stream: String,
-    session: zenoh::Session,
-    queue: Arc<Incoming<T>>,
+    keep: Keep,
+    depth: usize,
+    heard: Arc<Heard<T>>,
     // In this order, so that a sender that hears of the one can reach the other.
     _token: LivelinessToken,
-    _subscriber: Subscriber<()>,
-    end_key: String,
+    _subscribers: [Subscriber<()>; 2],
+    back: Publisher<'static>,
     tracker: Tracker,
+    /// What it said last, and when.
+    told: Option<(Position, Instant)>,
+    /// What was lost before the sender's present life.
+    lost_before: u64,
 }
 
-/// A sample, or the type that came instead.
-type Incoming<T> = Queue<Result<T, String>>;
+/// A sample with what went beside it.
+struct Incoming<T> {
+    since: u64,
+    gap: u64,
+    former: u64,
+    sample: T,
+}
+
+/// What the network has brought.
+struct Heard<T> {
+    stream: String,
+    queue: Queue<Incoming<T>>,
+    speakers: Mutex<Speakers>,
+    foreign: AtomicU64,
+    refused: AtomicU64,
+}
+
+impl<T: Sample> Heard<T> {
+    // No code panics while it holds the lock.
+    fn speakers(&self) -> MutexGuard<'_, Speakers> {
+        self.speakers.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Takes what has come; what its sender did not send is counted, and said once.
+    fn take(&self, message: &zenoh::sample::Sample) {
+        let stream = &self.stream;
+        let beside = message.attachment();
+        let beside = beside.and_then(|bytes| Beside::read(&bytes.to_bytes()));
+        let beside = beside.filter(|beside| self.speakers().hears(beside.instance));
+        let Some(Beside {
+            instance,
+            since,
+            mut gap,
+            former,
+        }) = beside
+        else {
+            if self.foreign.fetch_add(1, Ordering::Relaxed) == 0 {
+                tracing::warn!(
+                    "stream `{stream}`: somebody who is not its sender puts messages there: they are refused and \
+                     counted"
+                );
+            }
+            return;
+        };
+        let found = if *message.encoding() == encoding(T::KIND) {
+            samples::<T>(&message.payload().to_bytes())
+                .map_err(|length| format!("{length} bytes of {}", T::KIND.type_name()))
+        } else {
+            Err(message.encoding().to_string())
+        };
+        let samples = match found {
+            Ok(samples) => samples,
+            Err(found) => {
+                if self.refused.fetch_add(1, Ordering::Relaxed) == 0 {
+                    let (expected, size) = (T::KIND.type_name(), size_of::<T>());
+                    tracing::warn!(
+                        "stream `{stream}` carries {found}, expected {expected} of {size} bytes: it is refused and \
+                         counted; run the same version on all hosts"
+                    );
+                }
+                return;
+            }
+        };
+        for sample in samples {
+            let message = Message {
+                instance,
+                sequence: sample.header().sequence,
+                payload: Incoming {
+                    since,
+                    gap,
+                    former,
+                    sample,
+                },
+            };
+            gap = 0;
+            // What has no room is asked for again, or, where the newest are kept, counted as lost.
+            self.queue.push(message, Duration::ZERO);
+        }
+    }
+}
 
 impl<T: Sample> ZenohReceiver<T> {
     pub(super) fn open(
@@ -37,23 +130,42 @@ impl<T: Sample> ZenohReceiver<T> {
     ) -> Result<Self, LinkError> {
         let session = &transport.session;
         let failed = |error: zenoh::Error| open_error(stream, &error);
-        let queue = Arc::new(Incoming::<T>::new(keep, depth.clamp(1, MAX_DEPTH)));
-        let (filled, patience) = (Arc::clone(&queue), transport.patience);
-        let subscriber = session
-            .declare_subscriber(stream.to_owned())
-            .callback(move |sample| {
-                let message = decode::<T>(&sample);
-                let ends = matches!(&message.payload, Ok(s) if s.header().has(flags::END));
-                if ends {
-                    filled.push_over(message);
-                } else {
-                    // What is refused leaves a hole in the sequence, which the reader counts.
-                    filled.push(message, patience);
+        let depth = depth.clamp(1, MAX_DEPTH);
+        let heard = Arc::new(Heard {
+            stream: stream.to_owned(),
+            queue: Queue::new(keep, depth),
+            speakers: Mutex::default(),
+            foreign: AtomicU64::new(0),
+            refused: AtomicU64::new(0),
+        });
+        let tokens = Arc::clone(&heard);
+        let senders = session
+            .liveliness()
+            .declare_subscriber(format!("{stream}/@from/*"))
+            .history(true)
+            .callback(move |token| {
+                let Some(instance) = instance_of(token.key_expr()) else {
+                    return;
+                };
+                match token.kind() {
+                    Change::Put => tokens.speakers().appeared(instance),
+                    Change::Delete => tokens.speakers().gone(instance),
                 }
             })
             .wait()
             .map_err(failed)?;
-        let id = format!("{:016x}", transport.unique());
+        let taken = Arc::clone(&heard);
+        let samples = session
+            .declare_subscriber(data_key(stream, keep))
+            .callback(move |message| taken.take(&message))
+            .wait()
+            .map_err(failed)?;
+        let id = format!("{:016x}.{depth}", transport.unique());
+        let back = session
+            .declare_publisher(format!("{stream}/@taken/{id}"))
+            .congestion_control(CongestionControl::Drop)
+            .wait()
+            .map_err(failed)?;
         let token = session
             .liveliness()
             .declare_token(format!("{stream}/{}/{id}", policy(keep)))
@@ -61,49 +173,89 @@ impl<T: Sample> ZenohReceiver<T> {
             .map_err(failed)?;
         Ok(Self {
             stream: stream.to_owned(),
-            session: session.clone(),
-            queue,
+            keep,
+            depth,
+            heard,
             _token: token,
-            _subscriber: subscriber,
-            end_key: format!("{stream}/@end/{id}"),
-            tracker: Tracker::default(),
+            _subscribers: [senders, samples],
+            back,
+            tracker: Tracker::of(stream),
+            told: None,
+            lost_before: 0,
         })
     }
 
-    fn acknowledge_end(&self, instance: u64) -> Result<(), LinkError> {
-        self.session
-            .put(&self.end_key, instance.to_le_bytes())
-            .congestion_control(CongestionControl::Block)
-            .wait()
-            .map_err(|error| LinkError::Receive {
-                stream: self.stream.clone(),
-                reason: zenoh_reason(&error),
-            })
+    /// Whether the sample is the next one that can be had; if not, it comes again.
+    fn is_next(&mut self, message: &Message<Incoming<T>>) -> Result<bool, LinkError> {
+        if self.keep == Keep::Newest {
+            return Ok(true);
+        }
+        let next = match self.tracker.position() {
+            None => return Ok(true),
+            Some(position) if position.instance == message.instance => position.next,
+            // A new life counts from 0.
+            Some(_) => 0,
+        };
+        let Incoming { since, gap, .. } = message.payload;
+        if message.sequence < next {
+            self.tell_now_and_then(message.instance, next, Why::Took)?;
+            return Ok(false);
+        }
+        if message.sequence.saturating_sub(gap) > next.max(since) {
+            self.tell_now_and_then(message.instance, next, Why::Misses)?;
+            return Ok(false);
+        }
+        Ok(true)
     }
-}
 
-fn decode<T: Sample>(sample: &zenoh::sample::Sample) -> Message<Result<T, String>> {
-    let instance = sample
-        .attachment()
-        .and_then(|bytes| <[u8; 8]>::try_from(&*bytes.to_bytes()).ok())
-        .map_or(0, u64::from_le_bytes);
-    let payload = if *sample.encoding() == encoding(T::KIND) {
-        bytemuck::try_pod_read_unaligned::<T>(&sample.payload().to_bytes()).map_err(|_| {
-            format!(
-                "{} bytes of {}",
-                sample.payload().len(),
-                T::KIND.type_name()
-            )
+    /// Says how far it has come, if that is due.
+    fn tell_progress(&mut self, received: Received) -> Result<(), LinkError> {
+        let Some(position) = self.tracker.position() else {
+            return Ok(());
+        };
+        let due = match self.told {
+            None => true,
+            Some((told, at)) => {
+                let taken = position.next.saturating_sub(told.next);
+                let moved = told != position;
+                moved
+                    && (told.instance != position.instance
+                        || taken >= (self.depth as u64 / 4).max(1)
+                        || at.elapsed() >= TELL_EVERY)
+                    || (received == Received::Nothing && (moved || at.elapsed() >= TELL_AGAIN))
+            }
+        };
+        if due || received == Received::End {
+            self.tell(position, Why::Took)?;
+        }
+        Ok(())
+    }
+
+    fn tell_now_and_then(&mut self, instance: u64, next: u64, why: Why) -> Result<(), LinkError> {
+        if self.told.is_some_and(|(_, at)| at.elapsed() < TELL_EVERY) {
+            return Ok(());
+        }
+        self.tell(Position { instance, next }, why)
+    }
+
+    fn taken(&self, Position { instance, next }: Position, why: Why) -> Taken {
+        let lost = self.tracker.counts().lost;
+        Taken {
+            instance,
+            next,
+            lost: lost.saturating_sub(self.lost_before),
+            why,
+        }
+    }
+
+    fn tell(&mut self, position: Position, why: Why) -> Result<(), LinkError> {
+        self.told = Some((position, Instant::now()));
+        let taken = self.taken(position, why);
+        let put = self.back.put(taken.bytes()).wait();
+        put.map_err(|error| LinkError::Receive {
+            stream: self.stream.clone(),
+            reason: zenoh_reason(&error),
         })
-    } else {
-        Err(sample.encoding().to_string())
-    };
-    Message {
-        instance,
-        sequence: payload
-            .as_ref()
-            .map_or(0, |sample| sample.header().sequence),
-        payload,
     }
 }
 
@@ -113,26 +265,50 @@ impl<T: Sample> Receiver<T> for ZenohReceiver<T> {
         timeout: Duration,
         read: &mut dyn FnMut(&T),
     ) -> Result<Received, LinkError> {
-        while let Some(message) = self.queue.pop(timeout) {
-            let sample = message.payload.map_err(|found| LinkError::TypeMismatch {
-                stream: self.stream.clone(),
-                expected: format!("{} of {} bytes", T::KIND.type_name(), size_of::<T>()),
-                found,
-            })?;
-            let begin = self.queue.begin();
-            let taken = self.tracker.take(begin, message.instance, &sample, read);
-            if taken == Some(Received::End) {
-                self.acknowledge_end(message.instance)?;
+        let deadline = Instant::now() + timeout;
+        let mut received = Received::Nothing;
+        loop {
+            let left = deadline.saturating_duration_since(Instant::now());
+            let Some(message) = self.heard.queue.pop(left) else {
+                break;
+            };
+            if !self.is_next(&message)? {
+                continue;
             }
-            if let Some(received) = taken {
-                return Ok(received);
+            let instance = message.instance;
+            let begin = Position {
+                instance,
+                next: message.sequence,
+            };
+            // Those who keep the newest have lost what gave way since the first one came.
+            let begin = match self.keep {
+                Keep::All => Some(begin),
+                Keep::Newest => self.heard.queue.begin(),
+            };
+            let present = self.tracker.position().map(|it| it.instance);
+            if present != Some(instance) {
+                self.tracker.hears_of_former_lives(message.payload.former);
+                self.lost_before = self.tracker.counts().lost;
             }
+            let sample = &message.payload.sample;
+            let Some(taken) = self.tracker.take(begin, instance, sample, read) else {
+                continue;
+            };
+            if taken == Received::End {
+                self.heard.speakers().ends(instance);
+            }
+            received = taken;
+            break;
         }
-        Ok(Received::Nothing)
+        self.tell_progress(received)?;
+        Ok(received)
     }
 
     fn counts(&self) -> ReceiverCounts {
-        self.tracker.counts()
+        let mut counts = self.tracker.counts();
+        counts.foreign += self.heard.foreign.load(Ordering::Relaxed);
+        counts.refused += self.heard.refused.load(Ordering::Relaxed);
+        counts
     }
 
     fn position(&self) -> Option<Position> {
@@ -140,13 +316,21 @@ impl<T: Sample> Receiver<T> for ZenohReceiver<T> {
     }
 
     fn resume(&mut self, position: Position) {
+        self.heard.speakers().resume(position.instance);
         self.tracker.resume(position);
     }
 }
 
-impl<T> Drop for ZenohReceiver<T> {
+impl<T: Sample> Drop for ZenohReceiver<T> {
     fn drop(&mut self) {
-        // Lets a callback go that waits for room.
-        self.queue.close();
+        self.heard.queue.close();
+        let nowhere = Position {
+            instance: 0,
+            next: 0,
+        };
+        let position = self.tracker.position().unwrap_or(nowhere);
+        let taken = self.taken(position, Why::Leaves);
+        // If it does not get through, the sender finds its token gone.
+        let _ = self.back.put(taken.bytes()).wait();
     }
 }

@@ -1,204 +1,341 @@
 //! The sending end over Zenoh.
 
-use std::collections::HashSet;
-use std::marker::PhantomData;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use zenoh::Wait as _;
+use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::CongestionControl;
 use zenoh::sample::SampleKind as Change;
 
-use super::{Zenoh, encoding, open_error, policy, zenoh_reason};
-use crate::link::{Audience, Keep, LinkError, Sender, SenderCounts};
+use super::log::{Batch, Log};
+use super::message::{Beside, Taken, Why};
+use super::{Zenoh, data_key, encoding, last_chunk, open_error, policy, zenoh_reason};
+use crate::link::{Audience, Keep, LinkError, Sender, SenderCounts, SpillSettings};
 use crate::sample::{Sample, flags};
 
-pub(super) struct ZenohSender<T> {
+/// Most bytes of one message: what fits into one batch of Zenoh, so that it is never split.
+/// Resolution: how much is sent twice after a loss.
+const MESSAGE_BYTES: usize = 48 << 10;
+/// Samples that those who keep the newest may miss before the oldest gives way.
+const NEWEST: usize = 16;
+/// How often it is looked for what did not arrive.
+const LOOK_EVERY: Duration = Duration::from_millis(100);
+
+/// A sender with a log before the network and a thread of its own, which begins with the first sample.
+pub(super) struct ZenohSender<T: Sample> {
     stream: String,
-    publisher: Publisher<'static>,
-    audience: Audience,
-    presence: Arc<Presence>,
-    _tokens: [Subscriber<()>; 2],
-    _ends: Subscriber<()>,
-    instance: u64,
-    next: u64,
-    /// Who was there when the end was sent.
-    told: HashSet<String>,
-    counts: SenderCounts,
-    kind: PhantomData<T>,
+    shared: Arc<Shared<T>>,
+    /// Until the thread has it.
+    wire: Option<Wire>,
+    settings: SpillSettings,
+    /// Shows that it lives; gone first, so that its next life is heard.
+    token: Option<LivelinessToken>,
+    sent: u64,
 }
 
-/// What the sender hears of its receivers.
-#[derive(Debug, Default)]
-struct Presence {
-    state: Mutex<State>,
+/// The ends of a sender in the network.
+struct Wire {
+    publisher: Publisher<'static>,
+    instance: u64,
+    former: u64,
+    _tokens: Subscriber<()>,
+    _taken: Subscriber<()>,
+}
+
+struct Shared<T> {
+    state: Mutex<State<T>>,
+    /// There is something to send, or to look for.
+    filled: Condvar,
+    /// There is more room, or somebody else is there.
     changed: Condvar,
 }
 
-#[derive(Debug, Default)]
-struct State {
-    keep_all: HashSet<String>,
-    keep_newest: HashSet<String>,
-    /// Those that have taken the end.
-    taken: HashSet<String>,
-}
-
-impl State {
-    fn missing(&self, audience: Audience) -> usize {
-        audience.keep_all.saturating_sub(self.keep_all.len())
-            + audience.keep_newest.saturating_sub(self.keep_newest.len())
-    }
-
-    /// Those of `told` that are still there and have not taken the end.
-    fn untaken(&self, told: &HashSet<String>) -> usize {
-        let there = |id: &&String| self.keep_all.contains(*id) || self.keep_newest.contains(*id);
-        told.difference(&self.taken).filter(there).count()
-    }
-}
-
-impl Presence {
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn change(&self, f: impl FnOnce(&mut State)) {
-        f(&mut self.lock());
-        self.changed.notify_all();
-    }
-
-    /// Waits until `count` is 0 or for `timeout`, and returns it.
-    fn wait(&self, timeout: Duration, count: impl Fn(&State) -> usize) -> usize {
-        let (state, _) = self
-            .changed
-            .wait_timeout_while(self.lock(), timeout, |state| count(state) > 0)
-            .unwrap_or_else(PoisonError::into_inner);
-        count(&state)
-    }
+struct State<T> {
+    log: Log<T>,
+    /// The thread waits to be woken.
+    idle: bool,
+    /// Nobody sends any more; what waits is given so long.
+    closed: Option<Instant>,
+    failure: Option<LinkError>,
 }
 
 impl<T: Sample> ZenohSender<T> {
     pub(super) fn open(
         transport: &Zenoh,
         stream: &str,
+        keep: Keep,
         audience: Audience,
     ) -> Result<Self, LinkError> {
         let session = &transport.session;
+        let settings = transport.spill;
         let failed = |error: zenoh::Error| open_error(stream, &error);
-        let presence = Arc::new(Presence::default());
+        let most = match keep {
+            Keep::All => settings.bytes / size_of::<T>(),
+            Keep::Newest => NEWEST,
+        };
+        let shared = Arc::new(Shared {
+            state: Mutex::new(State {
+                log: Log::new(keep, audience, most, transport.patience),
+                idle: false,
+                closed: None,
+                failure: None,
+            }),
+            filled: Condvar::new(),
+            changed: Condvar::new(),
+        });
+        let instance = transport.unique();
         let publisher = session
-            .declare_publisher(stream.to_owned())
+            .declare_publisher(data_key(stream, keep))
             .encoding(encoding(T::KIND))
-            .congestion_control(CongestionControl::Block)
+            .congestion_control(CongestionControl::Drop)
             .wait()
             .map_err(failed)?;
-        let tokens = |keep| {
-            let presence = Arc::clone(&presence);
-            session
-                .liveliness()
-                .declare_subscriber(format!("{stream}/{}/*", policy(keep)))
-                .history(true)
-                .callback(move |token| {
-                    let id = last_chunk(token.key_expr());
-                    presence.change(|state| {
-                        let ids = match keep {
-                            Keep::All => &mut state.keep_all,
-                            Keep::Newest => &mut state.keep_newest,
-                        };
-                        match token.kind() {
-                            Change::Put => ids.insert(id),
-                            Change::Delete => ids.remove(&id),
-                        };
-                    });
-                })
-                .wait()
-                .map_err(failed)
-        };
-        let instance = transport.unique();
-        let ended = Arc::clone(&presence);
-        let ends = session
-            .declare_subscriber(format!("{stream}/@end/*"))
+        let theirs = Arc::clone(&shared);
+        let taken = session
+            .declare_subscriber(format!("{stream}/@taken/*"))
             .callback(move |sample| {
-                if *sample.payload().to_bytes() == instance.to_le_bytes() {
-                    let id = last_chunk(sample.key_expr());
-                    ended.change(|state| {
-                        state.taken.insert(id);
-                    });
-                }
+                let Some(taken) = Taken::read(&sample.payload().to_bytes()) else {
+                    return;
+                };
+                let id = last_chunk(sample.key_expr());
+                theirs.change(|log, now| match taken.why {
+                    Why::Leaves => log.leave(id),
+                    why if taken.instance == instance => {
+                        log.taken(id, (taken.next, taken.lost), why == Why::Misses, now);
+                    }
+                    _ => {}
+                });
             })
             .wait()
             .map_err(failed)?;
+        // A receiver that hears of the one can be heard by the other.
+        let token = session
+            .liveliness()
+            .declare_token(format!("{stream}/@from/{instance:016x}"))
+            .wait()
+            .map_err(failed)?;
+        let tokens = presence(session, stream, keep, &shared).map_err(failed)?;
         Ok(Self {
             stream: stream.to_owned(),
-            publisher,
-            audience,
-            _tokens: [tokens(Keep::All)?, tokens(Keep::Newest)?],
-            presence: Arc::clone(&presence),
-            _ends: ends,
-            instance,
-            next: 0,
-            told: HashSet::new(),
-            counts: SenderCounts::default(),
-            kind: PhantomData,
+            shared,
+            wire: Some(Wire {
+                publisher,
+                instance,
+                former: transport.former,
+                _tokens: tokens,
+                _taken: taken,
+            }),
+            settings,
+            token: Some(token),
+            sent: 0,
         })
     }
 
-    fn send(&mut self, write: &mut dyn FnMut(&mut T)) -> Result<(), LinkError> {
-        let mut sample = T::default();
-        write(&mut sample);
-        sample.header_mut().sequence = self.next;
-        self.next += 1;
-        let there = self.presence.lock().keep_all.len();
-        self.counts.undelivered += self.audience.keep_all.saturating_sub(there) as u64;
-        self.publisher
-            .put(bytemuck::bytes_of(&sample))
-            .attachment(self.instance.to_le_bytes())
-            .wait()
-            .map_err(|error| LinkError::Send {
-                stream: self.stream.clone(),
-                reason: zenoh_reason(&error),
-            })
+    /// Starts the thread, once.
+    fn start(&mut self) -> Result<(), LinkError> {
+        let Some(wire) = self.wire.take() else {
+            return Ok(());
+        };
+        let shared = Arc::clone(&self.shared);
+        let stream = self.stream.clone();
+        let linger = Duration::from_millis(self.settings.linger_ms);
+        let thread = std::thread::Builder::new().name("zenoh link".to_owned());
+        let started = thread.spawn(move || {
+            if let Err(reason) = shared.pump(&wire, linger) {
+                shared.lock().failure = Some(LinkError::Send { stream, reason });
+                shared.changed.notify_all();
+            }
+        });
+        started.map(|_| ()).map_err(|error| LinkError::Send {
+            stream: self.stream.clone(),
+            reason: format!("no thread for what waits to be sent: {error}"),
+        })
     }
+
+    /// The log, once a sender that can wait has room.
+    fn room(&mut self) -> Result<MutexGuard<'_, State<T>>, LinkError> {
+        self.start()?;
+        let mut state = self.shared.lock();
+        while self.settings.waits && state.failure.is_none() && state.log.is_full(Instant::now()) {
+            state = wait(&self.shared.changed, state, LOOK_EVERY);
+        }
+        match state.failure.take() {
+            Some(error) => Err(error),
+            None => Ok(state),
+        }
+    }
+
+    /// Waits until `count` is 0 or for `timeout`, and returns it.
+    fn until_none(&self, timeout: Duration, count: impl Fn(&Log<T>) -> usize) -> usize {
+        let deadline = Instant::now() + timeout;
+        let mut state = self.shared.lock();
+        loop {
+            let left = deadline.saturating_duration_since(Instant::now());
+            let found = count(&state.log);
+            if found == 0 || left.is_zero() || state.failure.is_some() {
+                return found;
+            }
+            state = wait(&self.shared.changed, state, left);
+        }
+    }
+}
+
+/// Hears who listens.
+fn presence<T: Sample>(
+    session: &zenoh::Session,
+    stream: &str,
+    keep: Keep,
+    shared: &Arc<Shared<T>>,
+) -> zenoh::Result<Subscriber<()>> {
+    let theirs = Arc::clone(shared);
+    session
+        .liveliness()
+        .declare_subscriber(format!("{stream}/{}/*", policy(keep)))
+        .history(true)
+        .callback(move |token| {
+            let id = last_chunk(token.key_expr());
+            let room = id.rsplit('.').next().and_then(|room| room.parse().ok());
+            theirs.change(|log, now| match token.kind() {
+                Change::Put => log.join(id, room.unwrap_or(1), now),
+                Change::Delete => log.lose(id, now),
+            });
+        })
+        .wait()
 }
 
 impl<T: Sample> Sender<T> for ZenohSender<T> {
     fn send_with(&mut self, write: &mut dyn FnMut(&mut T)) -> Result<(), LinkError> {
-        self.send(write)?;
-        self.counts.sent += 1;
+        let mut sample = T::default();
+        write(&mut sample);
+        let mut state = self.room()?;
+        sample.header_mut().sequence = state.log.next();
+        state.log.push(sample);
+        let idle = state.idle;
+        drop(state);
+        if idle {
+            self.shared.filled.notify_one();
+        }
+        self.sent += 1;
         Ok(())
     }
 
     fn skip(&mut self, count: u64) {
-        self.next += count;
+        self.shared.lock().log.skip(count);
     }
 
     fn end(&mut self) -> Result<(), LinkError> {
-        {
-            let state = self.presence.lock();
-            self.told = state.keep_all.union(&state.keep_newest).cloned().collect();
-        }
-        self.send(&mut |sample| sample.header_mut().flags = flags::END)
+        let mut mark = T::default();
+        mark.header_mut().flags = flags::END;
+        let mut state = self.room()?;
+        mark.header_mut().sequence = state.log.next();
+        state.log.push_end(mark);
+        drop(state);
+        self.shared.filled.notify_one();
+        Ok(())
     }
 
     fn wait_for_receivers(&mut self, timeout: Duration) -> Result<usize, LinkError> {
-        let audience = self.audience;
-        Ok(self.presence.wait(timeout, |state| state.missing(audience)))
+        Ok(self.until_none(timeout, Log::missing))
     }
 
     fn wait_until_taken(&mut self, timeout: Duration) -> Result<usize, LinkError> {
-        let told = &self.told;
-        Ok(self.presence.wait(timeout, |state| state.untaken(told)))
+        let untaken = self.until_none(timeout, Log::untaken);
+        let mut state = self.shared.lock();
+        if let Some(error) = state.failure.take() {
+            return Err(error);
+        }
+        if untaken > 0 {
+            state.log.abandon();
+        }
+        Ok(untaken)
     }
 
     fn counts(&self) -> SenderCounts {
-        self.counts
+        SenderCounts {
+            sent: self.sent,
+            undelivered: self.shared.lock().log.undelivered(),
+        }
     }
 }
 
-fn last_chunk(key: &zenoh::key_expr::KeyExpr<'_>) -> String {
-    key.as_str()
-        .rsplit('/')
-        .next()
-        .unwrap_or_default()
-        .to_owned()
+impl<T: Sample> Drop for ZenohSender<T> {
+    /// What waits is still sent; a process that exits takes it along.
+    fn drop(&mut self) {
+        self.token = None;
+        self.shared.lock().closed = Some(Instant::now());
+        self.shared.filled.notify_one();
+    }
+}
+
+impl<T: Sample> Shared<T> {
+    // No code panics while it holds the lock.
+    fn lock(&self) -> MutexGuard<'_, State<T>> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn change(&self, change: impl FnOnce(&mut Log<T>, Instant)) {
+        change(&mut self.lock().log, Instant::now());
+        self.filled.notify_one();
+        self.changed.notify_all();
+    }
+
+    /// Sends what waits until nobody sends any more.
+    fn pump(&self, wire: &Wire, linger: Duration) -> Result<(), String> {
+        let most = (MESSAGE_BYTES / size_of::<T>()).max(1);
+        while let Some(batch) = self.next(most, linger) {
+            let beside = Beside {
+                instance: wire.instance,
+                since: batch.since,
+                gap: batch.gap,
+                former: wire.former,
+            };
+            wire.publisher
+                .put(bytemuck::cast_slice::<T, u8>(&batch.samples))
+                .attachment(beside.bytes())
+                .wait()
+                .map_err(|error| zenoh_reason(&error))?;
+        }
+        Ok(())
+    }
+
+    /// What goes out next; none at the end.
+    fn next(&self, most: usize, linger: Duration) -> Option<Batch<T>> {
+        let mut state = self.lock();
+        loop {
+            let now = Instant::now();
+            state.log.look_back(now);
+            if let Some(batch) = state.log.batch(most, now) {
+                drop(state);
+                self.changed.notify_all();
+                return Some(batch);
+            }
+            let leaves = state.closed;
+            if leaves
+                .is_some_and(|at| state.log.is_empty() || at.elapsed() >= crate::link::PATIENCE)
+            {
+                return None;
+            }
+            state.idle = true;
+            state = wait(&self.filled, state, LOOK_EVERY);
+            state.idle = false;
+            if !linger.is_zero() && state.closed.is_none() {
+                drop(state);
+                std::thread::sleep(linger);
+                state = self.lock();
+            }
+        }
+    }
+}
+
+fn wait<'a, T>(
+    condition: &Condvar,
+    state: MutexGuard<'a, State<T>>,
+    timeout: Duration,
+) -> MutexGuard<'a, State<T>> {
+    condition
+        .wait_timeout(state, timeout)
+        .unwrap_or_else(PoisonError::into_inner)
+        .0
 }

@@ -5,7 +5,8 @@ use std::time::{Duration, Instant};
 use super::{Post, Turn};
 use crate::link::{LinkError, Sender, SenderCounts};
 use crate::sample::{Header, Health, Sample};
-use crate::shell::health::HealthClock;
+use crate::shell::Ledger;
+use crate::shell::health::HealthSender;
 use crate::shell::report::{InputReport, Report};
 use crate::stage::{Emit, Stage, StageError};
 
@@ -17,6 +18,7 @@ pub struct Outlet<'a, T: Sample> {
     slot: T,
     sent: u64,
     newest: Option<Header>,
+    ledger: Ledger,
 }
 
 impl<'a, T: Sample> Outlet<'a, T> {
@@ -31,6 +33,7 @@ impl<'a, T: Sample> Outlet<'a, T> {
             slot: T::default(),
             sent: 0,
             newest: None,
+            ledger: Ledger::default(),
         }
     }
 
@@ -82,11 +85,13 @@ impl<T: Sample> Emit<T> for Outlet<'_, T> {
             slot,
             sent,
             newest,
+            ledger,
         } = self;
         if let (Some(link), true) = (&mut *link, branches.is_empty()) {
             link.send_with(&mut |place| {
                 write(place);
                 *newest = Some(*place.header());
+                ledger.emitted(*sent + 1, place.header());
             })?;
             *sent += 1;
             return Ok(());
@@ -96,6 +101,7 @@ impl<T: Sample> Emit<T> for Outlet<'_, T> {
         slot.header_mut().sequence = *sent;
         *newest = Some(*slot.header());
         *sent += 1;
+        ledger.emitted(*sent, slot.header());
         // No detector waits for what a recorder is told.
         let heard = branches.iter_mut().try_for_each(|branch| {
             branch.hear(slot)?;
@@ -136,6 +142,9 @@ pub trait Part {
 
     /// The part of it that says how its input fares.
     fn input(&mut self) -> Option<&mut InputReport>;
+
+    /// Keeps what that part says.
+    fn keep_input(&mut self);
 
     /// Waits until all who hear it over links are there; how many are missing.
     ///
@@ -179,14 +188,16 @@ pub(super) struct Frame<'a, O: Sample> {
     pub place: usize,
     pub turn: Turn,
     pub out: Outlet<'a, O>,
-    pub health: HealthClock<Box<dyn Sender<Health> + 'a>>,
+    pub health: HealthSender<Box<dyn Sender<Health> + 'a>>,
     pub report: Report,
     /// A health report is due.
     pub due: bool,
+    ledger: Ledger,
 }
 
 impl<'a, O: Sample> Frame<'a, O> {
-    pub fn new(turn: &Turn, post: Post<'a>, out: Outlet<'a, O>) -> Self {
+    pub fn new(turn: &Turn, post: Post<'a>, mut out: Outlet<'a, O>) -> Self {
+        out.ledger = post.ledger.clone();
         let inputs = if post.from.is_empty() {
             Vec::new()
         } else {
@@ -199,13 +210,14 @@ impl<'a, O: Sample> Frame<'a, O> {
             place: turn.place(&post.stage),
             turn: turn.clone(),
             out,
-            health: HealthClock::new(post.health, &post.stage, post.restarts),
+            health: HealthSender::new(post.health, &post.stage, post.restarts),
             report: Report {
                 stage: post.stage,
                 inputs,
                 ..Report::default()
             },
             due: false,
+            ledger: post.ledger,
         }
     }
 
@@ -262,6 +274,8 @@ impl<I: Sample, O: Sample> Branch<I> for Node<'_, I, O> {
         let Self { frame, stage } = self;
         if let Some(input) = frame.report.inputs.first_mut() {
             input.counts.received += 1;
+            let received = input.counts.received;
+            frame.ledger.takes(0, received, sample.header());
         }
         frame.due = frame.health.note(sample.header());
         let (turn, out) = (&frame.turn, &mut frame.out);
@@ -292,6 +306,12 @@ impl<I: Sample, O: Sample> Part for Node<'_, I, O> {
 
     fn input(&mut self) -> Option<&mut InputReport> {
         self.frame.report.inputs.first_mut()
+    }
+
+    fn keep_input(&mut self) {
+        if let Some(input) = self.frame.report.inputs.first() {
+            self.frame.ledger.heard(0, &input.counts, input.position);
+        }
     }
 
     fn wait_for_receivers(&mut self, timeout: Duration) -> Result<usize, LinkError> {

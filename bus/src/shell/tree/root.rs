@@ -122,6 +122,8 @@ impl<T: Sample> Part for SourceRoot<'_, T> {
         None
     }
 
+    fn keep_input(&mut self) {}
+
     fn wait_for_receivers(&mut self, timeout: Duration) -> Result<usize, LinkError> {
         self.frame.wait_for_receivers(timeout)
     }
@@ -206,6 +208,7 @@ impl<I: Sample> Root for Linked<'_, I> {
             input.position = receiver.position();
             input.ended = self.ended;
         }
+        self.first.part().keep_input();
     }
 
     fn part(&mut self) -> &mut dyn Part {

@@ -5,8 +5,9 @@ mod joints;
 use maud::{Markup, html};
 use tauscope_publish::message::StatusMessage;
 
-use super::{Viewer, incidents, layout, tile};
+use super::{Viewer, incidents, layout, physics, tile};
 use crate::hub::Hub;
+use crate::physics::CellPhysics;
 use crate::store::{Day, Incident, JointNormal, KeptContact, Note};
 use crate::wall::{CellView, Snapshot, State};
 use crate::words;
@@ -27,6 +28,7 @@ pub struct Kept {
     contacts: Vec<KeptContact>,
     incidents: Vec<Incident>,
     notes: Vec<Note>,
+    physics: Option<CellPhysics>,
     /// Why something is missing.
     trouble: Option<String>,
 }
@@ -42,6 +44,7 @@ impl Kept {
                 contacts: store.contacts(cell, MOST)?,
                 incidents: store.incidents(Some(cell), MOST)?,
                 notes: store.notes(cell, MOST)?,
+                physics: None,
                 trouble: None,
             })
         });
@@ -49,10 +52,14 @@ impl Kept {
             trouble: Some(trouble),
             ..Self::default()
         };
-        match read {
+        let kept = match read {
             Some(Ok(kept)) => kept,
             Some(Err(error)) => trouble(error.to_string()),
             None => trouble("this fleet host keeps no history".to_owned()),
+        };
+        Self {
+            physics: hub.physics(cell),
+            ..kept
         }
     }
 }
@@ -78,6 +85,10 @@ pub fn page(viewer: &Viewer, snapshot: &Snapshot, name: &str, kept: &Kept) -> Ma
         section aria-labelledby="joints" {
             h2 #joints { "Joints" }
             (joints::section(snapshot, view, kept, unit))
+        }
+        section aria-labelledby="physics" {
+            h2 #physics { "Physics over weeks" }
+            (physics::section(kept.physics.as_ref(), &kept.notes))
         }
         section aria-labelledby="contacts" {
             h2 #contacts { "Contacts" }

@@ -95,6 +95,14 @@ fn facts(view: &CellView, status: &StatusMessage, now_ns: i64) -> Markup {
                 dt { "Drifts most" }
                 dd { (residual.joint) ", " (format!("{:.2}", residual.joint_ratio)) " × normal" }
             }
+            @if let Some(drift) = &view.drift {
+                dt { "Friction" }
+                dd.warn[drift.finding.is_some()] title=[drift.finding.as_ref()] {
+                    (drift.joint) ", " (drift.quantity.words()) " " (format!("{:+.0} %", 100.0 * drift.share))
+                    @if drift.is_warmth { " (warmth)" }
+                    @if drift.curve.len() > 2 { (chart::spark("friction over its first", &drift.curve, "six weeks")) }
+                }
+            }
             @if let Some(change) = status.changes.first() {
                 dt { "Watch" }
                 dd.warn { (words::change(change, &status.effort_unit)) }
@@ -153,6 +161,6 @@ fn residual(view: &CellView) -> Markup {
             }
             None => span.muted { "no normal to compare with" },
         }
-        @if curve.len() > 2 { (chart::spark(curve, span)) }
+        @if curve.len() > 2 { (chart::spark("residual", curve, span)) }
     }
 }

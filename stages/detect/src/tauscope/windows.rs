@@ -4,6 +4,7 @@ use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 
 use super::learnt::{Learnt, bin};
 use super::means::{Means, borne_out};
+use super::recovery::Recovery;
 use super::rest::Rest;
 use super::spans::{Follow, LONG, MIDDLE, SHORTEST, WINDOWS_S};
 use super::stand::{End, Stand};
@@ -47,6 +48,10 @@ pub(crate) struct Windows {
     /// The contact with a standing arm that goes on, and when one was over.
     end: End,
     settled: Option<Settled>,
+    /// What friction may hold behind a contact, if it is heeded.
+    recovery: Option<Recovery>,
+    /// By joint, how many times larger that makes the noise now.
+    doubt: JointArray,
     /// By window and joint, the noise at the present speed and unrest.
     noise: [JointArray; WINDOWS_S.len()],
     /// By window and joint, the mean residual as far as the newest samples bear it out.
@@ -69,6 +74,8 @@ impl Windows {
             stand: Stand::new(SLOW),
             end: End::default(),
             settled: None,
+            recovery: None,
+            doubt: [1.0; MAX_JOINTS],
             noise: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
             borne_out: [[0.0; MAX_JOINTS]; WINDOWS_S.len()],
             held: [0.0; MAX_JOINTS],
@@ -78,12 +85,13 @@ impl Windows {
         }
     }
 
-    /// From here on a standing arm is held against what it was before it was touched, if that was learnt; at this `threshold` there should be
-    /// so many false alarms an hour.
-    pub fn heed_rest(&mut self, threshold: f64, per_hour: f64) {
+    /// From here on contacts are sought, at this `threshold` for so many false alarms an hour. A standing arm is held against what it was before
+    /// it was touched, if that was learnt; and what friction may hold behind a contact is doubted.
+    pub fn seek(&mut self, threshold: f64, per_hour: f64) {
         let rest = self.learnt.rest.as_ref();
         self.at_rest =
             rest.map(|rest| Rest::new(rest, self.learnt.joints.len(), threshold, per_hour));
+        self.recovery = Some(Recovery::default());
     }
 
     pub fn reset(&mut self) {
@@ -94,6 +102,10 @@ impl Windows {
         self.stand.reset();
         self.end.forget();
         self.settled = None;
+        if let Some(recovery) = &mut self.recovery {
+            recovery.reset();
+        }
+        self.doubt = [1.0; MAX_JOINTS];
         self.score = 0.0;
     }
 
@@ -112,17 +124,19 @@ impl Windows {
                 noise[j] = usual.hypot(window.unquiet[j] * unrest);
             }
         }
-        self.borne_out = borne_out(
-            self.means.all(),
-            self.learnt.windows.len(),
-            self.joints(),
-            |w, j| self.noise[w][j],
-        );
-        self.score = 0.0;
-        for w in 0..self.learnt.windows.len() {
-            self.score = (self.length(w) / self.learnt.windows[w].usual).max(self.score);
+        let now_ns = sample.header.stamp_ns;
+        self.doubt = [1.0; MAX_JOINTS];
+        self.score = self.most_unusual();
+        if let Some(recovery) = &mut self.recovery {
+            recovery.step(now_ns, self.score.sqrt(), usual.is_none());
+            if recovery.doubts() {
+                for (doubt, slow) in self.doubt.iter_mut().zip(&self.means.slow) {
+                    *doubt = recovery.doubt(*slow);
+                }
+                self.score = self.most_unusual();
+            }
         }
-        self.score /= self.creep(sample.header.stamp_ns);
+        self.score /= self.creep(now_ns);
         let at_rest = (self.at_rest.as_mut()).and_then(|rest| rest.score(sample, usual.is_some()));
         self.score = at_rest.map_or(self.score, |score| score.max(self.score));
         // A sample that stands out is no drift, however short it is: one bad reading would be remembered for minutes.
@@ -130,6 +144,16 @@ impl Windows {
             self.means.follow();
         }
         self.score
+    }
+
+    /// The score of the most unusual window.
+    fn most_unusual(&mut self) -> f64 {
+        let windows = self.learnt.windows.len();
+        self.borne_out = borne_out(self.means.all(), windows, self.joints(), |w, j| {
+            self.doubted(w, j)
+        });
+        let scores = (0..windows).map(|w| self.length(w) / self.learnt.windows[w].usual);
+        scores.fold(0.0, f64::max)
     }
 
     /// By how much a score is less, for creep behind a contact with a standing arm.
@@ -200,7 +224,7 @@ impl Windows {
         let n = self.learnt.joints.len();
         let mut z = [0.0; MAX_JOINTS];
         for (j, z) in z.iter_mut().enumerate().take(n) {
-            *z = mean(j) / self.noise(window, j);
+            *z = mean(j) / self.doubted(window, j);
         }
         let inverse = &self.learnt.windows[window].inverse_correlation;
         // Symmetric: a row is a column.
@@ -265,7 +289,7 @@ impl Windows {
         let n = self.joints();
         let (mut change, mut held) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
         for j in 0..n {
-            let noise = self.noise(MIDDLE, j);
+            let noise = self.doubted(MIDDLE, j);
             change[j] = (self.mean(MIDDLE, j) - self.held[j]) / noise;
             held[j] = self.held[j] / noise;
         }
@@ -286,6 +310,12 @@ impl Windows {
     /// Its usual size at the joint's present speed and unrest \[effort unit\].
     pub fn noise(&self, window: usize, joint: usize) -> f64 {
         self.noise[window][joint]
+    }
+
+    /// The same where what friction may hold behind a contact is taken for noise, too. It says whether there is a contact; where one is and
+    /// whether the arm has come to rest are no matter of it.
+    fn doubted(&self, window: usize, joint: usize) -> f64 {
+        self.noise[window][joint] * self.doubt[joint]
     }
 
     /// Inverse of the correlation of the joints' means over a window, row by row.

@@ -139,6 +139,7 @@ impl Problem {
             cutoff_hz,
             effective_samples: Vec::new(),
             known_friction: vec![BTreeMap::new(); n],
+            is_foreign: false,
             cache: Arc::default(),
             units: Arc::default(),
             bare: OnceLock::new(),

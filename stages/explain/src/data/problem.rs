@@ -38,6 +38,8 @@ pub struct Problem {
     pub effective_samples: Vec<f64>,
     /// Coulomb and viscous friction by joint that the twin has already: by so much they may be less.
     pub known_friction: Vec<BTreeMap<&'static str, f64>>,
+    /// Whether the twin's effort is another simulation's, which follows the command and not the motion.
+    pub is_foreign: bool,
     /// Columns that were computed before.
     pub cache: Arc<ColumnCache>,
     /// What unit bodies cost.

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 use tauscope_dynamics::terms::{MotionSample, Physics};
 use tauscope_dynamics::{Data, Model, rnea};
 
+use crate::data::quiet_start::quiet_s;
 use crate::data::smoother::{LowPass, MotionSmoother};
 use crate::data::standstill;
 use crate::read::recording::{MAX_GAP_S, Recording};
@@ -47,6 +48,8 @@ pub struct Track {
     pub rigid: Vec<f64>,
     /// Effort of a corrected twin's terms that are not bodies \[the recording's unit\].
     pub beside: Vec<f64>,
+    /// Until when the beginning of an arm at rest is free of temporary effects \[s\].
+    pub quiet_s: f64,
 }
 
 impl Track {
@@ -71,6 +74,7 @@ impl Track {
             acceleration: vec![0.0; n * count],
             rigid: vec![0.0; n * count],
             beside: vec![0.0; n * count],
+            quiet_s: BEGINNING_S,
         };
         for j in 0..n {
             let measured: Vec<f64> = (0..count).map(|k| recording.position[k * n + j]).collect();
@@ -128,16 +132,19 @@ impl Track {
     /// cannot be told apart there.
     pub fn start_at_measured(&mut self, recording: &Recording, unit_nm: &[f64]) {
         let n = unit_nm.len();
-        let samples = self.time_s.partition_point(|t| *t < BEGINNING_S);
-        if recording.effort.is_empty() || samples == 0 {
+        if recording.effort.is_empty() || self.is_empty() {
             return;
         }
-        for (j, unit) in unit_nm.iter().enumerate() {
-            let off = |k: usize| {
-                let at = k * n + j;
-                (recording.effort[at] - self.beside[at]) * unit - self.rigid[at]
-            };
-            let mean = (0..samples).map(off).sum::<f64>() / samples as f64;
+        let off = |(j, unit): (usize, &f64)| -> Vec<f64> {
+            let at = (j..recording.effort.len()).step_by(n);
+            at.map(|at| (recording.effort[at] - self.beside[at]) * unit - self.rigid[at])
+                .collect()
+        };
+        let off: Vec<Vec<f64>> = unit_nm.iter().enumerate().map(off).collect();
+        self.quiet_s = quiet_s(&self.time_s, &off, BEGINNING_S);
+        let samples = self.time_s.partition_point(|t| *t < self.quiet_s).max(1);
+        for (j, off) in off.iter().enumerate() {
+            let mean = off[..samples].iter().sum::<f64>() / samples as f64;
             for value in self.rigid.iter_mut().skip(j).step_by(n) {
                 *value += mean;
             }
@@ -170,6 +177,7 @@ impl Track {
             acceleration: rows(&self.acceleration),
             rigid: rows(&self.rigid),
             beside: rows(&self.beside),
+            quiet_s: self.quiet_s,
         }
     }
 
@@ -353,6 +361,7 @@ mod tests {
             acceleration: vec![0.0; 100],
             rigid: vec![0.0; 100],
             beside: vec![0.0; 100],
+            quiet_s: BEGINNING_S,
         };
         track.sharpen_velocity(&recording, None);
         assert!(

@@ -41,20 +41,41 @@ const FELT_SHARE: f64 = 0.015;
 /// Tuned: by hand, on no recorded seeds; not swept.
 const MOST_OF_TIME: f64 = 0.7;
 
-/// Standard deviation of the residual at each joint over the beginning of a problem's only recording \[N m or N\].
+/// Standard deviation of the residual at each joint over the beginning of a problem's only recording \[N m or N\]. Where
+/// that is cut short by a push, it is that about its own mean over most parts of the recording as long as a beginning.
 fn deviations(problem: &Problem, fit: &Fit) -> Vec<f64> {
     let track = &problem.tracks[0];
-    let begins = |k: &usize| track.track.time_s[*k] < BEGINNING_S;
-    let beginning = track.compared.iter().take_while(|k| begins(k)).count();
+    let time = |k: usize| track.track.time_s[track.compared[k]];
+    let rows = track.compared.len();
+    let is_cut = track.track.quiet_s < BEGINNING_S;
     let of = |j: usize| {
-        let rows = problem.joint_rows(j);
-        let left = fit.residual[rows.clone()].iter().zip(&problem.weight[rows]);
-        let (sum, count) = left
-            .take(beginning)
-            .fold((0.0, 0.0), |(sum, n), (e, w)| (sum + w * e * e, n + w));
-        (sum / f64::max(count, 1.0))
-            .sqrt()
-            .max(problem.white_noise[j])
+        let first = problem.joint_rows(j).start;
+        let about = |from_s: f64, to_s: f64, own_mean: bool| {
+            let inside = |k: &usize| (from_s..to_s).contains(&time(*k));
+            let counted = (0..rows).filter(|k| inside(k) && problem.weight[first + k] > 0.0);
+            let left: Vec<f64> = counted.map(|k| fit.residual[first + k]).collect();
+            let count = left.len().max(1) as f64;
+            let mean = if own_mean {
+                left.iter().sum::<f64>() / count
+            } else {
+                0.0
+            };
+            (left.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt()
+        };
+        let deviation = if is_cut {
+            let end_s = track.track.time_s.last().copied().unwrap_or(0.0);
+            let parts = (end_s / BEGINNING_S) as usize;
+            let part = |k: usize| {
+                let from_s = BEGINNING_S * k as f64;
+                about(from_s, from_s + BEGINNING_S, true)
+            };
+            let mut all: Vec<f64> = (0..parts).map(part).collect();
+            all.sort_by(f64::total_cmp);
+            all.get(all.len() / 2).copied().unwrap_or(0.0)
+        } else {
+            about(0.0, BEGINNING_S, false)
+        };
+        deviation.max(problem.white_noise[j])
     };
     (0..problem.joints).map(of).collect()
 }
@@ -219,7 +240,7 @@ impl Context<'_> {
         }
         named.notes.push(format!(
             "No joint moves, so lasting effects cannot be told from the load at rest. The effort in the first {BEGINNING_S} s of each \
-             recording is taken as the usual load of that pose."
+             recording, or until it changes, is taken as the usual load of that pose."
         ));
         if !self.unscaled.is_empty() {
             let of =

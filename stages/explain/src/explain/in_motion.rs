@@ -46,12 +46,13 @@ impl Context<'_> {
             unnamed_bodies: &unnamed_bodies,
             say: &say,
         };
-        let (start, penalties) = started(&search, scales(), turn);
+        let (start, penalties) = started(&search, scales(), turn, input.bodies);
         let moving = search.first_guess(start, penalties);
         // Without set-valued friction, standstills are as informative as motion.
         progress(0.3, "standstills");
         let dry = (input.start.as_ref()).map_or_else(
-            || vec![false; joints.len()],
+            // Another simulation has friction of its own, and says nothing where the real one holds.
+            || vec![!input.bodies; joints.len()],
             |start| start.is_dry(&input.model),
         );
         let rests_count: Vec<bool> = (0..joints.len())
@@ -107,7 +108,13 @@ fn started(
     search: &Search<'_>,
     mut start: Vec<Active>,
     turn: Option<[f64; 2]>,
+    bodies: bool,
 ) -> (Vec<Active>, Vec<f64>) {
+    if !bodies {
+        // The other simulation has friction of its own.
+        let plain = search.hypotheses.iter().filter(|h| h.is_plain_friction());
+        start.extend(plain.map(|h| h.with(vec![0.0])));
+    }
     let mut penalties = vec![0.0; start.len()];
     let of_base = |h: &&Hypothesis| h.effect.place == PlaceKind::Base;
     if let (Some(turn), Some(tilt)) = (turn, search.hypotheses.iter().find(of_base)) {

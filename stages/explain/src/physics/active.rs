@@ -155,6 +155,13 @@ impl Hypothesis {
         self.effect.traits.drawn_over == Some(Against::Position)
     }
 
+    /// Whether it is a spring over its joint's position.
+    pub fn is_spring(&self) -> bool {
+        self.is_of_position()
+            && self.effect.family == Family::Spring
+            && self.effect.traits.most_at_one_place == 1
+    }
+
     /// How it depends on time.
     pub fn time_kind(&self) -> TimeKind {
         self.effect.time()

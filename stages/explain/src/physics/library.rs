@@ -1,11 +1,17 @@
 //! The hypotheses for a robot.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::{EFFECTS, Effect, PlaceKind};
 
 use crate::physics::active::{Hypothesis, Whereabouts};
+
+/// Plain friction of a joint that may be less than the twin's by any amount.
+pub fn any_plain_friction() -> BTreeMap<&'static str, f64> {
+    let plain = EFFECTS.iter().filter(|effect| effect.is_plain_friction());
+    plain.map(|effect| (effect.name, f64::INFINITY)).collect()
+}
 
 /// The hypotheses that describe a link's body without naming a cause. They exist for each moving link that has a body in
 /// the URDF, except for the last link, where every additional body is a payload.

@@ -94,12 +94,14 @@ pub enum RecordingError {
 }
 
 /// Topics to read.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct RecordingTopics {
     /// Measured joint states.
     pub state: String,
     /// Another twin's efforts.
     pub reference: Option<String>,
+    /// How much of a recording is read, from its first sample on \[s\]; infinite for all of it.
+    pub longest_s: f64,
 }
 
 impl Recording {
@@ -143,7 +145,9 @@ impl Recording {
         // What is known on opening, and what is found on the way.
         let mut damage = archive.damage().to_vec();
         let mut states = archive.joint_states(&topics.state)?;
-        while let Some(state) = states.next_state() {
+        while reader.recording.duration_s() < topics.longest_s
+            && let Some(state) = states.next_state()
+        {
             match state {
                 Ok(stamped) => reader.take(stamped.message),
                 Err(ArchiveError::Damaged(part)) => {
@@ -205,10 +209,8 @@ impl Recording {
                 })?;
             }
             let time_s = (message.header.stamp.ns() - self.start_ns) as f64 * 1e-9;
-            let row: Vec<f64> = order
-                .iter()
-                .filter_map(|&at| message.effort.get(at).copied())
-                .collect();
+            let efforts = order.iter().map_while(|&at| message.effort.get(at));
+            let row: Vec<f64> = efforts.copied().collect();
             let later = times.last().is_none_or(|last| time_s > *last);
             if row.len() == order.len() && row.iter().all(|x| x.is_finite()) && later {
                 times.push(time_s);
@@ -330,17 +332,15 @@ impl Reader<'_> {
         }
         match velocity {
             Some(velocity) if self.has_velocity => {
-                recording
-                    .velocity
-                    .extend(self.order.iter().map(|&at| velocity[at]));
+                let own = self.order.iter().map(|&at| velocity[at]);
+                recording.velocity.extend(own);
             }
             _ => self.has_velocity = false,
         }
         match effort {
             Some(effort) if self.has_effort => {
-                recording
-                    .effort
-                    .extend(self.order.iter().map(|&at| effort[at]));
+                let own = self.order.iter().map(|&at| effort[at]);
+                recording.effort.extend(own);
             }
             _ => self.has_effort = false,
         }

@@ -13,6 +13,21 @@ use tauscope_dynamics::terms::words::number;
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LOUD: f64 = 5.0;
 
+/// Lateness of another simulation that is worth a note \[s\].
+/// Resolution: half a sample at 500 Hz.
+const LATE_S: f64 = 0.001;
+
+/// The note on another simulation whose effort is late.
+pub fn late_twin(late_s: f64) -> Option<String> {
+    (late_s > LATE_S).then(|| {
+        let late_ms = number(1e3 * late_s);
+        format!(
+            "The effort of the twin's topic is {late_ms} ms late. So it was compared with the effort that was measured {late_ms} ms \
+             before its stamp. Detectors that use the topic as it is see the lateness."
+        )
+    })
+}
+
 /// Notes on the joints whose correction is not handed out, or makes the error on the held-out recordings larger.
 pub fn not_handed_out(proof: &Proof, found: &Fit, names: &[String], unit: &str) -> Vec<String> {
     let mut notes = Vec::new();

@@ -49,7 +49,9 @@ pub fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
     };
     let even =
         |against, of_joint, count| even_quantiles(readings(problem, against, of_joint), count);
-    for of_joint in 0..problem.joints {
+    // What another simulation leaves at one joint goes with all that moves at the same time.
+    let is_told = |of_joint: &usize| *of_joint == joint || !problem.is_foreign;
+    for of_joint in (0..problem.joints).filter(is_told) {
         let position = even(Against::Position, of_joint, KNOTS);
         add(Against::Position, of_joint, position, &[false, true]);
         // Friction jumps at standstill, so over the joint's own velocity only curves that change sign with the

@@ -95,7 +95,9 @@ impl Base<'_> {
             proposal.repeats = share.is_some_and(|s| s > by_chance.max(LEAST_CARRIED));
             proposal
         });
-        let able = judged.filter(|proposal| !proposal.is_of_noise());
+        // Another simulation's errors are as slow as any curve.
+        let is_seen = |p: &CurveProposal| p.repeats || !self.problem.is_foreign;
+        let able = judged.filter(|proposal| !proposal.is_of_noise() && is_seen(proposal));
         able.max_by(|a, b| {
             let carried = |p: &CurveProposal| p.carried.filter(|_| p.repeats).unwrap_or(0.0);
             let by_share = carried(a).total_cmp(&carried(b));

@@ -24,6 +24,9 @@ const MOST_WORSE: f64 = 10.0;
 /// More effects of one joint's position than this, each wave of a torque ripple counted, can imitate any curve.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const MOST_OF_POSITION: usize = 3;
+/// More springs than this in one joint draw the curve of another one.
+/// Physical: a joint is balanced or tugged by a cable.
+const MOST_SPRINGS: usize = 1;
 /// The effects of a joint are checked on recordings left out only where the variance without them is at least this many
 /// times that of the white noise.
 /// Tuned: by hand, on no recorded seeds; not swept.
@@ -212,7 +215,8 @@ impl Search<'_> {
             let bare = self.stripped(&best, &names, joint);
             let of_position = names.iter().filter(|&&i| of(i).is_of_position()).count();
             let open = names.iter().any(|&i| is_open_wave(&best.fit.actives[i]));
-            if (of_position > MOST_OF_POSITION || open)
+            let springs = names.iter().filter(|&&i| of(i).is_spring()).count();
+            if (of_position > MOST_OF_POSITION || springs > MOST_SPRINGS || open)
                 && let Some(curve) = self.with_curve(&bare, joint)
             {
                 best = curve;

@@ -20,13 +20,18 @@ const TRIED: usize = 4;
 /// Rows that a change point needs on either side.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_ROWS: usize = 8;
-/// Steps per recording on which change points and intervals are searched. Its logarithm is the penalty for the choice
-/// of one time.
+/// Steps per recording on which change points are searched, and intervals at least. Their number's logarithm is the
+/// penalty for the choice of one time.
 /// Tuned: by hand, for what it costs in time; not swept.
 const STEPS: usize = 100;
-/// Shortest step on which intervals are searched \[s\].
+/// Shortest and longest step on which the ends of short intervals are searched \[s\].
 /// Resolution: half the step costs four times the time; the fit refines the times afterwards.
 const LEAST_STEP_S: f64 = 0.05;
+const MOST_STEP_S: f64 = 0.1;
+/// Of a recording with more than [`STEPS`] steps, intervals of more than this many steps are searched on twice the step,
+/// so that the shortest are found in a log of any length and the work grows no faster than the log.
+/// Resolution: the ends of an interval are searched to within a twentieth of its length.
+const FINE_STEPS: usize = 40;
 /// Intervals whose two ends differ by at most this many steps in sum count as the same.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const SAME_STEPS: usize = 4;
@@ -141,7 +146,8 @@ impl Base<'_> {
         (shape[start], shape[end]) = (session_s + from_s, session_s + to_s);
         let mut proposal = self.propose_columns(hypothesis, &shape, None, &masked)?;
         // For the choice of one beginning and one end among many.
-        proposal.penalty += 2.0 * (STEPS as f64).ln();
+        let steps = (self.longest_s(only) / MOST_STEP_S).max(STEPS as f64);
+        proposal.penalty += 2.0 * steps.ln();
         Some(proposal)
     }
 
@@ -185,12 +191,9 @@ impl Base<'_> {
             Some(track) => vec![track],
             None => (0..problem.tracks.len()).collect(),
         };
-        let duration = tracks
-            .iter()
-            .filter_map(|&r| problem.tracks[r].track.time_s.last().copied())
-            .fold(0.0, f64::max);
-        let bin_s = (duration / STEPS as f64).max(LEAST_STEP_S);
-        let bins = (duration / bin_s).ceil() as usize + 1;
+        let duration_s = self.longest_s(only);
+        let bin_s = (duration_s / STEPS as f64).clamp(LEAST_STEP_S, MOST_STEP_S);
+        let bins = (duration_s / bin_s).ceil() as usize + 1;
         let mut gram = vec![DMatrix::<f64>::zeros(q, q); bins + 1];
         let mut right = vec![DVector::<f64>::zeros(q); bins + 1];
         for &r in &tracks {
@@ -219,37 +222,81 @@ impl Base<'_> {
             let (before, here) = right.split_at_mut(bin);
             here[0] += &before[bin - 1];
         }
-        let shortest = (SHORTEST_S / bin_s).ceil() as usize;
-        let mut found: Vec<(f64, usize, usize)> = Vec::new();
-        for from in 0..bins {
-            for to in (from + shortest.max(1))..=bins {
-                let mut normal = &gram[to] - &gram[from];
-                let rhs = &right[to] - &right[from];
-                let trace = normal.trace();
-                for a in 0..q {
-                    normal[(a, a)] += RIDGE * trace + LEAST_RIDGE;
-                }
-                if let Some(factor) = normal.cholesky() {
-                    found.push((rhs.dot(&factor.solve(&rhs)), from, to));
-                }
+        let shortest = ((SHORTEST_S / bin_s).ceil() as usize).max(1);
+        let mut found: Vec<(f64, Steps)> = Vec::new();
+        for interval in intervals(bins, shortest) {
+            let mut normal = &gram[interval.to] - &gram[interval.from];
+            let rhs = &right[interval.to] - &right[interval.from];
+            let trace = normal.trace();
+            for a in 0..q {
+                normal[(a, a)] += RIDGE * trace + LEAST_RIDGE;
+            }
+            if let Some(factor) = normal.cholesky() {
+                found.push((rhs.dot(&factor.solve(&rhs)), interval));
             }
         }
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
         // Nearly equal intervals are kept once.
-        let mut kept: Vec<(usize, usize)> = Vec::new();
-        for (_, from, to) in found {
-            let near = |&(a, b): &(usize, usize)| a.abs_diff(from) + b.abs_diff(to) <= SAME_STEPS;
-            if !kept.iter().any(near) {
-                kept.push((from, to));
+        let mut kept: Vec<Steps> = Vec::new();
+        for (_, interval) in found {
+            if !kept.iter().any(|other| other.is_near(&interval)) {
+                kept.push(interval);
             }
             if kept.len() == TRIED {
                 break;
             }
         }
+        let seconds = |step: usize| step as f64 * bin_s;
         kept.iter()
-            .map(|&(from, to)| (from as f64 * bin_s, to as f64 * bin_s))
+            .map(|interval| (seconds(interval.from), seconds(interval.to)))
             .collect()
     }
+
+    /// How long the recording lasts, or the longest of all \[s\].
+    fn longest_s(&self, only: Option<usize>) -> f64 {
+        let tracks = self.problem.tracks.iter().enumerate();
+        tracks
+            .filter(|(r, _)| only.is_none_or(|only| only == *r))
+            .filter_map(|(_, track)| track.track.time_s.last().copied())
+            .fold(0.0, f64::max)
+    }
+}
+
+/// An interval in steps, and on how many of them at once its ends were searched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Steps {
+    from: usize,
+    to: usize,
+    stride: usize,
+}
+
+impl Steps {
+    fn is_near(&self, other: &Self) -> bool {
+        let apart = self.from.abs_diff(other.from) + self.to.abs_diff(other.to);
+        apart <= SAME_STEPS * self.stride.max(other.stride)
+    }
+}
+
+/// The intervals of at least `shortest` steps that are searched among so many: all of few; of many, the longer the
+/// coarser.
+fn intervals(steps: usize, shortest: usize) -> Vec<Steps> {
+    let mut all = Vec::new();
+    let mut stride = 1;
+    let mut lengths = shortest..=if steps <= STEPS + 2 {
+        steps
+    } else {
+        FINE_STEPS
+    };
+    while lengths.start() * stride <= steps {
+        for from in (0..steps).step_by(stride) {
+            let ends = lengths.clone().map(|length| from + length * stride);
+            let ends = ends.take_while(|to| *to <= steps);
+            all.extend(ends.map(|to| Steps { from, to, stride }));
+        }
+        stride *= 2;
+        lengths = lengths.end() / 2 + 1..=*lengths.end();
+    }
+    all
 }
 
 fn time_indices(hypothesis: Hypothesis) -> Vec<usize> {
@@ -268,4 +315,50 @@ fn time_indices(hypothesis: Hypothesis) -> Vec<usize> {
 
 fn time_index(hypothesis: Hypothesis) -> Option<usize> {
     time_indices(hypothesis).first().copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// How much of both together the best of the searched intervals shares with this one.
+    fn overlap(all: &[Steps], from: usize, to: usize) -> f64 {
+        let share = |other: &Steps| {
+            let common = other.to.min(to).saturating_sub(other.from.max(from));
+            common as f64 / (other.to.max(to) - other.from.min(from)) as f64
+        };
+        all.iter().map(share).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn an_interval_of_any_length_is_found_in_a_log_of_any_length() {
+        for steps in [100, 820, 6000] {
+            let all = intervals(steps, 4);
+            for length in [4, 7, 33, 41, 79] {
+                // All of it lies within the log.
+                let from = (steps / 3 + 1).min(steps - length);
+                let share = overlap(&all, from, from + length);
+                assert!(share > 0.9, "{length} of {steps}: {share}");
+            }
+            let share = overlap(&all, 0, steps);
+            assert!(share > 0.9, "all of {steps}: {share}");
+        }
+    }
+
+    #[test]
+    fn the_work_grows_no_faster_than_the_log() {
+        let [short, long] = [1000, 10_000].map(|steps| intervals(steps, 4).len());
+        assert!(long < 11 * short, "{short} {long}");
+    }
+
+    #[test]
+    fn every_interval_lies_within_the_log() {
+        for steps in [3, 4, 5, 101, 103, 500] {
+            let all = intervals(steps, 4);
+            assert!(
+                all.iter()
+                    .all(|one| one.from + 4 <= one.to && one.to <= steps)
+            );
+        }
+    }
 }

@@ -4,7 +4,6 @@ use tauscope_archive::ros;
 use tauscope_bus::{JointArray, MAX_JOINTS};
 
 use super::layout::Layout;
-use super::stamp_of;
 
 /// A state of all joints.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,5 +113,13 @@ impl Gather {
                 let never = bad & !good;
                 (never != 0).then(|| (never.trailing_zeros() as usize, field))
             })
+    }
+}
+
+/// The header's stamp, or the time of reception where the publisher left it at zero.
+pub(super) fn stamp_of(header: &ros::Header, received_ns: i64) -> i64 {
+    match header.stamp.ns() {
+        0 => received_ns,
+        stamp_ns => stamp_ns,
     }
 }

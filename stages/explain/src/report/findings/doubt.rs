@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use tauscope_dynamics::Model;
-use tauscope_dynamics::terms::{Against, PlaceKind};
+use tauscope_dynamics::terms::{Against, PlaceKind, UNKNOWN};
 
 use crate::data::problem::Problem;
 use crate::physics::active::{Active, Hypothesis, TimeKind};
@@ -14,8 +14,12 @@ use tauscope_dynamics::kinematic_tree::bearing;
 use super::Named;
 
 /// Highest confidence of a doubted finding.
-/// Statistical: even odds.
-const DOUBTED: f64 = 0.5;
+/// Statistical: just below even odds.
+const DOUBTED: f64 = 0.45;
+/// What explains less than this share of the largest finding is doubted beside another simulation, whose own errors are
+/// larger than those of smoothing.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const PATCH_OF_FOREIGN: f64 = 0.05;
 /// Pushes in different recordings come at the same time if their times differ by less than this \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const SAME_TIME_S: f64 = 0.3;
@@ -35,6 +39,9 @@ pub fn doubt(named: &mut Named, problem: &Problem, actives: &[Active]) {
             doubt_it(finding);
         }
     }
+    if problem.is_foreign {
+        doubt_below(PATCH_OF_FOREIGN, &mut named.findings);
+    }
     let pushed = doubt_pushes(&mut named.findings, problem.tracks.len());
     named.notes.extend(pushed);
 }
@@ -42,8 +49,16 @@ pub fn doubt(named: &mut Named, problem: &Problem, actives: &[Active]) {
 /// Doubts findings that explain next to nothing beside the largest one. Called where the explanation does not carry over
 /// to held-out recordings: such findings may only patch an error elsewhere.
 pub fn doubt_patches(findings: &mut [Finding]) {
+    doubt_below(PATCH, findings);
+}
+
+/// Doubts findings that explain less than this share of what the largest one does.
+fn doubt_below(share: f64, findings: &mut [Finding]) {
     let largest = findings.iter().map(|f| f.explains).fold(0.0, f64::max);
-    let small = |finding: &&mut Finding| finding.explains < PATCH * largest;
+    // What is called unknown claims no more than that something is there.
+    let small = |finding: &&mut Finding| {
+        finding.explains < share * largest && finding.effect != UNKNOWN.name
+    };
     for finding in findings.iter_mut().filter(small) {
         doubt_it(finding);
     }

@@ -74,6 +74,9 @@ const PAYLOAD: &str = "mass_kg: 1.2, com_x_m: 0.02, com_y_m: -0.03, com_z_m: 0.0
 const SHARE_SPLIT: f64 = 0.6;
 const SHARE: f64 = 0.1;
 
+/// Scenarios drawn for each effect.
+const DRAWS: usize = 4;
+
 /// A scenario with an effect as it is concealed in others.
 fn drawn(effect: &Effect, seed: usize) -> Scenario {
     let concealing = concealing(&format!("seed: {seed}, effects: [{}]", effect.name));
@@ -102,24 +105,25 @@ fn describing(effect: &Effect) -> Scenario {
 
 #[test]
 fn every_effect_is_suffered_as_its_term_says_or_says_why_it_cannot_be() {
-    for (seed, effect) in EFFECTS.iter().enumerate() {
+    for effect in EFFECTS {
         if let Simulated::No(reason) = effect.simulated {
             assert!(!reason.is_empty(), "{}", effect.name);
             continue;
         }
-        // Not every one that is drawn is felt in this motion: a limit may not be reached.
-        let felt = (0..10).find_map(|further| {
-            let scenario = if effect.concealed.is_some() {
-                drawn(effect, seed + further)
-            } else {
-                describing(effect)
-            };
-            let (changed, wrong) = suffered(&scenario);
-            (changed > 0.0).then_some((scenario, changed, wrong))
-        });
-        let Some((scenario, changed, wrong)) = felt else {
-            panic!("{} is not felt", effect.name);
+        // Not every one that is drawn is felt in this motion: a limit may not be reached. The draws are judged
+        // together, for a joint whose two sides chatter is described worse than the next.
+        let draws: Vec<(f64, f64)> = if effect.concealed.is_some() {
+            (0..DRAWS)
+                .map(|seed| suffered(&drawn(effect, seed)))
+                .collect()
+        } else {
+            vec![suffered(&describing(effect))]
         };
+        let pooled = |of: fn(&(f64, f64)) -> f64| {
+            (draws.iter().map(|draw| of(draw).powi(2)).sum::<f64>() / draws.len() as f64).sqrt()
+        };
+        let (changed, wrong) = (pooled(|draw| draw.0), pooled(|draw| draw.1));
+        assert!(changed > 0.0, "{} is not felt", effect.name);
         let share = if effect.splits_joint() {
             SHARE_SPLIT
         } else {
@@ -127,8 +131,8 @@ fn every_effect_is_suffered_as_its_term_says_or_says_why_it_cannot_be() {
         };
         assert!(
             wrong < share * changed + DISCRETE_NM,
-            "{:?}: {wrong} of {changed}",
-            scenario.physics
+            "{}: {wrong} of {changed}, by draw {draws:?}",
+            effect.name
         );
     }
 }

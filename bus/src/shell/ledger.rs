@@ -1,0 +1,201 @@
+//! What a stage has done so far, where its death does not reach it.
+//!
+//! A report is up to a tenth of a second old when a stage is killed. So each stage also keeps its counts in a file that
+//! its supervisor has made and that lies in memory: the kernel keeps what was written there, whatever kills the writer.
+//! A sample is noted before it is sent, so that a link has never brought more than was noted.
+
+use std::fs::{File, OpenOptions};
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use memmap2::MmapRaw;
+
+use crate::link::{Position, ReceiverCounts};
+use crate::sample::Header;
+use crate::seat::Seat;
+
+/// Numbers of the stage itself: emitted, stamp of the newest sample.
+const OWN: usize = 2;
+/// Numbers of an input: received, lost, refused, before, foreign, whether it was heard, instance, next.
+const EACH: usize = 8;
+
+/// Where a stage keeps its counts; nowhere by default. Clones are one.
+#[derive(Debug, Clone, Default)]
+pub struct Ledger(Option<Arc<MmapRaw>>);
+
+impl Ledger {
+    /// Length of the file for a stage with so many inputs \[bytes\].
+    pub fn length(inputs: usize) -> usize {
+        (OWN + EACH * inputs) * size_of::<u64>()
+    }
+
+    /// Where the seat says. Without it a supervisor knows less, and the stage does its work.
+    pub fn of(seat: &Seat) -> Self {
+        let Some(path) = &seat.ledger else {
+            return Self::default();
+        };
+        Self::open(path).unwrap_or_else(|error| {
+            let stage = &seat.stage;
+            tracing::warn!(stage, %error, "the counts of this stage do not outlive it");
+            Self::default()
+        })
+    }
+
+    /// In a file of that length.
+    ///
+    /// # Errors
+    /// If it cannot be opened.
+    pub fn open(path: &Path) -> io::Result<Self> {
+        let file: File = OpenOptions::new().read(true).write(true).open(path)?;
+        Ok(Self(Some(Arc::new(MmapRaw::map_raw(&file)?))))
+    }
+
+    /// So many samples have been emitted, with the one of this header, which is about to be sent.
+    pub(super) fn emitted(&self, count: u64, newest: &Header) {
+        self.put(1, newest.stamp_ns.cast_unsigned());
+        self.put(0, count);
+    }
+
+    /// So much has come in from an input.
+    pub(super) fn heard(&self, input: usize, counts: &ReceiverCounts, position: Option<Position>) {
+        let at = OWN + EACH * input;
+        let ReceiverCounts {
+            received,
+            lost,
+            refused,
+            before,
+            foreign,
+        } = *counts;
+        let numbers = [received, lost, refused, before, foreign];
+        for (place, number) in (at..).zip(numbers) {
+            self.put(place, number);
+        }
+        if let Some(Position { instance, next }) = position {
+            self.put(at + 6, instance);
+            self.put(at + 7, next);
+            self.put(at + 5, 1);
+        }
+    }
+
+    /// So many samples have come in from an input with the one of this header, which is about to be dealt with.
+    pub(super) fn takes(&self, input: usize, received: u64, header: &Header) {
+        let at = OWN + EACH * input;
+        self.put(at, received);
+        self.put(at + 7, header.sequence.saturating_add(1));
+    }
+
+    #[allow(unsafe_code)]
+    #[expect(
+        clippy::cast_ptr_alignment,
+        reason = "a mapping begins at a page, and a place is a multiple of eight bytes from there"
+    )]
+    fn put(&self, place: usize, number: u64) {
+        let Some(map) = &self.0 else { return };
+        if (place + 1) * size_of::<u64>() > map.len() {
+            return;
+        }
+        // SAFETY: the place is within the mapping, which lives as long as `map`; a mapping begins at a page, so that
+        // the number is aligned; this process reaches the memory through atomics only, and others map or read it apart.
+        let word = unsafe { AtomicU64::from_ptr(map.as_mut_ptr().cast::<u64>().add(place)) };
+        word.store(number, Ordering::Release);
+    }
+}
+
+/// What stood in a [`Ledger`] when its stage died.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Account {
+    /// Samples that went out.
+    pub emitted: u64,
+    /// Stamp of the newest of them \[ns since the epoch\].
+    pub stamp_ns: i64,
+    /// Each input: what came, and how far it was.
+    pub inputs: Vec<(ReceiverCounts, Option<Position>)>,
+}
+
+impl Account {
+    /// Out of the bytes of a ledger.
+    pub fn read(bytes: &[u8]) -> Self {
+        let (words, _) = bytes.as_chunks::<8>();
+        let words: Vec<u64> = words.iter().map(|word| u64::from_ne_bytes(*word)).collect();
+        let (own, inputs) = words.split_at(OWN.min(words.len()));
+        let inputs = inputs.as_chunks::<EACH>().0.iter();
+        let inputs = inputs.map(|words| {
+            let [
+                received,
+                lost,
+                refused,
+                before,
+                foreign,
+                heard,
+                instance,
+                next,
+            ] = *words;
+            let counts = ReceiverCounts {
+                received,
+                lost,
+                refused,
+                before,
+                foreign,
+            };
+            (counts, (heard != 0).then_some(Position { instance, next }))
+        });
+        Self {
+            emitted: own.first().copied().unwrap_or(0),
+            stamp_ns: own.get(1).copied().unwrap_or(0).cast_signed(),
+            inputs: inputs.collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_noted_is_in_the_file_at_once() {
+        let path = std::env::temp_dir().join(format!("ledger_{}", std::process::id()));
+        let length = Ledger::length(2);
+        std::fs::write(&path, vec![0; length]).unwrap();
+        let ledger = Ledger::open(&path).unwrap();
+        let header = Header {
+            stamp_ns: -5,
+            sequence: 41,
+            ..Header::default()
+        };
+        let counts = ReceiverCounts {
+            received: 7,
+            lost: 2,
+            ..ReceiverCounts::default()
+        };
+        let position = Position {
+            instance: 3,
+            next: 9,
+        };
+        ledger.emitted(42, &header);
+        ledger.heard(1, &counts, Some(position));
+        ledger.takes(1, 8, &header);
+        // Beyond its end nothing is written.
+        ledger.heard(2, &counts, Some(position));
+        let account = Account::read(&std::fs::read(&path).unwrap());
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!((account.emitted, account.stamp_ns), (42, -5));
+        let second = ReceiverCounts {
+            received: 8,
+            ..counts
+        };
+        let there = Position {
+            instance: 3,
+            next: 42,
+        };
+        let none = (ReceiverCounts::default(), None);
+        assert_eq!(account.inputs, [none, (second, Some(there))]);
+    }
+
+    #[test]
+    fn a_stage_without_a_supervisor_notes_nothing() {
+        Ledger::default().emitted(1, &Header::default());
+        assert!(Account::read(&[]).inputs.is_empty());
+    }
+}

@@ -1,0 +1,258 @@
+//! One arm: what its series say together. A load changes several joints in the way of a mass, and the payload has a series
+//! of its own; wear changes one joint's friction; warmth goes with temperature.
+
+use crate::finding::{Cause, Finding};
+use crate::forecast::forecast;
+use crate::robust::median;
+use crate::series::{Covariate, Quantity, Series, Warmth};
+use crate::shape::Shape;
+use crate::watch::{Event, watch};
+use crate::words;
+
+/// Changes that begin within so many days of each other may have one cause.
+/// Resolution: the nights that a small change takes to be certain.
+const TOGETHER_D: f64 = 10.0;
+/// Warmth is told if it changes friction by this share.
+/// Resolution: twice what is told of wear; every gear follows the season a little.
+const WARM_SHARE: f64 = 0.1;
+/// The friction of so many joints, and of half of the arm's, does not wear at once.
+/// Resolution: three gears, of an arm of six.
+const MANY_JOINTS: usize = 3;
+
+/// An event and the series that it is in.
+#[derive(Clone, Copy)]
+struct Told<'a> {
+    series: &'a Series,
+    warmth: Option<&'a Warmth>,
+    event: Event,
+}
+
+/// What changed in an arm since the newest of `baselines` \[days since 1970-01-01 UTC\]: maintenance notes, after which it
+/// is another arm. The newest finding first.
+pub fn assess(all: &[Series], baselines: &[f64]) -> Vec<Finding> {
+    let since = baselines.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let all: Vec<Series> = all.iter().map(|one| behind(one, since)).collect();
+    let warmths: Vec<Option<Warmth>> = all.iter().map(|one| Warmth::of(one, &all)).collect();
+    let mut told = Vec::new();
+    let mut warm = Vec::new();
+    for (series, warmth) in all.iter().zip(&warmths) {
+        let warmth = warmth.as_ref();
+        let watched = watch(&series.estimates, series.quantity, warmth);
+        if let Some(warmth) = warmth
+            && watched.events.is_empty()
+            && series.quantity.is_friction()
+        {
+            warm.extend(explained(series, warmth, watched.slope));
+        }
+        let events = watched.events;
+        told.extend(events.into_iter().map(|event| Told {
+            series,
+            warmth,
+            event,
+        }));
+    }
+    let mut findings = payloads(&mut told);
+    findings.extend(frictions(&mut told, joints(&all)));
+    findings.extend(told.into_iter().map(|one| finding(other(&one), &one)));
+    // What is told of a joint explains its warmth as well.
+    warm.retain(|one: &Finding| findings.iter().all(|told| told.joint != one.joint));
+    findings.extend(shared(one_a_joint(warm), joints(&all)));
+    findings.sort_by(|a, b| {
+        b.told
+            .total_cmp(&a.told)
+            .then_with(|| a.joint.cmp(&b.joint))
+    });
+    findings
+}
+
+/// The series since a time.
+fn behind(series: &Series, since: f64) -> Series {
+    let estimates = series.estimates.iter().copied();
+    let mut estimates: Vec<_> = estimates.filter(|one| one.day >= since).collect();
+    estimates.sort_by(|a, b| a.day.total_cmp(&b.day));
+    Series {
+        estimates,
+        ..series.clone()
+    }
+}
+
+fn joints(all: &[Series]) -> usize {
+    let mut names: Vec<&String> = all.iter().filter_map(|one| one.joint.as_ref()).collect();
+    names.sort();
+    names.dedup();
+    names.len()
+}
+
+/// Whether two events may be one.
+fn together(a: &Event, b: &Event) -> bool {
+    let over = |event: &Event| event.until.unwrap_or(f64::INFINITY) + TOGETHER_D;
+    let begun_together = (a.from - b.from).abs() <= TOGETHER_D;
+    begun_together || (b.from >= a.from - TOGETHER_D && over(b) <= over(a))
+}
+
+/// Takes the payloads out of what is told, and all that they make of other series.
+fn payloads(told: &mut Vec<Told<'_>>) -> Vec<Finding> {
+    let is_payload = |one: &Told<'_>| one.series.quantity == Quantity::Payload;
+    let masses: Vec<Told<'_>> = told.iter().copied().filter(is_payload).collect();
+    told.retain(|one| {
+        let echoes = |mass: &Told<'_>| {
+            // Wear begins by chance within a payload's days; an echo ends with it.
+            let lasts_alike = mass.event.until.is_some() == one.event.until.is_some();
+            lasts_alike && together(&mass.event, &one.event)
+        };
+        !is_payload(one) && !masses.iter().any(echoes)
+    });
+    masses
+        .iter()
+        .map(|mass| finding(Cause::Payload, mass))
+        .collect()
+}
+
+/// Takes the frictions out: one finding a joint, or one for all if most joints changed together.
+fn frictions(told: &mut Vec<Told<'_>>, joints: usize) -> Vec<Finding> {
+    let is_friction = |one: &Told<'_>| one.series.quantity.is_friction();
+    let mut frictions: Vec<Told<'_>> = told.iter().copied().filter(is_friction).collect();
+    told.retain(|one| {
+        let beside = |friction: &Told<'_>| {
+            let same_joint = friction.series.joint == one.series.joint;
+            same_joint && together(&friction.event, &one.event)
+        };
+        !is_friction(one) && !frictions.iter().any(beside)
+    });
+    // The surest first.
+    let sureness = |one: &Told<'_>| {
+        let [low, high] = one.event.interval;
+        one.event.size.abs() / (high - low).max(f64::MIN_POSITIVE)
+    };
+    frictions.sort_by(|a, b| sureness(b).total_cmp(&sureness(a)));
+    let mut findings = Vec::new();
+    while let Some(first) = frictions.first().copied() {
+        let alike = |one: &Told<'_>| {
+            let same_way = one.event.size * first.event.size > 0.0;
+            let begun = (one.event.from - first.event.from).abs() <= TOGETHER_D;
+            same_way && begun && one.event.until.is_some() == first.event.until.is_some()
+        };
+        let mut names: Vec<_> = frictions.iter().filter(|one| alike(one)).collect();
+        names.sort_by(|a, b| a.series.joint.cmp(&b.series.joint));
+        names.dedup_by(|a, b| a.series.joint == b.series.joint);
+        if many(names.len(), joints) {
+            let mut common = finding(Cause::CommonFriction, &first);
+            common.joint = None;
+            common.sentence = words::common(&common, names.len());
+            findings.push(common);
+            frictions.retain(|one| !alike(one));
+        } else {
+            let of_one = |one: &&Told<'_>| one.series.joint == first.series.joint;
+            let told = frictions.iter().filter(of_one).map(|one| one.event.told);
+            let mut own = finding(friction(&first.event), &first);
+            own.told = told.fold(own.told, f64::min);
+            findings.push(own);
+            frictions.retain(|one| one.series.joint != first.series.joint);
+        }
+    }
+    findings
+}
+
+fn friction(event: &Event) -> Cause {
+    match (event.size > 0.0, event.shape) {
+        (true, Shape::Drift) => Cause::Wear,
+        (true, _) => Cause::FrictionStep,
+        (false, _) => Cause::FrictionLoss,
+    }
+}
+
+fn other(told: &Told<'_>) -> Cause {
+    match told.series.quantity {
+        Quantity::Coulomb | Quantity::Viscous => friction(&told.event),
+        Quantity::Gain => Cause::Gain,
+        Quantity::Offset => Cause::Offset,
+        Quantity::Backlash => Cause::Backlash,
+        Quantity::Payload => Cause::Payload,
+    }
+}
+
+fn finding(cause: Cause, told: &Told<'_>) -> Finding {
+    let event = &told.event;
+    let wears = cause == Cause::Wear && event.until.is_none();
+    let forecast = wears.then(|| forecast(&told.series.estimates, told.warmth, event));
+    let mut finding = Finding {
+        cause,
+        joint: told.series.joint.clone(),
+        quantity: told.series.quantity,
+        shape: event.shape,
+        from: event.from,
+        told: event.told,
+        until: event.until,
+        level: event.level,
+        size: event.size,
+        interval: event.interval,
+        forecast: forecast.flatten(),
+        sentence: String::new(),
+    };
+    finding.sentence = words::sentence(&finding);
+    finding
+}
+
+/// A change of friction that warmth explains: who does not look at it would tell the change. `slope` is that against what
+/// it goes with, and where that is centred.
+fn explained(series: &Series, warmth: &Warmth, [slope, centre]: [f64; 2]) -> Option<Finding> {
+    let blind = watch(&series.estimates, series.quantity, None).events;
+    let by_warmth = |event: &Event| {
+        let end = event.until.unwrap_or(f64::INFINITY);
+        let nights = series.estimates.iter().zip(&warmth.values);
+        let during = nights.filter(|(one, _)| (event.from..end).contains(&one.day));
+        slope * (median(during.filter_map(|(_, value)| *value).collect()) - centre)
+    };
+    let most = blind
+        .into_iter()
+        .filter(|event| {
+            let least = WARM_SHARE * event.level.abs();
+            let by_warmth = by_warmth(event) * event.size.signum();
+            event.size.abs() >= least && by_warmth >= least.max(0.5 * event.size.abs())
+        })
+        .max_by(|a, b| a.size.abs().total_cmp(&b.size.abs()))?;
+    let of_others = warmth.covariate == Covariate::OtherJoints;
+    let cause = if of_others {
+        Cause::CommonFriction
+    } else {
+        Cause::Warmth
+    };
+    let mut finding = finding(
+        cause,
+        &Told {
+            series,
+            warmth: None,
+            event: most,
+        },
+    );
+    finding.sentence = words::warmth(&finding, warmth.covariate);
+    Some(finding)
+}
+
+/// What the joints have in common is one finding, if most have it.
+fn shared(mut warm: Vec<Finding>, joints: usize) -> Vec<Finding> {
+    let is_common = |one: &Finding| one.cause == Cause::CommonFriction;
+    let count = warm.iter().filter(|one| is_common(one)).count();
+    let surest = warm.iter().filter(|one| is_common(one));
+    let surest = surest.min_by(|a, b| a.told.total_cmp(&b.told)).cloned();
+    warm.retain(|one| !is_common(one));
+    if let Some(mut common) = surest.filter(|_| many(count, joints)) {
+        common.joint = None;
+        common.sentence = words::common(&common, count);
+        warm.push(common);
+    }
+    warm
+}
+
+/// Whether so many joints of an arm do not change by themselves.
+fn many(count: usize, joints: usize) -> bool {
+    count >= MANY_JOINTS && 2 * count >= joints
+}
+
+/// The largest of each joint.
+fn one_a_joint(mut all: Vec<Finding>) -> Vec<Finding> {
+    let share = |one: &Finding| (one.size / one.level).abs();
+    all.sort_by(|a, b| a.joint.cmp(&b.joint).then(share(b).total_cmp(&share(a))));
+    all.dedup_by(|a, b| a.joint == b.joint);
+    all
+}

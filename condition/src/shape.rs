@@ -1,0 +1,193 @@
+//! The shape of a change: a step, or a drift that goes on.
+//!
+//! Weighted least squares of level, covariate and the change together, over all nights at which it may have begun; the
+//! best one stands (R. E. Quandt, "The Estimation of the Parameters of a Linear Regression System Obeying Two Separate
+//! Regimes", JASA 53, 1958).
+
+use serde::{Deserialize, Serialize};
+
+/// Fewest nights before and behind a place where a change may begin. Resolution: one night is an outlier.
+const LEAST_NIGHTS: usize = 3;
+
+/// How something changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Shape {
+    /// At once, and it stays.
+    Step,
+    /// More and more.
+    Drift,
+    /// For a while.
+    Episode,
+}
+
+/// A night as it counts here.
+#[derive(Debug, Clone, Copy)]
+pub struct Point {
+    /// When \[days\].
+    pub day: f64,
+    /// The estimate.
+    pub value: f64,
+    /// Standard deviation of its error.
+    pub deviation: f64,
+    /// The covariate; 0 where there is none.
+    pub covariate: f64,
+}
+
+/// A change with its numbers.
+#[derive(Debug, Clone, Copy)]
+pub struct Change {
+    /// Step or drift.
+    pub shape: Shape,
+    /// When it began \[days\].
+    pub from: f64,
+    /// The level before, at the centre of the covariate.
+    pub level: f64,
+    /// Change of the value by unit of the covariate.
+    pub slope: f64,
+    /// Standard deviation of the level.
+    pub level_deviation: f64,
+    /// By how much the newest night is off the level.
+    pub size: f64,
+    /// Its 95 % interval.
+    pub interval: [f64; 2],
+}
+
+/// The change that fits best; `None` for too few nights. `has_slope`: the covariate counts.
+pub fn change(points: &[Point], has_slope: bool) -> Option<Change> {
+    let last = points.last()?.day;
+    let mut best: Option<(f64, Change)> = None;
+    for at in LEAST_NIGHTS..points.len().saturating_sub(LEAST_NIGHTS) {
+        let from = points[at].day;
+        for shape in [Shape::Step, Shape::Drift] {
+            // A drift begins between two nights; the night before is its zero.
+            let begin = if shape == Shape::Drift {
+                points[at - 1].day
+            } else {
+                from
+            };
+            let column = |day: f64| match shape {
+                Shape::Drift => (day - begin).max(0.0) / (last - begin).max(f64::MIN_POSITIVE),
+                _ => f64::from(u8::from(day >= from)),
+            };
+            let Some(fit) = fit(points, has_slope, column) else {
+                continue;
+            };
+            if best.as_ref().is_none_or(|(left, _)| fit.left < *left) {
+                let half = 1.96 * fit.deviation;
+                let change = Change {
+                    shape,
+                    from: begin,
+                    level: fit.level,
+                    level_deviation: fit.level_deviation,
+                    slope: fit.slope,
+                    size: fit.size,
+                    interval: [fit.size - half, fit.size + half],
+                };
+                best = Some((fit.left, change));
+            }
+        }
+    }
+    best.map(|(_, change)| change)
+}
+
+struct Fit {
+    level: f64,
+    level_deviation: f64,
+    slope: f64,
+    size: f64,
+    deviation: f64,
+    /// Weighted sum of squares.
+    left: f64,
+}
+
+/// Least squares with a column beside level and covariate.
+fn fit(points: &[Point], has_slope: bool, column: impl Fn(f64) -> f64) -> Option<Fit> {
+    let rows = |point: &Point| {
+        let covariate = if has_slope { point.covariate } else { 0.0 };
+        [1.0, covariate, column(point.day)]
+    };
+    let (mut normal, mut right) = ([[0.0; 3]; 3], [0.0; 3]);
+    for point in points {
+        let (row, weight) = (rows(point), point.deviation.powi(-2));
+        for a in 0..3 {
+            for b in 0..3 {
+                normal[a][b] += weight * row[a] * row[b];
+            }
+            right[a] += weight * row[a] * point.value;
+        }
+    }
+    if !has_slope || normal[1][1] <= 0.0 {
+        normal[1][1] = 1.0;
+    }
+    let inverse = inverse(normal)?;
+    let solved: Vec<f64> = (0..3)
+        .map(|a| (0..3).map(|b| inverse[a][b] * right[b]).sum())
+        .collect();
+    let off = |point: &Point| {
+        let row = rows(point);
+        let expected: f64 = (0..3).map(|a| row[a] * solved[a]).sum();
+        ((point.value - expected) / point.deviation).powi(2)
+    };
+    let left: f64 = points.iter().map(off).sum();
+    let freedom = (points.len() as f64 - 3.0).max(1.0);
+    let scatter = left / freedom;
+    Some(Fit {
+        level: solved[0],
+        level_deviation: (inverse[0][0] * scatter).sqrt(),
+        slope: solved[1],
+        size: solved[2],
+        deviation: (inverse[2][2] * scatter).sqrt(),
+        left,
+    })
+}
+
+/// Inverse of a symmetric matrix; `None` if there is none.
+fn inverse(m: [[f64; 3]; 3]) -> Option<[[f64; 3]; 3]> {
+    // The remaining rows and columns, in cyclic order, so that signs come by themselves.
+    let cofactor = |a: usize, b: usize| {
+        let ([p, q], [r, s]) = ([(a + 1) % 3, (a + 2) % 3], [(b + 1) % 3, (b + 2) % 3]);
+        m[p][r] * m[q][s] - m[p][s] * m[q][r]
+    };
+    let determinant: f64 = (0..3).map(|b| m[0][b] * cofactor(0, b)).sum();
+    let sound = determinant.abs() > 1e-12 * (m[0][0] * m[1][1] * m[2][2]).abs();
+    sound.then(|| {
+        let mut inverse = [[0.0; 3]; 3];
+        for (a, row) in inverse.iter_mut().enumerate() {
+            for (b, value) in row.iter_mut().enumerate() {
+                *value = cofactor(b, a) / determinant;
+            }
+        }
+        inverse
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points(value: impl Fn(f64, f64) -> f64) -> Vec<Point> {
+        let one = |night: i32| {
+            let (day, covariate) = (f64::from(night), f64::from(night * 13 % 7));
+            Point {
+                day,
+                value: value(day, covariate),
+                deviation: 0.01,
+                covariate,
+            }
+        };
+        (0..80).map(one).collect()
+    }
+
+    #[test]
+    fn a_step_and_a_drift_are_told_apart_beside_a_covariate() {
+        let step = points(|day, x| 2.0 - 0.05 * x + if day >= 50.0 { 0.3 } else { 0.0 });
+        let found = change(&step, true).unwrap();
+        assert!(found.shape == Shape::Step && (found.from - 50.0).abs() < 1e-9);
+        assert!((found.size - 0.3).abs() < 1e-6 && (found.slope + 0.05).abs() < 1e-6);
+        let drift = points(|day, x| 2.0 - 0.05 * x + 0.01 * (day - 40.0).max(0.0));
+        let found = change(&drift, true).unwrap();
+        assert!(found.shape == Shape::Drift && (found.from - 40.0).abs() < 1e-9);
+        assert!((found.size - 0.39).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,266 @@
+//! The physics of all arms over weeks: the nightly tables of `tauscope physics`, read back and judged.
+//!
+//! The folder has a table a night: `cell=CELL/date=YYYY-MM-DD/physics*.parquet`, a row for each number. History belongs to
+//! the arm: an arm that moves to another cell takes its series with it.
+
+mod table;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use tauscope_condition::robust::median;
+use tauscope_condition::short::{SoFar, so_far};
+use tauscope_condition::{Cause, Estimate, Finding, Quantity, Series, assess, peers};
+
+pub use table::{Column, Row, TABLE, TextColumn, folder_of};
+
+/// Nights whose median is the state now. Resolution: a week has each day's work once.
+const NEWEST: usize = 7;
+/// Nights whose median is the state at first, the same as are learned.
+const FIRST: usize = tauscope_condition::series::LEARNED;
+/// Days of a curve on the wall. Resolution: six weeks, in which a gear wears.
+const CURVE_D: f64 = 42.0;
+
+/// Why the tables cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum PhysicsError {
+    /// The file system says no.
+    #[error("cannot read {path}: {source}")]
+    Read {
+        /// The folder or file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// It is no table of nightly physics.
+    #[error("{path} is no table of nightly physics: {reason}")]
+    Table {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+}
+
+/// One number's series, and where it stands.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Followed {
+    /// The series.
+    #[serde(flatten)]
+    pub series: Series,
+    /// Its unit.
+    pub unit: String,
+    /// Median of the first nights since the baseline.
+    pub first: f64,
+    /// Median of the newest nights.
+    pub now: f64,
+    /// The same number's median in arms of the same robot, where there are enough.
+    pub peers_median: Option<f64>,
+    /// Whether it is an outlier among them.
+    pub is_outlier: bool,
+    /// What fewer estimates than a month say.
+    pub so_far: Option<SoFar>,
+}
+
+/// The joint that drifts most.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Drift {
+    /// The joint.
+    pub joint: String,
+    /// The friction that drifts.
+    pub quantity: Quantity,
+    /// Its change since the baseline, as a share.
+    pub share: f64,
+    /// The last six weeks, as shares of the baseline.
+    pub curve: Vec<f64>,
+    /// What is found of the arm, if anything is.
+    pub finding: Option<String>,
+    /// Whether the change is warmth.
+    pub is_warmth: bool,
+}
+
+/// The physics of one cell's arm.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CellPhysics {
+    /// The cell.
+    pub cell: String,
+    /// The arm that is in it.
+    pub arm: String,
+    /// Its robot's name.
+    pub robot: String,
+    /// SHA-256 of the twin of the newest night; empty where there was none.
+    pub twin_sha256: String,
+    /// The newest night \[days since 1970-01-01 UTC\].
+    pub newest_day: f64,
+    /// What was found, the newest first.
+    pub findings: Vec<Finding>,
+    /// All series.
+    pub followed: Vec<Followed>,
+}
+
+/// Reads the tables of all cells under `folder` since a day; those that cannot be read are left out and told.
+/// `baselines` are the days of a cell's maintenance notes that begin a new baseline.
+///
+/// # Errors
+/// If the folder cannot be read.
+pub fn read(
+    folder: &Path,
+    since_day: f64,
+    baselines: &dyn Fn(&str) -> Vec<f64>,
+) -> Result<(Vec<CellPhysics>, Vec<PhysicsError>), PhysicsError> {
+    let (rows, unread) = table::rows(folder, since_day)?;
+    let mut by_arm: BTreeMap<&str, Vec<&Row>> = BTreeMap::new();
+    // The newest night tells which arm is in a cell.
+    let mut newest: BTreeMap<&str, &Row> = BTreeMap::new();
+    for row in &rows {
+        by_arm.entry(&row.arm).or_default().push(row);
+        let known = newest.entry(&row.cell).or_insert(row);
+        if row.stamp_ns >= known.stamp_ns {
+            *known = row;
+        }
+    }
+    let mut cells: Vec<CellPhysics> = newest
+        .into_iter()
+        .map(|(cell, newest)| of_cell(cell, newest, &by_arm[newest.arm.as_str()], &baselines(cell)))
+        .collect();
+    beside_peers(&mut cells);
+    Ok((cells, unread))
+}
+
+fn of_cell(cell: &str, newest: &Row, rows: &[&Row], baselines: &[f64]) -> CellPhysics {
+    let mut numbers: BTreeMap<(Option<&str>, Quantity), Vec<&Row>> = BTreeMap::new();
+    for row in rows {
+        if let Some(quantity) = Quantity::of_name(&row.quantity) {
+            let joint = (!row.joint.is_empty()).then_some(row.joint.as_str());
+            numbers.entry((joint, quantity)).or_default().push(row);
+        }
+    }
+    let since = baselines.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let followed = numbers.into_iter().map(|((joint, quantity), mut rows)| {
+        rows.sort_by_key(|row| row.stamp_ns);
+        let series = Series {
+            joint: joint.map(str::to_owned),
+            quantity,
+            estimates: rows.iter().map(|row| row.estimate()).collect(),
+        };
+        followed(series, rows.last().map_or("", |row| &row.unit), since)
+    });
+    let followed: Vec<Followed> = followed.collect();
+    let series: Vec<Series> = followed.iter().map(|one| one.series.clone()).collect();
+    CellPhysics {
+        cell: cell.to_owned(),
+        arm: newest.arm.clone(),
+        robot: newest.robot.clone(),
+        twin_sha256: newest.twin_sha256.clone(),
+        newest_day: newest.estimate().day,
+        findings: assess(&series, baselines),
+        followed,
+    }
+}
+
+fn followed(series: Series, unit: &str, since: f64) -> Followed {
+    let behind: Vec<Estimate> = series
+        .estimates
+        .iter()
+        .copied()
+        .filter(|one| one.day >= since)
+        .collect();
+    let values = |some: &[Estimate]| median(some.iter().map(|one| one.value).collect());
+    Followed {
+        unit: unit.to_owned(),
+        first: values(&behind[..behind.len().min(FIRST)]),
+        now: values(&behind[behind.len().saturating_sub(NEWEST)..]),
+        peers_median: None,
+        is_outlier: false,
+        so_far: (behind.len() <= 2 * FIRST).then(|| so_far(&behind)),
+        series,
+    }
+}
+
+/// Compares each number with the same one of the other arms of that robot.
+fn beside_peers(cells: &mut [CellPhysics]) {
+    let key = |cell: &CellPhysics, one: &Followed| {
+        (
+            cell.robot.clone(),
+            one.series.joint.clone(),
+            one.series.quantity,
+            one.unit.clone(),
+        )
+    };
+    let mut all: BTreeMap<_, Vec<(String, f64)>> = BTreeMap::new();
+    for cell in cells.iter().filter(|cell| !cell.robot.is_empty()) {
+        for one in &cell.followed {
+            all.entry(key(cell, one))
+                .or_default()
+                .push((cell.cell.clone(), one.now));
+        }
+    }
+    for cell in cells {
+        for at in 0..cell.followed.len() {
+            let others = all
+                .get(&key(cell, &cell.followed[at]))
+                .into_iter()
+                .flatten();
+            let others = others.filter(|(other, _)| *other != cell.cell);
+            let others: Vec<f64> = others.map(|(_, value)| *value).collect();
+            let one = &mut cell.followed[at];
+            let deviation = one.series.estimates.last().map_or(0.0, Estimate::deviation);
+            if let Some(among) = peers::among(one.now, deviation, &others) {
+                one.peers_median = Some(among.median);
+                one.is_outlier = among.is_outlier;
+            }
+        }
+    }
+}
+
+impl CellPhysics {
+    /// Whether something is found of this number.
+    pub fn is_found(&self, one: &Followed) -> bool {
+        let series = &one.series;
+        let of = |found: &Finding| found.quantity == series.quantity && found.joint == series.joint;
+        self.findings.iter().any(of)
+    }
+
+    /// The joint whose friction has changed most: one that is found first.
+    pub fn drift(&self) -> Option<Drift> {
+        let found = self
+            .findings
+            .iter()
+            .find(|one| one.is_alarm() && one.quantity.is_friction());
+        let is_found = |one: &&Followed| {
+            found.is_some_and(|found| {
+                one.series.quantity == found.quantity && one.series.joint == found.joint
+            })
+        };
+        let share = |one: &Followed| one.now / one.first - 1.0;
+        let frictions = || {
+            self.followed
+                .iter()
+                .filter(|one| one.series.quantity.is_friction() && one.first > 0.0)
+        };
+        let most = || frictions().max_by(|a, b| share(a).abs().total_cmp(&share(b).abs()));
+        let one = frictions().find(is_found).or_else(most)?;
+        let since = self.newest_day - CURVE_D;
+        let newest = one
+            .series
+            .estimates
+            .iter()
+            .filter(|estimate| estimate.day >= since);
+        Some(Drift {
+            joint: one.series.joint.clone()?,
+            quantity: one.series.quantity,
+            share: share(one),
+            curve: newest.map(|estimate| estimate.value / one.first).collect(),
+            is_warmth: self
+                .findings
+                .iter()
+                .any(|found| found.cause == Cause::Warmth && found.joint == one.series.joint),
+            finding: self
+                .findings
+                .iter()
+                .find(|one| one.is_alarm())
+                .map(|one| one.sentence.clone()),
+        })
+    }
+}

@@ -1,0 +1,46 @@
+//! Where the recorders of a pipeline write in a replay.
+
+use std::path::{Path, PathBuf};
+
+use tauscope_record::{Existing, FileName};
+
+/// A recorder's configuration for a replay: the same kinds of file, into `out`, named after the
+/// recording; no live picture. Nothing if there is no `out`.
+pub(super) fn redirect(
+    config: &tauscope_record::Config,
+    out: Option<&Path>,
+    stem: &str,
+    files: &mut Vec<PathBuf>,
+) -> Option<tauscope_record::Config> {
+    let out = out?;
+    let mut config = tauscope_record::Config {
+        // One result for each recording, again and again.
+        split: None,
+        keep: None,
+        existing: Existing::Replace,
+        // What is lost in a power cut is replayed again.
+        sync_s: 0.0,
+        ..config.clone()
+    };
+    if let Some(around) = &mut config.around_alarms {
+        for (path, kind) in [(&mut around.mcap, "mcap"), (&mut around.rerun, "rrd")] {
+            let stem = FileName::literal(&out.join(stem));
+            let name = format!("{}.alarm-{{date}}-{{time}}.{kind}", stem.display());
+            *path = path.take().map(|_| name.into());
+        }
+    }
+    if config.mcap.is_some() {
+        let path = out.join(format!("{stem}.mcap"));
+        config.mcap = Some(FileName::literal(&path));
+        files.push(path);
+    }
+    if let Some(rerun) = &mut config.rerun {
+        rerun.connect = None;
+        if rerun.file.is_some() {
+            let path = out.join(format!("{stem}.rrd"));
+            rerun.file = Some(FileName::literal(&path));
+            files.push(path);
+        }
+    }
+    config.writes_something().then_some(config)
+}

@@ -1,0 +1,132 @@
+//! What the paths of a query are: recordings, manifests of them, or results.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use tauscope_pipeline::report::{Problem, Report};
+use tauscope_pipeline::results::{Manifest, parquet_files};
+
+use crate::scan::Listed;
+
+/// What a query is about.
+#[derive(Debug, Default)]
+pub struct Sources {
+    /// Recordings, each once.
+    pub recordings: Vec<Listed>,
+    /// Parquet files of results.
+    pub results: Vec<PathBuf>,
+}
+
+impl Sources {
+    /// Sorts paths and patterns: a file that ends in `.parquet`, and a folder that holds some, is a result; one that ends
+    /// in `.jsonl` is a manifest; all else is a recording.
+    ///
+    /// # Errors
+    /// Each path at which there is nothing.
+    pub fn of(paths: &[PathBuf]) -> Result<Self, Report> {
+        let mut sources = Self::default();
+        let mut report = Report::default();
+        for path in expand(paths, &mut report) {
+            if let Err(problem) = sources.add(&path) {
+                report.append(problem);
+            }
+        }
+        let mut seen = BTreeSet::new();
+        sources
+            .recordings
+            .retain(|one| seen.insert(one.path.clone()));
+        report.into_result(sources)
+    }
+
+    fn add(&mut self, path: &Path) -> Result<(), Report> {
+        let ends = |ending| path.extension().is_some_and(|of| of == ending);
+        if ends("parquet") {
+            self.results.push(absolute(path)?);
+        } else if ends("jsonl") {
+            for wanted in Manifest::load(path)?.wanted {
+                self.recordings.push(Listed {
+                    path: absolute(&wanted.recording)?,
+                    bytes: wanted.bytes,
+                });
+            }
+        } else if path.is_dir() && !path.join("metadata.yaml").exists() {
+            let files =
+                parquet_files(path).map_err(|error| Problem::of_file(path, error.to_string()))?;
+            if files.is_empty() {
+                let problem = Problem::of_file(path, "the folder holds no result");
+                return Err(problem
+                    .help(format!(
+                        "recordings are named by a pattern: '{}/*.mcap'",
+                        path.display()
+                    ))
+                    .into());
+            }
+            for file in files {
+                self.results.push(absolute(&file)?);
+            }
+        } else {
+            self.recordings.push(listed(path)?);
+        }
+        Ok(())
+    }
+}
+
+/// The recordings of a pattern.
+///
+/// # Errors
+/// If there is none, or one is no recording.
+pub fn recordings(pattern: &str) -> Result<Vec<Listed>, Report> {
+    let sources = Sources::of(&[PathBuf::from(pattern)])?;
+    if sources.recordings.is_empty() {
+        return Err(Problem::new(format!(
+            "`{pattern}` names results, and replay takes recordings"
+        ))
+        .into());
+    }
+    Ok(sources.recordings)
+}
+
+fn listed(path: &Path) -> Result<Listed, Report> {
+    let failed = |error: std::io::Error| Problem::of_file(path, error.to_string());
+    let bytes = if path.is_dir() {
+        0
+    } else {
+        path.metadata().map_err(failed)?.len()
+    };
+    Ok(Listed {
+        path: absolute(path)?,
+        bytes,
+    })
+}
+
+/// Plans name files so that they can be found from any folder.
+fn absolute(path: &Path) -> Result<PathBuf, Report> {
+    Ok(std::path::absolute(path).map_err(|error| Problem::of_file(path, error.to_string()))?)
+}
+
+/// The paths, those of a pattern in the order of their names.
+fn expand(paths: &[PathBuf], report: &mut Report) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for path in paths {
+        if path.exists() {
+            found.push(path.clone());
+            continue;
+        }
+        let text = path.to_string_lossy();
+        let before = found.len();
+        match glob::glob(&text) {
+            Ok(paths) => found.extend(paths.filter_map(Result::ok)),
+            Err(error) => {
+                report.push(Problem::new(format!("`{text}` is no pattern: {error}")));
+                continue;
+            }
+        }
+        if found.len() == before {
+            let problem = Problem::new(format!("there is no file `{text}`"));
+            report.push(
+                problem.help("recordings, manifests and folders of results stand behind the query"),
+            );
+        }
+    }
+    found
+}

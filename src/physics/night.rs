@@ -1,0 +1,104 @@
+//! Which recordings a night is measured on.
+
+use std::path::{Path, PathBuf};
+
+use tauscope_pipeline::report::{Problem, Report};
+
+use super::open;
+
+/// Most recordings of a night. Resolution: twelve spread over a day have its cold and its warm hours.
+const MOST: usize = 12;
+/// A recording is measured for so long from its beginning \[s\], so that the work is bounded.
+/// Resolution: two minutes have several cycles of most programs.
+pub const LONGEST_S: f64 = 120.0;
+/// A pause between two recordings that is longer is a robot that was switched off \[ns\].
+/// Resolution: a joint cools down within an hour.
+const PAUSE_NS: i64 = 3_600_000_000_000;
+
+/// The recordings of a night.
+#[derive(Debug, PartialEq)]
+pub struct Choice {
+    /// The files, oldest first.
+    pub recordings: Vec<PathBuf>,
+    /// Mean of how long the robot had been running at each \[h\]; `None` where files tell no start.
+    pub hours_since_start: Option<f64>,
+}
+
+/// Of the files and the files in the folders of `paths`: those whose stamps lie within the `hours` before the newest, at
+/// most twelve, evenly spread. A file that was named itself is always taken.
+///
+/// # Errors
+/// Files that cannot be opened, or if nothing is left.
+pub fn choose(paths: &[PathBuf], hours: f64) -> Result<Choice, Report> {
+    let mut report = Report::default();
+    let mut all: Vec<(PathBuf, i64, i64)> = Vec::new();
+    let mut take = |path: &Path, report: &mut Report| match open(path) {
+        Ok(archive) => {
+            let begin = archive.start_ns().unwrap_or(0);
+            all.push((path.to_owned(), begin, archive.end_ns().unwrap_or(begin)));
+        }
+        Err(problems) => report.append(problems),
+    };
+    for path in paths {
+        let is_bag = path.join("metadata.yaml").exists();
+        if !path.is_dir() || is_bag {
+            take(path, &mut report);
+            continue;
+        }
+        let found = in_folder(path)?;
+        for file in &found {
+            // What a recorder is writing right now cannot be opened yet.
+            let mut aside = Report::default();
+            take(file, &mut aside);
+        }
+    }
+    report.into_result(())?;
+    all.sort_by(|a, b| a.1.cmp(&b.1).then_with(|| a.0.cmp(&b.0)));
+    let newest = all.last().map_or(0, |(_, begin, _)| *begin);
+    let is_named = |path: &PathBuf| paths.contains(path);
+    // Begins of the runs of the robot: a recording behind a pause is the first of one.
+    let mut since = Vec::with_capacity(all.len());
+    let mut run: Option<(i64, i64)> = None;
+    for (_, begin, end) in &all {
+        let started = run
+            .filter(|(_, last)| begin - last < PAUSE_NS)
+            .map_or(*begin, |run| run.0);
+        run = Some((started, *end));
+        since.push((begin - started) as f64 / 3.6e12);
+    }
+    let of_night: Vec<usize> = (0..all.len())
+        .filter(|&at| (newest - all[at].1) as f64 <= hours * 3.6e12 || is_named(&all[at].0))
+        .collect();
+    let named = of_night.iter().filter(|&&at| is_named(&all[at].0)).count();
+    let most = MOST.max(named);
+    let step = of_night.len().div_ceil(most).max(1);
+    let chosen: Vec<usize> = of_night.into_iter().step_by(step).collect();
+    if chosen.is_empty() {
+        let problem = Problem::new("there is no recording to measure");
+        return Err(problem
+            .help("name MCAP files, or the folder that the recorder writes to")
+            .into());
+    }
+    // One recording alone does not tell since when the robot has run.
+    let hours_since_start = (all.len() > 1)
+        .then(|| chosen.iter().map(|&at| since[at]).sum::<f64>() / chosen.len() as f64);
+    let recordings = chosen.into_iter().map(|at| all[at].0.clone()).collect();
+    Ok(Choice {
+        recordings,
+        hours_since_start,
+    })
+}
+
+/// The recordings in a folder, not in those below it.
+fn in_folder(folder: &Path) -> Result<Vec<PathBuf>, Report> {
+    let failed = |error: std::io::Error| Problem::of_file(folder, format!("cannot read: {error}"));
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        if path.extension().is_some_and(|ending| ending == "mcap") {
+            files.push(path);
+        }
+    }
+    files.sort();
+    Ok(files)
+}

@@ -1,0 +1,418 @@
+#!/usr/bin/env python3
+"""Faults done to running pipelines: what was lost must be what the summary says, to the sample.
+
+    tests/faults/faults.py PROGRAM [--short] [--only NAME]...
+
+PROGRAM is the built tauscope. Every scenario runs a robot of 7 joints at 1 kHz and ends with one line: what was done,
+what was lost, what was said. `--short` kills and cuts less often and for less long, and
+holds no tight bound on time. Needs Linux and Python 3.10; scenarios with network namespaces or a mounted disk need root
+and are skipped, visibly, without.
+"""
+import argparse
+import contextlib
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import urllib.request
+from pathlib import Path
+
+from hosts import Hosts, Skipped
+
+# A killed stage is back, a killed cell and one that was cut off are known, within so long on a quiet machine.
+BACK_S, KILLED_IS_KNOWN_S, CUT_IS_KNOWN_S = 1.0, 1.0, 5.0
+# The short form may run beside others, which make everything later; it tells whether, not how soon.
+BUSY = 10.0
+slack = 1.0
+
+HERE = Path(__file__).resolve().parent
+DATA = HERE.parent / "data"
+SCENARIO = """version: 1
+name: faults
+robot: {data}/demo_arm.urdf
+rate_hz: 1000
+recordings:
+  - name: loop
+    duration_s: {seconds}
+    motion: {{fourier: {{period_s: 10, harmonics: 4, speed: 0.4, acceleration_rad_s2: 2.5, range: 0.5}}}}
+"""
+STAGES = ["ingest", "twin", "detect", "record"]
+PIPELINE = """version: 1
+cells: {{demo: {{robot: {data}/demo_arm.urdf}}}}
+{hosts}stages:
+- {{name: ingest, {a}process: ingest, ingest: {{simulate: {{scenario: scenario.yaml}}, rate: realtime}}}}
+- {{name: twin, {a}process: twin, input: ingest, twin: {{}}}}
+- {{name: detect, {b}process: detect, input: twin, detect: {{naive_difference: {{}}, threshold: {{score: 1000.0}}}}}}
+- {{name: record, {b}inputs: [ingest, twin, detect], record: {{mcap: {out}/out.mcap, min_free_mb: {free}}}}}
+"""
+
+
+class Failed(Exception):
+    """Something is not as it must be."""
+
+
+def check(condition, *what):
+    if not condition:
+        raise Failed(" ".join(str(part) for part in what))
+
+
+class Run:
+    """One `tauscope run`, heard line by line."""
+
+    def __init__(self, program, folder, more=(), prefix=()):
+        command = [*prefix, program, "run", "--json", "pipeline.yaml", *more]
+        self.process = subprocess.Popen(
+            command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.lines, self.ids = [], {}
+        self.out = []
+        self.readers = [threading.Thread(target=self._hear), threading.Thread(target=self._read)]
+        for reader in self.readers:
+            reader.start()
+
+    def _hear(self):
+        for line in self.process.stderr:
+            self.lines.append((time.monotonic(), line.rstrip()))
+            if " runs as process " in line:
+                name, process = line.split("`")[1], int(line.split()[-1])
+                self.ids[name] = process
+
+    def _read(self):
+        self.out.append(self.process.stdout.read())
+
+    def wait_for(self, what, within=60.0):
+        """When the first line that holds `what` came."""
+        deadline = time.monotonic() + within
+        while time.monotonic() < deadline:
+            for at, line in list(self.lines):
+                if what in line:
+                    return at
+            time.sleep(0.02)
+        raise Failed("no line with", repr(what), "in", self.text())
+
+    def begun(self):
+        deadline = time.monotonic() + 60
+        while set(self.ids) < set(STAGES) and time.monotonic() < deadline:
+            time.sleep(0.02)
+        time.sleep(1.5)
+
+    def text(self):
+        return "\n".join(line for _, line in self.lines)
+
+    def end(self, within=180.0):
+        """Exit code and summary."""
+        try:
+            code = self.process.wait(within)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            raise Failed("it does not end:", self.text()) from None
+        for reader in self.readers:
+            reader.join()
+        check(self.out[0], "no summary:", self.text())
+        return code, json.loads(self.out[0])
+
+
+def make(folder, seconds, hosts="", a="", b="", out=".", free=100):
+    (folder / "scenario.yaml").write_text(SCENARIO.format(data=DATA, seconds=seconds))
+    (folder / "pipeline.yaml").write_text(PIPELINE.format(data=DATA, hosts=hosts, a=a, b=b, out=out, free=free))
+
+
+def link(summary, one, other):
+    return next(link for link in summary["links"] if (link["from"], link["to"]) == (one, other))
+
+
+def emitted(summary, stage):
+    return next(each["emitted"] for each in summary["stages"] if each["stage"] == stage)
+
+
+def balance(summary):
+    """The books of every link, and what is lost in all."""
+    lost = 0
+    for each in summary["links"]:
+        sent, got, dropped = each["emitted"], each["received"], each["dropped"]
+        check(each["surplus"] == 0, "more received than sent:", each)
+        if got is not None:
+            check(sent == got + dropped, "the books do not balance:", each)
+        check(dropped <= sent, "more dropped than sent:", each)
+        lost += dropped
+    return lost
+
+
+def archived(program, folder):
+    """Messages by topic in all archives of a folder."""
+    counts = {}
+    for path in sorted(folder.glob("**/*.mcap")):
+        info = subprocess.run([program, "info", "--json", path], capture_output=True, text=True, check=False)
+        check(info.stdout, path, info.stderr)
+        for topic in json.loads(info.stdout)["topics"]:
+            counts[topic["name"]] = counts.get(topic["name"], 0) + topic["message_count"]
+    return counts
+
+
+# One message for every sample; a detection is written only where it says something.
+TOPICS = {"ingest": "/joint_states", "twin": "/twin/joint_states"}
+
+
+def kill(program, folder, victim, times, seconds):
+    make(folder, seconds)
+    run = Run(program, folder)
+    run.begun()
+    slowest = 0.0
+    for number in range(times):
+        before, at = run.ids[victim], time.monotonic()
+        os.kill(before, signal.SIGKILL)
+        while run.ids[victim] == before and time.monotonic() < at + 30:
+            time.sleep(0.005)
+        check(run.ids[victim] != before, victim, "did not come back:", run.text())
+        slowest = max(slowest, time.monotonic() - at)
+        if number + 1 < times:
+            # Five deaths within ten seconds are too many.
+            time.sleep(3.0)
+    code, summary = run.end()
+    lost = balance(summary)
+    check(code == (3 if lost else 0), "exit code", code, "with", lost, "lost")
+    check(slowest < BACK_S * slack, f"{victim} was back after {slowest:.2f} s")
+    whole = seconds * 1000
+    check(abs(emitted(summary, "ingest") - whole) <= 2, emitted(summary, "ingest"), "of", whole, "samples emitted")
+    # What the recorder has taken is in the archive, but for what died with it.
+    if victim != "record":
+        counts = archived(program, folder)
+        for stage, topic in TOPICS.items():
+            check(counts.get(topic) == link(summary, stage, "record")["received"], topic, counts, summary["links"])
+    return f"{times} kills, back within {slowest * 1000:.0f} ms, {lost} samples lost, {lost} counted, exit {code}"
+
+
+def freeze(program, folder, victim, pause, seconds):
+    make(folder, seconds)
+    run = Run(program, folder)
+    run.begun()
+    os.kill(run.ids[victim], signal.SIGSTOP)
+    time.sleep(pause)
+    os.kill(run.ids[victim], signal.SIGCONT)
+    code, summary = run.end()
+    lost = balance(summary)
+    check(code == (3 if lost else 0), "exit code", code, "with", lost, "lost")
+    if victim == "record":
+        check(link(summary, "twin", "detect")["dropped"] == 0, "the detector lost samples:", summary["links"])
+    return f"stopped for {pause} s, {lost} samples lost and counted, exit {code}"
+
+
+def full_disk(program, folder, seconds):
+    disk = folder / "disk"
+    disk.mkdir()
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=4m", "tmpfs", disk], capture_output=True, text=True,
+                             check=False)
+    if mounted.returncode:
+        raise Skipped(f"a tmpfs cannot be mounted: {mounted.stderr.strip()}")
+    try:
+        make(folder, seconds, out=disk, free=1)
+        run = Run(program, folder)
+        code, summary = run.end()
+        check(balance(summary) == 0, "a link lost samples:", summary["links"])
+        check("recording pauses" in run.text(), "nobody says that the disk is full:", run.text())
+        check(emitted(summary, "detect") >= seconds * 1000 - 2, "detection ended:", summary["stages"])
+        lost = next(each["dropped"] for each in summary["stages"] if each["stage"] == "record")
+        check(lost > 0 and code == 3, "exit code", code, "with", lost, "not kept")
+        taken = link(summary, "ingest", "record")["received"] + link(summary, "twin", "record")["received"]
+        kept = sum(archived(program, folder)[topic] for topic in TOPICS.values())
+        check(taken - lost <= kept < taken, kept, "kept of", taken, "with", lost, "counted as lost")
+        return f"4 MB disk: detection went on, {lost} samples not kept and counted, exit {code}"
+    finally:
+        subprocess.run(["umount", "-l", disk], check=False)
+
+
+def across(program, folder, hosts, seconds, fault, connect="10.231.9.1:7447"):
+    """Source and twin on one host, detector and recorder on the other; what both say, and what is in the archive."""
+    listed = f'hosts: {{a: {{listen: "tcp/10.231.9.1:7447"}}, b: {{connect: "tcp/{connect}"}}}}\n'
+    make(folder, seconds, listed, "host: a, ", "host: b, ")
+    runs = [Run(program, folder, ["--host", name], hosts.enter(place)) for place, name in enumerate("ab")]
+    try:
+        runs[1].wait_for("stage `record` runs")
+        time.sleep(4.0)
+        fault(runs)
+        (near, sent), (far, got) = [run.end(seconds + 120) for run in runs]
+    finally:
+        for run in runs:
+            run.process.kill()
+    lost = balance(sent) + balance(got)
+    whole = emitted(sent, "ingest")
+    check(abs(whole - seconds * 1000) <= 2, "the source stopped:", whole, "of", seconds * 1000)
+    taken = link(got, "ingest", "record")
+    check(taken["emitted"] == whole, "the far host knows of", taken["emitted"], "samples, emitted were", whole)
+    check(far == (3 if balance(got) else 0), "exit code", far, "of the far host with", balance(got), "lost")
+    counts = archived(program, folder)
+    check(counts[TOPICS["ingest"]] == taken["received"], counts, taken)
+    return (f"{whole} joint states emitted, {taken['dropped']} lost and counted, {lost} samples of all streams; "
+            f"exits {near} and {far}")
+
+
+def cut(program, folder, pause, seconds):
+    hosts = Hosts()
+
+    def fault(_):
+        hosts.cut()
+        time.sleep(pause)
+        hosts.mend()
+
+    try:
+        return f"cut for {pause} s: " + across(program, folder, hosts, seconds, fault)
+    finally:
+        hosts.close()
+
+
+def far_freeze(program, folder, pause, seconds):
+    hosts = Hosts()
+
+    def fault(runs):
+        os.kill(runs[1].ids["record"], signal.SIGSTOP)
+        time.sleep(pause)
+        os.kill(runs[1].ids["record"], signal.SIGCONT)
+
+    try:
+        return f"stopped for {pause} s: " + across(program, folder, hosts, seconds, fault)
+    finally:
+        hosts.close()
+
+
+def far_kill(program, folder, times, seconds):
+    hosts = Hosts()
+
+    def fault(runs):
+        for _ in range(times):
+            os.kill(runs[0].ids["ingest"], signal.SIGKILL)
+            time.sleep(3.0)
+
+    try:
+        return f"{times} kills: " + across(program, folder, hosts, seconds, fault)
+    finally:
+        hosts.close()
+
+
+def poor_network(program, folder, seconds):
+    hosts = Hosts()
+    proxy = [*hosts.enter(1), sys.executable, HERE / "poor_network.py", "127.0.0.1:7449", "10.231.9.1:7447"]
+    process = subprocess.Popen([str(word) for word in proxy])
+    try:
+        return "50 ms, 5 % loss: " + across(program, folder, hosts, seconds, lambda _: None, "127.0.0.1:7449")
+    finally:
+        process.kill()
+        process.wait()
+        hosts.close()
+
+
+FLEET_CELL = """version: 1
+cells: {{demo: {{robot: {data}/demo_arm.urdf}}}}
+stages:
+- {{name: ingest, ingest: {{simulate: {{scenario: scenario.yaml}}, rate: realtime}}}}
+- {{name: twin, input: ingest, twin: {{}}}}
+- {{name: detect, input: twin, detect: {{naive_difference: {{}}, threshold: {{score: 1000.0}}}}}}
+- {{name: publish, inputs: [ingest, twin, detect], publish: {{zenoh: {{connect: ["{fleet}"], json: false}}}}}}
+"""
+FLEET = "tcp/10.231.9.2:7450"
+
+
+def fleet(program, folder, fault):
+    """How soon the fleet host knows of a cell that is killed or cut off."""
+    hosts = Hosts(alone=True)
+    (folder / "scenario.yaml").write_text(SCENARIO.format(data=DATA, seconds=120))
+    (folder / "pipeline.yaml").write_text(FLEET_CELL.format(data=DATA, fleet=FLEET))
+    users = folder / "users"
+    subprocess.run([program, "fleet", "--users", users, "--add-user", "anna"], capture_output=True, check=True)
+    command = [program, "fleet", "--serve", "127.0.0.1:0", "--users", users, "--expect", "demo", "--listen", FLEET]
+    wall = subprocess.Popen(
+        command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    cell = None
+    try:
+        address = next((line.split()[-1] for line in wall.stderr if "the wall is at" in line), None)
+        check(address, "the fleet host does not begin")
+        threading.Thread(target=wall.stderr.read, daemon=True).start()
+
+        def state():
+            with urllib.request.urlopen(address + "fleet.json", timeout=5) as answer:
+                cells = json.load(answer)["cells"]
+            return next((each["state"] for each in cells if each["cell"] == "demo"), None)
+
+        def wait(reached, within):
+            begin = time.monotonic()
+            while not reached(state()):
+                check(time.monotonic() - begin < within, "the cell is", state(), "after", within, "s")
+                time.sleep(0.02)
+            return time.monotonic() - begin
+
+        cell = Run(program, folder, prefix=hosts.enter(0))
+        wait(lambda seen: seen == "running", 30)
+        time.sleep(3.0)
+        if fault == "killed":
+            # All at once, as its computer would go; a supervisor that is killed alone lets its stages end in order.
+            cell.process.send_signal(signal.SIGSTOP)
+            for process in cell.ids.values():
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(process, signal.SIGKILL)
+            cell.process.kill()
+        else:
+            hosts.cut()
+        took = wait(lambda seen: seen == "stale", 30)
+        limit = (KILLED_IS_KNOWN_S if fault == "killed" else CUT_IS_KNOWN_S) * slack
+        check(took < limit, f"known after {took:.2f} s, not within {limit} s")
+        return f"known after {took:.2f} s"
+    finally:
+        wall.kill()
+        wall.wait()
+        if cell:
+            cell.process.kill()
+        hosts.close()
+
+
+def scenarios(short):
+    times, pause = (2, 3) if short else (100, 10)
+    length = 15 if short else 320
+    for victim in STAGES:
+        yield f"kill -9 of {victim}", lambda program, folder, victim=victim: kill(
+            program, folder, victim, times, length)
+    for victim in ("record", "twin"):
+        yield f"SIGSTOP of {victim}", lambda program, folder, victim=victim: freeze(
+            program, folder, victim, pause, pause + 8)
+    yield "full disk", lambda program, folder: full_disk(program, folder, 15)
+    for gap in (12,) if short else (12, 30):
+        yield f"network cut for {gap} s", lambda program, folder, gap=gap: cut(program, folder, gap, gap + 15)
+    yield "SIGSTOP of a recorder on another host", lambda program, folder: far_freeze(
+        program, folder, pause, pause + 15)
+    yield "kill -9 of a source with listeners on another host", lambda program, folder: far_kill(
+        program, folder, times if short else 10, 20 if short else 60)
+    for fault in ("killed", "cut off"):
+        yield f"fleet: a cell {fault}", lambda program, folder, fault=fault: fleet(program, folder, fault)
+    yield "poor network", lambda program, folder: poor_network(program, folder, 10 if short else 60)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("program", type=Path)
+    parser.add_argument("--short", action="store_true")
+    parser.add_argument("--only", action="append", help="scenarios whose name has this in it")
+    args = parser.parse_args()
+    global slack
+    slack = BUSY if args.short else 1.0
+    program = str(args.program.resolve())
+    failed = False
+    for name, scenario in scenarios(args.short):
+        if args.only and not any(part in name for part in args.only):
+            continue
+        folder = Path(tempfile.mkdtemp(prefix="faults_"))
+        try:
+            print(f"{name}: {scenario(program, folder)}", flush=True)
+        except Skipped as why:
+            print(f"SKIPPED {name}: {why}", flush=True)
+        except Failed as why:
+            failed = True
+            print(f"FAILED {name}: {why}", flush=True)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+    sys.exit(failed)
+
+
+if __name__ == "__main__":
+    main()
