@@ -10,7 +10,7 @@ mod live;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::Path;
-use std::process::{Child, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use common::{Out, bundled, tauscope, write};
@@ -38,6 +38,11 @@ fn router() -> (ZenohRouter, String) {
 
 /// A cell that plays the bundled recording at half its speed and meets the others at `router`.
 fn cell(folder: &Path, name: &str, router: &str) -> Live {
+    cell_as(tauscope(), folder, name, router)
+}
+
+/// The same, of a program with an environment of its own.
+fn cell_as(command: Command, folder: &Path, name: &str, router: &str) -> Live {
     let data = bundled();
     let data = data.display();
     let folder = folder.join(name);
@@ -55,7 +60,7 @@ fn cell(folder: &Path, name: &str, router: &str) -> Live {
              zenoh: {{connect: [{router}], json: false}}}}}}\n"
         ),
     );
-    Live::start(&folder, &[])
+    Live::start_as(command, &folder, &[])
 }
 
 /// A fleet host with a page; it is ended whatever happens.
@@ -246,6 +251,53 @@ fn cells_that_run_are_seen_acknowledged_from_the_page_and_missed_when_they_are_k
     fleet.wait("press", "ended", |cell| cell["state"] == "ended");
     signal(fleet.child.id(), "INT");
     assert!(fleet.child.wait().unwrap().success());
+}
+
+#[test]
+fn the_clock_of_a_cell_is_measured_and_told_of_where_it_is_off() {
+    let test = "the_clock_of_a_cell_is_measured_and_told_of_where_it_is_off";
+    let libraries = ["x86_64", "aarch64"]
+        .map(|machine| format!("/usr/lib/{machine}-linux-gnu/faketime/libfaketime.so.1"));
+    let shifts = libraries.iter().find(|path| Path::new(path).exists());
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let (_router, endpoint) = router();
+    let users = folder.join("users");
+    write(&users, "");
+    let fleet = Fleet::start(folder, &endpoint, &users);
+    let _here = cell(folder, "here", &endpoint);
+    let is_measured = |cell: &Value| cell["clock_ahead_ms"].is_number();
+    fleet.wait("here", "measured", is_measured);
+    // It is this computer's clock: the truth is 0.
+    let here = fleet.cell("here");
+    let ahead_ms = here["clock_ahead_ms"].as_f64().unwrap();
+    assert!(
+        ahead_ms.abs() <= here["clock_uncertainty_ms"].as_f64().unwrap(),
+        "{here:#}"
+    );
+    assert_eq!(here["clock_is_off"], false);
+
+    let Some(library) = shifts else {
+        return common::skipped(test, "a clock is shifted by libfaketime, which is absent");
+    };
+    let mut command = tauscope();
+    command
+        .env("LD_PRELOAD", library)
+        .env("FAKETIME", "-340")
+        .env("DONT_FAKE_MONOTONIC", "1");
+    let _past = cell_as(command, folder, "past", &endpoint);
+    fleet.wait("past", "measured", is_measured);
+    fleet.wait("past", "off", |cell| cell["clock_is_off"] == true);
+    let past = fleet.cell("past");
+    let ahead_ms = past["clock_ahead_ms"].as_f64().unwrap();
+    let most_ms = past["clock_uncertainty_ms"].as_f64().unwrap();
+    assert!((ahead_ms + 340_000.0).abs() <= most_ms, "{past:#}");
+    assert!(fleet.get("/").contains("340 s behind"), "{past:#}");
+    assert!(
+        fleet
+            .get("/metrics")
+            .contains("clock_ahead_seconds{cell=\"past\"} -3")
+    );
 }
 
 /// Acknowledges at the press; forms that are not the user's own are refused.

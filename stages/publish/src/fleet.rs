@@ -1,7 +1,7 @@
 //! What the fleet is told of the cell: once a second how it fares, and each contact as it comes.
 
 use std::os::unix::process::parent_id;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
 use tauscope_bus::{Command, Detection, Health, TwinState, flags};
 use zenoh::Session;
@@ -9,7 +9,7 @@ use zenoh::Session;
 use crate::alarm::State;
 use crate::error::PublishError;
 use crate::message::{AlarmMessage, HealthMessage, RecordMessage, STATUS_VERSION, StatusMessage};
-use crate::presence::Presence;
+use crate::presence::{Presence, now_ns};
 use crate::report::{Report, Residual};
 
 /// How often the status is told. Resolution: a fleet host calls a cell stale after a few of them.
@@ -187,11 +187,4 @@ impl Fleet {
 fn host() -> String {
     let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
     name.trim().to_owned()
-}
-
-fn now_ns() -> i64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    since.map_or(0, |since| {
-        i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
-    })
 }
