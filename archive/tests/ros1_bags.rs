@@ -28,8 +28,8 @@ fn changed(folder: &Path, change: impl FnOnce(&mut Vec<u8>)) -> PathBuf {
 
 /// Where `what` begins for the `n`-th time.
 fn find(bytes: &[u8], what: &[u8], n: usize) -> usize {
-    let places = (0..bytes.len()).filter(|&at| bytes[at..].starts_with(what));
-    places.skip(n).next().unwrap()
+    let mut places = (0..bytes.len()).filter(|&at| bytes[at..].starts_with(what));
+    places.nth(n).unwrap()
 }
 
 /// Positions of joint `a`, and how often something could not be read.
@@ -73,7 +73,8 @@ fn joint_states_and_flags_come_out_of_every_compression_in_order_of_time() {
                 (position, velocity),
                 (&expected.position, &expected.velocity)
             );
-            assert!(effort[0] == expected.effort[0] && effort[1].is_nan());
+            assert_eq!(effort[..1], expected.effort[..1]);
+            assert!(effort[1].is_nan());
         }
         assert!(states.next_state().is_none());
         recording.topic_of::<Bool>("/contact").unwrap();
