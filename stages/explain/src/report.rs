@@ -17,6 +17,7 @@ pub(crate) mod notes;
 pub(crate) mod remainder;
 pub(crate) mod schema;
 pub(crate) mod sentences;
+pub(crate) mod slip_words;
 pub(crate) mod slips;
 pub(crate) mod summary;
 pub(crate) mod verdict;

@@ -1,5 +1,6 @@
 //! What would make recordings match that do not match the robot: each remedy of a short list is tried on the data.
 
+mod mend;
 mod scale;
 mod trial;
 mod velocity;
@@ -7,8 +8,6 @@ mod velocity;
 use tauscope_dynamics::JointKind;
 
 use crate::data::problem::Problem;
-use crate::read::input::Input;
-use crate::read::recording::Recording;
 
 pub use scale::of_scale;
 use trial::{Left, Trial};
@@ -259,101 +258,14 @@ fn slip(remedy: Remedy, before: &[Option<Left>], after: &[Option<Left>]) -> Slip
     }
 }
 
-impl Input {
-    /// Applies remedies to the recordings, or to what is said of them.
-    pub fn mend(&mut self, slips: &[Slip]) {
-        for slip in slips {
-            let n = self.model.dof();
-            let recordings = self.fit.iter_mut().chain(&mut self.holdout);
-            match slip.remedy {
-                Remedy::GravitySubtracted => self.model.set_gravity([0.0; 3]),
-                Remedy::IsCurrent => "A".clone_into(&mut self.effort_unit),
-                Remedy::IsTorque => "Nm".clone_into(&mut self.effort_unit),
-                Remedy::ConstantsScaled(factor) => {
-                    for constant in self.torque_constants_nm_per_a.iter_mut().flatten() {
-                        *constant *= factor;
-                    }
-                }
-                Remedy::ConstantsWrong => self.torque_constants_nm_per_a = None,
-                Remedy::Degrees => {
-                    let turning = self.model.joints().iter();
-                    let turning: Vec<usize> = (turning.enumerate())
-                        .filter(|(_, joint)| joint.kind != JointKind::Prismatic)
-                        .map(|(j, _)| j)
-                        .collect();
-                    recordings.for_each(|recording| in_radians(recording, &turning, n));
-                }
-                _ => recordings.for_each(|recording| slip.remedy.mend(recording, n)),
-            }
-        }
-    }
-}
-
-/// Positions in degrees are put in rad; so are velocities, if they are the change of these positions.
-fn in_radians(recording: &mut Recording, turning: &[usize], n: usize) {
-    let in_degrees = velocity::slope(recording, turning, n).is_some_and(|slope| slope > 0.5);
-    let to_rad = std::f64::consts::PI / 180.0;
-    for &joint in turning {
-        scale(&mut recording.position, joint, n, to_rad);
-        if in_degrees {
-            scale(&mut recording.velocity, joint, n, to_rad);
-        }
-    }
-}
-
-/// Multiplies a joint's column.
-fn scale(rows: &mut [f64], joint: usize, n: usize, factor: f64) {
-    rows.iter_mut()
-        .skip(joint)
-        .step_by(n)
-        .for_each(|x| *x *= factor);
-}
-
-impl Remedy {
-    fn mend(&self, recording: &mut Recording, n: usize) {
-        match *self {
-            Self::Swapped(a, b) => recording
-                .effort
-                .chunks_exact_mut(n)
-                .for_each(|row| row.swap(a, b)),
-            Self::EffortTurned(j) => scale(&mut recording.effort, j, n, -1.0),
-            Self::PositionTurned(j) | Self::JointTurned(j) => {
-                scale(&mut recording.position, j, n, -1.0);
-                scale(&mut recording.velocity, j, n, -1.0);
-                if matches!(self, Self::JointTurned(_)) {
-                    scale(&mut recording.effort, j, n, -1.0);
-                }
-            }
-            Self::EffortScaled(factor) => {
-                recording.effort.iter_mut().for_each(|x| *x /= factor);
-            }
-            Self::Velocity(Some(joint), factor) => {
-                scale(&mut recording.velocity, joint, n, 1.0 / factor);
-            }
-            Self::Velocity(None, factor) => {
-                recording.velocity.iter_mut().for_each(|x| *x /= factor);
-            }
-            _ => {}
-        }
-    }
-
-    /// From efforts of mended recordings back to the recorded columns: rows of `n` numbers.
-    pub fn undo(&self, rows: &mut [f64], n: usize) {
-        match *self {
-            Self::Swapped(a, b) => rows.chunks_exact_mut(n).for_each(|row| row.swap(a, b)),
-            Self::EffortTurned(j) | Self::JointTurned(j) => scale(rows, j, n, -1.0),
-            Self::EffortScaled(factor) => rows.iter_mut().for_each(|x| *x *= factor),
-            _ => {}
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use tauscope_dynamics::{Inertia, Model};
 
+    use super::mend::scale;
     use super::*;
     use crate::fixture::{self, Noise};
+    use crate::read::recording::Recording;
 
     /// What is found in two recordings of the small arm, with friction, that `spoil` has changed.
     fn found(spoil: impl Fn(&mut Recording)) -> Audit {

@@ -4,7 +4,7 @@ use serde_json::Value;
 use tauscope_dynamics::terms::{Against, UNKNOWN, effect, words};
 
 use crate::report::schema::Finding;
-use crate::report::slips;
+use crate::report::slip_words;
 
 /// What to look at for a finding; nothing where it is no fault.
 pub fn look_at(finding: &Finding) -> Option<String> {
@@ -12,7 +12,7 @@ pub fn look_at(finding: &Finding) -> Option<String> {
     let is_curve = known == UNKNOWN.name && finding.link.is_none();
     let template = (is_curve.then(|| of_curve(finding)).flatten())
         .or_else(|| effect(known).map(|effect| effect.words.look_at))
-        .or_else(|| slips::words(known).map(|words| words.look_at))?;
+        .or_else(|| slip_words::words(known).map(|words| words.look_at))?;
     if template.is_empty() {
         return None;
     }

@@ -7,7 +7,7 @@ use serde_json::Value;
 use tauscope_dynamics::terms::{effect, words};
 
 use crate::report::sentences::in_amperes;
-use crate::report::slips;
+use crate::report::slip_words;
 
 /// The report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -140,13 +140,13 @@ impl Finding {
     pub fn known_as(&self) -> &str {
         let kind = self.parameters.get("kind").and_then(Value::as_str);
         let is_law = |kind: &str| effect(kind).is_some_and(|e| e.said() == self.effect);
-        kind.filter(|kind| is_law(kind) || slips::words(kind).is_some())
+        kind.filter(|kind| is_law(kind) || slip_words::words(kind).is_some())
             .unwrap_or(&self.effect)
     }
 
     /// Whether it is a fault of the recordings, or of what is said of them, and no physics.
     pub fn is_slip(&self) -> bool {
-        slips::words(self.known_as()).is_some()
+        slip_words::words(self.known_as()).is_some()
     }
 
     /// A parameter's name without its unit, and the unit that its number is in.
