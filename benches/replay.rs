@@ -6,13 +6,17 @@
 //! The archive is a simulated one of the bundled arm: 7 joints, 1 kHz, its states, its commands and its wrench. A replay
 //! gives what `tauscope replay` gives: every event, without any file; the last row writes the whole MCAP output.
 
-use std::ffi::OsStr;
 use std::hint::black_box;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 
 use tauscope_pipeline::pipeline::Pipeline;
 use tauscope_pipeline::replay::{Replay, TwinChoice};
+
+#[path = "common/recording.rs"]
+mod recording;
+
+use recording::{robot, simulate};
 
 /// How often each is done, in turn: the least of the times is the one in which the machine did nothing else.
 const ROUNDS: usize = 7;
@@ -30,31 +34,6 @@ const LIGHT: &str = "\
 const RECORD: &str = "\
 - {name: detect, input: twin, detect: {twin_regression: {}, threshold: {score: 1000}}}
 - {name: record, inputs: [in, twin, detect], record: {mcap: out.mcap}}";
-
-fn robot() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/demo_arm.urdf")
-}
-
-/// Makes the archive in `folder`.
-fn simulate(folder: &Path, seconds: u32) -> PathBuf {
-    let scenario = format!(
-        "version: 1\nname: bench\nrobot: {}\nrate_hz: 1000\nrecordings:\n  - name: loop\n    duration_s: {seconds}\n    \
-         motion: {{fourier: {{period_s: 10, harmonics: 4, speed: 0.4, acceleration_rad_s2: 2.5, range: 0.5}}}}\n",
-        robot().display()
-    );
-    let file = folder.join("scenario.yaml");
-    std::fs::write(&file, scenario).expect("the folder can be written");
-    let out = folder.join("simulated");
-    let arguments = [
-        OsStr::new("simulate"),
-        file.as_os_str(),
-        OsStr::new("--out"),
-        out.as_os_str(),
-    ];
-    let answer = tauscope::answer(arguments);
-    assert_eq!(answer.code, 0, "{}", answer.stderr);
-    out.join("loop.mcap")
-}
 
 fn pipeline(folder: &Path, name: &str, recording: &Path, stages: &str) -> Pipeline {
     let text = format!(

@@ -209,6 +209,8 @@ impl Supervisor<'_> {
                     self.tree_ended(root);
                 }
             }
+            // What follows of that is looked at four times a second.
+            Reported::Stuck => {}
             Reported::Ready { missing } => {
                 let missing = match missing {
                     0 => String::new(),

@@ -8,6 +8,11 @@ use std::process::Command;
 use common::{Out, root, skipped};
 
 fn fault(test: &str, only: &str) {
+    script(test, "faults.py", &["--only", only], only);
+}
+
+/// The short form of a script, whose output has to begin so.
+fn script(test: &str, name: &str, more: &[&str], begins: &str) {
     let python = Command::new("python3").arg("--version").output();
     if python.is_err() {
         skipped(test, "python3 is absent");
@@ -15,16 +20,17 @@ fn fault(test: &str, only: &str) {
     }
     let mut command = Command::new("python3");
     command
-        .arg(root().join("tests/faults/faults.py"))
+        .arg(root().join("tests/faults").join(name))
         .arg(env!("CARGO_BIN_EXE_tauscope"))
-        .args(["--short", "--only", only]);
+        .arg("--short")
+        .args(more);
     let out = Out::of(command);
     if let Some(why) = out.stdout.strip_prefix("SKIPPED ") {
         skipped(test, why.trim());
         return;
     }
     assert_eq!(out.code, 0, "{}{}", out.stdout, out.stderr);
-    assert!(out.stdout.starts_with(only), "{}", out.stdout);
+    assert!(out.stdout.starts_with(begins), "{}", out.stdout);
 }
 
 #[test]
@@ -42,6 +48,18 @@ fn a_killed_source_goes_on_and_costs_what_is_said() {
 fn a_stopped_recorder_holds_up_no_detector() {
     let test = "a_stopped_recorder_holds_up_no_detector";
     fault(test, "SIGSTOP of record");
+}
+
+#[test]
+fn a_thread_that_hangs_is_named_and_the_other_cell_of_its_process_goes_on() {
+    let test = "a_thread_that_hangs_is_named_and_the_other_cell_of_its_process_goes_on";
+    fault(test, "a thread that hangs");
+}
+
+#[test]
+fn a_fleet_host_bears_ten_cells_and_misses_who_goes() {
+    let test = "a_fleet_host_bears_ten_cells_and_misses_who_goes";
+    script(test, "hundred_cells.py", &[], "10 cells at 100 Hz");
 }
 
 #[test]

@@ -10,7 +10,7 @@ mod live;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::Path;
-use std::process::{Child, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use common::{Out, bundled, tauscope, write};
@@ -74,7 +74,11 @@ impl Drop for Fleet {
 
 impl Fleet {
     fn start(folder: &Path, router: &str, users: &Path) -> Self {
-        let mut command = tauscope();
+        Self::start_as(tauscope(), folder, router, users)
+    }
+
+    /// The same, of a program with an environment of its own.
+    fn start_as(mut command: Command, folder: &Path, router: &str, users: &Path) -> Self {
         command
             .current_dir(folder)
             .args(["fleet", "--serve", "127.0.0.1:0", "--expect", "paint"])
@@ -246,6 +250,50 @@ fn cells_that_run_are_seen_acknowledged_from_the_page_and_missed_when_they_are_k
     fleet.wait("press", "ended", |cell| cell["state"] == "ended");
     signal(fleet.child.id(), "INT");
     assert!(fleet.child.wait().unwrap().success());
+}
+
+#[test]
+fn the_clock_of_a_cell_is_measured_and_told_of_where_it_is_off() {
+    let test = "the_clock_of_a_cell_is_measured_and_told_of_where_it_is_off";
+    let libraries = ["x86_64", "aarch64"]
+        .map(|machine| format!("/usr/lib/{machine}-linux-gnu/faketime/libfaketime.so.1"));
+    let shifts = libraries.iter().find(|path| Path::new(path).exists());
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let (_router, endpoint) = router();
+    let users = folder.join("users");
+    write(&users, "");
+    let _cell = cell(folder, "press", &endpoint);
+    let measured = |fleet: &Fleet, ahead_ms: f64| {
+        fleet.wait("press", "measured", |cell| {
+            cell["clock_ahead_ms"].is_number()
+        });
+        let cell = fleet.cell("press");
+        let error_ms = cell["clock_ahead_ms"].as_f64().unwrap() - ahead_ms;
+        let most_ms = cell["clock_uncertainty_ms"].as_f64().unwrap();
+        assert!(error_ms.abs() <= most_ms, "{cell:#}");
+        cell["clock_is_off"].clone()
+    };
+    // It is this computer's clock.
+    let fleet = Fleet::start(folder, &endpoint, &users);
+    assert_eq!(measured(&fleet, 0.0), false);
+    drop(fleet);
+
+    let Some(library) = shifts else {
+        return common::skipped(test, "a clock is shifted by libfaketime, which is absent");
+    };
+    let mut command = tauscope();
+    command
+        .env("LD_PRELOAD", library)
+        .env("FAKETIME", "-340")
+        .env("DONT_FAKE_MONOTONIC", "1");
+    let fleet = Fleet::start_as(command, folder, &endpoint, &users);
+    assert_eq!(measured(&fleet, 340_000.0), true);
+    let page = fleet.get("/");
+    assert!(page.contains("340 s ahead"), "{page}");
+    let metrics = fleet.get("/metrics");
+    let metric = "clock_ahead_seconds{cell=\"press\"} 3";
+    assert!(metrics.contains(metric), "{metrics}");
 }
 
 /// Acknowledges at the press; forms that are not the user's own are refused.

@@ -9,7 +9,7 @@ use common::Out;
 
 /// The commands that `tauscope --help` lists.
 fn commands() -> Vec<String> {
-    let help = Out::answer(["--help"]).stderr;
+    let help = Out::answer(["--help"]).stdout;
     let listed = help.split("Commands:\n").nth(1).unwrap();
     let listed = listed.split("\n\n").next().unwrap().lines();
     let names = listed.filter_map(|line| line.split_whitespace().next());

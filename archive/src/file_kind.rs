@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
+use crate::ros1_bag;
 use crate::sqlite_file;
 
 /// As many bytes tell.
@@ -28,7 +29,7 @@ fn kind_of(beginning: &[u8]) -> Option<&'static str> {
             sqlite_file::MAGIC,
             "a SQLite database, perhaps a rosbag2 bag",
         ),
-        (b"#ROSBAG V", "a bag of ROS 1"),
+        (ros1_bag::MAGIC, "a bag of ROS 1"),
         (b"RRF", "a picture for the Rerun viewer"),
         (b"PAR1", "a Parquet table"),
         (b"<robot", "a URDF"),

@@ -1,10 +1,12 @@
 #![doc = include_str!("../README.md")]
 
 mod bag_folder;
+mod chunks;
 mod csv_file;
 mod cursor;
 mod damage;
 mod error;
+mod fields;
 mod file_kind;
 mod info;
 mod joint_facts;
@@ -13,6 +15,7 @@ mod mcap_write;
 mod recording;
 mod repair;
 pub mod ros;
+mod ros1_bag;
 mod sqlite_file;
 mod topic;
 pub mod whole_file;

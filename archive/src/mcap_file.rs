@@ -1,7 +1,7 @@
 //! Reading MCAP files (<https://mcap.dev/spec>) chunk by chunk.
 //!
 //! [`Layout::read`] learns what the file holds and where: from the index at its end if that is
-//! sound, else by walking all of it. [`McapCursor`] then loads chunks as they are needed and gives
+//! sound, else by walking all of it. [`mcap_cursor`] then loads chunks as they are needed and gives
 //! their messages in order of log time. At no time is more in memory than the index and the chunks
 //! that overlap the current log time.
 
@@ -15,16 +15,13 @@ mod scan;
 mod walk;
 
 pub(crate) use attachment::attachment_header;
-pub(crate) use cursor::{McapCursor, Order};
+pub(crate) use cursor::mcap_cursor;
 pub(crate) use index::{CRC_FROM_END_BYTES, read_footer, summary_crc};
 pub(crate) use layout::Layout;
 
 /// Longest record other than a chunk or an attachment that is read \[bytes\].
 /// Resolution: bounds memory.
 const MAX_RECORD_BYTES: u64 = 64 << 20;
-/// Longest chunk, packed or unpacked, and most unpacked chunks held at a time \[bytes\].
-/// Resolution: bounds memory.
-const MAX_LOADED_BYTES: usize = 1 << 30;
 /// Opcode and length before each record \[bytes\].
 /// Physical: the MCAP format: an opcode of 1 byte and a length of 8.
 const RECORD_PREFIX_BYTES: u64 = 9;

@@ -12,13 +12,15 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
+use crate::chunks::Order;
 use crate::csv_file::CsvTable;
 use crate::cursor::Cursor;
 use crate::damage::Damage;
 use crate::error::ArchiveError;
-use crate::mcap_file::{Layout, McapCursor, Order};
+use crate::mcap_file::{Layout, mcap_cursor};
 use crate::mcap_write::PROVENANCE;
 use crate::ros;
+use crate::ros1_bag::{Ros1Bag, ros1_cursor};
 use crate::sqlite_file::SqliteFile;
 use crate::topic::{Topic, Topics};
 
@@ -36,6 +38,8 @@ pub enum RecordingKind {
     Sqlite,
     /// The folder of a rosbag2 bag.
     Rosbag2,
+    /// A bag of ROS 1.
+    Ros1Bag,
     /// A table of numbers.
     Csv,
 }
@@ -46,6 +50,7 @@ impl std::fmt::Display for RecordingKind {
             Self::Mcap => "MCAP file",
             Self::Sqlite => "SQLite file of rosbag2",
             Self::Rosbag2 => "rosbag2 bag",
+            Self::Ros1Bag => "bag of ROS 1",
             Self::Csv => "CSV table",
         })
     }
@@ -69,6 +74,11 @@ enum Store {
         file: Box<SqliteFile>,
         /// The place in the list of topics of each topic's number in the database.
         numbers: BTreeMap<i64, usize>,
+    },
+    Ros1 {
+        bag: Arc<Ros1Bag>,
+        /// The place in the list of topics of each connection's topic.
+        topics: BTreeMap<u32, usize>,
     },
     Several(Arc<Vec<Part>>),
     Csv(Box<CsvTable>),
@@ -176,11 +186,12 @@ impl Recording {
         Ok(topic)
     }
 
-    /// Chunks of an MCAP file, counted as [`Messages::chunks_read`] does; 0 where the format has none.
+    /// Chunks of an MCAP file or a bag of ROS 1, counted as [`Messages::chunks_read`] does; 0 where the format has none.
     pub fn chunks(&self) -> u64 {
         match &self.store {
             Store::Mcap(layout) => layout.chunks(),
             Store::Several(parts) => parts.iter().map(|part| part.recording.chunks()).sum(),
+            Store::Ros1 { bag, .. } => bag.chunks(),
             Store::Sqlite { .. } | Store::Csv(_) => 0,
         }
     }
@@ -193,8 +204,8 @@ impl Recording {
         self.messages_within(topics, i64::MIN..=i64::MAX)
     }
 
-    /// As [`Recording::messages`], but only those whose log time lies in `within_ns` \[ns since the epoch\]. Chunks of an
-    /// MCAP file that lie outside are not read, and what is damaged in them is not told.
+    /// As [`Recording::messages`], but only those whose log time lies in `within_ns` \[ns since the epoch\]. Chunks
+    /// that lie outside are not read, and what is damaged in them is not told.
     ///
     /// # Errors
     /// As [`Recording::messages`].
@@ -254,12 +265,17 @@ impl Recording {
                     let topic = self.topics.of_channel(channel)?;
                     wanted[topic].then_some(topic)
                 };
-                let cursor = McapCursor::new(Arc::clone(layout), Order::LogTime, topic)?;
+                let cursor = mcap_cursor(Arc::clone(layout), Order::LogTime, topic)?;
                 Ok(Box::new(cursor.within(within_ns)))
             }
             Store::Sqlite { file, numbers } => {
                 let topic = |id| numbers.get(&id).copied().filter(|&topic| wanted[topic]);
                 Ok(Box::new(file.cursor(topic)?))
+            }
+            Store::Ros1 { bag, topics } => {
+                let topic = |number| topics.get(&number).copied().filter(|&topic| wanted[topic]);
+                let cursor = ros1_cursor(Arc::clone(bag), topic)?;
+                Ok(Box::new(cursor.within(within_ns)))
             }
             Store::Several(parts) => Ok(Box::new(SeveralCursor::new(
                 Arc::clone(parts),

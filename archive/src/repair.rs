@@ -12,10 +12,11 @@ use std::sync::Arc;
 
 use mcap::records::{MessageHeader, Metadata};
 
+use crate::chunks::Order;
 use crate::cursor::Cursor;
 use crate::damage::{Damage, DamageKind};
 use crate::error::ArchiveError;
-use crate::mcap_file::{Layout, McapCursor, Order, attachment_header};
+use crate::mcap_file::{Layout, attachment_header, mcap_cursor};
 use crate::mcap_write::rosbag2::{self, BagFile, BagTopic};
 use crate::mcap_write::{self, Compression, WriteError, Written};
 use crate::recording::{Recording, RecordingKind};
@@ -242,7 +243,7 @@ impl Copy {
         channels: &BTreeMap<u16, u16>,
     ) -> Result<(), RepairError> {
         let every = |channel| channels.get(&channel).map(|&new| usize::from(new));
-        let mut cursor = McapCursor::new(Arc::clone(layout), Order::File, every)?;
+        let mut cursor = mcap_cursor(Arc::clone(layout), Order::File, every)?;
         let mut chunk_bytes = 0;
         loop {
             match cursor.advance() {

@@ -182,9 +182,13 @@ fn what_is_no_bag_of_ros_is_unreadable() {
     ));
     for (name, content, says) in [
         ("empty.mcap", &b""[..], "the file is empty"),
-        ("ros1.bag", b"#ROSBAG V2.0\n....", "rosbags-convert"),
+        (
+            "ros1.bag",
+            b"#ROSBAG V2.0\n....",
+            "a header of 774778414 bytes",
+        ),
         ("a.csv", b"1,2,3,4,5,6,7,8,9", "a.columns.yaml"),
-        ("a.txt", b"some other text here", "neither an MCAP"),
+        ("a.txt", b"some other text here", "no MCAP file"),
     ] {
         let path = folder.path().join(name);
         fs::write(&path, content).unwrap();

@@ -14,19 +14,16 @@ use std::process::{Child, Command};
 use std::time::{Duration, Instant};
 
 use hdrhistogram::Histogram;
-use iceoryx2::port::listener::Listener;
-use iceoryx2::port::notifier::Notifier;
-use iceoryx2::port::publisher::Publisher;
-use iceoryx2::port::subscriber::Subscriber;
-use iceoryx2::prelude::{
-    Config, FileName, Node, NodeBuilder, Path, PortFactory as _, SemanticString as _,
-};
-use iceoryx2::service::ipc_threadsafe::Service;
 use tauscope_bus::link::PATIENCE;
 use tauscope_bus::{
     Audience, Domain, Keep, Received, Receiver, Sender, SharedMemory, Transport, TwinState, Zenoh,
     ZenohEndpoints,
 };
+
+#[path = "common/bare.rs"]
+mod bare;
+
+use bare::{BareReceiver, BareSender};
 
 const WARM_UP: usize = 2_000;
 const ROUNDS: usize = 50_000;
@@ -181,79 +178,24 @@ impl Side for Linked {
 }
 
 struct Bare {
-    publisher: Publisher<Service, TwinState, ()>,
-    subscriber: Subscriber<Service, TwinState, ()>,
-    notifier: Notifier<Service>,
-    listener: Listener<Service>,
-    waiting: bool,
-    _node: Node<Service>,
+    sender: BareSender,
+    receiver: BareReceiver,
 }
 
 impl Bare {
     fn open(place: &str, send: &str, receive: &str, waiting: bool) -> Self {
-        let mut config = Config::default();
-        let root = format!("/tmp/tauscope_{place}");
-        config
-            .global
-            .set_root_path(&Path::new(root.as_bytes()).unwrap());
-        config.global.prefix = FileName::new(format!("{place}_").as_bytes()).unwrap();
-        let node = NodeBuilder::new()
-            .config(&config)
-            .create::<Service>()
-            .unwrap();
-        let samples = |name: &str| {
-            node.service_builder(&name.try_into().unwrap())
-                .publish_subscribe::<TwinState>()
-                .open_or_create()
-                .unwrap()
-        };
-        let events = |name: &str| {
-            node.service_builder(&name.try_into().unwrap())
-                .event()
-                .open_or_create()
-                .unwrap()
-        };
-        let listener = events(receive).listener_builder().create().unwrap();
-        let subscriber = samples(receive).subscriber_builder().create().unwrap();
-        let out = samples(send);
-        let publisher = out.publisher_builder().create().unwrap();
-        let notifier = events(send).notifier_builder().create().unwrap();
-        let deadline = Instant::now() + LONG;
-        while out.dynamic_config().number_of_subscribers() == 0 {
-            assert!(Instant::now() < deadline, "the other side does not come");
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        Self {
-            publisher,
-            subscriber,
-            notifier,
-            listener,
-            waiting,
-            _node: node,
-        }
+        let receiver = BareReceiver::open(place, receive, waiting);
+        let sender = BareSender::open(place, send, waiting);
+        Self { sender, receiver }
     }
 }
 
 impl Side for Bare {
     fn send(&mut self, number: i64) {
-        let mut sample = self.publisher.loan().unwrap();
-        sample.payload_mut().header.stamp_ns = number;
-        sample.send().unwrap();
-        if self.waiting {
-            self.notifier.notify().unwrap();
-        }
+        self.sender.send(|sample| sample.header.stamp_ns = number);
     }
 
     fn receive(&mut self) -> i64 {
-        loop {
-            if let Some(sample) = self.subscriber.receive().unwrap() {
-                return sample.payload().header.stamp_ns;
-            }
-            if self.waiting {
-                self.listener.timed_wait(|_| {}, LONG).unwrap();
-            } else {
-                std::hint::spin_loop();
-            }
-        }
+        self.receiver.receive(|sample| sample.header.stamp_ns)
     }
 }

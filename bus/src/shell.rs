@@ -16,6 +16,7 @@ pub mod child;
 mod crew;
 mod health;
 mod ledger;
+mod pulse;
 mod report;
 mod single;
 mod sink;

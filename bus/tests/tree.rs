@@ -122,6 +122,60 @@ fn run(mood: Mood) -> (Vec<Report>, Vec<(&'static str, i64)>, Vec<i64>) {
     (reports, heard, seen)
 }
 
+#[test]
+fn a_stage_that_hangs_is_named_though_others_share_its_thread() {
+    let links = InProcess::new();
+    let turn = Turn::default();
+    let (go_on, until_it_may) = std::sync::mpsc::channel();
+    let out = Outlet::new(Vec::new(), None);
+    let stuck = Box::new(Stuck(until_it_may));
+    let stuck = branch(&turn, post(&links, "stuck", "twin"), stuck, out);
+    let heard = Heard::default();
+    let well = Detector("well", Arc::clone(&heard), Mood::Well);
+    let out = Outlet::new(Vec::new(), None);
+    let well = branch(&turn, post(&links, "well", "twin"), Box::new(well), out);
+    let out = Outlet::new(vec![well, stuck], None);
+    let twin: Box<dyn Branch<JointState>> =
+        branch(&turn, post(&links, "twin", "count"), Box::new(Twin), out);
+    let out = Outlet::new(vec![twin], None);
+    let tree = Tree::of_source(&turn, post(&links, "count", ""), Box::new(Counter(0)), out);
+    let context = Context::new("count");
+    let board = context.board.clone();
+    let soon = std::time::Duration::from_mins(1);
+    std::thread::scope(|scope| {
+        let begin = std::time::Instant::now();
+        scope.spawn(move || {
+            while board.stuck(std::time::Instant::now()).is_none() && begin.elapsed() < soon {
+                std::thread::sleep(std::time::Duration::from_millis(10));
+            }
+            let found = board.stuck(std::time::Instant::now());
+            go_on.send(()).unwrap();
+            assert_eq!(found.map(|(stage, _)| stage).as_deref(), Some("stuck"));
+        });
+        let reports = tree.run(&context);
+        assert!(reports.iter().all(Report::is_complete), "{reports:?}");
+    });
+    // One that has ended is not stuck.
+    let later = std::time::Instant::now() + soon;
+    assert_eq!(context.board.stuck(later), None);
+}
+
+/// Does not finish its tenth sample before it may.
+struct Stuck(std::sync::mpsc::Receiver<()>);
+
+impl Stage<TwinState, Detection> for Stuck {
+    fn accept(
+        &mut self,
+        twin: &TwinState,
+        out: &mut dyn Emit<Detection>,
+    ) -> Result<(), StageError> {
+        if twin.header.stamp_ns == 10 {
+            self.0.recv().unwrap();
+        }
+        Ok(out.emit(&mut |detection| detection.header.stamp_ns = twin.header.stamp_ns)?)
+    }
+}
+
 fn counts(reports: &[Report]) -> Vec<(&str, u64, u64)> {
     let one = reports.iter();
     one.map(|report| (report.stage.as_str(), report.received, report.emitted))

@@ -251,8 +251,8 @@ fn listen(session: &Session, mailbox: &Arc<Mailbox<Mail>>) -> Result<(), FleetEr
     Ok(())
 }
 
-/// Reads an answer of a cell: key and payload.
-type Read = fn(&str, &[u8]) -> Vec<Event>;
+/// Reads an answer of a cell: key and payload, and when it was asked and came \[ns since the epoch\].
+type Read = fn(&str, &[u8], [i64; 2]) -> Vec<Event>;
 
 /// The thread's own.
 struct Worker {
@@ -337,14 +337,21 @@ impl Worker {
     /// Asks a cell for what was missed; the answer is mail.
     fn ask(&self, effect: &Effect) {
         let (selector, read): (String, Read) = match effect {
-            Effect::AskStatus { cell } => (format!("{cell}/status"), |key, payload| {
+            Effect::AskStatus { cell } => (format!("{cell}/status"), |key, payload, _| {
                 vec![inbox::status(key, payload)]
             }),
-            Effect::AskRecords { cell, after } => {
-                (format!("{cell}/records?after={after}"), inbox::records)
-            }
+            Effect::AskRecords { cell, after } => (
+                format!("{cell}/records?after={after}"),
+                |key, payload, _| inbox::records(key, payload),
+            ),
+            Effect::AskClock { cell } => (format!("{cell}/status?clock"), |key, payload, times| {
+                let [asked_ns, back_ns] = times;
+                let event = inbox::clock(key, payload, asked_ns, back_ns);
+                event.into_iter().collect()
+            }),
             _ => return,
         };
+        let (asked_ns, begin) = (unix_ns(), Instant::now());
         let mailbox = self.mailbox.clone();
         let asked = self
             .session
@@ -352,7 +359,11 @@ impl Worker {
             .timeout(ASK_WITHIN)
             .callback(move |reply| {
                 let Ok(sample) = reply.result() else { return };
-                for event in read(sample.key_expr().as_str(), &sample.payload().to_bytes()) {
+                // This host's clock may be set meanwhile.
+                let took_ns = i64::try_from(begin.elapsed().as_nanos()).unwrap_or(i64::MAX);
+                let times = [asked_ns, asked_ns.saturating_add(took_ns)];
+                let payload = sample.payload().to_bytes();
+                for event in read(sample.key_expr().as_str(), &payload, times) {
                     mailbox.ordinary(Mail::Event(event));
                 }
             })

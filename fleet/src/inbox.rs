@@ -3,9 +3,10 @@
 //! What passes is bounded: texts, lists and numbers. Nothing in here can panic, whatever the bytes.
 
 use serde::de::DeserializeOwned;
+use tauscope_bus::clock::RoundTrip;
 use tauscope_publish::message::{
-    AlarmMessage, ChangeMessage, ContactMessage, HealthMessage, Record, RecordMessage,
-    ResidualMessage, STATUS_VERSION, StatusMessage,
+    AlarmMessage, ChangeMessage, ClockMessage, ContactMessage, HealthMessage, Record,
+    RecordMessage, ResidualMessage, STATUS_VERSION, StatusMessage,
 };
 
 use crate::wall::Event;
@@ -40,6 +41,34 @@ pub fn status(key: &str, payload: &[u8]) -> Event {
     cell_of(key, "/status")
         .and_then(event)
         .unwrap_or_else(Event::Refused)
+}
+
+/// What an answer to a question for the clock says, which was asked and came back at these times \[ns since the epoch\].
+/// A cell that does not know the question answers with its status, which says nothing of it.
+pub fn clock(key: &str, payload: &[u8], asked_ns: i64, back_ns: i64) -> Option<Event> {
+    let event = |cell: String| {
+        let clock: ClockMessage = read(payload, MAX_STATUS_BYTES)?;
+        all_text(std::iter::once(&clock.instance))?;
+        let trip = RoundTrip {
+            asked_ns,
+            received_ns: clock.received_ns,
+            answered_ns: clock.answered_ns,
+            back_ns,
+        };
+        let offset = trip.offset().ok_or("times that cannot be")?;
+        let instance = clock.instance;
+        Ok(Event::Clock {
+            cell,
+            instance,
+            offset,
+        })
+    };
+    let of_status = || read::<StatusMessage>(payload, MAX_STATUS_BYTES).is_ok();
+    match cell_of(key, "/status").and_then(event) {
+        Ok(event) => Some(event),
+        Err(_) if of_status() => None,
+        Err(reason) => Some(Event::Refused(reason)),
+    }
 }
 
 /// What a record says.
@@ -262,6 +291,30 @@ mod tests {
             refused(status("<b>/status", b"{}")),
             "name of a cell that is none"
         );
+    }
+
+    #[test]
+    fn a_clock_is_measured_by_an_answer_and_not_by_what_cannot_be() {
+        let answer = |received_ns: i64, answered_ns: i64| {
+            let message = ClockMessage {
+                instance: "a1".to_owned(),
+                received_ns,
+                answered_ns,
+            };
+            let text = serde_json::to_vec(&message).unwrap();
+            clock("c/status", &text, 1_000, 1_020).unwrap()
+        };
+        let Event::Clock { offset, .. } = answer(5_010, 5_010) else {
+            panic!();
+        };
+        assert_eq!((offset.ahead_ns, offset.uncertainty_ns), (4_000, 10));
+        assert_eq!(refused(answer(5_010, 5_000)), "times that cannot be");
+        assert_eq!(refused(answer(0, i64::MAX)), "times that cannot be");
+        // A cell of an older version knows no such question.
+        let status = serde_json::to_vec(&fixture::status("a1", 5)).unwrap();
+        assert_eq!(clock("c/status", &status, 0, 1), None);
+        let none = clock("c/status", b"{}", 0, 1).unwrap();
+        assert_eq!(refused(none), "not the message of its topic");
     }
 
     #[test]

@@ -101,7 +101,9 @@ impl Keeper {
                 // A loss is over when it is told.
                 self.store.close(cell, Kind::Loss, stage, now_ns)
             }
-            Effect::AskRecords { .. } | Effect::AskStatus { .. } => Ok(()),
+            Effect::AskRecords { .. } | Effect::AskStatus { .. } | Effect::AskClock { .. } => {
+                Ok(())
+            }
         }
     }
 

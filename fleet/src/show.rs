@@ -5,6 +5,9 @@ use comfy_table::{Table, presets};
 use crate::wall::{CellView, Snapshot, State};
 use crate::words;
 
+/// Clocks that are named above the table. Resolution: more of them are one fault, this host's own clock.
+const MOST_CLOCKS: usize = 3;
+
 /// All cells as a table, under a line that sums them up.
 pub fn table(snapshot: &Snapshot) -> String {
     let mut table = Table::new();
@@ -47,6 +50,10 @@ pub fn summary(snapshot: &Snapshot) -> String {
     }
     if snapshot.sessions_reached == 0 {
         text += "; THIS HOST REACHES NO ROUTER, nothing here is fresh";
+    }
+    let off = snapshot.cells.iter().filter(|view| view.clock_is_off);
+    for view in off.take(MOST_CLOCKS) {
+        text += &format!("; {}: clock {}", view.cell, words::clock(view));
     }
     let refused: u64 = snapshot.refused.values().sum();
     if refused > 0 {

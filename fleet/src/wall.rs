@@ -12,6 +12,7 @@ mod tests;
 
 use std::collections::BTreeMap;
 
+use tauscope_bus::clock::Offset;
 use tauscope_publish::message::{Record, RecordMessage, StatusMessage};
 
 use cell::Watched;
@@ -23,6 +24,9 @@ pub const MAX_CELLS: usize = 10_000;
 /// A status comes once a second: three that are missing are a silence \[ms\].
 /// Resolution: a pause of a busy host is shorter, and what is cut off is known within 5 s.
 pub const STALE_AFTER_MS: u64 = 3_500;
+/// Clocks that differ by more are told of \[ns\].
+/// Resolution: who lays the records of two cells side by side reads tenths of a second.
+pub const CLOCK_LIMIT_NS: i64 = 100_000_000;
 
 /// A time by two clocks: one that only runs, to judge ages by, and one that people read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -73,6 +77,15 @@ pub enum Event {
         /// The last number.
         number: u64,
     },
+    /// The cell has answered what its clock says.
+    Clock {
+        /// The cell.
+        cell: String,
+        /// The publisher's life.
+        instance: String,
+        /// How far it is ahead of this host's.
+        offset: Offset,
+    },
     /// A message that is none, and why.
     Refused(&'static str),
     /// So many Zenoh sessions are reached.
@@ -117,6 +130,11 @@ pub enum Effect {
         cell: String,
         /// The last number that is known.
         after: u64,
+    },
+    /// Ask the cell what its clock says.
+    AskClock {
+        /// The cell.
+        cell: String,
     },
     /// A cell lives whose status is not known: ask for it.
     AskStatus {
@@ -193,6 +211,16 @@ impl Wall {
                     return effects;
                 };
                 watched.record(&cell, *record, &mut effects);
+                cell
+            }
+            Event::Clock {
+                cell,
+                instance,
+                offset,
+            } => {
+                if let Some(watched) = self.cells.get_mut(&cell) {
+                    watched.clock(&instance, offset, now);
+                }
                 cell
             }
             Event::AllRecords {

@@ -3,6 +3,8 @@
 use jiff::Timestamp;
 use tauscope_publish::message::{ChangeMessage, ContactMessage};
 
+use crate::wall::CellView;
+
 /// An age: `0.4 s`, `12 s`, `5 min`, `3 h`, `2 d`.
 pub fn age(ms: u64) -> String {
     match ms {
@@ -18,6 +20,20 @@ pub fn age(ms: u64) -> String {
 pub fn age_at(at_ns: i64, now_ns: i64) -> String {
     let ms = now_ns.saturating_sub(at_ns).max(0) / 1_000_000;
     age(u64::try_from(ms).unwrap_or(0))
+}
+
+/// How a cell's clock stands against this host's: `340 ms ahead ± 2 ms`; empty where it was not measured.
+pub fn clock(view: &CellView) -> String {
+    let (Some(ahead_ms), Some(most_ms)) = (view.clock_ahead_ms, view.clock_uncertainty_ms) else {
+        return String::new();
+    };
+    let amount = |ms: f64| match ms {
+        10_000.0.. => format!("{:.0} s", ms * 1e-3),
+        10.0.. => format!("{ms:.0} ms"),
+        _ => format!("{ms:.1} ms"),
+    };
+    let side = if ahead_ms < 0.0 { "behind" } else { "ahead" };
+    format!("{} {side} ± {}", amount(ahead_ms.abs()), amount(most_ms))
 }
 
 /// A time for people: `2026-11-23 10:42:05 UTC`.

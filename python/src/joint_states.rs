@@ -8,7 +8,7 @@ use arrow::array::{ArrayRef, Float64Array, Int64Array, RecordBatch};
 use arrow::buffer::NullBuffer;
 use arrow::error::ArrowError;
 use pyo3::PyErr;
-use tauscope_archive::ros::{JointState, Message as _};
+use tauscope_archive::ros::JointState;
 use tauscope_archive::{ArchiveError, Recording};
 
 /// Messages between two questions whether to go on.
@@ -180,7 +180,7 @@ pub fn read(
 fn only_topic(recording: &Recording) -> Result<String, ReadError> {
     const USUAL: &str = "/joint_states";
     let topics = recording.topics().iter();
-    let with_joints = topics.filter(|topic| topic.type_name == JointState::TYPE);
+    let with_joints = topics.filter(|topic| topic.joint_state_type().is_some());
     let names: Vec<&str> = with_joints.map(|topic| topic.name.as_str()).collect();
     match names.as_slice() {
         [only] => Ok((*only).to_owned()),

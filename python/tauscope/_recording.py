@@ -41,7 +41,8 @@ class Recording:
 
 
 def read(path: str | os.PathLike[str], *, topic: str | None = None) -> Recording:
-    """Reads the joint states of a recording: an MCAP file, a rosbag2 folder, a `.db3` bag or a `.csv` table.
+    """Reads the joint states of a recording: an MCAP file, a rosbag2 folder, a `.db3` bag, a ROS 1 bag or a `.csv`
+    table.
 
     Without `topic` the only topic with joint states is read; if there are several, `/joint_states`.
     """

@@ -10,7 +10,7 @@ use crate::output::Output;
 /// Say what is in a recording: its topics and rates, gaps, whose joints move and what is odd about them, damage.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// An MCAP file, a rosbag2 folder, or a `.db3`.
+    /// An MCAP file, a rosbag2 folder, a `.db3`, a `.bag` of ROS 1, or a table (`.csv`).
     recording: PathBuf,
     /// Machine-readable.
     #[arg(long)]

@@ -1,5 +1,6 @@
 //! Who hangs: a stage says ten times a second how it fares, whether or not samples come. One that does not any more is
-//! named, and after a while its process is killed, so that it can begin again.
+//! named, and after a while its process is killed, so that it can begin again. Of stages of one thread their process
+//! says which one it is stuck in; the others only wait for that one.
 
 use std::time::Duration;
 
@@ -19,11 +20,13 @@ const KILLED_AFTER: Duration = Duration::from_secs(30);
 impl Supervisor<'_> {
     pub(super) fn tell_who_hangs(&mut self, now: Instant) {
         for index in 0..self.stages.len() {
-            let stage = &mut self.stages[index];
+            let stage = &self.stages[index];
             let unheard_for = stage.unheard_for(now).unwrap_or_default();
-            let hangs = unheard_for >= HANGS_AFTER;
-            let (is_new, crew) = (stage.note_hangs(hangs), stage.crew);
-            let name = &stage.seat.stage;
+            let (crew, name) = (stage.crew, stage.seat.stage.clone());
+            let stuck = self.stuck_in(crew, stage.root);
+            let only_waits = stuck.is_some_and(|stuck| stuck != name);
+            let hangs = unheard_for >= HANGS_AFTER && !only_waits;
+            let is_new = self.stages[index].note_hangs(hangs);
             let seconds = unheard_for.as_secs();
             if hangs && is_new {
                 let left = KILLED_AFTER.saturating_sub(HANGS_AFTER).as_secs();
@@ -32,13 +35,20 @@ impl Supervisor<'_> {
                     "warning: stage `{name}` hangs: nothing was heard of it for {seconds} s; its process {id} is \
                      killed in {left} s"
                 ));
-            } else if is_new && stage.is_running() {
+            } else if is_new && self.stages[index].is_running() {
                 self.view.note(&format!("note: stage `{name}` goes on"));
             }
             if unheard_for >= KILLED_AFTER {
                 self.crews[crew].kill();
             }
         }
+    }
+
+    /// The stage that a thread is stuck in, if its process says so.
+    fn stuck_in(&self, crew: usize, root: usize) -> Option<&str> {
+        let mut tree = (self.stages.iter()).filter(|it| it.crew == crew && it.root == root);
+        let stuck = tree.find(|stage| stage.is_stuck());
+        stuck.map(|stage| stage.seat.stage.as_str())
     }
 
     /// Tells the service manager how the run fares.

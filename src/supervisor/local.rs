@@ -56,6 +56,8 @@ pub struct Local {
 struct Pulse {
     /// When it last said how it fares.
     heard: Option<Instant>,
+    /// Its process has said since then that this stage is what its thread is stuck in.
+    stuck: bool,
     /// It was told that it hangs.
     hangs: bool,
 }
@@ -82,6 +84,8 @@ pub enum Reported<'a> {
     },
     /// What it has counted.
     Counts,
+    /// That it does not go on.
+    Stuck,
     /// What it has found.
     Note(String),
     /// Something that is none of the protocol.
@@ -196,10 +200,15 @@ impl Local {
             }
             Ok(Line::Report(report) | Line::Done(report)) => self.tally.note(report),
             Ok(Line::Note { text, .. }) => return Reported::Note(text),
+            Ok(Line::Stuck { .. }) => {
+                self.pulse.stuck = true;
+                return Reported::Stuck;
+            }
             Err(_) => return Reported::Other(line),
         }
         let now = Instant::now();
         self.pulse.heard = Some(now);
+        self.pulse.stuck = false;
         let moved = self.flow.note(self.samples(), now.into_std());
         if let Some(patience) = self.patience.as_mut().filter(|_| moved) {
             patience.extend(now);
@@ -270,6 +279,11 @@ impl Local {
             .heard
             .filter(|_| self.is_running() && !self.is_done());
         heard.map(|heard| now.duration_since(heard))
+    }
+
+    /// Whether it is the one of its thread that does not go on, as its process says.
+    pub fn is_stuck(&self) -> bool {
+        self.pulse.stuck
     }
 
     /// Notes whether it hangs; true if that is new.

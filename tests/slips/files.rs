@@ -36,7 +36,7 @@ const SLIPS: &[Slip] = &[
     Slip {
         typed: "info @ros1.bag",
         code: 2,
-        says: &["ROS 1", "rosbags-convert"],
+        says: &["ros1.bag", "ends within its header"],
     },
     Slip {
         typed: "info @table.csv",

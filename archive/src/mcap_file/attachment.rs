@@ -4,7 +4,7 @@ use std::io::{self, Read};
 
 use mcap::records::AttachmentHeader;
 
-use super::chunk::Fields;
+use crate::fields::Fields;
 
 /// Longest header: times, name and media type \[bytes\].
 /// Resolution: bounds memory.

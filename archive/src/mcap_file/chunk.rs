@@ -4,7 +4,9 @@ use std::io::Read;
 
 use mcap::records::op;
 
-use super::{MAX_LOADED_BYTES, MESSAGE_HEADER_BYTES, RECORD_PREFIX_BYTES};
+use super::{MESSAGE_HEADER_BYTES, RECORD_PREFIX_BYTES};
+use crate::chunks::MAX_LOADED_BYTES;
+use crate::fields::Fields;
 
 /// What a chunk says of itself.
 pub(super) struct ChunkHeader<'a> {
@@ -14,34 +16,6 @@ pub(super) struct ChunkHeader<'a> {
     crc: u32,
     compression: &'a str,
     packed_bytes: u64,
-}
-
-/// Takes fixed-size fields off the front of a slice.
-pub(super) struct Fields<'a>(pub(super) &'a [u8]);
-
-impl<'a> Fields<'a> {
-    pub(super) fn take(&mut self, len: usize) -> Option<&'a [u8]> {
-        let (field, rest) = self.0.split_at_checked(len)?;
-        self.0 = rest;
-        Some(field)
-    }
-
-    pub(super) fn text(&mut self) -> Option<&'a str> {
-        let len = self.u32()? as usize;
-        std::str::from_utf8(self.take(len)?).ok()
-    }
-
-    pub(super) fn u16(&mut self) -> Option<u16> {
-        Some(u16::from_le_bytes(self.take(2)?.try_into().ok()?))
-    }
-
-    pub(super) fn u32(&mut self) -> Option<u32> {
-        Some(u32::from_le_bytes(self.take(4)?.try_into().ok()?))
-    }
-
-    pub(super) fn u64(&mut self) -> Option<u64> {
-        Some(u64::from_le_bytes(self.take(8)?.try_into().ok()?))
-    }
 }
 
 impl<'a> ChunkHeader<'a> {

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 
 use mcap::records::{Channel, Metadata, Record, op};
 
-use super::chunk::{Fields, MessageHeader};
+use super::chunk::MessageHeader;
 use crate::damage::{Damage, DamageKind};
+use crate::fields::Fields;
 use crate::topic::{Topic, Topics};
 
 /// Most damages of a file that are told.

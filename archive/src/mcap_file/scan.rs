@@ -10,7 +10,8 @@ use mcap::records::op;
 use super::chunk::{ChunkHeader, MessageHeader, Unpacker, inner_records};
 use super::layout::{Extent, ExtentKind, Layout};
 use super::walk::{Record, Step, Walk};
-use super::{MAX_LOADED_BYTES, MAX_RECORD_BYTES, MESSAGE_HEADER_BYTES, RECORD_PREFIX_BYTES};
+use super::{MAX_RECORD_BYTES, MESSAGE_HEADER_BYTES, RECORD_PREFIX_BYTES};
+use crate::chunks::{MAX_LOADED_BYTES, too_long};
 use crate::damage::DamageKind;
 
 /// Messages without a chunk are read in runs of about this length \[bytes\].
@@ -90,7 +91,7 @@ impl Scan<'_> {
 
     fn chunk(&mut self, walk: &mut Walk, record: Record) -> io::Result<()> {
         if record.len > MAX_LOADED_BYTES as u64 {
-            let reason = format!("{} bytes, the limit is {MAX_LOADED_BYTES}", record.len);
+            let reason = too_long(record.len);
             self.broken_chunk(record, reason);
             return Ok(());
         }

@@ -126,8 +126,8 @@ impl Messages {
         None
     }
 
-    /// Chunks of an MCAP file that have been read so far. Messages that lie in it without a chunk count as one, up to the
-    /// next chunk.
+    /// Chunks of an MCAP file or a bag of ROS 1 that have been read so far. Messages of an MCAP file that lie in no chunk
+    /// count as one, up to the next chunk.
     pub fn chunks_read(&self) -> u64 {
         self.cursor.chunks_read()
     }

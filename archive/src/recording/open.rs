@@ -15,16 +15,17 @@ use crate::error::ArchiveError;
 use crate::file_kind::file_kind;
 use crate::mcap_file::Layout;
 use crate::ros::{JointState, Message as _};
+use crate::ros1_bag::{self, Ros1Bag};
 use crate::sqlite_file::{self, SqliteFile};
 use crate::topic::{Topic, Topics};
 
 impl Recording {
     /// Opens the recording at `path`: an MCAP file (also an unfinished `.part`), the folder of a
-    /// rosbag2 bag with MCAP or SQLite files, one such SQLite file, or a table (`.csv`) whose columns its header or a
-    /// file beside it tells.
+    /// rosbag2 bag with MCAP or SQLite files, one such SQLite file, a bag of ROS 1 (`.bag`), or a
+    /// table (`.csv`) whose columns its header or a file beside it tells.
     ///
-    /// Of an MCAP file, only the index is read if it has a sound one; else all of it, once. A
-    /// database is counted through once.
+    /// Of an MCAP file or a bag of ROS 1, only the index is read if it has a sound one; else all of
+    /// it, once. A database is counted through once.
     ///
     /// # Errors
     /// [`ArchiveError::Io`]; [`ArchiveError::UnknownFormat`]; [`ArchiveError::Unreadable`] if not
@@ -59,13 +60,13 @@ impl Recording {
                 SqliteFile::read(path, packed_messages)?,
             ));
         }
+        if beginning.starts_with(ros1_bag::MAGIC) {
+            return Ok(Self::from_ros1(Ros1Bag::read(path)?));
+        }
         let reason = match file_kind(path) {
             Some("empty") => "the file is empty".to_owned(),
-            Some(kind) if beginning.starts_with(b"#ROSBAG V") => {
-                format!("it is {kind}: convert it first, for example with `rosbags-convert`")
-            }
             Some(kind) => format!("it is {kind}"),
-            None => "it begins as neither an MCAP file nor a SQLite database does".to_owned(),
+            None => "it begins as no MCAP file, SQLite database or ROS 1 bag does".to_owned(),
         };
         Err(ArchiveError::UnknownFormat {
             path: path.to_owned(),
@@ -112,6 +113,23 @@ impl Recording {
             store: Store::Sqlite {
                 file: Box::new(file),
                 numbers,
+            },
+        }
+    }
+
+    fn from_ros1(bag: Ros1Bag) -> Self {
+        let (topics, places) = bag.topics();
+        Self {
+            path: bag.path.clone(),
+            kind: RecordingKind::Ros1Bag,
+            topics: Arc::new(topics),
+            log_times_ns: bag.log_times_ns,
+            bytes: bag.file_bytes,
+            metadata: BTreeMap::new(),
+            damage: bag.damage.clone(),
+            store: Store::Ros1 {
+                bag: Arc::new(bag),
+                topics: places,
             },
         }
     }

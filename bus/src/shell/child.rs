@@ -6,7 +6,7 @@
 //! | --- | --- |
 //! | standard input, first line | the [`Seat`] |
 //! | standard input, from then on | the line `stop`, or its end, tells the stage to stop: it deals with what has arrived, completes its output and leaves. `SIGTERM` does the same; `SIGINT` is left to the supervisor, since a terminal sends it to both |
-//! | standard output | one [`Line`] each: `{"event":"ready","missing":0}` once its receivers are connected (or the wait for them is over), `{"event":"report",...}` ten times a second, `{"event":"note","text":"..."}` where it found something, `{"event":"done",...}` at the end |
+//! | standard output | one [`Line`] each: `{"event":"ready","missing":0}` once its receivers are connected (or the wait for them is over), `{"event":"report",...}` ten times a second, `{"event":"stuck",...}` instead while it does not go on, `{"event":"note","text":"..."}` where it found something, `{"event":"done",...}` at the end |
 //! | standard error | anything, for people |
 //! | exit code | 0 ended or stopped, 1 failed |
 //!
@@ -18,7 +18,7 @@ use std::error::Error;
 use std::io::{self, BufRead as _, Write as _};
 use std::process::ExitCode;
 use std::sync::mpsc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 use tokio::signal::unix::{SignalKind, signal};
@@ -56,6 +56,14 @@ pub enum Line {
         stage: String,
         /// What.
         text: String,
+    },
+    /// It, and all that run in its thread, do not go on: for so long it has not finished what it does with a sample.
+    /// While that lasts there are no reports.
+    Stuck {
+        /// The stage.
+        stage: String,
+        /// For how long \[ms\].
+        for_ms: u64,
     },
     /// It leaves.
     Done(Report),
@@ -259,9 +267,14 @@ pub(super) fn say_posted(board: &Board) {
     // Locked before it is read, so that no older report comes after a newer one.
     let mut out = io::stdout().lock();
     let mut text = Vec::new();
-    let posted = board.read().into_iter();
-    for report in posted.filter(|report| report.outcome.is_none()) {
-        write_line(&mut text, &Line::Report(report));
+    if let Some((stage, silent_for)) = board.stuck(Instant::now()) {
+        let for_ms = u64::try_from(silent_for.as_millis()).unwrap_or(u64::MAX);
+        write_line(&mut text, &Line::Stuck { stage, for_ms });
+    } else {
+        let posted = board.read().into_iter();
+        for report in posted.filter(|report| report.outcome.is_none()) {
+            write_line(&mut text, &Line::Report(report));
+        }
     }
     // At once: what is killed meanwhile has said what all have done, or nothing.
     let _ = out.write_all(&text).and_then(|()| out.flush());

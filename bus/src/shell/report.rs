@@ -1,12 +1,13 @@
 //! How a stage fares.
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
 use crate::link::{Position, ReceiverCounts, SenderCounts};
+use crate::shell::pulse::Pulse;
 use crate::stage::StageError;
 use crate::trouble::Trouble;
 
@@ -120,20 +121,61 @@ impl Outcome {
 
 /// Where stages that run together post their reports, all of one instant. Clones are one.
 #[derive(Debug, Clone, Default)]
-pub struct Board(Arc<Mutex<Vec<Report>>>);
+pub struct Board(Arc<Mutex<Posted>>);
+
+#[derive(Debug, Default)]
+struct Posted {
+    reports: Vec<Report>,
+    at: Option<Instant>,
+    pulse: Option<Pulse>,
+    ends: bool,
+}
 
 impl Board {
+    /// A loop that has posted nothing for so long, and does not wait for a link, is stuck in one of its stages.
+    /// Resolution: ten reports are missing; a busy machine delays a few.
+    const STUCK_AFTER: Duration = Duration::from_secs(1);
+
     /// The newest reports; none until the loop has begun.
     pub fn read(&self) -> Vec<Report> {
-        self.0
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .clone()
+        self.lock().reports.clone()
+    }
+
+    /// The stage that the loop is stuck in, and for how long; none while the loop goes round.
+    pub fn stuck(&self, now: Instant) -> Option<(String, Duration)> {
+        let posted = self.lock();
+        let silent_for = now.saturating_duration_since(posted.at?);
+        let waits = posted.pulse.as_ref().is_some_and(Pulse::waits);
+        let over = posted.reports.iter().any(|report| report.outcome.is_some());
+        if silent_for < Self::STUCK_AFTER || waits || over || posted.ends {
+            return None;
+        }
+        // Without a tree there is one stage.
+        let stage = match &posted.pulse {
+            Some(pulse) => pulse.whose(),
+            None => posted.reports.first()?.stage.clone(),
+        };
+        Some((stage, silent_for))
+    }
+
+    /// Whose turn it is tells this.
+    pub(super) fn follow(&self, pulse: Pulse) {
+        self.lock().pulse = Some(pulse);
+    }
+
+    /// What the stages do at their end may take long, and whoever waits for that has a patience of his own.
+    pub(super) fn ends(&self) {
+        self.lock().ends = true;
     }
 
     pub(super) fn post(&self, reports: &[Report]) {
-        let mut posted = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        reports.clone_into(&mut posted);
+        let mut posted = self.lock();
+        reports.clone_into(&mut posted.reports);
+        posted.at = Some(Instant::now());
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Posted> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

@@ -153,6 +153,7 @@ impl SinkShell<'_> {
         if let Some(error) = self.failure.take() {
             return Err(error);
         }
+        context.board.ends();
         self.sink.finish()?;
         self.count();
         self.health.end(&self.report)?;

@@ -150,6 +150,7 @@ impl<'a> Tree<'a> {
     }
 
     fn drive(&mut self, context: &Context) -> Result<Outcome, StageError> {
+        context.board.follow(self.turn.pulse());
         let mut poster = Poster::new(context.board.clone());
         poster.post(&self.reports());
         let outcome = loop {
@@ -162,6 +163,7 @@ impl<'a> Tree<'a> {
                 poster.post(&self.reports());
             }
         };
+        context.board.ends();
         self.root.part().finish()?;
         self.turn.check()?;
         let deadline = Instant::now() + TAKEN_WITHIN;

@@ -2,11 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
+use tauscope_bus::clock::{ClockFilter, Offset};
 use tauscope_publish::message::{AlarmState, RecordMessage, StatusMessage};
 
 use super::snapshot::{CellView, ResidualView};
 use super::state::{StaleWhy, State, UnknownWhy};
-use super::{Effect, Now, STALE_AFTER_MS};
+use super::{CLOCK_LIMIT_NS, Effect, Now, STALE_AFTER_MS};
 
 /// Lives of one cell that are followed at a time. Resolution: one is right, two are a fault; a stranger may not fill
 /// the memory.
@@ -14,6 +15,10 @@ const MAX_LIVES: usize = 8;
 /// Minutes of the residual that are kept. Resolution: an hour on the small curve of a tile.
 const MINUTES: usize = 60;
 const NS_PER_MS: i64 = 1_000_000;
+/// How often a cell is asked for its clock \[ms\], and how often until it was so many times.
+/// Resolution: traffic, against how soon a clock that was set is told of; a first burst as of NTP.
+const CLOCK_EVERY_MS: u64 = 10_000;
+const CLOCK_BURST: (u64, usize) = (900, 4);
 
 /// A cell.
 #[derive(Debug, Default)]
@@ -30,8 +35,9 @@ pub struct Watched {
     records: u64,
     /// Lost samples by stage, as last told.
     lost: BTreeMap<String, u64>,
-    /// Clock of the cell minus clock of this host by the fastest message of a minute \[ns\], and when the minute began.
-    clock_ahead: Option<(i64, u64)>,
+    clock: ClockFilter,
+    /// When it was asked for its clock \[ms\].
+    clock_asked: Option<u64>,
     minutes: VecDeque<f64>,
     minute: Option<i64>,
     /// The state as of the last settling, and since when \[ns since the epoch\].
@@ -95,16 +101,19 @@ impl Watched {
             }
             self.records = 0;
             self.lost.clear();
-            self.clock_ahead = None;
+            self.clock = ClockFilter::default();
+            self.clock_asked = None;
         }
-        let ahead_ns = status.sent_ns.saturating_sub(now.unix_ns);
-        // What is late looks like a clock that is behind: the message that was fastest tells best.
-        let of_minute =
-            |(_, since_ms): &(i64, u64)| now.running_ms.saturating_sub(*since_ms) < 60_000;
-        self.clock_ahead = Some(match self.clock_ahead.filter(of_minute) {
-            Some((best_ns, since_ms)) => (best_ns.max(ahead_ns), since_ms),
-            None => (ahead_ns, now.running_ms),
-        });
+        let every = match CLOCK_BURST {
+            (soon_ms, times) if self.clock.len() < times => soon_ms,
+            _ => CLOCK_EVERY_MS,
+        };
+        let is_due = |asked: u64| now.running_ms.saturating_sub(asked) >= every;
+        if self.clock_asked.is_none_or(is_due) && !status.ended {
+            self.clock_asked = Some(now.running_ms);
+            let cell = name.to_owned();
+            effects.push(Effect::AskClock { cell });
+        }
         self.count_losses(name, &status, effects);
         if status.last_record > self.records {
             effects.push(Effect::AskRecords {
@@ -170,6 +179,14 @@ impl Watched {
         });
     }
 
+    /// What its clock says.
+    pub fn clock(&mut self, instance: &str, offset: Offset, now: Now) {
+        let known = self.newest();
+        if known.is_some_and(|status| status.instance == instance) {
+            self.clock.note(offset, now.running_ms);
+        }
+    }
+
     /// What is kept of the records has come; what is older is gone.
     pub fn all_records(&mut self, instance: &str, number: u64) {
         if self
@@ -196,7 +213,11 @@ impl Watched {
             return stale(at.unix_ns, StaleWhy::Connection);
         }
         if let Some(gone) = self.gone {
-            return stale(gone.unix_ns, StaleWhy::Token);
+            // One that has long been silent is not fresher because the network has noticed that, too.
+            let silent_ms = gone.running_ms.saturating_sub(at.running_ms);
+            let was_silent = silent_ms > STALE_AFTER_MS;
+            let since = if was_silent { *at } else { gone };
+            return stale(since.unix_ns, StaleWhy::Token);
         }
         let unknown = |why| State::Unknown { why };
         if self.lives.len() > 1 {
@@ -279,6 +300,8 @@ impl Watched {
             _ => self.settled.map(|(_, since_ns)| since_ns),
         };
         let age_ms = |at: &Now| now.running_ms.saturating_sub(at.running_ms);
+        let clock = self.clock.best(now.running_ms);
+        let ms = |ns: i64| ns as f64 / NS_PER_MS as f64;
         let status_age_ms = self.status.as_ref().map(|(_, at)| age_ms(at));
         let sample_age_ms = self
             .status
@@ -291,7 +314,9 @@ impl Watched {
             since_ns,
             status_age_ms,
             sample_age_ms,
-            clock_ahead_ms: self.clock_ahead.map(|(ns, _)| ns / NS_PER_MS),
+            clock_ahead_ms: clock.map(|clock| ms(clock.ahead_ns)),
+            clock_uncertainty_ms: clock.map(|clock| ms(clock.uncertainty_ns)),
+            clock_is_off: clock.is_some_and(|clock| clock.exceeds(CLOCK_LIMIT_NS)),
             lost_samples: self
                 .lost
                 .values()

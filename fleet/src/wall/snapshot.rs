@@ -44,8 +44,12 @@ pub struct CellView {
     pub status_age_ms: Option<u64>,
     /// Time since the newest sample arrived in the cell \[ms\].
     pub sample_age_ms: Option<u64>,
-    /// How far the cell's clock is ahead of the fleet host's, and the way of the fastest message less \[ms\].
-    pub clock_ahead_ms: Option<i64>,
+    /// How far the cell's clock is ahead of the fleet host's \[ms\].
+    pub clock_ahead_ms: Option<f64>,
+    /// The truth is no farther away from that \[ms\].
+    pub clock_uncertainty_ms: Option<f64>,
+    /// Whether the clocks differ by more than [`CLOCK_LIMIT_NS`](super::CLOCK_LIMIT_NS) for certain.
+    pub clock_is_off: bool,
     /// Samples that its stages have lost.
     pub lost_samples: u64,
     /// Its residual against its normal.
@@ -118,6 +122,26 @@ impl ResidualView {
     }
 }
 
+/// A name as people sort it, `press-2` before `press-10`: its words, with the number behind each.
+fn natural(name: &str) -> Vec<(&str, u64, usize)> {
+    let mut parts = Vec::new();
+    let mut rest = name;
+    while !rest.is_empty() {
+        let word = rest.find(|c: char| c.is_ascii_digit());
+        let (word, behind) = rest.split_at(word.unwrap_or(rest.len()));
+        let number = behind.find(|c: char| !c.is_ascii_digit());
+        let (number, behind) = behind.split_at(number.unwrap_or(behind.len()));
+        // A number that is too long is longer than all others; one with zeros before it is another name.
+        let value = match number {
+            "" => 0,
+            digits => digits.parse().unwrap_or(u64::MAX),
+        };
+        parts.push((word, value, number.len()));
+        rest = behind;
+    }
+    parts
+}
+
 impl Snapshot {
     pub(super) fn new(
         now: Now,
@@ -131,7 +155,9 @@ impl Snapshot {
                 let good = cell.severity == Severity::Good;
                 (cell.severity, if good { None } else { cell.since_ns })
             };
-            key(a).cmp(&key(b)).then_with(|| a.cell.cmp(&b.cell))
+            key(a)
+                .cmp(&key(b))
+                .then_with(|| natural(&a.cell).cmp(&natural(&b.cell)))
         });
         let mut totals: Totals = State::NAMES.iter().map(|name| (*name, 0)).collect();
         for cell in &cells {

@@ -115,6 +115,55 @@ fn a_token_that_goes_is_known_at_once_and_a_cut_cell_within_five_seconds() {
 }
 
 #[test]
+fn a_cell_that_was_silent_is_stale_since_then_also_when_its_token_goes() {
+    let mut story = Story::new(&[]);
+    story.alive("x").status(|_| {});
+    let silent_since = story.now.unix_ns;
+    story.wait(10_000).gone("x").is("stale").because("cut off");
+    let State::Stale { since_ns, .. } = story.wall.state("a").unwrap() else {
+        panic!();
+    };
+    assert_eq!(since_ns, silent_since);
+}
+
+#[test]
+fn a_clock_that_is_off_for_certain_is_told_of() {
+    let mut story = Story::new(&[]);
+    story.alive("x").status(|_| {});
+    let asked = |story: &Story| {
+        let is_clock = |effect: &&Effect| matches!(effect, Effect::AskClock { .. });
+        story.effects.iter().filter(is_clock).count()
+    };
+    assert_eq!(asked(&story), 1);
+    let answer = |story: &mut Story, instance: &str, ahead_ms: i64, most_ms: i64| {
+        let offset = Offset {
+            ahead_ns: ahead_ms * 1_000_000,
+            uncertainty_ns: most_ms * 1_000_000,
+        };
+        let (cell, instance) = ("a".to_owned(), instance.to_owned());
+        story.tell(Event::Clock {
+            cell,
+            instance,
+            offset,
+        });
+        let view = story.wall.snapshot().cells.remove(0);
+        (view.clock_ahead_ms, view.clock_is_off)
+    };
+    // A slow network leaves it open.
+    assert_eq!(answer(&mut story, "x", 340, 300), (Some(340.0), false));
+    assert_eq!(answer(&mut story, "x", 339, 2), (Some(339.0), true));
+    // Of another life nothing is taken.
+    assert_eq!(answer(&mut story, "y", 0, 1), (Some(339.0), true));
+    assert_eq!(answer(&mut story, "x", 1, 1), (Some(1.0), false));
+    // It is asked again, in the beginning more often.
+    for _ in 0..30 {
+        story.wait(1_000).status(|_| {});
+        answer(&mut story, "x", 1, 1);
+    }
+    assert!((4..8).contains(&asked(&story)), "{}", asked(&story));
+}
+
+#[test]
 fn a_fleet_host_that_reaches_nobody_says_so_of_itself() {
     let mut story = Story::new(&[]);
     story.alive("x").status(|_| {});
@@ -312,4 +361,20 @@ fn a_thousand_cells_pass_in_a_fraction_of_their_second() {
     }
     // Ten seconds of a thousand cells. Measured: 0.2 s.
     assert!(begin.elapsed().as_secs() < 10, "{:?}", begin.elapsed());
+}
+
+#[test]
+fn equals_stand_in_the_order_in_which_people_count() {
+    let names = [
+        "press-10", "weld", "press-2", "press-02", "press", "press-2b",
+    ];
+    let wall = Wall::new(names.map(str::to_owned));
+    let cells = wall.snapshot().cells;
+    let shown: Vec<&str> = cells.iter().map(|view| view.cell.as_str()).collect();
+    assert_eq!(
+        shown,
+        [
+            "press", "press-2", "press-2b", "press-02", "press-10", "weld"
+        ]
+    );
 }

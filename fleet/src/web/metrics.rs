@@ -68,6 +68,7 @@ struct Families {
     ratio: Reals<Cell>,
     changes: Family<Cell, Gauge>,
     clock: Reals<Cell>,
+    clock_uncertainty: Reals<Cell>,
     refused: Family<Reason, Gauge>,
 }
 
@@ -129,9 +130,11 @@ impl Families {
             self.sample_age.get_or_create(&cell()).set(seconds(age_ms));
         }
         if let Some(ahead_ms) = view.clock_ahead_ms {
-            self.clock
-                .get_or_create(&cell())
-                .set(ahead_ms as f64 * 1e-3);
+            self.clock.get_or_create(&cell()).set(ahead_ms * 1e-3);
+        }
+        if let Some(most_ms) = view.clock_uncertainty_ms {
+            let most_s = most_ms * 1e-3;
+            self.clock_uncertainty.get_or_create(&cell()).set(most_s);
         }
         if let Some(residual) = &view.residual {
             self.ratio.get_or_create(&cell()).set(residual.ratio);
@@ -191,6 +194,8 @@ impl Families {
         registry.register_with_unit("sample_age", help, seconds(), self.sample_age);
         let help = "How far the cell's clock is ahead of the fleet host's";
         registry.register_with_unit("clock_ahead", help, seconds(), self.clock);
+        let help = "The truth is no farther away from the measured clock_ahead";
+        registry.register_with_unit("clock_uncertainty", help, seconds(), self.clock_uncertainty);
         registry.register(
             "contacts_today",
             "Contacts since 00:00 UTC or the start of the cell",
@@ -245,7 +250,16 @@ mod tests {
         // What a stranger calls itself must not break a line.
         status.robot = "arm\"\\ {x}".to_owned();
         let status = Box::new(status);
+        let clock = Event::Clock {
+            cell: cell.clone(),
+            instance: "x".to_owned(),
+            offset: tauscope_bus::clock::Offset {
+                ahead_ns: -340_000_000,
+                uncertainty_ns: 2_000_000,
+            },
+        };
         wall.take(Event::Status { cell, status }, now);
+        wall.take(clock, now);
         wall.take(Event::Refused("too long"), now);
         text(&wall.snapshot()).unwrap()
     }
@@ -260,6 +274,8 @@ mod tests {
             "tauscope_fleet_lost_samples{cell=\"a\",stage=\"twin\"} 0",
             "tauscope_fleet_residual_rms{cell=\"a\",joint=\"joint2\",unit=\"Nm\"} 1.5",
             "tauscope_fleet_refused_messages{reason=\"too long\"} 1",
+            "tauscope_fleet_clock_ahead_seconds{cell=\"a\"} -0.34",
+            "tauscope_fleet_clock_uncertainty_seconds{cell=\"a\"} 0.002",
             "tauscope_fleet_sessions 1",
         ] {
             assert!(text.lines().any(|shown| shown == line), "{line} in\n{text}");

@@ -1,4 +1,4 @@
-//! Joint states out of a recording: MCAP, a rosbag2 bag, or a table.
+//! Joint states out of a recording: MCAP, a rosbag2 bag, a bag of ROS 1, or a table.
 
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,7 @@
 //! What the fleet is told of the cell: once a second how it fares, and each contact as it comes.
 
 use std::os::unix::process::parent_id;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
 use tauscope_bus::{Command, Detection, Health, TwinState, flags};
 use zenoh::Session;
@@ -9,7 +9,7 @@ use zenoh::Session;
 use crate::alarm::State;
 use crate::error::PublishError;
 use crate::message::{AlarmMessage, HealthMessage, RecordMessage, STATUS_VERSION, StatusMessage};
-use crate::presence::Presence;
+use crate::presence::{Presence, now_ns};
 use crate::report::{Report, Residual};
 
 /// How often the status is told. Resolution: a fleet host calls a cell stale after a few of them.
@@ -166,7 +166,7 @@ impl Fleet {
         let (contacts_today, contacts_since_ns) = self.report.today();
         self.status = StatusMessage {
             sent_ns: now_ns(),
-            ended: ended && parent_id() == self.supervisor,
+            ended: ended && parent_id() == self.supervisor && !is_exiting(self.supervisor),
             alarm: alarm.clone(),
             last_sample_ns: self.newest.map(|(stamp_ns, _)| stamp_ns),
             last_sample_age_ms: age.map(|age| u64::try_from(age.as_millis()).unwrap_or(u64::MAX)),
@@ -183,15 +183,46 @@ impl Fleet {
     }
 }
 
+/// Whether a process of this host is ending or has ended: it closes its pipes, by which its children learn of it, before
+/// they get another parent. False where the system does not tell.
+fn is_exiting(process: u32) -> bool {
+    // Field 9 of the line are the kernel's flags (proc(5)), of which PF_EXITING is this one (linux/sched.h).
+    const PF_EXITING: u64 = 0x4;
+    let line = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+    // The name before may have spaces and brackets in it.
+    let behind = line.rsplit(')').next().unwrap_or_default();
+    let flags = behind.split_whitespace().nth(6);
+    flags.is_some_and(|flags| {
+        flags
+            .parse::<u64>()
+            .is_ok_and(|flags| flags & PF_EXITING != 0)
+    })
+}
+
 /// The computer's name; empty where the system does not tell it.
 fn host() -> String {
     let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
     name.trim().to_owned()
 }
 
-fn now_ns() -> i64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    since.map_or(0, |since| {
-        i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
-    })
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_process_that_was_killed_is_seen_to_end_before_anybody_has_waited_for_it() {
+        assert!(!is_exiting(std::process::id()));
+        let mut child = std::process::Command::new("sleep")
+            .arg("60")
+            .spawn()
+            .unwrap();
+        assert!(!is_exiting(child.id()));
+        child.kill().unwrap();
+        let begin = Instant::now();
+        while !is_exiting(child.id()) {
+            assert!(begin.elapsed() < Duration::from_mins(1));
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        child.wait().unwrap();
+    }
 }

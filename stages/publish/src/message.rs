@@ -9,8 +9,8 @@ use crate::alarm::State;
 mod status;
 
 pub use status::{
-    ChangeMessage, ContactMessage, JointResidual, Record, RecordMessage, ResidualMessage,
-    STATUS_VERSION, StatusMessage,
+    ChangeMessage, ClockMessage, ContactMessage, JointResidual, Record, RecordMessage,
+    ResidualMessage, STATUS_VERSION, StatusMessage,
 };
 
 /// Under `<cell>/alarm`: what the cell is to do.
@@ -230,6 +230,8 @@ pub struct Messages {
     pub health: HealthMessage,
     /// `<cell>/status`.
     pub status: StatusMessage,
+    /// What the query `<cell>/status?clock` is answered with.
+    pub clock: ClockMessage,
     /// `<cell>/records`.
     pub records: RecordMessage,
     /// What `<cell>/commands` takes.

@@ -3,11 +3,12 @@
 //! | key | what |
 //! | --- | --- |
 //! | `<cell>/@alive/<instance>` | liveliness token: gone as soon as the process is |
-//! | `<cell>/status` | [`StatusMessage`] once a second; a query is answered with the newest |
+//! | `<cell>/status` | [`StatusMessage`] once a second; a query is answered with the newest, one with `clock` with a [`ClockMessage`] |
 //! | `<cell>/records` | [`RecordMessage`] as it comes; a query with `after=NUMBER` is answered with those behind it |
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use zenoh::bytes::Encoding;
 use zenoh::liveliness::LivelinessToken;
@@ -17,7 +18,7 @@ use zenoh::query::{Query, Queryable};
 use zenoh::{Session, Wait as _};
 
 use crate::error::PublishError;
-use crate::message::{RecordMessage, StatusMessage};
+use crate::message::{ClockMessage, RecordMessage, StatusMessage};
 
 /// Records that are kept for who missed them. Resolution: hours of contacts, and an answer below 100 kB.
 const MAX_RECORDS: usize = 256;
@@ -63,10 +64,15 @@ impl Presence {
         };
         let answer = |key: &str, text: fn(&Kept, &Query) -> Option<String>| {
             let (kept, own) = (kept.clone(), key.to_owned());
+            let instance = instance.to_owned();
             session
                 .declare_queryable(key.to_owned())
                 .callback(move |query| {
-                    let text = text(&lock(&kept), &query);
+                    let text = if query.parameters().contains_key("clock") {
+                        clock(&instance)
+                    } else {
+                        text(&lock(&kept), &query)
+                    };
                     if let Some(text) = text {
                         // Who has asked may be gone.
                         let _ = query
@@ -120,6 +126,25 @@ impl Presence {
         }
         self.records.put(text).wait().map_err(PublishError::zenoh)
     }
+}
+
+/// By the clock of this computer \[ns since the epoch\].
+pub fn now_ns() -> i64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.map_or(0, |since| {
+        i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
+    })
+}
+
+/// What the clock says now.
+fn clock(instance: &str) -> Option<String> {
+    let received_ns = now_ns();
+    let message = ClockMessage {
+        instance: instance.to_owned(),
+        received_ns,
+        answered_ns: received_ns,
+    };
+    serde_json::to_string(&message).ok()
 }
 
 /// The records behind the number that a query names, as a JSON array.

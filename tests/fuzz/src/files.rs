@@ -59,6 +59,11 @@ pub fn mcap(bytes: &[u8]) {
     }
 }
 
+/// A bag of ROS 1: opened, summed up, read.
+pub fn ros1_bag(bytes: &[u8]) {
+    recording(&file("a.bag", bytes));
+}
+
 /// A table.
 pub fn csv(bytes: &[u8]) {
     recording(&file("a.csv", bytes));

@@ -24,7 +24,7 @@ macro_rules! targets {
 }
 
 /// All of them.
-pub const TARGETS: [Target; 10] = targets! {
+pub const TARGETS: [Target; 11] = targets! {
     bus_samples: bus::samples,
     cdr: messages::cdr,
     command: messages::command,
@@ -32,6 +32,7 @@ pub const TARGETS: [Target; 10] = targets! {
     mcap: files::mcap,
     modbus: messages::modbus,
     pipeline: files::pipeline,
+    ros1_bag: files::ros1_bag,
     status: messages::status,
     twin: files::twin,
     urdf: files::urdf,

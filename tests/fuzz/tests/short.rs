@@ -136,6 +136,7 @@ short!(
     mcap,
     modbus,
     pipeline,
+    ros1_bag,
     status,
     twin,
     urdf

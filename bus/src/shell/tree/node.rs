@@ -7,6 +7,7 @@ use crate::link::{LinkError, Sender, SenderCounts};
 use crate::sample::{Header, Health, Sample};
 use crate::shell::Ledger;
 use crate::shell::health::HealthSender;
+use crate::shell::pulse::Pulse;
 use crate::shell::report::{InputReport, Report};
 use crate::stage::{Emit, Stage, StageError};
 
@@ -19,6 +20,7 @@ pub struct Outlet<'a, T: Sample> {
     sent: u64,
     newest: Option<Header>,
     ledger: Ledger,
+    pulse: Pulse,
 }
 
 impl<'a, T: Sample> Outlet<'a, T> {
@@ -34,6 +36,7 @@ impl<'a, T: Sample> Outlet<'a, T> {
             sent: 0,
             newest: None,
             ledger: Ledger::default(),
+            pulse: Pulse::default(),
         }
     }
 
@@ -86,12 +89,15 @@ impl<T: Sample> Emit<T> for Outlet<'_, T> {
             sent,
             newest,
             ledger,
+            pulse,
         } = self;
         if let (Some(link), true) = (&mut *link, branches.is_empty()) {
-            link.send_with(&mut |place| {
-                write(place);
-                *newest = Some(*place.header());
-                ledger.emitted(*sent + 1, place.header());
+            pulse.waiting(|| {
+                link.send_with(&mut |place| {
+                    write(place);
+                    *newest = Some(*place.header());
+                    ledger.emitted(*sent + 1, place.header());
+                })
             })?;
             *sent += 1;
             return Ok(());
@@ -108,7 +114,7 @@ impl<T: Sample> Emit<T> for Outlet<'_, T> {
             branch.tell()
         });
         if let Some(link) = link {
-            link.send_with(&mut |place| *place = *slot)?;
+            pulse.waiting(|| link.send_with(&mut |place| *place = *slot))?;
         }
         heard
     }
@@ -198,6 +204,7 @@ pub(super) struct Frame<'a, O: Sample> {
 impl<'a, O: Sample> Frame<'a, O> {
     pub fn new(turn: &Turn, post: Post<'a>, mut out: Outlet<'a, O>) -> Self {
         out.ledger = post.ledger.clone();
+        out.pulse = turn.pulse();
         let inputs = if post.from.is_empty() {
             Vec::new()
         } else {

@@ -1,9 +1,10 @@
 //! Whose turn it is in a tree, and who failed.
 
-use std::cell::{Cell, RefCell};
+use std::cell::RefCell;
 use std::rc::Rc;
 
 use crate::link::LinkError;
+use crate::shell::pulse::Pulse;
 use crate::stage::StageError;
 
 /// Shared by the stages of one tree, which run in one thread.
@@ -12,18 +13,20 @@ pub struct Turn(Rc<State>);
 
 #[derive(Debug, Default)]
 struct State {
-    names: RefCell<Vec<String>>,
-    /// The stage that runs; where one panicked, it stays.
-    at: Cell<usize>,
+    /// Where one panicked, it stays at that one.
+    pulse: Pulse,
     failure: RefCell<Option<(usize, StageError)>>,
 }
 
 impl Turn {
     /// A number for the stage of that name.
     pub(super) fn place(&self, name: &str) -> usize {
-        let mut names = self.0.names.borrow_mut();
-        names.push(name.to_owned());
-        names.len() - 1
+        self.0.pulse.place(name)
+    }
+
+    /// The same for other threads.
+    pub(super) fn pulse(&self) -> Pulse {
+        self.0.pulse.clone()
     }
 
     /// The stage at `place` does its work, perhaps within the work of the one before it.
@@ -32,9 +35,7 @@ impl Turn {
         place: usize,
         work: impl FnOnce() -> Result<(), StageError>,
     ) -> Result<(), LinkError> {
-        let before = self.0.at.replace(place);
-        let result = work();
-        self.0.at.set(before);
+        let result = self.0.pulse.turn_of(place, work);
         result.map_err(|error| {
             // Those before it pass on that it failed; what it said itself stays.
             let mut failure = self.0.failure.borrow_mut();
@@ -48,7 +49,7 @@ impl Turn {
 
     /// Whose turn it is.
     pub(super) fn whose(&self) -> String {
-        self.name(self.0.at.get())
+        self.0.pulse.whose()
     }
 
     /// Fails if a stage has failed, though those before it did not pass it on.
@@ -71,7 +72,6 @@ impl Turn {
     }
 
     fn name(&self, place: usize) -> String {
-        let names = self.0.names.borrow();
-        names.get(place).cloned().unwrap_or_default()
+        self.0.pulse.name(place)
     }
 }

@@ -223,9 +223,8 @@ fn facts(view: &CellView, status: &StatusMessage, now_ns: i64) -> Markup {
             dt { "Status sent" } dd { (tile::stamp(status.sent_ns, &words::time(status.sent_ns))) ", "
                 (words::age_at(status.sent_ns, now_ns)) " ago" }
             dt { "Clock" } dd { @match view.clock_ahead_ms {
-                Some(ms) if ms.abs() < 1000 => "as this host's, within 1 s",
-                Some(ms) => { strong { (format!("{:+.1} s", ms as f64 * 1e-3)) } " against this host's" }
-                None => "not known",
+                Some(_) => span.warn[view.clock_is_off] { (words::clock(view)) },
+                None => "not measured yet",
             } }
             dt { "Twin, SHA-256" } dd { code { (status.twin_sha256.as_ref().unwrap_or(&none)) } }
             dt { "URDF, SHA-256" } dd { code { (status.urdf_sha256.as_ref().unwrap_or(&none)) } }

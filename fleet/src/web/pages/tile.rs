@@ -30,7 +30,7 @@ pub fn tile(view: &CellView, now_ns: i64) -> Markup {
 pub fn badge(state: State) -> Markup {
     html! {
         p.badge data-severity=(name(state.severity())) {
-            (icon(state.severity())) " " (state.words())
+            (icon(state.severity())) " " span { (state.words()) }
         }
     }
 }
@@ -81,16 +81,16 @@ pub fn stamp(ns: i64, shown: &str) -> Markup {
 fn facts(view: &CellView, status: &StatusMessage, now_ns: i64) -> Markup {
     html! {
         dl {
-            dt { "Last sample" }
-            dd { (last_sample(view, status)) }
+            dt.brief { "Last sample" }
+            dd.brief { (last_sample(view, status)) }
             dt { "Last contact" }
             dd { (last_contact(status.last_contact.as_ref(), now_ns)) }
             dt { "Contacts today" }
             dd { (contacts_today(status)) }
-            dt { "Lost samples" }
+            dt.warn[view.lost_samples > 0] { "Lost samples" }
             dd.warn[view.lost_samples > 0] { (view.lost_samples) }
-            dt { "Residual" }
-            dd { (residual(view)) }
+            dt.brief { "Residual" }
+            dd.brief { (residual(view)) }
             @if let Some(residual) = &view.residual {
                 dt { "Drifts most" }
                 dd { (residual.joint) ", " (format!("{:.2}", residual.joint_ratio)) " × normal" }
@@ -104,8 +104,12 @@ fn facts(view: &CellView, status: &StatusMessage, now_ns: i64) -> Markup {
                 }
             }
             @if let Some(change) = status.changes.first() {
-                dt { "Watch" }
+                dt.warn { "Watch" }
                 dd.warn { (words::change(change, &status.effort_unit)) }
+            }
+            @if view.clock_is_off {
+                dt.warn { "Clock" }
+                dd.warn { (words::clock(view)) }
             }
             dt { "Twin, URDF" }
             dd { code title=[status.twin_sha256.as_ref()] { (words::short_hash(status.twin_sha256.as_ref())) }

@@ -66,6 +66,17 @@ pub struct StatusMessage {
     pub changes: Vec<ChangeMessage>,
 }
 
+/// The answer to the query `<cell>/status?clock`: by it the fleet host knows how far the clocks differ.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct ClockMessage {
+    /// The publisher's life, as in [`StatusMessage`].
+    pub instance: String,
+    /// When the query came, by the clock of the cell's computer \[ns since the epoch\].
+    pub received_ns: i64,
+    /// When this was sent, by the same clock \[ns since the epoch\].
+    pub answered_ns: i64,
+}
+
 /// A contact, as far as it is known by now.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ContactMessage {

@@ -1,0 +1,140 @@
+//! The messages of a bag one after the other.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::Path;
+use std::sync::Arc;
+
+use super::Ros1Bag;
+use super::chunk::Unpacker;
+use super::convert::{Conversion, Converter};
+use super::record::{Inner, Records, inner_records, op};
+use crate::chunks::{ChunkCursor, Chunks, Entry, Loaded, Order, Place};
+use crate::damage::DamageKind;
+use crate::error::ArchiveError;
+
+/// The chunks of a bag as they are loaded.
+pub(crate) struct Ros1Chunks {
+    bag: Arc<Ros1Bag>,
+    records: Records,
+    unpacker: Unpacker,
+    unpacked: Vec<u8>,
+    lister: Lister,
+}
+
+/// Over the connections to which `topic` gives a number.
+pub(crate) fn ros1_cursor(
+    bag: Arc<Ros1Bag>,
+    topic: impl Fn(u32) -> Option<usize>,
+) -> Result<ChunkCursor<Ros1Chunks>, ArchiveError> {
+    let file = File::open(&bag.path).map_err(ArchiveError::io(&bag.path))?;
+    let connections = bag.connections.iter().map(|(&number, connection)| {
+        let topic = topic(number).map(|topic| (topic as u32, connection.conversion()));
+        (number, topic)
+    });
+    let lister = Lister {
+        connections: connections.collect(),
+        converter: Converter::default(),
+    };
+    let wanted = |number: &u32| {
+        // A connection that nobody declared is damage to be told.
+        lister.connections.get(number).is_none_or(Option::is_some)
+    };
+    let chunks = bag.chunks.iter().enumerate();
+    let places = chunks.filter(|(_, chunk)| chunk.connections.iter().any(wanted));
+    let places = places.map(|(number, chunk)| Place {
+        number,
+        at: chunk.at,
+        start_ns: chunk.start_ns,
+        end_ns: chunk.end_ns,
+    });
+    let places = places.collect();
+    let chunks = Ros1Chunks {
+        records: Records::new(file, bag.file_bytes),
+        bag,
+        unpacker: Unpacker::default(),
+        unpacked: Vec::new(),
+        lister,
+    };
+    Ok(ChunkCursor::new(chunks, Order::LogTime, places))
+}
+
+impl Chunks for Ros1Chunks {
+    fn path(&self) -> &Path {
+        &self.bag.path
+    }
+
+    fn load(
+        &mut self,
+        number: usize,
+        loaded: &mut Loaded,
+    ) -> Result<Option<DamageKind>, ArchiveError> {
+        let chunk = &self.bag.chunks[number];
+        let read = self
+            .unpacker
+            .read(&mut self.records, chunk.at, chunk.torn, &mut self.unpacked)
+            .map_err(ArchiveError::io(&self.bag.path))?;
+        if let Err(reason) = read {
+            return Ok(Some(DamageKind::Chunk {
+                reason,
+                start_ns: Some(chunk.start_ns as i64),
+                end_ns: Some(chunk.end_ns as i64),
+            }));
+        }
+        let mut flaw = None;
+        for record in inner_records(&self.unpacked) {
+            let listed = match record {
+                Some(record) => self.lister.list(&record, loaded),
+                None if chunk.torn => Ok(()),
+                None => Err("a record in the chunk is cut short".to_owned()),
+            };
+            if let Err(reason) = listed {
+                flaw = Some(DamageKind::Record { reason });
+            }
+        }
+        Ok(flaw)
+    }
+}
+
+/// Puts messages into a chunk's list.
+struct Lister {
+    /// What the owner calls each connection's topic, and how its messages become those of ROS 2; `None` if it is not
+    /// wanted.
+    connections: BTreeMap<u32, Option<(u32, Option<Conversion>)>>,
+    converter: Converter,
+}
+
+impl Lister {
+    /// Lists a record if it is a wanted message; `Err` if it makes no sense, in words.
+    fn list(&mut self, record: &Inner<'_>, loaded: &mut Loaded) -> Result<(), String> {
+        if record.header.op() != Some(op::MESSAGE) {
+            return Ok(());
+        }
+        let number = record.header.u32("conn");
+        let number = number.ok_or("a message without a connection")?;
+        let time_ns = record.header.time_ns("time");
+        let time_ns = time_ns.ok_or("a message without a time")?;
+        let topic = self.connections.get(&number);
+        let topic = topic.ok_or_else(|| format!("message on undeclared connection {number}"))?;
+        let Some((topic, conversion)) = *topic else {
+            return Ok(());
+        };
+        let body_at = loaded.records.len();
+        match conversion {
+            Some(conversion) => {
+                let body = self.converter.convert(conversion, record.data)?;
+                loaded.records.extend_from_slice(body);
+            }
+            None => loaded.records.extend_from_slice(record.data),
+        }
+        loaded.messages.push(Entry {
+            log_time: time_ns,
+            publish_time: time_ns,
+            sequence: 0,
+            topic,
+            body_at,
+            body_len: loaded.records.len() - body_at,
+        });
+        Ok(())
+    }
+}
