@@ -13,7 +13,7 @@
 #include <pinocchio/algorithm/regressor.hpp>
 #include <pinocchio/algorithm/rnea.hpp>
 #include <pinocchio/codegen/cppadcg-algo.hpp>
-#include <pinocchio/parsers/urdf.hpp>
+#include <pinocchio/serialization.hpp>
 
 using Eigen::VectorXd;
 
@@ -83,7 +83,8 @@ static void generated(const char *name, const pinocchio::Model &model, int input
                       const std::vector<State> &states, Trace trace) {
     Generated<Trace> code(model, inputs, outputs, name, trace);
     code.initLib();
-    code.loadLib(true, "/usr/bin/gcc", "-O3 -march=native");
+    // It takes one option, so that it is told of a file with options.
+    code.loadLib(true, "/usr/bin/gcc", "@flags");
     std::vector<VectorXd> x;
     const std::string label = std::string("generated_") + name;
     measure(
@@ -93,7 +94,8 @@ static void generated(const char *name, const pinocchio::Model &model, int input
 
 int main(int, char **argv) {
     pinocchio::Model model;
-    pinocchio::urdf::buildModel(argv[1], model);
+    // As text, so that no object of the library from PyPI is used, which was compiled with other alignments.
+    model.loadFromText(argv[1]);
     pinocchio::Data data(model);
     const int n = model.nv;
     const auto all = states(n);

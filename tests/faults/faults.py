@@ -325,9 +325,10 @@ def full_disk(program, folder, seconds):
         subprocess.run(["umount", "-l", disk], check=False)
 
 
-def across(program, folder, hosts, seconds, fault, connect="10.231.9.1:7447"):
+def across(program, folder, hosts, seconds, fault, connect=None):
     """Source and twin on one host, detector and recorder on the other; what both say, and what is in the archive."""
-    listed = f'hosts: {{a: {{listen: "tcp/10.231.9.1:7447"}}, b: {{connect: "tcp/{connect}"}}}}\n'
+    router = f"{hosts.addresses[0]}:7447"
+    listed = f'hosts: {{a: {{listen: "tcp/{router}"}}, b: {{connect: "tcp/{connect or router}"}}}}\n'
     make(folder, seconds, listed, "host: a, ", "host: b, ")
     runs = [Run(program, folder, ["--host", name], hosts.enter(place)) for place, name in enumerate("ab")]
     try:
@@ -394,7 +395,7 @@ def far_kill(program, folder, times, seconds):
 
 def poor_network(program, folder, seconds):
     hosts = Hosts()
-    proxy = [*hosts.enter(1), sys.executable, HERE / "poor_network.py", "127.0.0.1:7449", "10.231.9.1:7447"]
+    proxy = [*hosts.enter(1), sys.executable, HERE / "poor_network.py", "127.0.0.1:7449", f"{hosts.addresses[0]}:7447"]
     process = subprocess.Popen([str(word) for word in proxy])
     try:
         return "50 ms, 5 % loss: " + across(program, folder, hosts, seconds, lambda _: None, "127.0.0.1:7449")
@@ -412,17 +413,17 @@ stages:
 - {{name: detect, input: twin, detect: {{naive_difference: {{}}, threshold: {{score: 1000.0}}}}}}
 - {{name: publish, inputs: [ingest, twin, detect], publish: {{zenoh: {{connect: ["{fleet}"], json: false}}}}}}
 """
-FLEET = "tcp/10.231.9.2:7450"
 
 
 def fleet(program, folder, fault):
     """How soon the fleet host knows of a cell that is killed or cut off."""
     hosts = Hosts(alone=True)
+    endpoint = f"tcp/{hosts.addresses[1]}:7450"
     (folder / "scenario.yaml").write_text(SCENARIO.format(data=DATA, seconds=120))
-    (folder / "pipeline.yaml").write_text(FLEET_CELL.format(data=DATA, fleet=FLEET))
+    (folder / "pipeline.yaml").write_text(FLEET_CELL.format(data=DATA, fleet=endpoint))
     users = folder / "users"
     subprocess.run([program, "fleet", "--users", users, "--add-user", "anna"], capture_output=True, check=True)
-    command = [program, "fleet", "--serve", "127.0.0.1:0", "--users", users, "--expect", "demo", "--listen", FLEET]
+    command = [program, "fleet", "--serve", "127.0.0.1:0", "--users", users, "--expect", "demo", "--listen", endpoint]
     wall = subprocess.Popen(
         command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     cell = None

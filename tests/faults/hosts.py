@@ -15,6 +15,8 @@ class Hosts:
         number = os.getpid()
         self.names = [f"ts_fault_{side}_{number}" for side in ("a" if alone else "ab")]
         self.ends = [f"tsf{side}{number}" for side in "ab"]
+        # Scripts that run at the same time must not meet on this machine.
+        self.addresses = [f"10.231.{number % 250}.{place + 1}" for place in range(2)]
         if not shutil.which("ip"):
             raise Skipped("network namespaces need `ip`")
         for name in self.names:
@@ -23,7 +25,7 @@ class Hosts:
                 *(() if alone else ("netns", self.names[1])))
         for place, end in enumerate(self.ends):
             there = ("-n", self.names[place]) if place < len(self.names) else ()
-            self.ip(*there, "address", "add", f"10.231.9.{place + 1}/24", "dev", end)
+            self.ip(*there, "address", "add", f"{self.addresses[place]}/24", "dev", end)
             self.ip(*there, "link", "set", "lo", "up")
             self.ip(*there, "link", "set", end, "up")
 

@@ -111,7 +111,7 @@ class Plant:
     def route(self):
         """The router, at the loopback and where the cell that is to be cut off meets it."""
         self.router_at = f"tcp/127.0.0.1:{self.port}"
-        endpoints = [self.router_at] + ([f"tcp/10.231.9.2:{self.port}"] if self.hosts else [])
+        endpoints = [self.router_at] + ([f"tcp/{self.hosts.addresses[1]}:{self.port}"] if self.hosts else [])
         listen = [word for endpoint in endpoints for word in ("--listen", endpoint)]
         if shutil.which("zenohd"):
             self.router_is, command = "zenohd", ["zenohd", "-c", ROUTER_FILE, *listen]
@@ -348,7 +348,7 @@ def plant_of(program, folder, args, slack):
         victims = {name: plant.run(name, [name]) for name in ("killed", "stopped")}
         if plant.hosts:
             victims["cut"] = plant.run(
-                "cut", ["cut"], plant.hosts.enter(0), f"tcp/10.231.9.2:{plant.port}")
+                "cut", ["cut"], plant.hosts.enter(0), f"tcp/{plant.hosts.addresses[1]}:{plant.port}")
         else:
             print("SKIPPED a cell that is cut off: network namespaces are not allowed", flush=True)
         everybody = [*names, *victims]
