@@ -5,8 +5,8 @@
 //!
 //! `tauscope run` plays a recording in real time. A stage of this program takes each sample, as a source does that the
 //! robot has just told something, and writes the time into it. The twin and the detector do their work. A second stage
-//! of this program hears the detector, as a publisher does, and takes the time again. The floor sends the largest of
-//! these samples over as many hops through as many processes, and does nothing else.
+//! of this program hears the detector and keeps the newest, as a publisher does, and takes the time again. The floor
+//! sends the largest of these samples over as many hops through as many processes, and does nothing else.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -40,15 +40,18 @@ struct Shape {
     /// What the twin and the detector say about their processes.
     twin: &'static str,
     detect: &'static str,
+    /// How the first of them learns that a sample is there.
+    wake: &'static str,
     recorder: bool,
 }
 
-const SHAPES: [Shape; 4] = [
+const SHAPES: [Shape; 5] = [
     Shape {
         name: "twin and detector in one process",
         hops: 2,
         twin: "chain",
         detect: "chain",
+        wake: "event",
         recorder: false,
     },
     Shape {
@@ -56,13 +59,23 @@ const SHAPES: [Shape; 4] = [
         hops: 2,
         twin: "chain",
         detect: "chain",
+        wake: "event",
         recorder: true,
+    },
+    Shape {
+        name: "the same without a recorder, looking all the time",
+        hops: 2,
+        twin: "chain",
+        detect: "chain",
+        wake: "spin",
+        recorder: false,
     },
     Shape {
         name: "a process for each stage",
         hops: 3,
         twin: "twin",
         detect: "detect",
+        wake: "event",
         recorder: false,
     },
     Shape {
@@ -70,6 +83,7 @@ const SHAPES: [Shape; 4] = [
         hops: 3,
         twin: "twin",
         detect: "detect",
+        wake: "event",
         recorder: true,
     },
 ];
@@ -223,12 +237,13 @@ fn pipeline(folder: &Path, recording: &Path, shape: &Shape) -> Vec<u64> {
         "version: 1\ncells: {{c: {{robot: {}}}}}\nstages:\n\
          - {{name: play, cell: c, process: play, ingest: {{file: {{path: {}}}}}}}\n\
          - {{name: in, input: play, outside: {{command: [{me}, stamp], output: joint_state}}}}\n\
-         - {{name: twin, input: in, process: {}, twin: {{}}}}\n\
+         - {{name: twin, input: in, process: {}, wake: {}, twin: {{}}}}\n\
          - {{name: detect, input: twin, process: {}, detect: {{twin_regression: {{}}, threshold: {{score: 1000}}}}}}\n\
-         - {{name: end, input: detect, outside: {{command: [{me}, end], output: detection, settings: {}}}}}\n{recorder}",
+         - {{name: end, input: detect, keep: newest, outside: {{command: [{me}, end], output: detection, settings: {}}}}}\n{recorder}",
         recording::robot().display(),
         recording.display(),
         shape.twin,
+        shape.wake,
         shape.detect,
         arrivals.display(),
         me = me.display(),

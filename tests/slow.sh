@@ -51,6 +51,17 @@ run() {
 # The proof has failed if a case is neither right nor right up to a class.
 proof() { tests/proof/prove.sh "$1" "$logs/proof" "$2" | tee /dev/stderr | grep -q ', 0 not\.$'; }
 
+# The campaign of faults; it needs tests/proof/requirements.txt.
+faults() {
+    if ! python3 -c 'import mcap, mujoco, numpy, yaml' 2>/dev/null; then
+        echo "SKIPPED: tests/proof/requirements.txt is not installed"
+        return 0
+    fi
+    local program=$1
+    shift
+    python3 tests/proof/faults.py "$program" "$logs/faults" "$@" | tee /dev/stderr | grep -q ', 0 are missed'
+}
+
 # Each test program as: package and target, folder, executable.
 programs() {
     cargo test "${packages[@]}" --no-run --message-format=json "${profile[@]}" 2>"$logs/build" | python3 -c '
@@ -85,6 +96,7 @@ held = json.load(open(sys.argv[1]))
 held["cases"] = [case for case in held["cases"] if case["case"] in ("m00", "m11")]
 json.dump(held, open(sys.argv[1], "w"))' "$some/answers.json"
     run "proof: two cases" proof "$some" target/debug/tauscope
+    run "faults: three" faults target/debug/tauscope --short
 else
     run "proof" proof tests/proof/set target/release/tauscope
 fi

@@ -15,7 +15,7 @@ pub use contact::{Contact, ContactFollower, Force};
 pub use effort_unit::EffortUnit;
 pub use link::{
     Audience, Domain, InProcess, Keep, LinkError, Position, Received, Receiver, ReceiverCounts,
-    Sender, SenderCounts, SharedMemory, Transport, Zenoh, ZenohEndpoints, ZenohRouter,
+    Sender, SenderCounts, SharedMemory, Transport, Wake, Zenoh, ZenohEndpoints, ZenohRouter,
     zenoh_reason,
 };
 pub use sample::{

@@ -17,6 +17,7 @@ mod queue;
 mod sequence;
 mod shared_memory;
 mod spill;
+mod wake;
 pub mod wire;
 pub mod zenoh;
 
@@ -26,6 +27,7 @@ pub use shared_memory::{
     Domain, DomainError, MAX_RECEIVERS, SharedMemory, left_behind, remove_left_behind,
 };
 pub use spill::{Spill, SpillSettings};
+pub use wake::Wake;
 pub use zenoh::{Zenoh, ZenohEndpoints, ZenohRouter, zenoh_reason};
 
 /// How long a sender waits for one keep-all receiver that takes nothing, before it counts the

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effort_unit::EffortUnit;
 use crate::link::{
-    Audience, Domain, Keep, MAX_RECEIVERS, PATIENCE, Position, SpillSettings, ZenohEndpoints,
+    Audience, Domain, Keep, MAX_RECEIVERS, PATIENCE, Position, SpillSettings, Wake, ZenohEndpoints,
 };
 use crate::sample::SampleKind;
 
@@ -147,6 +147,9 @@ pub struct Input {
     pub keep: Keep,
     /// How many samples it may leave unread.
     pub depth: usize,
+    /// How it learns that a sample is there, if that comes through shared memory.
+    #[serde(default)]
+    pub wake: Wake,
     /// How far an earlier life of this stage has come, so that what was lost with it is counted.
     #[serde(default)]
     pub resume: Option<Position>,

@@ -14,7 +14,7 @@ use tauscope_bus::seat::{Input, Output, OutputLink, TransportKind};
 use tauscope_bus::shell::{self, Line, Outcome, Report};
 use tauscope_bus::{
     Audience, Emit, Health, JointState, Keep, Position, Received, Receiver, SampleKind, Seat,
-    Sender, SharedMemory, Stage, StageError, Transport, TwinState,
+    Sender, SharedMemory, Stage, StageError, Transport, TwinState, Wake,
 };
 
 const LONG: Duration = Duration::from_secs(20);
@@ -84,6 +84,7 @@ impl Around {
             transport: TransportKind::Iceoryx2,
             keep: Keep::All,
             depth: DEPTH,
+            wake: Wake::Event,
             resume: None,
         }];
         seat.output = Some(output("c/echo", SampleKind::TwinState));

@@ -59,15 +59,22 @@ impl EffortScale {
     pub fn of(slopes: &[Slope]) -> Self {
         let turned = slopes.iter().filter(|one| one.slope < 0.0);
         let turned: Vec<String> = turned.map(|one| one.joint.clone()).collect();
-        let mut known: Vec<f64> = slopes.iter().map(|one| one.slope).collect();
+        if !turned.is_empty() {
+            return Self::Turned(turned);
+        }
+        let all: Vec<f64> = slopes.iter().map(|one| one.slope).collect();
+        Self::of_positive(&all)
+    }
+
+    /// The same of slopes that are known to be positive.
+    pub fn of_positive(slopes: &[f64]) -> Self {
+        let mut known = slopes.to_vec();
         known.retain(|slope| slope.is_finite() && *slope != 0.0);
         known.sort_by(f64::total_cmp);
         let Some(&slope) = known.get(known.len() / 2) else {
             return Self::Untold;
         };
-        if !turned.is_empty() {
-            Self::Turned(turned)
-        } else if slope < 1.0 / WRONG_SCALE {
+        if slope < 1.0 / WRONG_SCALE {
             Self::Current {
                 nm_per_unit: 1.0 / slope,
                 joints: known.len(),

@@ -14,16 +14,19 @@ mod concealed;
 mod contact_wall;
 mod coulomb_friction;
 mod counterbalance_spring;
+mod drive_deadband;
 mod eccentric_gear;
 mod effect;
 mod expansion;
 mod external_push;
+mod friction_drift;
 mod friction_step;
 mod gauge;
 mod gear_efficiency;
 mod ghost;
 mod joint_elasticity;
 mod joint_zero_offset;
+mod late_brake;
 mod law;
 mod link_com;
 mod link_inertia;
@@ -36,6 +39,7 @@ mod physics;
 mod presliding_hysteresis;
 mod quadratic_drag;
 mod rotor_inertia;
+mod sensor_hysteresis;
 mod spec;
 mod split_joint;
 mod stribeck_friction;
@@ -89,6 +93,8 @@ pub static EFFECTS: &[&Effect] = &[
     &quadratic_drag::EFFECT,
     &temperature_viscous::EFFECT,
     &friction_step::EFFECT,
+    &friction_drift::EFFECT,
+    &late_brake::EFFECT,
     &rotor_inertia::EFFECT,
     &torque_gain::EFFECT,
     &torque_bias::EFFECT,
@@ -108,6 +114,8 @@ pub static EFFECTS: &[&Effect] = &[
     &torque_delay::EFFECT,
     &torque_lowpass::EFFECT,
     &torque_saturation::EFFECT,
+    &drive_deadband::EFFECT,
+    &sensor_hysteresis::EFFECT,
     &joint_elasticity::EFFECT,
     &backlash::EFFECT,
     &table::EFFECT,

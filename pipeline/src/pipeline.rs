@@ -11,9 +11,9 @@ mod wiring;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use tauscope_bus::Keep;
+use tauscope_bus::{Keep, Wake};
 
-pub use file::{HostEntry, KeepEntry, PipelineFile};
+pub use file::{HostEntry, KeepEntry, PipelineFile, WakeEntry};
 pub use restart::{Restart, When};
 pub use role::{ROLE_KEYS, Role, words_for};
 
@@ -23,6 +23,10 @@ use crate::scenario::ScenarioFacts;
 use crate::settings::Settings;
 use crate::suggest;
 use crate::yaml;
+
+/// How often a recorder looks whether samples are there \[ms\].
+/// Resolution: how late the picture may be, against how often the machine wakes up.
+const RECORDER_LOOKS_MS: u64 = 10;
 
 /// A pipeline in which nothing is wrong as far as one can tell before it starts.
 #[derive(Debug)]
@@ -58,6 +62,8 @@ pub struct Stage {
     pub inputs: Vec<usize>,
     /// What becomes of samples that it has no time for.
     pub keep: Keep,
+    /// How it learns that a sample is there.
+    pub wake: Wake,
     /// When it is started again.
     pub restart: Restart,
     /// Its own part of the file, paths resolved, files read.
@@ -119,6 +125,12 @@ impl Pipeline {
                     // Nobody waits for those who are told.
                     None if wiring.roles[index] == Role::Publish => Keep::Newest,
                     Some(KeepEntry::All) | None => Keep::All,
+                },
+                wake: match entry.wake {
+                    Some(WakeEntry::Spin) => Wake::Spin,
+                    // Nobody waits for a recorder.
+                    None if wiring.roles[index] == Role::Record => Wake::EveryMs(RECORDER_LOOKS_MS),
+                    Some(WakeEntry::Event) | None => Wake::Event,
                 },
                 restart: entry.restart.map_or_else(Restart::default, Restart::from),
                 settings,

@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use tauscope_explain::report::Verdict;
 use tauscope_pipeline::cell::EffortUnit;
 
 use super::effort_unit;
@@ -116,7 +115,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     folder.write_set(&looked.cell, &looked.state_topic, &fit, &holdout)?;
     drop(hold);
     let explained = folder.explained().join("twin.yaml");
-    let explained = (outcome.report.verdict != Verdict::NotEvaluated).then_some(&*explained);
+    let explained = (outcome.report.hands_out_twin()).then_some(&*explained);
     let learnt = init::learn(
         &folder.set(),
         explained,

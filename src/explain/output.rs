@@ -126,9 +126,10 @@ pub fn write(
         predictions.push(path);
     }
     let evaluated = outcome.report.verdict != Verdict::NotEvaluated;
-    let twin = evaluated.then(|| twin_text(request, kept, outcome, &provenance, &mut made));
+    let is_handed_out = outcome.report.hands_out_twin();
+    let twin = is_handed_out.then(|| twin_text(request, kept, outcome, &provenance, &mut made));
     let twin = twin.transpose()?;
-    let urdf = evaluated.then(|| robot_text(request, kept, outcome, &mut made));
+    let urdf = is_handed_out.then(|| robot_text(request, kept, outcome, &mut made));
     let urdf = urdf.flatten();
     let shown = |path: &Path| path.display().to_string();
     let all = |recordings: &[Named]| recordings.iter().map(|named| shown(&named.path)).collect();

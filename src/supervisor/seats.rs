@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use tauscope_bus::link::SpillSettings;
 use tauscope_bus::seat::{Cell as SeatCell, Input, Output, OutputLink, TransportKind};
-use tauscope_bus::{Audience, Domain, Keep, SampleKind, Seat, ZenohEndpoints};
+use tauscope_bus::{Audience, Domain, Keep, SampleKind, Seat, Wake, ZenohEndpoints};
 use tauscope_pipeline::build::StreamFacts;
 use tauscope_pipeline::cell::CellFacts;
 use tauscope_pipeline::pipeline::{Pipeline, Role};
@@ -177,7 +177,8 @@ impl Planner<'_> {
     fn inputs(&self, at: usize) -> Vec<Input> {
         let mut inputs = Vec::new();
         for link in self.links.iter().filter(|link| link.to == at) {
-            let input = |stream: String, kind| Input {
+            let wake = self.pipeline.stages[at].wake;
+            let input = |stream: String, kind, wake| Input {
                 from: self.pipeline.stages[link.from].name.clone(),
                 stream,
                 kind,
@@ -188,11 +189,17 @@ impl Planner<'_> {
                     Keep::Newest if self.hears_health(at) => DEPTH_TOLD,
                     Keep::Newest => DEPTH_NEWEST,
                 },
+                wake,
                 resume: None,
             };
-            inputs.push(input(link.stream.clone(), link.carries));
+            inputs.push(input(link.stream.clone(), link.carries, wake));
             if self.hears_health(at) {
-                inputs.push(input(health_stream(&link.stream), SampleKind::Health));
+                // Few, so that each look would cost more than it saves.
+                inputs.push(input(
+                    health_stream(&link.stream),
+                    SampleKind::Health,
+                    Wake::Event,
+                ));
             }
         }
         inputs

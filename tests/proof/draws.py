@@ -4,6 +4,7 @@ import dataclasses
 import numpy as np
 
 import off_list
+import shop_floor
 import truth
 from effects import active
 
@@ -187,6 +188,8 @@ def unknown_shape(kind, c, rng, j):
     """The same for something off the list."""
     if kind in off_list.KINDS:
         return off_list.shape(kind, c, rng, j)
+    if kind in shop_floor.KINDS:
+        return shop_floor.shape(kind, c, rng, j)
     u = lambda a, b: float(rng.uniform(a, b))
     q, joint = np.concatenate([m.q[:, j] for m in c.fit_motions]), {"joint": c.robot.names[j]}
     low, wide = float(q.min()), float(np.ptp(q))
@@ -286,14 +289,16 @@ def draw(name, c, rng, target, taken=()):
     options = [0] if free else [j for j in candidates("" if kind else name, c)
                                 if kind or at or allowed(name, c.robot.names[j], taken)]
     options = [j for j in options if j == int(at)] if at else options
+    if kind in shop_floor.KINDS:
+        options = [j for j in options if shop_floor.shows(kind, c)[j]]
     if not options or (free and not allowed(name, None, taken)):
         return None
     j = int(rng.choice(options))
     if kind:
         place, values = unknown_shape(kind, c, rng, j)
         fixed = values(1.)
-        key = next(k for k in fixed if k in ("coulomb_nm", "amplitude_nm", "root_nm", "coefficient_nms_per_rad"))
-        values, low, high = (lambda s: {**fixed, key: s}), 0., 0.15 * float(c.robot.effort[j])
+        key = next(k for k in fixed if k in ("coulomb_nm", "amplitude_nm", "amplitude_rad", "root_nm", "coefficient_nms_per_rad"))
+        values, low, high = (lambda s: {**fixed, key: s}), 0., 0.03 if key == "amplitude_rad" else 0.15 * float(c.robot.effort[j])
     else:
         place, values, low, high = shape(name, c, rng, j)
     label = "unknown" if kind else name

@@ -6,6 +6,7 @@ The joint torques below take `math` or `numpy` as `m`, so that the plant and its
 import numpy as np
 
 import off_list
+import shop_floor
 
 SMOOTHING = 0.002  # rad/s (m/s): half width of the sign function
 
@@ -61,6 +62,7 @@ FRICTION = {
     # The other joint's load on a common bearing: friction here grows with the speed there.
     "unknown:cross_joint_friction": lambda p, m, q, v, other, **_: -p["coefficient_nms_per_rad"] * abs(other) * sgn(m, v),
     **off_list.FRICTION,
+    **shop_floor.FRICTION,
 }
 # Torques of position or time alone.
 FIELD = {
@@ -71,12 +73,13 @@ FIELD = {
     "unknown:periodic_disturbance": lambda p, m, q, v, session, **_: p["amplitude_nm"] * m.sin(
         2 * np.pi * p["frequency_hz"] * session + p["phase_rad"]),
     **off_list.FIELD,
+    **shop_floor.FIELD,
 }
 BODY = ("payload", "payload_pickup", "link_mass", "link_com", "base_tilt", "bodies_off")
 TWO_MASS = ("joint_elasticity", "backlash")
 WRENCH = ("external_push", "contact_wall")
 # In the order in which they act on the record.
-RECORD = ("transmission_coupling", "torque_gain", "torque_bias", "torque_lowpass", "torque_delay", "torque_saturation")
+RECORD = (*shop_floor.RECORD, "transmission_coupling", "torque_gain", "torque_bias", "torque_lowpass", "torque_delay", "torque_saturation")
 
 
 def formula(effect):
@@ -144,7 +147,9 @@ def on_record(robot, effect, tau, dt):
             out[k] = out[k - 1] + c * (tau[k] - out[k - 1])
         return out
     j = robot.names.index(effect["joint"])
-    if name == "torque_gain":
+    if name == "unknown":
+        out[:, j] += shop_floor.hysteresis(p, tau[:, j])
+    elif name == "torque_gain":
         out[:, j] *= p["gain"]
     elif name == "torque_bias":
         out[:, j] += p["bias_nm"]

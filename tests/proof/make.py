@@ -18,7 +18,8 @@ import draws
 import motion
 import record
 import truth
-from effects import RECORD
+import shop_floor
+from effects import RECORD, formula
 from plant import Log, Plant
 from robot import Robot
 
@@ -189,12 +190,12 @@ def simulate(robot, effects, recs, commands, starts):
 
 def followed(robot, effects, recs, commands, starts):
     """Logs of motions that are as they were commanded, with the torques that they take: no plant, so in a tenth of the time."""
-    physics, logs = [e for e in effects if e["effect"] not in RECORD], []
+    physics, logs = [e for e in effects if formula(e) not in RECORD], []
     for name, command, start in zip(recs, commands, starts):
         command = motion.smooth(command, 0.03)
         m = truth.of_command(name, start, command, stride=1)
         rigid, parts = truth.contributions(robot, physics, m)
-        logs.append(Log(m.t, m.q, m.v, m.a, m.q, m.v, m.a, rigid + sum(parts), command, None))
+        logs.append(Log(m.t, m.q, m.v, m.a, m.q, m.v, m.a, rigid + sum(parts), command, 0. * m.q, None))
     return logs, None
 
 

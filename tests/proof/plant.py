@@ -10,6 +10,7 @@ import math
 import mujoco
 import numpy as np
 
+import shop_floor
 from effects import BODY, FIELD, FRICTION, TWO_MASS, WRENCH, active, bristle, formula, merged
 from robot import Model
 
@@ -30,6 +31,7 @@ class Log:
     a_link: np.ndarray
     torque: np.ndarray      # motor effort at the joint side of the gear
     command: np.ndarray     # commanded positions
+    lost: np.ndarray        # what the drives did not deliver of `torque`
     trouble: str | None     # why the recording is no good
 
 
@@ -81,6 +83,8 @@ class Plant:
         self.wrenches = [e for e in effects if e["effect"] in WRENCH]
         self.clip = [(at(e), e["parameters"]["limit_nm"]) for e in effects
                      if e["effect"] == "torque_saturation" and e["parameters"]["mode"] == "actuator"]
+        self.deaf = [(at(e), e["parameters"]) for e in effects if formula(e) == shop_floor.DRIVE]
+        self.encoders = [(at(e), e["parameters"]) for e in effects if formula(e) == shop_floor.ENCODER]
         self.kp, self.kd, self.ki = self._gains(np.concatenate([q[::500] for q in commands]))
 
     def _gains(self, poses):
@@ -108,14 +112,16 @@ class Plant:
         motors = {j: [q[j], 0., 0.] for j, _ in self.two}          # position, speed, acceleration
         state = {"z": {}, "load": dict.fromkeys(self.rubbing, 0.)}
         integral, encoder, rate = np.zeros(n), q.copy(), np.zeros(n)
-        out = {k: np.empty((total, n)) for k in ("q", "v", "a", "ql", "vl", "al", "tau")}
+        out = {k: np.empty((total, n)) for k in ("q", "v", "a", "ql", "vl", "al", "tau", "lost")}
         jac, unit, columns = np.zeros((3, n)), np.zeros((1, n)), {j: np.zeros((1, n)) for j in self.rubbing}
         dots = {j: 0. for j in self.rubbing}
         data.qpos[:] = q
         mujoco.mj_forward(model.model, data)
-        trouble = None
+        trouble, since = None, shop_floor.since_start(command, 1e-3)
         for k in range(-hold, total):
             i, t0 = max(k, 0), k * 1e-3
+            for j, p in self.encoders:
+                encoder[j], rate[j], _ = shop_floor.read(p, encoder[j], rate[j], 0.)
             for j, m in motors.items():
                 encoder[j], rate[j] = m[0], m[1]
             e = command[i] - encoder
@@ -128,6 +134,8 @@ class Plant:
             applied = torque.copy()
             for j, limit in self.clip:
                 applied[j] = min(max(applied[j], -limit), limit)
+            for j, p in self.deaf:
+                applied[j] = shop_floor.delivered(p, applied[j])
             if self.loaded:
                 now = self.loaded if active(self.pickup, name, t0) else self.model
                 if now is not model:
@@ -148,7 +156,7 @@ class Plant:
                 mujoco.mj_forward(model.model, data)
                 new = v + DT * data.qacc
                 if self.rubbing:
-                    new = self._rub(new, q, v, tau, model, data, state, columns, dots, unit, max(t, 0.), session_start + t)
+                    new = self._rub(new, q, v, tau, model, data, state, columns, dots, unit, max(t, 0.), session_start + t, since[i])
                 acceleration = (new - v) / DT
                 if step == 0 and k >= 0:
                     for key, value in (("ql", q), ("vl", new), ("al", acceleration), ("tau", torque),
@@ -156,6 +164,9 @@ class Plant:
                         out[key][k] = value
                     for j, m in motors.items():
                         out["q"][k, j], out["v"][k, j], out["a"][k, j] = m[3], m[1], m[2]
+                    for j, p in self.encoders:
+                        out["q"][k, j], out["v"][k, j], out["a"][k, j] = shop_floor.read(p, q[j], new[j], acceleration[j])
+                    out["lost"][k] = torque - applied
                 for j in self.rubbing:                     # what the gear carries, friction aside
                     state["load"][j] = tau[j] + dots[j] - self.armature[j] * acceleration[j]
                 v = new
@@ -165,7 +176,7 @@ class Plant:
                 trouble = "lost track"
                 break
         t = np.arange(total) * 1e-3
-        return Log(t, out["q"], out["v"], out["a"], out["ql"], out["vl"], out["al"], out["tau"], command, trouble)
+        return Log(t, out["q"], out["v"], out["a"], out["ql"], out["vl"], out["al"], out["tau"], command, out["lost"], trouble)
 
     @staticmethod
     def _transmit(j, effect, motor, q, v, torque):
@@ -195,7 +206,7 @@ class Plant:
         depth = normal @ place - p["offset_m"]
         return -p["stiffness_n_per_m"] * max(depth, 0.) * (jac.T @ normal)
 
-    def _rub(self, free, q, v, tau, model, data, state, columns, friction, unit, t, session):
+    def _rub(self, free, q, v, tau, model, data, state, columns, friction, unit, t, session, since):
         """Speeds at the end of the step with friction: sweeps over the rubbing joints, each solved for its own speed."""
         laws = {}
         for j, effects in self.rubbing.items():
@@ -212,7 +223,7 @@ class Plant:
                         total += bristle(p, state["z"].get(j, 0.), x, DT)[1]
                         continue
                     other = v[self.robot.names.index(p["source_joint"])] if "source_joint" in p else 0.
-                    total += FRICTION[formula(e)](p, math, q[j], x, t=t, session=session, load=load, other=other)
+                    total += FRICTION[formula(e)](p, math, q[j], x, t=t, session=session, load=load, other=other, since=since[j])
                 return total
 
             laws[j] = law

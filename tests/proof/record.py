@@ -2,6 +2,7 @@
 import struct
 
 import numpy as np
+from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 DEFINITION = """std_msgs/Header header
@@ -60,3 +61,42 @@ def write(path, names, stamps_ns, position, velocity, effort, command=None, twin
             if commands is not None:
                 writer.add_message(commands, ns, encode(ns, names, (command[i], None, None)), ns, i)
         writer.finish()
+
+
+def decode(body):
+    """(names, position, velocity, effort) of one message, as `encode` wrote it; an absent field is empty."""
+    at = 8                                                   # behind the stamp
+
+    def count():
+        nonlocal at
+        at += -at % 4
+        (n,) = struct.unpack_from("<I", body, 4 + at)
+        at += 4
+        return n
+
+    def text():
+        nonlocal at
+        n = count()
+        at += n
+        return bytes(body[4 + at - n:4 + at - 1]).decode()
+
+    def numbers():
+        nonlocal at
+        n = count()
+        at += -at % 8 if n else 0
+        x = np.frombuffer(body, "<f8", n, 4 + at)
+        at += 8 * n
+        return x
+
+    text()
+    names = [text() for _ in range(count())]
+    return names, numbers(), numbers(), numbers()
+
+
+def read(path):
+    """(names, stamps [ns], position, velocity or None, effort) of the /joint_states that `write` wrote. Rows are samples."""
+    with open(path, "rb") as file:
+        rows = [(m.log_time, *decode(m.data)) for _, _, m in make_reader(file).iter_messages(topics=["/joint_states"])]
+    stack = lambda k: np.stack([row[k] for row in rows])
+    velocity = stack(3)
+    return rows[0][1], stack(0).astype(np.int64), stack(2), velocity if velocity.shape[1] else None, stack(4)

@@ -7,6 +7,7 @@ import dataclasses
 
 import numpy as np
 
+import shop_floor
 from effects import BODY, FIELD, FRICTION, RECORD, TWO_MASS, active, bristle, formula, merged, on_record
 from robot import Model
 
@@ -16,7 +17,8 @@ BAND_HZ = 8.      # of the derivatives estimated from the encoder
 
 @dataclasses.dataclass
 class Motion:
-    """Uniform samples of one recording; `link` is (q, v, a) beyond an elastic or loose joint."""
+    """Uniform samples of one recording; `link` is (q, v, a) beyond an elastic or loose joint, or where an encoder errs; `since`
+    the time since the command last began to move; `lost` the torque that the drives did not deliver."""
     recording: str
     session_start: float
     dt: float
@@ -25,6 +27,8 @@ class Motion:
     v: np.ndarray
     a: np.ndarray
     link: tuple | None = None
+    since: np.ndarray | None = None
+    lost: np.ndarray | None = None
 
 
 def of_command(recording, session_start, q, stride=20):
@@ -32,11 +36,13 @@ def of_command(recording, session_start, q, stride=20):
     from motion import RATE, derivatives
     v, a = derivatives(q)
     s = slice(None, None, stride)
-    return Motion(recording, session_start, stride / RATE, np.arange(len(q))[s] / RATE, q[s], v[s], a[s])
+    since = shop_floor.since_start(q, 1. / RATE)[s]
+    return Motion(recording, session_start, stride / RATE, np.arange(len(q))[s] / RATE, q[s], v[s], a[s], since=since)
 
 
 def of_log(recording, session_start, log):
-    return Motion(recording, session_start, 1e-3, log.t, log.q, log.v, log.a, (log.q_link, log.v_link, log.a_link))
+    return Motion(recording, session_start, 1e-3, log.t, log.q, log.v, log.a, (log.q_link, log.v_link, log.a_link),
+                  shop_floor.since_start(log.command, 1e-3), log.lost)
 
 
 def wrench(robot, effect, motion, link):
@@ -51,18 +57,32 @@ def wrench(robot, effect, motion, link):
     return p["stiffness_n_per_m"] * depth[:, None] * np.einsum("kij,i->kj", J, normal)
 
 
+def misread(robot, effects, motion):
+    """(q, v, a) of joints whose encoders read `motion`: to first order in the encoders' errors."""
+    q, v, a = motion.q.copy(), motion.v.copy(), motion.a.copy()
+    for e in effects:
+        if formula(e) == shop_floor.ENCODER:
+            j = robot.names.index(e["joint"])
+            back = e["parameters"] | {"amplitude_rad": -e["parameters"]["amplitude_rad"]}
+            q[:, j], v[:, j], a[:, j] = shop_floor.read(back, q[:, j], v[:, j], a[:, j])
+    return q, v, a
+
+
 def contributions(robot, effects, motion, rigid=None):
     """(rigid-body torque of the nominal robot, one array per effect), samples x joints, N m at the joint; their sum is the
     recorded effort without noise."""
-    link = motion.link or (motion.q, motion.v, motion.a)
+    link = motion.link or misread(robot, effects, motion)
     if rigid is None:
         rigid = robot.nominal.rnea(motion.q, motion.v, motion.a)
     parts, total, so_far = {}, rigid.copy(), []
-    twisted = any(e["effect"] in TWO_MASS for e in effects)
+    encoders = [k for k, e in enumerate(effects) if formula(e) == shop_floor.ENCODER]
+    twisted = encoders or any(e["effect"] in TWO_MASS for e in effects)
     nominal = robot.nominal.rnea(*link) if twisted else rigid
     carried = nominal
     for k, e in enumerate(effects):
-        if e["effect"] in TWO_MASS:
+        if k in encoders:
+            parts[k] = (nominal - rigid) / len(encoders)
+        elif e["effect"] in TWO_MASS:
             j = robot.names.index(e["joint"])
             parts[k] = nominal - rigid
             parts[k][:, j] += e["parameters"]["rotor_inertia_kgm2"] * motion.a[:, j]
@@ -75,7 +95,7 @@ def contributions(robot, effects, motion, rigid=None):
                 so_far.append(e)
                 parts[k], carried = heavier - carried, heavier
     for k, e in enumerate(effects):
-        if k in parts or e["effect"] in RECORD:
+        if k in parts or formula(e) in (*RECORD, shop_floor.DRIVE):
             continue
         if e["effect"] in ("external_push", "contact_wall"):
             parts[k] = wrench(robot, e, motion, link)
@@ -92,13 +112,19 @@ def contributions(robot, effects, motion, rigid=None):
         else:
             law = FRICTION.get(formula(e)) or FIELD[formula(e)]
             other = link[1][:, robot.names.index(p["source_joint"])] if "source_joint" in p else 0.
-            torque[:, j] = -law(p, np, q, v, t=motion.t, session=motion.session_start + motion.t, load=carried[:, j], other=other)
+            torque[:, j] = -law(p, np, q, v, t=motion.t, session=motion.session_start + motion.t, load=carried[:, j], other=other,
+                                since=motion.since[:, j])
         parts[k] = torque
     for x in parts.values():
         total += x
+    for k, e in enumerate(effects):
+        if formula(e) == shop_floor.DRIVE:
+            j, parts[k] = robot.names.index(e["joint"]), np.zeros_like(total)
+            parts[k][:, j] = e["parameters"]["amplitude_nm"] * np.sign(total[:, j]) if motion.lost is None else motion.lost[:, j]
+            total += parts[k]
     for name in RECORD:
         for k, e in enumerate(effects):
-            if e["effect"] == name:
+            if formula(e) == name:
                 if name == "torque_saturation" and e["parameters"]["mode"] == "actuator":
                     # The command is recorded: what is missing shows only where the motor was cut.
                     j, limit = robot.names.index(e["joint"]), e["parameters"]["limit_nm"]
@@ -116,7 +142,7 @@ def recorded(robot, effects, log):
     tau = log.torque
     for name in RECORD:
         for e in effects:
-            if e["effect"] == name:
+            if formula(e) == name:
                 tau = on_record(robot, e, tau, 1e-3)
     return tau
 

@@ -33,7 +33,9 @@ use iceoryx2::service::builder::publish_subscribe::{
 use iceoryx2::service::ipc_threadsafe::Service;
 use iceoryx2::service::port_factory::{event, publish_subscribe};
 
-use super::{Audience, FanOut, Keep, LinkError, MAX_DEPTH, PATIENCE, Receiver, Sender, Transport};
+use super::{
+    Audience, FanOut, Keep, LinkError, MAX_DEPTH, PATIENCE, Receiver, Sender, Transport, Wake,
+};
 use crate::sample::Sample;
 
 mod backpressure;
@@ -83,6 +85,7 @@ pub struct SharedMemory {
     node: SharedNode,
     patience: Duration,
     receivers: usize,
+    wake: Wake,
 }
 
 /// A node may move between threads but not be used by two at once.
@@ -122,6 +125,7 @@ impl SharedMemory {
             node: SharedNode(Arc::new(Mutex::new(node))),
             patience: PATIENCE,
             receivers: MAX_RECEIVERS,
+            wake: Wake::Event,
         })
     }
 
@@ -137,6 +141,13 @@ impl SharedMemory {
     #[must_use]
     pub fn with_receivers(mut self, receivers: usize) -> Self {
         self.receivers = receivers.clamp(1, MAX_RECEIVERS);
+        self
+    }
+
+    /// The same with receivers that learn in another way that a sample is there.
+    #[must_use]
+    pub fn with_wake(mut self, wake: Wake) -> Self {
+        self.wake = wake;
         self
     }
 

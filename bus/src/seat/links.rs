@@ -115,7 +115,10 @@ impl Links {
         let (stream, keep, depth) = (&input.stream, input.keep, input.depth);
         let mut receiver = match input.transport {
             TransportKind::InProcess => return Err(in_process(stream)),
-            TransportKind::Iceoryx2 => self.shared_memory()?.receiver::<T>(stream, keep, depth)?,
+            TransportKind::Iceoryx2 => {
+                let shared_memory = self.shared_memory()?.with_wake(input.wake);
+                shared_memory.receiver::<T>(stream, keep, depth)?
+            }
             TransportKind::Zenoh => self.zenoh()?.receiver::<T>(stream, keep, depth)?,
         };
         if let Some(position) = input.resume {

@@ -7,7 +7,8 @@ use std::time::{Duration, Instant};
 
 use tauscope_bus::{
     Audience, Domain, Header, InProcess, JointState, Keep, LinkError, Received, Receiver, Sender,
-    SharedMemory, Transport, TwinState, Zenoh, ZenohEndpoints, ZenohRouter, link::SpillSettings,
+    SharedMemory, Transport, TwinState, Wake, Zenoh, ZenohEndpoints, ZenohRouter,
+    link::SpillSettings,
 };
 
 mod promises;
@@ -65,6 +66,29 @@ impl Sides for SharedMemorySides {
     }
     fn receiving(&self) -> &SharedMemory {
         self.receiving.as_ref().unwrap()
+    }
+}
+
+/// Shared memory with receivers that look for themselves.
+struct LookingSides<const INTERVAL_MS: u64>(SharedMemorySides);
+
+impl<const INTERVAL_MS: u64> Sides for LookingSides<INTERVAL_MS> {
+    type Transport = SharedMemory;
+    const REMEMBERS: bool = false;
+    fn new(patience: Duration) -> Self {
+        let mut sides = SharedMemorySides::new(patience);
+        let wake = match INTERVAL_MS {
+            0 => Wake::Spin,
+            interval_ms => Wake::EveryMs(interval_ms),
+        };
+        sides.receiving = sides.receiving.take().map(|side| side.with_wake(wake));
+        Self(sides)
+    }
+    fn sending(&self) -> &SharedMemory {
+        self.0.sending()
+    }
+    fn receiving(&self) -> &SharedMemory {
+        self.0.receiving()
     }
 }
 
@@ -227,5 +251,7 @@ macro_rules! conforms {
 
 conforms!(in_process, InProcessSides);
 conforms!(shared_memory, SharedMemorySides);
+conforms!(shared_memory_looked_at, LookingSides<5>);
+conforms!(shared_memory_spinning, LookingSides<0>);
 conforms!(zenoh, ZenohSides);
 conforms!(zenoh_between_hosts, ZenohHostSides);

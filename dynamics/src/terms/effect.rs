@@ -235,6 +235,11 @@ pub struct Traits {
     /// It has a law and a name here, but the list of names that reports may use lacks it. A finding is an `unknown` whose
     /// parameter `kind` is this name, so that who reads reports by that list sees an honest `unknown` with numbers.
     pub is_off_list: bool,
+    /// It holds a joint that stands still, with any effort up to its own; told here of what does not jump at every reversal.
+    pub holds_at_rest: bool,
+    /// The number of its simpler effect, from its coordinates and a time of the session \[s\], if that changes all the time.
+    /// Its coordinates are that number at the start of the session and its growth.
+    pub drifts: Option<fn(&[f64], f64) -> f64>,
     /// Its effort is linear in its factors to first order only, so it is computed anew for each of their values.
     pub bends: bool,
     /// Whether some gear makes it with these coordinates; what none makes only draws a curve.
@@ -260,6 +265,8 @@ impl Traits {
         is_scale: false,
         describes_only: false,
         is_off_list: false,
+        holds_at_rest: false,
+        drifts: None,
         bends: false,
         is_made_by_gears: |_| true,
         off_in_urdf: None,

@@ -118,6 +118,28 @@ impl TermSpec {
         afterwards.unwrap_or_else(|| self.clone())
     }
 
+    /// What it is at a time of its session: of what changes steadily, the simpler effect with the number that it has then.
+    #[must_use]
+    pub fn at_session(self, session_s: f64) -> Self {
+        let settled = self.effect().ok().and_then(|effect| {
+            let (at, simpler) = (effect.traits.drifts?, effect.simpler?.effect);
+            let value = |p: &super::Parameter| self.parameters.get(p.name).copied();
+            let values = effect.parameters.iter().map(value);
+            let values = values.collect::<Option<Vec<f64>>>()?;
+            let parameter = simpler.parameters.first()?;
+            let number = at(&(effect.to_coordinates)(&values), session_s);
+            Some((simpler.name, parameter.name, number.max(parameter.minimum)))
+        });
+        let Some((effect, parameter, number)) = settled else {
+            return self;
+        };
+        Self {
+            effect: effect.to_owned(),
+            parameters: BTreeMap::from([(parameter.to_owned(), number)]),
+            ..self
+        }
+    }
+
     /// The effect it names.
     ///
     /// # Errors
@@ -263,6 +285,15 @@ mod tests {
         assert_eq!(term.coordinates(), [3.0]);
         let again = TermSpec::of(&*term, &spec.site(&model).unwrap());
         assert_eq!(serde_json::to_string(&again).unwrap(), VISCOUS);
+    }
+
+    #[test]
+    fn what_changes_steadily_is_what_it_was_at_the_end() {
+        let drift = r#"{"effect":"friction_drift","joint":"joint2","parameters":{"coulomb_start_nm":2.0,"growth_nm_per_s":-0.01}}"#;
+        let coulomb =
+            r#"{"effect":"coulomb_friction","joint":"joint2","parameters":{"coulomb_nm":1.0}}"#;
+        assert_eq!(spec(drift).at_session(100.0), spec(coulomb));
+        assert_eq!(spec(VISCOUS).at_session(100.0), spec(VISCOUS));
     }
 
     #[test]

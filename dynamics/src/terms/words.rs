@@ -83,7 +83,7 @@ fn place(inner: &str) -> (&str, Told) {
 }
 
 /// Endings of canonical names and the units they stand for, longer ones before those they end in.
-const UNITS: [(&str, &str); 22] = [
+const UNITS: [(&str, &str); 23] = [
     ("_nms2_per_rad2", "N m s²/rad²"),
     ("_nms_per_rad", "N m s/rad"),
     ("_nm_per_rad", "N m/rad"),
@@ -93,6 +93,7 @@ const UNITS: [(&str, &str); 22] = [
     ("_n_per_m", "N/m"),
     ("_per_rad", "1/rad"),
     ("_per_nm", "1/(N m)"),
+    ("_nm_per_s", "N m/s"),
     ("_per_rev", "per turn"),
     ("_rad_s2", "rad/s²"),
     ("_rad_s", "rad/s"),
@@ -177,6 +178,7 @@ mod tests {
     fn units_come_from_names() {
         for (name, expected) in [
             ("coulomb_nm", Some(("coulomb", "N m"))),
+            ("growth_nm_per_s", Some(("growth", "N m/s"))),
             ("viscous_nms_per_rad", Some(("viscous", "N m s/rad"))),
             ("delta_com_x_m", Some(("delta_com_x", "m"))),
             (

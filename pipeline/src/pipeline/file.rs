@@ -130,6 +130,10 @@ pub struct StageEntry {
     /// What becomes of samples that it has no time for.
     #[serde(default)]
     pub keep: Option<KeepEntry>,
+    /// How it learns that a sample is there, if another process of its host sends it. Left out, the sender wakes it; a
+    /// recorder looks a hundred times a second, so that it costs those before it nothing.
+    #[serde(default)]
+    pub wake: Option<WakeEntry>,
     /// When it is started again after it died. Left out: `on_failure`.
     #[serde(default)]
     pub restart: Option<RestartEntry>,
@@ -164,6 +168,16 @@ pub enum KeepEntry {
     All,
     /// The oldest give way and are counted, so that it works on what is new.
     Newest,
+}
+
+/// How a stage learns that a sample is there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum WakeEntry {
+    /// The sender wakes it.
+    Event,
+    /// It looks all the time, which takes a core: the least latency.
+    Spin,
 }
 
 /// Place of stage `index` in the file.

@@ -10,16 +10,17 @@ use tauscope_dynamics::terms::TermError;
 
 use crate::context::Context;
 use crate::data::noise::white_noise;
-use crate::data::other_simulation;
 use crate::data::units::scales;
+use crate::data::{other_simulation, remedies};
 use crate::outcome::Outcome;
 use crate::read::audit;
 use crate::read::input::Input;
 use crate::read::start::Start;
 use crate::report::schema::{Report, Verdict};
+use crate::report::slips::Slips;
 use crate::report::{findings, locate, notes, summary, verdict};
 
-use judged::Judged;
+use judged::{Judged, Stop};
 
 /// Explains the input. `progress` receives the share that is done, 0 to 1, and the name of the step.
 ///
@@ -38,11 +39,57 @@ pub fn explain(
     if input.holdout.is_empty() && !at_rest {
         hold_out_some(&mut input);
     }
+    let n = joints.len();
+    let mut slips = if at_rest {
+        Slips::default()
+    } else {
+        Slips::new(remedies::of_velocity(&input.fit, n))
+    };
+    input.mend(&slips.all);
+    loop {
+        let (stop, errors) = match attempt(&mut input, at_rest, &slips, &joints, progress)? {
+            Attempt::Done(outcome) => return Ok(*outcome),
+            Attempt::Stopped(stop, errors) => (stop, errors),
+        };
+        match stop {
+            Stop::Slips(found) if slips.all.len() < MOST_SLIPS_PER_JOINT * n => {
+                input.mend(&found);
+                slips.add(found, errors);
+            }
+            Stop::Slips(_) => {
+                let reason =
+                    "so much is wrong with these recordings that they are of another robot";
+                return Ok(not_evaluated(&input, joints, reason.to_owned()));
+            }
+            Stop::Reason(reason) => return Ok(not_evaluated(&input, joints, reason)),
+        }
+    }
+}
+
+/// More faults of recordings than this for each joint are another robot's.
+/// Resolution: each joint may be in another's place, turned, and have another unit.
+const MOST_SLIPS_PER_JOINT: usize = 3;
+
+/// What came of an attempt to explain.
+enum Attempt {
+    Done(Box<Outcome>),
+    /// Why there is no verdict yet, and the error of the twin on the held-out recordings as they are.
+    Stopped(Stop, Vec<f64>),
+}
+
+/// Explains recordings of which `slips` are mended.
+fn attempt(
+    input: &mut Input,
+    at_rest: bool,
+    slips: &Slips,
+    joints: &[String],
+    progress: &(dyn Fn(f64, &str) + Sync),
+) -> Result<Attempt, TermError> {
     let constants = input
         .torque_constants_nm_per_a
         .clone()
         .unwrap_or_else(|| vec![1.0; joints.len()]);
-    let (unit_nm, unscaled) = scales(&input, &constants, at_rest);
+    let (unit_nm, unscaled) = scales(input, &constants, at_rest);
     let session_start_ns = input
         .fit
         .iter()
@@ -53,10 +100,10 @@ pub fn explain(
     let twin_late_s = if input.bodies || at_rest {
         0.0
     } else {
-        other_simulation::put_on_clock(&mut input, &constants, &unit_nm)
+        other_simulation::put_on_clock(input, &constants, &unit_nm)
     };
     let mut context = Context {
-        input: &input,
+        input,
         constants: &constants,
         unit_nm: &unit_nm,
         unscaled,
@@ -71,25 +118,28 @@ pub fn explain(
         context.in_motion(progress)?
     };
     if let Ok(first) = &judged
-        && input.start.as_ref().is_some_and(Start::needs_load)
+        && context.input.start.as_ref().is_some_and(Start::needs_load)
     {
         context.loads = context.bodies(&first.found);
         if !context.loads.is_empty() && !at_rest {
             judged = context.in_motion(progress)?;
         }
     }
-    let judged = match judged {
-        Ok(judged) => judged,
-        Err(reason) => return Ok(not_evaluated(&input, joints, reason)),
-    };
-    conclude(&context, judged, joints, progress)
+    match judged {
+        Ok(judged) => {
+            let outcome = conclude(&context, judged, slips, joints, progress)?;
+            Ok(Attempt::Done(Box::new(outcome)))
+        }
+        Err(stop) => Ok(Attempt::Stopped(stop, context.rigid_errors()?)),
+    }
 }
 
 /// The report on the result of a search, with the errors on the held-out recordings.
 fn conclude(
     context: &Context<'_>,
     judged: Judged,
-    joints: Vec<String>,
+    slips: &Slips,
+    joints: &[String],
     progress: &(dyn Fn(f64, &str) + Sync),
 ) -> Result<Outcome, TermError> {
     let input = context.input;
@@ -102,20 +152,19 @@ fn conclude(
         rests_count,
     } = judged;
     progress(0.95, "proof");
-    let proof = context.proof(&problem, &before, &found)?;
+    let mut proof = context.proof(&problem, &before, &found)?;
     let noise_floor: Vec<f64> = (0..joints.len())
         .map(|j| white_noise(&input.fit, j, joints.len()))
         .collect();
     let unit = if input.effort_unit == "A" { "A" } else { "N m" };
     let remainders = context.remainders((&problem, &found), &before, &rests_count, unit)?;
     let twin_is_topic = !input.bodies;
-    let verdict = verdict::verdict(&found, &named.findings, &remainders.all, twin_is_topic);
     if !remainders.elsewhere.is_empty() {
         findings::doubt_patches(&mut named.findings);
     }
     let mut notes = named.notes;
     notes.extend(notes::late_twin(context.twin_late_s));
-    notes.extend(notes::not_handed_out(&proof, &found, &joints, unit));
+    notes.extend(notes::not_handed_out(&proof, &found, joints, unit));
     notes.extend(notes::notes(
         input,
         &problem,
@@ -123,26 +172,32 @@ fn conclude(
         &rests_count,
         &remainders.all,
     ));
+    let mut findings = slips.findings(joints, unit);
+    notes.splice(0..0, slips.note());
+    findings.append(&mut named.findings);
+    slips.undo(&mut proof);
+    let verdict = verdict::verdict(&findings, &remainders.all, twin_is_topic);
     let report = Report {
         case: input.case.clone(),
         verdict,
         reason: None,
         summary: summary::summary(
             verdict,
-            &named.findings,
+            &findings,
             &remainders.all,
-            &joints,
+            joints,
             [&proof.before, &proof.after],
+            input.start.is_some(),
         ),
         effort_unit: input.effort_unit.clone(),
-        located: locate::located(&problem, &before, &joints),
+        located: locate::located(&problem, &before, joints),
         undetectable,
-        findings: named.findings,
+        findings,
         rejected: named.rejected,
         next_motions: named.next_motions,
         remaining: remainders.all,
         notes,
-        joints,
+        joints: joints.to_vec(),
         holdout_rms_before: proof.before,
         holdout_rms_after: proof.after,
         noise_floor,

@@ -11,11 +11,14 @@ pub(crate) mod handed_out;
 pub(crate) mod holdout;
 pub mod html;
 pub(crate) mod locate;
+pub(crate) mod look_at;
 pub(crate) mod next_motion;
 pub(crate) mod notes;
 pub(crate) mod remainder;
 pub(crate) mod schema;
 pub(crate) mod sentences;
+pub(crate) mod slip_words;
+pub(crate) mod slips;
 pub(crate) mod summary;
 pub(crate) mod verdict;
 

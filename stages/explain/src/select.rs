@@ -13,6 +13,7 @@
 //! - `nested` prefers the simpler of two nested effects;
 //! - `cross_validation` rejects effects that do not predict recordings left out of the fit (the book's section 7.10);
 //! - `curves` and `free_body` describe the residual where no effect of the library fits;
+//! - `drifts` names friction that is a straight line over the session;
 //! - `carried` tells what carries over from one recording to the next from noise, however slow that is.
 //!
 //! Evidence is the gain of log-likelihood minus the penalty of the Bayesian information criterion (Schwarz, "Estimating
@@ -31,6 +32,7 @@ pub mod cross_validation;
 pub mod curve_axes;
 pub mod curve_shapes;
 pub mod curves;
+pub mod drifts;
 pub mod evidence;
 pub mod exchange;
 pub mod explanation;

@@ -13,11 +13,23 @@ use crate::link::sequence::Tracker;
 use crate::link::{Keep, LinkError, MAX_DEPTH, Position, Received, Receiver, ReceiverCounts};
 use crate::sample::Sample;
 
+/// While a receiver spins: how often it looks for senders that are new.
+/// Resolution: how soon a sender is greeted, against the cost of looking.
+const GREET_EVERY: Duration = Duration::from_millis(1);
+
+/// How a receiver waits, as its [`Wake`] says.
+enum Waiting {
+    /// Until an event comes.
+    Woken(Listener<Service>),
+    /// So long between two looks.
+    Looks(Duration),
+}
+
 pub(super) struct SharedMemoryReceiver<T: Sample> {
     stream: String,
     subscriber: Subscriber<Service, T, Joined>,
     samples: Samples<T>,
-    woken: Listener<Service>,
+    waiting: Waiting,
     back: Notifier<Service>,
     /// The senders that have been told that they are heard.
     greeted: Vec<u128>,
@@ -31,11 +43,14 @@ impl<T: Sample> SharedMemoryReceiver<T> {
         keep: Keep,
         depth: usize,
     ) -> Result<Self, LinkError> {
-        let woken = transport
-            .events(stream, keep, "")?
-            .listener_builder()
-            .create()
-            .map_err(|error| open_error(stream, &error))?;
+        let waiting = match transport.wake.pause() {
+            Some(pause) => Waiting::Looks(pause),
+            None => Waiting::Woken(
+                (transport.events(stream, keep, "")?.listener_builder())
+                    .create()
+                    .map_err(|error| open_error(stream, &error))?,
+            ),
+        };
         let back = transport
             .events(stream, keep, "/back")?
             .notifier_builder()
@@ -51,7 +66,7 @@ impl<T: Sample> SharedMemoryReceiver<T> {
             stream: stream.to_owned(),
             subscriber,
             samples,
-            woken,
+            waiting,
             back,
             greeted: Vec::with_capacity(MAX_SENDERS),
             tracker: Tracker::of(stream),
@@ -100,12 +115,16 @@ impl<T: Sample> SharedMemoryReceiver<T> {
         for &id in there() {
             if !self.greeted.contains(&id) {
                 // Looks for new senders first.
-                self.subscriber.has_samples().map_err(|e| self.error(&e))?;
+                self.has_samples()?;
                 self.tell(greeting(id))?;
                 self.greeted.push(id);
             }
         }
         Ok(())
+    }
+
+    fn has_samples(&self) -> Result<bool, LinkError> {
+        self.subscriber.has_samples().map_err(|e| self.error(&e))
     }
 
     fn tell(&self, event: EventId) -> Result<(), LinkError> {
@@ -140,11 +159,17 @@ impl<T: Sample> Receiver<T> for SharedMemoryReceiver<T> {
             if left.is_zero() {
                 return Ok(Received::Nothing);
             }
-            // A notification that came since the look above ends this wait at once.
-            wait(&self.woken, left, |_| {}).map_err(|reason| LinkError::Receive {
-                stream: self.stream.clone(),
-                reason,
-            })?;
+            match &self.waiting {
+                // A notification that came since the look above ends this wait at once.
+                Waiting::Woken(by) => wait(by, left, |_| {}).map_err(|e| self.error(&e))?,
+                Waiting::Looks(Duration::ZERO) => {
+                    let until = Instant::now() + left.min(GREET_EVERY);
+                    while !self.has_samples()? && Instant::now() < until {
+                        std::hint::spin_loop();
+                    }
+                }
+                Waiting::Looks(pause) => std::thread::sleep(left.min(*pause)),
+            }
         }
     }
 

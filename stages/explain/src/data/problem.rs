@@ -61,6 +61,18 @@ impl Problem {
         others
     }
 
+    /// When the first recording begins and the last one ends \[s from the start of the session\].
+    pub fn session_s(&self) -> (f64, f64) {
+        let first_s = |t: &FitTrack| t.track.session_s;
+        let last_s = |t: &FitTrack| first_s(t) + t.track.time_s.last().copied().unwrap_or(0.0);
+        let first = self
+            .tracks
+            .iter()
+            .map(first_s)
+            .fold(f64::INFINITY, f64::min);
+        (first, self.tracks.iter().map(last_s).fold(first, f64::max))
+    }
+
     /// What the twin says without any physics beside it.
     pub fn bare(&self) -> &Efforts {
         self.bare.get_or_init(|| {

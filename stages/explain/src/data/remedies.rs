@@ -1,34 +1,62 @@
-//! What would make efforts fit that do not fit the robot: each remedy of a short list is tried on the data.
+//! What would make recordings match that do not match the robot: each remedy of a short list is tried on the data.
 
+mod mend;
+mod scale;
 mod trial;
+mod velocity;
+
+use tauscope_dynamics::JointKind;
 
 use crate::data::problem::Problem;
 
-use trial::Trial;
+pub use scale::of_scale;
+use trial::{Left, Trial};
+pub use velocity::of_velocity;
 
-/// A joint fits badly if the twin leaves at least this share of the variance that friction leaves. A twin that only lacks
-/// physics leaves less, and where it leaves more no remedy makes it good.
+/// A remedy must divide the error that friction and a gain leave by this, all joints together.
 /// Tuned: by hand, on no recorded seeds; not swept.
-const BAD: f64 = 0.5;
-/// A remedy makes a joint good if it leaves at most this share.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const GOOD: f64 = 0.1;
+const LEAST_GAIN: f64 = 3.0;
+/// No joint's error may grow by more than this factor.
+/// Tuned: as [`LEAST_GAIN`].
+const HARMLESS: f64 = 1.1;
+/// A joint whose error the remedy divides by at least this counts as mended.
+/// Tuned: as [`LEAST_GAIN`].
+const MENDED: f64 = 1.3;
+/// Remedies are tried if the motion leaves this share of a joint's variance beside friction.
+/// Tuned: as [`LEAST_GAIN`]. Most arms leave less at all strong joints and are not searched.
+const SUSPECT: f64 = 0.1;
 
-/// What makes the efforts fit.
+/// What makes recordings match the robot.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Remedy {
-    /// The base is turned: roll and pitch \[rad\], as in `base_tilt`.
+    /// The base is turned: roll and pitch \[rad\], as in `base_tilt`. Physics, which the search names.
     BaseTurned([f64; 2]),
-    /// The tool carries so much \[kg\].
+    /// The tool carries so much \[kg\]. Physics, too.
     Payload(f64),
     /// The efforts of two joints are swapped.
     Swapped(usize, usize),
     /// The effort of a joint has the other sign.
     EffortTurned(usize),
+    /// The position of a joint has the other sign.
+    PositionTurned(usize),
     /// The position of a joint counts the other way, and its effort with it.
     JointTurned(usize),
     /// The positions of joints that turn are in degrees.
     Degrees,
+    /// The controller has subtracted gravity from the effort.
+    GravitySubtracted,
+    /// The effort that is said to be in N m is motor current.
+    IsCurrent,
+    /// The effort that is said to be motor current is in N m.
+    IsTorque,
+    /// The effort is so many times a N m at every joint.
+    EffortScaled(f64),
+    /// The torque constants are to be multiplied by this.
+    ConstantsScaled(f64),
+    /// The torque constants are wrong, and by no common factor.
+    ConstantsWrong,
+    /// The recorded velocity is so many times the change of position: of a joint, or of all.
+    Velocity(Option<usize>, f64),
 }
 
 impl Remedy {
@@ -36,153 +64,294 @@ impl Remedy {
     pub fn is_physics(&self) -> bool {
         matches!(self, Self::BaseTurned(_) | Self::Payload(_))
     }
+}
 
-    /// Why nothing can be said, and what to do. `left` are the shares of variance that are left without and with it.
-    pub fn reason(&self, joints: &[String], left: [f64; 2]) -> String {
-        let cure = match self {
-            Self::BaseTurned([roll, pitch]) => {
-                format!("the base is turned: roll {roll:.2} rad, pitch {pitch:.2} rad")
+/// A remedy that was tried and helps.
+#[derive(Debug, Clone)]
+pub struct Slip {
+    /// What helps.
+    pub remedy: Remedy,
+    /// By joint that it mends, the error without and with it, beside friction and a gain \[N m, or A where the scale is not
+    /// known\].
+    pub mended: Vec<(usize, [f64; 2])>,
+    /// Share of the squared error, in units of what is left, that it takes away.
+    pub share: f64,
+    /// By joint that tells, measured effort per effort that the motion requires, or recorded velocity per change of position.
+    pub slopes: Vec<(usize, f64)>,
+}
+
+/// How the recorded columns are read.
+#[derive(Debug, Clone, PartialEq)]
+struct Reading {
+    /// By joint, the joint whose effort column holds its effort.
+    column: Vec<usize>,
+    /// By joint, the factor of its effort.
+    effort: Vec<f64>,
+    /// By joint, the factor of its position.
+    position: Vec<f64>,
+    /// Whether gravity is part of the effort.
+    weighs: bool,
+}
+
+impl Reading {
+    fn as_recorded(joints: usize) -> Self {
+        Self {
+            column: (0..joints).collect(),
+            effort: vec![1.0; joints],
+            position: vec![1.0; joints],
+            weighs: true,
+        }
+    }
+
+    /// The same after a remedy that is no physics.
+    fn with(&self, remedy: &Remedy, turns: &[bool]) -> Self {
+        let mut new = self.clone();
+        match *remedy {
+            Remedy::Swapped(a, b) => new.column.swap(a, b),
+            Remedy::EffortTurned(j) => new.effort[j] *= -1.0,
+            Remedy::PositionTurned(j) => new.position[j] *= -1.0,
+            Remedy::JointTurned(j) => {
+                new.effort[j] *= -1.0;
+                new.position[j] *= -1.0;
             }
-            Self::Payload(mass) => format!("the tool carries {mass:.1} kg"),
-            Self::Swapped(a, b) => format!(
-                "the efforts of {} and {} are swapped: exchange them in the driver",
-                joints[*a], joints[*b]
-            ),
-            Self::EffortTurned(j) => format!(
-                "the effort of {} has the other sign: turn it in the driver",
-                joints[*j]
-            ),
-            Self::JointTurned(j) => format!(
-                "{} counts the other way than in the URDF: turn its axis there, or position and effort in the driver",
-                joints[*j]
-            ),
-            Self::Degrees => "the positions are in degrees: convert them to rad".to_owned(),
-        };
-        format!(
-            "the efforts do not follow this robot's motion, which leaves {:.0} % of their variance, but would with one \
-             change, which leaves {:.1} %: {cure}",
-            100.0 * left[0],
-            100.0 * left[1]
-        )
+            Remedy::Degrees => {
+                for (factor, turns) in new.position.iter_mut().zip(turns) {
+                    if *turns {
+                        *factor *= std::f64::consts::PI / 180.0;
+                    }
+                }
+            }
+            Remedy::GravitySubtracted => new.weighs = false,
+            _ => {}
+        }
+        new
     }
 }
 
-/// The remedy that makes a bad fit good, with the shares of variance that are left without and with it.
-pub fn remedy(problem: &Problem) -> Option<(Remedy, [f64; 2])> {
-    let trial = Trial::new(problem);
-    let own = trial.left(&trial.own, |j| (j, 1.0));
-    if !own.iter().any(|left| *left > BAD) {
+/// What the audit found.
+#[derive(Debug, Default)]
+pub struct Audit {
+    /// What is wrong with the recordings, the worst first.
+    pub slips: Vec<Slip>,
+    /// Physics that explains what does not match.
+    pub physics: Option<Remedy>,
+}
+
+/// Tries remedies, one after the other, until none helps. `is_scaled` says whether efforts are N m, so that gains are near 1.
+pub fn audit(problem: &Problem, is_scaled: bool) -> Audit {
+    let trial = Trial::new(problem, is_scaled);
+    let n = problem.joints;
+    let turns: Vec<bool> = (problem.model.joints().iter())
+        .map(|joint| joint.kind != JointKind::Prismatic)
+        .collect();
+    let mut reading = Reading::as_recorded(n);
+    let mut model = problem.rigid().to_vec();
+    let mut found = Audit::default();
+    // Each joint may be turned and be in another's place; more is another robot.
+    while found.slips.len() < 2 * n {
+        let now = trial.left(&model, &reading);
+        if !now.iter().flatten().any(|left| left.share() > SUSPECT) {
+            break;
+        }
+        let physics = if found.slips.is_empty() {
+            trial.physics()
+        } else {
+            Vec::new()
+        };
+        let physics = (physics.into_iter()).filter_map(|(remedy, model)| {
+            let gain = total_gain(&now, &trial.left(&model, &reading))?;
+            Some((remedy, gain))
+        });
+        let physics = physics.max_by(|(_, a), (_, b)| a.total_cmp(b));
+        let mut best: Option<(Slip, Reading, Vec<f64>, f64)> = None;
+        for remedy in candidates(n, &turns, &reading) {
+            let new = reading.with(&remedy, &turns);
+            let moved = new.position != reading.position || new.weighs != reading.weighs;
+            let model = if moved {
+                trial.model(&new)
+            } else {
+                model.clone()
+            };
+            let after = trial.left(&model, &new);
+            let Some(gain) = total_gain(&now, &after) else {
+                continue;
+            };
+            if best.as_ref().is_none_or(|(_, _, _, most)| gain > *most) {
+                let slip = slip(remedy, &now, &after);
+                best = Some((slip, new, model, gain));
+            }
+        }
+        let most = best.as_ref().map_or(0.0, |(_, _, _, gain)| *gain);
+        if let Some((remedy, gain)) = physics
+            && gain >= most
+            && gain > LEAST_GAIN.ln()
+        {
+            found.physics = Some(remedy);
+            break;
+        }
+        let Some((slip, new, moved, _)) = best.filter(|_| most > LEAST_GAIN.ln()) else {
+            break;
+        };
+        found.slips.push(slip);
+        (reading, model) = (new, moved);
+    }
+    found
+}
+
+/// All remedies that can be tried on a reading.
+fn candidates(n: usize, turns: &[bool], reading: &Reading) -> Vec<Remedy> {
+    let mut all = Vec::new();
+    for a in 0..n {
+        all.extend((a + 1..n).map(|b| Remedy::Swapped(a, b)));
+        all.push(Remedy::EffortTurned(a));
+        all.push(Remedy::PositionTurned(a));
+        all.push(Remedy::JointTurned(a));
+    }
+    let plain = |j: usize| reading.position[j].abs() >= 1.0;
+    if turns.contains(&true) && (0..n).all(plain) {
+        all.push(Remedy::Degrees);
+    }
+    if reading.weighs {
+        all.push(Remedy::GravitySubtracted);
+    }
+    all
+}
+
+/// By how much the error falls, as the logarithm of its factor, all joints together. Nothing if a joint or a recording says
+/// otherwise.
+fn total_gain(before: &[Option<Left>], after: &[Option<Left>]) -> Option<f64> {
+    let pairs = || {
+        before
+            .iter()
+            .zip(after)
+            .filter_map(|(a, b)| a.as_ref().zip(b.as_ref()))
+    };
+    if pairs().any(|(before, after)| after.rms() > HARMLESS * before.rms()) {
         return None;
     }
-    let worst = |left: &[f64]| left.iter().copied().fold(0.0, f64::max);
-    let mut best: Option<(Remedy, [f64; 2], f64)> = None;
-    let mut consider = |remedy: Remedy, left: &[f64]| {
-        if worst(left) > GOOD {
-            return;
-        }
-        let evidence: f64 = left.iter().map(|left| -left.max(1e-9).ln()).sum();
-        if best.as_ref().is_none_or(|(_, _, most)| evidence > *most) {
-            best = Some((remedy, [worst(&own), worst(left)], evidence));
-        }
+    let recordings = pairs().map(|(left, _)| left.squares.len()).max()?;
+    let in_recording = |r: usize| -> f64 {
+        let gain = |(a, b): (&Left, &Left)| 0.5 * (a.squares[r] / b.squares[r]).ln();
+        pairs().map(gain).sum()
     };
-    let n = problem.joints;
-    for a in 0..n {
-        for b in a + 1..n {
-            let swap = |j: usize| {
-                if j == a {
-                    b
-                } else if j == b {
-                    a
-                } else {
-                    j
-                }
-            };
-            consider(
-                Remedy::Swapped(a, b),
-                &trial.left(&trial.own, |j| (swap(j), 1.0)),
-            );
-        }
-        let sign = |j: usize| if j == a { -1.0 } else { 1.0 };
-        consider(
-            Remedy::EffortTurned(a),
-            &trial.left(&trial.own, |j| (j, sign(j))),
-        );
-        let turned = trial.moved(sign);
-        consider(
-            Remedy::JointTurned(a),
-            &trial.left(&turned, |j| (j, sign(j))),
-        );
+    if (0..recordings).any(|r| in_recording(r) < 0.0) {
+        return None;
     }
-    let in_degrees = trial.moved(|_| std::f64::consts::PI / 180.0);
-    consider(Remedy::Degrees, &trial.left(&in_degrees, |j| (j, 1.0)));
-    if let Some((turn, left)) = trial.base_turned() {
-        consider(Remedy::BaseTurned(turn), &left);
+    Some(pairs().map(|(a, b)| (a.rms() / b.rms()).ln()).sum())
+}
+
+fn slip(remedy: Remedy, before: &[Option<Left>], after: &[Option<Left>]) -> Slip {
+    let pairs = before.iter().zip(after).enumerate();
+    let known = pairs.filter_map(|(j, (a, b))| Some((j, [a.as_ref()?.rms(), b.as_ref()?.rms()])));
+    let known: Vec<(usize, [f64; 2])> = known.collect();
+    let sum = |of: usize| -> f64 {
+        let scaled = |(_, errors): &(usize, [f64; 2])| (errors[of] / errors[1]).powi(2);
+        known.iter().map(scaled).sum()
+    };
+    Slip {
+        remedy,
+        share: 1.0 - sum(1) / sum(0).max(f64::MIN_POSITIVE),
+        mended: (known.iter().copied())
+            .filter(|(_, [before, after])| before > &(MENDED * after))
+            .collect(),
+        slopes: Vec::new(),
     }
-    if let Some((mass, left)) = trial.payload() {
-        consider(Remedy::Payload(mass), &left);
-    }
-    best.map(|(remedy, left, _)| (remedy, left))
 }
 
 #[cfg(test)]
 mod tests {
     use tauscope_dynamics::{Inertia, Model};
 
+    use super::mend::scale;
     use super::*;
     use crate::fixture::{self, Noise};
+    use crate::read::recording::Recording;
 
-    /// The remedy for two recordings of the small arm that `spoil` has changed.
-    fn remedy_of(spoil: impl Fn(&mut crate::read::recording::Recording)) -> Option<Remedy> {
+    /// What is found in two recordings of the small arm, with friction, that `spoil` has changed.
+    fn found(spoil: impl Fn(&mut Recording)) -> Audit {
         let model = fixture::model();
         let mut noise = Noise(7);
         let recordings = [4, 5].map(|seed| {
             let mut recording = fixture::recording(&model, seed, |_, qd, effort| {
                 effort[0] += 2.0 * qd[0].signum() + 0.05 * noise.next();
-                effort[1] += 0.05 * noise.next();
+                effort[1] += 0.5 * qd[1].signum() + 0.05 * noise.next();
             });
             spoil(&mut recording);
             recording
         });
-        remedy(&fixture::problem(&model, &recordings)).map(|(remedy, _)| remedy)
+        audit(&fixture::problem(&model, &recordings), true)
+    }
+
+    fn remedies(audit: Audit) -> Vec<Remedy> {
+        assert_eq!(audit.physics, None);
+        audit.slips.into_iter().map(|slip| slip.remedy).collect()
+    }
+
+    fn turn(rows: &mut [f64], joint: usize) {
+        scale(rows, joint, 2, -1.0);
     }
 
     #[test]
     fn what_fits_needs_no_remedy() {
-        assert_eq!(remedy_of(|_| {}), None);
+        assert_eq!(remedies(found(|_| {})), []);
     }
 
     #[test]
-    fn swapped_efforts_a_turned_sign_a_turned_joint_and_degrees_are_told() {
-        let swapped = remedy_of(|recording| {
-            recording
-                .effort
-                .chunks_mut(2)
-                .for_each(|row| row.swap(0, 1));
+    fn swapped_efforts_turned_signs_and_degrees_are_told() {
+        let swap = |r: &mut Recording| r.effort.chunks_mut(2).for_each(|row| row.swap(0, 1));
+        assert_eq!(remedies(found(swap)), [Remedy::Swapped(0, 1)]);
+        assert_eq!(
+            remedies(found(|r| turn(&mut r.effort, 1))),
+            [Remedy::EffortTurned(1)]
+        );
+        let both = found(|r| {
+            turn(&mut r.effort, 0);
+            turn(&mut r.effort, 1);
         });
-        assert_eq!(swapped, Some(Remedy::Swapped(0, 1)));
-        let turned = |of: usize, also_position: bool| {
-            remedy_of(move |recording| {
-                for row in recording.effort.chunks_mut(2) {
-                    row[of] = -row[of];
-                }
-                if also_position {
-                    for all in [&mut recording.position, &mut recording.velocity] {
-                        all.chunks_mut(2).for_each(|row| row[of] = -row[of]);
-                    }
-                }
-            })
-        };
-        assert_eq!(turned(1, false), Some(Remedy::EffortTurned(1)));
-        // Seen in a mirror, this arm with one joint turned is the one with the other turned.
-        assert!(matches!(turned(0, true), Some(Remedy::JointTurned(_))));
-        let degrees = remedy_of(|recording| {
-            for all in [&mut recording.position, &mut recording.velocity] {
-                for x in all.iter_mut() {
-                    *x = x.to_degrees();
-                }
+        let both = remedies(both);
+        assert!(
+            both.len() == 2 && both.contains(&Remedy::EffortTurned(0)),
+            "{both:?}"
+        );
+        let counts = remedies(found(|r| {
+            for all in [&mut r.position, &mut r.velocity, &mut r.effort] {
+                turn(all, 0);
             }
-        });
-        assert_eq!(degrees, Some(Remedy::Degrees));
+        }));
+        // Seen in a mirror, this arm with one joint turned is the one with the other turned.
+        assert!(matches!(counts[..], [Remedy::JointTurned(_)]), "{counts:?}");
+        let degrees = remedies(found(|r| {
+            let angles = r.position.iter_mut().chain(&mut r.velocity);
+            angles.for_each(|x| *x = x.to_degrees());
+        }));
+        assert_eq!(degrees, [Remedy::Degrees]);
+    }
+
+    #[test]
+    fn a_mended_recording_is_as_it_was_and_a_prediction_for_it_finds_back() {
+        let model = fixture::model();
+        let whole = fixture::recording(&model, 4, |_, _, _| {});
+        for remedy in [
+            Remedy::Swapped(0, 1),
+            Remedy::EffortTurned(1),
+            Remedy::JointTurned(0),
+            Remedy::EffortScaled(100.0),
+        ] {
+            // Each of these undoes itself, but for a factor.
+            let mut spoilt = whole.clone();
+            remedy.undo(&mut spoilt.effort, 2);
+            let recorded = spoilt.effort.clone();
+            if let Remedy::JointTurned(j) = remedy {
+                turn(&mut spoilt.position, j);
+                turn(&mut spoilt.velocity, j);
+            }
+            remedy.mend(&mut spoilt, 2);
+            let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
+            assert!(near(&spoilt.effort, &whole.effort), "{remedy:?}");
+            assert!(near(&spoilt.position, &whole.position), "{remedy:?}");
+            remedy.undo(&mut spoilt.effort, 2);
+            assert!(near(&spoilt.effort, &recorded), "{remedy:?}");
+        }
     }
 
     #[test]
@@ -192,7 +361,7 @@ mod tests {
             let mut real = model.clone();
             change(&mut real);
             let recordings = [4, 5].map(|seed| fixture::recording(&real, seed, |_, _, _| {}));
-            remedy(&fixture::problem(&model, &recordings)).map(|(remedy, _)| remedy)
+            audit(&fixture::problem(&model, &recordings), true).physics
         };
         let ceiling = told(&|real| real.set_gravity([0.0, 0.0, 9.81]));
         let Some(Remedy::BaseTurned([roll, pitch])) = ceiling else {

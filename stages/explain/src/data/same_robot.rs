@@ -1,11 +1,9 @@
-//! Whether measured and computed efforts are those of one robot, in one unit.
+//! Whether measured and computed efforts are those of one robot.
 
 use nalgebra::{DMatrix, DVector};
-use tauscope_dynamics::effort_scale::{EffortScale, Slope};
 
 use crate::data::problem::Problem;
 use crate::read::audit::MOVES;
-use crate::read::input::Input;
 
 /// A joint is compared if the standard deviation of its twin's effort is at least this many times the noise.
 /// Tuned: by hand, on no recorded seeds; not swept.
@@ -20,44 +18,45 @@ const LEAST_ROWS: usize = 20;
 /// Resolution: far above the rounding of f64, far below what the noise hides.
 const RIDGE: f64 = 1e-9;
 
-/// The reason why these efforts allow no verdict, if there is one: a wrong robot or a wrong unit.
-pub fn reason_against(input: &Input, problem: &Problem) -> Option<String> {
-    if !input.bodies || input.start.is_some() {
-        return None;
-    }
-    let (mut strong, mut following, mut slopes) = (0, 0, Vec::new());
-    for j in 0..problem.joints {
-        let (share, slope, spread) = regression(problem, j);
-        if spread < STRONG * problem.white_noise[j] {
-            continue;
+/// How measured efforts go with those that the motion requires.
+#[derive(Debug, Clone)]
+pub struct Likeness {
+    /// Joints whose required effort stands out of the noise.
+    strong: usize,
+    /// By joint that follows the motion, measured over required effort.
+    pub slopes: Vec<(usize, f64)>,
+}
+
+impl Likeness {
+    /// Of all joints.
+    pub fn of(problem: &Problem) -> Self {
+        let (mut strong, mut slopes) = (0, Vec::new());
+        for joint in 0..problem.joints {
+            let (share, slope, spread) = regression(problem, joint);
+            if spread < STRONG * problem.white_noise[joint] {
+                continue;
+            }
+            strong += 1;
+            if share > FOLLOWS && slope > 0.0 {
+                slopes.push((joint, slope));
+            }
         }
-        strong += 1;
-        if share > FOLLOWS && slope > 0.0 {
-            following += 1;
-            let joint = input
-                .model
-                .joint_names()
-                .nth(j)
-                .unwrap_or_default()
-                .to_owned();
-            slopes.push(Slope { joint, slope });
-        }
+        Self { strong, slopes }
     }
-    if strong == 0 {
-        return None;
+
+    /// The reason why these efforts allow no verdict, if they are not this robot's.
+    pub fn of_another_robot(&self) -> Option<String> {
+        let Self { strong, slopes } = self;
+        let following = slopes.len();
+        let another = 2 * following < *strong || (*strong >= 2 && following == 0);
+        another.then(|| {
+            format!(
+                "the effort of {} of {strong} joints does not follow the effort that this robot's motion requires: the \
+                 recording is of another robot, joints have other signs, or gravity is subtracted from the effort",
+                strong - following
+            )
+        })
     }
-    if 2 * following < strong || (strong >= 2 && following == 0) {
-        return Some(format!(
-            "the effort of {} of {strong} joints does not follow the effort that this robot's motion requires: the \
-             recording is of another robot, joints have other signs, or gravity is subtracted from the effort",
-            strong - following
-        ));
-    }
-    let known_scale = input.effort_unit == "Nm" || input.torque_constants_nm_per_a.is_some();
-    let fault = EffortScale::of(&slopes)
-        .fault_in_nm()
-        .filter(|_| known_scale);
-    fault.map(|fault| fault.to_string())
 }
 
 /// Share of a joint's measured variance that the twin's effort explains beside direction and speed, the slope, and

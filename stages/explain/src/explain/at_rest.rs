@@ -6,7 +6,7 @@ use tauscope_dynamics::terms::words::number;
 use crate::context::Context;
 use crate::data::problem::Problem;
 use crate::data::track::BEGINNING_S;
-use crate::explain::judged::Judged;
+use crate::explain::judged::{Judged, Stop};
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Hypothesis, TimeKind};
 use crate::read::audit;
@@ -201,7 +201,7 @@ impl Context<'_> {
     pub fn at_rest(
         &self,
         progress: &(dyn Fn(f64, &str) + Sync),
-    ) -> Result<Result<Judged, String>, TermError> {
+    ) -> Result<Result<Judged, Stop>, TermError> {
         let input = self.input;
         let joints: Vec<String> = input.model.joint_names().map(str::to_owned).collect();
         let rests_count = vec![true; joints.len()];
@@ -233,10 +233,9 @@ impl Context<'_> {
             actives.extend(found.fit.actives);
         }
         if named.findings.is_empty() {
-            return Ok(Err(
-                "no joint moves long or far enough: at rest, friction cannot be told from load"
-                    .to_owned(),
-            ));
+            let reason =
+                "no joint moves long or far enough: at rest, friction cannot be told from load";
+            return Ok(Err(Stop::Reason(reason.to_owned())));
         }
         named.notes.push(format!(
             "No joint moves, so lasting effects cannot be told from the load at rest. The effort in the first {BEGINNING_S} s of each \

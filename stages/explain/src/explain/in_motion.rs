@@ -1,12 +1,13 @@
 //! The search for an arm that moves.
 
+use tauscope_dynamics::effort_scale::EffortScale;
 use tauscope_dynamics::terms::{PlaceKind, TermError};
 
 use crate::context::Context;
 use crate::data::problem::Problem;
 use crate::data::remedies::{self, Remedy};
-use crate::data::same_robot;
-use crate::explain::judged::Judged;
+use crate::data::same_robot::Likeness;
+use crate::explain::judged::{Judged, Stop};
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis};
 use crate::physics::{library, torque_scale};
@@ -15,18 +16,17 @@ use crate::select::propose::penalty;
 use crate::select::search::Search;
 
 impl Context<'_> {
-    /// Searches in motion alone, then with the standstills of the joints that have no set-valued friction. Returns the
-    /// reason if there is no verdict.
+    /// Searches in motion alone, then with the standstills of the joints that have no set-valued friction.
     pub fn in_motion(
         &self,
         progress: &(dyn Fn(f64, &str) + Sync),
-    ) -> Result<Result<Judged, String>, TermError> {
+    ) -> Result<Result<Judged, Stop>, TermError> {
         let input = self.input;
         let joints: Vec<String> = input.model.joint_names().map(str::to_owned).collect();
         let problem = self.problem(&input.fit, &vec![false; joints.len()])?;
-        let turn = match self.remedied(&problem, &joints) {
+        let turn = match self.remedied(&problem) {
             Ok(turn) => turn,
-            Err(reason) => return Ok(Err(reason)),
+            Err(stop) => return Ok(Err(stop)),
         };
         let hypotheses = self.hypotheses();
         let unnamed_bodies = if input.bodies {
@@ -88,16 +88,36 @@ impl Context<'_> {
             problem,
         }))
     }
-    /// The turn of the base that the efforts ask for, if any; the reason if they allow no verdict.
-    fn remedied(&self, problem: &Problem, joints: &[String]) -> Result<Option<[f64; 2]>, String> {
+
+    /// The turn of the base that the efforts ask for, if any.
+    fn remedied(&self, problem: &Problem) -> Result<Option<[f64; 2]>, Stop> {
         let input = self.input;
-        // Where scales are not known, or the twin is corrected already, other remedies would be needed.
-        let is_plain = input.bodies && input.start.is_none() && self.unscaled.is_empty();
-        match is_plain.then(|| remedies::remedy(problem)).flatten() {
-            Some((Remedy::BaseTurned(turn), _)) => Ok(Some(turn)),
-            Some((remedy, _)) if remedy.is_physics() => Ok(None),
-            Some((remedy, left)) => Err(remedy.reason(joints, left)),
-            None => same_robot::reason_against(input, problem).map_or(Ok(None), Err),
+        if !input.bodies {
+            return Ok(None);
+        }
+        let likeness = Likeness::of(problem);
+        let slopes: Vec<f64> = likeness.slopes.iter().map(|(_, slope)| *slope).collect();
+        let is_torque = EffortScale::of_positive(&slopes);
+        let is_scaled = self.unscaled.is_empty() && matches!(is_torque, EffortScale::Torque { .. });
+        let audit = remedies::audit(problem, is_scaled);
+        if !audit.slips.is_empty() {
+            return Err(Stop::Slips(audit.slips));
+        }
+        match audit.physics {
+            Some(Remedy::BaseTurned(turn)) => return Ok(Some(turn)),
+            Some(_) => return Ok(None),
+            None => {}
+        }
+        // A corrected twin was made of this robot, and in its unit.
+        if input.start.is_some() {
+            return Ok(None);
+        }
+        if let Some(reason) = likeness.of_another_robot() {
+            return Err(Stop::Reason(reason));
+        }
+        match remedies::of_scale(input, &likeness.slopes) {
+            Some(slip) => Err(Stop::Slips(vec![slip])),
+            None => Ok(None),
         }
     }
 }

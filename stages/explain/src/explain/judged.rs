@@ -1,6 +1,7 @@
 //! The result of a search, and the findings in it.
 
 use crate::data::problem::Problem;
+use crate::data::remedies::Slip;
 use crate::fit::fitted::Fit;
 use crate::report::findings::Named;
 use crate::report::schema::Undetectable;
@@ -19,4 +20,12 @@ pub struct Judged {
     pub undetectable: Vec<Undetectable>,
     /// By joint, whether its standstills are compared.
     pub rests_count: Vec<bool>,
+}
+
+/// Why a search did not begin.
+pub enum Stop {
+    /// The recordings allow no verdict.
+    Reason(String),
+    /// They must be mended first.
+    Slips(Vec<Slip>),
 }

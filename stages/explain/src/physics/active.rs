@@ -91,6 +91,9 @@ impl Hypothesis {
         let Some(joint) = self.only_joint() else {
             return false;
         };
+        if self.effect.traits.holds_at_rest {
+            return true;
+        }
         let site = self.place.site(model);
         let middle = |c: &Coordinate| match c.kind {
             CoordinateKind::Factor { .. } => 1.0,

@@ -24,7 +24,8 @@ impl Context<'_> {
         (gain, deviation)
     }
 
-    /// An effect in the format of `twin.yaml`.
+    /// An effect in the format of `twin.yaml`. Of one that changes steadily, the simpler one as it is at the end of the
+    /// recordings: how it goes on is not known.
     fn spec(&self, active: &Active) -> TermSpec {
         let model = &self.input.model;
         let place = active.hypothesis.place;
@@ -34,7 +35,17 @@ impl Context<'_> {
             source: place.source,
             link: place.link,
         };
-        TermSpec::of(&*active.term(model), &site)
+        TermSpec::of(&*active.term(model), &site).at_session(self.session_end_s())
+    }
+
+    /// When the last recording ends \[s from the start of the session\].
+    fn session_end_s(&self) -> f64 {
+        let recordings = self.input.fit.iter().chain(&self.input.holdout);
+        let ends = recordings.map(|recording| {
+            let start_ns = recording.start_ns - self.session_start_ns;
+            start_ns as f64 * 1e-9 + recording.time_s.last().copied().unwrap_or(0.0)
+        });
+        ends.fold(0.0, f64::max)
     }
 
     /// The bodies of an explanation that load the gears for more than a moment.

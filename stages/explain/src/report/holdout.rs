@@ -148,6 +148,23 @@ impl Context<'_> {
         Ok(best.1)
     }
 
+    /// RMS error by joint of the twin as it is on the hold-out recordings \[effort unit\]; NaN where no effort was recorded.
+    ///
+    /// # Errors
+    /// If a term of the start cannot be built for the robot.
+    pub fn rigid_errors(&self) -> Result<Vec<f64>, TermError> {
+        let n = self.unit_nm.len();
+        let motion_hz = Problem::motion_cutoff_hz(Problem::cutoff_hz(&self.input.fit));
+        let mut errors = Errors::new(n);
+        for recording in &self.input.holdout {
+            let track = self.track(recording, motion_hz)?;
+            let rows = track.rigid.iter().zip(&track.beside).enumerate();
+            let twin = rows.map(|(k, (rigid, beside))| rigid / self.unit_nm[k % n] + beside);
+            errors.add(recording, &twin.collect::<Vec<_>>());
+        }
+        Ok(errors.rms())
+    }
+
     /// Runs the corrected twin over the hold-out recordings.
     pub fn proof(&self, problem: &Problem, scaled: &Fit, found: &Fit) -> Result<Proof, TermError> {
         let n = self.unit_nm.len();

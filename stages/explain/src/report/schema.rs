@@ -7,6 +7,7 @@ use serde_json::Value;
 use tauscope_dynamics::terms::{effect, words};
 
 use crate::report::sentences::in_amperes;
+use crate::report::slip_words;
 
 /// The report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -47,6 +48,18 @@ pub struct Report {
     pub noise_floor: Vec<f64>,
     /// By hold-out recording, the file with the corrected twin's effort.
     pub holdout_predictions: BTreeMap<String, String>,
+}
+
+impl Report {
+    /// Whether all but the faults that are listed first is of the recordings without these faults.
+    pub fn is_of_mended(&self) -> bool {
+        self.findings.iter().any(Finding::is_slip)
+    }
+
+    /// Whether there is a corrected twin for a pipeline. One of mended recordings would not fit what the robot publishes.
+    pub fn hands_out_twin(&self) -> bool {
+        self.verdict != Verdict::NotEvaluated && !self.is_of_mended()
+    }
 }
 
 /// The answer of an explanation in one word.
@@ -126,8 +139,14 @@ impl Finding {
     /// The effect, by the name that [`tauscope_dynamics::terms`] knows it by: that of an `unknown` with a law is its `kind`.
     pub fn known_as(&self) -> &str {
         let kind = self.parameters.get("kind").and_then(Value::as_str);
-        kind.filter(|kind| effect(kind).is_some_and(|e| e.said() == self.effect))
+        let is_law = |kind: &str| effect(kind).is_some_and(|e| e.said() == self.effect);
+        kind.filter(|kind| is_law(kind) || slip_words::words(kind).is_some())
             .unwrap_or(&self.effect)
+    }
+
+    /// Whether it is a fault of the recordings, or of what is said of them, and no physics.
+    pub fn is_slip(&self) -> bool {
+        slip_words::words(self.known_as()).is_some()
     }
 
     /// A parameter's name without its unit, and the unit that its number is in.

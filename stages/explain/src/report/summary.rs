@@ -1,15 +1,18 @@
 //! The verdict in a sentence.
 
+use crate::report::look_at::look_at;
 use crate::report::schema::{Finding, Remaining, Verdict};
 use crate::report::sentences::{UNCHANGED, error_left};
 
-/// The verdict in a sentence. `errors` are those on held-out recordings by joint, before and after.
+/// The verdict in a sentence. `errors` are those on held-out recordings by joint, before and after. Where the arm was sound
+/// before and `has_changed`, the likely part is named.
 pub fn summary(
     verdict: Verdict,
     findings: &[Finding],
     remaining: &[Remaining],
     joints: &[String],
     errors: [&[f64]; 2],
+    has_changed: bool,
 ) -> String {
     let proof = proof(joints, errors);
     let remains = remaining.iter().max_by(|a, b| {
@@ -29,6 +32,8 @@ pub fn summary(
             // That with the largest effort, as far as sizes are known.
             let larger = |a: &&Finding, b: &&Finding| a.effort_rms.total_cmp(&b.effort_rms);
             let first = findings.iter().rev().max_by(larger);
+            let part = first.filter(|_| has_changed).and_then(look_at);
+            let part = part.map_or_else(String::new, |part| format!(" Look there first: {part}"));
             let first = first.map_or("", |finding| finding.sentence.as_str());
             let more = match findings.len() {
                 0 | 1 => String::new(),
@@ -40,7 +45,7 @@ pub fn summary(
             } else {
                 format!(" {remains}")
             };
-            format!("{first}{more}{proof}{remains}")
+            format!("{first}{part}{more}{proof}{remains}")
         }
     }
 }

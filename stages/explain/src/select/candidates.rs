@@ -99,3 +99,54 @@ impl Search<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{at_joint, problem_with};
+
+    /// Whether there is more evidence for the effect `name` in the second joint than for what else may act there.
+    fn is_before_its_rivals(name: &str, add: impl FnMut(&[f64], &[f64], &mut [f64])) -> bool {
+        let problem = problem_with(5, add);
+        let nothing = Fit::new(&problem, Vec::new());
+        let base = Base::new(&problem, &nothing, 40);
+        let evidence = |name| {
+            let proposal = base.propose(at_joint(name, 1));
+            proposal.map_or(f64::NEG_INFINITY, |proposal| proposal.evidence())
+        };
+        let rivals = [
+            "drive_deadband",
+            "sensor_hysteresis",
+            "friction_drift",
+            "coulomb_friction",
+            "asymmetric_coulomb",
+            "load_dependent_friction",
+            "gear_efficiency",
+            "torque_bias",
+            "torque_gain",
+            "counterbalance_spring",
+            "torque_saturation",
+        ];
+        let mut rivals = rivals.into_iter().filter(|rival| *rival != name);
+        let own = evidence(name);
+        own > LEAST_EVIDENCE && rivals.all(|rival| evidence(rival) < own)
+    }
+
+    #[test]
+    fn what_a_drive_loses_is_told_from_what_turns_with_the_motion() {
+        assert!(is_before_its_rivals("drive_deadband", |_, _, effort| {
+            effort[1] += 0.4 * effort[1].signum();
+        }));
+    }
+
+    #[test]
+    fn a_sensor_that_lags_behind_its_torque_is_told_from_friction() {
+        let (mut before, mut stop) = (0.0, 0.0_f64);
+        assert!(is_before_its_rivals("sensor_hysteresis", |_, _, effort| {
+            let change = effort[1] - before;
+            before = effort[1];
+            stop = (stop + change).clamp(-1.5, 1.5);
+            effort[1] -= 0.3 * stop;
+        }));
+    }
+}

@@ -14,6 +14,9 @@ use crate::select::search::Search;
 /// Where the residual is far above the noise, share of it that an effect must explain to be added.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LOUD_SIZE: f64 = 0.25;
+/// Proposals of effects that the list of names lacks that are refined beside those of the list before one is taken.
+/// Tuned: by hand, for what it costs in time; not swept.
+const REFINED_UNLISTED: usize = 2;
 /// Most effects in an explanation, torque scales not counted.
 /// Tuned: by hand, for what it costs in time; not swept.
 const MOST_PIECES: usize = 48;
@@ -74,7 +77,7 @@ impl Search<'_> {
         let mut promising: Vec<&Proposal> = promising.collect();
         // If the most promising proposals fail when refined, those at other joints are tried.
         while !promising.is_empty() {
-            let tried: Vec<&Proposal> = promising.iter().take(REFINED).copied().collect();
+            let tried = to_refine(&promising);
             if let Some(found) = self.best_refined(now, &tried, rival) {
                 return Some(found);
             }
@@ -121,5 +124,56 @@ impl Search<'_> {
             fit: fit.refined_at(self.problem, Some(&joints), rival),
             penalties: [&now.penalties[..], &[proposal.penalty]].concat(),
         }
+    }
+}
+
+/// Proposals of a round that are refined before one is taken: the first of the list of names, and of those that come
+/// before them the first that the list lacks. Rarer effects that fail must not crowd out the usual ones.
+fn to_refine<'a>(promising: &[&'a Proposal]) -> Vec<&'a Proposal> {
+    let (mut listed, mut unlisted) = (REFINED, REFINED_UNLISTED);
+    let mut tried = Vec::new();
+    for &proposal in promising {
+        let is_off_list = proposal.active.hypothesis.effect.traits.is_off_list;
+        let left = if is_off_list {
+            &mut unlisted
+        } else {
+            &mut listed
+        };
+        if *left > 0 {
+            *left -= 1;
+            tried.push(proposal);
+        }
+        if listed == 0 {
+            break;
+        }
+    }
+    tried
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::at_joint;
+
+    #[test]
+    fn effects_that_the_list_lacks_do_not_crowd_out_those_of_the_list() {
+        let proposal = |effect: &str| Proposal {
+            active: at_joint(effect, 0).with(Vec::new()),
+            gain: 1.0,
+            penalty: 0.0,
+            size: 1.0,
+        };
+        let unlisted = ["friction_drift", "late_brake", "gear_efficiency"];
+        let listed = [
+            "coulomb_friction",
+            "viscous_friction",
+            "torque_bias",
+            "torque_gain",
+        ];
+        let all: Vec<Proposal> = unlisted.into_iter().chain(listed).map(proposal).collect();
+        let tried = to_refine(&all.iter().collect::<Vec<_>>());
+        let tried = tried.iter().map(|p| p.active.hypothesis.effect.name);
+        let expected = [&unlisted[..2], &listed[..3]].concat();
+        assert_eq!(tried.collect::<Vec<_>>(), expected);
     }
 }

@@ -13,9 +13,24 @@ const LONGEST_SHARE: f64 = 0.75;
 /// Tuned: by hand, on no recorded seeds; not swept.
 const BESIDE_S: f64 = 0.5;
 
-/// Whether the times of an effect can be told: an effect that acts once begins and ends within one recording.
+/// What changes steadily changes over the session by at least this share of its larger end: less is what friction does from
+/// day to day.
+/// Tuned: as the least step of friction; not swept.
+const LEAST_DRIFT: f64 = 0.3;
+/// And leaves at least this share of it: no friction comes from nothing or goes for good.
+/// Tuned: as the least that a step of friction leaves; not swept.
+const LEAST_LEFT: f64 = 0.1;
+
+/// Whether the times of an effect can be told: an effect that acts once begins and ends within one recording, and one that
+/// changes steadily changes enough over the session.
 pub fn is_timely(problem: &Problem, active: &Active) -> bool {
     let x = &active.coordinates;
+    if let Some(at) = active.hypothesis.effect.traits.drifts {
+        let (first_s, last_s) = problem.session_s();
+        let (first, last) = (at(x, first_s), at(x, last_s));
+        let (less, more) = (first.min(last), first.max(last));
+        return more - less > LEAST_DRIFT * more && less >= LEAST_LEFT * more;
+    }
     match active.hypothesis.time_kind() {
         TimeKind::Once => {
             let [.., start_s, end_s] = x[..] else {
@@ -64,4 +79,26 @@ pub fn plausible(active: &Active, model: &Model) -> bool {
     let hypothesis = active.hypothesis;
     let site = hypothesis.place.site(model);
     hypothesis.effect.is_plausible(&site, &active.coordinates)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{at_joint, problem_with};
+
+    #[test]
+    fn friction_that_drifts_changes_by_a_third_and_does_not_vanish() {
+        let problem = problem_with(1, |_, _, _| {});
+        let (first_s, last_s) = problem.session_s();
+        let drifts = |first: f64, last: f64| {
+            let growth = (last - first) / (last_s - first_s);
+            let drift = at_joint("friction_drift", 0);
+            is_timely(
+                &problem,
+                &drift.with(vec![first - growth * first_s, growth]),
+            )
+        };
+        assert!(drifts(1.0, 2.0) && drifts(2.0, 1.0));
+        assert!(!drifts(1.0, 1.2) && !drifts(1.0, 0.05));
+    }
 }

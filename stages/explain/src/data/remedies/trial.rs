@@ -1,8 +1,9 @@
-//! The fit of a robot to the data after a change, beside offset, Coulomb and viscous friction in each joint.
+//! The fit of a robot to the data after a change, beside offset, gain, Coulomb and viscous friction in each joint.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use tauscope_dynamics::{Data, Inertia, Model, gravity_effort, rnea};
 
+use super::{Reading, Remedy};
 use crate::data::efforts::TrackEfforts;
 use crate::data::problem::Problem;
 use crate::data::track::Track;
@@ -17,6 +18,15 @@ const TURNED_RAD: f64 = 0.5;
 /// A joint is compared if its effort varies by at least this many times the noise.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const STRONG: f64 = 5.0;
+/// A joint with fewer rows than this is not compared.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const LEAST_ROWS: usize = 20;
+/// A measured torque is between these times the required one: gain errors of sensors and wrong bodies.
+/// Physical: as `effort_scale::SURE_SCALE`.
+const GAINS_OF_TORQUE: [f64; 2] = [0.5, 2.0];
+/// A current may be any share of the torque, of the same sign.
+/// Physical: torque constants are positive.
+const GAINS_OF_CURRENT: [f64; 2] = [0.0, f64::INFINITY];
 /// Added to the diagonal of the normal equations, as a share of their trace.
 /// Resolution: far above the rounding of f64, far below what the noise hides.
 const RIDGE: f64 = 1e-9;
@@ -24,114 +34,176 @@ const RIDGE: f64 = 1e-9;
 /// The data that every remedy is tried on.
 pub(super) struct Trial<'a> {
     problem: &'a Problem,
-    /// The twin's effort as a signal.
-    pub own: Vec<f64>,
+    /// Limits of the slope of measured over required effort.
+    gains: [f64; 2],
+    /// By joint, the rows that count.
+    rows: Vec<Vec<Counted>>,
 }
 
-/// A joint's rows that count: 1, direction, speed.
-type Friction = Vec<[f64; 3]>;
+/// A row of a joint that counts.
+struct Counted {
+    row: usize,
+    recording: usize,
+    velocity: f64,
+}
+
+/// What a model leaves of a joint's measured effort, beside friction and a gain.
+#[derive(Debug, Clone)]
+pub(super) struct Left {
+    /// Sum of squares by recording, no less than that of the noise.
+    pub squares: Vec<f64>,
+    /// Rows.
+    pub count: f64,
+    /// Sum of squares that friction alone leaves.
+    pub beside_friction: f64,
+}
+
+impl Left {
+    /// RMS error.
+    pub fn rms(&self) -> f64 {
+        (self.squares.iter().sum::<f64>() / self.count).sqrt()
+    }
+
+    /// Share of the variance beside friction that is left.
+    pub fn share(&self) -> f64 {
+        self.squares.iter().sum::<f64>() / self.beside_friction
+    }
+}
 
 impl<'a> Trial<'a> {
-    pub fn new(problem: &'a Problem) -> Self {
+    pub fn new(problem: &'a Problem, is_scaled: bool) -> Self {
+        let gains = if is_scaled {
+            GAINS_OF_TORQUE
+        } else {
+            GAINS_OF_CURRENT
+        };
+        let rows = (0..problem.joints).map(|j| counted(problem, j)).collect();
         Self {
             problem,
-            own: problem.rigid().to_vec(),
+            gains,
+            rows,
         }
     }
 
-    /// The efforts of `model` over the motion that `track` gives.
+    /// The efforts over the motion that `of` gives for each track, as a signal.
     fn efforts(&self, mut of: impl FnMut(&Track) -> Vec<f64>) -> Vec<f64> {
         let tracks = self.problem.tracks.iter();
         let efforts: TrackEfforts = tracks.map(|track| of(&track.track)).collect();
         self.problem.signal(&efforts)
     }
 
-    /// The twin's effort where the position of each joint that turns is multiplied by `factor`.
-    pub fn moved(&self, factor: impl Fn(usize) -> f64) -> Vec<f64> {
-        let model = &self.problem.model;
-        let mut data = Data::new(model);
-        let slides = tauscope_dynamics::JointKind::Prismatic;
-        let factor: Vec<f64> = (model.joints().iter().enumerate())
-            .map(|(j, joint)| {
-                let factor = factor(j);
-                if joint.kind == slides {
-                    factor.signum()
-                } else {
-                    factor
-                }
-            })
-            .collect();
+    /// The twin's effort, as a signal, for the positions and the gravity of a reading.
+    pub fn model(&self, reading: &Reading) -> Vec<f64> {
+        let mut model = self.problem.model.clone();
+        if !reading.weighs {
+            model.set_gravity([0.0; 3]);
+        }
+        let mut data = Data::new(&model);
         let times = |all: &[f64]| -> Vec<f64> {
-            all.iter()
-                .zip(&factor)
-                .map(|(x, factor)| x * factor)
-                .collect()
+            let pairs = all.iter().zip(&reading.position);
+            pairs.map(|(x, factor)| x * factor).collect()
         };
         self.efforts(|track| {
             let mut effort = Vec::with_capacity(track.position.len());
             track.each(|_, at| {
                 let [q, qd, qdd] = [at.position, at.velocity, at.acceleration].map(times);
-                effort.extend_from_slice(rnea(model, &mut data, &q, &qd, &qdd));
+                effort.extend_from_slice(rnea(&model, &mut data, &q, &qd, &qdd));
             });
             effort
         })
     }
 
-    /// The rows of a joint that count, and its friction there.
-    fn rows(&self, joint: usize) -> (Vec<usize>, Friction) {
-        let first = self.problem.joint_rows(joint).start;
-        let (mut rows, mut friction) = (Vec::new(), Vec::new());
-        for track in &self.problem.tracks {
-            for (row, &k) in track.rows().zip(&track.compared) {
-                if self.problem.weight[first + row] > 0.0 {
-                    let velocity = track.track.velocity[k * self.problem.joints + joint];
-                    let sign = if velocity.abs() < MOVES {
-                        0.0
-                    } else {
-                        velocity.signum()
-                    };
-                    rows.push(row);
-                    friction.push([1.0, sign, velocity]);
-                }
-            }
-        }
-        (rows, friction)
+    /// By joint, what `model` leaves of the effort that a reading takes for its. Nothing for joints with hardly any effort.
+    pub fn left(&self, model: &[f64], reading: &Reading) -> Vec<Option<Left>> {
+        let of = |joint: usize| self.left_of(joint, model, reading);
+        (0..self.problem.joints).map(of).collect()
     }
 
-    /// By joint, the share of the measured variance beside friction that `model` leaves. A joint's measured effort is
-    /// that of the channel, times the sign, that `channel` gives. Joints with hardly any effort are left out.
-    pub fn left(&self, model: &[f64], channel: impl Fn(usize) -> (usize, f64)) -> Vec<f64> {
-        let mut all = Vec::new();
-        for joint in 0..self.problem.joints {
-            let (rows, friction) = self.rows(joint);
-            let (from, sign) = channel(joint);
-            let first = self.problem.joint_rows(from).start;
-            let own = self.problem.joint_rows(joint).start;
-            let measured: Vec<f64> = (rows.iter())
-                .map(|row| sign * self.problem.measured[first + row])
-                .collect();
-            let without: Vec<f64> = (rows.iter().zip(&measured))
-                .map(|(row, measured)| measured - model[own + row])
-                .collect();
-            let (before, after) = (beside(&friction, &measured), beside(&friction, &without));
-            let noise = STRONG * self.problem.white_noise[from];
-            if rows.len() > 3 && before > noise * noise * rows.len() as f64 {
-                all.push(after / before);
-            }
+    fn left_of(&self, joint: usize, model: &[f64], reading: &Reading) -> Option<Left> {
+        let rows = &self.rows[joint];
+        let from = self.problem.joint_rows(reading.column[joint]).start;
+        let own = self.problem.joint_rows(joint).start;
+        let measured = rows
+            .iter()
+            .map(|r| reading.effort[joint] * self.problem.measured[from + r.row]);
+        let measured = DVector::from_iterator(rows.len(), measured);
+        let required = rows.iter().map(|r| model[own + r.row]);
+        let required = DVector::from_iterator(rows.len(), required);
+        let friction = friction(rows, reading.position[joint]);
+        let (_, beside) = least_squares(&friction, &measured);
+        let noise = self.problem.white_noise[reading.column[joint]].max(f64::MIN_POSITIVE);
+        let enough = rows.len() > LEAST_ROWS;
+        let strong = beside.norm_squared() > (STRONG * noise).powi(2) * rows.len() as f64;
+        if !enough || !strong {
+            return None;
         }
-        all
+        let residual = self.residual(&friction, &measured, &required, self.is_known(joint));
+        // No sum is zero, not even where a recording has no row that counts.
+        let mut squares = vec![noise * noise; self.problem.tracks.len()];
+        for (row, error) in rows.iter().zip(residual.iter()) {
+            squares[row.recording] += error * error + noise * noise;
+        }
+        Some(Left {
+            squares,
+            count: rows.len() as f64,
+            beside_friction: beside.norm_squared(),
+        })
     }
 
-    /// The factors of `columns` (signals) beside friction that make the twin's effort fit best, and what is then left.
+    /// Whether the twin has friction of the joint already: there may be less of it.
+    fn is_known(&self, joint: usize) -> bool {
+        !self.problem.known_friction[joint].is_empty()
+    }
+
+    /// What a gain within its limits and friction that takes power leave. What is known of the friction may be too much.
+    fn residual(
+        &self,
+        friction: &DMatrix<f64>,
+        measured: &DVector<f64>,
+        required: &DVector<f64>,
+        is_known: bool,
+    ) -> DVector<f64> {
+        let [low, high] = self.gains;
+        let fitted = |friction: &DMatrix<f64>| {
+            let width = friction.ncols();
+            let mut all = friction.clone().insert_column(width, 0.0);
+            all.set_column(width, required);
+            let (numbers, left) = least_squares(&all, measured);
+            let gain = numbers[width].clamp(low, high);
+            if (gain - numbers[width]).abs() <= f64::EPSILON {
+                return (numbers, left);
+            }
+            least_squares(friction, &(measured - gain * required))
+        };
+        let (numbers, left) = fitted(friction);
+        // Averaged over the motion.
+        let power = friction.column(1).dot(&friction.column(2)) * numbers[1]
+            + friction.column(2).norm_squared() * numbers[2];
+        if power >= 0.0 || is_known {
+            return left;
+        }
+        let offset = friction.columns(0, 1).into_owned();
+        fitted(&offset).1
+    }
+
+    /// Physics that may be behind all that does not match, with the effort that the robot then needs.
+    pub fn physics(&self) -> Vec<(Remedy, Vec<f64>)> {
+        let all = [self.base_turned(), self.payload()];
+        all.into_iter().flatten().collect()
+    }
+
+    /// The factors of `columns` (signals) beside friction that make the twin's effort fit best, and that effort.
     fn fitted(&self, start: &[f64], columns: &[Vec<f64>]) -> Option<(DVector<f64>, Vec<f64>)> {
         let p = columns.len();
         let (mut normal, mut right) = (DMatrix::zeros(p, p), DVector::zeros(p));
         for joint in 0..self.problem.joints {
-            let (rows, friction) = self.rows(joint);
+            let rows = &self.rows[joint];
+            let friction = friction(rows, 1.0);
             let first = self.problem.joint_rows(joint).start;
             let left = |of: &dyn Fn(usize) -> f64| {
-                let values: Vec<f64> = rows.iter().map(|row| of(first + row)).collect();
-                residual(&friction, &values)
+                let values = rows.iter().map(|counted| of(first + counted.row));
+                let values = DVector::from_iterator(rows.len(), values);
+                least_squares(&friction, &values).1
             };
             let y = left(&|at| self.problem.measured[at] - start[at]);
             let x: Vec<DVector<f64>> = columns.iter().map(|c| left(&|at| c[at])).collect();
@@ -154,12 +226,11 @@ impl<'a> Trial<'a> {
                 *model += factor * column;
             }
         }
-        let left = self.left(&model, |j| (j, 1.0));
-        Some((factors, left))
+        Some((factors, model))
     }
 
     /// Roll and pitch of the base that fit best, if gravity is then as strong as before.
-    pub fn base_turned(&self) -> Option<([f64; 2], Vec<f64>)> {
+    fn base_turned(&self) -> Option<(Remedy, Vec<f64>)> {
         let model = &self.problem.model;
         let along = |axis: usize| {
             let mut gravity = [0.0; 3];
@@ -167,20 +238,21 @@ impl<'a> Trial<'a> {
             self.against_gravity(gravity)
         };
         let columns: Vec<Vec<f64>> = (0..3).map(along).collect();
-        let mut weightless = self.own.clone();
+        let mut weightless = self.problem.rigid().to_vec();
         for (weightless, weight) in weightless
             .iter_mut()
             .zip(self.against_gravity(model.gravity()))
         {
             *weightless -= weight;
         }
-        let (found, left) = self.fitted(&weightless, &columns)?;
+        let (found, model_turned) = self.fitted(&weightless, &columns)?;
         let found = Vector3::new(found[0], found[1], found[2]);
         let was = Vector3::from(model.gravity());
         let same = (found.norm() / was.norm() - 1.0).abs() < SAME_GRAVITY;
         let upright = was.x == 0.0 && was.y == 0.0;
         let turned = found.angle(&was) > TURNED_RAD;
-        (same && upright && turned).then(|| (turn_to(&found), left))
+        let remedy = Remedy::BaseTurned(turn_to(&found));
+        (same && upright && turned).then_some((remedy, model_turned))
     }
 
     fn against_gravity(&self, gravity: [f64; 3]) -> Vec<f64> {
@@ -197,7 +269,7 @@ impl<'a> Trial<'a> {
     }
 
     /// Mass of the body on the tool that fits best.
-    pub fn payload(&self) -> Option<(f64, Vec<f64>)> {
+    fn payload(&self) -> Option<(Remedy, Vec<f64>)> {
         let robot = &self.problem.model;
         let unit = |k: usize| {
             let mut parameters = [0.0; 10];
@@ -214,27 +286,55 @@ impl<'a> Trial<'a> {
             })
         };
         let columns: Vec<Vec<f64>> = (0..10).map(unit).collect();
-        let (found, left) = self.fitted(&self.own, &columns)?;
-        (found[0] > 0.0).then_some((found[0], left))
+        let (found, loaded) = self.fitted(self.problem.rigid(), &columns)?;
+        (found[0] > 0.0).then_some((Remedy::Payload(found[0]), loaded))
     }
 }
 
-/// What friction leaves of `values`.
-fn residual(friction: &[[f64; 3]], values: &[f64]) -> DVector<f64> {
-    let x = DMatrix::from_fn(values.len(), 3, |a, b| friction[a][b]);
-    let y = DVector::from_column_slice(values);
-    let mut normal = x.transpose() * &x;
-    let ridge = RIDGE * normal.trace() + f64::MIN_POSITIVE;
-    for a in 0..3 {
-        normal[(a, a)] += ridge;
+/// The rows of a joint that count.
+fn counted(problem: &Problem, joint: usize) -> Vec<Counted> {
+    let first = problem.joint_rows(joint).start;
+    let mut rows = Vec::new();
+    for (recording, track) in problem.tracks.iter().enumerate() {
+        for (row, &k) in track.rows().zip(&track.compared) {
+            if problem.weight[first + row] > 0.0 {
+                let velocity = track.track.velocity[k * problem.joints + joint];
+                rows.push(Counted {
+                    row,
+                    recording,
+                    velocity,
+                });
+            }
+        }
     }
-    let solution = normal.cholesky().map(|c| c.solve(&(x.transpose() * &y)));
-    solution.map_or(y.clone(), |solution| y - x * solution)
+    rows
 }
 
-/// The same as a sum of squares.
-fn beside(friction: &[[f64; 3]], values: &[f64]) -> f64 {
-    residual(friction, values).norm_squared()
+/// Columns of an offset, the direction and the speed, where positions are multiplied by `factor`.
+fn friction(rows: &[Counted], factor: f64) -> DMatrix<f64> {
+    DMatrix::from_fn(rows.len(), 3, |row, column| {
+        let velocity = factor * rows[row].velocity;
+        match column {
+            0 => 1.0,
+            // As recorded, so that each reading has the same standstills.
+            1 if rows[row].velocity.abs() < MOVES => 0.0,
+            1 => velocity.signum(),
+            _ => velocity,
+        }
+    })
+}
+
+/// Least squares of `values` on `columns`: the numbers, and what is left.
+fn least_squares(columns: &DMatrix<f64>, values: &DVector<f64>) -> (DVector<f64>, DVector<f64>) {
+    let mut normal = columns.tr_mul(columns);
+    for at in 0..columns.ncols() {
+        normal[(at, at)] += RIDGE * normal[(at, at)] + f64::MIN_POSITIVE;
+    }
+    let right = columns.tr_mul(values);
+    let solution = normal.cholesky().map(|c| c.solve(&right));
+    let solution = solution.unwrap_or_else(|| DVector::zeros(columns.ncols()));
+    let left = values - columns * &solution;
+    (solution, left)
 }
 
 /// Roll and pitch of a base that sees gravity so, with a pitch of a quarter turn at most.

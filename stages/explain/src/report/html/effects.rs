@@ -3,18 +3,19 @@
 use tauscope_dynamics::terms;
 
 use super::number_format::sentence_case;
+use crate::report::slip_words;
 
 /// An effect's name in words.
 pub(super) fn effect_title(effect: &str) -> String {
-    terms::effect(effect).map_or_else(
-        || sentence_case(effect),
-        |effect| effect.words.title.to_owned(),
-    )
+    let of_effect = terms::effect(effect).map(|effect| effect.words.title);
+    let title = of_effect.or_else(|| slip_words::words(effect).map(|words| words.title));
+    title.map_or_else(|| sentence_case(effect), str::to_owned)
 }
 
 /// What an effect is, in a sentence; nothing for one that is not known.
 pub(super) fn effect_meaning(effect: &str) -> Option<&'static str> {
-    terms::effect(effect).map(|effect| effect.words.meaning)
+    let of_effect = terms::effect(effect).map(|effect| effect.words.meaning);
+    of_effect.or_else(|| slip_words::words(effect).map(|words| words.meaning))
 }
 
 /// An effect and where it is: `Coulomb friction of joint3`.

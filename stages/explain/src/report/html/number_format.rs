@@ -16,7 +16,7 @@ pub(super) fn sentence_case(name: &str) -> String {
 }
 
 /// Parameters whose names say too little by themselves.
-const USUAL: [(&str, &str); 12] = [
+const USUAL: [(&str, &str); 16] = [
     ("t_start", "Begins"),
     ("t_end", "Ends"),
     ("coulomb", "Coulomb friction"),
@@ -24,11 +24,15 @@ const USUAL: [(&str, &str); 12] = [
     ("coulomb_negative", "Friction backward"),
     ("coulomb_before", "Friction before"),
     ("coulomb_after", "Friction after"),
+    ("coulomb_start", "Friction at the start"),
+    ("growth", "Change of friction"),
     ("static", "Friction before it slips"),
     ("viscous", "Viscous friction"),
     ("viscous_warm", "Viscous friction, warm"),
     ("viscous_extra_cold", "More of it when cold"),
     ("change_time_session", "Changed at, in the session"),
+    ("turning", "Turns over"),
+    ("release", "Lets go after"),
 ];
 
 /// A parameter's name in words and its unit (empty for a pure number), from its canonical name.

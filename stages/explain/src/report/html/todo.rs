@@ -1,7 +1,7 @@
 //! What to do now: which file to load, what to look at, what to record next; and what the page was made from.
 
 use maud::{Markup, html};
-use tauscope_dynamics::terms::{UNKNOWN, effect, words};
+use tauscope_dynamics::terms::UNKNOWN;
 
 use super::Around;
 use super::effects::effect_title;
@@ -9,6 +9,7 @@ use super::groups::{self, Group};
 use super::number_format::{almost_all, percent};
 use super::proof;
 use super::rivals::trajectory;
+use crate::report::look_at::look_at as part;
 use crate::report::schema::{Finding, NextMotion, Report, Rival, Verdict};
 use crate::report::sentences::{UNCHANGED, error_left};
 
@@ -46,7 +47,13 @@ fn load(report: &Report, around: &Around<'_>) -> Markup {
         .as_deref()
         .filter(|_| report.verdict != Verdict::NotEvaluated)
     else {
-        return html! { p { "Nothing. There is no corrected twin without a verdict." } };
+        return html! {
+            p {
+                @if report.is_of_mended() {
+                    "Nothing yet. The recordings, or what is said of them, must be mended first; then explain them again."
+                } @else { "Nothing. There is no corrected twin without a verdict." }
+            }
+        };
     };
     let left = error_left(&report.holdout_rms_before, &report.holdout_rms_after);
     let in_pipeline = html! {
@@ -118,28 +125,6 @@ fn look_at(report: &Report) -> Markup {
         }
         @if parts.len() > PARTS { p.muted { (parts.len() - PARTS) " more places are below, with smaller efforts." } }
     }
-}
-
-/// What to look at for a finding; nothing where it is no fault.
-fn part(finding: &Finding) -> Option<String> {
-    let effect = effect(finding.known_as())?;
-    let template = effect.words.look_at;
-    if template.is_empty() {
-        return None;
-    }
-    let source = finding
-        .parameters
-        .get("source_joint")
-        .and_then(|source| source.as_str());
-    let place = finding
-        .link
-        .as_deref()
-        .or(finding.joint.as_deref())
-        .unwrap_or("");
-    Some(words::fill(template, |name, _| match name {
-        "source" => source.unwrap_or("the other joint").to_owned(),
-        _ => place.to_owned(),
-    }))
 }
 
 /// The motion that would tell more, or that none is needed.

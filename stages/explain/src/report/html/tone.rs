@@ -31,7 +31,9 @@ impl Tone {
             Verdict::NothingMissing => ("nothing", "✓"),
             Verdict::NotEvaluated => ("none", "–"),
             // A clear remainder at one joint is not averaged away by what is explained at others.
-            Verdict::UnknownRemains if !report.remaining.is_empty() => ("remains", "?"),
+            Verdict::UnknownRemains if !report.remaining.is_empty() || report.is_of_mended() => {
+                ("remains", "?")
+            }
             Verdict::UnknownRemains => return Self::unknown(unknown_share(report)),
         };
         let text = verdict_text(report.verdict).to_owned();

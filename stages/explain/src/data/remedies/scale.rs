@@ -1,0 +1,114 @@
+//! Efforts that are a common factor off, in another unit, or divided by wrong torque constants.
+
+use tauscope_dynamics::effort_scale::EffortScale;
+
+use super::{Remedy, Slip};
+use crate::read::input::Input;
+
+/// Slopes of an arm are the same if each is within this factor of the middle one.
+/// Physical: masses of published URDFs are within a tenth of the real ones, and a gravity torque sums several.
+const SAME: f64 = 1.2;
+/// A common factor further from 1 than this is none of the masses of an arm.
+/// Physical: as [`SAME`]; all bodies of an arm are not wrong by a third in the same direction.
+const OFF: f64 = 1.4;
+/// Joints that must agree.
+/// Physical: one joint's factor is that of its own drive.
+const LEAST_JOINTS: usize = 2;
+/// The same for a factor that a wrong body might have, too.
+/// Physical: a wrong mass of the last link weighs on two joints alike.
+const LEAST_JOINTS_NEAR_1: usize = 3;
+
+/// What is wrong with the scale of efforts, given the slope of measured over required effort by joint that tells.
+pub fn of_scale(input: &Input, slopes: &[(usize, f64)]) -> Option<Slip> {
+    let mut sorted: Vec<f64> = slopes.iter().map(|(_, slope)| *slope).collect();
+    sorted.sort_by(f64::total_cmp);
+    let middle = *sorted.get(sorted.len() / 2)?;
+    let off = |from: f64| move |slope: &f64| (slope / from).ln().abs();
+    let is_same = sorted.iter().map(off(middle)).all(|x| x < SAME.ln());
+    let common = is_same && sorted.len() >= LEAST_JOINTS;
+    let scale = EffortScale::of_positive(&sorted);
+    let wrong = matches!(
+        scale,
+        EffortScale::Current { .. } | EffortScale::TooLarge { .. }
+    );
+    let is_off = off(1.0)(&middle) > OFF.ln();
+    let common_off = common && (wrong || is_off && sorted.len() >= LEAST_JOINTS_NEAR_1);
+    let in_amperes = input.effort_unit == "A";
+    let remedy = match (in_amperes, input.torque_constants_nm_per_a.is_some()) {
+        (true, false) => (common && !is_off).then_some(Remedy::IsTorque),
+        (true, true) if common_off => Some(Remedy::ConstantsScaled(1.0 / middle)),
+        (true, true) => wrong.then_some(Remedy::ConstantsWrong),
+        (false, _) if common_off => Some(Remedy::EffortScaled(middle)),
+        (false, _) => matches!(scale, EffortScale::Current { .. }).then_some(Remedy::IsCurrent),
+    };
+    remedy.map(|remedy| Slip {
+        remedy,
+        mended: Vec::new(),
+        share: 1.0 - (1.0 - (middle - 1.0).abs().min(1.0)).powi(2),
+        slopes: slopes.to_vec(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::model;
+
+    /// What is wrong with efforts in `unit` that have these slopes, given torque constants or not.
+    fn wrong(unit: &str, has_constants: bool, slopes: &[f64]) -> Option<Remedy> {
+        let input = Input {
+            case: String::new(),
+            model: model(),
+            bodies: true,
+            effort_unit: unit.to_owned(),
+            torque_constants_nm_per_a: has_constants.then(|| vec![9.0; slopes.len()]),
+            fit: Vec::new(),
+            holdout: Vec::new(),
+            start: None,
+            without: std::collections::BTreeSet::new(),
+        };
+        let slopes: Vec<(usize, f64)> = slopes.iter().copied().enumerate().collect();
+        of_scale(&input, &slopes).map(|slip| slip.remedy)
+    }
+
+    #[test]
+    fn a_torque_as_required_and_a_current_that_is_said_to_be_one_are_right() {
+        assert_eq!(wrong("Nm", false, &[0.93, 1.0, 1.08]), None);
+        assert_eq!(wrong("Nm", false, &[0.7, 1.0, 1.0]), None);
+        assert_eq!(wrong("A", true, &[0.93, 1.0, 1.08]), None);
+        // The published torque constants of a UR10e.
+        assert_eq!(
+            wrong("A", false, &[1.0 / 10.7, 1.0 / 8.46, 1.0 / 9.0]),
+            None
+        );
+        assert_eq!(wrong("Nm", false, &[]), None);
+    }
+
+    #[test]
+    fn a_unit_that_was_mistaken_is_told() {
+        assert_eq!(
+            wrong("A", false, &[1.15, 1.05, 1.0]),
+            Some(Remedy::IsTorque)
+        );
+        assert_eq!(
+            wrong("Nm", false, &[0.05, 0.12, 0.09]),
+            Some(Remedy::IsCurrent)
+        );
+        assert_eq!(
+            wrong("Nm", false, &[101.0, 99.0, 100.0]),
+            Some(Remedy::EffortScaled(100.0))
+        );
+    }
+
+    #[test]
+    fn torque_constants_that_are_wrong_are_told_with_their_factor_if_they_share_one() {
+        assert_eq!(
+            wrong("A", true, &[0.19, 0.2, 0.21]),
+            Some(Remedy::ConstantsScaled(5.0))
+        );
+        assert_eq!(
+            wrong("A", true, &[0.05, 0.2, 0.3]),
+            Some(Remedy::ConstantsWrong)
+        );
+    }
+}
