@@ -40,11 +40,16 @@ def strip(text):
     return pattern.sub(lambda found: re.sub(r"[^\n]", " ", found.group()), text)
 
 
+def test_modules(code):
+    """Where the inline test modules of `code` (stripped) begin and end."""
+    begin = r"#\[cfg\(test\)\]\s*(?:#\[[^\n]*\]\s*)*(?:pub )?mod \w+ \{"
+    return [(found.start(), closing(code, found.end() - 1)) for found in re.finditer(begin, code)]
+
+
 def without_tests(code):
     """`code` (stripped) without its inline test modules."""
-    for found in reversed(list(re.finditer(r"#\[cfg\(test\)\]\s*(?:#\[[^\n]*\]\s*)*(?:pub )?mod \w+ \{", code))):
-        end = closing(code, found.end() - 1)
-        code = code[: found.start()] + re.sub(r"[^\n]", " ", code[found.start() : end]) + code[end:]
+    for begin, end in test_modules(code):
+        code = code[:begin] + re.sub(r"[^\n]", " ", code[begin:end]) + code[end:]
     return code
 
 
@@ -317,7 +322,10 @@ def measure(root):
 def quoted(text, code, effect):
     """How often `effect` is quoted outside comments and tests."""
     count = 0
+    tests = test_modules(strip(text)) if f'"{effect}"' in text else []
     for found in re.finditer(f'"{effect}"', text):
+        if any(begin <= found.start() < end for begin, end in tests):
+            continue
         line = text.rfind("\n", 0, found.start()) + 1
         end = text.find("\n", found.end())
         # What is stripped of literals and comments keeps something on a line of code; a list of names stands alone.

@@ -20,7 +20,7 @@ const GREET_EVERY: Duration = Duration::from_millis(1);
 /// How a receiver waits, as its [`Wake`] says.
 enum Waiting {
     /// Until an event comes.
-    Woken(Listener<Service>),
+    Woken(Box<Listener<Service>>),
     /// So long between two looks.
     Looks(Duration),
 }
@@ -45,11 +45,11 @@ impl<T: Sample> SharedMemoryReceiver<T> {
     ) -> Result<Self, LinkError> {
         let waiting = match transport.wake.pause() {
             Some(pause) => Waiting::Looks(pause),
-            None => Waiting::Woken(
+            None => Waiting::Woken(Box::new(
                 (transport.events(stream, keep, "")?.listener_builder())
                     .create()
                     .map_err(|error| open_error(stream, &error))?,
-            ),
+            )),
         };
         let back = transport
             .events(stream, keep, "/back")?

@@ -33,7 +33,7 @@ pub fn of_velocity(recordings: &[Recording], n: usize) -> Vec<Slip> {
     let told: Vec<(usize, f64)> = slopes
         .filter_map(|(joint, slope)| Some((joint, slope?)))
         .collect();
-    let is_off = |slope: f64| slope < 1.0 / OFF || slope > OFF;
+    let is_off = |slope: f64| !(1.0 / OFF..=OFF).contains(&slope);
     let off: Vec<(usize, f64)> = (told.iter().copied())
         .filter(|(_, slope)| is_off(*slope))
         .collect();
