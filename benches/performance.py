@@ -4,7 +4,7 @@
 
 It builds the release program and the benchmarks, runs each, and puts what they print between the marks of the document
 (`<!-- figures: NAME -->` to `<!-- end -->`); the words around them are left alone. A part that fails leaves a visible
-line in its place. Without other work on the machine it takes less than a quarter of an hour, builds aside.
+line in its place. Without other work on the machine it takes about half an hour, builds aside.
 """
 
 import argparse
@@ -27,9 +27,10 @@ PARTS = {
     "cells": ("python3 benches/cells.py target/release/tauscope 50 100 150 --processes one", "table"),
     "apart": ("python3 benches/cells.py target/release/tauscope 50 --processes cell", "table"),
     "links": (f"{BENCH} -p tauscope-bus --bench link_latency", "text"),
+    "live": (f"{BENCH} --bench live", "table"),
 }
 # What stands in a folder of its own may need what is not there.
-OUTSIDE = {"pinocchio": ("benches/pinocchio/run.sh", "table")}
+OUTSIDE = {"pinocchio": ("benches/pinocchio/run.sh", "table"), "dora": ("benches/dora/run.sh", "table")}
 
 
 def machine():
