@@ -120,16 +120,15 @@ fn ros_2_hears_a_contact() {
 fn messages_of_a_topic_are_numbered_as_rmw_zenoh_numbers_them() {
     let (mut publisher, _session, heard) = heard_publisher("7/**");
     let key = ros_key::<ros::Bool>("free");
-    let before = heard.lock().unwrap()[&key].len();
+    let count = || heard.lock().unwrap().get(&key).map_or(0, Vec::len);
+    let before = count();
     for ms in 0..20 {
         feed(
             &mut publisher,
             &says(ms, if ms % 2 == 0 { "contact" } else { "free" }),
         );
     }
-    until("all heard", || {
-        heard.lock().unwrap()[&key].len() >= before + 20
-    });
+    until("all heard", || count() >= before + 20);
     let heard = heard.lock().unwrap();
     let attachments: Vec<&Vec<u8>> = heard[&key]
         .iter()
