@@ -244,12 +244,17 @@ impl Effect {
             });
         };
         let known = &self.parameters[index];
-        if !(value.is_finite() && value >= known.minimum) {
+        // Beside a twin that already holds the effect, a term may say that there is less of it.
+        let minimum = match self.words.less {
+            Some(_) if index == 0 => f64::NEG_INFINITY,
+            _ => known.minimum,
+        };
+        if !(value.is_finite() && value >= minimum) {
             return Err(TermError::OutOfRange {
                 effect: self.name,
                 parameter: known.name,
                 value,
-                expected: match known.minimum {
+                expected: match minimum {
                     f64::NEG_INFINITY => "a number".to_owned(),
                     minimum => format!("a number of at least {minimum}"),
                 },
@@ -297,6 +302,12 @@ mod tests {
     }
 
     #[test]
+    fn less_friction_than_the_twin_has_is_a_term() {
+        let less = spec(&VISCOUS.replace("3.0", "-3.0"));
+        assert_eq!(less.build(&joints()).unwrap().coordinates(), [-3.0]);
+    }
+
+    #[test]
     fn what_is_wrong_is_named() {
         let message = |json: &str| spec(json).build(&joints()).unwrap_err().to_string();
         for (from, to, expected) in [
@@ -320,14 +331,14 @@ mod tests {
                 "",
                 "`viscous_friction` needs the parameter `viscous_nms_per_rad`",
             ),
-            (
-                "3.0",
-                "-3.0",
-                "`viscous_nms_per_rad` of `viscous_friction` is -3, it must be a number of at least 0",
-            ),
         ] {
             assert_eq!(message(&VISCOUS.replace(from, to)), expected);
         }
+        let drag = r#"{"effect":"quadratic_drag","joint":"joint1","parameters":{"drag_nms2_per_rad2":-3.0}}"#;
+        assert_eq!(
+            message(drag),
+            "`drag_nms2_per_rad2` of `quadratic_drag` is -3, it must be a number of at least 0"
+        );
         let unknown = message(&VISCOUS.replace("viscous_friction", "viscous"));
         assert!(unknown.starts_with("there is no effect `viscous`; known are: "));
     }
