@@ -5,12 +5,14 @@
 //! - `bare, polling`: a publisher and a subscriber each way, both sides spinning: the floor.
 //! - `bare, waiting`: the same, where the reader sleeps until an event says that a sample was sent.
 //! - `link, shared memory`: our link, which waits in the same way.
+//! - `bare zenoh`: publishers and subscribers of Zenoh alone, over TCP on the loopback device: the floor of the next.
 //! - `link, zenoh`: our link over TCP on the loopback device.
 
 // Without what it measures over, a measurement has no more to say.
 #![allow(clippy::unwrap_used)]
 
 use std::process::{Child, Command};
+use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 use hdrhistogram::Histogram;
@@ -19,6 +21,8 @@ use tauscope_bus::{
     Audience, Domain, Keep, Received, Receiver, Sender, SharedMemory, Transport, TwinState, Zenoh,
     ZenohEndpoints,
 };
+use zenoh::Wait;
+use zenoh::qos::CongestionControl;
 
 #[path = "common/bare.rs"]
 mod bare;
@@ -54,6 +58,7 @@ fn main() {
         "bare, polling",
         "bare, waiting",
         "link, shared memory",
+        "bare zenoh",
         "link, zenoh",
     ];
     let medians = ways.map(|way| {
@@ -72,11 +77,15 @@ fn main() {
         "link over shared memory: {:.2} times bare iceoryx2 that waits as well (p50)",
         medians[2] / medians[1]
     );
+    println!(
+        "link over Zenoh: {:.2} times Zenoh alone (p50)",
+        medians[4] / medians[3]
+    );
 }
 
 fn measure(way: &str) -> Histogram<u64> {
     let domain = Domain::unique();
-    let place = if way == "link, zenoh" {
+    let place = if way.ends_with("zenoh") {
         let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
         format!("tcp/{}", listener.local_addr().unwrap())
     } else {
@@ -126,6 +135,7 @@ fn open(way: &str, place: &str, send: &str, receive: &str) -> Box<dyn Side> {
             let links = SharedMemory::open(&domain).unwrap();
             Box::new(Linked::open(&links, send, receive))
         }
+        "bare zenoh" => Box::new(BareZenoh::open(place, send, receive)),
         _ => {
             let endpoint = vec![place.to_owned()];
             let mut endpoints = ZenohEndpoints::default();
@@ -197,5 +207,68 @@ impl Side for Bare {
 
     fn receive(&mut self) -> i64 {
         self.receiver.receive(|sample| sample.header.stamp_ns)
+    }
+}
+
+/// Publisher and subscriber of one session, and nothing else: no numbers, no log, no thread of ours.
+struct BareZenoh {
+    publisher: zenoh::pubsub::Publisher<'static>,
+    received: mpsc::Receiver<i64>,
+    _subscriber: zenoh::pubsub::Subscriber<()>,
+    _session: zenoh::Session,
+}
+
+impl BareZenoh {
+    fn open(place: &str, send: &str, receive: &str) -> Self {
+        let mut config = zenoh::Config::default();
+        let way = if send == "ping" { "listen" } else { "connect" };
+        for (key, value) in [
+            ("mode", "\"peer\"".to_owned()),
+            ("scouting/multicast/enabled", "false".to_owned()),
+            ("listen/endpoints", "[]".to_owned()),
+            (&format!("{way}/endpoints"), format!("[\"{place}\"]")),
+        ] {
+            config.insert_json5(key, &value).unwrap();
+        }
+        let session = zenoh::open(config).wait().unwrap();
+        let (heard, received) = mpsc::sync_channel(8);
+        let subscriber = session
+            .declare_subscriber(receive.to_owned())
+            .callback(move |sample| {
+                let bytes = sample.payload().to_bytes();
+                let number = bytes.first_chunk().copied().map(i64::from_le_bytes);
+                heard.send(number.unwrap()).unwrap();
+            })
+            .wait()
+            .unwrap();
+        let publisher = session
+            .declare_publisher(send.to_owned())
+            .congestion_control(CongestionControl::Drop)
+            .express(true)
+            .wait()
+            .unwrap();
+        let deadline = Instant::now() + LONG;
+        while !publisher.matching_status().wait().unwrap().matching() {
+            assert!(Instant::now() < deadline, "the other side does not come");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        Self {
+            publisher,
+            received,
+            _subscriber: subscriber,
+            _session: session,
+        }
+    }
+}
+
+impl Side for BareZenoh {
+    fn send(&mut self, number: i64) {
+        let mut bytes = vec![0; size_of::<TwinState>()];
+        bytes[..8].copy_from_slice(&number.to_le_bytes());
+        self.publisher.put(bytes).wait().unwrap();
+    }
+
+    fn receive(&mut self) -> i64 {
+        self.received.recv_timeout(LONG).unwrap()
     }
 }

@@ -90,6 +90,8 @@ impl<T: Sample> ZenohSender<T> {
             .declare_publisher(data_key(stream, keep))
             .encoding(encoding(T::KIND))
             .congestion_control(CongestionControl::Drop)
+            // What is to go together is put as one message; nothing waits for what may come after it.
+            .express(true)
             .wait()
             .map_err(failed)?;
         let theirs = Arc::clone(&shared);
