@@ -14,19 +14,24 @@ mod concealed;
 mod contact_wall;
 mod coulomb_friction;
 mod counterbalance_spring;
+mod delay_line;
 mod drive_deadband;
 mod eccentric_gear;
 mod effect;
+mod encoder_eccentricity;
 mod expansion;
 mod external_push;
 mod friction_drift;
 mod friction_step;
+mod gain_drift;
+mod gain_ripple;
 mod gauge;
 mod gear_efficiency;
 mod ghost;
 mod joint_elasticity;
 mod joint_zero_offset;
 mod late_brake;
+mod late_effort;
 mod law;
 mod link_com;
 mod link_inertia;
@@ -71,6 +76,7 @@ pub use effect::{
 pub use expansion::Expansion;
 pub use gauge::Gauge;
 pub use payload::EFFECT as PAYLOAD;
+pub use payload_pickup::EFFECT as PAYLOAD_PICKUP;
 pub use physics::Physics;
 pub use spec::{TermError, TermSpec};
 pub use table::{Against, EFFECT as UNKNOWN, Table, TableSpec, table};
@@ -108,6 +114,10 @@ pub static EFFECTS: &[&Effect] = &[
     &link_inertia::EFFECT,
     &base_tilt::EFFECT,
     &joint_zero_offset::EFFECT,
+    &encoder_eccentricity::EFFECT,
+    &gain_drift::EFFECT,
+    &gain_ripple::EFFECT,
+    &late_effort::EFFECT,
     &external_push::EFFECT,
     &contact_wall::EFFECT,
     &payload_pickup::EFFECT,

@@ -10,7 +10,7 @@ use super::{
 use crate::Inertia;
 
 /// As a payload, between two times of each recording.
-pub(super) static EFFECT: Effect = Effect {
+pub static EFFECT: Effect = Effect {
     name: "payload_pickup",
     words: Words::new(
         "Payload for a while",

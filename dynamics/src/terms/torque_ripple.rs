@@ -12,8 +12,11 @@ use super::{
 /// known of them.
 /// Tuned: not swept.
 const MOST_WHOLE_CYCLES: f64 = 30.0;
-/// How far from a whole number that is. Tuned: not swept.
+/// How far from a whole number that is, at the most. Tuned: not swept.
 const NEARLY_WHOLE: f64 = 0.15;
+/// And for each cycle: over the range of a joint, slow waves are known the better the fewer they are.
+/// Resolution: over two radians, the phase of a wave is known to a twentieth of a turn.
+const NEARLY_WHOLE_PER_CYCLE: [f64; 2] = [0.03, 0.02];
 
 /// Effort -A sin(n q + φ), searched as the factors of sin n q and cos n q. Of several waves each is a term.
 pub(super) static EFFECT: Effect = Effect {
@@ -66,7 +69,9 @@ pub(super) static EFFECT: Effect = Effect {
         most_at_one_place: 2,
         second: &["amplitude2_nm", "cycles_per_rev2", "phase2_rad"],
         is_made_by_gears: |x| {
-            x[2] >= MOST_WHOLE_CYCLES || (x[2] - x[2].round()).abs() <= NEARLY_WHOLE
+            let [at_none, more] = NEARLY_WHOLE_PER_CYCLE;
+            let nearly = (at_none + more * x[2]).min(NEARLY_WHOLE);
+            x[2] >= MOST_WHOLE_CYCLES || (x[2] - x[2].round()).abs() <= nearly
         },
         ..Traits::NONE
     },

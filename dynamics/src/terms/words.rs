@@ -83,7 +83,7 @@ fn place(inner: &str) -> (&str, Told) {
 }
 
 /// Endings of canonical names and the units they stand for, longer ones before those they end in.
-const UNITS: [(&str, &str); 23] = [
+const UNITS: [(&str, &str); 24] = [
     ("_nms2_per_rad2", "N m s²/rad²"),
     ("_nms_per_rad", "N m s/rad"),
     ("_nm_per_rad", "N m/rad"),
@@ -94,6 +94,7 @@ const UNITS: [(&str, &str); 23] = [
     ("_per_rad", "1/rad"),
     ("_per_nm", "1/(N m)"),
     ("_nm_per_s", "N m/s"),
+    ("_per_s", "1/s"),
     ("_per_rev", "per turn"),
     ("_rad_s2", "rad/s²"),
     ("_rad_s", "rad/s"),

@@ -8,7 +8,8 @@
 pub(crate) mod corrected_twin;
 pub(crate) mod findings;
 pub(crate) mod handed_out;
-pub(crate) mod holdout;
+pub(crate) mod history;
+mod holdout;
 pub mod html;
 pub(crate) mod locate;
 pub(crate) mod look_at;
@@ -20,6 +21,7 @@ pub(crate) mod sentences;
 pub(crate) mod slip_words;
 pub(crate) mod slips;
 pub(crate) mod summary;
+pub(crate) mod varying_delay;
 pub(crate) mod verdict;
 
 pub use next_motion::MOTION_PREFIX;

@@ -3,14 +3,17 @@
 //! The size of a remainder does not tell noise from physics: noise may be slow, and hundreds of times as large as its
 //! fastest changes. So a remainder counts as physics by what noise cannot do:
 //!
-//! - it follows the motion, and a curve of that predicts it in recordings that the curve was not fitted on;
+//! - it follows the motion, and a curve of that, or a sum over the last moments of it (`history.rs`), predicts it in
+//!   recordings that it was not fitted on;
 //! - it is far larger on held-out recordings than on fitted ones, although their efforts change no faster;
 //! - it stands out for moments.
 
 use crate::context::Context;
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
+use crate::report::history;
 use crate::report::schema::Remaining;
+use crate::report::varying_delay::varying_delay;
 use crate::select::evidence::PATCH;
 use crate::select::propose::Base;
 use tauscope_dynamics::terms::TermError;
@@ -70,31 +73,19 @@ impl Left<'_> {
     fn rows(&self, joint: usize) -> Vec<Row> {
         let problem = self.problem;
         let first = problem.joint_rows(joint).start;
+        let rates = rates_of(problem, self.fit, joint);
         let mut rows = Vec::new();
         for (recording, track) in problem.tracks.iter().enumerate() {
-            let own: Vec<usize> = track.rows().collect();
-            let time = |k: usize| track.track.time_s[track.compared[k]];
-            let twin = |k: usize| {
-                let at = first + own[k];
-                problem.measured[at] - self.fit.residual[at]
-            };
-            for k in 0..own.len() {
-                let at = first + own[k];
-                if problem.weight[at] <= 0.0 {
-                    continue;
+            for (row, &k) in track.rows().zip(&track.compared) {
+                let at = first + row;
+                if problem.weight[at] > 0.0 {
+                    rows.push(Row {
+                        recording,
+                        time_s: track.track.time_s[k],
+                        error: self.fit.residual[at],
+                        rate: rates[row],
+                    });
                 }
-                let (before, after) = (k.saturating_sub(1), (k + 1).min(own.len() - 1));
-                let span_s = time(after) - time(before);
-                rows.push(Row {
-                    recording,
-                    time_s: time(k),
-                    error: self.fit.residual[at],
-                    rate: if span_s > 0.0 {
-                        (twin(after) - twin(before)) / span_s
-                    } else {
-                        0.0
-                    },
-                });
             }
         }
         rows
@@ -201,6 +192,7 @@ fn of(
 ) -> Remainders {
     let problem = found.problem;
     let mut remainders = Remainders::default();
+    let late = varying_delay(problem, found.fit, &rates(problem, found.fit));
     for (j, joint) in joints.iter().enumerate() {
         let (here, noise) = (found.rms(j), problem.white_noise[j]);
         let told = |nm: f64| format!("{} {unit}", number(nm / unit_nm[j]));
@@ -210,6 +202,14 @@ fn of(
             sentences.push(format!(
                 "{} remain at joint {joint}, and not as noise: {with}",
                 told(here)
+            ));
+        }
+        if let Some(late) = late.as_ref().filter(|late| late.joints.contains(&j)) {
+            sentences.push(format!(
+                "At joint {joint} {} remain as if the effort came early and late by {:.0} ms, at all joints at once: look at the \
+                 recorder, the bus and their clocks.",
+                told(here),
+                1e3 * late.rms_s
             ));
         }
         if let (Some(held), Some(there)) = (held, there)
@@ -246,6 +246,30 @@ fn of(
     remainders
 }
 
+/// Rate of change of the twin's effort \[N m/s or N/s\], by joint and row.
+pub(super) fn rates(problem: &Problem, fit: &Fit) -> Vec<Vec<f64>> {
+    let joints = 0..problem.joints;
+    joints.map(|joint| rates_of(problem, fit, joint)).collect()
+}
+
+fn rates_of(problem: &Problem, fit: &Fit, joint: usize) -> Vec<f64> {
+    let first = problem.joint_rows(joint).start;
+    let mut rates = vec![0.0; problem.rows];
+    for track in &problem.tracks {
+        let own: Vec<usize> = track.rows().collect();
+        let time = |k: usize| track.track.time_s[track.compared[k]];
+        let twin = |k: usize| problem.measured[first + own[k]] - fit.residual[first + own[k]];
+        for k in 0..own.len() {
+            let (before, after) = (k.saturating_sub(1), (k + 1).min(own.len() - 1));
+            let span_s = time(after) - time(before);
+            if span_s > 0.0 {
+                rates[own[k]] = (twin(after) - twin(before)) / span_s;
+            }
+        }
+    }
+    rates
+}
+
 /// How many times as fast the effort changes on held-out recordings, in words.
 fn than(faster: f64) -> String {
     if faster <= 1.0 {
@@ -271,20 +295,33 @@ fn follows_motion(found: Left<'_>, before: &Fit, joint: usize) -> Option<String>
     if fit.squares[joint] <= 0.0 || problem.tracks.len() < 2 {
         return None;
     }
-    let curve = Base::new(problem, fit, 1).propose_curve(joint)?;
-    let share = curve.carried.filter(|_| curve.repeats)?;
+    let names: Vec<String> = problem.model.joint_names().map(str::to_owned).collect();
     // What effects are known to do is not known to the last percent.
     let known = (before.squares[joint] - fit.squares[joint]).max(0.0);
-    if share * fit.squares[joint] < PATCH * known {
-        return None;
-    }
-    let table = curve.active.curve.as_ref()?;
-    let names: Vec<String> = problem.model.joint_names().map(str::to_owned).collect();
-    Some(format!(
-        "what remains depends on {}, and a curve of that predicts {:.0} % of its square in recordings that it was not fitted on.",
-        table.depends_on(joint, &names),
-        100.0 * share
-    ))
+    let is_worth_telling = |share: f64| share * fit.squares[joint] >= PATCH * known;
+    let told = |on: &str, by: &str, share: f64| {
+        format!(
+            "what remains depends on {on}, and {by} of that predicts {:.0} % of its square in recordings that it was not fitted on.",
+            100.0 * share
+        )
+    };
+    let curve = Base::new(problem, fit, 1).propose_curve(joint);
+    let of_curve = curve.and_then(|curve| {
+        let share = curve.carried.filter(|_| curve.repeats)?;
+        let on = curve.active.curve.as_ref()?.depends_on(joint, &names);
+        is_worth_telling(share).then(|| told(&on, "a curve", share))
+    });
+    let of_arm = !problem.is_foreign;
+    of_curve.or_else(|| {
+        let history = history::predicts(problem, fit, joint, &names).filter(|_| of_arm)?;
+        // Errors of clocks and derivatives follow the motion, too.
+        let rows = found.rows(joint);
+        let cost = clock_s(&problem.tracks[0].track.time_s) * rms_rate(&rows);
+        let is_more =
+            history.share.sqrt() * found.rms(joint) > cost.max(problem.white_noise[joint]);
+        (is_more && is_worth_telling(history.share))
+            .then(|| told(&history.on, "a sum", history.share))
+    })
 }
 
 /// Whether the error of a joint is much larger on held-out recordings, and how many times as fast as on the fitted ones the

@@ -4,15 +4,23 @@ use tauscope_dynamics::terms::UNKNOWN;
 
 use crate::report::schema::{Finding, Remaining, Verdict};
 
+/// A finding with less confidence names nothing.
+/// Statistical: it is more likely wrong than right.
+const NAMES: f64 = 0.5;
+
 /// The verdict, given what remains beyond the noise. Where the `twin_is_topic`, a remainder beside findings decides
-/// nothing: another simulation has its own delays and friction, and they are no physics of the arm.
+/// nothing: another simulation has its own delays and friction, and they are no physics of the arm. Where no finding is
+/// more likely right than wrong, something is there that nobody has named.
 pub fn verdict(findings: &[Finding], remaining: &[Remaining], twin_is_topic: bool) -> Verdict {
     let described = findings.iter().any(|f| f.effect == UNKNOWN.name);
+    let named = twin_is_topic || findings.iter().any(|f| f.confidence >= NAMES);
     let of_the_arm = !remaining.is_empty() && (!twin_is_topic || findings.is_empty());
     if described || of_the_arm {
         Verdict::UnknownRemains
     } else if findings.is_empty() {
         Verdict::NothingMissing
+    } else if !named {
+        Verdict::UnknownRemains
     } else {
         Verdict::Explained
     }

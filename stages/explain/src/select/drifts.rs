@@ -3,7 +3,7 @@
 use tauscope_dynamics::terms::Against;
 
 use crate::fit::fitted::Fit;
-use crate::physics::active::Active;
+use crate::physics::active::{Active, Hypothesis};
 use crate::select::explanation::{Explanation, describe};
 use crate::select::plausible::is_timely;
 use crate::select::search::Search;
@@ -38,7 +38,13 @@ impl Search<'_> {
         }
         let joint = active.hypothesis.place.joint;
         let mut all = self.hypotheses.iter();
-        let drifts = all.find(|h| h.effect.traits.drifts.is_some() && h.place.joint == joint)?;
+        let is_friction = |h: &Hypothesis| {
+            let simpler = h.effect.simpler;
+            simpler.is_some_and(|simpler| simpler.effect.is_plain_friction())
+        };
+        let drifts = all.find(|h| {
+            h.effect.traits.drifts.is_some() && is_friction(h) && h.place.joint == joint
+        })?;
         let ends = active.values_at_knots(line);
         let growth = (ends[1] - ends[0]) / (last_s - first_s);
         let drift = drifts.with(vec![ends[0] - growth * first_s, growth]);

@@ -17,6 +17,9 @@ const BESIDE_S: f64 = 0.5;
 /// day to day.
 /// Tuned: as the least step of friction; not swept.
 const LEAST_DRIFT: f64 = 0.3;
+/// A gain that changes steadily changes by at least this share: less is what the fit of a wrong body does.
+/// Physical: a motor that warms up by 10 K.
+const LEAST_GAIN_DRIFT: f64 = 0.01;
 /// And leaves at least this share of it: no friction comes from nothing or goes for good.
 /// Tuned: as the least that a step of friction leaves; not swept.
 const LEAST_LEFT: f64 = 0.1;
@@ -29,7 +32,12 @@ pub fn is_timely(problem: &Problem, active: &Active) -> bool {
         let (first_s, last_s) = problem.session_s();
         let (first, last) = (at(x, first_s), at(x, last_s));
         let (less, more) = (first.min(last), first.max(last));
-        return more - less > LEAST_DRIFT * more && less >= LEAST_LEFT * more;
+        let least = if active.hypothesis.effect.traits.is_scale {
+            LEAST_GAIN_DRIFT
+        } else {
+            LEAST_DRIFT
+        };
+        return more - less > least * more && less >= LEAST_LEFT * more;
     }
     match active.hypothesis.time_kind() {
         TimeKind::Once => {

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use tauscope_dynamics::Model;
-use tauscope_dynamics::terms::{Against, PlaceKind, UNKNOWN};
+use tauscope_dynamics::terms::{Against, PAYLOAD_PICKUP, PlaceKind, UNKNOWN};
 
 use crate::data::problem::Problem;
 use crate::physics::active::{Active, Hypothesis, TimeKind};
@@ -44,6 +44,45 @@ pub fn doubt(named: &mut Named, problem: &Problem, actives: &[Active]) {
     }
     let pushed = doubt_pushes(&mut named.findings, problem.tracks.len());
     named.notes.extend(pushed);
+    doubt_patched_pushes(&mut named.findings);
+}
+
+/// Doubts a push that only corrects another finding: one that lasts exactly as long as a picked-up payload is held, and
+/// one of two that overlap on different links and explain next to nothing.
+fn doubt_patched_pushes(findings: &mut [Finding]) {
+    let largest = findings.iter().map(|f| f.explains).fold(0.0, f64::max);
+    let is_patch = |push: &Finding| {
+        let corrects = |other: &Finding| match &other.recording {
+            None => other.effect == PAYLOAD_PICKUP.name && last_equally_long(push, other),
+            Some(_) => {
+                push.explains < PATCH * largest
+                    && other.explains < PATCH * largest
+                    && other.recording == push.recording
+                    && other.link != push.link
+                    && overlap(push, other)
+            }
+        };
+        push.recording.is_some() && push.link.is_some() && findings.iter().any(corrects)
+    };
+    let patches: Vec<bool> = findings.iter().map(is_patch).collect();
+    let doubted = findings.iter_mut().zip(patches).filter(|(_, patch)| *patch);
+    doubted.for_each(|(finding, _)| doubt_it(finding));
+}
+
+/// Whether two findings begin and end at the same time.
+fn last_equally_long(a: &Finding, b: &Finding) -> bool {
+    let apart = |a: Option<f64>, b: Option<f64>| Some((a? - b?).abs());
+    let starts = apart(a.t_start, b.t_start);
+    let ends = apart(a.t_end, b.t_end);
+    starts
+        .zip(ends)
+        .is_some_and(|(s, e)| s.max(e) < SAME_TIME_S)
+}
+
+/// Whether two findings of one recording act at one time.
+fn overlap(a: &Finding, b: &Finding) -> bool {
+    let before = |a: Option<f64>, b: Option<f64>| a.zip(b).is_some_and(|(a, b)| a < b);
+    before(a.t_start, b.t_end) && before(b.t_start, a.t_end)
 }
 
 /// Doubts findings that explain next to nothing beside the largest one. Called where the explanation does not carry over
@@ -96,15 +135,7 @@ fn doubt_pushes(findings: &mut [Finding], recordings: usize) -> Vec<String> {
     }
     let mut notes = Vec::new();
     for (link, all) in by_link {
-        let apart = |a: Option<f64>, b: Option<f64>| Some((a? - b?).abs());
-        let together = |&i: &usize| {
-            let (a, b) = (&findings[i], &findings[all[0]]);
-            let starts = apart(a.t_start, b.t_start);
-            let ends = apart(a.t_end, b.t_end);
-            starts
-                .zip(ends)
-                .is_some_and(|(s, e)| s.max(e) < SAME_TIME_S)
-        };
+        let together = |&i: &usize| last_equally_long(&findings[i], &findings[all[0]]);
         let same: Vec<usize> = all.iter().copied().filter(together).collect();
         let names: BTreeSet<&String> = same
             .iter()
@@ -210,6 +241,31 @@ mod tests {
         doubt_patches(&mut found);
         let confidence = found.map(|finding| finding.confidence);
         assert!(confidence[0] > 0.9 && confidence[1] > 0.9 && confidence[2] <= DOUBTED);
+    }
+
+    #[test]
+    fn a_push_as_long_as_a_payload_is_held_is_doubted() {
+        let mut found = [push("a", 2.0), push("a", 2.1), push("b", 2.6)];
+        found[0].effect = PAYLOAD_PICKUP.name.to_owned();
+        found[0].recording = None;
+        doubt_patched_pushes(&mut found);
+        let confidence = found.map(|finding| finding.confidence);
+        assert!(confidence[0] > 0.9 && confidence[1] <= DOUBTED && confidence[2] > 0.9);
+    }
+
+    #[test]
+    fn two_pushes_at_once_on_different_links_are_doubted_if_they_explain_next_to_nothing() {
+        let both = |explains: f64| {
+            let mut found = [push("a", 0.0), push("b", 2.0), push("b", 2.5)];
+            found[0].explains = 0.9;
+            found[1].explains = explains;
+            found[2].explains = explains;
+            found[2].link = Some("hand".to_owned());
+            doubt_patched_pushes(&mut found);
+            found.map(|finding| finding.confidence <= DOUBTED)
+        };
+        assert_eq!(both(0.001), [false, true, true]);
+        assert_eq!(both(0.3), [false, false, false]);
     }
 
     #[test]

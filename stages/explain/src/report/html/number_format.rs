@@ -16,7 +16,7 @@ pub(super) fn sentence_case(name: &str) -> String {
 }
 
 /// Parameters whose names say too little by themselves.
-const USUAL: [(&str, &str); 16] = [
+const USUAL: [(&str, &str); 18] = [
     ("t_start", "Begins"),
     ("t_end", "Ends"),
     ("coulomb", "Coulomb friction"),
@@ -25,7 +25,9 @@ const USUAL: [(&str, &str); 16] = [
     ("coulomb_before", "Friction before"),
     ("coulomb_after", "Friction after"),
     ("coulomb_start", "Friction at the start"),
-    ("growth", "Change of friction"),
+    ("growth", "Change"),
+    ("gain_excess_start", "Too large at the start by"),
+    ("share_of_effort", "Share of the effort"),
     ("static", "Friction before it slips"),
     ("viscous", "Viscous friction"),
     ("viscous_warm", "Viscous friction, warm"),

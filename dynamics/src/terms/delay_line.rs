@@ -1,0 +1,90 @@
+//! A memory of efforts, from which they come late.
+
+use super::MotionSample;
+
+/// How many samples are remembered: enough for a second at 1 kHz.
+/// Tuned: from the longest delay and the usual rates; not swept.
+const CAPACITY: usize = 1024;
+
+/// Efforts as they were a while ago, straight between samples. Before the first sample that one is held.
+#[derive(Debug)]
+pub(super) struct DelayLine {
+    delay_s: f64,
+    joint_count: usize,
+    /// Time since the reset \[s\].
+    now_s: f64,
+    /// A ring of times and, joint by joint, of efforts.
+    times_s: Vec<f64>,
+    efforts: Vec<f64>,
+    /// How many were stored since the reset.
+    stored: usize,
+    /// The oldest that may still be asked for; it only moves on.
+    oldest: usize,
+}
+
+impl DelayLine {
+    /// One for efforts of so many joints; a delay below zero is none \[s\].
+    pub fn new(joint_count: usize, delay_s: f64) -> Self {
+        Self {
+            delay_s: delay_s.max(0.0),
+            joint_count,
+            now_s: 0.0,
+            times_s: vec![0.0; CAPACITY],
+            efforts: vec![0.0; CAPACITY * joint_count],
+            stored: 0,
+            oldest: 0,
+        }
+    }
+
+    /// Forgets what came before.
+    pub fn reset(&mut self) {
+        self.now_s = 0.0;
+        self.stored = 0;
+        self.oldest = 0;
+    }
+
+    /// Takes the efforts of the next instant, and puts those in their place that were so long ago.
+    pub fn pass(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
+        self.now_s += at.dt_s.max(0.0);
+        self.store(effort);
+        let wanted_s = self.now_s - self.delay_s;
+        self.oldest = self.oldest.max((self.stored).saturating_sub(CAPACITY));
+        while self.oldest + 2 < self.stored && self.time_s(self.oldest + 1) <= wanted_s {
+            self.oldest += 1;
+        }
+        let (before, after) = (self.oldest, (self.oldest + 1).min(self.stored - 1));
+        let (t0, t1) = (self.time_s(before), self.time_s(after));
+        let share = if t1 > t0 {
+            ((wanted_s - t0) / (t1 - t0)).clamp(0.0, 1.0)
+        } else {
+            1.0
+        };
+        let n = self.joint_count;
+        let (before, after) = ((before % CAPACITY) * n, (after % CAPACITY) * n);
+        for (j, effort) in effort.iter_mut().enumerate() {
+            let (e0, e1) = (self.efforts[before + j], self.efforts[after + j]);
+            *effort = e0 + (e1 - e0) * share;
+        }
+    }
+
+    fn time_s(&self, index: usize) -> f64 {
+        self.times_s[index % CAPACITY]
+    }
+
+    fn store(&mut self, effort: &[f64]) {
+        // More than fits into the ring within the delay is not stored: what was in between is taken
+        // from the straight line. Of three samples the first and last are at least so far apart.
+        let finest_s = 2.0 * self.delay_s / (CAPACITY - 4) as f64;
+        let index = match self.stored {
+            // The newest is always kept; it gives way to the next if it came too soon.
+            n if n >= 2 && self.now_s - self.time_s(n - 2) < finest_s => n - 1,
+            n => {
+                self.stored += 1;
+                n
+            }
+        };
+        let at = index % CAPACITY;
+        self.times_s[at] = self.now_s;
+        self.efforts[at * self.joint_count..][..self.joint_count].copy_from_slice(effort);
+    }
+}

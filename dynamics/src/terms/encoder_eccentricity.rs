@@ -1,0 +1,205 @@
+//! An encoder off centre: its error comes back once or twice per revolution. B. W. Mooring, Z. S. Roth and M. R. Driels,
+//! *Fundamentals of Manipulator Calibration*, 1991, count it among the non-geometric errors of a joint.
+
+use std::f64::consts::PI;
+
+use super::law::array;
+use super::{
+    Coordinate, CoordinateKind, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter,
+    PlaceKind, Scale, Simulated, Term, Traits, Words,
+};
+use crate::{Data, JointKind, Model, rnea};
+
+/// A larger error is none of an encoder \[rad\].
+/// Physical: at arm's length the arm would miss by a hand's width, which nobody overlooks.
+const LARGEST_RAD: f64 = 0.2;
+/// A smaller one is how encoders are made and mounted \[rad\].
+/// Physical: a disc of 50 mm that is off its axis by 0.1 mm.
+const LEAST_RAD: f64 = 0.004;
+/// The error closes after a revolution: its waves are whole numbers of cycles, within what is known of them.
+/// Tuned: as for friction that varies with the angle; not swept.
+const NEARLY_WHOLE: f64 = 0.15;
+
+/// The joint stands at the recorded position q plus A sin(n q + φ), and moves accordingly: the effort of the robot there less
+/// that of the recorded motion. To first order linear in the factors of sin n q and cos n q.
+pub(super) static EFFECT: Effect = Effect {
+    name: "encoder_eccentricity",
+    words: Words::new(
+        "Encoder off centre",
+        "an encoder off centre",
+        "The recorded position is off by an error that comes and goes once or twice per revolution: an encoder disc or ring off \
+         its axis, or a gear with a kinematic error.",
+        "Joint {place}: is its encoder disc or ring mounted off centre, loose or dirty at one side?",
+        "The recorded position of joint {place} is off by up to {amplitude_rad} either way, {cycles_per_rev:ratio} times per \
+         revolution.",
+    ),
+    family: Family::Recording,
+    place: PlaceKind::Joint,
+    layer: Layer::Body,
+    parameters: &[
+        Parameter::at_least("amplitude_rad", 0.0),
+        Parameter::at_least("cycles_per_rev", 0.0),
+        Parameter::any("phase_rad"),
+    ],
+    coordinates: &[
+        factor("sine_rad"),
+        factor("cosine_rad"),
+        Coordinate::shape("cycles_per_rev", 1.0, 2.0, 2, Scale::Linear),
+    ],
+    to_parameters: |c| vec![c[0].hypot(c[1]), c[2], c[1].atan2(c[0])],
+    to_coordinates: |p| {
+        let (sin, cos) = p[2].sin_cos();
+        vec![p[0] * cos, p[0] * sin, p[1]]
+    },
+    simpler: None,
+    limit: Some(|site, x| {
+        let turns = site.model.joints()[site.joint].kind != JointKind::Prismatic;
+        let closes = (x[2] - x[2].round()).abs() <= NEARLY_WHOLE;
+        turns && closes && (LEAST_RAD..=LARGEST_RAD).contains(&x[0].hypot(x[1]))
+    }),
+    excitation: Excitation::Poses,
+    simulated: Simulated::No("the simulated controller reads the joint's true position"),
+    concealed: Some(|draw| {
+        let cycles = f64::from(draw.chance.whole(1, 2));
+        let phase = draw.chance.between(-PI, PI);
+        Drawn::new([1e-3, 0.1], move |size| {
+            vec![
+                ("amplitude_rad", size),
+                ("cycles_per_rev", cycles),
+                ("phase_rad", phase),
+            ]
+        })
+    }),
+    traits: Traits {
+        is_off_list: true,
+        bends: true,
+        ..Traits::NONE
+    },
+    build: |site, values| {
+        Box::new(EncoderEccentricity {
+            joint: site.joint,
+            values: array(values),
+            model: site.model.clone(),
+            data: Data::new(site.model),
+            position: vec![0.0; site.model.dof()],
+            velocity: vec![0.0; site.model.dof()],
+            acceleration: vec![0.0; site.model.dof()],
+        })
+    },
+};
+
+/// A factor whose effect is linear for small values only \[rad\].
+const fn factor(name: &'static str) -> Coordinate {
+    Coordinate {
+        name,
+        kind: CoordinateKind::Factor {
+            step: 1e-3,
+            minimum: f64::NEG_INFINITY,
+        },
+    }
+}
+
+#[derive(Debug)]
+struct EncoderEccentricity {
+    joint: usize,
+    /// Factors of sine and cosine \[rad\], and cycles per revolution.
+    values: [f64; 3],
+    model: Model,
+    data: Data,
+    position: Vec<f64>,
+    velocity: Vec<f64>,
+    acceleration: Vec<f64>,
+}
+
+impl EncoderEccentricity {
+    /// Where the joint truly is, and how it moves there.
+    fn place_truly(&mut self, at: &MotionSample<'_>) {
+        let j = self.joint;
+        self.position.copy_from_slice(at.position);
+        self.velocity.copy_from_slice(at.velocity);
+        self.acceleration.copy_from_slice(at.acceleration);
+        let [sine, cosine, n] = self.values;
+        let (q, qd, qdd) = (at.position[j], at.velocity[j], at.acceleration[j]);
+        let (sin, cos) = (n * q).sin_cos();
+        let error = sine * sin + cosine * cos;
+        let slope = n * (sine * cos - cosine * sin);
+        let bend = -n * n * error;
+        self.position[j] = q + error;
+        self.velocity[j] = qd * (1.0 + slope);
+        self.acceleration[j] = qdd * (1.0 + slope) + bend * qd * qd;
+    }
+}
+
+impl Term for EncoderEccentricity {
+    fn effect(&self) -> &'static Effect {
+        &EFFECT
+    }
+
+    fn coordinates(&self) -> &[f64] {
+        &self.values
+    }
+
+    fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
+        if self.values[0] == 0.0 && self.values[1] == 0.0 {
+            return;
+        }
+        self.place_truly(at);
+        let there = rnea(
+            &self.model,
+            &mut self.data,
+            &self.position,
+            &self.velocity,
+            &self.acceleration,
+        );
+        for (effort, there) in effort.iter_mut().zip(there) {
+            *effort += there;
+        }
+        let recorded = rnea(
+            &self.model,
+            &mut self.data,
+            at.position,
+            at.velocity,
+            at.acceleration,
+        );
+        for (effort, recorded) in effort.iter_mut().zip(recorded) {
+            *effort -= recorded;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{TwoJoints, motion, run};
+    use super::*;
+
+    #[test]
+    fn the_robot_is_where_the_encoder_does_not_say() {
+        let robot = TwoJoints::new();
+        let motion = motion(&robot.model, 50);
+        let mut data = Data::new(&robot.model);
+        let mut term = (EFFECT.build)(&robot.site(), &[0.02, -0.01, 1.0]);
+        let off = |q: f64| 0.02 * q.sin() - 0.01 * q.cos();
+        for (at, added) in motion.iter().zip(run(&mut *term, &motion)) {
+            // The recorded motion as a short path, whose true path is differenced.
+            let path = |t: f64| {
+                let q = at.position[0] + at.velocity[0] * t + 0.5 * at.acceleration[0] * t * t;
+                q + off(q)
+            };
+            let step = 1e-4;
+            let (before, now, after) = (path(-step), path(0.0), path(step));
+            let (mut q, mut qd, mut qdd) = (at.position, at.velocity, at.acceleration);
+            q[0] = now;
+            qd[0] = (after - before) / (2.0 * step);
+            qdd[0] = (after - 2.0 * now + before) / (step * step);
+            let there = rnea(&robot.model, &mut data, &q, &qd, &qdd).to_vec();
+            for j in 0..2 {
+                let expected = there[j] - at.transmitted[j];
+                assert!(
+                    (added[j] - expected).abs() < 1e-3,
+                    "{} {expected}",
+                    added[j]
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! Effort of one joint that is reported late: a channel of its own, a sensor that is read less often than the others.
+
+use super::delay_line::DelayLine;
+use super::law::array;
+use super::{
+    Coordinate, CoordinateKind, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter,
+    PlaceKind, Simulated, Term, Traits, Words,
+};
+
+/// Delays that a channel may have beside the others \[s\]. A channel that is read every T s is late by T / 2 on average.
+/// Physical: from one period of a controller to a channel that is read twice a second.
+const DELAYS_S: std::ops::RangeInclusive<f64> = 0.004..=0.25;
+
+/// Recorded effort of the joint: the true one as it was a while ago.
+pub(super) static EFFECT: Effect = Effect {
+    name: "late_effort",
+    words: Words::new(
+        "Late effort channel",
+        "an effort channel that is late",
+        "The torque of one joint is reported late against its position, and against the other joints.",
+        "Joint {place}: how its torque is read and sent; is its channel slower, filtered or read less often than the others?",
+        "The effort of joint {place} is recorded {delay_s} later than that of the other joints.",
+    ),
+    family: Family::Recording,
+    place: PlaceKind::Joint,
+    layer: Layer::Record,
+    parameters: &[Parameter::at_least("delay_s", 0.0)],
+    coordinates: &[Coordinate {
+        name: "delay_s",
+        kind: CoordinateKind::Factor {
+            step: 1e-3,
+            minimum: 0.0,
+        },
+    }],
+    to_parameters: <[f64]>::to_vec,
+    to_coordinates: <[f64]>::to_vec,
+    simpler: None,
+    limit: Some(|_, x| DELAYS_S.contains(&x[0])),
+    excitation: Excitation::Fast,
+    simulated: Simulated::Record,
+    concealed: Some(|_| Drawn::new([1e-3, 0.2], |delay| vec![("delay_s", delay)])),
+    traits: Traits {
+        is_off_list: true,
+        bends: true,
+        smallest_told_as: Some("delay_s"),
+        ..Traits::NONE
+    },
+    build: |site, values| {
+        let values: [f64; 1] = array(values);
+        Box::new(LateEffort {
+            joint: site.joint,
+            values,
+            line: DelayLine::new(1, values[0]),
+        })
+    },
+};
+
+#[derive(Debug)]
+struct LateEffort {
+    joint: usize,
+    values: [f64; 1],
+    line: DelayLine,
+}
+
+impl Term for LateEffort {
+    fn effect(&self) -> &'static Effect {
+        &EFFECT
+    }
+
+    fn coordinates(&self) -> &[f64] {
+        &self.values
+    }
+
+    fn reset(&mut self) {
+        self.line.reset();
+    }
+
+    fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
+        self.line
+            .pass(at, std::slice::from_mut(&mut effort[self.joint]));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{TwoJoints, sample};
+    use super::*;
+
+    #[test]
+    fn one_joint_comes_late_and_the_others_do_not() {
+        let robot = TwoJoints::new();
+        let mut term = (EFFECT.build)(&robot.site(), &[0.03]);
+        for k in 0..20 {
+            let t = 0.01 * f64::from(k);
+            let dt_s = if k == 0 { 0.0 } else { 0.01 };
+            let mut effort = [t, t];
+            let at = sample(dt_s, t, [0.0; 2], [0.0; 2], [0.0; 2]);
+            term.act(&at.view(), &mut effort);
+            assert!((effort[0] - (t - 0.03).max(0.0)).abs() < 1e-12);
+            assert!((effort[1] - t).abs() < 1e-12);
+        }
+    }
+}
