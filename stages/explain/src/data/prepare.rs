@@ -86,8 +86,11 @@ impl Problem {
                     .map(|at| (recording.effort[at] - full.beside[at]) * unit_nm[j])
                     .collect();
                 let rate = (full.len() - 1) as f64 / recording.duration_s();
-                variances[j]
-                    .push(white_variance(&signal) * cutoff_hz * NOISE_BANDWIDTH / (0.5 * rate));
+                let (white, share) = (
+                    white_variance(&signal),
+                    cutoff_hz * NOISE_BANDWIDTH / (0.5 * rate),
+                );
+                variances[j].push((white * share, white));
                 if kept.len() < full.len() {
                     // Against aliasing.
                     LowPass::new(&full.time_s, ALIASING_RATIO * cutoff_hz).apply(&mut signal);
@@ -117,8 +120,10 @@ impl Problem {
                 problem.measured.extend(&measured[r * n + j]);
                 problem.weight.extend(&weight[r * n + j]);
             }
-            variances[j].sort_by(f64::total_cmp);
-            problem.white_noise[j] = variances[j][variances[j].len() / 2].sqrt();
+            variances[j].sort_by(|(a, _), (b, _)| a.total_cmp(b));
+            let (filtered, unfiltered) = variances[j][variances[j].len() / 2];
+            problem.white_noise[j] = filtered.sqrt();
+            problem.unfiltered_noise[j] = unfiltered.sqrt();
         }
         problem.effective_samples = per_row(&problem);
         problem
@@ -135,6 +140,7 @@ impl Problem {
             measured: Vec::new(),
             weight: Vec::new(),
             white_noise: vec![0.0; n],
+            unfiltered_noise: vec![0.0; n],
             largest_effort: vec![0.0; n],
             cutoff_hz,
             effective_samples: Vec::new(),

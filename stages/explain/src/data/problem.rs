@@ -30,6 +30,8 @@ pub struct Problem {
     /// Standard deviation of the measured effort's white noise after the filter, by joint \[N m\]: the least
     /// that any model can leave.
     pub white_noise: Vec<f64>,
+    /// The same before the filter \[N m\].
+    pub unfiltered_noise: Vec<f64>,
     /// Largest measured effort by joint, unfiltered \[N m\].
     pub largest_effort: Vec<f64>,
     /// Half amplitude of the filter \[Hz\].

@@ -56,7 +56,7 @@ impl Search<'_> {
         best = self.with_listed_names(self.with_drifts_named(best));
         // So far it was refined only as far as comparisons needed. Now its parameters are refined fully.
         best.fit = best.fit.refined(self.problem);
-        self.with_split_pushes(self.with_names_that_hold(best))
+        self.without_hidden(self.with_split_pushes(self.with_names_that_hold(best)))
     }
 
     fn started(&self, start: Vec<Active>, penalties: Vec<f64>) -> Explanation {
