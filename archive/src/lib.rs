@@ -10,8 +10,10 @@ mod fields;
 mod file_kind;
 mod info;
 mod joint_facts;
+mod lerobot;
 mod mcap_file;
 mod mcap_write;
+mod parquet_file;
 mod recording;
 mod repair;
 pub mod ros;
@@ -26,10 +28,15 @@ pub use error::ArchiveError;
 pub use file_kind::file_kind;
 pub use info::{Gap, Info, JointsInfo, TopicInfo};
 pub use joint_facts::JointFacts;
+pub use lerobot::{LerobotError, LerobotProblem};
 pub use mcap_write::{
     CHUNK_SPAN_NS, Compression, McapWriter, PROVENANCE, TopicWriter, WriteError, Written,
 };
-pub use recording::{JointStates, Message, Messages, Recording, RecordingKind, Stamped};
+pub use parquet_file::{ParquetError, ParquetProblem};
+pub use recording::{
+    JointStates, Message, Messages, Recording, RecordingKind, Stamped, is_there, recordings_at,
+    source_files,
+};
 pub use repair::{
     RepairError, Repaired, RepairedFolder, repair, repair_folder, repair_in_place,
     repaired_folder_path, repaired_path,

@@ -1,0 +1,353 @@
+//! Episodes of LeRobot data sets. `data/lerobot_sets.py` makes them; `tests/formats.rs` of the program compares what the
+//! commands find in one with what they find in MCAP.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use tauscope_archive::ros::JointState;
+use tauscope_archive::{
+    ArchiveError, Info, Recording, RecordingKind, is_there, recordings_at, source_files,
+};
+
+fn data() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/lerobot")
+}
+
+/// A copy of a set, to be changed, in a folder of its own.
+fn copy(set: &str) -> (tempfile::TempDir, PathBuf) {
+    fn copy_all(from: &Path, to: &Path) {
+        fs::create_dir_all(to).unwrap();
+        for entry in fs::read_dir(from).unwrap() {
+            let entry = entry.unwrap();
+            let target = to.join(entry.file_name());
+            if entry.path().is_dir() {
+                copy_all(&entry.path(), &target);
+            } else {
+                fs::copy(entry.path(), target).unwrap();
+            }
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path().join(set);
+    copy_all(&data().join(set), &root);
+    (folder, root)
+}
+
+/// Replaces text in `meta/info.json`.
+fn change_info(root: &Path, from: &str, to: &str) {
+    let path = root.join("meta/info.json");
+    let text = fs::read_to_string(&path).unwrap();
+    assert!(text.contains(from), "{text}");
+    fs::write(path, text.replace(from, to)).unwrap();
+}
+
+fn states(path: &Path) -> Vec<JointState> {
+    let recording = Recording::open(path).unwrap();
+    assert_eq!(recording.kind(), RecordingKind::Lerobot);
+    let mut states = recording.joint_states("/joint_states").unwrap();
+    let mut all = Vec::new();
+    while let Some(state) = states.next_state() {
+        all.push(state.unwrap().message.clone());
+    }
+    assert_eq!(all.len() as u64, recording.message_count());
+    all
+}
+
+fn refusal(path: &Path) -> String {
+    match Recording::open(path) {
+        Ok(_) => panic!("{} was opened", path.display()),
+        Err(error) => error.to_string(),
+    }
+}
+
+/// What `lerobot_sets.py` writes into an element.
+fn value(episode: usize, row: usize, element: usize) -> f64 {
+    (0.1 * row as f64 + element as f64 + episode as f64).sin()
+}
+
+fn assert_close(found: f64, expected: f64) {
+    assert!((found - expected).abs() < 1e-5, "{found} for {expected}");
+}
+
+#[test]
+fn an_episode_of_version_2_has_positions_and_efforts() {
+    for (episode, rows) in [(0, 20), (1, 12)] {
+        let path = data().join(format!("aloha/episode_00000{episode}"));
+        let states = states(&path);
+        assert_eq!(states.len(), rows);
+        for (row, state) in states.iter().enumerate() {
+            assert_eq!(state.name[0], "left_waist");
+            assert_eq!(state.name[13], "right_gripper");
+            // The grid of 50 Hz, not the nearest `float32`.
+            assert_eq!(state.header.stamp.ns(), row as i64 * 20_000_000);
+            assert!(state.velocity.is_empty());
+            for joint in 0..14 {
+                assert_close(state.position[joint], value(episode, row, joint));
+                assert_close(state.effort[joint], value(episode, row, 100 + joint));
+            }
+        }
+        assert!(Recording::open(&path).unwrap().check_comparable().is_ok());
+    }
+}
+
+#[test]
+fn episodes_of_version_3_lie_in_common_files() {
+    for (episode, rows) in [(0, 15), (1, 9), (2, 12)] {
+        let states = states(&data().join(format!("openarm/episode_{episode}")));
+        assert_eq!(states.len(), rows);
+        for (row, state) in states.iter().enumerate() {
+            assert_eq!(state.name[6..], ["joint_7", "gripper"]);
+            for joint in 0..8 {
+                let element = |what: usize| 90.0 * value(episode, row, 3 * joint + what);
+                assert!((state.position[joint] - element(0)).abs() < 1e-4);
+                assert!((state.velocity[joint] - element(1)).abs() < 1e-4);
+                assert!((state.effort[joint] - element(2)).abs() < 1e-4);
+            }
+        }
+    }
+}
+
+#[test]
+fn degrees_are_asked_for_and_put_in_rad() {
+    let (_folder, root) = copy("openarm");
+    let path = root.join("episode_000001");
+    let refused = Recording::open(&path)
+        .unwrap()
+        .check_comparable()
+        .unwrap_err();
+    let words = refused.to_string();
+    assert!(
+        words.contains("openarm.columns.yaml") && words.contains("`degrees: true`"),
+        "{words}"
+    );
+    let beside = root.with_file_name("openarm.columns.yaml");
+    fs::write(&beside, "degrees: true\n").unwrap();
+    assert!(Recording::open(&path).unwrap().check_comparable().is_ok());
+    let state = &states(&path)[4];
+    assert_close(state.position[2], 90.0_f64.to_radians() * value(1, 4, 6));
+    assert_close(state.velocity[2], 90.0_f64.to_radians() * value(1, 4, 7));
+    assert!((state.effort[2] - 90.0 * value(1, 4, 8)).abs() < 1e-4);
+    fs::write(&beside, "degrees: false\n").unwrap();
+    assert!(Recording::open(&path).unwrap().check_comparable().is_ok());
+}
+
+#[test]
+fn positions_alone_are_shown_and_said_to_be_too_little() {
+    let path = data().join("so101");
+    let recording = Recording::open(&path).unwrap();
+    let info = Info::read(&recording).unwrap();
+    let joints = info.topics[0].joints.as_ref().unwrap();
+    assert_eq!(joints.names[0], "shoulder_pan");
+    assert!(joints.position && !joints.velocity && !joints.effort);
+    let said = recording.check_comparable().unwrap_err().to_string();
+    for words in [
+        "so101",
+        "no efforts",
+        "observation.state",
+        "observation.effort",
+        "so101.columns.yaml",
+    ] {
+        assert!(said.contains(words), "{said}");
+    }
+    assert!(info.to_string().contains("no efforts"), "{info}");
+}
+
+#[test]
+fn a_file_beside_the_set_names_joints_and_features() {
+    let (_folder, root) = copy("aloha");
+    let beside = root.with_file_name("aloha.columns.yaml");
+    let joints: Vec<String> = (0..14).map(|n| format!("arm_{n}")).collect();
+    let text = format!(
+        "joints: [{}]\neffort: {{names: [action]}}\nvelocity: {{names: [observation.effort]}}\n",
+        joints.join(", ")
+    );
+    fs::write(&beside, text).unwrap();
+    let state = &states(&root.join("episode_000000"))[3];
+    assert_eq!(state.name, joints);
+    assert_close(state.velocity[5], value(0, 3, 105));
+    assert_close(state.effort[5], value(0, 3, 205));
+
+    // One arm of two.
+    let of = |feature: &str| format!("[{feature}.right_waist, {feature}.right_elbow]");
+    let (position, effort) = (of("observation.state"), of("observation.effort"));
+    let text =
+        format!("position: {{names: {position}}}\neffort: {{names: {effort}}}\njoints: [a, b]\n");
+    fs::write(&beside, text).unwrap();
+    let state = &states(&root.join("episode_000000"))[3];
+    assert_eq!(state.name, ["a", "b"]);
+    assert_close(state.position[1], value(0, 3, 9));
+    assert_close(state.effort[1], value(0, 3, 109));
+
+    for (text, words) in [
+        (
+            "joints: [a]\n",
+            "joints: 1 for 14 joints, which the data set calls left_waist",
+        ),
+        (
+            "effort: {names: [observation.current]}\n",
+            "no feature \"observation.current\"",
+        ),
+        ("effort: {first: 3}\n", "give `names`"),
+        ("effort: {names: [timestamp]}\n", "effort: 1 for 14 joints"),
+        ("effrot: 3\n", "effrot"),
+    ] {
+        fs::write(&beside, text).unwrap();
+        let said = refusal(&root.join("episode_000000"));
+        assert!(
+            said.contains("aloha.columns.yaml") && said.contains(words),
+            "{said}"
+        );
+    }
+}
+
+#[test]
+fn names_that_say_nothing_keep_the_order() {
+    let (_folder, root) = copy("aloha");
+    // The names of all features; then of none.
+    change_info(&root, "left_", "motor_");
+    change_info(&root, "\"motors\"", "\"else\"");
+    assert_eq!(
+        states(&root.join("episode_000000"))[0].name[1],
+        "motor_shoulder"
+    );
+    change_info(&root, "\"shape\": [\n    14\n   ]", "\"shape\": [14]");
+    change_info(&root, "motor_waist\",", "motor_waist\", \"one too many\",");
+    let state = &states(&root.join("episode_000000"))[2];
+    assert_eq!(state.name[13], "joint_13");
+    assert_close(state.effort[13], value(0, 2, 113));
+}
+
+#[test]
+fn a_set_is_its_episodes() {
+    let set = data().join("openarm");
+    let all = recordings_at(&set).unwrap();
+    let names = ["episode_000000", "episode_000001", "episode_000002"];
+    assert_eq!(all, names.map(|name| set.join(name)));
+    assert!(all.iter().all(|path| is_there(path)) && !all[0].exists());
+    let said = refusal(&set);
+    for words in [
+        "3 episodes",
+        "openarm/episode_000000",
+        "openarm/episode_000002",
+    ] {
+        assert!(said.contains(words), "{said}");
+    }
+    // One of one may go by the name of the set.
+    assert_eq!(states(&data().join("so101")).len(), 10);
+    assert_eq!(recordings_at(&data().join("so101")).unwrap().len(), 1);
+    // Whatever is none is itself.
+    let other = data().join("nothing");
+    assert_eq!(recordings_at(&other).unwrap(), [other.as_path()]);
+    assert!(!is_there(&other));
+}
+
+#[test]
+fn a_file_with_one_episode_is_that_episode() {
+    let file = data().join("aloha/data/chunk-000/episode_000001.parquet");
+    assert_eq!(states(&file).len(), 12);
+    assert_eq!(
+        states(&data().join("openarm/data/chunk-000/file-001.parquet")).len(),
+        12
+    );
+    let said = refusal(&data().join("openarm/data/chunk-000/file-000.parquet"));
+    assert!(
+        said.contains("2 episodes") && said.contains("openarm/episode_000001"),
+        "{said}"
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let alone = folder.path().join("episode_000001.parquet");
+    fs::copy(file, &alone).unwrap();
+    let said = refusal(&alone);
+    assert!(said.contains("meta/info.json"), "{said}");
+}
+
+#[test]
+fn results_depend_on_the_rows_and_on_what_says_what_they_are() {
+    let (_folder, root) = copy("openarm");
+    let path = root.join("episode_000002");
+    let files = source_files(&path).unwrap();
+    assert_eq!(
+        files,
+        [
+            root.join("data/chunk-000/file-001.parquet"),
+            root.join("meta/info.json")
+        ]
+    );
+    let beside = root.with_file_name("openarm.columns.yaml");
+    fs::write(&beside, "degrees: true\n").unwrap();
+    assert!(source_files(&path).unwrap().contains(&beside));
+}
+
+#[test]
+fn what_is_missing_is_named() {
+    let (_folder, root) = copy("aloha");
+    let said = refusal(&root.join("episode_000007"));
+    assert!(
+        said.contains("no episode 7") && said.contains("episode_000001"),
+        "{said}"
+    );
+    fs::remove_file(root.join("data/chunk-000/episode_000001.parquet")).unwrap();
+    let said = refusal(&root.join("episode_000001"));
+    assert!(
+        said.contains("chunk-000/episode_000001.parquet") && said.contains("download"),
+        "{said}"
+    );
+    fs::remove_file(root.join("meta/info.json")).unwrap();
+    let said = refusal(&root);
+    assert!(said.contains("no meta/info.json"), "{said}");
+
+    let (_folder, root) = copy("openarm");
+    fs::remove_dir_all(root.join("meta/episodes")).unwrap();
+    let said = refusal(&root.join("episode_000000"));
+    assert!(
+        said.contains("meta/episodes") && said.contains("download"),
+        "{said}"
+    );
+    fs::write(root.join("meta/info.json"), "{}").unwrap();
+    assert!(refusal(&root.join("episode_000000")).contains("version unknown"));
+    fs::write(root.join("meta/info.json"), "[1").unwrap();
+    assert!(refusal(&root).contains("no description of a LeRobot data set"));
+}
+
+#[test]
+fn another_episode_in_the_file_of_one_is_noticed() {
+    let (_folder, root) = copy("aloha");
+    let chunk = root.join("data/chunk-000");
+    fs::copy(
+        chunk.join("episode_000001.parquet"),
+        chunk.join("episode_000000.parquet"),
+    )
+    .unwrap();
+    let said = refusal(&root.join("episode_000000"));
+    assert!(
+        said.contains("episode_index 0") && said.contains("the first has 1"),
+        "{said}"
+    );
+}
+
+#[test]
+fn torn_and_changed_tables_are_refused_and_never_a_panic() {
+    let (_folder, root) = copy("aloha");
+    let file = root.join("data/chunk-000/episode_000001.parquet");
+    let whole = fs::read(&file).unwrap();
+    let path = root.join("episode_000001");
+    for length in (0..whole.len()).step_by(97) {
+        fs::write(&file, &whole[..length]).unwrap();
+        let said = refusal(&path);
+        assert!(said.contains("episode_000001.parquet"), "{said}");
+    }
+    let mut refused = 0;
+    for at in 0..whole.len() {
+        let mut changed = whole.clone();
+        changed[at] ^= 0x55;
+        fs::write(&file, &changed).unwrap();
+        match Recording::open(&path) {
+            Ok(recording) => drop(Info::read(&recording).unwrap()),
+            Err(ArchiveError::Parquet(_) | ArchiveError::Lerobot(_)) => refused += 1,
+            Err(other) => panic!("at {at}: {other}"),
+        }
+    }
+    assert!(refused > 200, "{refused}");
+}
