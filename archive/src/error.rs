@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::csv_file::CsvError;
 use crate::damage::{Damage, seconds};
-use crate::lerobot::LerobotError;
+use crate::lerobot_error::LerobotError;
 use crate::parquet_file::ParquetError;
 use crate::ros::{DecodeError, EncodeError};
 

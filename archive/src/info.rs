@@ -129,7 +129,7 @@ impl Info {
             provenance: recording.provenance().cloned(),
             damage,
             obstacle: recording
-                .check_comparable()
+                .check_comparable(&[])
                 .err()
                 .map(|error| error.to_string()),
         })

@@ -9,7 +9,6 @@
 
 mod columns;
 mod cursor;
-mod error;
 mod find;
 mod info;
 mod layout;
@@ -19,10 +18,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::error::ArchiveError;
+use crate::lerobot_error::{LerobotError, LerobotProblem};
 use crate::parquet_file::{ParquetFile, Rows};
 use columns::ColumnsFile;
 pub(crate) use cursor::EpisodeCursor;
-pub use error::{LerobotError, LerobotProblem};
 pub(crate) use find::{Place, episodes, files, locate, name, of_table};
 use info::Info;
 use layout::Layout;
@@ -113,10 +112,18 @@ impl Episode {
         Ok(())
     }
 
-    /// Whether its joint states can be compared with expected efforts.
-    pub(crate) fn check_comparable(&self) -> Result<(), ArchiveError> {
-        match &self.obstacle {
-            Some(problem) => Err(LerobotError::new(&self.root, problem.clone()).into()),
+    /// Whether its joint states can be compared with expected efforts of `joints`.
+    pub(crate) fn check_comparable(&self, joints: &[String]) -> Result<(), ArchiveError> {
+        let own = &self.layout.joints;
+        let missing = joints.iter().filter(|joint| !own.contains(joint));
+        let missing: Vec<String> = missing.cloned().collect();
+        let unnamed = (!missing.is_empty()).then(|| LerobotProblem::Joints {
+            missing,
+            own: own.clone(),
+            columns_file: ColumnsFile::path(&self.root),
+        });
+        match self.obstacle.clone().or(unnamed) {
+            Some(problem) => Err(LerobotError::new(&self.root, problem).into()),
             None => Ok(()),
         }
     }
@@ -139,28 +146,29 @@ fn rows_of(file: &Arc<ParquetFile>, number: u64) -> Result<(u64, u64), ArchiveEr
     let wrong = |problem| ArchiveError::from(LerobotError::new(file.path(), problem));
     let mut of_rows = file.column(EPISODE_INDEX, 0)?;
     let mut found: Option<(u64, u64)> = None;
-    let mut held = Vec::new();
+    let mut held = None;
     let mut at = 0;
-    while let Some(own) = next_number(&mut of_rows)? {
-        if own == number as f64 {
+    while let Some(own) = next_index(&mut of_rows)? {
+        if own == number {
             let (first, rows) = found.unwrap_or((at, 0));
             if first + rows != at {
                 return Err(wrong(LerobotProblem::Scattered { number }));
             }
             found = Some((first, rows + 1));
-        } else if held.last() != Some(&own) && held.len() < 2 {
-            held.push(own);
+        } else if held.is_none() {
+            held = Some(own);
         }
         at += 1;
     }
     found.ok_or_else(|| wrong(LerobotProblem::NotInFile { number, held }))
 }
 
-/// The next row of a column that holds one number a row.
-fn next_number(rows: &mut Rows) -> Result<Option<f64>, ArchiveError> {
+/// The next row of a column of places. What is no place is [`u64::MAX`], which nothing has.
+fn next_index(rows: &mut Rows) -> Result<Option<u64>, ArchiveError> {
     let mut row = Vec::with_capacity(1);
     if !rows.next_row(&mut row)? {
         return Ok(None);
     }
-    Ok(Some(row.first().copied().unwrap_or(f64::NAN)))
+    let index = row.first().copied().filter(|index| *index >= 0.0);
+    Ok(Some(index.map_or(u64::MAX, |index| index as u64)))
 }

@@ -11,6 +11,7 @@ mod file_kind;
 mod info;
 mod joint_facts;
 mod lerobot;
+mod lerobot_error;
 mod mcap_file;
 mod mcap_write;
 mod parquet_file;
@@ -28,14 +29,14 @@ pub use error::ArchiveError;
 pub use file_kind::file_kind;
 pub use info::{Gap, Info, JointsInfo, TopicInfo};
 pub use joint_facts::JointFacts;
-pub use lerobot::{LerobotError, LerobotProblem};
+pub use lerobot_error::{LerobotError, LerobotProblem};
 pub use mcap_write::{
     CHUNK_SPAN_NS, Compression, McapWriter, PROVENANCE, TopicWriter, WriteError, Written,
 };
 pub use parquet_file::{ParquetError, ParquetProblem};
 pub use recording::{
-    JointStates, Message, Messages, Recording, RecordingKind, Stamped, is_there, recordings_at,
-    source_files,
+    JointStates, Message, Messages, Recording, RecordingKind, Sources, Stamped, is_there,
+    recordings_at, sources,
 };
 pub use repair::{
     RepairError, Repaired, RepairedFolder, repair, repair_folder, repair_in_place,

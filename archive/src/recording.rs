@@ -28,7 +28,7 @@ use crate::topic::{Topic, Topics};
 
 pub use joint_states::{JointStates, Stamped};
 pub use messages::{Message, Messages};
-pub use places::{is_there, recordings_at, source_files};
+pub use places::{Sources, is_there, recordings_at, sources};
 use several::{Part, SeveralCursor};
 
 /// What a recording is stored as.
@@ -143,14 +143,14 @@ impl Recording {
         &self.damage
     }
 
-    /// Whether its joint states can be compared with expected efforts, as far as its format tells: a LeRobot data set
-    /// may have no efforts, or positions in degrees without saying so.
+    /// Whether its joint states can be compared with expected efforts of `joints`, as far as its format tells: a LeRobot
+    /// data set may have no efforts, positions in degrees without saying so, or names of its own for the joints.
     ///
     /// # Errors
     /// [`ArchiveError::Lerobot`], with what to do.
-    pub fn check_comparable(&self) -> Result<(), ArchiveError> {
+    pub fn check_comparable(&self, joints: &[String]) -> Result<(), ArchiveError> {
         match &self.store {
-            Store::Lerobot(episode) => episode.check_comparable(),
+            Store::Lerobot(episode) => episode.check_comparable(joints),
             _ => Ok(()),
         }
     }

@@ -12,6 +12,7 @@ use tauscope_archive::{Recording, whole_file};
 use tauscope_dynamics::terms::UNKNOWN;
 use tauscope_pipeline::parallel;
 use tauscope_pipeline::pipeline::Pipeline;
+use tauscope_pipeline::recordings;
 use tauscope_pipeline::replay::{Outcome, Replay, ReplayError, TwinChoice, stem};
 use tauscope_pipeline::report::{Problem, Report, without_path};
 use tauscope_pipeline::tables::{write_events, write_summary};
@@ -26,7 +27,7 @@ use crate::progress::Progress;
 
 /// Run a pipeline's stages over recordings, in process, as fast as the machine allows: the same bytes
 /// every time. The recordings take the place of the pipeline's own source.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Clone, clap::Args)]
 pub struct Args {
     /// MCAP files, rosbag2 folders, `.db3` bags, ROS 1 bags, or tables (`.csv`, if the pipeline's source is one).
     #[arg(required_unless_present = "manifest", conflicts_with = "manifest")]
@@ -80,6 +81,16 @@ fn check_recordings(args: &Args) -> Result<(), Report> {
 
 /// Replays them.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
+    let recordings = recordings::expand(&args.recordings)?;
+    let args = Args {
+        recordings,
+        ..args.clone()
+    };
+    of_each(&args, out)
+}
+
+/// Replays recordings, none of which is a data set of several.
+fn of_each(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let pipeline = Pipeline::load(&args.pipeline, None)?;
     check_names(args)?;
     for warning in pipeline.warnings(None) {

@@ -139,6 +139,11 @@ impl Told<'_> {
     fn check_joints(&self, cell: &Cell, topic: &str) -> Result<(), Report> {
         let mut report = Report::default();
         for recording in self.recordings {
+            let comparable = Recording::open_comparable(recording, &cell.facts.joint_names);
+            if let Err(error) = comparable {
+                report.push(Problem::new(error.to_string()));
+                continue;
+            }
             let names = match first_joint_names(recording, topic) {
                 Ok(names) => names,
                 Err(problems) => {

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::error::{LerobotError, LerobotProblem};
 use crate::csv_file::Columns;
 use crate::error::ArchiveError;
+use crate::lerobot_error::{LerobotError, LerobotProblem};
 
 /// Ending of the file beside a data set `DATASET`: `DATASET.columns.yaml`, as beside a table.
 const BESIDE: &str = "columns.yaml";

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use super::error::{LerobotError, LerobotProblem};
 use super::layout::{Element, Quantity};
 use super::{Episode, TIMESTAMP, TOPIC};
 use crate::csv_file::limits;
 use crate::cursor::{Cursor, RawMessage};
 use crate::error::ArchiveError;
+use crate::lerobot_error::{LerobotError, LerobotProblem};
 use crate::parquet_file::{Physical, Rows};
 use crate::ros::{self, JointState, Time};
 

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use super::columns::ColumnsFile;
-use super::error::{LerobotError, LerobotProblem};
 use super::info::{INFO, Info};
-use super::{EPISODE_INDEX, next_number};
+use super::{EPISODE_INDEX, next_index};
 use crate::error::ArchiveError;
+use crate::lerobot_error::{LerobotError, LerobotProblem};
 use crate::parquet_file::ParquetFile;
 
 /// Where version 3 says in which file an episode lies.
@@ -88,9 +88,9 @@ pub(crate) fn of_table(path: &Path) -> Result<Place, ArchiveError> {
     }
     let mut of_rows = file.column(EPISODE_INDEX, 0)?;
     let mut numbers: Vec<u64> = Vec::new();
-    while let Some(number) = next_number(&mut of_rows)? {
-        if numbers.last() != Some(&(number as u64)) && numbers.len() < MOST_EPISODES as usize {
-            numbers.push(number as u64);
+    while let Some(number) = next_index(&mut of_rows)? {
+        if numbers.last() != Some(&number) && numbers.len() < MOST_EPISODES as usize {
+            numbers.push(number);
         }
     }
     match numbers.as_slice() {
@@ -221,11 +221,11 @@ fn each_episode(
         let [numbers, chunks, files] = rows.as_mut_slice() else {
             continue;
         };
-        while let Some(number) = next_number(numbers)? {
-            let chunk = next_number(chunks)?.unwrap_or(0.0);
-            let file = next_number(files)?.unwrap_or(0.0);
+        while let Some(number) = next_index(numbers)? {
+            let chunk = next_index(chunks)?.unwrap_or(u64::MAX);
+            let file = next_index(files)?.unwrap_or(u64::MAX);
             seen += 1;
-            if !take(number as u64, chunk as u64, file as u64) || seen > MOST_EPISODES {
+            if !take(number, chunk, file) || seen > MOST_EPISODES {
                 return Ok(());
             }
         }

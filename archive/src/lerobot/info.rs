@@ -8,8 +8,8 @@ use std::path::{Component, Path, PathBuf};
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::error::{LerobotError, LerobotProblem};
 use crate::error::ArchiveError;
+use crate::lerobot_error::{LerobotError, LerobotProblem};
 
 /// Where it lies in the data set.
 pub(super) const INFO: &str = "meta/info.json";

@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use super::columns::ColumnsFile;
-use super::error::{LerobotError, LerobotProblem};
-use super::info::Info;
+use super::info::{Feature, Info};
 use super::names::{self, Kind};
 use crate::csv_file::Columns;
+use crate::lerobot_error::{LerobotError, LerobotProblem};
 
 /// An element of a feature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -176,7 +176,7 @@ impl Builder<'_> {
             self.info
                 .features
                 .get(**name)
-                .is_some_and(|f| f.is_numeric())
+                .is_some_and(Feature::is_numeric)
         };
         match features.iter().find(is_there) {
             Some(feature) => self.elements(feature),

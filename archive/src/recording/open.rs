@@ -52,6 +52,19 @@ impl Recording {
         Self::open_file(path, false)
     }
 
+    /// As [`Recording::open`], but refuses what [`Recording::check_comparable`] does.
+    ///
+    /// # Errors
+    /// Of both.
+    pub fn open_comparable(
+        path: impl AsRef<Path>,
+        joints: &[String],
+    ) -> Result<Self, ArchiveError> {
+        let recording = Self::open(path)?;
+        recording.check_comparable(joints)?;
+        Ok(recording)
+    }
+
     fn open_file(path: &Path, packed_messages: bool) -> Result<Self, ArchiveError> {
         let mut beginning = Vec::new();
         File::open(path)

@@ -25,23 +25,41 @@ pub fn is_there(path: &Path) -> bool {
     path.exists() || matches!(lerobot::locate(path), Ok(Some(_)))
 }
 
-/// The files on which the recording at `path` depends: itself, the files of its folder in the order of their names, or
-/// the rows of an episode and what says what they are.
+/// On what a recording, or another file, depends.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Sources {
+    /// The file itself, the files of the folder in the order of their names, or the rows of an episode and what says
+    /// what they are.
+    pub files: Vec<PathBuf>,
+    /// The number of the episode of a LeRobot data set: a file may hold several.
+    pub episode: Option<u64>,
+}
+
+/// On what the recording, or another file, at `path` depends.
 ///
 /// # Errors
 /// If a folder cannot be read, or has no such episode.
-pub fn source_files(path: &Path) -> Result<Vec<PathBuf>, ArchiveError> {
+pub fn sources(path: &Path) -> Result<Sources, ArchiveError> {
     if let Some(place) = lerobot::locate(path)? {
         let (root, number) = place.one()?;
-        return lerobot::files(&root, number);
+        return Ok(Sources {
+            files: lerobot::files(&root, number)?,
+            episode: Some(number),
+        });
     }
     if !path.is_dir() {
-        return Ok(vec![path.to_owned()]);
+        return Ok(Sources {
+            files: vec![path.to_owned()],
+            episode: None,
+        });
     }
     let entries = std::fs::read_dir(path).and_then(Iterator::collect::<Result<Vec<_>, _>>);
     let entries = entries.map_err(ArchiveError::io(path))?.into_iter();
     let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
     files.retain(|path| path.is_file());
     files.sort();
-    Ok(files)
+    Ok(Sources {
+        files,
+        episode: None,
+    })
 }

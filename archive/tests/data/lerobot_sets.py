@@ -12,6 +12,7 @@ LeRobot (https://github.com/huggingface/lerobot): `src/lerobot/datasets/` of ver
 | `aloha` | 2.1 | two episodes; `observation.effort`, names under `motors`, no velocities |
 | `openarm` | 3.0 | three episodes in two files; `joint_1.pos`, `.vel` and `.torque` in the state, in degrees |
 | `so101` | 3.0 | one episode; positions only, in degrees |
+| `encodings` | 2.1 | the rows of an episode in each way that pyarrow writes them, and in two that are not read |
 """
 
 import json
@@ -115,6 +116,35 @@ def version_3(root: pathlib.Path, robot: str, fps: int, own: dict, files: list, 
     pq.write_table(pa.table(where), root / "meta/episodes/chunk-000/file-000.parquet")
 
 
+# By episode: how pyarrow is to write it.
+ENCODINGS = [
+    {"compression": "none", "use_dictionary": False},
+    {"compression": "zstd", "data_page_version": "2.0"},
+    {"compression": "snappy", "data_page_version": "2.0", "use_dictionary": False, "write_page_checksum": True},
+    {"compression": "snappy", "data_page_size": 16, "write_batch_size": 3},
+    {"compression": "zstd", "row_group_size": 7},
+    {"compression": "gzip"},
+    {"use_dictionary": False, "column_encoding": {"observation.state.list.element": "BYTE_STREAM_SPLIT"}},
+]
+
+
+def encodings(root: pathlib.Path) -> None:
+    """All episodes have the same values: steps that a dictionary is good for, gaps in the effort, `float64`."""
+    own = {name: feature(["a", "b"], 2) for name in ["observation.state", "observation.effort"]}
+    rows = 40
+    info(root, "v2.1", "two_joints", 50, own, [rows] * len(ENCODINGS))
+    steps = pa.array([[row // 8 / 4, -(row // 5) / 8] for row in range(rows)], pa.list_(pa.float64()))
+    gaps = pa.array([[row / 2, None if row % 3 == 0 else row / 4] for row in range(rows)], pa.list_(pa.float32()))
+    for episode, options in enumerate(ENCODINGS):
+        columns = {
+            "observation.state": steps,
+            "observation.effort": gaps,
+            "timestamp": pa.array([row / 50 for row in range(rows)], pa.float64()),
+            "episode_index": pa.array([episode] * rows, pa.int32()),
+        }
+        pq.write_table(pa.table(columns), root / f"data/chunk-000/episode_{episode:06d}.parquet", **options)
+
+
 def main() -> None:
     folder = pathlib.Path(sys.argv[1])
     names = {"motors": [f"{arm}_{joint}" for arm in ("left", "right") for joint in ALOHA]}
@@ -127,6 +157,8 @@ def main() -> None:
 
     own = {name: feature([f"{joint}.pos" for joint in SO101], 6) for name in ["action", "observation.state"]}
     version_3(folder / "so101", "so101_follower", 30, own, [[10]], {"observation.state": 60.0})
+
+    encodings(folder / "encodings")
 
 
 if __name__ == "__main__":

@@ -94,6 +94,7 @@ impl RecordedSource {
         config: &Config,
         setup: &Setup,
     ) -> Result<Self, IngestError> {
+        recording.check_comparable(&setup.joint_names)?;
         let named = |topic: &Option<String>| topic.is_some();
         let settings = PackSettings {
             velocity_cutoff_hz: config.velocity_cutoff_hz,

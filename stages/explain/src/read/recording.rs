@@ -114,7 +114,7 @@ impl Recording {
         topics: &RecordingTopics,
         joint_names: &[String],
     ) -> Result<Self, RecordingError> {
-        let archive = Archive::open(path)?;
+        let archive = Archive::open_comparable(path, joint_names)?;
         let name = path.file_stem().map_or_else(
             || path.display().to_string(),
             |stem| stem.to_string_lossy().into_owned(),

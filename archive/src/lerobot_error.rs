@@ -17,7 +17,7 @@ pub struct LerobotError {
 }
 
 impl LerobotError {
-    pub(super) fn new(path: &Path, problem: LerobotProblem) -> Self {
+    pub(crate) fn new(path: &Path, problem: LerobotProblem) -> Self {
         Self {
             path: path.to_owned(),
             problem,
@@ -89,12 +89,12 @@ pub enum LerobotProblem {
         file: String,
     },
     /// The rows of an episode are not in its file.
-    #[error("no row of it has the episode_index {number}{}", held_words(held))]
+    #[error("no row of it has the episode_index {number}{}", held_words(*held))]
     NotInFile {
         /// The episode.
         number: u64,
-        /// Some that it has.
-        held: Vec<f64>,
+        /// One that it has.
+        held: Option<u64>,
     },
     /// The rows of an episode do not follow each other.
     #[error("the rows of episode {number} do not follow each other")]
@@ -144,6 +144,20 @@ pub enum LerobotProblem {
         /// Where to say it.
         columns_file: PathBuf,
     },
+    /// The joints have other names than those of the robot.
+    #[error(
+        "the LeRobot data set names no {}; its joints are {}. If they are the same joints, write the robot's names in this \
+         order in {}: `joints: [NAME, ...]`",
+        list(missing), own.join(", "), columns_file.display()
+    )]
+    Joints {
+        /// Joints of the robot that it does not name.
+        missing: Vec<String>,
+        /// Those that it names.
+        own: Vec<String>,
+        /// Where to say it.
+        columns_file: PathBuf,
+    },
     /// Positions are in degrees.
     #[error(
         "joints go to {most:.0} rad, which no arm does: write `degrees: true` in {} if the data set is in degrees, as those \
@@ -168,9 +182,6 @@ fn list(features: &[String]) -> String {
     }
 }
 
-fn held_words(held: &[f64]) -> String {
-    match held {
-        [] => "; it has no rows".to_owned(),
-        [first, ..] => format!("; the first has {first}"),
-    }
+fn held_words(held: Option<u64>) -> String {
+    held.map_or_else(String::new, |first| format!("; the first has {first}"))
 }
