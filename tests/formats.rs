@@ -20,7 +20,11 @@ use serde_json::Value;
 use tauscope_twin::TwinFile;
 
 /// Those that hold stamps, names, positions, velocities and efforts just as MCAP does.
-const EXACT: [Format; 2] = [formats::dynamic_joint_states, formats::ros1_bag];
+const EXACT: [Format; 3] = [
+    formats::dynamic_joint_states,
+    formats::ros1_bag,
+    formats::lerobot,
+];
 
 fn answer(arguments: &[&OsStr]) -> Out {
     let out = Out::answer(arguments);

@@ -35,7 +35,7 @@ pub use mcap_write::{
 };
 pub use parquet_file::{ParquetError, ParquetProblem};
 pub use recording::{
-    JointStates, Message, Messages, Recording, RecordingKind, Sources, Stamped, is_there,
+    JointStates, Message, Messages, Recording, RecordingKind, Sources, Stamped, is_there, name_of,
     recordings_at, sources,
 };
 pub use repair::{

@@ -28,7 +28,7 @@ use crate::topic::{Topic, Topics};
 
 pub use joint_states::{JointStates, Stamped};
 pub use messages::{Message, Messages};
-pub use places::{Sources, is_there, recordings_at, sources};
+pub use places::{Sources, is_there, name_of, recordings_at, sources};
 use several::{Part, SeveralCursor};
 
 /// What a recording is stored as.

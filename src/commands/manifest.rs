@@ -18,7 +18,8 @@ use crate::progress::Progress;
 /// Write down which recordings are wanted, with their hashes: what `replay --manifest` works through.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Recordings or patterns of them in quotes: 'archive/**/*.mcap'. Of a rosbag2 bag, its folder.
+    /// Recordings or patterns of them in quotes: 'archive/**/*.mcap'. Of a rosbag2 bag or a LeRobot
+    /// data set, its folder.
     #[arg(required = true)]
     recordings: Vec<PathBuf>,
     /// The manifest: a line of JSON for each recording, with its path relative to this file.

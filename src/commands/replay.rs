@@ -29,7 +29,8 @@ use crate::progress::Progress;
 /// every time. The recordings take the place of the pipeline's own source.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Args {
-    /// MCAP files, rosbag2 folders, `.db3` bags, ROS 1 bags, or tables (`.csv`, if the pipeline's source is one).
+    /// MCAP files, rosbag2 folders, `.db3` bags, ROS 1 bags, tables (`.csv`, if the pipeline's source is one), or LeRobot
+    /// data sets (`DATASET` for all of its episodes, `DATASET/episode_000003` for one).
     #[arg(required_unless_present = "manifest", conflicts_with = "manifest")]
     recordings: Vec<PathBuf>,
     /// Instead of recordings: a file of `tauscope manifest`. Each of its recordings becomes one Parquet file in --out, named

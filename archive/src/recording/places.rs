@@ -19,6 +19,23 @@ pub fn recordings_at(path: &Path) -> Result<Vec<PathBuf>, ArchiveError> {
     }
 }
 
+/// What a recording is called: as its file without the ending, as its folder, or as its data set and its number there,
+/// `DATASET_episode_000003`.
+pub fn name_of(path: &Path) -> String {
+    if let Ok(Some(Place::Episode(root, number))) = lerobot::locate(path) {
+        let root = root.canonicalize().unwrap_or(root);
+        let set = root.file_name().unwrap_or_default().to_string_lossy();
+        return format!("{set}_episode_{number:06}");
+    }
+    let name = if path.is_dir() {
+        path.file_name()
+    } else {
+        path.file_stem()
+    };
+    let name = name.map(|name| name.to_string_lossy().into_owned());
+    name.unwrap_or_else(|| "recording".to_owned())
+}
+
 /// Whether there may be a recording at `path`: an episode of a LeRobot data set has a path, but perhaps no file of that
 /// path.
 pub fn is_there(path: &Path) -> bool {

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-use tauscope_archive::{is_there, recordings_at};
+use tauscope_archive::{is_there, name_of, recordings_at};
 use tauscope_dynamics::Model;
 use tauscope_pipeline::cell::{
     Cell, CellFacts, ConstantSpot, EffortUnit, first_joint_names, torque_constants,
@@ -133,11 +133,8 @@ impl Assembly<'_> {
                     report.push((self.problem)(spot(index), title));
                     continue;
                 }
-                let stem = path
-                    .file_stem()
-                    .unwrap_or(path.as_os_str())
-                    .to_string_lossy();
-                let mut name = stem.clone().into_owned();
+                let stem = name_of(&path);
+                let mut name = stem.clone();
                 let mut number = 2;
                 while !names.insert(name.clone()) {
                     name = format!("{stem}_{number}");

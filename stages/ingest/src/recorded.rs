@@ -1,4 +1,4 @@
-//! Joint states out of a recording: MCAP, a rosbag2 bag, a bag of ROS 1, or a table.
+//! Joint states out of a recording: MCAP, a rosbag2 bag, a bag of ROS 1, a table, or an episode of a LeRobot data set.
 
 use std::path::{Path, PathBuf};
 
