@@ -276,6 +276,28 @@ fn rows_are_the_same_however_they_are_encoded() {
 }
 
 #[test]
+fn times_are_checked_and_kept_where_they_are_off_the_grid() {
+    let episode = |number| data().join(format!("times/episode_{number}"));
+    let said = refusal(&episode(0));
+    assert!(
+        said.contains("row 2 (timestamp): NaN is not a time"),
+        "{said}"
+    );
+    let said = refusal(&episode(1));
+    assert!(
+        said.contains("row 2 (timestamp)") && said.contains("backwards"),
+        "{said}"
+    );
+    let states = states(&episode(2));
+    let stamps: Vec<i64> = states.iter().map(|state| state.header.stamp.ns()).collect();
+    assert_eq!([stamps[0], stamps[2]], [0, 40_000_000]);
+    assert!((stamps[1] - 25_000_000).abs() < 10 && (stamps[3] - 65_000_100).abs() < 10);
+    assert!(states[1].position[1].is_nan());
+    let info = Info::read(&Recording::open(episode(2)).unwrap()).unwrap();
+    assert_eq!(info.topics[0].joints.as_ref().unwrap().nan_messages, 4);
+}
+
+#[test]
 fn a_set_is_its_episodes() {
     let set = data().join("openarm");
     let all = recordings_at(&set).unwrap();

@@ -2,6 +2,7 @@
 
 pub mod archive;
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -71,10 +72,15 @@ pub struct Args {
 /// of a table are may stand in the pipeline file, so whoever reads the table checks it.
 fn check_recordings(args: &Args) -> Result<(), Report> {
     let mut report = Report::default();
+    let mut said = BTreeSet::new();
     let is_table = |path: &&PathBuf| path.extension().is_some_and(|ending| ending == "csv");
     for path in args.recordings.iter().filter(|path| !is_table(path)) {
-        if let Err(error) = Recording::open(path) {
-            report.push(Problem::new(error.to_string()));
+        if let Err(error) = Recording::open_comparable(path, &[]) {
+            let title = error.to_string();
+            // What a data set lacks, all of its episodes lack.
+            if said.insert(title.clone()) {
+                report.push(Problem::new(title));
+            }
         }
     }
     report.into_result(())

@@ -123,6 +123,9 @@ impl Footer {
         if let Some((column, what)) = schema.refused {
             return Err(ParquetProblem::Unsupported { column, what });
         }
+        if schema.names.is_empty() {
+            return Err(ParquetProblem::Footer("it names no columns"));
+        }
         let rows = groups
             .iter()
             .fold(0_u64, |sum, group| sum.saturating_add(group.rows));

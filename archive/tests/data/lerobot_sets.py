@@ -12,6 +12,7 @@ LeRobot (https://github.com/huggingface/lerobot): `src/lerobot/datasets/` of ver
 | `aloha` | 2.1 | two episodes; `observation.effort`, names under `motors`, no velocities |
 | `openarm` | 3.0 | three episodes in two files; `joint_1.pos`, `.vel` and `.torque` in the state, in degrees |
 | `so101` | 3.0 | one episode; positions only, in degrees |
+| `times` | 2.1 | a time that is NaN, times that run backwards, times that are off the grid |
 | `encodings` | 2.1 | the rows of an episode in each way that pyarrow writes them, and in two that are not read |
 """
 
@@ -145,6 +146,16 @@ def encodings(root: pathlib.Path) -> None:
         pq.write_table(pa.table(columns), root / f"data/chunk-000/episode_{episode:06d}.parquet", **options)
 
 
+def times(root: pathlib.Path) -> None:
+    own = {name: feature(["a", "b"], 2) for name in ["observation.state", "observation.effort"]}
+    episodes = [[0.0, 0.02, math.nan, 0.06], [0.0, 0.04, 0.02, 0.06], [0.0, 0.025, 0.04, 0.0650001]]
+    info(root, "v2.1", "two_joints", 50, own, [4] * len(episodes))
+    for episode, own_times in enumerate(episodes):
+        columns = {name: pa.array([[0.5, math.nan]] * 4, pa.list_(pa.float32())) for name in own}
+        columns["timestamp"] = pa.array(own_times, pa.float32())
+        pq.write_table(pa.table(columns), root / f"data/chunk-000/episode_{episode:06d}.parquet")
+
+
 def main() -> None:
     folder = pathlib.Path(sys.argv[1])
     names = {"motors": [f"{arm}_{joint}" for arm in ("left", "right") for joint in ALOHA]}
@@ -159,6 +170,7 @@ def main() -> None:
     version_3(folder / "so101", "so101_follower", 30, own, [[10]], {"observation.state": 60.0})
 
     encodings(folder / "encodings")
+    times(folder / "times")
 
 
 if __name__ == "__main__":
