@@ -5,14 +5,19 @@ use std::path::{Path, PathBuf};
 use crate::error::ArchiveError;
 use crate::lerobot::{self, Place};
 
-/// The recordings at `path`: the episodes of a LeRobot data set, or `path` itself.
+/// The recordings at `path`: the episodes of a LeRobot data set of several, or `path` itself.
 ///
 /// # Errors
 /// If the data set does not tell its episodes.
 pub fn recordings_at(path: &Path) -> Result<Vec<PathBuf>, ArchiveError> {
     match lerobot::locate(path)? {
         Some(Place::Set(root)) => {
-            let numbers = lerobot::episodes(&root)?.into_iter();
+            let numbers = lerobot::episodes(&root)?;
+            // One of one goes by the name of the data set.
+            if numbers.len() == 1 {
+                return Ok(vec![path.to_owned()]);
+            }
+            let numbers = numbers.into_iter();
             Ok(numbers.map(|number| lerobot::name(&root, number)).collect())
         }
         _ => Ok(vec![path.to_owned()]),
