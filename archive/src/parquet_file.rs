@@ -26,6 +26,8 @@ pub(crate) use rows::Rows;
 
 /// How a Parquet file begins and ends.
 pub(crate) const MAGIC: &[u8] = b"PAR1";
+/// How a file begins that Git LFS has not fetched: `version https://git-lfs.github.com/spec/v1`.
+const LFS_POINTER: [u8; 4] = *b"vers";
 /// Longest footer that is read \[bytes\].
 /// Resolution: bounds memory; a thousand row groups of 300 columns have 45 MB.
 const MAX_FOOTER_BYTES: u64 = 64 << 20;
@@ -113,6 +115,9 @@ fn footer_of(file: &File, bytes: u64) -> Result<Vec<u8>, ParquetProblem> {
         return Err(ParquetProblem::Torn);
     }
     file.read_exact_at(&mut head, 0)?;
+    if head == LFS_POINTER {
+        return Err(ParquetProblem::LfsPointer);
+    }
     if head != MAGIC {
         return Err(ParquetProblem::NotParquet);
     }

@@ -3,37 +3,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+#[path = "common/lerobot.rs"]
+mod sets;
+
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use tauscope_archive::ros::JointState;
-use tauscope_archive::{
-    ArchiveError, Info, Recording, RecordingKind, is_there, name_of, recordings_at, sources,
-};
-
-fn data() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/lerobot")
-}
-
-/// A copy of a set, to be changed, in a folder of its own.
-fn copy(set: &str) -> (tempfile::TempDir, PathBuf) {
-    fn copy_all(from: &Path, to: &Path) {
-        fs::create_dir_all(to).unwrap();
-        for entry in fs::read_dir(from).unwrap() {
-            let entry = entry.unwrap();
-            let target = to.join(entry.file_name());
-            if entry.path().is_dir() {
-                copy_all(&entry.path(), &target);
-            } else {
-                fs::copy(entry.path(), target).unwrap();
-            }
-        }
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let root = folder.path().join(set);
-    copy_all(&data().join(set), &root);
-    (folder, root)
-}
+use sets::{copy, data, refusal, states};
+use tauscope_archive::{Info, Recording, is_there, name_of, recordings_at, sources};
 
 /// Replaces text in `meta/info.json`.
 fn change_info(root: &Path, from: &str, to: &str) {
@@ -41,25 +18,6 @@ fn change_info(root: &Path, from: &str, to: &str) {
     let text = fs::read_to_string(&path).unwrap();
     assert!(text.contains(from), "{text}");
     fs::write(path, text.replace(from, to)).unwrap();
-}
-
-fn states(path: &Path) -> Vec<JointState> {
-    let recording = Recording::open(path).unwrap();
-    assert_eq!(recording.kind(), RecordingKind::Lerobot);
-    let mut states = recording.joint_states("/joint_states").unwrap();
-    let mut all = Vec::new();
-    while let Some(state) = states.next_state() {
-        all.push(state.unwrap().message.clone());
-    }
-    assert_eq!(all.len() as u64, recording.message_count());
-    all
-}
-
-fn refusal(path: &Path) -> String {
-    match Recording::open(path) {
-        Ok(_) => panic!("{} was opened", path.display()),
-        Err(error) => error.to_string(),
-    }
 }
 
 /// What `lerobot_sets.py` writes into an element.
@@ -276,28 +234,6 @@ fn rows_are_the_same_however_they_are_encoded() {
 }
 
 #[test]
-fn times_are_checked_and_kept_where_they_are_off_the_grid() {
-    let episode = |number| data().join(format!("times/episode_{number}"));
-    let said = refusal(&episode(0));
-    assert!(
-        said.contains("row 2 (timestamp): NaN is not a time"),
-        "{said}"
-    );
-    let said = refusal(&episode(1));
-    assert!(
-        said.contains("row 2 (timestamp)") && said.contains("backwards"),
-        "{said}"
-    );
-    let states = states(&episode(2));
-    let stamps: Vec<i64> = states.iter().map(|state| state.header.stamp.ns()).collect();
-    assert_eq!([stamps[0], stamps[2]], [0, 40_000_000]);
-    assert!((stamps[1] - 25_000_000).abs() < 10 && (stamps[3] - 65_000_100).abs() < 10);
-    assert!(states[1].position[1].is_nan());
-    let info = Info::read(&Recording::open(episode(2)).unwrap()).unwrap();
-    assert_eq!(info.topics[0].joints.as_ref().unwrap().nan_messages, 4);
-}
-
-#[test]
 fn a_set_is_its_episodes() {
     let set = data().join("openarm");
     let all = recordings_at(&set).unwrap();
@@ -361,76 +297,4 @@ fn results_depend_on_the_rows_and_on_what_says_what_they_are() {
     let beside = root.with_file_name("openarm.columns.yaml");
     fs::write(&beside, "degrees: true\n").unwrap();
     assert!(sources(&path).unwrap().files.contains(&beside));
-}
-
-#[test]
-fn what_is_missing_is_named() {
-    let (_folder, root) = copy("aloha");
-    let said = refusal(&root.join("episode_000007"));
-    assert!(
-        said.contains("no episode 7") && said.contains("episode_000001"),
-        "{said}"
-    );
-    fs::remove_file(root.join("data/chunk-000/episode_000001.parquet")).unwrap();
-    let said = refusal(&root.join("episode_000001"));
-    assert!(
-        said.contains("chunk-000/episode_000001.parquet") && said.contains("download"),
-        "{said}"
-    );
-    fs::remove_file(root.join("meta/info.json")).unwrap();
-    let said = refusal(&root);
-    assert!(said.contains("no meta/info.json"), "{said}");
-
-    let (_folder, root) = copy("openarm");
-    fs::remove_dir_all(root.join("meta/episodes")).unwrap();
-    let said = refusal(&root.join("episode_000000"));
-    assert!(
-        said.contains("meta/episodes") && said.contains("download"),
-        "{said}"
-    );
-    fs::write(root.join("meta/info.json"), "{}").unwrap();
-    assert!(refusal(&root.join("episode_000000")).contains("version unknown"));
-    fs::write(root.join("meta/info.json"), "[1").unwrap();
-    assert!(refusal(&root).contains("no description of a LeRobot data set"));
-}
-
-#[test]
-fn another_episode_in_the_file_of_one_is_noticed() {
-    let (_folder, root) = copy("aloha");
-    let chunk = root.join("data/chunk-000");
-    fs::copy(
-        chunk.join("episode_000001.parquet"),
-        chunk.join("episode_000000.parquet"),
-    )
-    .unwrap();
-    let said = refusal(&root.join("episode_000000"));
-    assert!(
-        said.contains("episode_index 0") && said.contains("the first has 1"),
-        "{said}"
-    );
-}
-
-#[test]
-fn torn_and_changed_tables_are_refused_and_never_a_panic() {
-    let (_folder, root) = copy("aloha");
-    let file = root.join("data/chunk-000/episode_000001.parquet");
-    let whole = fs::read(&file).unwrap();
-    let path = root.join("episode_000001");
-    for length in (0..whole.len()).step_by(97) {
-        fs::write(&file, &whole[..length]).unwrap();
-        let said = refusal(&path);
-        assert!(said.contains("episode_000001.parquet"), "{said}");
-    }
-    let mut refused = 0;
-    for at in (0..whole.len()).step_by(7) {
-        let mut changed = whole.clone();
-        changed[at] ^= 0x55;
-        fs::write(&file, &changed).unwrap();
-        match Recording::open(&path) {
-            Ok(recording) => drop(Info::read(&recording).unwrap()),
-            Err(ArchiveError::Parquet(_) | ArchiveError::Lerobot(_)) => refused += 1,
-            Err(other) => panic!("at {at}: {other}"),
-        }
-    }
-    assert!(refused > 30, "{refused}");
 }

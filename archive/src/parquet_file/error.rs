@@ -30,6 +30,12 @@ pub enum ParquetProblem {
     /// It begins otherwise.
     #[error("not a Parquet table: it does not begin with PAR1")]
     NotParquet,
+    /// It was cloned without its contents.
+    #[error(
+        "a pointer of Git LFS in the place of the Parquet table: fetch the table with `git lfs pull`, or download the data \
+         set with `hf download`"
+    )]
+    LfsPointer,
     /// It ends otherwise.
     #[error(
         "the Parquet table is torn: it does not end with PAR1, where it says what is in it; copy or download it again"
