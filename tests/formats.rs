@@ -20,7 +20,11 @@ use serde_json::Value;
 use tauscope_twin::TwinFile;
 
 /// Those that hold stamps, names, positions, velocities and efforts just as MCAP does.
-const EXACT: [Format; 2] = [formats::dynamic_joint_states, formats::ros1_bag];
+const EXACT: [Format; 3] = [
+    formats::dynamic_joint_states,
+    formats::ros1_bag,
+    formats::lerobot,
+];
 
 fn answer(arguments: &[&OsStr]) -> Out {
     let out = Out::answer(arguments);
@@ -138,5 +142,20 @@ fn initialised(folder: &Path, format: Format) -> String {
     let twin = std::fs::read_to_string(cell.join("twin.yaml")).unwrap();
     let file: TwinFile = serde_saphyr::from_str(&twin).unwrap();
     assert!(!file.terms.is_empty(), "{twin}");
-    format!("{:?}", file.terms)
+    // Of an episode of a data set, the time starts at 0, so a session has other instants and other last digits.
+    let mut terms: Vec<String> = file
+        .terms
+        .iter()
+        .map(|term| {
+            let parameters = term.parameters.iter();
+            let rounded = parameters.map(|(name, value)| format!("{name} {value:.5}"));
+            let rounded = rounded.collect::<Vec<_>>();
+            format!(
+                "{} {:?} {:?} {rounded:?}",
+                term.effect, term.joint, term.link
+            )
+        })
+        .collect();
+    terms.sort();
+    terms.join("\n")
 }

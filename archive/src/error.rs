@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use crate::csv_file::CsvError;
 use crate::damage::{Damage, seconds};
+use crate::lerobot_error::LerobotError;
+use crate::parquet_file::ParquetError;
 use crate::ros::{DecodeError, EncodeError};
 
 /// Why a recording cannot be read or written.
@@ -127,6 +129,12 @@ pub enum ArchiveError {
         /// Why.
         source: EncodeError,
     },
+    /// A LeRobot data set cannot be read, or not be used.
+    #[error(transparent)]
+    Lerobot(Box<LerobotError>),
+    /// A Parquet table cannot be read.
+    #[error(transparent)]
+    Parquet(Box<ParquetError>),
     /// A database cannot be read.
     #[error("{}: {source}", path.display())]
     Sqlite {
@@ -135,6 +143,18 @@ pub enum ArchiveError {
         /// What SQLite says.
         source: rusqlite::Error,
     },
+}
+
+impl From<LerobotError> for ArchiveError {
+    fn from(error: LerobotError) -> Self {
+        Self::Lerobot(Box::new(error))
+    }
+}
+
+impl From<ParquetError> for ArchiveError {
+    fn from(error: ParquetError) -> Self {
+        Self::Parquet(Box::new(error))
+    }
 }
 
 impl ArchiveError {

@@ -43,6 +43,8 @@ pub struct Info {
     pub provenance: Option<BTreeMap<String, String>>,
     /// What of it cannot be read.
     pub damage: Vec<Damage>,
+    /// Why its joint states cannot be compared with expected efforts, as far as its format tells.
+    pub obstacle: Option<String>,
 }
 
 /// What is on a topic.
@@ -126,6 +128,10 @@ impl Info {
             topics,
             provenance: recording.provenance().cloned(),
             damage,
+            obstacle: recording
+                .check_comparable(&[])
+                .err()
+                .map(|error| error.to_string()),
         })
     }
 
@@ -296,6 +302,9 @@ impl fmt::Display for Info {
         }
         for damage in &self.damage {
             writeln!(f, "damage: {damage}")?;
+        }
+        if let Some(obstacle) = &self.obstacle {
+            writeln!(f, "warning: {obstacle}")?;
         }
         Ok(())
     }

@@ -10,8 +10,11 @@ mod fields;
 mod file_kind;
 mod info;
 mod joint_facts;
+mod lerobot;
+mod lerobot_error;
 mod mcap_file;
 mod mcap_write;
+mod parquet_file;
 mod recording;
 mod repair;
 pub mod ros;
@@ -26,10 +29,15 @@ pub use error::ArchiveError;
 pub use file_kind::file_kind;
 pub use info::{Gap, Info, JointsInfo, TopicInfo};
 pub use joint_facts::JointFacts;
+pub use lerobot_error::{LerobotError, LerobotProblem};
 pub use mcap_write::{
     CHUNK_SPAN_NS, Compression, McapWriter, PROVENANCE, TopicWriter, WriteError, Written,
 };
-pub use recording::{JointStates, Message, Messages, Recording, RecordingKind, Stamped};
+pub use parquet_file::{ParquetError, ParquetProblem};
+pub use recording::{
+    JointStates, Message, Messages, Recording, RecordingKind, Sources, Stamped, is_there, name_of,
+    recordings_at, sources,
+};
 pub use repair::{
     RepairError, Repaired, RepairedFolder, repair, repair_folder, repair_in_place,
     repaired_folder_path, repaired_path,

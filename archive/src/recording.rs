@@ -3,6 +3,7 @@
 mod joint_states;
 mod messages;
 mod open;
+mod places;
 mod several;
 
 use std::collections::BTreeMap;
@@ -17,6 +18,7 @@ use crate::csv_file::CsvTable;
 use crate::cursor::Cursor;
 use crate::damage::Damage;
 use crate::error::ArchiveError;
+use crate::lerobot::Episode;
 use crate::mcap_file::{Layout, mcap_cursor};
 use crate::mcap_write::PROVENANCE;
 use crate::ros;
@@ -26,6 +28,7 @@ use crate::topic::{Topic, Topics};
 
 pub use joint_states::{JointStates, Stamped};
 pub use messages::{Message, Messages};
+pub use places::{Sources, is_there, name_of, recordings_at, sources};
 use several::{Part, SeveralCursor};
 
 /// What a recording is stored as.
@@ -42,6 +45,8 @@ pub enum RecordingKind {
     Ros1Bag,
     /// A table of numbers.
     Csv,
+    /// An episode of a LeRobot data set.
+    Lerobot,
 }
 
 impl std::fmt::Display for RecordingKind {
@@ -52,6 +57,7 @@ impl std::fmt::Display for RecordingKind {
             Self::Rosbag2 => "rosbag2 bag",
             Self::Ros1Bag => "bag of ROS 1",
             Self::Csv => "CSV table",
+            Self::Lerobot => "episode of a LeRobot data set",
         })
     }
 }
@@ -82,6 +88,7 @@ enum Store {
     },
     Several(Arc<Vec<Part>>),
     Csv(Box<CsvTable>),
+    Lerobot(Box<Episode>),
 }
 
 impl Recording {
@@ -134,6 +141,18 @@ impl Recording {
     /// only when it is read, and told by [`Messages`] then.
     pub fn damage(&self) -> &[Damage] {
         &self.damage
+    }
+
+    /// Whether its joint states can be compared with expected efforts of `joints`, as far as its format tells: a LeRobot
+    /// data set may have no efforts, positions in degrees without saying so, or names of its own for the joints.
+    ///
+    /// # Errors
+    /// [`ArchiveError::Lerobot`], with what to do.
+    pub fn check_comparable(&self, joints: &[String]) -> Result<(), ArchiveError> {
+        match &self.store {
+            Store::Lerobot(episode) => episode.check_comparable(joints),
+            _ => Ok(()),
+        }
     }
 
     /// The topic `name`, which must carry messages of type `M` as CDR, and at least one.
@@ -192,7 +211,7 @@ impl Recording {
             Store::Mcap(layout) => layout.chunks(),
             Store::Several(parts) => parts.iter().map(|part| part.recording.chunks()).sum(),
             Store::Ros1 { bag, .. } => bag.chunks(),
-            Store::Sqlite { .. } | Store::Csv(_) => 0,
+            Store::Sqlite { .. } | Store::Csv(_) | Store::Lerobot(_) => 0,
         }
     }
 
@@ -283,6 +302,7 @@ impl Recording {
                 within_ns.clone(),
             ))),
             Store::Csv(table) => Ok(Box::new(table.cursor()?)),
+            Store::Lerobot(episode) => Ok(Box::new(episode.cursor()?)),
         }
     }
 

@@ -6,7 +6,7 @@ mod twins;
 
 use std::path::{Path, PathBuf};
 
-use tauscope_archive::Recording;
+use tauscope_archive::{Recording, recordings_at};
 use tauscope_detect::{DETECTORS, Entry};
 use tauscope_dynamics::Model;
 use tauscope_ingest::Topics;
@@ -155,9 +155,14 @@ fn recordings(
         (Role::Validation, &set.validation),
         (Role::Test, &set.test),
     ] {
-        for (index, path) in paths.iter().enumerate() {
-            let place = Place::root().key(role.as_str()).index(index);
+        let given = paths.iter().enumerate().flat_map(|(index, path)| {
             let path = file.resolve(path);
+            // Whoever opens what is no data set says what is wrong.
+            let all = recordings_at(&path).unwrap_or_else(|_| vec![path]);
+            all.into_iter().map(move |path| (index, path))
+        });
+        for (index, path) in given {
+            let place = Place::root().key(role.as_str()).index(index);
             let name = stem(&path);
             if all.iter().any(|other| other.name == name) {
                 let problem = file.at(&place, format!("a second recording named `{name}`"));
@@ -186,7 +191,7 @@ fn recordings(
 /// The stamp of a recording's first joint state, and what its topic of contacts says.
 fn open(path: &Path, state: &str, contact: Option<&str>) -> Result<(i64, Option<Truth>), String> {
     let wrong = |error: tauscope_archive::ArchiveError| error.to_string();
-    let recording = Recording::open(path).map_err(wrong)?;
+    let recording = Recording::open_comparable(path, &[]).map_err(wrong)?;
     let mut states = recording.joint_states(state).map_err(wrong)?;
     let (start_ns, start_log_ns) = loop {
         match states.next_state() {

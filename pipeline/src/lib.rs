@@ -13,6 +13,7 @@ pub mod learnt_state;
 pub mod parallel;
 pub mod pipeline;
 pub mod provenance;
+pub mod recordings;
 pub mod replay;
 pub mod report;
 pub mod results;

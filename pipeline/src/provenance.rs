@@ -7,24 +7,19 @@ use std::path::Path;
 
 use sha2::{Digest, Sha256};
 
-/// SHA-256 of a file, or of all files of a bag's folder in the order of their names, in hexadecimal.
+/// SHA-256 of a file, of all files of a bag's folder in the order of their names, or of the files of an episode of a
+/// LeRobot data set and its number, in hexadecimal.
 ///
 /// # Errors
 /// If the file cannot be read.
 pub fn sha256_of_file(path: &Path) -> std::io::Result<String> {
-    let mut files = vec![path.to_owned()];
-    if path.is_dir() {
-        let entries = std::fs::read_dir(path)?.collect::<Result<Vec<_>, _>>()?;
-        files = entries
-            .into_iter()
-            .map(|entry| entry.path())
-            .filter(|p| p.is_file())
-            .collect();
-        files.sort();
-    }
+    let sources = tauscope_archive::sources(path).map_err(std::io::Error::other)?;
     let mut hash = Sha256::new();
     let mut buffer = vec![0; 1 << 16];
-    for file in files {
+    if let Some(episode) = sources.episode {
+        hash.update(episode.to_le_bytes());
+    }
+    for file in sources.files {
         let mut file = File::open(&file)?;
         loop {
             let count = file.read(&mut buffer)?;

@@ -353,17 +353,9 @@ impl<'a> Replay<'a> {
     }
 }
 
-/// A recording's name: of the file without its ending, or of the bag's folder.
+/// A recording's name; see [`tauscope_archive::name_of`].
 pub fn stem(recording: &Path) -> String {
-    let name = if recording.is_dir() {
-        recording.file_name()
-    } else {
-        recording.file_stem()
-    };
-    name.map_or_else(
-        || "recording".to_owned(),
-        |name| name.to_string_lossy().into_owned(),
-    )
+    tauscope_archive::name_of(recording)
 }
 
 /// `source` and every stage that hangs on it without a program that is not ours in between, in the

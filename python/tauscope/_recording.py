@@ -41,8 +41,8 @@ class Recording:
 
 
 def read(path: str | os.PathLike[str], *, topic: str | None = None) -> Recording:
-    """Reads the joint states of a recording: an MCAP file, a rosbag2 folder, a `.db3` bag, a ROS 1 bag or a `.csv`
-    table.
+    """Reads the joint states of a recording: an MCAP file, a rosbag2 folder, a `.db3` bag, a ROS 1 bag, a `.csv`
+    table, or an episode of a LeRobot data set (`DATASET/episode_000003`).
 
     Without `topic` the only topic with joint states is read; if there are several, `/joint_states`.
     """

@@ -3,6 +3,8 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use tauscope_archive::is_there;
+use tauscope_pipeline::recordings;
 use tauscope_pipeline::report::{Problem, Report};
 use tauscope_pipeline::results::{Manifest, parquet_files};
 
@@ -39,6 +41,13 @@ impl Sources {
     }
 
     fn add(&mut self, path: &Path) -> Result<(), Report> {
+        let episodes = recordings::expand(&[path.to_owned()])?;
+        if episodes != [path] {
+            for episode in episodes {
+                self.recordings.push(listed(&episode)?);
+            }
+            return Ok(());
+        }
         let ends = |ending| path.extension().is_some_and(|of| of == ending);
         if ends("parquet") {
             self.results.push(absolute(path)?);
@@ -88,7 +97,8 @@ pub fn recordings(pattern: &str) -> Result<Vec<Listed>, Report> {
 
 fn listed(path: &Path) -> Result<Listed, Report> {
     let failed = |error: std::io::Error| Problem::of_file(path, error.to_string());
-    let bytes = if path.is_dir() {
+    // An episode of a data set has no file of its name.
+    let bytes = if path.is_dir() || !path.exists() {
         0
     } else {
         path.metadata().map_err(failed)?.len()
@@ -108,7 +118,7 @@ fn absolute(path: &Path) -> Result<PathBuf, Report> {
 fn expand(paths: &[PathBuf], report: &mut Report) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for path in paths {
-        if path.exists() {
+        if is_there(path) {
             found.push(path.clone());
             continue;
         }

@@ -9,8 +9,8 @@ use tauscope_archive::{ArchiveError, Recording};
 use tauscope_ingest::Topics;
 use tauscope_pipeline::calibrate::{Calibrated, Job};
 use tauscope_pipeline::cell::{Cell, ConstantSpot, EffortUnit};
-use tauscope_pipeline::provenance;
 use tauscope_pipeline::report::Problem;
+use tauscope_pipeline::{provenance, recordings};
 use tauscope_twin::{Expected, Motion, TwinFile};
 
 use super::effort_unit;
@@ -26,7 +26,7 @@ const WEAK: f64 = 0.5;
 
 /// Learn gain, offset and noise per joint from contact-free recordings, and what the detectors'
 /// scores do while nothing touches the robot.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Clone, clap::Args)]
 pub struct Args {
     /// Contact-free recordings that the gains are fitted on.
     #[arg(required = true)]
@@ -91,6 +91,11 @@ fn motion(text: &str) -> Result<Motion, String> {
 
 /// Calibrates and writes the twin.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
+    let args = &Args {
+        recordings: recordings::expand(&args.recordings)?,
+        validation: recordings::expand(&args.validation)?,
+        ..args.clone()
+    };
     args.force.check([args.out.clone()])?;
     let constants = args.torque_constant.iter().cloned().collect();
     let problem = |_: ConstantSpot<'_>, title| Problem::new(title);

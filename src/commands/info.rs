@@ -10,7 +10,8 @@ use crate::output::Output;
 /// Say what is in a recording: its topics and rates, gaps, whose joints move and what is odd about them, damage.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// An MCAP file, a rosbag2 folder, a `.db3`, a `.bag` of ROS 1, or a table (`.csv`).
+    /// An MCAP file, a rosbag2 folder, a `.db3`, a `.bag` of ROS 1, a table (`.csv`), or an episode of a LeRobot data set
+    /// (`DATASET/episode_000003`).
     recording: PathBuf,
     /// Machine-readable.
     #[arg(long)]

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use tauscope_pipeline::cell::EffortUnit;
+use tauscope_pipeline::recordings;
 
 use super::effort_unit;
 use crate::existing::Force;
@@ -62,7 +63,7 @@ const EXPLAINED: f64 = 0.75;
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let folder = Folder::prepare(&args.out, args.force)?;
     let recordings = match args.live {
-        None => args.recordings.clone(),
+        None => recordings::expand(&args.recordings)?,
         Some(seconds) => {
             let (source, robot) = (&args.source, &args.robot);
             let live = Live {

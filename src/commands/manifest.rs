@@ -3,8 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
+use tauscope_archive::is_there;
 use tauscope_archive::whole_file::{self, Existing};
 use tauscope_pipeline::parallel;
+use tauscope_pipeline::recordings;
 use tauscope_pipeline::report::{Problem, Report, without_path};
 use tauscope_pipeline::results::{Manifest, Wanted};
 
@@ -16,7 +18,8 @@ use crate::progress::Progress;
 /// Write down which recordings are wanted, with their hashes: what `replay --manifest` works through.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Recordings or patterns of them in quotes: 'archive/**/*.mcap'. Of a rosbag2 bag, its folder.
+    /// Recordings or patterns of them in quotes: 'archive/**/*.mcap'. Of a rosbag2 bag or a LeRobot
+    /// data set, its folder.
     #[arg(required = true)]
     recordings: Vec<PathBuf>,
     /// The manifest: a line of JSON for each recording, with its path relative to this file.
@@ -84,8 +87,8 @@ fn expand(given: &[PathBuf]) -> Result<Vec<PathBuf>, Report> {
     let mut found = Vec::new();
     let mut report = Report::default();
     for path in given {
-        if path.exists() {
-            found.push(path.clone());
+        if is_there(path) {
+            found.extend(recordings::expand(std::slice::from_ref(path))?);
             continue;
         }
         let text = path.to_string_lossy();

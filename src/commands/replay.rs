@@ -2,6 +2,7 @@
 
 pub mod archive;
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -12,6 +13,7 @@ use tauscope_archive::{Recording, whole_file};
 use tauscope_dynamics::terms::UNKNOWN;
 use tauscope_pipeline::parallel;
 use tauscope_pipeline::pipeline::Pipeline;
+use tauscope_pipeline::recordings;
 use tauscope_pipeline::replay::{Outcome, Replay, ReplayError, TwinChoice, stem};
 use tauscope_pipeline::report::{Problem, Report, without_path};
 use tauscope_pipeline::tables::{write_events, write_summary};
@@ -26,9 +28,10 @@ use crate::progress::Progress;
 
 /// Run a pipeline's stages over recordings, in process, as fast as the machine allows: the same bytes
 /// every time. The recordings take the place of the pipeline's own source.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Clone, clap::Args)]
 pub struct Args {
-    /// MCAP files, rosbag2 folders, `.db3` bags, ROS 1 bags, or tables (`.csv`, if the pipeline's source is one).
+    /// MCAP files, rosbag2 folders, `.db3` bags, ROS 1 bags, tables (`.csv`, if the pipeline's source is one), or LeRobot
+    /// data sets (`DATASET` for all of its episodes, `DATASET/episode_000003` for one).
     #[arg(required_unless_present = "manifest", conflicts_with = "manifest")]
     recordings: Vec<PathBuf>,
     /// Instead of recordings: a file of `tauscope manifest`. Each of its recordings becomes one Parquet file in --out, named
@@ -69,10 +72,15 @@ pub struct Args {
 /// of a table are may stand in the pipeline file, so whoever reads the table checks it.
 fn check_recordings(args: &Args) -> Result<(), Report> {
     let mut report = Report::default();
+    let mut said = BTreeSet::new();
     let is_table = |path: &&PathBuf| path.extension().is_some_and(|ending| ending == "csv");
     for path in args.recordings.iter().filter(|path| !is_table(path)) {
-        if let Err(error) = Recording::open(path) {
-            report.push(Problem::new(error.to_string()));
+        if let Err(error) = Recording::open_comparable(path, &[]) {
+            let title = error.to_string();
+            // What a data set lacks, all of its episodes lack.
+            if said.insert(title.clone()) {
+                report.push(Problem::new(title));
+            }
         }
     }
     report.into_result(())
@@ -80,6 +88,16 @@ fn check_recordings(args: &Args) -> Result<(), Report> {
 
 /// Replays them.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
+    let recordings = recordings::expand(&args.recordings)?;
+    let args = Args {
+        recordings,
+        ..args.clone()
+    };
+    of_each(&args, out)
+}
+
+/// Replays recordings, none of which is a data set of several.
+fn of_each(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let pipeline = Pipeline::load(&args.pipeline, None)?;
     check_names(args)?;
     for warning in pipeline.warnings(None) {

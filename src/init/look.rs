@@ -1,6 +1,6 @@
 //! What the recordings are: which topic holds the joint states, whose joints they are, in which unit the effort is.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use tauscope_archive::ros::JointStateType;
@@ -138,7 +138,17 @@ impl Told<'_> {
     /// Every recording must have every joint of the robot.
     fn check_joints(&self, cell: &Cell, topic: &str) -> Result<(), Report> {
         let mut report = Report::default();
+        let mut said = BTreeSet::new();
         for recording in self.recordings {
+            let comparable = Recording::open_comparable(recording, &cell.facts.joint_names);
+            if let Err(error) = comparable {
+                let title = error.to_string();
+                // What a data set lacks, all of its episodes lack.
+                if said.insert(title.clone()) {
+                    report.push(Problem::new(title));
+                }
+                continue;
+            }
             let names = match first_joint_names(recording, topic) {
                 Ok(names) => names,
                 Err(problems) => {

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use tauscope_pipeline::recordings;
 use tauscope_pipeline::report::{Problem, Report};
 
 use super::open;
@@ -39,6 +40,7 @@ pub fn choose(paths: &[PathBuf], hours: f64) -> Result<Choice, Report> {
         }
         Err(problems) => report.append(problems),
     };
+    let paths = &recordings::expand(paths)?;
     for path in paths {
         let is_bag = path.join("metadata.yaml").exists();
         if !path.is_dir() || is_bag {

@@ -3,8 +3,14 @@
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::collections::BTreeMap;
+use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use arrow::array::{ArrayRef, Float64Builder, Int64Array, ListBuilder, RecordBatch};
+use parquet::arrow::ArrowWriter;
+use parquet::basic::{Compression as Codec, ZstdLevel};
+use parquet::file::properties::WriterProperties;
 use tauscope_archive::ros::{DynamicJointState, InterfaceValue, JointState};
 use tauscope_archive::{Compression, McapWriter, Recording};
 
@@ -70,6 +76,58 @@ pub fn dynamic_joint_states(folder: &Path, name: &str) -> PathBuf {
         writer.write(topic, at, at, &message).unwrap();
     }
     writer.finish().unwrap().path
+}
+
+/// A LeRobot data set of version 2.1 with one episode, whose features are those of ALOHA and hold `float64`.
+pub fn lerobot(folder: &Path, name: &str) -> PathBuf {
+    let states = states(name);
+    let root = folder.join(name);
+    let file = "data/chunk-000/episode_000000.parquet";
+    for folder in ["meta", "data/chunk-000"] {
+        std::fs::create_dir_all(root.join(folder)).unwrap();
+    }
+    let joints = &states[0].1.name;
+    let feature = serde_json::json!({"dtype": "float64", "shape": [joints.len()], "names": {"motors": joints}});
+    let features = [
+        "observation.state",
+        "observation.velocity",
+        "observation.effort",
+    ];
+    let info = serde_json::json!({
+        "codebase_version": "v2.1",
+        "total_episodes": 1,
+        "fps": 100,
+        "data_path": "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet",
+        "features": features.map(|name| (name, feature.clone())).into_iter().collect::<BTreeMap<_, _>>(),
+    });
+    std::fs::write(root.join("meta/info.json"), info.to_string()).unwrap();
+
+    let start_ns = states[0].1.header.stamp.ns();
+    let mut times = Float64Builder::new();
+    let mut columns = features.map(|_| ListBuilder::new(Float64Builder::new()));
+    for (_, state) in &states {
+        times.append_value((state.header.stamp.ns() - start_ns) as f64 * 1e-9);
+        let quantities = [&state.position, &state.velocity, &state.effort];
+        for (column, values) in columns.iter_mut().zip(quantities) {
+            column.values().append_slice(values);
+            column.append(true);
+        }
+    }
+    let episode = Int64Array::from(vec![0; states.len()]);
+    let mut table: Vec<(&str, ArrayRef)> = vec![
+        ("timestamp", Arc::new(times.finish())),
+        ("episode_index", Arc::new(episode)),
+    ];
+    for (name, mut column) in features.into_iter().zip(columns) {
+        table.push((name, Arc::new(column.finish())));
+    }
+    let batch = RecordBatch::try_from_iter(table).unwrap();
+    let packed = WriterProperties::builder().set_compression(Codec::ZSTD(ZstdLevel::default()));
+    let file = File::create(root.join(file)).unwrap();
+    let mut writer = ArrowWriter::try_new(file, batch.schema(), Some(packed.build())).unwrap();
+    writer.write(&batch).unwrap();
+    writer.close().unwrap();
+    root
 }
 
 /// A bag of ROS 1: one chunk, not compressed.

@@ -8,6 +8,7 @@
 mod common;
 
 mod arguments;
+mod data_sets;
 mod files;
 mod recordings;
 
@@ -47,6 +48,7 @@ impl Desk {
         std::fs::write(this.path("ros1.bag"), "#ROSBAG V2.0\n").unwrap();
         std::fs::write(this.path("table.csv"), "0,1\n1,2\n").unwrap();
         std::fs::create_dir(this.path("folder")).unwrap();
+        this.data_sets();
         let other = std::fs::read_to_string(this.path("demo_arm.urdf")).unwrap();
         std::fs::write(this.path("other.urdf"), other.replace("\"joint", "\"axis_")).unwrap();
         std::fs::write(
@@ -67,6 +69,45 @@ stages:
         )
         .unwrap();
         this
+    }
+
+    /// LeRobot data sets: one of positions only, one of two episodes, and some that are broken.
+    fn data_sets(&self) {
+        let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("archive/tests/data/lerobot");
+        let mut files = Vec::new();
+        walk(&from, &mut files);
+        let copy = |set: &str, to: &str| {
+            for (file, _) in &files {
+                let Ok(below) = file.strip_prefix(from.join(set)) else {
+                    continue;
+                };
+                let target = self.path(to).join(below);
+                std::fs::create_dir_all(target.parent().unwrap()).unwrap();
+                std::fs::copy(file, target).unwrap();
+            }
+        };
+        for (set, to) in [
+            ("so101", "so101"),
+            ("aloha", "aloha"),
+            ("openarm", "openarm"),
+            ("aloha", "no_meta"),
+            ("aloha", "torn"),
+            ("so101", "unnamed"),
+        ] {
+            copy(set, to);
+        }
+        std::fs::remove_dir_all(self.path("no_meta/meta")).unwrap();
+        let rows = self.path("torn/data/chunk-000/episode_000000.parquet");
+        let whole = std::fs::read(&rows).unwrap();
+        std::fs::write(&rows, &whole[..whole.len() / 2]).unwrap();
+        let mut changed = whole;
+        changed[300..340].fill(0xff);
+        std::fs::write(rows.with_file_name("episode_000001.parquet"), changed).unwrap();
+        std::fs::write(
+            self.path("unnamed.columns.yaml"),
+            "effort: {names: [observation.nothing]}\n",
+        )
+        .unwrap();
     }
 
     fn path(&self, name: &str) -> PathBuf {

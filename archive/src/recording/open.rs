@@ -13,7 +13,9 @@ use crate::csv_file::{self, CsvMapping, CsvTable};
 use crate::damage::{Damage, DamageKind};
 use crate::error::ArchiveError;
 use crate::file_kind::file_kind;
+use crate::lerobot::{self, Episode};
 use crate::mcap_file::Layout;
+use crate::parquet_file;
 use crate::ros::{JointState, Message as _};
 use crate::ros1_bag::{self, Ros1Bag};
 use crate::sqlite_file::{self, SqliteFile};
@@ -21,11 +23,12 @@ use crate::topic::{Topic, Topics};
 
 impl Recording {
     /// Opens the recording at `path`: an MCAP file (also an unfinished `.part`), the folder of a
-    /// rosbag2 bag with MCAP or SQLite files, one such SQLite file, a bag of ROS 1 (`.bag`), or a
-    /// table (`.csv`) whose columns its header or a file beside it tells.
+    /// rosbag2 bag with MCAP or SQLite files, one such SQLite file, a bag of ROS 1 (`.bag`), a table
+    /// (`.csv`) whose columns its header or a file beside it tells, or an episode of a LeRobot data
+    /// set (`DATASET/episode_000003`, or the set's folder or Parquet file if it holds one episode).
     ///
     /// Of an MCAP file or a bag of ROS 1, only the index is read if it has a sound one; else all of
-    /// it, once. A database is counted through once.
+    /// it, once. A database is counted through once, an episode is read through once.
     ///
     /// # Errors
     /// [`ArchiveError::Io`]; [`ArchiveError::UnknownFormat`]; [`ArchiveError::Unreadable`] if not
@@ -33,6 +36,9 @@ impl Recording {
     /// [`Recording::damage`].
     pub fn open(path: impl AsRef<Path>) -> Result<Self, ArchiveError> {
         let path = path.as_ref();
+        if let Some(place) = lerobot::locate(path)? {
+            return Self::open_episode(path, place);
+        }
         if path.is_dir() {
             return Self::open_folder(path);
         }
@@ -44,6 +50,19 @@ impl Recording {
             return Self::open_csv(path, &csv_file::mapping_of(path)?, &[]);
         }
         Self::open_file(path, false)
+    }
+
+    /// As [`Recording::open`], but refuses what [`Recording::check_comparable`] does.
+    ///
+    /// # Errors
+    /// Of both.
+    pub fn open_comparable(
+        path: impl AsRef<Path>,
+        joints: &[String],
+    ) -> Result<Self, ArchiveError> {
+        let recording = Self::open(path)?;
+        recording.check_comparable(joints)?;
+        Ok(recording)
     }
 
     fn open_file(path: &Path, packed_messages: bool) -> Result<Self, ArchiveError> {
@@ -63,10 +82,14 @@ impl Recording {
         if beginning.starts_with(ros1_bag::MAGIC) {
             return Ok(Self::from_ros1(Ros1Bag::read(path)?));
         }
+        if beginning.starts_with(parquet_file::MAGIC) {
+            return Self::open_episode(path, lerobot::of_table(path)?);
+        }
         let reason = match file_kind(path) {
             Some("empty") => "the file is empty".to_owned(),
             Some(kind) => format!("it is {kind}"),
-            None => "it begins as no MCAP file, SQLite database or ROS 1 bag does".to_owned(),
+            None => "it begins as no MCAP file, SQLite database, ROS 1 bag or Parquet table does"
+                .to_owned(),
         };
         Err(ArchiveError::UnknownFormat {
             path: path.to_owned(),
@@ -182,6 +205,21 @@ impl Recording {
         })
     }
 
+    fn open_episode(path: &Path, place: lerobot::Place) -> Result<Self, ArchiveError> {
+        let (root, number) = place.one()?;
+        let episode = Episode::check(&root, number)?;
+        Ok(Self {
+            path: path.to_owned(),
+            kind: RecordingKind::Lerobot,
+            topics: Arc::new(joint_states(lerobot::TOPIC, episode.rows)),
+            log_times_ns: episode.times_ns,
+            bytes: episode.bytes(),
+            metadata: BTreeMap::new(),
+            damage: Vec::new(),
+            store: Store::Lerobot(Box::new(episode)),
+        })
+    }
+
     /// Opens the table at `path`, with `joints` as the names that its columns stand for unless the
     /// mapping has its own. Its rows appear as joint states on the topic `/joint_states`.
     ///
@@ -197,19 +235,10 @@ impl Recording {
     ) -> Result<Self, ArchiveError> {
         let path = path.as_ref();
         let table = CsvTable::check(path, mapping, joints)?;
-        let mut topics = Topics::default();
-        topics.add(Topic {
-            name: csv_file::TOPIC.to_owned(),
-            type_name: JointState::TYPE.to_owned(),
-            message_encoding: "cdr".to_owned(),
-            type_hash: Some(JointState::TYPE_HASH.to_owned()),
-            offered_qos: None,
-            message_count: table.rows,
-        });
         Ok(Self {
             path: path.to_owned(),
             kind: RecordingKind::Csv,
-            topics: Arc::new(topics),
+            topics: Arc::new(joint_states(csv_file::TOPIC, table.rows)),
             log_times_ns: table.times_ns,
             bytes: length(path),
             metadata: BTreeMap::new(),
@@ -217,6 +246,20 @@ impl Recording {
             store: Store::Csv(Box::new(table)),
         })
     }
+}
+
+/// The one topic of what is no bag.
+fn joint_states(name: &str, message_count: u64) -> Topics {
+    let mut topics = Topics::default();
+    topics.add(Topic {
+        name: name.to_owned(),
+        type_name: JointState::TYPE.to_owned(),
+        message_encoding: "cdr".to_owned(),
+        type_hash: Some(JointState::TYPE_HASH.to_owned()),
+        offered_qos: None,
+        message_count,
+    });
+    topics
 }
 
 /// A file of a bag that cannot be opened.

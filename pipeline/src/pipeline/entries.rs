@@ -9,6 +9,7 @@ mod record;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use tauscope_archive::is_there;
 use tauscope_ingest::SourceSettings;
 use tauscope_twin::{Expected, Motion, TwinFile};
 
@@ -154,7 +155,7 @@ impl<'a> Resolver<'a> {
         if let Some(path) = config.path_mut() {
             *path = self.file.resolve(path);
         }
-        let missing = config.path_mut().filter(|path| !path.exists()).cloned();
+        let missing = config.path_mut().filter(|path| !is_there(path)).cloned();
         if let (Some(path), Some((_, what))) = (missing, file)
             && self.is_here(index)
         {

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
+use tauscope_archive::{is_there, name_of, recordings_at};
 use tauscope_dynamics::Model;
 use tauscope_pipeline::cell::{
     Cell, CellFacts, ConstantSpot, EffortUnit, first_joint_names, torque_constants,
@@ -109,8 +110,17 @@ impl Assembly<'_> {
         let mut names = BTreeSet::new();
         let mut named = |paths: &[PathBuf], spot: fn(usize) -> Spot<'static>| {
             let mut all = Vec::new();
-            for (index, path) in paths.iter().enumerate() {
-                let Ok(canonical) = path.canonicalize() else {
+            let given = paths.iter().enumerate();
+            let given = given.flat_map(|(index, path)| match recordings_at(path) {
+                Ok(recordings) => recordings.into_iter().map(|path| (index, path)).collect(),
+                // Whoever opens it says what is wrong.
+                Err(_) => vec![(index, path.clone())],
+            });
+            for (index, path) in given {
+                // An episode of a data set is none of its files.
+                let absolute = || is_there(&path).then(|| std::path::absolute(&path).ok());
+                let canonical = path.canonicalize().ok().or_else(|| absolute().flatten());
+                let Some(canonical) = canonical else {
                     let title = format!("there is no recording {}", path.display());
                     report.push((self.problem)(spot(index), title));
                     continue;
@@ -123,17 +133,13 @@ impl Assembly<'_> {
                     report.push((self.problem)(spot(index), title));
                     continue;
                 }
-                let stem = path
-                    .file_stem()
-                    .unwrap_or(path.as_os_str())
-                    .to_string_lossy();
-                let mut name = stem.clone().into_owned();
+                let stem = name_of(&path);
+                let mut name = stem.clone();
                 let mut number = 2;
                 while !names.insert(name.clone()) {
                     name = format!("{stem}_{number}");
                     number += 1;
                 }
-                let path = path.clone();
                 all.push(Named { name, path });
             }
             all

@@ -14,7 +14,7 @@ pub use ur_rtde::{UrEffort, UrRtdeConfig};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
-    /// A recording: an MCAP file, a rosbag2 folder, an SQLite bag, or a bag of ROS 1.
+    /// A recording: an MCAP file, a rosbag2 folder, an SQLite bag, a bag of ROS 1, or an episode of a LeRobot data set.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<FileConfig>,
     /// A table, with or without a header line.
@@ -63,7 +63,8 @@ impl Default for Config {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FileConfig {
-    /// The MCAP file, the folder of a rosbag2 bag or its `.db3`, or the `.bag` of ROS 1.
+    /// The MCAP file, the folder of a rosbag2 bag or its `.db3`, the `.bag` of ROS 1, or `DATASET/episode_000003` of a
+    /// LeRobot data set.
     pub path: PathBuf,
     /// Where in it the messages are.
     #[serde(default)]

@@ -1,4 +1,4 @@
-//! Joint states out of a recording: MCAP, a rosbag2 bag, a bag of ROS 1, or a table.
+//! Joint states out of a recording: MCAP, a rosbag2 bag, a bag of ROS 1, a table, or an episode of a LeRobot data set.
 
 use std::path::{Path, PathBuf};
 
@@ -94,6 +94,7 @@ impl RecordedSource {
         config: &Config,
         setup: &Setup,
     ) -> Result<Self, IngestError> {
+        recording.check_comparable(&setup.joint_names)?;
         let named = |topic: &Option<String>| topic.is_some();
         let settings = PackSettings {
             velocity_cutoff_hz: config.velocity_cutoff_hz,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use tauscope_archive::ros::JointState;
-use tauscope_archive::{Info, Recording, repair};
+use tauscope_archive::{Info, Recording, recordings_at, repair};
 use tauscope_dynamics::Model;
 use tauscope_pipeline::pipeline::Pipeline;
 use tauscope_pipeline::yaml;
@@ -62,6 +62,32 @@ pub fn mcap(bytes: &[u8]) {
 /// A bag of ROS 1: opened, summed up, read.
 pub fn ros1_bag(bytes: &[u8]) {
     recording(&file("a.bag", bytes));
+}
+
+/// An episode of a LeRobot data set: its rows, or what describes them.
+pub fn lerobot(bytes: &[u8]) {
+    const SET: &str = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../archive/tests/data/lerobot/encodings"
+    );
+    const INFO: &str = "meta/info.json";
+    const ROWS: &str = "data/chunk-000/episode_000000.parquet";
+    static WHOLE: OnceLock<[Vec<u8>; 2]> = OnceLock::new();
+    let whole = WHOLE.get_or_init(|| {
+        [INFO, ROWS].map(|name| fs::read(Path::new(SET).join(name)).expect("the archive's data"))
+    });
+    let is_info = bytes.trim_ascii_start().starts_with(b"{");
+    let set = file("set", b"").with_file_name("lerobot");
+    for folder in ["meta", "data/chunk-000"] {
+        fs::create_dir_all(set.join(folder)).expect("room in the temporary folder");
+    }
+    for (name, own, whole) in [(INFO, is_info, &whole[0]), (ROWS, !is_info, &whole[1])] {
+        let bytes = if own { bytes } else { whole };
+        fs::write(set.join(name), bytes).expect("room in the temporary folder");
+    }
+    let _ = recordings_at(&set);
+    recording(&set.join("episode_000000"));
+    recording(&set.join(ROWS));
 }
 
 /// A table.

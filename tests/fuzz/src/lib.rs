@@ -24,11 +24,12 @@ macro_rules! targets {
 }
 
 /// All of them.
-pub const TARGETS: [Target; 11] = targets! {
+pub const TARGETS: [Target; 12] = targets! {
     bus_samples: bus::samples,
     cdr: messages::cdr,
     command: messages::command,
     csv: files::csv,
+    lerobot: files::lerobot,
     mcap: files::mcap,
     modbus: messages::modbus,
     pipeline: files::pipeline,

@@ -133,6 +133,7 @@ short!(
     cdr,
     command,
     csv,
+    lerobot,
     mcap,
     modbus,
     pipeline,

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use tauscope_archive::{ArchiveError, Recording as Archive};
+use tauscope_archive::{ArchiveError, Recording as Archive, name_of};
 
 /// A longer time between two samples is a gap \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
@@ -114,11 +114,8 @@ impl Recording {
         topics: &RecordingTopics,
         joint_names: &[String],
     ) -> Result<Self, RecordingError> {
-        let archive = Archive::open(path)?;
-        let name = path.file_stem().map_or_else(
-            || path.display().to_string(),
-            |stem| stem.to_string_lossy().into_owned(),
-        );
+        let archive = Archive::open_comparable(path, joint_names)?;
+        let name = name_of(path);
         let mut reader = Reader {
             recording: Self {
                 name,

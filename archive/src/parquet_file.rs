@@ -1,0 +1,144 @@
+//! Columns of numbers out of a Parquet file (<https://parquet.apache.org/docs/file-format/>), row by row.
+//!
+//! What is read: numbers and lists of numbers, plain or by dictionary, in pages of version 1 and 2, uncompressed or
+//! compressed with Snappy or Zstandard. This is what pyarrow, pandas, Hugging Face `datasets` and Polars write unless
+//! told otherwise. Everything else is refused by its name.
+//!
+//! Files come from strangers. What a file declares of its own sizes is checked against the file and a limit before
+//! memory is taken. A page of a column, and its dictionary, are all that is held.
+
+mod error;
+mod footer;
+mod hybrid;
+mod page;
+mod rows;
+mod thrift;
+
+use std::fs::File;
+use std::os::unix::fs::FileExt as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+pub use error::{ParquetError, ParquetProblem};
+use footer::Footer;
+pub(crate) use footer::Physical;
+pub(crate) use rows::Rows;
+
+/// How a Parquet file begins and ends.
+pub(crate) const MAGIC: &[u8] = b"PAR1";
+/// How a file begins that Git LFS has not fetched: `version https://git-lfs.github.com/spec/v1`.
+const LFS_POINTER: [u8; 4] = *b"vers";
+/// Longest footer that is read \[bytes\].
+/// Resolution: bounds memory; a thousand row groups of 300 columns have 45 MB.
+const MAX_FOOTER_BYTES: u64 = 64 << 20;
+/// The length of the footer and the magic, at the end of the file \[bytes\].
+const TAIL_BYTES: u64 = 8;
+
+/// An open file, of which some columns are wanted.
+#[derive(Debug)]
+pub(crate) struct ParquetFile {
+    path: PathBuf,
+    file: File,
+    pub(crate) bytes: u64,
+    footer: Footer,
+}
+
+impl ParquetFile {
+    /// Opens the file at `path`, to read the columns `wanted` of it. Which of them it has, [`ParquetFile::has`] tells.
+    ///
+    /// # Errors
+    /// If it is torn, or its footer makes no sense or is too long.
+    pub(crate) fn open(path: &Path, wanted: &[&str]) -> Result<Arc<Self>, ParquetError> {
+        let refuse = |problem: ParquetProblem| ParquetError::new(path, problem);
+        let file = File::open(path).map_err(|error| refuse(error.into()))?;
+        let metadata = file.metadata().map_err(|error| refuse(error.into()))?;
+        let bytes = metadata.len();
+        let text = footer_of(&file, bytes).map_err(refuse)?;
+        let footer = Footer::parse(&text, wanted, bytes).map_err(refuse)?;
+        Ok(Arc::new(Self {
+            path: path.to_owned(),
+            file,
+            bytes,
+            footer,
+        }))
+    }
+
+    /// Where it lies.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Rows of the table.
+    pub(crate) fn rows(&self) -> u64 {
+        self.footer.groups.iter().map(|group| group.rows).sum()
+    }
+
+    /// How the numbers of a column that was wanted are stored, if the file has it.
+    pub(crate) fn physical(&self, column: &str) -> Option<Physical> {
+        let leaf = self.footer.leaves.iter().find(|leaf| leaf.name == column)?;
+        Some(leaf.physical)
+    }
+
+    /// Whether it has a column that was wanted.
+    pub(crate) fn has(&self, column: &str) -> bool {
+        self.physical(column).is_some()
+    }
+
+    /// The rows of `column` from the one at `first` on.
+    ///
+    /// # Errors
+    /// If there is no such column, it is no column of numbers, or what lies before `first` cannot be read.
+    pub(crate) fn column(self: &Arc<Self>, column: &str, first: u64) -> Result<Rows, ParquetError> {
+        let place = (self.footer.leaves.iter()).position(|leaf| leaf.name == column);
+        let Some(place) = place else {
+            let known = self.footer.names.join(", ");
+            let problem = ParquetProblem::NoColumn {
+                column: column.to_owned(),
+                known,
+            };
+            return Err(ParquetError::new(&self.path, problem));
+        };
+        Rows::open(Arc::clone(self), place, first)
+    }
+
+    /// Fills `buffer` from the byte at `at` on.
+    fn read(&self, buffer: &mut [u8], at: u64) -> Result<(), ParquetProblem> {
+        Ok(self.file.read_exact_at(buffer, at)?)
+    }
+}
+
+/// The bytes of the footer.
+fn footer_of(file: &File, bytes: u64) -> Result<Vec<u8>, ParquetProblem> {
+    let magic = MAGIC.len() as u64;
+    let mut head = [0; MAGIC.len()];
+    if bytes < magic + TAIL_BYTES {
+        return Err(ParquetProblem::Torn);
+    }
+    file.read_exact_at(&mut head, 0)?;
+    if head == LFS_POINTER {
+        return Err(ParquetProblem::LfsPointer);
+    }
+    if head != MAGIC {
+        return Err(ParquetProblem::NotParquet);
+    }
+    let mut tail = [0; TAIL_BYTES as usize];
+    file.read_exact_at(&mut tail, bytes - TAIL_BYTES)?;
+    let [a, b, c, d, end @ ..] = tail;
+    if end != MAGIC {
+        return Err(ParquetProblem::Torn);
+    }
+    let length = u64::from(u32::from_le_bytes([a, b, c, d]));
+    if length > MAX_FOOTER_BYTES {
+        return Err(ParquetProblem::TooLarge {
+            what: "the footer",
+            bytes: length,
+            limit: MAX_FOOTER_BYTES,
+        });
+    }
+    let start = (bytes - TAIL_BYTES).checked_sub(length);
+    let start = start.filter(|start| *start >= magic);
+    let start = start.ok_or(ParquetProblem::Footer("it is longer than the file"))?;
+    let mut text = vec![0; length as usize];
+    file.read_exact_at(&mut text, start)?;
+    Ok(text)
+}
