@@ -1,0 +1,96 @@
+//! What is told of remainders.
+
+use super::*;
+use crate::fixture::{Noise, model, problem, recording};
+
+/// What is said of recordings of two joints in which `add` is added to the first joint's effort, given the number of
+/// the recording, its sample and the joint's position. The last recording is held out.
+fn remainders(mut add: impl FnMut(u64, usize, f64) -> f64) -> Remainders {
+    let model = model();
+    let mut noise = Noise(11);
+    let mut of = |seed: u64| {
+        let mut k = 0;
+        recording(&model, seed, |q, _, effort| {
+            effort[0] += add(seed, k, q[0]) + 0.05 * noise.next();
+            effort[1] += 0.05 * noise.next();
+            k += 1;
+        })
+    };
+    let fitted = problem(&model, &[of(1), of(2), of(3)]);
+    let held = problem(&model, &[of(4)]);
+    let (here, there) = (Fit::new(&fitted, Vec::new()), Fit::new(&held, Vec::new()));
+    let left = |problem, fit| Left { problem, fit };
+    let joints = ["shoulder".to_owned(), "elbow".to_owned()];
+    let (found, held) = (left(&fitted, &here), left(&held, &there));
+    of_all(found, held, &here, &joints)
+}
+
+fn of_all(found: Left<'_>, held: Left<'_>, before: &Fit, joints: &[String]) -> Remainders {
+    of(found, before, Some(held), &[1.0, 1.0], joints, "N m")
+}
+
+#[test]
+fn slow_noise_is_no_remainder_however_large() {
+    let mut noise = Noise(5);
+    let mut slow = 0.0;
+    let found = remainders(|_, _, _| {
+        slow = 0.99 * slow + 0.14 * noise.next();
+        2.0 * slow
+    });
+    assert!(found.all.is_empty(), "{:?}", found.all);
+}
+
+#[test]
+fn what_follows_the_motion_is_a_remainder_and_is_told_with_what_it_goes() {
+    let found = remainders(|_, _, q| 0.8 * (4.0 * q).sin());
+    let [one] = &found.all[..] else {
+        panic!("{:?}", found.all)
+    };
+    assert_eq!(one.joint, "shoulder");
+    assert!(
+        one.sentence.contains("its own position"),
+        "{}",
+        one.sentence
+    );
+    assert!(one.rms > 5.0 * one.noise);
+}
+
+#[test]
+fn what_is_larger_on_held_out_recordings_alone_is_a_remainder() {
+    let mut noise = Noise(7);
+    let mut slow = 0.0;
+    let found = remainders(|recording, _, _| {
+        slow = 0.99 * slow + 0.14 * noise.next();
+        if recording == 4 {
+            3.0 * slow
+        } else {
+            0.1 * slow
+        }
+    });
+    assert_eq!(found.elsewhere, [0]);
+    let said = &found.all[0].sentence;
+    assert!(said.contains("On the held-out recordings"), "{said}");
+}
+
+#[test]
+fn held_out_recordings_like_the_worst_fitted_one_have_no_remainder() {
+    let mut noise = Noise(9);
+    let mut slow = 0.0;
+    let found = remainders(|recording, _, _| {
+        slow = 0.99 * slow + 0.14 * noise.next();
+        if recording > 2 {
+            1.5 * slow
+        } else {
+            0.1 * slow
+        }
+    });
+    assert!(found.elsewhere.is_empty(), "{:?}", found.all);
+}
+
+#[test]
+fn knocks_are_told_with_their_time() {
+    let knocked = |k: usize| (200..230).contains(&(k % 400));
+    let found = remainders(|_, k, _| if knocked(k) { 9.0 } else { 0.0 });
+    let said = &found.all[0].sentence;
+    assert!(said.contains("stands out for moments"), "{said}");
+}
