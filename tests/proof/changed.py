@@ -101,7 +101,7 @@ class Arm:
             log = plant.record(name, command, start)
             if log.trouble:
                 raise RuntimeError(f"{self.folder} {name}: {log.trouble}")
-            self.write(name, start, truth.of_log(name, start, log), truth.recorded(self.robot, effects, log), seconds)
+            self.write(name, start, truth.of_log(name, start, log), truth.recorded(self.robot, effects, log, start), seconds)
         return names, new
 
     def write(self, name, start, m, clean, seconds):

@@ -133,8 +133,8 @@ def merged(robot, effects):
     return out
 
 
-def on_record(robot, effect, tau, dt):
-    """The recorded torque (uniform samples x joints) after one effect on the record."""
+def on_record(robot, effect, tau, dt, q, session):
+    """The recorded torque (uniform samples x joints) after one effect on the record, along angles `q` and times of the session."""
     p, name, out = effect["parameters"], effect["effect"], tau.copy()
     if name in ("torque_lowpass", "torque_delay"):
         if name == "torque_delay":
@@ -148,7 +148,7 @@ def on_record(robot, effect, tau, dt):
         return out
     j = robot.names.index(effect["joint"])
     if name == "unknown":
-        out[:, j] += shop_floor.hysteresis(p, tau[:, j])
+        out[:, j] = shop_floor.recorded(p, tau[:, j], q[:, j], session, dt)
     elif name == "torque_gain":
         out[:, j] *= p["gain"]
     elif name == "torque_bias":

@@ -158,7 +158,7 @@ class Arm:
             return False
         rng, n = self.rng, self.robot.n
         for name, start, log in zip(names, starts, logs):
-            m, clean = truth.of_log(name, start, log), truth.recorded(self.robot, all_effects, log)
+            m, clean = truth.of_log(name, start, log), truth.recorded(self.robot, all_effects, log, start)
             t = np.arange(int(self.seconds * RATE) - 1) / RATE
             at = lambda x: np.stack([np.interp(t, m.t, column) for column in x.T], 1)
             slow = make.coloured(rng, t, n, 0.1)

@@ -228,7 +228,7 @@ def attempt(o, ident, kind, names, robot, rng, folder, rejected):
     for r, s, log in zip(recs, starts, logs):
         m = truth.of_log(r, s, log)
         rigid, parts = truth.contributions(robot, effects, m)
-        clean = truth.recorded(robot, effects, log)
+        clean = truth.recorded(robot, effects, log, s)
         shown[r] = (m, rigid, parts, clean)
         gap = (clean - rigid - sum(parts)) / sigma
         closure = max(closure, float(rms(gap).max()))

@@ -1,6 +1,7 @@
 """Faults of drives, brakes, sensors and springs that workshops know: what each does to a simulated arm, and random shapes of them.
 
-Written apart from the laws of `explain`: a dead band is cut out of the motor's torque, a sensor's hysteresis is a sum of plays
+Written apart from the laws of `explain`: a motor's constant falls as its winding's temperature does, a rotor's magnets are unequal in pairs, a
+channel is read now and then, a dead band is cut out of the motor's torque, a sensor's hysteresis is a sum of plays
 (Prandtl-Ishlinskii), a brake follows the command, a gas spring has pivots, and an encoder's error is in the position that the
 controller sees. Each has an `amplitude_nm`, about the torque at usual speeds, loads and angles, or for the encoder an angle.
 """
@@ -33,10 +34,11 @@ def _gas_spring(p, m, q, v, **_):
 
 FRICTION = {"unknown:late_brake": _late_brake, "unknown:friction_drift": _drift}
 FIELD = {"unknown:gas_spring": _gas_spring}
-RECORD = ("unknown:sensor_hysteresis",)      # change what is recorded
+RECORD = tuple(f"unknown:{kind}" for kind in ("sensor_hysteresis", "gain_drift", "gain_ripple", "late_effort"))      # change what is recorded
 DRIVE = "unknown:drive_deadband"             # cuts the motor's torque
 ENCODER = "unknown:encoder_eccentricity"     # changes the position that is read
-KINDS = ["friction_drift", "drive_deadband", "sensor_hysteresis", "late_brake", "encoder_eccentricity", "gas_spring"]
+KINDS = ["friction_drift", "drive_deadband", "sensor_hysteresis", "late_brake", "encoder_eccentricity", "gas_spring", "gain_drift", "gain_ripple",
+         "late_effort"]
 # As these laws are called in reports; others have the same name there.
 NEEDS_PLANT = {"drive_deadband", "encoder_eccentricity"}
 
@@ -71,6 +73,21 @@ def hysteresis(p, torque):
     return out
 
 
+def recorded(p, torque, q, session, dt):
+    """What is recorded of a joint's torque, along samples; the angle `q` and the time of the session go with them."""
+    kind = p["kind"]
+    if kind == "sensor_hysteresis":
+        return torque + hysteresis(p, torque)
+    share = p["amplitude_nm"] / p["usual_nm"]
+    if kind == "gain_drift":       # a winding that warms up towards its end temperature
+        return torque * (1. + share * p["sign"] * (1. - np.exp(-session / p["time_s"])))
+    if kind == "gain_ripple":      # pairs of magnets of unequal strength
+        n, phase = p["pairs"], p["phase_rad"]
+        return torque * (1. + share * (np.cos(n * q + phase) + 0.3 * np.cos(2. * n * q + 1.7 * phase)))
+    held = np.arange(len(torque)) * dt // max(share * p["longest_s"], dt) * max(share * p["longest_s"], dt)
+    return torque[np.minimum(np.round(held / dt).astype(int), len(torque) - 1)]
+
+
 def read(p, q, v, a):
     """Position, speed and acceleration that an eccentric encoder reads where the joint has these."""
     size, n, phase = p["amplitude_rad"], p["cycles_per_rev"], p["phase_rad"]
@@ -84,7 +101,7 @@ def shows(kind, c):
     if kind == "drive_deadband":
         ahead = (load > 0).mean(0)
         return (ahead > 0.15) & (ahead < 0.85) & (c.swing / c.sigma > 25)
-    if kind == "sensor_hysteresis":
+    if kind in ("sensor_hysteresis", "gain_drift", "gain_ripple", "late_effort"):
         return c.swing / c.sigma > 25
     if kind == "gas_spring":
         return (c.range > 1.5) & ~c.robot.slides
@@ -104,6 +121,9 @@ def shape(kind, c, rng, j):
         "drive_deadband": {},
         "sensor_hysteresis": {"reach_nm": u(0.3, 1.) * float(c.swing[j]), "shares": rng.dirichlet(np.full(PLAYS, 2.)).tolist()},
         "late_brake": {"late_s": u(0.15, 0.5)},
+        "gain_drift": {"usual_nm": float(c.swing[j]), "time_s": u(0.5, 2.) * session, "sign": float(rng.choice([-1., 1.]))},
+        "gain_ripple": {"usual_nm": float(c.swing[j]), "pairs": int(rng.integers(1, 5)), "phase_rad": u(-3., 3.)},
+        "late_effort": {"usual_nm": float(c.swing[j]), "longest_s": u(0.3, 0.6)},
         "encoder_eccentricity": {"cycles_per_rev": float(rng.choice([1, 2])), "phase_rad": u(-3., 3.)},
         "gas_spring": {"arm_m": u(0.08, 0.2), "base_m": u(0.22, 0.4), "rise": u(0.1, 0.4),
                        "dead_centre_rad": float(np.mean(q)) + float(rng.choice([-1., 1.])) * u(0.1, 1.4)},

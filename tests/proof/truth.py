@@ -132,18 +132,18 @@ def contributions(robot, effects, motion, rigid=None):
                     if motion.link is None:
                         parts[k][:, j] = total[:, j] - np.clip(total[:, j], -limit, limit)
                     continue
-                after = on_record(robot, e, total, motion.dt)
+                after = on_record(robot, e, total, motion.dt, motion.q, motion.session_start + motion.t)
                 parts[k], total = after - total, after
     return rigid, [parts[k] for k in range(len(effects))]
 
 
-def recorded(robot, effects, log):
+def recorded(robot, effects, log, session_start):
     """The recorded effort without noise, at 1 kHz: the motor's, then what happens on the record."""
     tau = log.torque
     for name in RECORD:
         for e in effects:
             if formula(e) == name:
-                tau = on_record(robot, e, tau, 1e-3)
+                tau = on_record(robot, e, tau, 1e-3, log.q, session_start + log.t)
     return tau
 
 
