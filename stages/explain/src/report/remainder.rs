@@ -16,6 +16,7 @@ use crate::report::schema::Remaining;
 use crate::report::varying_delay::varying_delay;
 use crate::select::evidence::PATCH;
 use crate::select::propose::Base;
+use crate::select::prune::HIDDEN;
 use tauscope_dynamics::terms::TermError;
 use tauscope_dynamics::terms::words::number;
 
@@ -41,6 +42,9 @@ const APART_S: f64 = 0.5;
 /// Accelerations are uncertain within this time of either end of a recording \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const END_S: f64 = 0.25;
+/// Share of that by which stamps are wrong as root mean square, where the error may follow the motion.
+/// Statistical: a stamp anywhere within its sample is off by 0.29 of it.
+const CLOCK_SHARE: f64 = 0.29;
 /// Stamps may be wrong by at least this much \[s\].
 /// Resolution: delays below this are not searched for.
 const CLOCK_S: f64 = 0.002;
@@ -298,7 +302,11 @@ fn follows_motion(found: Left<'_>, before: &Fit, joint: usize) -> Option<String>
     let names: Vec<String> = problem.model.joint_names().map(str::to_owned).collect();
     // What effects are known to do is not known to the last percent.
     let known = (before.squares[joint] - fit.squares[joint]).max(0.0);
-    let is_worth_telling = |share: f64| share * fit.squares[joint] >= PATCH * known;
+    let hidden = HIDDEN * problem.unfiltered_noise[joint];
+    let is_worth_telling = |share: f64| {
+        let is_seen = share.sqrt() * found.rms(joint) >= hidden;
+        is_seen && share * fit.squares[joint] >= PATCH * known
+    };
     let told = |on: &str, by: &str, share: f64| {
         format!(
             "what remains depends on {on}, and {by} of that predicts {:.0} % of its square in recordings that it was not fitted on.",
@@ -316,7 +324,7 @@ fn follows_motion(found: Left<'_>, before: &Fit, joint: usize) -> Option<String>
         let history = history::predicts(problem, fit, joint, &names).filter(|_| of_arm)?;
         // Errors of clocks and derivatives follow the motion, too.
         let rows = found.rows(joint);
-        let cost = clock_s(&problem.tracks[0].track.time_s) * rms_rate(&rows);
+        let cost = CLOCK_SHARE * clock_s(&problem.tracks[0].track.time_s) * rms_rate(&rows);
         let is_more =
             history.share.sqrt() * found.rms(joint) > cost.max(problem.white_noise[joint]);
         (is_more && is_worth_telling(history.share))

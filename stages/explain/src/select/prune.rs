@@ -23,7 +23,7 @@ const CERTAIN_MORE: f64 = 60.0;
 
 /// An effect is hidden if its effort is less than this many times the white noise, both as root mean square.
 /// Tuned: by hand; not swept.
-const HIDDEN: f64 = 0.5;
+pub const HIDDEN: f64 = 0.5;
 
 impl Search<'_> {
     /// Removes the effects that are no longer needed, one at a time.
