@@ -1,22 +1,27 @@
 //! Calibration: what a twin's gain, offset and noise per joint are, and what the detectors' scores do
 //! while nothing touches the robot. The stages are the pipeline's own, so that the numbers hold there.
 
+mod spread;
+
 use std::path::{Path, PathBuf};
 
-use tauscope_bus::{SampleRef, Sink, StageError, TwinState, flags};
+use tauscope_bus::{JointState, SampleRef, Sink, StageError, TwinState, flags};
 use tauscope_detect::Detector;
 use tauscope_dynamics::effort_scale::{EffortScale, ScaleFault};
 use tauscope_ingest::{FileConfig, RecordedSource, Topics};
 use tauscope_twin::{
-    Calibration, Expected, JointCorrection, Robot, ScoreStatistics, TwinFile, telling_slopes,
+    Calibration, Expected, JointCorrection, JointFit, Robot, TwinFile, spread_scale, telling_slopes,
 };
 
 use crate::build;
 use crate::cell::{Cell, EffortUnit};
 use crate::graph::Graph;
+use crate::plausible::{Oddity, Plausible};
 use crate::provenance;
 use crate::replay::ReplayError;
 use crate::report::without_path;
+
+use spread::Spread;
 
 /// What to calibrate, and on what.
 #[derive(Debug)]
@@ -49,6 +54,20 @@ pub enum CalibrateError {
         "no sample to calibrate on: the recordings hold no effort, or end before the twin's filters have settled"
     )]
     TooShort,
+    /// Nothing that is learnt from this recording can be right.
+    #[error("{}: {oddity}", recording.display())]
+    Implausible {
+        /// The recording.
+        recording: PathBuf,
+        /// Why.
+        oddity: Oddity,
+    },
+    /// The arm stands, and how many N m an ampere gives is not known.
+    #[error(
+        "the arm stands in all recordings, so that no gain from N m to A can be told: record it in motion, or give \
+         the torque constants"
+    )]
+    Stands,
     /// The recordings are not of this robot in this unit.
     #[error(transparent)]
     WrongScale(#[from] ScaleFault),
@@ -59,7 +78,7 @@ impl CalibrateError {
     pub fn is_input(&self) -> bool {
         match self {
             Self::Recording { source, .. } => source.is_input(),
-            Self::TooShort | Self::WrongScale(_) => true,
+            Self::TooShort | Self::Implausible { .. } | Self::Stands | Self::WrongScale(_) => true,
         }
     }
 }
@@ -73,6 +92,8 @@ pub struct Calibrated {
     pub samples: u64,
     /// Samples of the recordings that were lost or refused.
     pub lost: u64,
+    /// What is odd in the recordings, a line each.
+    pub notes: Vec<String>,
 }
 
 impl Job<'_> {
@@ -107,20 +128,27 @@ impl Job<'_> {
             facts.effort_unit == EffortUnit::Nm || facts.torque_constants_nm_per_a.is_some();
         let from_topic = self.twin.expected == Expected::Topic;
         let mut calibration = Calibration::new(joint_count, in_nm || from_topic);
+        let mut notes = Vec::new();
+        let mut all_stand = true;
         for (index, recording) in self.fit.iter().enumerate() {
             let step = &mut |fraction| progress(index, fraction);
-            lost += self.each(recording, None, step, &mut |sample| {
+            let mut plausible = Plausible::new(self.cell);
+            lost += self.each(recording, None, &mut plausible, step, &mut |sample| {
                 if is_free(recording, sample.header.stamp_ns) {
                     calibration.add(sample);
                 }
             })?;
+            all_stand &= plausible.stands();
+            notes.extend(odd_in(recording, &plausible)?);
         }
         let Some(fits) = calibration.fit() else {
             return Err(CalibrateError::TooShort);
         };
-        if in_nm && !from_topic {
-            let slopes = telling_slopes(&facts.joint_names, &fits);
-            if let Some(fault) = EffortScale::of(&slopes).fault_in_nm() {
+        if !from_topic {
+            if all_stand && !in_nm {
+                return Err(CalibrateError::Stands);
+            }
+            if let Some(fault) = scale_fault(&facts.joint_names, &fits, in_nm) {
                 return Err(fault.into());
             }
         }
@@ -141,6 +169,7 @@ impl Job<'_> {
             file,
             samples: calibration.samples(),
             lost,
+            notes,
         })
     }
 
@@ -166,7 +195,8 @@ impl Job<'_> {
         let mut lost = 0;
         for (index, recording) in recordings.iter().enumerate() {
             let step = &mut |fraction| progress(index, fraction);
-            lost += self.each(recording, Some(file), step, &mut |sample| {
+            let mut plausible = Plausible::new(self.cell);
+            lost += self.each(recording, Some(file), &mut plausible, step, &mut |sample| {
                 for (spread, residual) in noise.iter_mut().zip(sample.residual) {
                     spread.add(residual);
                 }
@@ -211,6 +241,7 @@ impl Job<'_> {
         &self,
         recording: &Path,
         model: Option<&TwinFile>,
+        plausible: &mut Plausible,
         progress: &mut dyn FnMut(f64),
         take: &mut (dyn FnMut(&TwinState) + Send),
     ) -> Result<u64, CalibrateError> {
@@ -230,12 +261,16 @@ impl Job<'_> {
             let mut graph = Graph::default();
             let states = graph.source("ingest", Box::new(source));
             let twins = graph.stage("twin", Box::new(twin), &states)?;
-            let input = graph.listen::<TwinState>(&twins)?;
-            graph.sink(
-                "calibration",
-                Box::new(Settled { take, reset: true }),
-                vec![input],
-            );
+            let inputs = vec![
+                graph.listen::<JointState>(&states)?,
+                graph.listen::<TwinState>(&twins)?,
+            ];
+            let settled = Settled {
+                plausible: &mut *plausible,
+                take: &mut *take,
+                reset: true,
+            };
+            graph.sink("calibration", Box::new(settled), inputs);
             let counts = graph.run(&mut |fraction| {
                 progress(fraction);
                 true
@@ -281,16 +316,48 @@ impl Job<'_> {
     }
 }
 
+/// What is odd in a recording.
+///
+/// # Errors
+/// If nothing that is learnt from it can be right.
+fn odd_in(recording: &Path, plausible: &Plausible) -> Result<Vec<String>, CalibrateError> {
+    let mut notes = Vec::new();
+    for oddity in plausible.oddities() {
+        if oddity.is_fault() {
+            let recording = recording.to_owned();
+            return Err(CalibrateError::Implausible { recording, oddity });
+        }
+        notes.push(format!("{}: {oddity}", recording.display()));
+    }
+    Ok(notes)
+}
+
+/// Why the efforts cannot be this robot's in the unit that they are said to be in.
+fn scale_fault(names: &[String], fits: &[JointFit], in_nm: bool) -> Option<ScaleFault> {
+    let scale = EffortScale::of(&telling_slopes(names, fits));
+    if !in_nm {
+        return scale.fault_in_a();
+    }
+    let spread = || EffortScale::fault_of_spread_in_nm(spread_scale(fits)?);
+    scale.fault_in_nm().or_else(spread)
+}
+
 /// Hands every sample whose filters have settled to a closure; the first one after a reset says so.
 struct Settled<'a> {
+    plausible: &'a mut Plausible,
     take: &'a mut (dyn FnMut(&TwinState) + Send),
     reset: bool,
 }
 
 impl Sink for Settled<'_> {
     fn accept(&mut self, _from: &str, sample: SampleRef<'_>) -> Result<(), StageError> {
-        let SampleRef::TwinState(sample) = sample else {
-            return Ok(());
+        let sample = match sample {
+            SampleRef::TwinState(sample) => sample,
+            SampleRef::JointState(sample) => {
+                self.plausible.add(sample);
+                return Ok(());
+            }
+            _ => return Ok(()),
         };
         self.reset |= sample.header.has(flags::RESET);
         if sample.header.has(flags::READY) {
@@ -312,36 +379,3 @@ impl Sink for Settled<'_> {
 
 /// A detector and what its score has done.
 type Scored = (Box<dyn Detector>, Spread);
-
-/// Mean and spread of a number, as it comes (Welford).
-#[derive(Debug, Clone, Copy, Default)]
-struct Spread {
-    count: u64,
-    mean: f64,
-    squares: f64,
-}
-
-impl Spread {
-    fn add(&mut self, value: f64) {
-        self.count += 1;
-        let delta = value - self.mean;
-        self.mean += delta / self.count as f64;
-        self.squares += delta * (value - self.mean);
-    }
-
-    fn variance(&self) -> f64 {
-        self.squares / self.count.max(1) as f64
-    }
-
-    fn root_mean_square(&self) -> f64 {
-        (self.variance() + self.mean * self.mean).sqrt()
-    }
-
-    fn statistics(&self) -> ScoreStatistics {
-        ScoreStatistics {
-            mean: self.mean,
-            standard_deviation: self.variance().sqrt(),
-            samples: self.count,
-        }
-    }
-}

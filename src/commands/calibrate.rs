@@ -9,6 +9,7 @@ use tauscope_archive::{ArchiveError, Recording};
 use tauscope_ingest::Topics;
 use tauscope_pipeline::calibrate::{Calibrated, Job};
 use tauscope_pipeline::cell::{Cell, ConstantSpot, EffortUnit};
+use tauscope_pipeline::plausible::cutoff_above_half;
 use tauscope_pipeline::provenance;
 use tauscope_pipeline::report::Problem;
 use tauscope_twin::{Expected, Motion, TwinFile};
@@ -91,7 +92,9 @@ fn motion(text: &str) -> Result<Motion, String> {
 
 /// Calibrates and writes the twin.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
-    args.force.check([args.out.clone()])?;
+    let recordings = args.recordings.iter().chain(&args.validation);
+    let inputs = recordings.chain([&args.robot]);
+    args.force.check_beside([args.out.clone()], inputs)?;
     let constants = args.torque_constant.iter().cloned().collect();
     let problem = |_: ConstantSpot<'_>, title| Problem::new(title);
     let cell = Cell::from_urdf(&args.robot, args.effort_unit, &constants, &problem)?;
@@ -165,12 +168,8 @@ fn check_cutoffs(args: &Args) -> Result<(), Failure> {
         let span_ns = recording.end_ns().unwrap_or(0) - recording.start_ns().unwrap_or(0);
         let rate_hz = topic.message_count as f64 / (span_ns as f64 * 1e-9);
         for (name, cutoff_hz) in cutoffs {
-            if cutoff_hz > rate_hz / 2.0 {
-                let title = format!(
-                    "{}: {rate_hz:.1} joint states a second, so {name} {cutoff_hz} would pass everything",
-                    path.display()
-                );
-                let help = format!("give less than {:.1}, half the rate", rate_hz / 2.0);
+            if let Some((title, help)) = cutoff_above_half(name, cutoff_hz, rate_hz) {
+                let title = format!("{}: {title}", path.display());
                 return Err(Failure::Rejected(Problem::new(title).help(help).into()));
             }
         }
@@ -256,6 +255,9 @@ fn report(calibrated: &Calibrated, cell: &Cell, args: &Args) -> String {
     }
     if args.validation.is_empty() {
         text.push_str("\nnote: noise and scores were measured on the recordings of the fit; give others with --validation for thresholds that hold");
+    }
+    for note in &calibrated.notes {
+        text.push_str(&format!("\nwarning: {note}"));
     }
     if calibrated.lost > 0 {
         text.push_str(&format!(
