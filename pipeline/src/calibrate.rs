@@ -10,7 +10,7 @@ use tauscope_detect::Detector;
 use tauscope_dynamics::effort_scale::{EffortScale, ScaleFault};
 use tauscope_ingest::{FileConfig, RecordedSource, Topics};
 use tauscope_twin::{
-    Calibration, Expected, JointCorrection, JointFit, Robot, TwinFile, spread_scale, telling_slopes,
+    Calibration, Expected, JointCorrection, Robot, TwinFile, spread_scale, telling_slopes,
 };
 
 use crate::build;
@@ -94,6 +94,8 @@ pub struct Calibrated {
     pub lost: u64,
     /// What is odd in the recordings, a line each.
     pub notes: Vec<String>,
+    /// Why the gains cannot be right, though they could be fitted.
+    doubt: Option<CalibrateError>,
 }
 
 impl Job<'_> {
@@ -104,6 +106,9 @@ impl Job<'_> {
     /// If a recording cannot be read, or all are too short.
     pub fn run(&self, progress: &dyn Fn(usize, f64)) -> Result<Calibrated, CalibrateError> {
         let mut calibrated = self.fit(&|_, _| true, progress)?;
+        if let Some(doubt) = calibrated.doubt.take() {
+            return Err(doubt);
+        }
         let lost = self.measure(&mut calibrated.file, self.measured(), &|index, fraction| {
             progress(self.fit.len() + index, fraction);
         })?;
@@ -144,14 +149,16 @@ impl Job<'_> {
         let Some(fits) = calibration.fit() else {
             return Err(CalibrateError::TooShort);
         };
-        if !from_topic {
-            if all_stand && !in_nm {
-                return Err(CalibrateError::Stands);
-            }
-            if let Some(fault) = scale_fault(&facts.joint_names, &fits, in_nm) {
-                return Err(fault.into());
-            }
+        let scale = EffortScale::of(&telling_slopes(&facts.joint_names, &fits));
+        if let Some(fault) = scale.fault_in_nm().filter(|_| in_nm && !from_topic) {
+            return Err(fault.into());
         }
+        let doubt = match (from_topic, in_nm) {
+            (true, _) => None,
+            (false, true) => spread_scale(&fits).and_then(EffortScale::fault_of_spread_in_nm),
+            (false, false) => scale.fault_in_a(),
+        };
+        let stands = (all_stand && !in_nm && !from_topic).then_some(CalibrateError::Stands);
         let mut file = self.file();
         for (name, fit) in self.cell.facts.joint_names.iter().zip(&fits) {
             let joint = JointCorrection {
@@ -170,6 +177,7 @@ impl Job<'_> {
             samples: calibration.samples(),
             lost,
             notes,
+            doubt: stands.or(doubt.map(CalibrateError::from)),
         })
     }
 
@@ -330,16 +338,6 @@ fn odd_in(recording: &Path, plausible: &Plausible) -> Result<Vec<String>, Calibr
         notes.push(format!("{}: {oddity}", recording.display()));
     }
     Ok(notes)
-}
-
-/// Why the efforts cannot be this robot's in the unit that they are said to be in.
-fn scale_fault(names: &[String], fits: &[JointFit], in_nm: bool) -> Option<ScaleFault> {
-    let scale = EffortScale::of(&telling_slopes(names, fits));
-    if !in_nm {
-        return scale.fault_in_a();
-    }
-    let spread = || EffortScale::fault_of_spread_in_nm(spread_scale(fits)?);
-    scale.fault_in_nm().or_else(spread)
 }
 
 /// Hands every sample whose filters have settled to a closure; the first one after a reset says so.

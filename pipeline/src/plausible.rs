@@ -14,7 +14,7 @@ use tauscope_dynamics::JointKind;
 use crate::cell::Cell;
 use crate::suggest;
 
-pub use twin::{PlausibleTwin, cutoff_above_half};
+pub use twin::{PlausibleTwin, cutoff_above_half, cutoffs_above_half, recorded_rate_hz};
 pub use watched::{Watched, WatchedTwin};
 
 /// Samples that tell whether efforts are zero: fewer may be a driver that has only begun.

@@ -179,8 +179,7 @@ impl<'a> Replay<'a> {
                 .cloned();
             let stream = match (&stage.settings, input) {
                 (Settings::Ingest(config), _) => {
-                    let source = open::recording(config, recording, cell)?;
-                    let source = Commanded::archived(source);
+                    let source = Commanded::archived(open::recording(config, recording, cell)?);
                     Some(graph.source(&stage.name, Box::new(source)))
                 }
                 (Settings::Twin { config, model }, Some(input)) => {

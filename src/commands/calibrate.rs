@@ -9,7 +9,7 @@ use tauscope_archive::{ArchiveError, Recording};
 use tauscope_ingest::Topics;
 use tauscope_pipeline::calibrate::{Calibrated, Job};
 use tauscope_pipeline::cell::{Cell, ConstantSpot, EffortUnit};
-use tauscope_pipeline::plausible::cutoff_above_half;
+use tauscope_pipeline::plausible::{cutoff_above_half, recorded_rate_hz};
 use tauscope_pipeline::provenance;
 use tauscope_pipeline::report::Problem;
 use tauscope_twin::{Expected, Motion, TwinFile};
@@ -162,11 +162,10 @@ fn check_cutoffs(args: &Args) -> Result<(), Failure> {
     for path in args.recordings.iter().chain(&args.validation) {
         let rejected = |error: ArchiveError| Failure::rejected(error.to_string());
         let recording = Recording::open(path).map_err(rejected)?;
-        let topic = recording
-            .joint_state_topic(&args.state_topic)
-            .map_err(rejected)?;
-        let span_ns = recording.end_ns().unwrap_or(0) - recording.start_ns().unwrap_or(0);
-        let rate_hz = topic.message_count as f64 / (span_ns as f64 * 1e-9);
+        let Some(rate_hz) = recorded_rate_hz(&recording, &args.state_topic).map_err(rejected)?
+        else {
+            continue;
+        };
         for (name, cutoff_hz) in cutoffs {
             if let Some((title, help)) = cutoff_above_half(name, cutoff_hz, rate_hz) {
                 let title = format!("{}: {title}", path.display());
@@ -240,6 +239,15 @@ fn report(calibrated: &Calibrated, cell: &Cell, args: &Args) -> String {
         column.set_cell_alignment(CellAlignment::Right);
     }
     let mut text = format!("{table}\n\nfitted on {} samples", calibrated.samples);
+    if args.effort_unit == EffortUnit::Nm
+        && args.twin_topic.is_none()
+        && weak.len() == cell.facts.joint_names.len()
+    {
+        text.push_str(
+            "\nnote: no joint's effort follows the robot's weight: if the driver publishes motor current, give \
+             --effort-unit A",
+        );
+    }
     if !weak.is_empty() {
         text.push_str(&format!(
             "\nnote: the model explains less than {:.0} % of the effort of {}: friction or too little motion outweighs it, so the gain there is not to be read as the drive's",

@@ -10,7 +10,7 @@ use tauscope_archive::ros::JointStateType;
 use tauscope_archive::{Info, Recording};
 use tauscope_dynamics::effort_scale::EffortScale;
 use tauscope_ingest::Topics;
-use tauscope_pipeline::calibrate::{CalibrateError, Job};
+use tauscope_pipeline::calibrate::Job;
 use tauscope_pipeline::cell::{Cell, ConstantSpot, EffortUnit, first_joint_names};
 use tauscope_pipeline::report::{Problem, Report};
 use tauscope_pipeline::suggest;
@@ -218,15 +218,12 @@ impl Told<'_> {
         if let Some(problem) = turned_in_some(&each.collect::<Vec<_>>()) {
             return Err(Failure::Rejected(problem.into()));
         }
-        match fit(self.recordings) {
-            Ok(fitted) => Ok(Slopes {
-                all: telling(&fitted.file),
-                notes: fitted.notes,
-            }),
-            // A standing arm does not tell; whoever knows the unit goes on.
-            Err(CalibrateError::Stands) => Ok(Slopes::default()),
-            Err(error) => Err(Failure::rejected(error.to_string())),
-        }
+        let fitted = fit(self.recordings);
+        let fitted = fitted.map_err(|error| Failure::rejected(error.to_string()))?;
+        Ok(Slopes {
+            all: telling(&fitted.file),
+            notes: fitted.notes,
+        })
     }
 
     /// The unit and how it is known.

@@ -1,6 +1,7 @@
 //! What cannot be in a twin's samples: efforts with the other sign or in another unit than the twin's, and a low-pass
 //! that passes everything.
 
+use tauscope_archive::{ArchiveError, Recording};
 use tauscope_bus::TwinState;
 use tauscope_dynamics::effort_scale::{self, EffortScale, ScaleFault};
 use tauscope_twin::{Calibration, Filters, TwinFile, telling_slopes};
@@ -73,17 +74,8 @@ impl PlausibleTwin {
 
     /// What is odd so far.
     pub fn oddities(&self) -> Vec<String> {
-        let cutoffs = self.rate_hz().map(|rate_hz| {
-            let filters = [
-                ("velocity_cutoff_hz", self.filters.velocity_cutoff_hz),
-                ("effort_cutoff_hz", self.filters.effort_cutoff_hz),
-            ];
-            let told = filters.map(|(name, cutoff_hz)| {
-                let (title, help) = cutoff_above_half(&format!("`{name}`"), cutoff_hz, rate_hz)?;
-                Some(format!("{title}; {help}"))
-            });
-            told.into_iter().flatten()
-        });
+        let rate_hz = self.rate_hz().into_iter();
+        let cutoffs = rate_hz.flat_map(|rate_hz| cutoffs_above_half(self.filters, rate_hz));
         let scale = self.scale_fault().map(|fault| match fault {
             ScaleFault::Turned(joints) => format!(
                 "the effort of {} has the other sign than the twin's: turn its sign in the driver",
@@ -93,7 +85,7 @@ impl PlausibleTwin {
                 "the measured effort is {slope:.3} times what the twin expects: its unit is another than the twin's"
             ),
         });
-        cutoffs.into_iter().flatten().chain(scale).collect()
+        cutoffs.chain(scale).collect()
     }
 
     fn scale_fault(&self) -> Option<ScaleFault> {
@@ -122,4 +114,27 @@ pub fn cutoff_above_half(name: &str, cutoff_hz: f64, rate_hz: f64) -> Option<(St
         let help = format!("give less than {:.1}, half the rate", rate_hz / 2.0);
         (title, help)
     })
+}
+
+/// What to say of a twin's low-passes at this rate.
+pub fn cutoffs_above_half(filters: Filters, rate_hz: f64) -> impl Iterator<Item = String> {
+    let all = [
+        ("`velocity_cutoff_hz`", filters.velocity_cutoff_hz),
+        ("`effort_cutoff_hz`", filters.effort_cutoff_hz),
+    ];
+    all.into_iter().filter_map(move |(name, cutoff_hz)| {
+        let (title, help) = cutoff_above_half(name, cutoff_hz, rate_hz)?;
+        Some(format!("{title}; {help}"))
+    })
+}
+
+/// Joint states per second on the topic `state` of a recording, as far as its index tells.
+///
+/// # Errors
+/// If there is no such topic.
+pub fn recorded_rate_hz(recording: &Recording, state: &str) -> Result<Option<f64>, ArchiveError> {
+    let count = recording.joint_state_topic(state)?.message_count as f64;
+    let span_ns = recording.end_ns().zip(recording.start_ns());
+    let span_ns = span_ns.map_or(0, |(end, start)| end - start);
+    Ok((span_ns > 0).then(|| count / (span_ns as f64 * 1e-9)))
 }

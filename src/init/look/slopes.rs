@@ -7,7 +7,7 @@ use tauscope_pipeline::report::Problem;
 use tauscope_twin::TwinFile;
 
 /// The slopes of the joints that tell one.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Slopes {
     /// Over all recordings.
     pub all: Vec<Slope>,
