@@ -85,7 +85,7 @@ const SLIPS: &[Slip] = &[
     Slip {
         typed: "check @moved.yaml",
         code: 2,
-        says: &["there is no recording", "cannot write into"],
+        says: &["there is no recording"],
     },
     Slip {
         typed: "replay @demo.mcap --pipeline @cut.yaml",
