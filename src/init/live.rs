@@ -164,3 +164,37 @@ stages:
     inputs: [ingest]
     record: {mcap: FILES, split: {after_s: SECONDS}}
 ";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn live(seconds: f64) -> Live<'static> {
+        Live {
+            seconds,
+            source: "zenoh: {}",
+            robot: Path::new("robot.urdf"),
+        }
+    }
+
+    #[test]
+    fn five_pieces_hold_all_that_is_recorded() {
+        for seconds in [SHORTEST_S, 20.0, 75.0, 3600.0] {
+            let pieces_s = RECORDINGS * live(seconds).piece_s();
+            assert!(pieces_s >= seconds + RUN_ON_S - 1e-9, "{seconds}");
+            let last_s = seconds - (RECORDINGS - 1.0) * live(seconds).piece_s();
+            assert!(last_s > LEAST_SHARE * seconds / RECORDINGS, "{seconds}");
+        }
+    }
+
+    #[test]
+    fn a_rest_is_left_out_and_told() {
+        let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/demo.mcap");
+        let mut out = Output::Memory(String::new(), String::new());
+        let kept = live(60.0).long_enough(vec![demo.clone()], &mut out);
+        assert_eq!(kept.unwrap(), std::slice::from_ref(&demo));
+        let kept = live(6000.0).long_enough(vec![demo], &mut out);
+        assert!(kept.unwrap().is_empty());
+        assert!(matches!(out, Output::Memory(_, said) if said.contains("is left out")));
+    }
+}
