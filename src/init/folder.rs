@@ -62,7 +62,7 @@ impl Folder {
 
     /// A path as the files of the folder name it: what is in the folder moves with it.
     pub fn seen_from(&self, path: &Path) -> String {
-        let absolute = |path: &Path| std::path::absolute(path).unwrap_or(path.to_owned());
+        let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         let (path, folder) = (absolute(path), absolute(&self.path));
         let inside = path.strip_prefix(&folder).unwrap_or(&path);
         inside.display().to_string()
