@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use tauscope_pipeline::report::Problem;
+use tauscope_pipeline::report::{Problem, Report};
 
 use crate::exit::Failure;
 
@@ -18,6 +18,21 @@ pub struct Force {
 }
 
 impl Force {
+    /// As [`check`](Self::check), and refuses where a result would take the place of what the command reads. That
+    /// may nobody allow: the input would be lost.
+    ///
+    /// # Errors
+    /// The inputs in the way, or else the files.
+    pub fn check_beside<'a>(
+        self,
+        results: impl IntoIterator<Item = PathBuf>,
+        inputs: impl IntoIterator<Item = &'a PathBuf>,
+    ) -> Result<(), Failure> {
+        let results: Vec<PathBuf> = results.into_iter().collect();
+        keep_inputs(&results, inputs)?;
+        self.check(results)
+    }
+
     /// Refuses where one of `results` is there already, and nobody said that it may be replaced. Nothing is
     /// touched here.
     ///
@@ -41,7 +56,13 @@ impl Force {
                 Err(refused(&title))
             }
             files => {
-                let folder = files[0].parent().unwrap_or(Path::new(""));
+                // The folder that holds them all.
+                let mut folder = files[0].parent().unwrap_or(Path::new(""));
+                while let Some(above) = folder.parent()
+                    && !files.iter().all(|file| file.starts_with(folder))
+                {
+                    folder = above;
+                }
                 let name = |path: &PathBuf| {
                     let below = path.strip_prefix(folder).unwrap_or(path);
                     below.display().to_string()
@@ -66,6 +87,38 @@ impl Force {
             }
         }
     }
+}
+
+/// Refuses where one of `results` would take the place of one of `inputs`.
+///
+/// # Errors
+/// Each input in the way.
+pub fn keep_inputs<'a>(
+    results: &[PathBuf],
+    inputs: impl IntoIterator<Item = &'a PathBuf>,
+) -> Result<(), Report> {
+    let mut report = Report::default();
+    for input in inputs {
+        if let Some(result) = results.iter().find(|result| takes_place(result, input)) {
+            let name = result.file_name().unwrap_or_default().display();
+            let title = format!("the result {name} would overwrite {}", input.display());
+            report.push(Problem::new(title).help("give another place with --out"));
+        }
+    }
+    report.into_result(())
+}
+
+/// Whether the file at `result` is `input`, or a piece of a recording that is a folder.
+fn takes_place(result: &Path, input: &Path) -> bool {
+    const PIECES: [&str; 3] = ["mcap", "db3", "yaml"];
+    let (Ok(result), Ok(input)) = (result.canonicalize(), input.canonicalize()) else {
+        return false;
+    };
+    let is_piece = || {
+        let ending = result.extension().and_then(|ending| ending.to_str());
+        ending.is_some_and(|ending| PIECES.contains(&ending))
+    };
+    result == input || (input.is_dir() && result.parent() == Some(&*input) && is_piece())
 }
 
 fn refused(title: &str) -> Failure {
@@ -103,5 +156,21 @@ mod tests {
         );
         assert!(all.contains("--force"), "{all}");
         force(true).check(results()).unwrap();
+    }
+
+    #[test]
+    fn an_input_is_never_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let bag = folder.path().join("bag");
+        std::fs::create_dir(&bag).unwrap();
+        let piece = bag.join("bag_0.mcap");
+        std::fs::write(&piece, "").unwrap();
+        let force = Force { force: true };
+        for input in [&piece, &bag, &bag.join("../bag/bag_0.mcap")] {
+            let told = title(force.check_beside([piece.clone()], [input]).unwrap_err());
+            assert!(told.contains("would overwrite"), "{told}");
+        }
+        let beside = bag.join("summary.parquet");
+        force.check_beside([beside], [&piece, &bag]).unwrap();
     }
 }

@@ -22,7 +22,7 @@ use crate::exit::Failure;
 pub use folder::Folder;
 pub use learn::learn;
 pub use live::Live;
-pub use look::Told;
+pub use look::{Looked, Told};
 pub use page::page;
 
 /// Writes a file of the folder, whole or not at all. What must not be replaced was found before anything began.

@@ -88,11 +88,6 @@ impl Progress {
         interrupt::far(mean);
         self.bar.set_position((mean * STEPS) as u64);
     }
-
-    /// Writes a line to standard error, above the bar.
-    pub fn say(&self, line: &str) {
-        self.bar.suspend(|| eprintln!("{line}"));
-    }
 }
 
 impl Drop for Progress {

@@ -191,3 +191,83 @@ fn amperes(folder: &Path) -> std::path::PathBuf {
     writer.finish().unwrap();
     path
 }
+
+#[test]
+fn the_topic_with_positions_is_taken() {
+    use tauscope_archive::ros::JointState;
+    use tauscope_archive::{Compression, McapWriter, Recording};
+
+    let folder = tempfile::tempdir().unwrap();
+    let free = FREE.map(|name| {
+        let recording = Recording::open(bundled().join(name)).unwrap();
+        let path = folder.path().join(name);
+        let none = std::collections::BTreeMap::new();
+        let mut writer = McapWriter::create(&path, Compression::Zstd, &none).unwrap();
+        let topic = writer.add_topic::<JointState>("/joint_states").unwrap();
+        let sensors = writer.add_topic::<JointState>("/joint_torques").unwrap();
+        let mut states = recording.joint_states("/joint_states").unwrap();
+        while let Some(state) = states.next_state() {
+            let mut message = state.unwrap().message.clone();
+            let ns = message.header.stamp.ns();
+            writer.write(topic, ns, ns, &message).unwrap();
+            message.position.clear();
+            message.velocity.clear();
+            writer.write(sensors, ns, ns, &message).unwrap();
+        }
+        writer.finish().unwrap();
+        path
+    });
+    let robot = bundled().join("demo_arm.urdf");
+    let cell = folder.path().join("cell");
+    let mut arguments: Vec<&OsStr> = vec!["init".as_ref()];
+    arguments.extend(free.iter().map(|path| path.as_os_str()));
+    arguments.extend(["--robot".as_ref(), robot.as_os_str()]);
+    arguments.extend(["--out".as_ref(), cell.as_os_str()]);
+    let out = Out::answer(arguments);
+    assert_eq!(out.code, 0, "{}", out.stderr);
+    let text = std::fs::read_to_string(cell.join("init.md")).unwrap();
+    assert!(text.contains("on /joint_states in"), "{text}");
+    assert!(text.contains("The signs of "), "{text}");
+}
+
+#[test]
+fn what_fails_half_way_leaves_nothing_and_can_be_repeated() {
+    use tauscope_archive::ros::JointState;
+    use tauscope_archive::{Compression, McapWriter, Recording};
+
+    let folder = tempfile::tempdir().unwrap();
+    let robot = bundled().join("demo_arm.urdf");
+    let cell = folder.path().join("cell");
+    let short = |name: &str| {
+        let recording = Recording::open(bundled().join(name)).unwrap();
+        let path = folder.path().join(name);
+        let none = std::collections::BTreeMap::new();
+        let mut writer = McapWriter::create(&path, Compression::Zstd, &none).unwrap();
+        let topic = writer.add_topic::<JointState>("/joint_states").unwrap();
+        let mut states = recording.joint_states("/joint_states").unwrap();
+        for _ in 0..160 {
+            let message = states.next_state().unwrap().unwrap().message.clone();
+            let ns = message.header.stamp.ns();
+            writer.write(topic, ns, ns, &message).unwrap();
+        }
+        writer.finish().unwrap();
+        path
+    };
+    let (one, two) = (short(FREE[0]), short(FREE[1]));
+    let arguments: Vec<&OsStr> = vec![
+        "init".as_ref(),
+        one.as_os_str(),
+        two.as_os_str(),
+        "--robot".as_ref(),
+        robot.as_os_str(),
+        "--effort-unit".as_ref(),
+        "Nm".as_ref(),
+        "--out".as_ref(),
+        cell.as_os_str(),
+    ];
+    let failed = Out::answer(arguments);
+    assert_eq!(failed.code, 2, "{}{}", failed.stdout, failed.stderr);
+    assert!(!cell.exists(), "{}", failed.stderr);
+    let out = init(&cell, &[]);
+    assert_eq!(out.code, 0, "{}", out.stderr);
+}

@@ -247,6 +247,13 @@ impl JointsInfo {
                 lacking.join(", ")
             ));
         }
+        remarks.extend(self.row_remarks());
+        remarks
+    }
+
+    /// What is odd about the messages as such, in words.
+    pub fn row_remarks(&self) -> Vec<String> {
+        let mut remarks = Vec::new();
         if self.repeated_messages > 0 {
             let count = self.repeated_messages;
             remarks.push(format!(

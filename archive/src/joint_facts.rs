@@ -38,6 +38,12 @@ pub struct JointFacts {
 }
 
 impl JointFacts {
+    /// Whether its positions are in degrees, told by its velocities.
+    pub fn is_in_degrees(&self) -> bool {
+        let slope = self.velocity_slope;
+        slope.is_some_and(|slope| (slope / RADIANS_PER_DEGREE - 1.0).abs() < ODD_SHARE)
+    }
+
     /// What is odd about it, in words.
     pub fn remark(&self) -> Option<String> {
         let slope = self
@@ -45,7 +51,7 @@ impl JointFacts {
             .filter(|slope| (slope - 1.0).abs() > ODD_SHARE)?;
         let hint = if slope < 0.0 {
             ": one of them has the other sign"
-        } else if (slope / RADIANS_PER_DEGREE - 1.0).abs() < ODD_SHARE {
+        } else if self.is_in_degrees() {
             ": positions are in degrees"
         } else {
             ""
@@ -57,7 +63,7 @@ impl JointFacts {
     }
 }
 
-/// Follows the joints of one topic. A message may name its joints in another order than the one before.
+/// Follows the joints of one topic, with memory for the joints alone. A message may name its joints in another order than the one before.
 #[derive(Debug, Default)]
 pub struct JointTallies {
     joints: Vec<JointTally>,
@@ -98,6 +104,22 @@ impl JointTally {
             squares: 0.0,
             products: 0.0,
             moved: 0.0,
+        }
+    }
+
+    /// Takes position, velocity and effort, as far as they are given and numbers.
+    fn add(&mut self, stamp_ns: i64, values: [Option<f64>; 3]) {
+        let [position, velocity, effort] = values.map(|value| value.filter(|it| it.is_finite()));
+        if let Some(effort) = effort {
+            self.efforts += 1;
+            self.zeros += u64::from(effort == 0.0);
+        }
+        let Some(position) = position else {
+            return;
+        };
+        self.add_position(position);
+        if let Some(velocity) = velocity {
+            self.add_velocity(stamp_ns, position, velocity);
         }
     }
 
@@ -160,21 +182,34 @@ impl JointTallies {
                 Some(joint) if joint.name == *name => at,
                 _ => self.place(name),
             };
-            let joint = &mut self.joints[place];
-            let of = |values: &[f64]| values.get(at).copied().filter(|value| value.is_finite());
-            if let Some(effort) = of(&state.effort) {
-                joint.efforts += 1;
-                joint.zeros += u64::from(effort == 0.0);
-            }
-            let Some(position) = of(&state.position) else {
-                continue;
-            };
-            joint.add_position(position);
-            if let Some(velocity) = of(&state.velocity) {
-                joint.add_velocity(stamp_ns, position, velocity);
-            }
+            let of = |values: &[f64]| values.get(at).copied();
+            let values = [of(&state.position), of(&state.velocity), of(&state.effort)];
+            self.joints[place].add(stamp_ns, values);
         }
         self.last.get_or_insert_default().clone_from(state);
+    }
+
+    /// For samples that hold their joints always in the order of `names`.
+    pub fn in_order(names: &[String]) -> Self {
+        let joints = names.iter().map(|name| JointTally::new(name)).collect();
+        Self {
+            joints,
+            ..Self::default()
+        }
+    }
+
+    /// Takes the values of one instant; no values for what the source does not give.
+    pub fn add_values(
+        &mut self,
+        stamp_ns: i64,
+        position: &[f64],
+        velocity: &[f64],
+        effort: &[f64],
+    ) {
+        for (at, joint) in self.joints.iter_mut().enumerate() {
+            let of = |values: &[f64]| values.get(at).copied();
+            joint.add(stamp_ns, [of(position), of(velocity), of(effort)]);
+        }
     }
 
     fn place(&mut self, name: &str) -> usize {

@@ -13,6 +13,9 @@ const WRONG_SCALE: f64 = 3.0;
 /// Within this factor of 1, either way, the unit is N m without doubt.
 /// Physical: as `WRONG_SCALE`, for an arm whose payload weighs no more than the arm.
 const SURE_SCALE: f64 = 2.0;
+/// A current of more than this for each N m is none in A.
+/// Physical: torque constants at the joint begin at 0.1 N m/A, of small motors without a gear.
+const TOO_MUCH_CURRENT: f64 = 30.0;
 /// A line from the modelled to the measured effort that explains at least this share of it tells a slope.
 /// Statistical: the model explains more than friction, noise and all else together.
 pub const TELLING: f64 = 0.5;
@@ -98,6 +101,23 @@ impl EffortScale {
             Self::TooLarge { slope } => Some(ScaleFault::WrongUnit { slope: *slope }),
         }
     }
+
+    /// Why an effort that is said to be in A cannot be.
+    pub fn fault_in_a(&self) -> Option<ScaleFault> {
+        match self {
+            Self::Turned(joints) => Some(ScaleFault::Turned(joints.clone())),
+            Self::TooLarge { slope } if *slope > TOO_MUCH_CURRENT => {
+                Some(ScaleFault::NoCurrent { slope: *slope })
+            }
+            _ => None,
+        }
+    }
+
+    /// Why an effort that is said to be in N m cannot be, told by how much it varies for each N m that the model
+    /// varies. Friction and noise only add to that.
+    pub fn fault_of_spread_in_nm(spread: f64) -> Option<ScaleFault> {
+        (spread < 1.0 / WRONG_SCALE).then_some(ScaleFault::WrongUnit { slope: spread })
+    }
 }
 
 /// Why an effort cannot be this robot's in N m.
@@ -110,6 +130,11 @@ pub enum ScaleFault {
         /// The middle slope of the joints that bear weight.
         slope: f64,
     },
+    /// The efforts are too large for motor currents in A.
+    NoCurrent {
+        /// The middle slope of the joints that bear weight \[recorded unit per N m\].
+        slope: f64,
+    },
 }
 
 impl fmt::Display for ScaleFault {
@@ -120,6 +145,11 @@ impl fmt::Display for ScaleFault {
                 "the effort of {} has the other sign than this robot's motion requires: turn its sign in the driver, \
                  or the joint's axis in the URDF",
                 joints.join(", ")
+            ),
+            Self::NoCurrent { slope } => write!(
+                f,
+                "the measured effort is {slope:.0} for each N m that this robot's motion requires, too much for a motor \
+                 current in A: a driver that publishes mA must divide by 1000"
             ),
             Self::WrongUnit { slope } => {
                 write!(
@@ -182,6 +212,12 @@ mod tests {
         assert_eq!(of(&[]).fault_in_nm(), None);
         let fault = of(&[0.1, 0.1]).fault_in_nm().map(|fault| fault.to_string());
         assert!(fault.is_some_and(|text| text.contains("0.10 times") && text.contains("--effort-unit A")));
+        let fault = of(&[125.0]).fault_in_a().map(|fault| fault.to_string());
+        assert!(fault.is_some_and(|text| text.contains("mA")));
+        assert_eq!(of(&[0.1, 0.3]).fault_in_a(), None);
+        assert_eq!(of(&[5.0]).fault_in_a(), None);
+        assert_eq!(EffortScale::fault_of_spread_in_nm(0.9), None);
+        assert!(EffortScale::fault_of_spread_in_nm(0.1).is_some());
         let fault = of(&[-1.0]).fault_in_nm().map(|fault| fault.to_string());
         assert!(fault.is_some_and(|text| text.contains("joint1") && text.contains("sign")));
     }

@@ -136,6 +136,7 @@ impl Evaluation {
         }
         odd.close(request);
         notes.extend(twin.doubts());
+        notes.extend(twin.passing_all(request));
         notes.extend(odd.unjudged(&runners));
         notes.extend(notes::silent(&runners));
         self.lost += odd.lost;

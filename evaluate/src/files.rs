@@ -163,27 +163,9 @@ pub fn results(out: &Path, request: &Request) -> Vec<PathBuf> {
 /// Makes the folder for results.
 ///
 /// # Errors
-/// If it cannot be made, or a twin that was given would be overwritten.
-pub fn prepare(out: &Path, request: &Request) -> Result<(), WriteError> {
-    make(out)?;
-    for (index, twin) in request.twins.iter().enumerate() {
-        let folder = if index == 0 {
-            out.to_owned()
-        } else {
-            out.join(&twin.name)
-        };
-        let result = folder.join("twin.yaml").canonicalize().ok();
-        let mut given = request.twins.iter().filter_map(|twin| twin.path.as_ref());
-        if result.is_some() && given.any(|path| path.canonicalize().ok() == result) {
-            let title = format!(
-                "the result {}/twin.yaml would overwrite the twin",
-                folder.display()
-            );
-            let problem = Problem::new(title).help("give another folder with --out");
-            return Err(WriteError::Refused(problem.into()));
-        }
-    }
-    Ok(())
+/// If it cannot be made.
+pub fn prepare(out: &Path) -> Result<(), WriteError> {
+    make(out)
 }
 
 fn make(folder: &Path) -> Result<(), WriteError> {

@@ -3,10 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use tauscope_archive::Recording;
 use tauscope_bus::flags;
 use tauscope_detect::{Impedance, Lesson, Setup};
 use tauscope_pipeline::build;
 use tauscope_pipeline::calibrate::Job;
+use tauscope_pipeline::plausible::{cutoffs_above_half, recorded_rate_hz};
 use tauscope_twin::{Expected, JointCorrection, TwinFile};
 
 use crate::error::EvaluateError;
@@ -156,6 +158,19 @@ impl Prepared {
                 self.name,
                 said.join(", ")
             )
+        })
+    }
+
+    /// What to say of the first recording whose rate is so low that a low-pass of the twin passes everything.
+    pub fn passing_all(&self, request: &Request) -> Option<String> {
+        let filters = self.config.filters(Some(self.file.filters));
+        let topics = request.topics(false);
+        request.recordings.iter().find_map(|named| {
+            // One that cannot be read has been told.
+            let recording = Recording::open(&named.path).ok()?;
+            let rate_hz = recorded_rate_hz(&recording, &topics.state).ok()??;
+            let fault = cutoffs_above_half(filters, rate_hz).next()?;
+            Some(format!("{}: {fault}", named.name))
         })
     }
 

@@ -1,22 +1,27 @@
 //! Calibration: what a twin's gain, offset and noise per joint are, and what the detectors' scores do
 //! while nothing touches the robot. The stages are the pipeline's own, so that the numbers hold there.
 
+mod spread;
+
 use std::path::{Path, PathBuf};
 
-use tauscope_bus::{SampleRef, Sink, StageError, TwinState, flags};
+use tauscope_bus::{JointState, SampleRef, Sink, StageError, TwinState, flags};
 use tauscope_detect::Detector;
 use tauscope_dynamics::effort_scale::{EffortScale, ScaleFault};
 use tauscope_ingest::{FileConfig, RecordedSource, Topics};
 use tauscope_twin::{
-    Calibration, Expected, JointCorrection, Robot, ScoreStatistics, TwinFile, telling_slopes,
+    Calibration, Expected, JointCorrection, Robot, TwinFile, spread_scale, telling_slopes,
 };
 
 use crate::build;
 use crate::cell::{Cell, EffortUnit};
 use crate::graph::Graph;
+use crate::plausible::{Oddity, Plausible};
 use crate::provenance;
 use crate::replay::ReplayError;
 use crate::report::without_path;
+
+use spread::Spread;
 
 /// What to calibrate, and on what.
 #[derive(Debug)]
@@ -49,6 +54,20 @@ pub enum CalibrateError {
         "no sample to calibrate on: the recordings hold no effort, or end before the twin's filters have settled"
     )]
     TooShort,
+    /// Nothing that is learnt from this recording can be right.
+    #[error("{}: {oddity}", recording.display())]
+    Implausible {
+        /// The recording.
+        recording: PathBuf,
+        /// Why.
+        oddity: Oddity,
+    },
+    /// The arm stands, and how many N m an ampere gives is not known.
+    #[error(
+        "the arm stands in all recordings, so that no gain from N m to A can be told: record it in motion, or give \
+         the torque constants"
+    )]
+    Stands,
     /// The recordings are not of this robot in this unit.
     #[error(transparent)]
     WrongScale(#[from] ScaleFault),
@@ -59,7 +78,7 @@ impl CalibrateError {
     pub fn is_input(&self) -> bool {
         match self {
             Self::Recording { source, .. } => source.is_input(),
-            Self::TooShort | Self::WrongScale(_) => true,
+            Self::TooShort | Self::Implausible { .. } | Self::Stands | Self::WrongScale(_) => true,
         }
     }
 }
@@ -73,6 +92,10 @@ pub struct Calibrated {
     pub samples: u64,
     /// Samples of the recordings that were lost or refused.
     pub lost: u64,
+    /// What is odd in the recordings, a line each.
+    pub notes: Vec<String>,
+    /// Why the gains cannot be right, though they could be fitted.
+    doubt: Option<CalibrateError>,
 }
 
 impl Job<'_> {
@@ -83,6 +106,9 @@ impl Job<'_> {
     /// If a recording cannot be read, or all are too short.
     pub fn run(&self, progress: &dyn Fn(usize, f64)) -> Result<Calibrated, CalibrateError> {
         let mut calibrated = self.fit(&|_, _| true, progress)?;
+        if let Some(doubt) = calibrated.doubt.take() {
+            return Err(doubt);
+        }
         let lost = self.measure(&mut calibrated.file, self.measured(), &|index, fraction| {
             progress(self.fit.len() + index, fraction);
         })?;
@@ -107,23 +133,32 @@ impl Job<'_> {
             facts.effort_unit == EffortUnit::Nm || facts.torque_constants_nm_per_a.is_some();
         let from_topic = self.twin.expected == Expected::Topic;
         let mut calibration = Calibration::new(joint_count, in_nm || from_topic);
+        let mut notes = Vec::new();
+        let mut all_stand = true;
         for (index, recording) in self.fit.iter().enumerate() {
             let step = &mut |fraction| progress(index, fraction);
-            lost += self.each(recording, None, step, &mut |sample| {
+            let mut plausible = Plausible::new(self.cell);
+            lost += self.each(recording, None, &mut plausible, step, &mut |sample| {
                 if is_free(recording, sample.header.stamp_ns) {
                     calibration.add(sample);
                 }
             })?;
+            all_stand &= plausible.stands();
+            notes.extend(odd_in(recording, &plausible)?);
         }
         let Some(fits) = calibration.fit() else {
             return Err(CalibrateError::TooShort);
         };
-        if in_nm && !from_topic {
-            let slopes = telling_slopes(&facts.joint_names, &fits);
-            if let Some(fault) = EffortScale::of(&slopes).fault_in_nm() {
-                return Err(fault.into());
-            }
+        let scale = EffortScale::of(&telling_slopes(&facts.joint_names, &fits));
+        if let Some(fault) = scale.fault_in_nm().filter(|_| in_nm && !from_topic) {
+            return Err(fault.into());
         }
+        let doubt = match (from_topic, in_nm) {
+            (true, _) => None,
+            (false, true) => spread_scale(&fits).and_then(EffortScale::fault_of_spread_in_nm),
+            (false, false) => scale.fault_in_a(),
+        };
+        let stands = (all_stand && !in_nm && !from_topic).then_some(CalibrateError::Stands);
         let mut file = self.file();
         for (name, fit) in self.cell.facts.joint_names.iter().zip(&fits) {
             let joint = JointCorrection {
@@ -141,6 +176,8 @@ impl Job<'_> {
             file,
             samples: calibration.samples(),
             lost,
+            notes,
+            doubt: stands.or(doubt.map(CalibrateError::from)),
         })
     }
 
@@ -166,7 +203,8 @@ impl Job<'_> {
         let mut lost = 0;
         for (index, recording) in recordings.iter().enumerate() {
             let step = &mut |fraction| progress(index, fraction);
-            lost += self.each(recording, Some(file), step, &mut |sample| {
+            let mut plausible = Plausible::new(self.cell);
+            lost += self.each(recording, Some(file), &mut plausible, step, &mut |sample| {
                 for (spread, residual) in noise.iter_mut().zip(sample.residual) {
                     spread.add(residual);
                 }
@@ -211,6 +249,7 @@ impl Job<'_> {
         &self,
         recording: &Path,
         model: Option<&TwinFile>,
+        plausible: &mut Plausible,
         progress: &mut dyn FnMut(f64),
         take: &mut (dyn FnMut(&TwinState) + Send),
     ) -> Result<u64, CalibrateError> {
@@ -230,12 +269,16 @@ impl Job<'_> {
             let mut graph = Graph::default();
             let states = graph.source("ingest", Box::new(source));
             let twins = graph.stage("twin", Box::new(twin), &states)?;
-            let input = graph.listen::<TwinState>(&twins)?;
-            graph.sink(
-                "calibration",
-                Box::new(Settled { take, reset: true }),
-                vec![input],
-            );
+            let inputs = vec![
+                graph.listen::<JointState>(&states)?,
+                graph.listen::<TwinState>(&twins)?,
+            ];
+            let settled = Settled {
+                plausible: &mut *plausible,
+                take: &mut *take,
+                reset: true,
+            };
+            graph.sink("calibration", Box::new(settled), inputs);
             let counts = graph.run(&mut |fraction| {
                 progress(fraction);
                 true
@@ -281,16 +324,38 @@ impl Job<'_> {
     }
 }
 
+/// What is odd in a recording.
+///
+/// # Errors
+/// If nothing that is learnt from it can be right.
+fn odd_in(recording: &Path, plausible: &Plausible) -> Result<Vec<String>, CalibrateError> {
+    let mut notes = Vec::new();
+    for oddity in plausible.oddities() {
+        if oddity.is_fault() {
+            let recording = recording.to_owned();
+            return Err(CalibrateError::Implausible { recording, oddity });
+        }
+        notes.push(format!("{}: {oddity}", recording.display()));
+    }
+    Ok(notes)
+}
+
 /// Hands every sample whose filters have settled to a closure; the first one after a reset says so.
 struct Settled<'a> {
+    plausible: &'a mut Plausible,
     take: &'a mut (dyn FnMut(&TwinState) + Send),
     reset: bool,
 }
 
 impl Sink for Settled<'_> {
     fn accept(&mut self, _from: &str, sample: SampleRef<'_>) -> Result<(), StageError> {
-        let SampleRef::TwinState(sample) = sample else {
-            return Ok(());
+        let sample = match sample {
+            SampleRef::TwinState(sample) => sample,
+            SampleRef::JointState(sample) => {
+                self.plausible.add(sample);
+                return Ok(());
+            }
+            _ => return Ok(()),
         };
         self.reset |= sample.header.has(flags::RESET);
         if sample.header.has(flags::READY) {
@@ -312,36 +377,3 @@ impl Sink for Settled<'_> {
 
 /// A detector and what its score has done.
 type Scored = (Box<dyn Detector>, Spread);
-
-/// Mean and spread of a number, as it comes (Welford).
-#[derive(Debug, Clone, Copy, Default)]
-struct Spread {
-    count: u64,
-    mean: f64,
-    squares: f64,
-}
-
-impl Spread {
-    fn add(&mut self, value: f64) {
-        self.count += 1;
-        let delta = value - self.mean;
-        self.mean += delta / self.count as f64;
-        self.squares += delta * (value - self.mean);
-    }
-
-    fn variance(&self) -> f64 {
-        self.squares / self.count.max(1) as f64
-    }
-
-    fn root_mean_square(&self) -> f64 {
-        (self.variance() + self.mean * self.mean).sqrt()
-    }
-
-    fn statistics(&self) -> ScoreStatistics {
-        ScoreStatistics {
-            mean: self.mean,
-            standard_deviation: self.variance().sqrt(),
-            samples: self.count,
-        }
-    }
-}

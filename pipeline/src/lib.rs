@@ -12,6 +12,7 @@ pub mod graph;
 pub mod learnt_state;
 pub mod parallel;
 pub mod pipeline;
+pub mod plausible;
 pub mod provenance;
 pub mod recordings;
 pub mod replay;

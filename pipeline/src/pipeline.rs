@@ -87,15 +87,28 @@ impl Pipeline {
     /// # Errors
     /// Everything that is wrong, each with its place.
     pub fn load(path: &Path, host: Option<&str>) -> Result<Self, Report> {
+        Self::examine(path, Purpose::Run { host })
+    }
+
+    /// As [`load`](Self::load), to work on recordings: what only a run reads and writes (the source's own recording,
+    /// the recorders' folders, programs) need not be there.
+    ///
+    /// # Errors
+    /// Everything that is wrong, each with its place.
+    pub fn load_to_replay(path: &Path) -> Result<Self, Report> {
+        Self::examine(path, Purpose::Replay)
+    }
+
+    fn examine(path: &Path, purpose: Purpose<'_>) -> Result<Self, Report> {
         let examined = yaml::examine::<PipelineFile>(path)?;
         let file = &examined.file;
         let mut report = Report::default();
         let wiring = wiring::check(file, &mut report);
         let cells = cells::resolve(file, &mut report);
-        if let Some(host) = host {
+        if let Purpose::Run { host: Some(host) } = purpose {
             check_host(&file.value, host, &mut report);
         }
-        let mut files = entries::resolve(file, host, &cells, wiring.as_ref(), &mut report);
+        let mut files = entries::resolve(file, purpose, &cells, wiring.as_ref(), &mut report);
         let file = examined.into_sound(report)?;
         let Some(wiring) = wiring else {
             return Err(Problem::of_file(path, "the stages make no pipeline").into());
@@ -148,6 +161,15 @@ impl Pipeline {
             model_sha256,
         })
     }
+}
+
+/// What a pipeline is read for.
+#[derive(Debug, Clone, Copy)]
+enum Purpose<'a> {
+    /// To run it on this host; on all if none is named.
+    Run { host: Option<&'a str> },
+    /// To work on recordings, in place of its sources.
+    Replay,
 }
 
 fn check_host(file: &PipelineFile, host: &str, report: &mut Report) {

@@ -3,19 +3,21 @@
 
 mod error;
 mod observe;
+mod open;
 mod redirect;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use tauscope_bus::{Detection, JointState, SampleKind, Sink, Source, TwinState};
-use tauscope_ingest::{ArchivedTwin, Commanded, RecordedSource};
+use tauscope_bus::{Detection, JointState, SampleKind, Sink, TwinState};
+use tauscope_ingest::{ArchivedTwin, Commanded};
 use tauscope_twin::TwinFile;
 
 use crate::build;
 use crate::cell::Cell;
 use crate::graph::{Graph, SinkInput, StageCounts, Stream};
 use crate::pipeline::{Pipeline, Stage};
+use crate::plausible::PlausibleTwin;
 use crate::settings::Settings;
 use crate::tally::{DetectionTally, TwinTally};
 
@@ -59,6 +61,8 @@ pub struct Outcome {
     pub stages: Vec<StageCounts>,
     /// What was written.
     pub files: Vec<PathBuf>,
+    /// What cannot be in the recording, or is odd, a line each.
+    pub notes: Vec<String>,
 }
 
 /// A pipeline prepared to be replayed: its sources replaced by recordings.
@@ -160,7 +164,7 @@ impl<'a> Replay<'a> {
     ) -> Result<Outcome, ReplayError> {
         let cell = self.cell();
         let stem = stem(recording);
-        let mut observer = Observer::new(&cell.facts.joint_names);
+        let mut observer = Observer::new(cell, self.plausible_twins());
         let mut files = Vec::new();
         let mut graph = Graph::default();
         let mut streams: BTreeMap<usize, Stream> = BTreeMap::new();
@@ -175,7 +179,7 @@ impl<'a> Replay<'a> {
                 .cloned();
             let stream = match (&stage.settings, input) {
                 (Settings::Ingest(config), _) => {
-                    let source = Commanded::archived(self.open(config, recording)?);
+                    let source = Commanded::archived(open::recording(config, recording, cell)?);
                     Some(graph.source(&stage.name, Box::new(source)))
                 }
                 (Settings::Twin { config, model }, Some(input)) => {
@@ -232,6 +236,18 @@ impl<'a> Replay<'a> {
         Ok(observer.observed.into_outcome(cell, stem, stages, files))
     }
 
+    fn plausible_twins(&self) -> BTreeMap<String, PlausibleTwin> {
+        let stages = self.members.iter().map(|&at| &self.pipeline.stages[at]);
+        let twins = stages.filter_map(|stage| {
+            let Settings::Twin { config, model } = &stage.settings else {
+                return None;
+            };
+            let twin = PlausibleTwin::new(config, model.as_ref(), self.cell());
+            Some((stage.name.clone(), twin))
+        });
+        twins.collect()
+    }
+
     /// The files that a replay of `recording` into `out` writes.
     pub fn files(&self, recording: &Path, out: &Path) -> Vec<PathBuf> {
         let mut files = Vec::new();
@@ -253,39 +269,12 @@ impl<'a> Replay<'a> {
         &self.pipeline.cells[name]
     }
 
-    /// The recording in the place of the pipeline's own source, not paced.
-    fn open(
-        &self,
-        config: &tauscope_ingest::Config,
-        recording: &Path,
-    ) -> Result<Box<dyn Source<JointState>>, ReplayError> {
-        let setup = build::ingest_setup(self.cell());
-        let table = recording
-            .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("csv"));
-        Ok(Box::new(if table {
-            let Some(csv) = &config.csv else {
-                return Err(ReplayError::NoColumns {
-                    path: recording.to_owned(),
-                    stage: self.source.name.clone(),
-                });
-            };
-            let csv = tauscope_ingest::CsvConfig {
-                path: recording.to_owned(),
-                ..csv.clone()
-            };
-            RecordedSource::open_csv(&csv, config, &setup)?
-        } else {
-            RecordedSource::open_file(&file_config(config, recording), config, &setup)?
-        }))
-    }
-
     fn open_twin(&self, recording: &Path) -> Result<ArchivedTwin, ReplayError> {
         let Settings::Ingest(config) = &self.source.settings else {
             return Err(ReplayError::NoSource);
         };
         let topics = tauscope_ingest::ArchivedTwinTopics {
-            state: file_config(config, recording).topics.state,
+            state: open::file_config(config, recording).topics.state,
             ..Default::default()
         };
         let setup = build::ingest_setup(self.cell());
@@ -370,18 +359,4 @@ fn members(pipeline: &Pipeline, source: &Stage) -> Vec<usize> {
         }
     }
     members
-}
-
-/// The pipeline's topics, for a recording of its robot.
-fn file_config(config: &tauscope_ingest::Config, recording: &Path) -> tauscope_ingest::FileConfig {
-    let topics = config.source().ok().and_then(|(_, source)| source.topics());
-    // What a simulated cell was asked for is in its archive, too.
-    let simulated = || tauscope_ingest::Topics {
-        learn: Some("/learn".to_owned()),
-        ..tauscope_ingest::Topics::default()
-    };
-    tauscope_ingest::FileConfig {
-        path: recording.to_owned(),
-        topics: topics.cloned().unwrap_or_else(simulated),
-    }
 }

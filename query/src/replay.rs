@@ -21,7 +21,7 @@ pub(crate) struct Loaded {
 
 impl Loaded {
     pub(crate) fn load(path: &Path) -> Result<Self> {
-        let pipeline = Pipeline::load(path, None).map_err(external)?;
+        let pipeline = Pipeline::load_to_replay(path).map_err(external)?;
         let identity = Identity::of(&pipeline, TwinChoice::Recompute, false).map_err(external)?;
         Ok(Self { pipeline, identity })
     }

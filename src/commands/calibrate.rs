@@ -9,6 +9,7 @@ use tauscope_archive::{ArchiveError, Recording};
 use tauscope_ingest::Topics;
 use tauscope_pipeline::calibrate::{Calibrated, Job};
 use tauscope_pipeline::cell::{Cell, ConstantSpot, EffortUnit};
+use tauscope_pipeline::plausible::{cutoff_above_half, recorded_rate_hz};
 use tauscope_pipeline::report::Problem;
 use tauscope_pipeline::{provenance, recordings};
 use tauscope_twin::{Expected, Motion, TwinFile};
@@ -96,7 +97,9 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         validation: recordings::expand(&args.validation)?,
         ..args.clone()
     };
-    args.force.check([args.out.clone()])?;
+    let inputs = args.recordings.iter().chain(&args.validation);
+    let inputs = inputs.chain([&args.robot]);
+    args.force.check_beside([args.out.clone()], inputs)?;
     let constants = args.torque_constant.iter().cloned().collect();
     let problem = |_: ConstantSpot<'_>, title| Problem::new(title);
     let cell = Cell::from_urdf(&args.robot, args.effort_unit, &constants, &problem)?;
@@ -164,18 +167,13 @@ fn check_cutoffs(args: &Args) -> Result<(), Failure> {
     for path in args.recordings.iter().chain(&args.validation) {
         let rejected = |error: ArchiveError| Failure::rejected(error.to_string());
         let recording = Recording::open(path).map_err(rejected)?;
-        let topic = recording
-            .joint_state_topic(&args.state_topic)
-            .map_err(rejected)?;
-        let span_ns = recording.end_ns().unwrap_or(0) - recording.start_ns().unwrap_or(0);
-        let rate_hz = topic.message_count as f64 / (span_ns as f64 * 1e-9);
+        let Some(rate_hz) = recorded_rate_hz(&recording, &args.state_topic).map_err(rejected)?
+        else {
+            continue;
+        };
         for (name, cutoff_hz) in cutoffs {
-            if cutoff_hz > rate_hz / 2.0 {
-                let title = format!(
-                    "{}: {rate_hz:.1} joint states a second, so {name} {cutoff_hz} would pass everything",
-                    path.display()
-                );
-                let help = format!("give less than {:.1}, half the rate", rate_hz / 2.0);
+            if let Some((title, help)) = cutoff_above_half(name, cutoff_hz, rate_hz) {
+                let title = format!("{}: {title}", path.display());
                 return Err(Failure::Rejected(Problem::new(title).help(help).into()));
             }
         }
@@ -246,6 +244,15 @@ fn report(calibrated: &Calibrated, cell: &Cell, args: &Args) -> String {
         column.set_cell_alignment(CellAlignment::Right);
     }
     let mut text = format!("{table}\n\nfitted on {} samples", calibrated.samples);
+    if args.effort_unit == EffortUnit::Nm
+        && args.twin_topic.is_none()
+        && weak.len() == cell.facts.joint_names.len()
+    {
+        text.push_str(
+            "\nnote: no joint's effort follows the robot's weight: if the driver publishes motor current, give \
+             --effort-unit A",
+        );
+    }
     if !weak.is_empty() {
         text.push_str(&format!(
             "\nnote: the model explains less than {:.0} % of the effort of {}: friction or too little motion outweighs it, so the gain there is not to be read as the drive's",
@@ -261,6 +268,9 @@ fn report(calibrated: &Calibrated, cell: &Cell, args: &Args) -> String {
     }
     if args.validation.is_empty() {
         text.push_str("\nnote: noise and scores were measured on the recordings of the fit; give others with --validation for thresholds that hold");
+    }
+    for note in &calibrated.notes {
+        text.push_str(&format!("\nwarning: {note}"));
     }
     if calibrated.lost > 0 {
         text.push_str(&format!(

@@ -77,7 +77,9 @@ fn check(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         return Ok(Exit::Done);
     }
     let pipeline = Pipeline::load(file, args.host.as_deref())?;
-    for warning in pipeline.warnings(args.host.as_deref()) {
+    let host = args.host.as_deref();
+    let warnings = pipeline.warnings(host).into_iter();
+    for warning in warnings.chain(pipeline.rate_warnings(host)) {
         out.say(&format!("warning: {warning}"));
     }
     let links = plan::links(&pipeline);

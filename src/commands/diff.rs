@@ -63,7 +63,8 @@ fn tolerance(text: &str) -> Result<f64, String> {
 
 /// Compares them.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
-    args.force.check(args.html.clone())?;
+    let inputs = [&args.a, &args.b].into_iter().chain(&args.manifest);
+    args.force.check_beside(args.html.clone(), inputs)?;
     let (a, lost_a) = result(args, &args.a, "a", out)?;
     let (b, lost_b) = result(args, &args.b, "b", out)?;
     let comparison =
@@ -109,7 +110,7 @@ fn result(
                 json: false,
             };
             let mut told = Output::Memory(String::new(), String::new());
-            let replayed = archive::run(&job, &Pipeline::load(given, None)?, &mut told);
+            let replayed = archive::run(&job, &Pipeline::load_to_replay(given)?, &mut told);
             if let Output::Memory(done, said) = told {
                 out.say(format!("{}: {done}{said}", given.display()).trim_end());
             }

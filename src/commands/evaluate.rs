@@ -61,9 +61,14 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         jobs: usize::from(args.jobs),
     };
     let request = tauscope_evaluate::load(&args.set, &options)?;
-    args.force
-        .check(tauscope_evaluate::results(&args.out, &request))?;
-    tauscope_evaluate::prepare(&args.out, &request)?;
+    let recordings = request.recordings.iter();
+    let twins = request.twins.iter();
+    let inputs = (recordings.map(|recording| &recording.path))
+        .chain(twins.filter_map(|twin| twin.path.as_ref()))
+        .chain([&args.set]);
+    let results = tauscope_evaluate::results(&args.out, &request);
+    args.force.check_beside(results, inputs)?;
+    tauscope_evaluate::prepare(&args.out)?;
     let progress = Progress::of_work();
     let result = tauscope_evaluate::run(request, &args.out, &|share, what| {
         progress.doing(share, what);

@@ -1,6 +1,6 @@
 //! `tauscope init`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use tauscope_pipeline::cell::EffortUnit;
 use tauscope_pipeline::recordings;
@@ -9,7 +9,7 @@ use super::effort_unit;
 use crate::existing::Force;
 use crate::exit::{Exit, Failure};
 use crate::explain::{self, Arguments, Kept};
-use crate::init::{self, Folder, Live, Told};
+use crate::init::{self, Folder, Live, Looked, Told};
 use crate::interrupt;
 use crate::output::Output;
 use crate::progress::Progress;
@@ -61,7 +61,7 @@ const EXPLAINED: f64 = 0.75;
 
 /// Sets up the cell.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
-    let folder = Folder::prepare(&args.out, args.force)?;
+    let folder = Folder::prepare(&args.out, args.force, &args.recordings)?;
     let recordings = match args.live {
         None => recordings::expand(&args.recordings)?,
         Some(seconds) => {
@@ -83,10 +83,30 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         effort_unit: args.effort_unit,
     };
     let looked = told.look()?;
-    for sentence in &looked.sentences {
-        progress.say(sentence);
+    match set_up(args, &folder, &looked, progress) {
+        Ok((page, exit)) => {
+            folder.keep();
+            out.print(&page)?;
+            out.print(&format!("wrote {}", args.out.display()))?;
+            Ok(exit)
+        }
+        Err(failure) => {
+            // They stand on the page, which there is none of.
+            for sentence in &looked.sentences {
+                out.say(sentence);
+            }
+            Err(failure)
+        }
     }
+}
 
+/// Explains the twin, lets the detector learn and writes the folder; gives the page.
+fn set_up(
+    args: &Args,
+    folder: &Folder,
+    looked: &Looked,
+    progress: Progress,
+) -> Result<(String, Exit), Failure> {
     let (fit, holdout) = looked.parted();
     let arguments = Arguments {
         robot: Some(&args.robot),
@@ -99,10 +119,10 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         holdout: &holdout,
     };
     let request = explain::from_arguments(&arguments, std::collections::BTreeSet::new())?;
+    explain::refuse_to_replace(&folder.explained(), &request, args.force)?;
     let input = explain::read(&request, &|share, what| {
         progress.doing(LOOKED * share, what);
     })?;
-    explain::refuse_to_replace(&folder.explained(), &request, args.force)?;
     explain::make(&folder.explained())?;
     let kept = Kept::of(&input);
     let step = |share: f64, what: &str| progress.doing(LOOKED + (EXPLAINED - LOOKED) * share, what);
@@ -127,14 +147,16 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     )?;
     let hold = interrupt::hold();
     folder.write_twin(&learnt.twin)?;
-    let shown = holdout.first().or(fit.first()).unwrap_or(&recordings[0]);
+    let shown = holdout
+        .first()
+        .or(fit.first())
+        .map_or(Path::new(""), PathBuf::as_path);
     let live = args.live.is_some().then_some(&*args.source);
-    folder.write_pipeline(&looked.cell, &looked.state_topic, shown, live)?;
-    let page = init::page(&folder, &looked, &outcome.report, &learnt);
+    let is_explained = learnt.is_explained;
+    folder.write_pipeline(&looked.cell, &looked.state_topic, shown, live, is_explained)?;
+    let page = init::page(folder, looked, &outcome.report, &learnt, live.is_some());
     init::write(&folder.page(), page.as_bytes())?;
     drop(hold);
     drop(progress);
-    out.print(&page)?;
-    out.print(&format!("wrote {}", args.out.display()))?;
-    Ok(Exit::from_loss(kept.lost > 0))
+    Ok((page, Exit::from_loss(kept.lost > 0)))
 }

@@ -38,8 +38,8 @@ pub struct Args {
 
 /// Writes it.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
-    args.force.check([args.out.clone()])?;
     let recordings = expand(&args.recordings)?;
+    args.force.check_beside([args.out.clone()], &recordings)?;
     let folder = absolute(args.out.parent().unwrap_or(Path::new("")))?;
     let progress = Progress::new(recordings.len());
     let numbered = recordings.iter().enumerate().collect();

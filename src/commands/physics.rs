@@ -106,7 +106,7 @@ fn request(args: &Args, recordings: &[PathBuf]) -> Result<(Request, String), Fai
     let loaded = args
         .pipeline
         .as_deref()
-        .map(|path| Pipeline::load(path, None))
+        .map(Pipeline::load_to_replay)
         .transpose()?;
     let Some(pipeline) = loaded else {
         let request = from_arguments(

@@ -4,7 +4,7 @@ pub mod archive;
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Context as _;
 use comfy_table::{CellAlignment, Table, presets};
@@ -30,8 +30,8 @@ use crate::progress::Progress;
 /// every time. The recordings take the place of the pipeline's own source.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Args {
-    /// MCAP files, rosbag2 folders, `.db3` bags, ROS 1 bags, tables (`.csv`, if the pipeline's source is one), or LeRobot
-    /// data sets (`DATASET` for all of its episodes, `DATASET/episode_000003` for one).
+    /// MCAP files, rosbag2 folders, `.db3` bags, ROS 1 bags, tables (`.csv`), or LeRobot data sets (`DATASET` for all of its
+    /// episodes, `DATASET/episode_000003` for one).
     #[arg(required_unless_present = "manifest", conflicts_with = "manifest")]
     recordings: Vec<PathBuf>,
     /// Instead of recordings: a file of `tauscope manifest`. Each of its recordings becomes one Parquet file in --out, named
@@ -98,7 +98,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
 
 /// Replays recordings, none of which is a data set of several.
 fn of_each(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
-    let pipeline = Pipeline::load(&args.pipeline, None)?;
+    let pipeline = Pipeline::load_to_replay(&args.pipeline)?;
     check_names(args)?;
     for warning in pipeline.warnings(None) {
         out.say(&format!("warning: {warning}"));
@@ -127,7 +127,8 @@ fn of_each(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         let of = |recording| replay.files(recording, folder);
         let tables = ["summary.parquet", "events.parquet"].map(|name| folder.join(name));
         let files = args.recordings.iter().flat_map(|recording| of(recording));
-        args.force.check(files.chain(tables))?;
+        let inputs = args.recordings.iter().chain([&args.pipeline]);
+        args.force.check_beside(files.chain(tables), inputs)?;
         std::fs::create_dir_all(folder).map_err(|error| {
             Failure::rejected(format!("cannot make {}: {error}", folder.display()))
         })?;
@@ -203,23 +204,8 @@ fn check_names(args: &Args) -> Result<(), Report> {
                 Problem::new(title).help("replay them in two commands with two --out folders"),
             );
         }
-        let target = args
-            .out
-            .as_ref()
-            .map(|out| out.join(format!("{}.mcap", stem(recording))));
-        if target.is_some_and(|target| same_file(&target, recording)) {
-            let title = format!(
-                "the result would overwrite the recording `{}`",
-                recording.display()
-            );
-            report.push(Problem::new(title).help("choose another --out folder"));
-        }
     }
     report.into_result(())
-}
-
-fn same_file(a: &Path, b: &Path) -> bool {
-    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
 /// The result of each recording, in their order, whatever the number of jobs.
@@ -252,6 +238,7 @@ struct Summary<'a> {
     detectors: Vec<DetectorSummary<'a>>,
     stages: &'a [tauscope_pipeline::graph::StageCounts],
     files: &'a [PathBuf],
+    notes: &'a [String],
 }
 
 #[derive(Debug, Serialize)]
@@ -297,6 +284,7 @@ impl<'a> Summary<'a> {
                 .collect(),
             stages: &outcome.stages,
             files: &outcome.files,
+            notes: &outcome.notes,
         }
     }
 }
@@ -339,6 +327,9 @@ fn table(outcomes: &[Outcome]) -> String {
         }
         for file in &outcome.files {
             let _ = writeln!(text, "  wrote {}", file.display());
+        }
+        for note in &outcome.notes {
+            let _ = writeln!(text, "  warning: {note}");
         }
     }
     text

@@ -38,7 +38,9 @@ pub struct Args {
 /// Makes them.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let facts = ScenarioFacts::load(&args.scenario)?;
-    args.force.check(results(&facts, &args.out))?;
+    let inputs = [&args.scenario, &facts.scenario.robot];
+    args.force
+        .check_beside(results(&facts, &args.out), inputs)?;
     let robot = facts.robot().context("cannot use the URDF")?;
     // What is concealed cannot be had from the recordings.
     let mut told = facts.scenario.clone();

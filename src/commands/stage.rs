@@ -11,6 +11,7 @@ use tauscope_ingest::SimulatedRobot;
 use tauscope_pipeline::build::{self, BuildError};
 use tauscope_pipeline::cell::Cell;
 use tauscope_pipeline::learnt_state::{self, Kept};
+use tauscope_pipeline::plausible::{Plausible, PlausibleTwin, Watched, WatchedTwin};
 use tauscope_pipeline::report::Report;
 use tauscope_pipeline::scenario::ScenarioFacts;
 use tauscope_pipeline::settings::Settings;
@@ -105,13 +106,17 @@ fn member(seat: &Seat, shared: &tauscope_detect::Shared) -> Result<Member, SeatE
                 .transpose()?;
             let source = build::ingest(config, robot.as_ref(), cell()?, told.after_ns)?;
             let source = build::commanded(source, config, cell()?)?;
+            let source = Watched::new(&seat.stage, source, Plausible::new(cell()?));
             Member::Source(Box::new(announce::commands::Announced::new(
                 &seat.stage,
                 source,
             )))
         }
         Settings::Twin { config, model } => {
-            Member::Twin(Box::new(build::twin(config, model.as_ref(), cell()?)?))
+            let (model, cell) = (model.as_ref(), cell()?);
+            let twin = build::twin(config, model, cell)?;
+            let plausible = PlausibleTwin::new(config, model, cell);
+            Member::Twin(Box::new(WatchedTwin::new(&seat.stage, twin, plausible)))
         }
         Settings::Detect { config, model } => {
             let mut config = config.clone();

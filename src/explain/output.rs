@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use tauscope_explain::report::{MOTION_PREFIX, Verdict};
 use tauscope_explain::{Outcome, html};
-use tauscope_pipeline::report::{Problem, Report};
 
 use super::input::{Named, Request};
 use super::read::Kept;
@@ -44,19 +43,11 @@ pub fn make(out: &Path) -> Result<(), Failure> {
 /// If a file of the input would be overwritten, or a result is there already and nobody said that it may be
 /// replaced.
 pub fn refuse_to_replace(out: &Path, request: &Request, force: Force) -> Result<(), Failure> {
-    let mut report = Report::default();
     let start = request.start.iter().map(|start| &start.path);
     let recordings = request.fit.iter().chain(&request.holdout);
     let inputs = start.chain(&request.robot_path);
-    for input in inputs.chain(recordings.map(|recording| &recording.path)) {
-        if let Some(result) = results(out, request).find(|result| same_file(result, input)) {
-            let name = result.file_name().unwrap_or_default().display();
-            let title = format!("the result {name} would overwrite {}", input.display());
-            report.push(Problem::new(title).help("give another folder with --out"));
-        }
-    }
-    report.into_result(())?;
-    force.check(results(out, request))
+    let inputs = inputs.chain(recordings.map(|recording| &recording.path));
+    force.check_beside(results(out, request), inputs)
 }
 
 /// What an explanation may write. Motions that are worth recording next have names that only it knows; those of an
@@ -81,13 +72,6 @@ fn motions(out: &Path) -> Vec<PathBuf> {
         .map(|entry| entry.path())
         .filter(is_motion)
         .collect()
-}
-
-fn same_file(a: &Path, b: &Path) -> bool {
-    match (a.canonicalize(), b.canonicalize()) {
-        (Ok(a), Ok(b)) => a == b,
-        _ => false,
-    }
 }
 
 /// Writes everything to `out`, and into the report which prediction is where.

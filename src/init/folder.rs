@@ -1,5 +1,6 @@
 //! The folder of a cell: which files it has, and the pipeline file in it.
 
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
@@ -12,20 +13,25 @@ use super::write;
 use crate::existing::Force;
 use crate::exit::Failure;
 
-/// The folder and the names in it.
+/// The folder and the names in it. Dropped before it is kept, it takes away what has come into it since, so that a
+/// failed attempt can be repeated.
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
+    /// What was not there before, folders behind what is in them.
+    new: RefCell<Vec<PathBuf>>,
 }
 
 impl Folder {
-    /// The folder at `path`, which is made. Files that `init` would replace are an error unless `force` allows it.
+    /// The folder at `path`, which is made. Files that `init` would replace are an error unless `force` allows it;
+    /// `recordings` must not be among them.
     ///
     /// # Errors
     /// If it cannot be made, or holds a pipeline already.
-    pub fn prepare(path: &Path, force: Force) -> Result<Self, Failure> {
+    pub fn prepare(path: &Path, force: Force, recordings: &[PathBuf]) -> Result<Self, Failure> {
         let this = Self {
             path: path.to_owned(),
+            new: RefCell::default(),
         };
         let mine = [
             this.pipeline(),
@@ -36,7 +42,12 @@ impl Folder {
             this.page(),
             this.explained().join("report.json"),
         ];
-        force.check(mine)?;
+        force.check_beside(mine.clone(), recordings)?;
+        let explained = this.explained();
+        let made = mine.into_iter().take(6);
+        let made = made.chain([this.schema(), explained, path.to_owned()]);
+        let new = made.filter(|path| path.symlink_metadata().is_err());
+        this.new.replace(new.collect());
         std::fs::create_dir_all(path).map_err(|error| {
             let problem = Problem::of_file(path, format!("cannot make the folder: {error}"));
             Failure::Rejected(problem.into())
@@ -44,9 +55,27 @@ impl Folder {
         Ok(this)
     }
 
+    /// All is written, and stays.
+    pub fn keep(&self) {
+        self.new.take();
+    }
+
+    /// A path as the files of the folder name it: what is in the folder moves with it.
+    pub fn seen_from(&self, path: &Path) -> String {
+        let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        let (path, folder) = (absolute(path), absolute(&self.path));
+        let inside = path.strip_prefix(&folder).unwrap_or(&path);
+        inside.display().to_string()
+    }
+
     /// What `tauscope run` runs.
     pub fn pipeline(&self) -> PathBuf {
         self.path.join("pipeline.yaml")
+    }
+
+    /// The schema of the pipeline file, for editors.
+    fn schema(&self) -> PathBuf {
+        self.path.join("pipeline.schema.json")
     }
 
     /// The corrected twin.
@@ -111,9 +140,7 @@ impl Folder {
         for (key, recordings) in [("train", fit), ("validation", holdout)] {
             text.push_str(&format!("{key}:\n"));
             for recording in recordings {
-                let absolute = std::path::absolute(recording);
-                let path = absolute.as_deref().unwrap_or(recording);
-                text.push_str(&format!("  - {}\n", quoted(&path.display().to_string())));
+                text.push_str(&format!("  - {}\n", quoted(&self.seen_from(recording))));
             }
         }
         write(&self.set(), text.as_bytes())
@@ -129,7 +156,7 @@ impl Folder {
     }
 
     /// Writes the pipeline file, and its schema. It listens to the `live` source; without one it plays `recording` until
-    /// it is told to listen to the robot.
+    /// it is told to listen to the robot. `is_explained` says which twin it has.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -139,19 +166,41 @@ impl Folder {
         state_topic: &str,
         recording: &Path,
         live: Option<&str>,
+        is_explained: bool,
     ) -> Result<(), Failure> {
         let schema = FileKind::Pipeline.schema_text();
-        write(&self.path.join("pipeline.schema.json"), schema.as_bytes())?;
-        let absolute = std::path::absolute(recording);
-        let recording = absolute.as_deref().unwrap_or(recording);
+        write(&self.schema(), schema.as_bytes())?;
         let source = live.map_or(RECORDED.to_owned(), |live| LIVE.replace("LIVE", live));
         let text = PIPELINE
             .replace("SOURCE", &source)
             .replace("CELL", &name(&cell.facts.name))
             .replace("UNIT", cell.facts.effort_unit.as_str())
-            .replace("RECORDING", &quoted(&recording.display().to_string()))
+            .replace("RECORDING", &quoted(&self.seen_from(recording)))
+            .replace(
+                "TWIN",
+                if is_explained {
+                    "The robot as `explain` corrected it: explained/report.html says how."
+                } else {
+                    "A gain and an offset per joint correct the URDF: init.md says why."
+                },
+            )
             .replace("TOPIC", &quoted(state_topic));
         write(&self.pipeline(), text.as_bytes())
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        for path in self.new.take() {
+            // What is not there was not written; a folder with recordings of `--live` in it stays.
+            let _ = if path == self.explained() {
+                std::fs::remove_dir_all(&path)
+            } else if path == self.path {
+                std::fs::remove_dir(&path)
+            } else {
+                std::fs::remove_file(&path)
+            };
+        }
     }
 }
 
@@ -193,7 +242,7 @@ SOURCE
 
   - name: twin
     input: ingest
-    # The robot as `explain` corrected it: explained/report.html says how.
+    # TWIN
     twin: {model: twin.yaml}
 
   - name: detect

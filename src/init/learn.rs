@@ -21,6 +21,8 @@ const REGRESSION: &str = "regression";
 pub struct Learnt {
     /// The twin.
     pub twin: TwinFile,
+    /// Whether it is the explained one.
+    pub is_explained: bool,
     /// What was found, a sentence each.
     pub sentences: Vec<String>,
 }
@@ -71,18 +73,13 @@ pub fn learn(
     let learnt: BTreeMap<&str, &Config> = BTreeMap::from([(DETECTOR, &run.first().config)]);
     let text = serde_saphyr::to_string(&learnt).context("what was learnt")?;
     write(out, text.as_bytes())?;
-    let mut sentences = vec![format!(
-        "The detector uses {}.",
-        if best.twin == REGRESSION {
-            "a gain and an offset per joint"
-        } else {
-            "the explained twin"
-        }
-    )];
+    let is_explained = best.twin != REGRESSION;
+    let mut sentences = vec![format!("The detector uses {}.", best.words())];
     sentences.extend(trials.iter().map(Trial::sentence));
     sentences.extend(taught.notes.iter().cloned());
     Ok(Learnt {
         twin: taught.twins[0].file.clone(),
+        is_explained,
         sentences,
     })
 }
@@ -143,12 +140,17 @@ fn trials(evaluation: &Evaluation, twins: &[String]) -> Vec<Trial> {
 }
 
 impl Trial {
-    fn sentence(&self) -> String {
-        let twin = if self.twin == REGRESSION {
+    /// Its twin.
+    fn words(&self) -> &'static str {
+        if self.twin == REGRESSION {
             "a gain and an offset per joint"
         } else {
             "the explained twin"
-        };
+        }
+    }
+
+    fn sentence(&self) -> String {
+        let twin = self.words();
         let force = self.force_n.map_or_else(String::new, |force_n| {
             format!(" From {force_n:.0} N on it would find half of the pushes on the middle link.")
         });

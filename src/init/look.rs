@@ -1,17 +1,21 @@
 //! What the recordings are: which topic holds the joint states, whose joints they are, in which unit the effort is.
 
+mod slopes;
+
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use tauscope_archive::ros::JointStateType;
 use tauscope_archive::{Info, Recording};
-use tauscope_dynamics::effort_scale::{EffortScale, Slope, TELLING};
+use tauscope_dynamics::effort_scale::EffortScale;
 use tauscope_ingest::Topics;
 use tauscope_pipeline::calibrate::Job;
 use tauscope_pipeline::cell::{Cell, ConstantSpot, EffortUnit, first_joint_names};
 use tauscope_pipeline::report::{Problem, Report};
 use tauscope_pipeline::suggest;
 
+use self::slopes::{Slopes, signs, telling, turned_in_some};
 use crate::exit::Failure;
 
 /// The arm and its recordings, before anything is fitted.
@@ -97,9 +101,11 @@ impl Told<'_> {
                     .map(|remark| format!("{name}: {remark}.")),
             );
         }
-        let scale = self.scale(&cell, &state_topic)?;
-        let (unit, sentence) = self.unit(&scale)?;
+        let slopes = self.slopes(&cell, &state_topic)?;
+        sentences.extend(slopes.notes.iter().map(|note| format!("{note}.")));
+        let (unit, sentence) = self.unit(&EffortScale::of(&slopes.all))?;
         sentences.push(sentence);
+        sentences.extend(signs(&slopes.all));
         Ok(Looked {
             cell: self.cell(unit)?,
             state_topic,
@@ -113,7 +119,7 @@ impl Told<'_> {
         Cell::from_urdf(self.robot, unit, &BTreeMap::new(), &problem)
     }
 
-    /// The topic of joint states whose messages name most of the robot's joints.
+    /// The topic of joint states with positions whose messages name most of the robot's joints.
     fn find_topic(&self, cell: &Cell) -> Result<String, Report> {
         let first = &self.recordings[0];
         let recording = Recording::open(first).map_err(|error| Problem::new(error.to_string()))?;
@@ -123,16 +129,28 @@ impl Told<'_> {
             let names = first_joint_names(first, &topic.name).ok()?;
             let wanted = &cell.facts.joint_names;
             let known = wanted.iter().filter(|name| names.contains(name)).count();
-            let has_effort = has_effort(&recording, &topic.name);
-            Some((has_effort, known, topic.message_count, topic.name.clone()))
+            let (position, effort) = given(&recording, &topic.name);
+            let name = Reverse(topic.name.clone());
+            Some((position, effort, known, topic.message_count, name))
         });
-        let best = named.max();
-        best.map(|(.., name)| name).ok_or_else(|| {
-            let title = format!("{} holds no {}", first.display(), JointStateType::names());
-            let topics = recording.topics().iter().map(|topic| topic.name.as_str());
-            let help = format!("its topics are {}", suggest::list(topics));
-            Problem::new(title).help(help).into()
-        })
+        match named.max() {
+            Some((true, .., name)) => Ok(name.0),
+            Some((false, .., name)) => {
+                let title = format!(
+                    "{}: no joint states with positions; {} has none",
+                    first.display(),
+                    name.0
+                );
+                let help = "record the topic that holds the joints' positions and efforts";
+                Err(Problem::new(title).help(help).into())
+            }
+            None => {
+                let title = format!("{} holds no {}", first.display(), JointStateType::names());
+                let topics = recording.topics().iter().map(|topic| topic.name.as_str());
+                let help = format!("its topics are {}", suggest::list(topics));
+                Err(Problem::new(title).help(help).into())
+            }
+        }
     }
 
     /// Every recording must have every joint of the robot.
@@ -180,8 +198,8 @@ impl Told<'_> {
         report.into_result(())
     }
 
-    /// What the slopes of measured over expected effort tell of the unit.
-    fn scale(&self, cell: &Cell, state_topic: &str) -> Result<EffortScale, Failure> {
+    /// The slopes of measured over expected effort, and what is odd in the recordings.
+    fn slopes(&self, cell: &Cell, state_topic: &str) -> Result<Slopes, Failure> {
         let topics = Topics {
             state: state_topic.to_owned(),
             command: None,
@@ -191,30 +209,41 @@ impl Told<'_> {
             commands: None,
         };
         let twin = tauscope_twin::Config::default();
-        let job = Job {
-            cell,
-            topics: &topics,
-            twin: &twin,
-            fit: self.recordings,
-            validation: &[],
+        let fit = |recordings: &[PathBuf]| {
+            let job = Job {
+                cell,
+                topics: &topics,
+                twin: &twin,
+                fit: recordings,
+                validation: &[],
+            };
+            job.fit(&|_, _| true, &|_, _| {})
         };
-        let fitted = job.fit(&|_, _| true, &|_, _| {});
-        let fitted = fitted.map_err(|error| Failure::rejected(error.to_string()))?;
-        let joints = fitted.file.joints.iter();
-        let telling = joints.filter(|(_, joint)| joint.explained.unwrap_or(0.0) >= TELLING);
-        let slopes = telling.map(|(name, joint)| Slope {
-            joint: name.clone(),
-            slope: joint.gain,
+        // Signs first: a joint that is turned in some recordings only has no slope over all of them.
+        let each = self.recordings.iter().filter_map(|recording| {
+            // What is wrong with one that cannot be fitted is found with all of them.
+            let fitted = fit(std::slice::from_ref(recording)).ok()?;
+            Some((recording.as_path(), telling(&fitted.file)))
         });
-        Ok(EffortScale::of(&slopes.collect::<Vec<_>>()))
+        if let Some(problem) = turned_in_some(&each.collect::<Vec<_>>()) {
+            return Err(Failure::Rejected(problem.into()));
+        }
+        let fitted = fit(self.recordings);
+        let fitted = fitted.map_err(|error| Failure::rejected(error.to_string()))?;
+        Ok(Slopes {
+            all: telling(&fitted.file),
+            notes: fitted.notes,
+        })
     }
 
     /// The unit and how it is known.
     fn unit(&self, scale: &EffortScale) -> Result<(EffortUnit, String), Failure> {
         if let Some(unit) = self.effort_unit {
-            if unit == EffortUnit::Nm
-                && let Some(fault) = scale.fault_in_nm()
-            {
+            let fault = match unit {
+                EffortUnit::Nm => scale.fault_in_nm(),
+                EffortUnit::A => scale.fault_in_a(),
+            };
+            if let Some(fault) = fault {
                 return Err(Failure::rejected(fault.to_string()));
             }
             return Ok((unit, format!("Effort is in {}, as told.", words(unit))));
@@ -232,8 +261,8 @@ impl Told<'_> {
             } => {
                 let sentence = format!(
                     "Effort is in A, motor current: {joints} joint(s) that bear weight measure {:.3} per N m that the \
-                     robot's weight requires, which is a torque constant of {nm_per_unit:.1} N m/A. --effort-unit Nm \
-                     says otherwise.",
+                     robot's weight requires, which is a torque constant of {nm_per_unit:.1} N m/A. If that is \
+                     wrong, give --effort-unit Nm.",
                     1.0 / nm_per_unit
                 );
                 Ok((EffortUnit::A, sentence))
@@ -243,7 +272,7 @@ impl Told<'_> {
     }
 }
 
-/// How far the joints move in a recording, and what is odd about its joint states.
+/// How far the joints move in a recording, and what is odd about its messages.
 fn oddities(path: &Path, topic: &str) -> Result<(f64, Vec<String>), Report> {
     let failed =
         |error: tauscope_archive::ArchiveError| Report::from(Problem::new(error.to_string()));
@@ -255,7 +284,7 @@ fn oddities(path: &Path, topic: &str) -> Result<(f64, Vec<String>), Report> {
     let joints = joints.unwrap_or_default();
     Ok((
         joints.joints.iter().map(|joint| joint.travel).sum(),
-        joints.remarks(),
+        joints.row_remarks(),
     ))
 }
 
@@ -282,16 +311,16 @@ fn undecided(scale: &EffortScale) -> Problem {
     }
 }
 
-/// Whether the first message on a topic has efforts.
-fn has_effort(recording: &Recording, topic: &str) -> bool {
+/// Whether the first message on a topic has positions, and efforts.
+fn given(recording: &Recording, topic: &str) -> (bool, bool) {
     let states = recording.joint_states(topic).ok();
     let first = states.and_then(|mut states| {
-        states
-            .next_state()?
-            .ok()
-            .map(|state| !state.message.effort.is_empty())
+        states.next_state()?.ok().map(|state| {
+            let message = &state.message;
+            (!message.position.is_empty(), !message.effort.is_empty())
+        })
     });
-    first.unwrap_or(false)
+    first.unwrap_or_default()
 }
 
 /// The unit in words.

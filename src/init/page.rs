@@ -9,8 +9,14 @@ use super::learn::Learnt;
 use super::look::Looked;
 
 /// The page as Markdown: what the recordings are, what the twin leaves out, what the detector has learnt, what to
-/// record next, and how to go on.
-pub fn page(folder: &Folder, looked: &Looked, report: &Report, learnt: &Learnt) -> String {
+/// record next, and how to go on. `is_live` tells that the pipeline listens to the robot.
+pub fn page(
+    folder: &Folder,
+    looked: &Looked,
+    report: &Report,
+    learnt: &Learnt,
+    is_live: bool,
+) -> String {
     let mut text = format!("# {}\n", looked.cell.facts.name);
     section(&mut text, "Recordings", &looked.sentences);
 
@@ -33,24 +39,40 @@ pub fn page(folder: &Folder, looked: &Looked, report: &Report, learnt: &Learnt) 
         list(&mut text, &next);
     }
 
+    section(&mut text, "Go on", &[]);
+    list(&mut text, &go_on(folder, report, learnt, is_live));
+    text
+}
+
+/// What to do with the folder.
+fn go_on(folder: &Folder, report: &Report, learnt: &Learnt, is_live: bool) -> Vec<String> {
     let pipeline = folder.pipeline();
     let pipeline = pipeline.display();
-    section(&mut text, "Go on", &[]);
-    list(
-        &mut text,
-        &[
-            format!("Play a recording through the pipeline: `tauscope run {pipeline}`."),
-            format!(
-                "Search recordings for contacts: `tauscope replay RECORDING... --pipeline {pipeline} --out results`."
-            ),
-            format!("Listen to the robot: change `ingest` in {pipeline} as its comment says."),
-            format!(
-                "Read how the twin was corrected: {}.",
-                folder.explained().join("report.html").display()
-            ),
-        ],
+    let search = format!(
+        "Search recordings for contacts: `tauscope replay RECORDING... --pipeline {pipeline} --out results`."
     );
-    text
+    let first = if is_live {
+        vec![
+            format!("Listen to the robot: `tauscope run {pipeline}`."),
+            search,
+        ]
+    } else {
+        vec![
+            format!("Play a recording through the pipeline: `tauscope run {pipeline}`."),
+            search,
+            format!("Listen to the robot: change `ingest` in {pipeline} as its comment says."),
+        ]
+    };
+    let what = if report.verdict == Verdict::NotEvaluated {
+        "why the twin was not explained"
+    } else if learnt.is_explained {
+        "how the twin was corrected"
+    } else {
+        "what the explanation found, although the detector does not use its twin"
+    };
+    let page = folder.explained().join("report.html");
+    let read = format!("Read {what}: {}.", page.display());
+    first.into_iter().chain([read]).collect()
 }
 
 /// The motions to record next; a motion that is the same for several joints is told once.

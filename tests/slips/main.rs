@@ -11,6 +11,7 @@ mod arguments;
 mod data_sets;
 mod files;
 mod recordings;
+mod spoilt;
 
 use std::path::{Path, PathBuf};
 
@@ -47,6 +48,7 @@ impl Desk {
         std::fs::write(this.path("words.mcap"), "hello\n").unwrap();
         std::fs::write(this.path("ros1.bag"), "#ROSBAG V2.0\n").unwrap();
         std::fs::write(this.path("table.csv"), "0,1\n1,2\n").unwrap();
+        spoilt::write_all(this.folder.path());
         std::fs::create_dir(this.path("folder")).unwrap();
         this.data_sets();
         let other = std::fs::read_to_string(this.path("demo_arm.urdf")).unwrap();
@@ -68,6 +70,18 @@ stages:
 ",
         )
         .unwrap();
+        let text = std::fs::read_to_string(this.path("pipeline.yaml")).unwrap();
+        let text = |from: &str, to: &str| {
+            assert!(text.contains(from));
+            text.replace(from, to)
+        };
+        let moved = text("path: demo.mcap", "path: gone/far.mcap");
+        let moved = moved.replace("out-{n}", "/proc/nowhere/out-{n}");
+        std::fs::write(this.path("moved.yaml"), moved).unwrap();
+        let cut = text("twin: {}", "twin: {effort_cutoff_hz: 80}");
+        std::fs::write(this.path("cut.yaml"), cut).unwrap();
+        let amperes = text("file: {path: demo.mcap}", "ur_rtde: {host: robot}");
+        std::fs::write(this.path("rtde.yaml"), amperes).unwrap();
         this
     }
 

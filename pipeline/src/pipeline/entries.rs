@@ -13,11 +13,12 @@ use tauscope_archive::is_there;
 use tauscope_ingest::SourceSettings;
 use tauscope_twin::{Expected, Motion, TwinFile};
 
+use super::Purpose;
 use super::file::{PipelineFile, StageEntry, stage_place};
 use super::role::Role;
 use super::wiring::Wiring;
 use crate::build;
-use crate::cell::Cell;
+use crate::cell::{Cell, EffortUnit};
 use crate::provenance;
 use crate::report::Report;
 use crate::scenario::ScenarioFacts;
@@ -37,14 +38,14 @@ pub struct Files {
 /// Reads and checks what each stage names, by place in the file.
 pub fn resolve(
     file: &Located<PipelineFile>,
-    host: Option<&str>,
+    purpose: Purpose<'_>,
     cells: &BTreeMap<String, Cell>,
     wiring: Option<&Wiring>,
     report: &mut Report,
 ) -> Files {
     let mut resolver = Resolver {
         file,
-        host,
+        purpose,
         cells,
         wiring,
         report,
@@ -68,7 +69,7 @@ pub fn resolve(
 
 struct Resolver<'a> {
     file: &'a Located<PipelineFile>,
-    host: Option<&'a str>,
+    purpose: Purpose<'a>,
     cells: &'a BTreeMap<String, Cell>,
     wiring: Option<&'a Wiring>,
     report: &'a mut Report,
@@ -83,10 +84,13 @@ impl<'a> Resolver<'a> {
         &self.file.value.stages[index]
     }
 
-    /// Whether the stage runs where the check runs, as far as one knows.
+    /// Whether the stage runs where the check runs, as far as one knows. In a replay no stage has files of its own.
     fn is_here(&self, index: usize) -> bool {
-        let host = &self.entry(index).host;
-        self.host.is_none() || host.is_none() || host.as_deref() == self.host
+        let Purpose::Run { host: here } = self.purpose else {
+            return false;
+        };
+        let host = self.entry(index).host.as_deref();
+        here.is_none() || host.is_none() || host == here
     }
 
     /// The stage's cell, if stage and cell are sound so far.
@@ -148,6 +152,17 @@ impl<'a> Resolver<'a> {
         if let Some((title, help)) = source.fault() {
             let problem = self.file.at_key(&place.key(key), title);
             self.report.push(problem.help(help));
+        }
+        if let (Some(setting), Some(cell)) = (source.gives_amperes(), self.cell(index))
+            && cell.facts.effort_unit == EffortUnit::Nm
+        {
+            let title = format!(
+                "the source gives motor currents (`{setting}`), but the cell's effort is in N m"
+            );
+            let problem = self.file.at_key(&place.key(key), title);
+            let name = &cell.facts.name;
+            self.report
+                .push(problem.help(format!("give the cell `{name}` `effort_unit: A`")));
         }
         let file = source.file();
         let path_place = file.map_or(place.clone(), |(path, _)| place.key(key).key(path));

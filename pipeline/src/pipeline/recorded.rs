@@ -2,12 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use tauscope_archive::Recording;
 use tauscope_record::{RecordError, Recorder};
 use tauscope_watch as watch;
 
 use super::{Pipeline, Role, Stage};
 use crate::build::{self, StreamFacts};
 use crate::cell::Cell;
+use crate::plausible;
 use crate::provenance::sha256;
 use crate::settings::Settings;
 
@@ -26,6 +28,25 @@ impl Pipeline {
             if let Some(warning) = setup.and_then(|setup| config.warning(&setup)) {
                 warnings.push(format!("{}: {warning}", stage.name));
             }
+        }
+        warnings
+    }
+
+    /// Twins whose low-passes would pass everything, where the rate of their source is known before it is read.
+    pub fn rate_warnings(&self, host: Option<&str>) -> Vec<String> {
+        let here = |stage: &&Stage| host.is_none() || stage.host.as_deref() == host;
+        let mut warnings = Vec::new();
+        for stage in self.stages.iter().filter(here) {
+            let Settings::Twin { config, model } = &stage.settings else {
+                continue;
+            };
+            let source = stage.inputs.first().map(|&input| &self.stages[input]);
+            let Some(rate_hz) = source.and_then(rate_hz) else {
+                continue;
+            };
+            let filters = config.filters(model.as_ref().map(|model| model.filters));
+            let faults = plausible::cutoffs_above_half(filters, rate_hz);
+            warnings.extend(faults.map(|fault| format!("{}: {fault}", stage.name)));
         }
         warnings
     }
@@ -84,4 +105,20 @@ impl Pipeline {
         }
         all
     }
+}
+
+/// How many joint states a second a source gives, where that is known before it is read.
+fn rate_hz(source: &Stage) -> Option<f64> {
+    let Settings::Ingest(config) = &source.settings else {
+        return None;
+    };
+    if let Some(scenario) = &source.scenario {
+        return Some(scenario.scenario.rate_hz);
+    }
+    if let Some(controller) = &config.ur_rtde {
+        return Some(controller.rate_hz);
+    }
+    let file = config.file.as_ref()?;
+    let recording = Recording::open(&file.path).ok()?;
+    plausible::recorded_rate_hz(&recording, &file.topics.state).ok()?
 }

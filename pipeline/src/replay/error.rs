@@ -1,7 +1,5 @@
 //! Why a replay cannot be, or was not brought to its end.
 
-use std::path::PathBuf;
-
 use crate::build;
 
 /// Why a replay cannot be, or was not brought to its end.
@@ -23,17 +21,6 @@ pub enum ReplayError {
         name: String,
         /// What there is.
         known: String,
-    },
-    /// A table, but the pipeline does not say which column is what.
-    #[error(
-        "{}: a table needs its columns: give stage `{stage}` of the pipeline a `csv` source",
-        path.display()
-    )]
-    NoColumns {
-        /// The table.
-        path: PathBuf,
-        /// The source.
-        stage: String,
     },
     /// The recording cannot be read.
     #[error(transparent)]

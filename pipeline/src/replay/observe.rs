@@ -8,6 +8,7 @@ use tauscope_bus::{SampleRef, Sink, StageError};
 use super::Outcome;
 use crate::cell::Cell;
 use crate::graph::StageCounts;
+use crate::plausible::{Plausible, PlausibleTwin};
 use crate::tally::{DetectionTally, TwinTally};
 
 /// What was observed.
@@ -19,6 +20,8 @@ pub struct Observed {
     pub detectors: BTreeMap<String, DetectionTally>,
     /// First and newest stamp of all \[ns\].
     pub stamps_ns: Option<(i64, i64)>,
+    /// What cannot be, or is odd, a line each; known at the end.
+    pub notes: Vec<String>,
 }
 
 impl Observed {
@@ -43,6 +46,7 @@ impl Observed {
             detectors: self.detectors.into_values().collect(),
             stages,
             files,
+            notes: self.notes,
         }
     }
 }
@@ -51,15 +55,20 @@ impl Observed {
 #[derive(Debug)]
 pub struct Observer {
     joint_names: Vec<String>,
+    plausible: Plausible,
+    /// By twin stage.
+    plausible_twins: BTreeMap<String, PlausibleTwin>,
     /// What it has seen so far.
     pub observed: Observed,
 }
 
 impl Observer {
-    /// An observer of a cell with these joints.
-    pub fn new(joint_names: &[String]) -> Self {
+    /// An observer of `cell`, with these twins.
+    pub fn new(cell: &Cell, plausible_twins: BTreeMap<String, PlausibleTwin>) -> Self {
         Self {
-            joint_names: joint_names.to_vec(),
+            joint_names: cell.facts.joint_names.clone(),
+            plausible: Plausible::new(cell),
+            plausible_twins,
             observed: Observed::default(),
         }
     }
@@ -77,6 +86,9 @@ impl Sink for &mut Observer {
                 if let Some(tally) = observed.twins.get_mut(from) {
                     tally.add(sample);
                 }
+                if let Some(plausible) = self.plausible_twins.get_mut(from) {
+                    plausible.add(sample);
+                }
                 sample.header.stamp_ns
             }
             SampleRef::Detection(sample) => {
@@ -89,7 +101,10 @@ impl Sink for &mut Observer {
                 }
                 sample.header.stamp_ns
             }
-            SampleRef::JointState(sample) => sample.header.stamp_ns,
+            SampleRef::JointState(sample) => {
+                self.plausible.add(sample);
+                sample.header.stamp_ns
+            }
             SampleRef::Health(_) => return Ok(()),
         };
         let (first, _) = observed.stamps_ns.unwrap_or((stamp_ns, stamp_ns));
@@ -98,6 +113,19 @@ impl Sink for &mut Observer {
     }
 
     fn finish(&mut self) -> Result<(), StageError> {
+        let oddities = self.plausible.oddities().into_iter();
+        let mut notes: Vec<String> = oddities.map(|oddity| oddity.to_string()).collect();
+        // Twins behind one source find the same.
+        for note in self
+            .plausible_twins
+            .values()
+            .flat_map(PlausibleTwin::oddities)
+        {
+            if !notes.contains(&note) {
+                notes.push(note);
+            }
+        }
+        self.observed.notes = notes;
         Ok(())
     }
 }

@@ -80,6 +80,11 @@ pub trait SourceSettings {
         None
     }
 
+    /// The setting by which its efforts are motor currents in A, where it is known.
+    fn gives_amperes(&self) -> Option<&'static str> {
+        None
+    }
+
     /// Why it can never give a sample, and what would help.
     fn fault(&self) -> Option<(&'static str, &'static str)> {
         None
@@ -186,6 +191,10 @@ impl SourceSettings for UrRtdeConfig {
             "the controller has no address",
             "give `host: 192.168.0.10`, or the controller's name",
         ))
+    }
+
+    fn gives_amperes(&self) -> Option<&'static str> {
+        (self.effort == crate::config::UrEffort::ActualCurrent).then_some("effort: actual_current")
     }
 
     fn without_twin(&self) -> Option<&'static str> {

@@ -18,6 +18,10 @@ const LEAST_MOVING: f64 = 0.01;
 /// Tuned: not swept.
 const LEAST_EXPLAINED: f64 = 0.05;
 
+/// A joint whose model effort varies by more than this bears weight \[N m\].
+/// Physical: a hand of 1 kg at 10 cm.
+const BEARS_WEIGHT: f64 = 1.0;
+
 /// One joint's fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointFit {
@@ -31,6 +35,8 @@ pub struct JointFit {
     pub explained: f64,
     /// Range of the model's effort over the recordings, as its standard deviation \[model unit\].
     pub excitation: f64,
+    /// Range of the measured effort over the recordings, as its standard deviation \[effort unit\].
+    pub measured: f64,
 }
 
 /// Running sums of one joint, about the first sample for numerical sanity (Welford).
@@ -124,6 +130,7 @@ impl Calibration {
                 noise: (left(gain) / n).sqrt(),
                 explained: if varies { explained(gain) } else { 0.0 },
                 excitation: (m.xx / n).sqrt(),
+                measured: (m.yy / n).sqrt(),
             }
         };
         Some(self.joints.iter().map(fit).collect())
@@ -142,6 +149,16 @@ pub fn telling_slopes(names: &[String], fits: &[JointFit]) -> Vec<Slope> {
             slope: fit.gain,
         });
     slopes.collect()
+}
+
+/// How much the measured efforts vary for each unit that the model's vary, of the middle joint among those that bear
+/// weight. A torque varies at least as much as the weight makes it, whatever friction adds; so this tells a current
+/// also where friction hides every slope.
+pub fn spread_scale(fits: &[JointFit]) -> Option<f64> {
+    let bears = fits.iter().filter(|fit| fit.excitation > BEARS_WEIGHT);
+    let mut ratios: Vec<f64> = bears.map(|fit| fit.measured / fit.excitation).collect();
+    ratios.sort_by(f64::total_cmp);
+    ratios.get(ratios.len() / 2).copied()
 }
 
 #[cfg(test)]

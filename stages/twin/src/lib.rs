@@ -56,7 +56,7 @@ mod motion;
 mod stage;
 mod twin_file;
 
-pub use calibration::{Calibration, JointFit, telling_slopes};
+pub use calibration::{Calibration, JointFit, spread_scale, telling_slopes};
 pub use config::{Config, Expected, Motion};
 pub use stage::{Setup, Twin, TwinError};
 pub use twin_file::{

@@ -1,0 +1,37 @@
+//! Mean and spread.
+
+use tauscope_twin::ScoreStatistics;
+
+/// Mean and spread of a number, as it comes (Welford).
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Spread {
+    /// How many there were.
+    pub count: u64,
+    mean: f64,
+    squares: f64,
+}
+
+impl Spread {
+    pub fn add(&mut self, value: f64) {
+        self.count += 1;
+        let delta = value - self.mean;
+        self.mean += delta / self.count as f64;
+        self.squares += delta * (value - self.mean);
+    }
+
+    fn variance(&self) -> f64 {
+        self.squares / self.count.max(1) as f64
+    }
+
+    pub fn root_mean_square(&self) -> f64 {
+        (self.variance() + self.mean * self.mean).sqrt()
+    }
+
+    pub fn statistics(&self) -> ScoreStatistics {
+        ScoreStatistics {
+            mean: self.mean,
+            standard_deviation: self.variance().sqrt(),
+            samples: self.count,
+        }
+    }
+}

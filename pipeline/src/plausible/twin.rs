@@ -1,0 +1,140 @@
+//! What cannot be in a twin's samples: efforts with the other sign or in another unit than the twin's, and a low-pass
+//! that passes everything.
+
+use tauscope_archive::{ArchiveError, Recording};
+use tauscope_bus::TwinState;
+use tauscope_dynamics::effort_scale::{self, EffortScale, ScaleFault};
+use tauscope_twin::{Calibration, Filters, TwinFile, telling_slopes};
+
+use super::PAUSE_NS;
+use crate::cell::{Cell, EffortUnit};
+
+/// Samples in which some joint moves, for the slopes to be worth a word.
+/// Resolution: ten seconds at 100 Hz.
+const TELLING_SAMPLES: u64 = 1000;
+/// A line that explains less of the measured effort says nothing of its sign: a push may be stronger than the weight.
+/// Physical: above what the model and friction share with each other.
+const TELLING: f64 = 0.7;
+/// A joint faster than this moves \[rad/s, m/s\].
+/// Physical: above the velocity noise of encoders.
+const MOVES: f64 = 0.03;
+
+/// Follows the samples of a twin.
+#[derive(Debug)]
+pub struct PlausibleTwin {
+    names: Vec<String>,
+    calibration: Calibration,
+    /// Whether measured and expected effort are in one unit.
+    is_alike: bool,
+    filters: Filters,
+    last_ns: Option<i64>,
+    /// Steps without pauses, and how long they are together \[ns\].
+    steps: u64,
+    steps_ns: i64,
+}
+
+impl PlausibleTwin {
+    /// Nothing seen yet, of a twin with this configuration and correction.
+    pub fn new(config: &tauscope_twin::Config, model: Option<&TwinFile>, cell: &Cell) -> Self {
+        let facts = &cell.facts;
+        let in_nm =
+            facts.effort_unit == EffortUnit::Nm || facts.torque_constants_nm_per_a.is_some();
+        Self {
+            names: facts.joint_names.clone(),
+            calibration: Calibration::new(facts.joint_names.len(), false),
+            is_alike: in_nm || model.is_some(),
+            filters: config.filters(model.map(|model| model.filters)),
+            last_ns: None,
+            steps: 0,
+            steps_ns: 0,
+        }
+    }
+
+    /// Takes a sample.
+    pub fn add(&mut self, sample: &TwinState) {
+        let stamp_ns = sample.header.stamp_ns;
+        if let Some(last_ns) = self.last_ns.replace(stamp_ns) {
+            let step_ns = stamp_ns - last_ns;
+            if (1..PAUSE_NS).contains(&step_ns) {
+                self.steps += 1;
+                self.steps_ns += step_ns;
+            }
+        }
+        // A standing arm bends where it is pushed: its effort then says nothing of its weight.
+        let velocities = &sample.velocity[..self.names.len()];
+        if velocities.iter().any(|velocity| velocity.abs() > MOVES) {
+            self.calibration.add(sample);
+        }
+    }
+
+    /// Samples per second.
+    pub fn rate_hz(&self) -> Option<f64> {
+        (self.steps > 0).then(|| self.steps as f64 / (self.steps_ns as f64 * 1e-9))
+    }
+
+    /// What is odd so far.
+    pub fn oddities(&self) -> Vec<String> {
+        let rate_hz = self.rate_hz().into_iter();
+        let cutoffs = rate_hz.flat_map(|rate_hz| cutoffs_above_half(self.filters, rate_hz));
+        let scale = self.scale_fault().map(|fault| match fault {
+            ScaleFault::Turned(joints) => format!(
+                "the effort of {} has the other sign than the twin's: turn its sign in the driver",
+                joints.join(", ")
+            ),
+            ScaleFault::WrongUnit { slope } | ScaleFault::NoCurrent { slope } => format!(
+                "the measured effort is {slope:.3} times what the twin expects: its unit is another than the twin's"
+            ),
+        });
+        cutoffs.chain(scale).collect()
+    }
+
+    fn scale_fault(&self) -> Option<ScaleFault> {
+        if self.calibration.samples() < TELLING_SAMPLES {
+            return None;
+        }
+        let mut fits = self.calibration.fit()?;
+        for fit in &mut fits {
+            if fit.explained < TELLING {
+                fit.explained = effort_scale::TELLING / 2.0;
+            }
+        }
+        let scale = EffortScale::of(&telling_slopes(&self.names, &fits));
+        let fault = scale.fault_in_nm()?;
+        let tells = self.is_alike || matches!(fault, ScaleFault::Turned(_));
+        tells.then_some(fault)
+    }
+}
+
+/// What to say of a low-pass called `name` that passes everything at this rate, and the remedy.
+pub fn cutoff_above_half(name: &str, cutoff_hz: f64, rate_hz: f64) -> Option<(String, String)> {
+    (cutoff_hz > rate_hz / 2.0).then(|| {
+        let title = format!(
+            "{rate_hz:.1} joint states a second, so {name} {cutoff_hz} would pass everything"
+        );
+        let help = format!("give less than {:.1}, half the rate", rate_hz / 2.0);
+        (title, help)
+    })
+}
+
+/// What to say of a twin's low-passes at this rate.
+pub fn cutoffs_above_half(filters: Filters, rate_hz: f64) -> impl Iterator<Item = String> {
+    let all = [
+        ("`velocity_cutoff_hz`", filters.velocity_cutoff_hz),
+        ("`effort_cutoff_hz`", filters.effort_cutoff_hz),
+    ];
+    all.into_iter().filter_map(move |(name, cutoff_hz)| {
+        let (title, help) = cutoff_above_half(name, cutoff_hz, rate_hz)?;
+        Some(format!("{title}; {help}"))
+    })
+}
+
+/// Joint states per second on the topic `state` of a recording, as far as its index tells.
+///
+/// # Errors
+/// If there is no such topic.
+pub fn recorded_rate_hz(recording: &Recording, state: &str) -> Result<Option<f64>, ArchiveError> {
+    let count = recording.joint_state_topic(state)?.message_count as f64;
+    let span_ns = recording.end_ns().zip(recording.start_ns());
+    let span_ns = span_ns.map_or(0, |(end, start)| end - start);
+    Ok((span_ns > 0).then(|| count / (span_ns as f64 * 1e-9)))
+}

@@ -1,0 +1,167 @@
+//! A source and a twin of a run that say what cannot be in their samples, once for each thing, while they come.
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use tauscope_bus::{
+    Emit, JointState, LinkError, Progress, Source, Stage, StageError, Trouble, TwinState,
+};
+
+use super::{Oddity, Plausible, PlausibleTwin};
+
+/// When the first look is taken \[ns of stream time\]; each next one after twice the time.
+/// Physical: a person who watches the start still sits there after three seconds.
+const FIRST_LOOK_NS: i64 = 3_000_000_000;
+/// Looks are at most so far apart \[ns\].
+/// Resolution: a look costs microseconds.
+const LONGEST_NS: i64 = 60_000_000_000;
+
+/// When to look, and what was told.
+#[derive(Debug, Default)]
+struct Told {
+    next_ns: Option<i64>,
+    wait_ns: i64,
+    said: BTreeSet<String>,
+}
+
+impl Told {
+    /// Whether it is time for a look.
+    fn is_time(&mut self, stamp_ns: i64) -> bool {
+        let next_ns = *self.next_ns.get_or_insert(stamp_ns + FIRST_LOOK_NS);
+        // A clock that was set back must not keep it from looking.
+        if (next_ns - LONGEST_NS..next_ns).contains(&stamp_ns) {
+            return false;
+        }
+        self.wait_ns = (2 * self.wait_ns).clamp(FIRST_LOOK_NS, LONGEST_NS);
+        self.next_ns = Some(stamp_ns + self.wait_ns);
+        true
+    }
+
+    fn warn(&mut self, stage: &str, key: String, text: &str) {
+        if self.said.insert(key) {
+            tracing::warn!("{stage}: {text}");
+        }
+    }
+}
+
+/// A source that says what is odd about its joint states.
+pub struct Watched<S> {
+    stage: String,
+    inner: S,
+    plausible: Plausible,
+    told: Told,
+}
+
+impl<S> Watched<S> {
+    /// Watches `inner`, the source of the stage with this name.
+    pub fn new(stage: &str, inner: S, plausible: Plausible) -> Self {
+        Self {
+            stage: stage.to_owned(),
+            inner,
+            plausible,
+            told: Told::default(),
+        }
+    }
+}
+
+/// Hands on, and shows to `see` what was written.
+struct Seen<'a, T> {
+    out: &'a mut dyn Emit<T>,
+    see: &'a mut dyn FnMut(&T),
+}
+
+impl<T: tauscope_bus::Sample> Emit<T> for Seen<'_, T> {
+    fn emit(&mut self, write: &mut dyn FnMut(&mut T)) -> Result<(), LinkError> {
+        let see = &mut *self.see;
+        self.out.emit(&mut |sample| {
+            write(sample);
+            see(sample);
+        })
+    }
+}
+
+impl<S: Source<JointState>> Source<JointState> for Watched<S> {
+    fn step(&mut self, out: &mut dyn Emit<JointState>) -> Result<Progress, StageError> {
+        let (stage, plausible, told) = (&self.stage, &mut self.plausible, &mut self.told);
+        let see = &mut |sample: &JointState| {
+            plausible.add(sample);
+            if told.is_time(sample.header.stamp_ns) {
+                let oddities = plausible.oddities().into_iter();
+                // A pause is told where it is noticed.
+                for oddity in oddities.filter(|it| !matches!(it, Oddity::Pause { .. })) {
+                    told.warn(stage, oddity.key(), &oddity.to_string());
+                }
+            }
+        };
+        self.inner.step(&mut Seen { out, see })
+    }
+
+    fn dropped(&self) -> u64 {
+        self.inner.dropped()
+    }
+
+    fn fraction_done(&self) -> Option<f64> {
+        self.inner.fraction_done()
+    }
+
+    fn trouble(&mut self, silent_for: Duration) -> Option<Trouble> {
+        self.inner.trouble(silent_for)
+    }
+}
+
+/// A twin that says what is odd about measured and expected effort.
+pub struct WatchedTwin<S> {
+    stage: String,
+    inner: S,
+    plausible: PlausibleTwin,
+    told: Told,
+}
+
+impl<S> WatchedTwin<S> {
+    /// Watches `inner`, the twin of the stage with this name.
+    pub fn new(stage: &str, inner: S, plausible: PlausibleTwin) -> Self {
+        Self {
+            stage: stage.to_owned(),
+            inner,
+            plausible,
+            told: Told::default(),
+        }
+    }
+
+    fn seen<R>(
+        &mut self,
+        out: &mut dyn Emit<TwinState>,
+        run: impl FnOnce(&mut S, &mut dyn Emit<TwinState>) -> R,
+    ) -> R {
+        let (stage, plausible, told) = (&self.stage, &mut self.plausible, &mut self.told);
+        let see = &mut |sample: &TwinState| {
+            plausible.add(sample);
+            if told.is_time(sample.header.stamp_ns) {
+                for text in plausible.oddities() {
+                    // The words, without the numbers that go on changing.
+                    let key = text.replace(|c: char| c.is_ascii_digit() || c == '.', "");
+                    told.warn(stage, key, &text);
+                }
+            }
+        };
+        run(&mut self.inner, &mut Seen { out, see })
+    }
+}
+
+impl<S: Stage<JointState, TwinState>> Stage<JointState, TwinState> for WatchedTwin<S> {
+    fn accept(
+        &mut self,
+        sample: &JointState,
+        out: &mut dyn Emit<TwinState>,
+    ) -> Result<(), StageError> {
+        self.seen(out, |inner, out| inner.accept(sample, out))
+    }
+
+    fn finish(&mut self, out: &mut dyn Emit<TwinState>) -> Result<(), StageError> {
+        self.seen(out, Stage::finish)
+    }
+
+    fn dropped(&self) -> u64 {
+        self.inner.dropped()
+    }
+}

@@ -1,0 +1,49 @@
+//! A recording in the place of a pipeline's own source.
+
+use std::path::Path;
+
+use tauscope_bus::{JointState, Source};
+use tauscope_ingest::{Config, CsvConfig, FileConfig, IngestError, RecordedSource, Topics};
+
+use crate::build;
+use crate::cell::Cell;
+
+/// Opens it, not paced. Of a table the pipeline may say what its columns are; else its header does, or a file beside it.
+pub(super) fn recording(
+    config: &Config,
+    recording: &Path,
+    cell: &Cell,
+) -> Result<Box<dyn Source<JointState>>, IngestError> {
+    let setup = build::ingest_setup(cell);
+    let ending = recording.extension();
+    let is_table = ending.is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
+    let path = recording.to_owned();
+    Ok(Box::new(match &config.csv {
+        Some(csv) if is_table => {
+            let csv = CsvConfig {
+                path,
+                ..csv.clone()
+            };
+            RecordedSource::open_csv(&csv, config, &setup)?
+        }
+        None if is_table => {
+            let topics = Topics::default();
+            RecordedSource::open_file(&FileConfig { path, topics }, config, &setup)?
+        }
+        _ => RecordedSource::open_file(&file_config(config, recording), config, &setup)?,
+    }))
+}
+
+/// The pipeline's topics, for a recording of its robot.
+pub(super) fn file_config(config: &Config, recording: &Path) -> FileConfig {
+    let topics = config.source().ok().and_then(|(_, source)| source.topics());
+    // What a simulated cell was asked for is in its archive, too.
+    let simulated = || Topics {
+        learn: Some("/learn".to_owned()),
+        ..Topics::default()
+    };
+    FileConfig {
+        path: recording.to_owned(),
+        topics: topics.cloned().unwrap_or_else(simulated),
+    }
+}

@@ -1,0 +1,236 @@
+//! Recordings whose values cannot be: made of a bundled one.
+
+use std::path::Path;
+
+use tauscope_archive::ros::JointState;
+use tauscope_archive::{Compression, McapWriter, Recording};
+
+use super::{Slip, bundled, type_all};
+
+/// Writes a contact-free recording with its values changed by `spoil`, told the message's number.
+fn write(path: &Path, spoil: &dyn Fn(u64, &mut JointState)) {
+    let recording = Recording::open(bundled().join("demo_train_sweep.mcap")).unwrap();
+    let none = std::collections::BTreeMap::new();
+    let mut writer = McapWriter::create(path, Compression::Zstd, &none).unwrap();
+    let topic = writer.add_topic::<JointState>("/joint_states").unwrap();
+    let mut states = recording.joint_states("/joint_states").unwrap();
+    let mut number = 0;
+    while let Some(state) = states.next_state() {
+        let mut message = state.unwrap().message.clone();
+        let ns = message.header.stamp.ns();
+        spoil(number, &mut message);
+        number += 1;
+        writer.write(topic, ns, ns, &message).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+fn scaled(values: &mut [f64], factor: f64) {
+    values.iter_mut().for_each(|value| *value *= factor);
+}
+
+/// Writes all of them into `folder`.
+pub fn write_all(folder: &Path) {
+    let write = |name: &str, spoil: &dyn Fn(u64, &mut JointState)| {
+        write(&folder.join(name), spoil);
+    };
+    write("zero.mcap", &|_, state| scaled(&mut state.effort, 0.0));
+    write("one_zero.mcap", &|_, state| state.effort[1] = 0.0);
+    write("degrees.mcap", &|_, state| {
+        scaled(&mut state.position, 57.295_779_513);
+    });
+    write("half.mcap", &|_, state| scaled(&mut state.velocity, 0.5));
+    write("turned.mcap", &|_, state| scaled(&mut state.effort, -1.0));
+    write("amperes.mcap", &|_, state| scaled(&mut state.effort, 0.1));
+    write("milliamperes.mcap", &|_, state| {
+        scaled(&mut state.effort, 100.0)
+    });
+    write("standing.mcap", &|_, state| {
+        scaled(&mut state.position, 0.0);
+        scaled(&mut state.velocity, 0.0);
+    });
+}
+
+const SLIPS: &[Slip] = &[
+    Slip {
+        typed: "replay @zero.mcap --pipeline @pipeline.yaml",
+        code: 0,
+        says: &["warning: the effort is zero throughout: the driver does not publish it"],
+    },
+    Slip {
+        typed: "replay @one_zero.mcap --pipeline @pipeline.yaml --json",
+        code: 0,
+        says: &["the effort of joint2 is zero throughout"],
+    },
+    Slip {
+        typed: "replay @degrees.mcap --pipeline @pipeline.yaml",
+        code: 0,
+        says: &["warning: the positions of joint1", "are in degrees"],
+    },
+    Slip {
+        typed: "replay @half.mcap --pipeline @pipeline.yaml",
+        code: 0,
+        says: &["warning: the velocity of joint2 is 0.500 times the derivative"],
+    },
+    Slip {
+        typed: "replay @turned.mcap --pipeline @pipeline.yaml",
+        code: 0,
+        says: &["joint2", "has the other sign than the twin's"],
+    },
+    Slip {
+        typed: "replay @demo.mcap --pipeline @moved.yaml",
+        code: 0,
+        says: &["naive_difference"],
+    },
+    Slip {
+        typed: "check @moved.yaml",
+        code: 2,
+        says: &["there is no recording"],
+    },
+    Slip {
+        typed: "replay @demo.mcap --pipeline @cut.yaml",
+        code: 0,
+        says: &[
+            "`effort_cutoff_hz` 80 would pass everything",
+            "less than 50.0",
+        ],
+    },
+    Slip {
+        typed: "check @cut.yaml",
+        code: 0,
+        says: &[
+            "`effort_cutoff_hz` 80 would pass everything",
+            "less than 50",
+        ],
+    },
+    Slip {
+        typed: "check @rtde.yaml",
+        code: 2,
+        says: &["motor currents", "effort: actual_current", "effort_unit: A"],
+    },
+    Slip {
+        typed: "calibrate @zero.mcap --robot @demo_arm.urdf --effort-unit A --out @x.yaml",
+        code: 2,
+        says: &["the effort is zero throughout"],
+    },
+    Slip {
+        typed: "calibrate @degrees.mcap --robot @demo_arm.urdf --effort-unit A --out @x.yaml",
+        code: 2,
+        says: &["are in degrees"],
+    },
+    Slip {
+        typed: "calibrate @standing.mcap --robot @demo_arm.urdf --effort-unit A --out @x.yaml",
+        code: 2,
+        says: &["the arm stands", "torque constants"],
+    },
+    Slip {
+        typed: "calibrate @turned.mcap --robot @demo_arm.urdf --effort-unit A --out @x.yaml",
+        code: 2,
+        says: &["joint2", "other sign"],
+    },
+    Slip {
+        typed: "calibrate @milliamperes.mcap --robot @demo_arm.urdf --effort-unit A --out @x.yaml",
+        code: 2,
+        says: &["mA must divide by 1000"],
+    },
+    Slip {
+        typed: "calibrate @demo_validation.mcap --robot @demo_arm.urdf --out @demo_validation.mcap --force",
+        code: 2,
+        says: &["would overwrite"],
+    },
+    Slip {
+        typed: "calibrate @demo_validation.mcap --robot @demo_arm.urdf --out @demo_arm.urdf --force",
+        code: 2,
+        says: &["would overwrite"],
+    },
+    Slip {
+        typed: "manifest @demo.mcap --out @demo.mcap --force",
+        code: 2,
+        says: &["would overwrite"],
+    },
+    Slip {
+        typed: "init @zero.mcap @demo_validation.mcap --robot @demo_arm.urdf --out @x12",
+        code: 2,
+        says: &["zero.mcap", "the effort is zero throughout"],
+    },
+    Slip {
+        typed: "init @turned.mcap @demo_validation.mcap --robot @demo_arm.urdf --out @x12",
+        code: 2,
+        says: &["turned.mcap", "other sign", "not in the others"],
+    },
+    Slip {
+        typed: "init @degrees.mcap @demo_validation.mcap --robot @demo_arm.urdf --out @x12",
+        code: 2,
+        says: &["degrees.mcap", "are in degrees"],
+    },
+    Slip {
+        typed: "calibrate @half.mcap --robot @demo_arm.urdf --out @x13.yaml",
+        code: 0,
+        says: &[
+            "warning: ",
+            "half.mcap: the velocity of joint2 is 0.500 times",
+        ],
+    },
+];
+
+#[test]
+fn what_cannot_be_is_said() {
+    type_all(SLIPS);
+}
+
+#[test]
+fn a_run_warns_once_of_what_cannot_be() {
+    let desk = super::Desk::new();
+    let text = std::fs::read_to_string(desk.path("pipeline.yaml")).unwrap();
+    for (name, wanted) in [
+        ("zero.mcap", "the effort is zero throughout"),
+        ("degrees.mcap", "are in degrees"),
+        ("turned.mcap", "other sign than the twin's"),
+    ] {
+        let file = desk.path("spoilt.yaml");
+        std::fs::write(&file, text.replace("demo.mcap", name)).unwrap();
+        let mut run = super::common::tauscope();
+        run.args(["run", "-q"]).arg(&file);
+        let out = super::Out::of(run);
+        let told = out.stderr.matches(wanted).count();
+        assert_eq!((out.code, told), (0, 1), "{name}: {out:?}");
+    }
+    let mut run = super::common::tauscope();
+    run.args(["run", "-q"]).arg(desk.path("pipeline.yaml"));
+    let sound = super::Out::of(run);
+    assert!(!sound.stderr.contains("WARN"), "{sound:?}");
+}
+
+/// A table is replayed as other commands read it: a file beside it says what its columns are.
+#[test]
+fn a_table_is_replayed() {
+    let desk = super::Desk::new();
+    let recording = Recording::open(desk.path("demo.mcap")).unwrap();
+    let mut states = recording.joint_states("/joint_states").unwrap();
+    let (mut rows, mut joints) = (String::new(), Vec::new());
+    while let Some(state) = states.next_state() {
+        let message = &state.unwrap().message;
+        let values = [&message.position, &message.velocity, &message.effort];
+        let values = values.into_iter().flatten().map(f64::to_string);
+        let t = message.header.stamp.ns() as f64 * 1e-9;
+        let row: Vec<String> = std::iter::once(t.to_string()).chain(values).collect();
+        rows += &(row.join(",") + "\n");
+        joints.clone_from(&message.name);
+    }
+    std::fs::write(desk.path("arm.csv"), rows).unwrap();
+    let count = joints.len();
+    let columns = format!(
+        "time: {{number: 1}}\nposition: {{first: 2}}\nvelocity: {{first: {}}}\neffort: {{first: {}}}\njoints: [{}]\n",
+        2 + count,
+        2 + 2 * count,
+        joints.join(", ")
+    );
+    std::fs::write(desk.path("arm.columns.yaml"), columns).unwrap();
+    let events = |name: &str| {
+        let typed = format!("replay @{name} --pipeline @pipeline.yaml --json");
+        let out = desk.answer(&typed);
+        assert_eq!(out.code, 0, "{}", out.stderr);
+        out.stdout.matches("\"t_off\"").count()
+    };
+    assert_eq!(events("arm.csv"), events("demo.mcap"));
+}
