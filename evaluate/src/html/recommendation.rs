@@ -57,20 +57,33 @@ pub(super) fn sentence(judged: &[Judged<'_>]) -> String {
     } else if rank(numbers).0 {
         "All are in alarm for much of the time without contact; it makes the fewest mistakes of them:".to_owned()
     } else {
-        let alike = |other: &&Judged<'_>| {
-            let other = other.first();
+        let alike = |other: &&Numbers| {
             mistakes(other) == mistakes(numbers) && other.free_share_in_alarm <= ALWAYS_ON
         };
-        let alike = judged.iter().filter(alike).count() - 1;
-        match alike {
-            0 => "It makes the fewest mistakes:".to_owned(),
-            1 => "It makes the fewest mistakes, as few as one other, and is in alarm for less time or faster:".to_owned(),
-            _ => format!(
-                "It makes the fewest mistakes, as few as {alike} others, and is in alarm for the least time or the fastest:"
-            ),
-        }
+        let others = judged.iter().filter(|one| one.label != best.label);
+        let alike: Vec<&Numbers> = others.map(Judged::first).filter(alike).collect();
+        ahead_of(numbers, &alike)
     };
     format!("Take {}. {reason} {}.", best.label, said_of(numbers))
+}
+
+/// Why the one with these numbers is ahead of others that make as few mistakes.
+fn ahead_of(numbers: &Numbers, alike: &[&Numbers]) -> String {
+    let few = match alike.len() {
+        0 => return "It makes the fewest mistakes:".to_owned(),
+        1 => "as few as one other".to_owned(),
+        n => format!("as few as {n} others"),
+    };
+    let share = |numbers: &Numbers| rank(numbers).2;
+    let least = alike.iter().all(|other| share(numbers) < share(other));
+    let why = if least {
+        "is in alarm without contact for the least time of them"
+    } else if alike.iter().all(|other| rank(numbers).3 < rank(other).3) {
+        "tells of contacts the soonest of them"
+    } else {
+        "of those in alarm without contact for the least time it tells of contacts the soonest"
+    };
+    format!("It makes the fewest mistakes, {few}, and {why}:")
 }
 
 fn said_of(numbers: &Numbers) -> String {

@@ -208,3 +208,18 @@ fn a_publisher_that_went_is_not_taken_for_a_slip() {
     );
     assert_eq!(trouble.likely, None);
 }
+
+#[test]
+fn only_where_publishers_announce_themselves_has_one_gone() {
+    let fed = Fed {
+        was_well: true,
+        ..Fed::default()
+    };
+    let nothing = || seen(&[]);
+    let plain = diagnose(&expected(Keys::Ros2dds, None), &fed, &nothing()).to_string();
+    assert!(plain.contains("no message on"), "{plain}");
+    assert!(plain.contains("paused or ended"), "{plain}");
+    let rmw = diagnose(&expected(Keys::RmwZenoh, None), &fed, &nothing()).to_string();
+    assert!(rmw.contains("has gone"), "{rmw}");
+    assert!(rmw.contains("lost its router"), "{rmw}");
+}
