@@ -235,12 +235,15 @@ impl Supervisor<'_> {
 
     /// Whether what the stage at `index` finds raises no stop: the source of its cell says that a mute holds.
     fn is_muted(&self, index: usize) -> bool {
-        let cell = |stage: &Local| stage.seat.cell.as_ref().map(|cell| cell.name.clone());
-        let of = cell(&self.stages[index]);
+        let finder = &self.stages[index];
+        let of =
+            |source: &Local, cell: &String| source.seat.cells.iter().any(|each| each.name == *cell);
         let mut sources = self.stages.iter().filter(|stage| stage.is_source());
-        let muted =
-            |source: &Local| source.holds == announce::commands::MUTED && cell(source) == of;
-        !self.stages[index].is_source() && of.is_some() && sources.any(muted)
+        !finder.is_source()
+            && sources.any(|source| {
+                let mut cells = finder.seat.cells.iter().map(|cell| &cell.name);
+                source.holds == announce::commands::MUTED && cells.any(|cell| of(source, cell))
+            })
     }
 
     /// Frees what the dead process still holds in shared memory, so that those who wait for it go on

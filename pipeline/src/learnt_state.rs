@@ -250,7 +250,7 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
     use tauscope_bus::{Header, LinkError, flags};
-    use tauscope_detect::indri::virtual_collision_sensor::{FirstBias, Settings};
+    use tauscope_detect::indri::virtual_collision_sensor::{FirstBias, Learn, Settings};
     use tauscope_detect::{JointSetup, Setup};
 
     use super::*;

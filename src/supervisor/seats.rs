@@ -1,7 +1,7 @@
 //! What each stage's process is told: its seat.
 
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use tauscope_bus::link::SpillSettings;
 use tauscope_bus::seat::{Cell as SeatCell, Input, Output, OutputLink, TransportKind};
@@ -170,7 +170,7 @@ impl Planner<'_> {
     }
 
     /// Whether anything in these cells learns when it is told to, as far as one knows.
-    fn learns(&self, cells: &[String]) -> bool {
+    fn learns(&self, cells: &BTreeSet<String>) -> bool {
         let stages = self.pipeline.stages.iter();
         let mut there = stages.filter(|stage| stage.cells.iter().any(|cell| cells.contains(cell)));
         there.any(|stage| match &stage.settings {

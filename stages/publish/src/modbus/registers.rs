@@ -22,7 +22,13 @@ pub const PAYLOAD: u16 = 16;
 pub const LABEL: u16 = 20;
 /// Names of the registers that are written only and read as 0, from [`PAYLOAD`] on: a payload is written alone or with
 /// its centre of mass.
-pub const WRITTEN: [&str; 5] = ["payload", "payload_x", "payload_y", "payload_z", "label"];
+pub const WRITTEN: [&str; 5] = [
+    "payload_mass",
+    "payload_x",
+    "payload_y",
+    "payload_z",
+    "label",
+];
 /// Names of the bits, from address 0: coils and discrete inputs alike.
 pub const BITS: [&str; 6] = [
     "free",
