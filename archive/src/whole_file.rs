@@ -215,15 +215,10 @@ pub fn check_writable(folder: &Path) -> io::Result<()> {
 /// Whether the file system at `folder` shows what the kernel knows and keeps no files.
 fn is_made_by_the_kernel(folder: &Path) -> io::Result<bool> {
     /// Of sysfs. Physical: the number that Linux gives it.
-    const SYSFS_MAGIC: i64 = 0x6265_6572;
-    #[allow(
-        clippy::cast_lossless,
-        clippy::unnecessary_cast,
-        clippy::useless_conversion,
-        reason = "its width differs from machine to machine"
-    )]
-    let kind = rustix::fs::statfs(folder)?.f_type as i64;
-    Ok(kind == rustix::fs::PROC_SUPER_MAGIC as i64 || kind == SYSFS_MAGIC)
+    const SYSFS_MAGIC: i128 = 0x6265_6572;
+    // Its width differs from machine to machine.
+    let kind = i128::from(rustix::fs::statfs(folder)?.f_type);
+    Ok(kind == i128::from(rustix::fs::PROC_SUPER_MAGIC) || kind == SYSFS_MAGIC)
 }
 
 /// Bytes that an ordinary user may still write on the disk of `path`, which need not be there yet.

@@ -254,9 +254,7 @@ mod tests {
     }
 
     fn page(report: &Report) -> String {
-        cards(report)
-            .map(|cards| cards.into_string())
-            .unwrap_or_default()
+        cards(report).map(Markup::into_string).unwrap_or_default()
     }
 
     #[test]
