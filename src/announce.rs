@@ -76,34 +76,46 @@ impl Emit<Detection> for Listener<'_> {
         let told = &mut *self.told;
         self.out.emit(&mut |slot| {
             write(slot);
-            if let Some(line) = told.line(slot) {
+            for line in told.lines(slot) {
                 shell::note(&told.stage, &line);
+            }
+            match slot.event() {
+                EventKind::Onset => shell::holds(&told.stage, slot.state.as_str()),
+                EventKind::Offset => shell::holds(&told.stage, ""),
+                EventKind::None => {}
             }
         })
     }
 }
 
+/// A contact that begins, and where it seems to be.
+fn first_guess(detection: &Detection) -> String {
+    let link = detection.link.as_str();
+    if link.is_empty() {
+        return detection.state.to_string();
+    }
+    format!("{} at {link} (first guess)", detection.state)
+}
+
 impl Told {
-    /// What is to be said of a sample, if anything begins or ends there.
-    fn line(&mut self, detection: &Detection) -> Option<String> {
+    /// What is to be said of a sample: what ends there, then what begins.
+    fn lines(&mut self, detection: &Detection) -> Vec<String> {
         let start_ns = *self.start_ns.get_or_insert(detection.header.stamp_ns);
         let t = (detection.header.stamp_ns - start_ns) as f64 * 1e-9;
         let ended = self.contacts.push(detection);
         let watches = detection.detector.as_str() == watch::NAME;
+        let over = |ended: Contact| format!("{t:8.3} s  {}", self.over(&ended));
         match detection.event() {
-            EventKind::Onset if watches => Some(self.change(t, start_ns, detection)),
-            EventKind::Offset if watches => ended?
-                .size
-                .map(|_| format!("{t:8.3} s  learned: the arm as it is now is the rule")),
-            EventKind::None => None,
+            EventKind::None => Vec::new(),
+            EventKind::Onset if watches => vec![self.change(t, start_ns, detection)],
+            EventKind::Offset if watches => (ended.and_then(|ended| ended.size).into_iter())
+                .map(|_| format!("{t:8.3} s  learned: the arm as it is now is the rule"))
+                .collect(),
+            EventKind::Offset => ended.map(over).into_iter().collect(),
             EventKind::Onset => {
-                let begun = format!("{t:8.3} s  {}", detection.state);
-                Some(match ended {
-                    Some(before) => format!("{t:8.3} s  {}\n{begun}", self.over(&before)),
-                    None => begun,
-                })
+                let begun = format!("{t:8.3} s  {}", first_guess(detection));
+                ended.map(over).into_iter().chain([begun]).collect()
             }
-            EventKind::Offset => Some(format!("{t:8.3} s  {}", self.over(&ended?))),
         }
     }
 
@@ -134,5 +146,44 @@ impl Told {
             text += &format!(", felt in {}", loaded.join(", "));
         }
         text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tauscope_bus::Name;
+
+    fn told() -> Told {
+        Told {
+            stage: "detect".to_owned(),
+            joint_names: Vec::new(),
+            effort_unit: "Nm",
+            start_ns: None,
+            contacts: ContactFollower::default(),
+        }
+    }
+
+    fn onset(s: i64, state: &str, link: &str) -> Detection {
+        let mut detection = Detection::default();
+        detection.header.stamp_ns = s * 1_000_000_000;
+        detection.header.flags = flags::ALARM;
+        detection.state = Name::new(state);
+        detection.link = Name::new(link);
+        detection.event = Detection::ONSET;
+        detection.contact_ns = detection.header.stamp_ns;
+        detection
+    }
+
+    #[test]
+    fn an_onset_tells_the_first_guess_as_one_and_each_line_stands_alone() {
+        let mut told = told();
+        told.lines(&Detection::default());
+        let lines = told.lines(&onset(1, "contact", "link4"));
+        assert_eq!(lines, ["   1.000 s  contact at link4 (first guess)"]);
+        let lines = told.lines(&onset(3, "collision", ""));
+        assert_eq!(lines.len(), 2, "{lines:?}");
+        assert!(lines[0].starts_with("   3.000 s  over after"));
+        assert_eq!(lines[1], "   3.000 s  collision");
     }
 }

@@ -86,7 +86,7 @@ pub fn code(outcome: Result<Exit, Failure>, out: &mut Output) -> u8 {
         Ok(Exit::Lossy) => 3,
         Ok(Exit::Rejected) => 2,
         Err(Failure::Failed(error)) => {
-            out.say(&format!("error: {error:#}"));
+            out.say(&format!("error: {}", told_once(&error)));
             1
         }
         Err(Failure::Interrupted(far)) => {
@@ -98,5 +98,34 @@ pub fn code(outcome: Result<Exit, Failure>, out: &mut Output) -> u8 {
             out.say(&report.render(styled));
             2
         }
+    }
+}
+
+/// An error and its causes; what one says already, the next does not say again.
+fn told_once(error: &anyhow::Error) -> String {
+    let mut text = error.to_string();
+    for cause in error.chain().skip(1).map(ToString::to_string) {
+        if !text.contains(&cause) {
+            text += &format!(": {cause}");
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use anyhow::Context as _;
+
+    use super::*;
+
+    #[test]
+    fn no_cause_is_told_twice() {
+        let denied = std::io::Error::from(std::io::ErrorKind::PermissionDenied);
+        let once: Result<(), _> = Err(denied).context("cannot write: permission denied");
+        let told = once.map_err(|error| told_once(&error.context("ro/x.mcap")));
+        assert_eq!(
+            told,
+            Err("ro/x.mcap: cannot write: permission denied".to_owned())
+        );
     }
 }

@@ -22,6 +22,8 @@ struct Parts {
     /// From 0 to 1.
     fractions: Vec<f64>,
     sum: f64,
+    /// The step that was told last.
+    what: String,
 }
 
 /// Standard error, where it can redraw.
@@ -44,6 +46,7 @@ impl Progress {
             done: Mutex::new(Parts {
                 fractions: vec![0.0; count],
                 sum: 0.0,
+                what: String::new(),
             }),
         }
     }
@@ -59,15 +62,21 @@ impl Progress {
     }
 
     /// The work has come to `fraction` and goes on with `what`. Where the fraction does not grow from one
-    /// step to the next, the bar creeps on, ever slower, so that it is seen to live.
+    /// step to the next, the bar creeps on, ever slower, so that it is seen to live; the same step told
+    /// again is no further one.
     pub fn doing(&self, fraction: f64, what: &str) {
         const CREEP: f64 = 0.02;
         let shown = {
             let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
+            let is_next = done.what != what;
+            if is_next {
+                what.clone_into(&mut done.what);
+            }
             let Some(shown) = done.fractions.first_mut() else {
                 return;
             };
-            *shown = fraction.max(*shown + CREEP * (1.0 - *shown)).min(1.0);
+            let crept = if is_next { CREEP * (1.0 - *shown) } else { 0.0 };
+            *shown = fraction.max(*shown + crept).min(1.0);
             *shown
         };
         self.bar.set_position((shown * STEPS) as u64);
@@ -93,5 +102,31 @@ impl Progress {
 impl Drop for Progress {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shown(progress: &Progress) -> f64 {
+        progress.bar.position() as f64 / STEPS
+    }
+
+    #[test]
+    fn a_step_that_is_told_again_and_again_moves_nothing() {
+        let progress = Progress::of_work();
+        for _ in 0..1000 {
+            progress.doing(0.1, "fitting the twin");
+        }
+        assert!(
+            (shown(&progress) - 0.1).abs() < 0.03,
+            "{}",
+            shown(&progress)
+        );
+        progress.doing(0.1, "the next step");
+        assert!(shown(&progress) > 0.1, "it is seen to live");
+        progress.doing(0.6, "the next step");
+        assert!((shown(&progress) - 0.6).abs() < 1e-3);
     }
 }

@@ -17,6 +17,7 @@ mod lives;
 mod local;
 mod patience;
 mod process;
+mod reported;
 mod restart;
 mod router;
 mod seats;
@@ -35,10 +36,12 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::mpsc;
 use tokio::time::Instant;
 
+use crate::announce;
 use crate::plan::{Link, Over};
 use crew::Crew;
-use local::{Local, Reported};
+use local::Local;
 use process::Event;
+use reported::Reported;
 use router::Router;
 pub use seats::Instructions;
 use service::Service;
@@ -210,7 +213,7 @@ impl Supervisor<'_> {
                 }
             }
             // What follows of that is looked at four times a second.
-            Reported::Stuck => {}
+            Reported::Stuck | Reported::Holds => {}
             Reported::Ready { missing } => {
                 let missing = match missing {
                     0 => String::new(),
@@ -220,12 +223,27 @@ impl Supervisor<'_> {
                 self.view.detail(&line);
             }
             Reported::Note(text) => {
-                self.view.note(&format!("[{}] {text}", stage.seat.stage));
+                let name = stage.seat.stage.clone();
+                let muted = if self.is_muted(index) { " (muted)" } else { "" };
+                self.view.note(&format!("[{name}] {text}{muted}"));
             }
             Reported::Other(line) => {
                 self.view.note(&format!("[{}] {line}", stage.seat.stage));
             }
         }
+    }
+
+    /// Whether what the stage at `index` finds raises no stop: the source of its cell says that a mute holds.
+    fn is_muted(&self, index: usize) -> bool {
+        let finder = &self.stages[index];
+        let of =
+            |source: &Local, cell: &String| source.seat.cells.iter().any(|each| each.name == *cell);
+        let mut sources = self.stages.iter().filter(|stage| stage.is_source());
+        !finder.is_source()
+            && sources.any(|source| {
+                let mut cells = finder.seat.cells.iter().map(|cell| &cell.name);
+                source.holds == announce::commands::MUTED && cells.any(|cell| of(source, cell))
+            })
     }
 
     /// Frees what the dead process still holds in shared memory, so that those who wait for it go on

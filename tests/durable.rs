@@ -197,3 +197,26 @@ fn a_folder_that_cannot_be_written_to_is_an_error_of_check() {
         checked.stderr
     );
 }
+
+#[test]
+fn a_recorder_that_names_a_folder_or_no_place_for_files_is_an_error_of_check() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("there")).unwrap();
+    for (record, said) in [
+        ("{mcap: rec/}", "is a folder, no file"),
+        ("{mcap: there}", "is a folder, no file"),
+        ("{mcap: /dev/null/x.mcap}", "cannot write into /dev/null"),
+        ("{mcap: /proc/nope/x.mcap}", "cannot write into /proc/nope"),
+    ] {
+        let file = pipeline(folder.path(), "4", record);
+        let checked = Out::answer([Path::new("check"), &file]);
+        assert_eq!(checked.code, 2, "{record}: {}", checked.stdout);
+        assert!(
+            checked.stderr.contains(said),
+            "{record}: {}",
+            checked.stderr
+        );
+        let place = "pipeline.yaml:7:";
+        assert!(checked.stderr.contains(place), "{}", checked.stderr);
+    }
+}

@@ -33,6 +33,7 @@ fn pipeline(folder: &Path, commands: u16, publish: &str, tool: &str) {
              commands: {{listen: [tcp/127.0.0.1:{commands}]}}}}}}\n\
              - {{name: twin, input: ingest, twin: {{model: {data}/demo.twin.yaml}}}}\n\
              - {{name: detect, input: twin, detect: {{twin_regression: {{}}}}}}\n\
+             - {{name: learns, input: twin, detect: {{virtual_collision_sensor: {{bias: [20, 20, 20, 20, 20, 20, 20]}}}}}}\n\
              - {{name: record, inputs: [ingest, twin, detect], record: {{mcap: x.mcap}}}}\n\
              {publish}"
         ),

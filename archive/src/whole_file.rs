@@ -31,6 +31,9 @@ pub enum Existing {
 /// The `.part` files that this process has begun and not finished.
 static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
+/// The folders that this process has made, each after the one that it is in.
+static FOLDERS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
 /// This process begins to write `part`.
 pub fn begin(part: &Path) {
     let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
@@ -42,6 +45,16 @@ fn end(part: &Path) {
     unfinished.remove(part);
 }
 
+/// `path` is there, but belongs to a result that is not whole yet: until [`keep`] it counts as unfinished.
+pub fn is_part_of_unfinished(path: &Path) {
+    begin(path);
+}
+
+/// `path` belongs to a result that is whole now.
+pub fn keep(path: &Path) {
+    end(path);
+}
+
 /// Removes what this process has begun and not finished: what it would have held is made again by doing
 /// the same again. Not for recordings of a live robot.
 pub fn remove_unfinished() {
@@ -49,6 +62,11 @@ pub fn remove_unfinished() {
     for part in std::mem::take(&mut *unfinished) {
         // One that is not there any more need not be removed.
         let _ = fs::remove_file(part);
+    }
+    let mut made = FOLDERS.lock().unwrap_or_else(PoisonError::into_inner);
+    // The deepest first. One that holds anything stays.
+    for folder in std::mem::take(&mut *made).iter().rev() {
+        let _ = fs::remove_dir(folder);
     }
 }
 
@@ -134,7 +152,12 @@ pub fn create_folder(folder: &Path) -> io::Result<()> {
         Err(error) if error.kind() != io::ErrorKind::AlreadyExists || !folder.is_dir() => {
             Err(error)
         }
-        _ => sync_folder_of(folder),
+        Ok(()) => {
+            let mut made = FOLDERS.lock().unwrap_or_else(PoisonError::into_inner);
+            made.insert(folder.to_owned());
+            sync_folder_of(folder)
+        }
+        Err(_) => sync_folder_of(folder),
     }
 }
 
@@ -168,12 +191,17 @@ pub fn is_being_written(part: &Path) -> io::Result<bool> {
 /// # Errors
 /// What keeps from it, in the operating system's words.
 pub fn check_writable(folder: &Path) -> io::Result<()> {
+    // Without the slash at its end, with which a file is said not to be there.
+    let folder: PathBuf = folder.components().collect();
     let there = folder.ancestors().find(|above| above.exists());
     let there = there
         .filter(|above| *above != Path::new(""))
         .unwrap_or(Path::new("."));
     if !there.is_dir() {
         return Err(io::ErrorKind::NotADirectory.into());
+    }
+    if is_made_by_the_kernel(there)? {
+        return Err(io::ErrorKind::ReadOnlyFilesystem.into());
     }
     // The effective user: what a service may not do, its file's owner may.
     Ok(rustix::fs::accessat(
@@ -182,6 +210,15 @@ pub fn check_writable(folder: &Path) -> io::Result<()> {
         Access::WRITE_OK | Access::EXEC_OK,
         AtFlags::EACCESS,
     )?)
+}
+
+/// Whether the file system at `folder` shows what the kernel knows and keeps no files.
+fn is_made_by_the_kernel(folder: &Path) -> io::Result<bool> {
+    /// Of sysfs. Physical: the number that Linux gives it.
+    const SYSFS_MAGIC: i128 = 0x6265_6572;
+    // Its width differs from machine to machine.
+    let kind = i128::from(rustix::fs::statfs(folder)?.f_type);
+    Ok(kind == i128::from(rustix::fs::PROC_SUPER_MAGIC) || kind == SYSFS_MAGIC)
 }
 
 /// Bytes that an ordinary user may still write on the disk of `path`, which need not be there yet.

@@ -109,6 +109,14 @@ pub enum LinkError {
         /// What the transport says.
         reason: String,
     },
+    /// There is no session with those that are reached over a network.
+    #[error("cannot open a Zenoh session at {at}: {reason}")]
+    Session {
+        /// Where it listens and connects.
+        at: String,
+        /// Why, and what to do.
+        reason: String,
+    },
     /// A sample could not be sent.
     #[error("cannot send on stream `{stream}`: {reason}")]
     Send {

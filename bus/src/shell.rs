@@ -22,7 +22,7 @@ mod single;
 mod sink;
 pub mod tree;
 
-pub use child::{Child, ChildError, Line, note, outside};
+pub use child::{Child, ChildError, Line, holds, note, outside};
 pub use crew::{Member, Unmade, crew};
 pub use health::HealthClock;
 pub use ledger::{Account, Ledger};

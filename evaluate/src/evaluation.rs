@@ -239,6 +239,13 @@ fn leave_out_failed(
     Ok(())
 }
 
+/// How long a detector learns, compared with others: nets for long.
+fn effort(entry: &Entry) -> usize {
+    /// Tuned: by hand, for the progress that is shown; no number depends on it.
+    const OF_NETS: usize = 30;
+    if entry.random { OF_NETS } else { 1 }
+}
+
 /// Lets every detector learn. Those that cannot are noted, unless somebody asked for just them.
 fn learn(
     request: &Request,
@@ -252,10 +259,12 @@ fn learn(
     let pupils: Vec<(&'static Entry, u64)> = (request.detectors.iter())
         .flat_map(|entry| (0..seeds(entry)).map(move |seed| (*entry, seed)))
         .collect();
-    let (count, done) = (pupils.len() as f64, AtomicUsize::new(0));
+    let all: usize = pupils.iter().map(|(entry, _)| effort(entry)).sum();
+    let done = AtomicUsize::new(0);
+    let share = || done.load(Ordering::Relaxed) as f64 / all.max(1) as f64;
     let results = parallel::map(request.jobs, pupils, |(entry, seed)| {
-        let share = done.load(Ordering::Relaxed) as f64 / count;
-        progress(share, &format!("{} learns", entry.name));
+        let what = format!("{} learns", entry.name);
+        progress(share(), &what);
         let file = format!("{}.{}.{seed}", twin.name, entry.name);
         let task = Task {
             setup: &setup,
@@ -267,7 +276,8 @@ fn learn(
             weights: out.join("models").join(file),
         };
         let runner = Runner::new(entry, &task);
-        done.fetch_add(1, Ordering::Relaxed);
+        done.fetch_add(effort(entry), Ordering::Relaxed);
+        progress(share(), &what);
         runner
     });
     let (mut runners, mut notes) = (Vec::new(), Vec::new());

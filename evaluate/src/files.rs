@@ -84,6 +84,11 @@ pub fn write(
     judged: &[Judged<'_>],
     tables: &[Table],
 ) -> Result<Vec<PathBuf>, WriteError> {
+    for runner in evaluation.runs.iter().flat_map(|run| &run.seeds) {
+        for (_, weights) in runner.config.clone().trained_files_mut() {
+            whole_file::keep(weights);
+        }
+    }
     for run in &evaluation.runs {
         let (runner, twin) = (run.first(), &evaluation.twins[run.twin].name);
         let (folder, detector) = if run.twin == 0 {
@@ -169,7 +174,7 @@ pub fn prepare(out: &Path) -> Result<(), WriteError> {
 }
 
 fn make(folder: &Path) -> Result<(), WriteError> {
-    std::fs::create_dir_all(folder).map_err(|error| {
+    whole_file::create_folder(folder).map_err(|error| {
         let title = format!("cannot make {}: {error}", folder.display());
         WriteError::Refused(Problem::new(title).into())
     })

@@ -144,7 +144,7 @@ fn tables(tables: &[Table]) -> Markup {
                             @for row in &table.rows {
                                 tr {
                                     @for (index, cell) in row.iter().enumerate() {
-                                        @if index == 0 { th scope="row" { (cell) } } @else { td.num { (cell) } }
+                                        @if index == 0 { th scope="row" { (breakable(cell)) } } @else { td.num { (cell) } }
                                     }
                                 }
                             }
@@ -152,6 +152,16 @@ fn tables(tables: &[Table]) -> Markup {
                     }
                 }
             }
+        }
+    }
+}
+
+/// A detector's name, which a narrow screen breaks behind an underscore and nowhere else.
+fn breakable(name: &str) -> Markup {
+    html! {
+        @for (index, part) in name.split_inclusive('_').enumerate() {
+            @if index > 0 { wbr; }
+            (part)
         }
     }
 }
@@ -181,7 +191,7 @@ fn footer(provenance: &BTreeMap<String, String>) -> Markup {
                 dl.words {
                     dt { "AUC" } dd { "The probability that a sample in a contact scores higher than one outside." }
                     dt { "F1" } dd { "Harmonic mean of precision and recall of the samples at a threshold." }
-                    dt { "Best F1" } dd { "The best over thresholds of mean + i standard deviations of the validation scores: what the method could do, not what a user would get." }
+                    dt { "Best F1" } dd { "The best over thresholds of mean + i standard deviations of the validation scores, for the i of the papers: what the method could do, not what a user would get. The threshold that was set may lie between two of them and do a little better." }
                     dt { "Found" } dd { "An alarm from 20 ms before the labelled beginning to 150 ms after the end." }
                     dt { "False alarm" } dd { "An alarm that belongs to no contact, nor comes in the rest after one; those within 250 ms of each other count once." }
                     dt { "Under … an hour at 95 %" } dd { "A detector with this rate would raise so few false alarms, or fewer, in one of 20 evaluations like this one (Poisson). Few minutes without contact cannot show a low rate." }

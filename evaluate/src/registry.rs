@@ -3,6 +3,7 @@
 
 use std::path::PathBuf;
 
+use tauscope_archive::whole_file;
 use tauscope_detect::{Config, Entry, LearnError, Lessons, Setup, Suits, Sweeps};
 use tauscope_pipeline::files::SetFile;
 use tauscope_pipeline::trained;
@@ -42,7 +43,10 @@ impl Task<'_> {
         let given = self.given.given(entry).unwrap_or(&*usual);
         let (mut settings, trained) = given.learn(&self.of_detector())?;
         if let (Some(trained), Some(file)) = (trained, settings.trained_file()) {
-            *file = Some(trained::write(&self.weights, &self.lessons, trained)?);
+            let path = trained::write(&self.weights, &self.lessons, trained)?;
+            // Of an evaluation that is interrupted nothing stays.
+            whole_file::is_part_of_unfinished(&path);
+            *file = Some(path);
         }
         let shared = Config {
             threshold: self.given.threshold,

@@ -142,7 +142,7 @@ mod tests {
             "{text}"
         );
         assert!(
-            lines[3].contains("contact at link5, 24 N, 1 s ago"),
+            lines[3].contains("contact at link5, 24 N (first guess), 1 s ago"),
             "{text}"
         );
         assert!(lines[3].contains("joint2 3.00 x"), "{text}");

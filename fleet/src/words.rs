@@ -82,6 +82,10 @@ pub fn contact(contact: &ContactMessage) -> String {
     if let Some(force_n) = contact.peak_force_n {
         text += &format!(", {force_n:.0} N");
     }
+    if contact.end_ns.is_none() && contact.link.is_some() {
+        // Link and force are known once it is over.
+        text += " (first guess)";
+    }
     text
 }
 
@@ -129,7 +133,10 @@ mod tests {
 
     #[test]
     fn a_contact_and_a_change_are_one_sentence_each() {
-        assert_eq!(contact(&fixture::contact(1, 5)), "contact at link5, 24 N");
+        assert_eq!(
+            contact(&fixture::contact(1, 5)),
+            "contact at link5, 24 N (first guess)"
+        );
         assert_eq!(
             change(&fixture::change(), "Nm"),
             "not a contact: payload +2.10 kg at tool since 00:00:00 UTC"

@@ -9,7 +9,8 @@ use tauscope_bus::{
     Emit, JointState, LinkError, Progress, SampleKind, Source, StageError, Trouble, ZenohEndpoints,
 };
 use tauscope_detect::Detect;
-use tauscope_ingest::{Commanded, IngestError, Paced, Rate, SimulatedRobot};
+use tauscope_dynamics::{Link, Model};
+use tauscope_ingest::{Commanded, IngestError, Paced, Rate, SimulatedRobot, Takes};
 use tauscope_publish::{PublishError, Publisher};
 use tauscope_record::{CellInfo, RecordError, Recorder, StreamInfo};
 use tauscope_twin::{Correction, Twin, TwinFile};
@@ -56,7 +57,8 @@ pub fn ingest_setup(cell: &Cell) -> tauscope_ingest::Setup {
     }
 }
 
-/// A source of `cell` with the commands that its configuration lets in, and those of an archive.
+/// A source of `cell` with the commands that its configuration lets in, and those of an archive. To learn can be asked
+/// for where `somebody_learns`.
 ///
 /// # Errors
 /// If commands cannot be listened to.
@@ -64,9 +66,18 @@ pub fn commanded(
     source: Box<dyn Source<JointState>>,
     config: &tauscope_ingest::Config,
     cell: &Cell,
+    somebody_learns: bool,
 ) -> Result<Commanded, LinkError> {
     match &config.commands {
-        Some(endpoints) => Commanded::live(source, &ingest_setup(cell), endpoints),
+        Some(endpoints) => {
+            let links = cell.model.as_ref().map(Model::links);
+            let arm_kg = links.map(|links| links.iter().map(Link::mass_kg).sum::<f64>());
+            let takes = Takes {
+                learn: somebody_learns,
+                arm_kg: arm_kg.filter(|kg| *kg > 0.0),
+            };
+            Commanded::live(source, &ingest_setup(cell), endpoints, takes)
+        }
         None => Ok(Commanded::archived(source)),
     }
 }

@@ -2,9 +2,12 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, Receiver, SyncSender};
+use std::thread::JoinHandle;
 
 use tauscope_bus::{Detection, Emit, Stage, StageError, TwinState};
-use tauscope_detect::{Config, Detect, StateFile};
+use tauscope_detect::{Config, Detect, State, StateFile};
+use tauscope_watch::{Memory, Watch};
 
 use crate::report::Report;
 use crate::suggest;
@@ -14,7 +17,7 @@ use tauscope_archive::whole_file::{self, Existing};
 /// Time between two writes, in time of the stream \[ns\]. What was learnt since is lost if the process
 /// dies.
 /// Resolution: writes to disk, against what a killed process forgets.
-const WRITE_EVERY_NS: i64 = 60_000_000_000;
+const WRITE_EVERY_NS: i64 = 10_000_000_000;
 
 /// Lets the detector go on from what the file that `config` names holds, if there is one yet. Gives the
 /// file's path.
@@ -29,6 +32,22 @@ pub fn resume(config: &mut Config) -> Result<Option<PathBuf>, Report> {
         resumed.map_err(|error| state.at(&Place::root(), error.to_string()))?;
     }
     Ok(path)
+}
+
+/// What a watch has learnt, out of the file at `path`, if it is there yet.
+///
+/// # Errors
+/// Everything that is wrong with the file.
+pub fn of_watch(path: &Path, joints: usize) -> Result<Option<Memory>, Report> {
+    if !path.exists() {
+        return Ok(None);
+    }
+    let memory = yaml::load::<Memory>(path)?;
+    if !memory.value.fits(joints) {
+        let problem = "this is not what a watch has learnt of a robot with as many joints";
+        return Err(memory.at(&Place::root(), problem).into());
+    }
+    Ok(Some(memory.value))
 }
 
 /// Replaces the file of what was learnt that `config` names, if it names one, by its content. Such a file is
@@ -58,56 +77,79 @@ pub fn read_learnt(config: &mut Config, resolve: &dyn Fn(&Path) -> PathBuf) -> R
     (config.resume(&learnt)).map_err(|error| file.at(&place, error.to_string()).into())
 }
 
-/// A detector whose learnt state is written to a file, once a minute and at the end. Its stream is
-/// untouched.
-pub struct Kept {
-    stage: Detect,
-    path: Option<PathBuf>,
-    written_ns: Option<i64>,
+/// A stage that learns while it runs.
+pub trait Learns: Stage<TwinState, Detection> {
+    /// What it has learnt, to be given to its next life; `None` if there is nothing.
+    fn learnt(&self) -> Option<State>;
+
+    /// Whether it learns just now, so that what it has learnt is not whole yet.
+    fn is_learning(&self) -> bool;
 }
 
-impl Kept {
+impl Learns for Detect {
+    fn learnt(&self) -> Option<State> {
+        Self::learnt(self)
+    }
+
+    fn is_learning(&self) -> bool {
+        Self::is_learning(self)
+    }
+}
+
+impl Learns for Watch {
+    fn learnt(&self) -> Option<State> {
+        serde_json::to_value(Self::learnt(self)?).ok()
+    }
+
+    fn is_learning(&self) -> bool {
+        Self::is_learning(self)
+    }
+}
+
+/// A stage whose learnt state is written to a file: as its learning ends, at short intervals, and at the end. While it
+/// learns nothing is written, so a stage that dies then begins to learn anew. Its stream is untouched.
+pub struct Kept<S> {
+    stage: S,
+    keeper: Option<Keeper>,
+}
+
+impl<S: Learns> Kept<S> {
     /// `stage`, whose state is kept at `path`, if anywhere.
-    pub fn new(stage: Detect, path: Option<PathBuf>) -> Self {
+    pub fn new(stage: S, path: Option<PathBuf>) -> Self {
+        let was_learning = stage.is_learning();
         Self {
             stage,
-            path,
-            written_ns: None,
+            keeper: path.map(|path| Keeper::new(path, was_learning)),
         }
-    }
-
-    fn write(&self) -> Result<(), StageError> {
-        let (Some(path), Some(learnt)) = (&self.path, self.stage.learnt()) else {
-            return Ok(());
-        };
-        let failed = |error: String| {
-            let path = path.display();
-            StageError::failed(format!("cannot keep what was learnt in {path}: {error}"))
-        };
-        let text = serde_saphyr::to_string(&learnt).map_err(|error| failed(error.to_string()))?;
-        whole_file::write(path, text, Existing::Replace).map_err(|error| failed(error.to_string()))
     }
 }
 
-impl Stage<TwinState, Detection> for Kept {
+impl<S: Learns> Stage<TwinState, Detection> for Kept<S> {
     fn accept(
         &mut self,
         sample: &TwinState,
         out: &mut dyn Emit<Detection>,
     ) -> Result<(), StageError> {
         self.stage.accept(sample, out)?;
-        let stamp_ns = sample.header.stamp_ns;
-        let written_ns = *self.written_ns.get_or_insert(stamp_ns);
-        if !(0..WRITE_EVERY_NS).contains(&(stamp_ns - written_ns)) {
-            self.written_ns = Some(stamp_ns);
-            self.write()?;
+        let Some(keeper) = &mut self.keeper else {
+            return Ok(());
+        };
+        keeper.check()?;
+        if keeper.is_due(sample.header.stamp_ns, self.stage.is_learning())
+            && let Some(learnt) = self.stage.learnt()
+        {
+            keeper.write(learnt);
         }
         Ok(())
     }
 
     fn finish(&mut self, out: &mut dyn Emit<Detection>) -> Result<(), StageError> {
         self.stage.finish(out)?;
-        self.write()
+        let Some(keeper) = self.keeper.take() else {
+            return Ok(());
+        };
+        let learnt = self.stage.learnt();
+        keeper.end(learnt.filter(|_| !self.stage.is_learning()))
     }
 
     fn dropped(&self) -> u64 {
@@ -115,12 +157,100 @@ impl Stage<TwinState, Detection> for Kept {
     }
 }
 
+/// Writes a file again and again, in a thread of its own: no sample waits for a disk.
+struct Keeper {
+    path: PathBuf,
+    written_ns: Option<i64>,
+    was_learning: bool,
+    to_write: SyncSender<State>,
+    writer: JoinHandle<()>,
+    failures: Receiver<String>,
+}
+
+impl Keeper {
+    fn new(path: PathBuf, was_learning: bool) -> Self {
+        let (to_write, waiting) = mpsc::sync_channel::<State>(1);
+        let (failed, failures) = mpsc::channel();
+        let file = path.clone();
+        let writer = std::thread::spawn(move || {
+            for learnt in waiting {
+                if let Err(error) = write(&file, &learnt)
+                    && failed.send(error).is_err()
+                {
+                    return;
+                }
+            }
+        });
+        Self {
+            path,
+            written_ns: None,
+            was_learning,
+            to_write,
+            writer,
+            failures,
+        }
+    }
+
+    /// Whether what is learnt by the sample of that stamp is to be written.
+    fn is_due(&mut self, stamp_ns: i64, is_learning: bool) -> bool {
+        let ended = std::mem::replace(&mut self.was_learning, is_learning) && !is_learning;
+        let written_ns = *self.written_ns.get_or_insert(stamp_ns);
+        let due = ended || !(0..WRITE_EVERY_NS).contains(&(stamp_ns - written_ns));
+        if due {
+            self.written_ns = Some(stamp_ns);
+        }
+        due && !is_learning
+    }
+
+    /// Has it written, unless the disk is still busy with what was learnt before; then the next one is.
+    fn write(&mut self, learnt: State) {
+        if self.to_write.try_send(learnt).is_err() {
+            self.written_ns = self.written_ns.map(|ns| ns - WRITE_EVERY_NS);
+        }
+    }
+
+    /// What went wrong with a write.
+    fn check(&self) -> Result<(), StageError> {
+        match self.failures.try_recv() {
+            Ok(error) => Err(failed(&self.path, &error)),
+            Err(_) => Ok(()),
+        }
+    }
+
+    /// Waits for the writes, and writes what was `learnt` at the end.
+    fn end(self, learnt: Option<State>) -> Result<(), StageError> {
+        let Self {
+            path,
+            to_write,
+            writer,
+            ..
+        } = self;
+        drop(to_write);
+        // It has no reason to panic, and what counts is what is written next.
+        let _ = writer.join();
+        let Some(learnt) = learnt else {
+            return Ok(());
+        };
+        write(&path, &learnt).map_err(|error| failed(&path, &error))
+    }
+}
+
+fn failed(path: &Path, error: &str) -> StageError {
+    let path = path.display();
+    StageError::failed(format!("cannot keep what was learnt in {path}: {error}"))
+}
+
+fn write(path: &Path, learnt: &State) -> Result<(), String> {
+    let text = serde_saphyr::to_string(learnt).map_err(|error| error.to_string())?;
+    whole_file::write(path, text, Existing::Replace).map_err(|error| error.to_string())
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
     use tauscope_bus::{Header, LinkError, flags};
-    use tauscope_detect::indri::virtual_collision_sensor::{FirstBias, Settings};
+    use tauscope_detect::indri::virtual_collision_sensor::{FirstBias, Learn, Settings};
     use tauscope_detect::{JointSetup, Setup};
 
     use super::*;
@@ -134,11 +264,20 @@ mod tests {
         }
     }
 
-    fn kept(path: &Path) -> Kept {
+    fn kept(path: &Path) -> Kept<Detect> {
+        kept_by(
+            path,
+            Settings {
+                bias: Some(FirstBias::InOrder(vec![1.0])),
+                ..Settings::default()
+            },
+        )
+    }
+
+    fn kept_by(path: &Path, settings: Settings) -> Kept<Detect> {
         let mut config = Config::of(Settings {
-            bias: Some(FirstBias::InOrder(vec![1.0])),
             state: Some(path.to_owned()),
-            ..Settings::default()
+            ..settings
         });
         assert_eq!(resume(&mut config).unwrap().as_deref(), Some(path));
         let joint = JointSetup {
@@ -155,12 +294,8 @@ mod tests {
         Kept::new(config.stage(setup).unwrap(), Some(path.to_owned()))
     }
 
-    #[test]
-    fn what_was_learnt_is_there_after_a_restart() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("learnt.yaml");
-        let mut first = kept(&path);
-        for i in 0..1000_i32 {
+    fn run(stage: &mut Kept<Detect>, samples: std::ops::Range<i32>) {
+        for i in samples {
             let mut sample = TwinState {
                 header: Header {
                     stamp_ns: i64::from(i) * 2_000_000,
@@ -171,8 +306,45 @@ mod tests {
                 ..TwinState::default()
             };
             sample.effort[0] = 0.3 * (f64::from(i) * 0.02).sin();
-            first.accept(&sample, &mut Nowhere).unwrap();
+            stage.accept(&sample, &mut Nowhere).unwrap();
         }
+    }
+
+    /// Waits for the thread that writes.
+    fn appears(path: &Path) -> bool {
+        (0..200).any(|_| {
+            std::thread::sleep(std::time::Duration::from_millis(10));
+            path.exists()
+        })
+    }
+
+    #[test]
+    fn what_was_learnt_is_there_as_learning_ends_and_not_before() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("learnt.yaml");
+        let settings = Settings {
+            bias: Some(FirstBias::InOrder(vec![1.0])),
+            learn: Learn::AtStart,
+            learning_s: 15.0,
+            ..Settings::default()
+        };
+        // Nothing ends in order here, as in a process that is killed.
+        let mut killed = kept_by(&path, settings);
+        run(&mut killed, 0..7000);
+        assert!(!path.exists(), "it learns; ten seconds have passed");
+        run(&mut killed, 7000..8000);
+        assert!(appears(&path), "it has learnt");
+        std::fs::remove_file(&path).unwrap();
+        run(&mut killed, 8000..14_000);
+        assert!(appears(&path), "again at short intervals");
+    }
+
+    #[test]
+    fn what_was_learnt_is_there_after_a_restart() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("learnt.yaml");
+        let mut first = kept(&path);
+        run(&mut first, 0..1000);
         assert!(!path.exists());
         first.finish(&mut Nowhere).unwrap();
         let learnt = first.stage.learnt().unwrap();

@@ -7,6 +7,9 @@ use tauscope_bus::{
     Emit, JointState, LinkError, Progress, Source, StageError, Trouble, Verb, shell,
 };
 
+/// What holds at a source while its cell is muted.
+pub const MUTED: &str = "muted";
+
 /// A source whose commands are told to the supervisor. Its stream is untouched.
 pub struct Announced<S> {
     source: S,
@@ -66,14 +69,22 @@ impl Emit<JointState> for Listener<'_> {
         let told = &mut *self.told;
         self.out.emit(&mut |slot| {
             write(slot);
+            let was_muted = told.is_muted();
             for line in told.lines(slot) {
                 shell::note(&told.stage, &line);
+            }
+            if told.is_muted() != was_muted {
+                shell::holds(&told.stage, if was_muted { "" } else { MUTED });
             }
         })
     }
 }
 
 impl Told {
+    fn is_muted(&self) -> bool {
+        self.muted_until_ns.is_some()
+    }
+
     /// What is to be said of a sample.
     fn lines(&mut self, state: &JointState) -> impl Iterator<Item = String> + use<> {
         let now_ns = state.header.stamp_ns;

@@ -51,11 +51,13 @@ enum Verb {
     /// Alarms raise no stop for so long, at most 60 s; 0 ends that at once.
     Mute {
         /// From the sample that takes the command [s].
+        #[arg(allow_negative_numbers = true)]
         seconds: f64,
     },
     /// The tool that is attached from now on, as a point mass.
     Payload {
         /// Mass [kg]; 0 for none.
+        #[arg(allow_negative_numbers = true)]
         mass_kg: f64,
         /// Centre of mass in the tool link's frame [m].
         #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
@@ -94,9 +96,8 @@ impl Verb {
 /// Sends it and prints the answer.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let request = args.verb.request();
-    if let Err(refusal) = request.command() {
-        return Err(Failure::rejected(refusal.to_string()));
-    }
+    let command = request.command();
+    let command = command.map_err(|refusal| Failure::rejected(refusal.to_string()))?;
     let (cell, endpoints) = match (&args.connect, &args.cell) {
         (Some(endpoint), Some(cell)) => {
             let connect = vec![endpoint.clone()];
@@ -119,7 +120,8 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
                     stamp_ns % 1_000_000_000
                 );
                 out.print(&format!(
-                    "{cell}: holds from the sample with the stamp {stamp} s"
+                    "{cell}: {}: holds from the sample with the stamp {stamp} s",
+                    command.in_words().unwrap_or_default()
                 ))?;
             }
             Ok(Exit::Done)

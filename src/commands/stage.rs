@@ -2,11 +2,12 @@
 
 use std::collections::BTreeMap;
 use std::os::unix::process::CommandExt;
+use std::path::Path;
 use std::process::{Command, ExitCode};
 
 use rustix::process::{Signal, set_parent_process_death_signal};
 use tauscope_bus::Seat;
-use tauscope_bus::shell::{Member, Unmade, crew};
+use tauscope_bus::shell::{self, Member, Unmade, crew};
 use tauscope_ingest::SimulatedRobot;
 use tauscope_pipeline::build::{self, BuildError};
 use tauscope_pipeline::cell::Cell;
@@ -89,6 +90,18 @@ pub fn exec(args: &ExecArgs) -> ExitCode {
     ExitCode::FAILURE
 }
 
+/// Says that a stage which is started again and keeps nothing begins to learn anew.
+fn tell_what_is_lost(seat: &Seat, kept: Option<&Path>) {
+    if seat.restarts > 0 && kept.is_none_or(|path| !path.exists()) {
+        let how = match kept {
+            Some(_) => "nothing was kept yet",
+            None => "`state: FILE` keeps it",
+        };
+        let lost = format!("started again: what it had learnt is lost; {how}");
+        shell::note(&seat.stage, &lost);
+    }
+}
+
 fn member(seat: &Seat, shared: &tauscope_detect::Shared) -> Result<Member, SeatError> {
     let told: Instructions = serde_json::from_value(seat.config.clone())?;
     let cells: Vec<Cell> = told
@@ -105,7 +118,7 @@ fn member(seat: &Seat, shared: &tauscope_detect::Shared) -> Result<Member, SeatE
                 .map(ScenarioFacts::robot)
                 .transpose()?;
             let source = build::ingest(config, robot.as_ref(), cell()?, told.after_ns)?;
-            let source = build::commanded(source, config, cell()?)?;
+            let source = build::commanded(source, config, cell()?, told.somebody_learns)?;
             let source = Watched::new(&seat.stage, source, Plausible::new(cell()?));
             Member::Source(Box::new(announce::commands::Announced::new(
                 &seat.stage,
@@ -121,6 +134,9 @@ fn member(seat: &Seat, shared: &tauscope_detect::Shared) -> Result<Member, SeatE
         Settings::Detect { config, model } => {
             let mut config = config.clone();
             let path = learnt_state::resume(&mut config).map_err(SeatError::LearntState)?;
+            if config.learns_when_told() {
+                tell_what_is_lost(seat, path.as_deref());
+            }
             let detect = build::detect(&config, model.as_ref(), cell()?, Some(shared.clone()))?;
             let detect = Kept::new(detect, path);
             Member::Judge(Box::new(Announced::new(
@@ -134,8 +150,19 @@ fn member(seat: &Seat, shared: &tauscope_detect::Shared) -> Result<Member, SeatE
             model,
             effort_cutoff_hz,
         } => {
-            let watch = build::watch(config, model.as_ref(), *effort_cutoff_hz, cell()?)?;
-            Member::Judge(Box::new(Announced::new(&seat.stage, watch, &cell()?.facts)))
+            let cell = cell()?;
+            let mut watch = build::watch(config, model.as_ref(), *effort_cutoff_hz, cell)?;
+            if let Some(path) = &config.state {
+                let joints = cell.facts.joint_names.len();
+                let memory =
+                    learnt_state::of_watch(path, joints).map_err(SeatError::LearntState)?;
+                if let Some(memory) = memory {
+                    watch = watch.resumed(&memory);
+                }
+            }
+            tell_what_is_lost(seat, config.state.as_deref());
+            let watch = Kept::new(watch, config.state.clone());
+            Member::Judge(Box::new(Announced::new(&seat.stage, watch, &cell.facts)))
         }
         Settings::Record(config) => {
             let cells: Vec<&Cell> = cells.iter().collect();

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
+use tauscope_archive::whole_file;
 use tauscope_explain::report::{MOTION_PREFIX, Verdict};
 use tauscope_explain::{Outcome, html};
 
@@ -33,7 +34,7 @@ pub struct Made {
 /// # Errors
 /// If it cannot be made.
 pub fn make(out: &Path) -> Result<(), Failure> {
-    std::fs::create_dir_all(out)
+    whole_file::create_folder(out)
         .map_err(|error| Failure::rejected(format!("cannot make {}: {error}", out.display())))
 }
 
@@ -125,8 +126,8 @@ pub fn write(
         start: request.start.as_ref().map(|start| shown(&start.path)),
         fit: all(&request.fit),
         holdout: all(&request.holdout),
-        twin: twin.is_some().then(|| shown(&out.join(TWIN))),
-        corrected_robot: urdf.is_some().then(|| shown(&out.join(ROBOT))),
+        twin: twin.is_some().then(|| pasted(out, TWIN)),
+        corrected_robot: urdf.is_some().then(|| pasted(out, ROBOT)),
     };
     let put = |name: &str, text: &str, made: &mut Made| {
         let path = out.join(name);
@@ -223,5 +224,26 @@ fn robot_text(
                 .push(format!("{ROBOT} was not written: {error}."));
             None
         }
+    }
+}
+
+/// A result as a pipeline file names it: such a file may lie anywhere, and its paths begin at its own folder.
+fn pasted(out: &Path, name: &str) -> String {
+    let path = out.join(name);
+    std::path::absolute(&path)
+        .unwrap_or(path)
+        .display()
+        .to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_pasted_into_a_pipeline_file_works_wherever_it_lies() {
+        let path = pasted(Path::new("cell/explained"), TWIN);
+        assert!(Path::new(&path).is_absolute(), "{path}");
+        assert!(path.ends_with("/cell/explained/twin.yaml"), "{path}");
     }
 }

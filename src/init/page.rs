@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use tauscope_explain::html;
 use tauscope_explain::report::{Report, Verdict};
 
 use super::folder::Folder;
@@ -25,7 +26,7 @@ pub fn page(
         twin.push(proof(report));
     }
     section(&mut text, "Twin", &twin);
-    let findings = report.findings.iter();
+    let findings = html::largest_first(report);
     let findings: Vec<String> = findings.map(|finding| finding.sentence.clone()).collect();
     let page = folder.explained().join("report.html");
     list(&mut text, &first(findings, &page.display().to_string()));

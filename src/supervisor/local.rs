@@ -11,6 +11,7 @@ use tokio::time::Instant;
 use super::flow::Flow;
 use super::ledger::Kept;
 use super::patience::{Overdue, Patience};
+use super::reported::Reported;
 use super::restart::Deaths;
 use super::silence::Silence;
 use super::tally::Tally;
@@ -39,6 +40,8 @@ pub struct Local {
     ready: bool,
     /// How its samples come.
     pub flow: Flow,
+    /// What holds there, in a word or two; empty for nothing of note.
+    pub holds: String,
     /// What was told of it while none came.
     pub silence: Silence,
     /// Since it was told to end.
@@ -74,24 +77,6 @@ enum State {
     Lost,
 }
 
-/// What a line of a stage's standard output said.
-#[derive(Debug, PartialEq, Eq)]
-pub enum Reported<'a> {
-    /// It begins, with so many receivers missing.
-    Ready {
-        /// How many.
-        missing: usize,
-    },
-    /// What it has counted.
-    Counts,
-    /// That it does not go on.
-    Stuck,
-    /// What it has found.
-    Note(String),
-    /// Something that is none of the protocol.
-    Other(&'a str),
-}
-
 impl Local {
     /// A stage that is to be started.
     pub fn new(at: usize, mut seat: Seat, crew: usize, root: usize) -> Self {
@@ -111,6 +96,7 @@ impl Local {
             last_life: false,
             ready: false,
             flow: Flow::new(now.into_std()),
+            holds: String::new(),
             silence: Silence::default(),
             patience: None,
             killed: false,
@@ -153,6 +139,7 @@ impl Local {
     pub fn started(&mut self) {
         self.state = State::Running;
         self.ready = false;
+        self.holds.clear();
         self.pulse = Pulse::default();
         self.patience = None;
     }
@@ -200,6 +187,10 @@ impl Local {
             }
             Ok(Line::Report(report) | Line::Done(report)) => self.tally.note(report),
             Ok(Line::Note { text, .. }) => return Reported::Note(text),
+            Ok(Line::Holds { text, .. }) => {
+                self.holds = text;
+                return Reported::Holds;
+            }
             Ok(Line::Stuck { .. }) => {
                 self.pulse.stuck = true;
                 return Reported::Stuck;

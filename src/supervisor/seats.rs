@@ -1,7 +1,7 @@
 //! What each stage's process is told: its seat.
 
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use tauscope_bus::link::SpillSettings;
 use tauscope_bus::seat::{Cell as SeatCell, Input, Output, OutputLink, TransportKind};
@@ -53,6 +53,9 @@ pub struct Instructions {
     /// For a source that is started again: the stamp of the last sample it gave out \[ns\].
     #[serde(default)]
     pub after_ns: Option<i64>,
+    /// For a source: whether anything in its cell learns while it runs.
+    #[serde(default)]
+    pub somebody_learns: bool,
 }
 
 /// The seats of the stages on `host` (of all without one), with their place in the pipeline; where
@@ -162,7 +165,19 @@ impl Planner<'_> {
             },
             scenario: stage.scenario.clone(),
             after_ns: None,
+            somebody_learns: self.learns(&stage.cells),
         }
+    }
+
+    /// Whether anything in these cells learns when it is told to, as far as one knows.
+    fn learns(&self, cells: &BTreeSet<String>) -> bool {
+        let stages = self.pipeline.stages.iter();
+        let mut there = stages.filter(|stage| stage.cells.iter().any(|cell| cells.contains(cell)));
+        there.any(|stage| match &stage.settings {
+            Settings::Detect { config, .. } => config.learns_when_told(),
+            Settings::Outside(_) => true,
+            _ => false,
+        })
     }
 
     fn cell(&self, name: &str) -> Option<SeatCell> {

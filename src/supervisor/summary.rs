@@ -212,6 +212,16 @@ impl Summary {
     /// What else nobody should miss.
     fn warnings(&self) -> Vec<String> {
         let mut lines = Vec::new();
+        let mut sources = self
+            .stages
+            .iter()
+            .filter(|stage| stage.is_source)
+            .peekable();
+        if sources.peek().is_some() && sources.all(|stage| stage.reported && stage.received == 0) {
+            lines.push(
+                "nothing came in: this run has watched nothing and recorded nothing".to_owned(),
+            );
+        }
         for stage in self.stages.iter().filter(|stage| stage.unknown_loss) {
             let name = &stage.stage;
             lines.push(format!(

@@ -44,6 +44,8 @@ pub struct Row {
     pub dropped: u64,
     /// How far a source of known length is, from 0 to 1.
     pub fraction_done: Option<f64>,
+    /// What holds there: a mute, a contact. Empty for nothing of note.
+    pub holds: String,
 }
 
 /// What people see.
@@ -144,6 +146,9 @@ fn line(rows: &[Row]) -> String {
             }
             text.push(')');
         }
+        if !row.holds.is_empty() {
+            text += &format!(", {}", row.holds);
+        }
         if let Some(done) = row.fraction_done {
             text += &format!(", {:.0} % done", 100.0 * done);
         }
@@ -157,7 +162,7 @@ fn table(rows: &[Row]) -> String {
     let mut table = Table::new();
     table
         .load_preset(presets::NOTHING)
-        .set_header(["stage", "received", "Hz", "last", "dropped", ""]);
+        .set_header(["stage", "received", "Hz", "last", "dropped", "", ""]);
     for row in rows {
         let age = row
             .age
@@ -172,6 +177,7 @@ fn table(rows: &[Row]) -> String {
             age,
             row.dropped.to_string(),
             done.unwrap_or_default(),
+            row.holds.clone(),
         ]);
     }
     for column in table.column_iter_mut().skip(1) {
@@ -197,11 +203,12 @@ mod tests {
             age: age_ms.map(Duration::from_millis),
             dropped,
             fraction_done: None,
+            holds: if stage == "ingest" { "muted" } else { "" }.to_owned(),
         };
         let rows = [row("ingest", Some(40), 3), row("twin", None, 0)];
         assert_eq!(
             line(&rows),
-            "ingest 1200 (500 Hz, last 0.0 s ago, 3 dropped); twin 1200"
+            "ingest 1200 (500 Hz, last 0.0 s ago, 3 dropped), muted; twin 1200"
         );
         let table = table(&rows);
         let shown: Vec<Vec<&str>> = table
@@ -209,6 +216,9 @@ mod tests {
             .map(|line| line.split_whitespace().collect())
             .collect();
         assert_eq!(shown[0], ["stage", "received", "Hz", "last", "dropped"]);
-        assert_eq!(shown[1], ["ingest", "1200", "500", "0.0", "s", "ago", "3"]);
+        assert_eq!(
+            shown[1],
+            ["ingest", "1200", "500", "0.0", "s", "ago", "3", "muted"]
+        );
     }
 }

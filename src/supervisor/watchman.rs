@@ -226,5 +226,6 @@ fn row(stage: &Local, now: Instant) -> Row {
         age: stage.flow.age(now.into_std()),
         dropped: lost + sums.refused,
         fraction_done: stage.fraction_done(),
+        holds: stage.holds.clone(),
     }
 }

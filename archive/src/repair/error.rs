@@ -15,7 +15,7 @@ pub enum RepairError {
     #[error(transparent)]
     Write(#[from] WriteError),
     /// Something lies where the new file should go.
-    #[error("{}: is there already", path.display())]
+    #[error("{} is there already; give another name with --out", path.display())]
     Exists {
         /// Where.
         path: PathBuf,

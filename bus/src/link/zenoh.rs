@@ -246,7 +246,7 @@ fn open_session(
 ) -> Result<zenoh::Session, LinkError> {
     let session = config(mode, endpoints, patience, &[])
         .and_then(|config| zenoh::open(config).wait())
-        .map_err(|error| open_error("*", &error))?;
+        .map_err(|error| session_error(endpoints, &zenoh_reason(&error)))?;
     endpoint::watch(&session, &endpoints.connect);
     Ok(session)
 }
@@ -296,6 +296,20 @@ fn open_error(stream: &str, error: &zenoh::Error) -> LinkError {
     }
 }
 
+fn session_error(endpoints: &ZenohEndpoints, reason: &str) -> LinkError {
+    let all = endpoints.listen.iter().chain(&endpoints.connect);
+    let all: Vec<&str> = all.map(String::as_str).collect();
+    let taken = reason.contains("Address already in use");
+    LinkError::Session {
+        at: all.join(", "),
+        reason: if taken {
+            "another program listens there already; end it, or give another port".to_owned()
+        } else {
+            reason.to_owned()
+        },
+    }
+}
+
 fn encoding(kind: SampleKind) -> Encoding {
     Encoding::ZENOH_BYTES.with_schema(kind.type_name())
 }
@@ -326,12 +340,28 @@ fn policy(keep: Keep) -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use super::without_places;
+    use super::{ZenohEndpoints, session_error, without_places};
 
     #[test]
     fn an_error_of_zenoh_says_nothing_of_its_source_code() {
         let text = "Unable to open at /home/x/.cargo/registry/src/a/b.rs:114. - Caused by refused at c.rs:2.";
         assert_eq!(without_places(text), "Unable to open - Caused by refused");
         assert_eq!(without_places("no port at 7447"), "no port at 7447");
+    }
+
+    #[test]
+    fn a_port_that_is_taken_is_said_once_with_the_remedy() {
+        let endpoints = ZenohEndpoints {
+            listen: vec!["tcp/127.0.0.1:7448".to_owned()],
+            connect: Vec::new(),
+        };
+        let reason =
+            "Can not create a listener on 127.0.0.1:7448: [Address already in use (os error 98)";
+        let said = session_error(&endpoints, reason).to_string();
+        assert_eq!(
+            said,
+            "cannot open a Zenoh session at tcp/127.0.0.1:7448: another program listens there already; end it, or \
+             give another port"
+        );
     }
 }

@@ -57,6 +57,13 @@ pub enum Line {
         /// What.
         text: String,
     },
+    /// What holds there from now on, in a word or two.
+    Holds {
+        /// The stage.
+        stage: String,
+        /// What; empty for nothing of note.
+        text: String,
+    },
     /// It, and all that run in its thread, do not go on: for so long it has not finished what it does with a sample.
     /// While that lasts there are no reports.
     Stuck {
@@ -291,6 +298,14 @@ pub(super) fn say_ready(stage: &str, missing: usize) {
 /// Tells people what a stage that runs in this process has found.
 pub fn note(stage: &str, text: &str) {
     say(&Line::Note {
+        stage: stage.to_owned(),
+        text: text.to_owned(),
+    });
+}
+
+/// Tells people what holds at a stage of this process from now on; nothing of note if `text` is empty.
+pub fn holds(stage: &str, text: &str) {
+    say(&Line::Holds {
         stage: stage.to_owned(),
         text: text.to_owned(),
     });

@@ -97,7 +97,7 @@ impl<'a> Tree<'a> {
                 }
             };
             let stage = &part.report().stage;
-            if missing > 0 {
+            if missing > 0 && !context.stop.is_stopped() {
                 tracing::warn!(stage, missing, ?within, "receivers are not there");
             }
             ready(stage, missing);

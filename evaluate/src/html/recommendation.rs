@@ -57,20 +57,37 @@ pub(super) fn sentence(judged: &[Judged<'_>]) -> String {
     } else if rank(numbers).0 {
         "All are in alarm for much of the time without contact; it makes the fewest mistakes of them:".to_owned()
     } else {
-        let alike = |other: &&Judged<'_>| {
-            let other = other.first();
+        let alike = |other: &&Numbers| {
             mistakes(other) == mistakes(numbers) && other.free_share_in_alarm <= ALWAYS_ON
         };
-        let alike = judged.iter().filter(alike).count() - 1;
-        match alike {
-            0 => "It makes the fewest mistakes:".to_owned(),
-            1 => "It makes the fewest mistakes, as few as one other, and is in alarm for less time or faster:".to_owned(),
-            _ => format!(
-                "It makes the fewest mistakes, as few as {alike} others, and is in alarm for the least time or the fastest:"
-            ),
-        }
+        let others = judged.iter().filter(|one| one.label != best.label);
+        let alike = others.map(Judged::first).filter(alike).map(share_and_delay);
+        ahead_of(share_and_delay(numbers), &alike.collect::<Vec<_>>())
     };
     format!("Take {}. {reason} {}.", best.label, said_of(numbers))
+}
+
+/// Share of the contact-free time in alarm, and delay, of those that make as few mistakes.
+fn share_and_delay(numbers: &Numbers) -> (f64, f64) {
+    let (_, _, share, delay) = rank(numbers);
+    (share, delay)
+}
+
+/// Why the one with this share and delay is ahead of others that make as few mistakes.
+fn ahead_of((share, delay): (f64, f64), alike: &[(f64, f64)]) -> String {
+    let few = match alike.len() {
+        0 => return "It makes the fewest mistakes:".to_owned(),
+        1 => "as few as one other".to_owned(),
+        n => format!("as few as {n} others"),
+    };
+    let why = if alike.iter().all(|other| share < other.0) {
+        "is in alarm without contact for the least time of them"
+    } else if alike.iter().all(|other| delay < other.1) {
+        "tells of contacts the soonest of them"
+    } else {
+        "of those in alarm without contact for the least time it tells of contacts the soonest"
+    };
+    format!("It makes the fewest mistakes, {few}, and {why}:")
 }
 
 fn said_of(numbers: &Numbers) -> String {
@@ -142,6 +159,18 @@ pub(super) fn flagged(judged: &[Judged<'_>]) -> Option<Markup> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_one_reason_that_decided_is_told() {
+        let told = |alike: &[(f64, f64)]| ahead_of((0.01, 0.09), alike);
+        assert_eq!(told(&[]), "It makes the fewest mistakes:");
+        assert!(told(&[(0.02, 0.05)]).contains("as few as one other, and is in alarm"));
+        assert!(
+            told(&[(0.01, 0.1), (0.02, 0.1)])
+                .contains("2 others, and tells of contacts the soonest of them")
+        );
+        assert!(told(&[(0.01, 0.1), (0.02, 0.05)]).contains("of those in alarm"));
+    }
 
     #[test]
     fn a_bound_is_rounded_up() {

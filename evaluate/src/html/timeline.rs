@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 use tauscope_explain::html::chart::{Axis, Panel, bulk, r};
 
-use super::{line_class, recommendation};
+use super::recommendation;
 use crate::judged::Judged;
 use crate::metrics::Scored;
 
@@ -19,11 +19,12 @@ const POINTS: usize = 700;
 /// What is beyond so many thresholds stands at the upper end.
 /// Tuned: by eye, for the picture; no number depends on it.
 const HIGHEST: f64 = 6.0;
+/// Class of the score's line: one colour for every detector, and none that alarms have.
+const SCORE: &str = "c0";
 
 /// A plot a recording, of the recommended detector; none if nothing was scored.
 pub(super) fn section(judged: &[Judged<'_>]) -> Option<Markup> {
     let drawn = recommendation::best(judged).or_else(|| judged.first())?;
-    let index = judged.iter().position(|one| one.label == drawn.label)?;
     if drawn.scored.is_empty() {
         return None;
     }
@@ -31,13 +32,14 @@ pub(super) fn section(judged: &[Judged<'_>]) -> Option<Markup> {
     let (open, rest) = all.split_at(all.len().min(OPEN));
     let left_out = drawn.scored.len() - all.len();
     let plots = |scored: &[&Scored<'_>]| {
-        html! { @for one in scored { (plot(drawn, index, one)) } }
+        html! { @for one in scored { (plot(drawn, one)) } }
     };
     Some(html! {
         p.lead {
             "The score of " b { (drawn.label) } " over its threshold (1 is the threshold; what is far above it is cut off)."
         }
         p.legend {
+            span class={ "key own " (SCORE) } { "Score" }
             span.key.truth { "Labelled contact" }
             span.key.found { "Alarm of a contact" }
             span.key.wrong { "False alarm" }
@@ -52,7 +54,7 @@ pub(super) fn section(judged: &[Judged<'_>]) -> Option<Markup> {
     })
 }
 
-fn plot(judged: &Judged<'_>, index: usize, one: &Scored<'_>) -> Markup {
+fn plot(judged: &Judged<'_>, one: &Scored<'_>) -> Markup {
     let threshold = judged.run.first().threshold;
     let (xs, ys) = thinned(&one.output.t, &one.output.scores, threshold);
     let Some([low, high]) = bulk(ys.iter().copied(), 0.0) else {
@@ -87,7 +89,7 @@ fn plot(judged: &Judged<'_>, index: usize, one: &Scored<'_>) -> Markup {
                 @for matched in &one.matching.events {
                     (panel.span(matched.event.t_on, matched.event.t_off))
                 }
-                (panel.line(&format!("line own {}", line_class(index)), &xs, &ys))
+                (panel.line(&format!("line own {SCORE}"), &xs, &ys))
                 line.middle x1="56" x2="950" y1=(r(panel.y.px(1.0))) y2=(r(panel.y.px(1.0))) {}
                 @for event in &one.output.events {
                     @let class = if wrong(event.t) { "alarm wrong" } else if found(event.t) { "alarm found" } else { "alarm" };

@@ -19,6 +19,7 @@ use super::role::Role;
 use super::wiring::Wiring;
 use crate::build;
 use crate::cell::{Cell, EffortUnit};
+use crate::learnt_state;
 use crate::provenance;
 use crate::report::Report;
 use crate::scenario::ScenarioFacts;
@@ -356,14 +357,24 @@ impl<'a> Resolver<'a> {
         let effort_cutoff_hz = twin_config
             .filters(model.map(|model| model.filters))
             .effort_cutoff_hz;
-        if let Some(cell) = self.cell(index)
-            && let Err(error) = build::watch(config, model, effort_cutoff_hz, cell)
-        {
-            self.report.push(self.file.at_key(place, error.to_string()));
-            return None;
+        let mut config = config.clone();
+        if let Some(path) = &mut config.state {
+            *path = self.file.resolve(path);
+        }
+        if let Some(cell) = self.cell(index) {
+            if let Err(error) = build::watch(&config, model, effort_cutoff_hz, cell) {
+                self.report.push(self.file.at_key(place, error.to_string()));
+                return None;
+            }
+            let joints = cell.facts.joint_names.len();
+            let state = config.state.as_ref().filter(|_| self.is_here(index));
+            if let Some(Err(problems)) = state.map(|path| learnt_state::of_watch(path, joints)) {
+                self.report.append(problems);
+                return None;
+            }
         }
         Some(Settings::Explain {
-            config: config.clone(),
+            config,
             model: model.cloned(),
             effort_cutoff_hz,
         })

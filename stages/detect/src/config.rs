@@ -142,6 +142,11 @@ impl Config {
         self.all().find_map(|settings| settings.warning(setup))
     }
 
+    /// Whether the detector begins to learn anew when it is told to.
+    pub fn learns_when_told(&self) -> bool {
+        self.all().any(AnySettings::learns_when_told)
+    }
+
     /// The file that keeps what the detector learns while running, where one is named. The program reads
     /// and writes it.
     pub fn state_mut(&mut self) -> Option<&mut PathBuf> {

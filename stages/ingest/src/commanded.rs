@@ -17,6 +17,15 @@ use tauscope_bus::{
 use crate::setup::{Setup, Tool};
 use inbox::Inbox;
 
+/// What commands may ask of a cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Takes {
+    /// Whether anything in the cell learns while it runs.
+    pub learn: bool,
+    /// What the arm itself weighs \[kg\], where that is known: it carries no more.
+    pub arm_kg: Option<f64>,
+}
+
 /// A source with commands.
 pub struct Commanded {
     inner: Box<dyn Source<JointState>>,
@@ -34,7 +43,7 @@ impl Commanded {
         }
     }
 
-    /// `inner`, and commands for its cell that come in at `endpoints`.
+    /// `inner`, and commands for its cell that come in at `endpoints`, as far as it `takes` them.
     ///
     /// # Errors
     /// If Zenoh does not take an endpoint, or cannot listen there.
@@ -42,9 +51,10 @@ impl Commanded {
         inner: Box<dyn Source<JointState>>,
         setup: &Setup,
         endpoints: &ZenohEndpoints,
+        takes: Takes,
     ) -> Result<Self, LinkError> {
         Ok(Self {
-            inbox: Some(Inbox::open(endpoints, setup)?),
+            inbox: Some(Inbox::open(endpoints, setup, takes)?),
             ..Self::archived(inner)
         })
     }

@@ -54,7 +54,7 @@ mod ur_rtde;
 mod zenoh;
 
 pub use archived_twin::{ArchivedTwin, ArchivedTwinTopics};
-pub use commanded::Commanded;
+pub use commanded::{Commanded, Takes};
 pub use config::{
     Config, ConfigError, CsvConfig, FileConfig, Keys, Rate, SimulateConfig, Topics, UrEffort,
     UrRtdeConfig, ZenohConfig,

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use common::{Collect, cell};
 use tauscope_bus::command::{Answer, Request, ask, key};
 use tauscope_bus::{Emit, JointState, Progress, Source, StageError, Verb, ZenohEndpoints, flags};
-use tauscope_ingest::{Commanded, Setup};
+use tauscope_ingest::{Commanded, Setup, Takes};
 use zenoh::{Session, Wait};
 
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -44,7 +44,11 @@ fn commanded(runs: bool, has_tool_link: bool) -> (Commanded, Session) {
         ..cell("a b")
     };
     let states = Box::new(States { ms: 0, runs });
-    let source = Commanded::live(states, &setup, &endpoints(&[&endpoint], &[])).unwrap();
+    let takes = Takes {
+        learn: has_tool_link,
+        arm_kg: Some(30.0),
+    };
+    let source = Commanded::live(states, &setup, &endpoints(&[&endpoint], &[]), takes).unwrap();
     (source, endpoints(&[], &[&endpoint]).session().unwrap())
 }
 
@@ -112,6 +116,23 @@ fn what_cannot_hold_is_refused_and_no_sample_carries_it() {
             .chain(&more)
             .all(|sample| sample.command.verb().is_none())
     );
+}
+
+#[test]
+fn learning_is_refused_where_nothing_learns_and_a_payload_that_the_arm_cannot_carry() {
+    let (mut source, session) = commanded(true, false);
+    let (answer, samples) = asked(&mut source, &session, Request::Learn);
+    assert!(refusal(&answer).contains("no detector of this cell learns"));
+    assert!(samples.iter().all(|s| s.command.verb().is_none()));
+    let (mut source, session) = commanded(true, true);
+    let (answer, _) = asked(&mut source, &session, Request::Learn);
+    assert!(matches!(answer, Answer::Taken { .. }), "{answer:?}");
+    let heavy = Request::Payload {
+        mass_kg: 31.0,
+        com_m: [0.0; 3],
+    };
+    let (answer, _) = asked(&mut source, &session, heavy);
+    assert!(refusal(&answer).contains("30.0 kg"), "{answer:?}");
 }
 
 #[test]

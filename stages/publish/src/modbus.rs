@@ -186,15 +186,13 @@ impl Service for Client {
                 return self.write(write, Response::WriteMultipleCoils(at, 1));
             }
             Request::WriteSingleRegister(at, value) => {
-                let write = registers::word(at, value);
+                let write = registers::words(at, &[value]);
                 return self.write(write, Response::WriteSingleRegister(at, value));
             }
             Request::WriteMultipleRegisters(at, values) => {
-                let write = match values.as_ref() {
-                    [value] => registers::word(at, *value),
-                    _ => Err(ExceptionCode::IllegalDataAddress),
-                };
-                return self.write(write, Response::WriteMultipleRegisters(at, 1));
+                let count = values.len() as u16;
+                let write = registers::words(at, &values);
+                return self.write(write, Response::WriteMultipleRegisters(at, count));
             }
             _ => Err(ExceptionCode::IllegalFunction),
         };
@@ -211,6 +209,11 @@ impl Client {
                 Write::Nothing => return Ok(done),
                 Write::Acknowledge => Asked::Acknowledge,
                 Write::Mute { seconds } => Asked::Mute { seconds },
+                Write::Payload { mass_kg, com_m } => Asked::Payload { mass_kg, com_m },
+                Write::Learn => Asked::Learn,
+                Write::Label(number) => Asked::Label {
+                    text: format!("plc {number}"),
+                },
             };
             let commands = commands.ok_or(ExceptionCode::ServerDeviceFailure)?;
             let answer = tokio::task::spawn_blocking(move || {

@@ -80,6 +80,21 @@ async fn a_plc_acknowledges_and_mutes() {
     plc.write_single_register(0, 7).await.unwrap().unwrap();
     let asked = source.asked.try_iter().last().unwrap();
     assert_eq!(asked, Request::Mute { seconds: 7.0 });
+    let last = || source.asked.try_iter().last().unwrap();
+    plc.write_multiple_registers(16, &[250, 0, 0, 100])
+        .await
+        .unwrap()
+        .unwrap();
+    let payload = Request::Payload {
+        mass_kg: 2.5,
+        com_m: [0.0, 0.0, 0.1],
+    };
+    assert_eq!(last(), payload);
+    plc.write_single_coil(17, true).await.unwrap().unwrap();
+    assert_eq!(last(), Request::Learn);
+    plc.write_single_register(20, 17).await.unwrap().unwrap();
+    let text = "plc 17".to_owned();
+    assert_eq!(last(), Request::Label { text });
 }
 
 #[tokio::test(flavor = "multi_thread")]

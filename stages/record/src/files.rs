@@ -137,10 +137,13 @@ impl Files {
         told: Told<'_>,
     ) -> Result<(), RecordError> {
         let now_ns = sample.header().received_ns;
-        if self
-            .open
-            .as_ref()
-            .is_some_and(|open| self.is_full(open, now_ns))
+        // Of what a stage has done is told ahead of its samples, which may wait in a queue.
+        let is_of_time = !matches!(sample, SampleRef::Health(_));
+        if is_of_time
+            && self
+                .open
+                .as_ref()
+                .is_some_and(|open| self.is_full(open, now_ns))
         {
             self.complete(streams)?;
         }
@@ -154,7 +157,9 @@ impl Files {
                 }
             },
         };
-        open.start_ns.get_or_insert(now_ns);
+        if is_of_time {
+            open.start_ns.get_or_insert(now_ns);
+        }
         let kept = open.accept(streams, index, sample, told);
         self.open = Some(open);
         kept

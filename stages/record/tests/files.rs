@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use synthetic::{arm, cell, motion, streams};
 use tauscope_archive::Recording;
 use tauscope_archive::ros::{Float64, JointState, Message};
-use tauscope_bus::Sink;
+use tauscope_bus::{SampleRef, Sink};
 use tauscope_record::{Config, Existing, Keep, RecordError, Recorder, RerunConfig, Split};
 
 fn recorder(config: &Config) -> Result<Recorder, RecordError> {
@@ -73,6 +73,36 @@ fn files_are_split_by_time_and_lose_nothing() {
         assert_eq!(count::<Float64>(file, threshold), 1, "{}", file.display());
     }
     assert_eq!(recorder.completed_files(), (&expected[2..], 3));
+}
+
+#[test]
+fn reports_of_stages_that_are_ahead_split_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = Config {
+        mcap: Some(folder.path().join("a-{n}.mcap")),
+        split: Some(Split {
+            after_s: Some(2.0),
+            after_mb: None,
+        }),
+        ..Config::default()
+    };
+    let mut recorder = recorder(&config).unwrap();
+    let motion = motion(5.0);
+    // The source has read all of the file before the recorder has taken its first sample.
+    for health in motion.iter().filter_map(|instant| instant.health.as_ref()) {
+        let sample = SampleRef::Health(health);
+        recorder.accept("twin", sample).unwrap();
+    }
+    for instant in &motion {
+        instant.feed(&mut recorder, "");
+    }
+    recorder.finish().unwrap();
+    let states: Vec<usize> = files(folder.path())
+        .iter()
+        .map(|file| count::<JointState>(file, "/joint_states"))
+        .collect();
+    assert_eq!(states.len(), 3, "{states:?}");
+    assert_eq!(states[0], motion.len() * 2 / 5);
 }
 
 #[test]

@@ -11,7 +11,7 @@ pub(super) const BLOCK_ROWS: u32 = 10;
 pub(super) const BLOCK_S: f64 = 0.5;
 /// Features in which a motion may be novel.
 /// Physical: position, velocity and expected effort.
-pub(super) const FEATURES: usize = 3;
+pub(crate) const FEATURES: usize = 3;
 
 /// The range of a joint's features.
 #[derive(Debug, Clone, Copy)]
@@ -47,6 +47,9 @@ impl Ranges {
     }
 }
 
+/// The lowest and the highest value of each feature, where there is one.
+pub(crate) type Told = [Option<[f64; 2]>; FEATURES];
+
 /// The ranges in which a joint moved lately. Old motion is forgotten, as in the reference: a program that returns after
 /// many others is novel again.
 #[derive(Debug, Clone, Copy)]
@@ -75,6 +78,36 @@ impl Known {
         }
         self.current.join(ranges);
         self.blocks += 1;
+    }
+
+    /// The ranges of both generations, and how many blocks the current one has. A feature without a range is `None`.
+    pub fn told(&self) -> ([Told; 2], usize) {
+        let told = |ranges: &Ranges| {
+            std::array::from_fn(|f| {
+                let range = [ranges.low[f], ranges.high[f]];
+                range.iter().all(|x| x.is_finite()).then_some(range)
+            })
+        };
+        ([told(&self.current), told(&self.previous)], self.blocks)
+    }
+
+    /// What was [`told`](Self::told).
+    pub fn of_told(&([current, previous], blocks): &([Told; 2], usize)) -> Self {
+        let ranges = |told: Told| {
+            let mut ranges = Ranges::NONE;
+            for (f, range) in told.into_iter().enumerate() {
+                if let Some([low, high]) = range {
+                    ranges.low[f] = low;
+                    ranges.high[f] = high;
+                }
+            }
+            ranges
+        };
+        Self {
+            current: ranges(current),
+            previous: ranges(previous),
+            blocks: blocks.min(Self::GENERATION),
+        }
     }
 
     /// Whether `other` exceeds the ranges of both generations; see [`Ranges::is_left_by`].

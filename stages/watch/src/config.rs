@@ -1,5 +1,7 @@
 //! The stage's part of the pipeline file.
 
+use std::path::PathBuf;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -15,6 +17,10 @@ pub struct Config {
     /// report in many hours; larger values report less.
     #[schemars(range(min = 0.1, max = 100.0))]
     pub caution: f64,
+    /// The file that keeps what it has learnt from one run to the next. A run goes on from what it holds, and writes it
+    /// as learning ends, every 10 s and at its end. A replay neither reads nor writes it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub state: Option<PathBuf>,
 }
 
 /// Default of [`Config::learn_s`].
@@ -29,6 +35,7 @@ impl Default for Config {
         Self {
             learn_s: LEARN_S,
             caution: CAUTION,
+            state: None,
         }
     }
 }

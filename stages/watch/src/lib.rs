@@ -4,6 +4,7 @@ mod blocks;
 mod config;
 mod finding;
 mod judge;
+mod memory;
 mod messages;
 mod moments;
 mod monitor;
@@ -20,6 +21,7 @@ use tauscope_dynamics::Model;
 
 pub use config::Config;
 pub use finding::{Cause, Finding};
+pub use memory::Memory;
 pub use messages::{amount, in_words, size_unit};
 
 use monitor::{Monitor, News};
@@ -73,6 +75,23 @@ impl Watch {
             changed: None,
             ends: false,
         }
+    }
+
+    /// Goes on from what an earlier life has learnt, if that [fits](Memory::fits) the robot.
+    #[must_use]
+    pub fn resumed(mut self, memory: &Memory) -> Self {
+        self.monitor.resume(memory);
+        self
+    }
+
+    /// What it has learnt, to be given to its next life; `None` before it has learnt anything.
+    pub fn learnt(&self) -> Option<Memory> {
+        self.monitor.watches().then(|| self.monitor.memory())
+    }
+
+    /// Whether it learns just now.
+    pub fn is_learning(&self) -> bool {
+        !self.monitor.watches()
     }
 
     /// Name of the link of a finding; empty if there is none.

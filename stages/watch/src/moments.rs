@@ -60,6 +60,28 @@ impl Moments {
         rows: 0.0,
     };
 
+    /// All numbers, in one row.
+    pub fn numbers(&self) -> Vec<f64> {
+        let products = self.gram.iter().chain(&self.with_residual);
+        products
+            .copied()
+            .chain([self.residual, self.rows])
+            .collect()
+    }
+
+    /// Moments of these numbers; `None` if they are not as many as [`Moments::numbers`] gives.
+    pub fn of_numbers(numbers: &[f64]) -> Option<Self> {
+        let (gram, rest) = numbers.split_at_checked(COLUMNS * COLUMNS)?;
+        let (with_residual, rest) = rest.split_at_checked(COLUMNS)?;
+        let [residual, rows] = *<&[f64; 2]>::try_from(rest).ok()?;
+        Some(Self {
+            gram: Gram::from_column_slice(gram),
+            with_residual: Coefficients::from_column_slice(with_residual),
+            residual,
+            rows,
+        })
+    }
+
     pub fn add_row(&mut self, row: &JointRow) {
         let x = Coefficients::from(row.columns);
         self.gram.ger(1.0, &x, &x, 1.0);

@@ -2,6 +2,7 @@
 
 mod contact;
 mod learning;
+mod memory;
 
 use super::blocks::{BLOCK_ROWS, BLOCK_S, Known, Ring};
 use super::finding::Finding;

@@ -1,5 +1,8 @@
 //! Usual gains: how much a change explains by chance, learned from the stream itself.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 /// Most windows that a running mean weighs as much as; one window ends with each block, so 20 minutes of motion.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const MEMORY: f64 = 2400.0;
@@ -11,8 +14,9 @@ const LEAST_SHORT: f64 = 4.0;
 const LEAST_LONG: f64 = 1.0;
 
 /// A running mean that becomes an exponential one after [`MEMORY`] values.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Mean {
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Mean {
     pub value: f64,
     pub count: f64,
 }
@@ -31,8 +35,9 @@ impl Mean {
 
 /// The gain of a change in windows without one. It is larger than white noise gives, and grows with the length of the
 /// window, if the residual is correlated or if the twin has errors that the reference does not contain.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Scale {
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Scale {
     short: Mean,
     long: Mean,
     /// The largest gain without a change, over all instants of change.
@@ -86,8 +91,9 @@ impl Scale {
 }
 
 /// Energy per row of a joint's residual in a block, beside the reference: its mean and its largest value.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Loudness {
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Loudness {
     mean: Mean,
     peak: f64,
 }

@@ -133,6 +133,34 @@ fn a_change_is_named_at_its_place_within_ten_seconds_of_motion() {
 }
 
 #[test]
+fn a_watch_that_is_started_again_goes_on_watching() {
+    let setup = |stream: &Stream| Setup {
+        model: Some(stream.nominal.clone()),
+        effort_per_nm: vec![1.0; 7],
+        effort_cutoff_hz: 4.0,
+    };
+    let mut stream = Stream::new(3).with(Act::Coulomb(1, 1.0), 110.0, FOR_GOOD);
+    let mut said = Vec::new();
+    let mut first = Watch::new(&Config::default(), &setup(&stream));
+    assert!(first.learnt().is_none() && first.is_learning());
+    while stream.time_s() < 100.0 {
+        let sample = stream.next_sample();
+        first.accept(&sample, &mut Listen(&mut said)).unwrap();
+    }
+    let memory = first.learnt().unwrap();
+    assert!(memory.fits(7) && !memory.fits(6));
+    let mut second = Watch::new(&Config::default(), &setup(&stream)).resumed(&memory);
+    assert!(!second.is_learning());
+    assert_eq!(second.learnt().as_ref(), Some(&memory));
+    while stream.time_s() < 135.0 {
+        let sample = stream.next_sample();
+        second.accept(&sample, &mut Listen(&mut said)).unwrap();
+    }
+    assert_eq!(said.len(), 1, "{}", texts(&said));
+    assert_eq!(said[0].state, "coulomb_friction", "{}", texts(&said));
+}
+
+#[test]
 fn a_contact_is_not_taken_for_a_change() {
     for (link, force, duration_s) in [
         (6, [0.0, 15.0, -13.0], 1.0),

@@ -33,9 +33,33 @@ impl Resolver<'_> {
             return None;
         }
         if self.is_here(index) {
+            self.are_files(index, place, &mut config)?;
             self.can_be_written(index, place, &config)?;
         }
         Some(Settings::Record(config))
+    }
+
+    /// Looks whether the names that a recorder is given are those of files.
+    fn are_files(
+        &mut self,
+        index: usize,
+        place: &Place,
+        config: &mut tauscope_record::Config,
+    ) -> Option<()> {
+        let cells = self.wiring.map(|wiring| &wiring.cells[index]);
+        let cell = cells.and_then(|cells| cells.first());
+        let cell = cell.map_or("", String::as_str).to_owned();
+        let ends = |path: &Path| path.to_string_lossy().ends_with('/');
+        let given = config.all_names_mut().find(|path| ends(path)).cloned();
+        let there = || config.in_the_way(&cell).into_iter().find(|p| p.is_dir());
+        let Some(folder) = given.or_else(there) else {
+            return Some(());
+        };
+        let title = format!("{} is a folder, no file", folder.display());
+        let problem = self.file.at_key(place, title);
+        self.report
+            .push(problem.help("name a file in it, for example `{date}-{time}.mcap`"));
+        None
     }
 
     /// Looks whether the folders that a recorder writes to take files of this user.

@@ -76,6 +76,11 @@ pub trait Detector: Send {
         None
     }
 
+    /// Whether it is learning just now, so that what it has learnt is not whole yet.
+    fn is_learning(&self) -> bool {
+        false
+    }
+
     /// Why it can never judge this stream, once that shows: the stage ends with it.
     fn fault(&self) -> Option<String> {
         None

@@ -103,6 +103,11 @@ pub trait DetectorSettings:
         None
     }
 
+    /// Whether it begins to learn anew when it is told to.
+    fn learns_when_told(&self) -> bool {
+        false
+    }
+
     /// The setting that names the file of what it learns while running, for one that does.
     fn state_file(&mut self) -> Option<&mut Option<PathBuf>> {
         None
@@ -181,6 +186,8 @@ pub trait AnySettings: Any + Debug + Send + Sync + erased_serde::Serialize {
     fn found_by_evaluation(&self) -> Vec<&'static str>;
     /// [`DetectorSettings::trained_file`].
     fn trained_file(&mut self) -> Option<&mut Option<PathBuf>>;
+    /// [`DetectorSettings::learns_when_told`].
+    fn learns_when_told(&self) -> bool;
     /// [`DetectorSettings::state_file`].
     fn state_file(&mut self) -> Option<&mut Option<PathBuf>>;
     /// [`DetectorSettings::learnt_file`].
@@ -239,6 +246,10 @@ impl<S: DetectorSettings> AnySettings for S {
 
     fn state_file(&mut self) -> Option<&mut Option<PathBuf>> {
         DetectorSettings::state_file(self)
+    }
+
+    fn learns_when_told(&self) -> bool {
+        DetectorSettings::learns_when_told(self)
     }
 
     fn learnt_file(&self) -> Option<&Path> {

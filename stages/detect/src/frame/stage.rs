@@ -109,6 +109,11 @@ impl Detect {
     pub fn learnt(&self) -> Option<State> {
         self.detector.learnt()
     }
+
+    /// Whether it is learning just now.
+    pub fn is_learning(&self) -> bool {
+        self.detector.is_learning()
+    }
 }
 
 /// Whether every value of every joint is a number.

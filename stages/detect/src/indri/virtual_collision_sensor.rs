@@ -137,6 +137,10 @@ impl DetectorSettings for Settings {
         state.chain(self.learnt.iter().map(|_| "learnt")).collect()
     }
 
+    fn learns_when_told(&self) -> bool {
+        true
+    }
+
     fn state_file(&mut self) -> Option<&mut Option<PathBuf>> {
         Some(&mut self.state)
     }

@@ -60,6 +60,8 @@ pub struct Around<'a> {
     pub corrected_robot: Option<String>,
 }
 
+pub use groups::largest_first;
+
 /// The page.
 ///
 /// `pictures` are the recordings to draw, none if there are none; the first stamp among them counts as the start of the
@@ -163,15 +165,30 @@ fn header(report: &Report) -> Markup {
             @if let Some(reason) = reason { p.reason { "Why: " (reason) } }
             @if !facts.is_empty() {
                 dl.facts {
-                    @for (number, text) in facts { div { dt { (number) } dd { (text) } } }
+                    @for Fact { number, text, is_good } in facts {
+                        div.plain[!is_good] { dt { (number) } dd { (text) } }
+                    }
                 }
             }
         }
     }
 }
 
+/// A number under the verdict.
+struct Fact {
+    number: String,
+    text: String,
+    /// Whether it speaks for the verdict; else it does not have its colour.
+    is_good: bool,
+}
+
 /// What it comes to, in numbers.
-fn facts(report: &Report) -> Vec<(String, String)> {
+fn facts(report: &Report) -> Vec<Fact> {
+    let fact = |number: String, text: &str, is_good| Fact {
+        number,
+        text: text.to_owned(),
+        is_good,
+    };
     let mut facts = Vec::new();
     if report.verdict == Verdict::NotEvaluated {
         return facts;
@@ -184,11 +201,11 @@ fn facts(report: &Report) -> Vec<(String, String)> {
         } else {
             "effects found"
         };
-        facts.push((count.to_string(), text.to_owned()));
+        facts.push(fact(count.to_string(), text, true));
         let left = error_left(&report.holdout_rms_before, &report.holdout_rms_after);
         if left.is_finite() && !proof::is_elsewhere(report) {
             let text = "of the error (RMS) is left on held-out data, which was never fitted";
-            facts.push((percent(left), text.to_owned()));
+            facts.push(fact(percent(left), text, true));
         }
     }
     let known = rows.iter().filter(|row| row.over_noise().is_finite());
@@ -204,7 +221,7 @@ fn facts(report: &Report) -> Vec<(String, String)> {
                 " after the correction"
             }
         );
-        facts.push((format!("{quiet} of {known}"), text));
+        facts.push(fact(format!("{quiet} of {known}"), &text, quiet == known));
     }
     facts
 }

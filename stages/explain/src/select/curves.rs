@@ -229,9 +229,7 @@ impl Search<'_> {
             let left_here = best.fit.squares[joint] / bare.fit.squares[joint];
             let left_there = left_elsewhere(self.problem, &best.fit, joint)
                 / left_elsewhere(self.problem, &bare.fit, joint);
-            (self.say)(&format!(
-                "! joint {joint}: {left_there:.3} of the variance remains where left out, {left_here:.3} where fitted"
-            ));
+            (self.say)(&format!("proving what was found at joint {}", joint + 1));
             if left_there > MOST_LEFT.max(MOST_WORSE * left_here) {
                 best = self.with_curve(&bare, joint).unwrap_or(bare);
             }

@@ -22,7 +22,7 @@ impl Search<'_> {
         }
         if is_named {
             best.fit = Fit::new(self.problem, actives);
-            (self.say)(&format!("~ {}", describe(&best)));
+            (self.say)(&describe(&best));
         }
         best
     }

@@ -42,7 +42,7 @@ impl Search<'_> {
             };
             let without = self.without(&best, index);
             if let Some(better) = self.replaced(&best, &without, index) {
-                (self.say)(&format!("= {}", describe(&better)));
+                (self.say)(&describe(&better));
                 best = better;
             }
         }
@@ -54,7 +54,7 @@ impl Search<'_> {
             let without = pushes.iter().rev().fold(best.clone(), less);
             let better = self.replaced(&best, &without, pushes[0]);
             if let Some(better) = better.or_else(|| self.with_wall(&best, &without)) {
-                (self.say)(&format!("== {}", describe(&better)));
+                (self.say)(&describe(&better));
                 best = better;
             }
         }
@@ -74,7 +74,7 @@ impl Search<'_> {
                 let (low, high) = (first.min(second), first.max(second));
                 let without = self.without(&self.without(&best, high), low);
                 if let Some(better) = self.replaced(&best, &without, low) {
-                    (self.say)(&format!("== {}", describe(&better)));
+                    (self.say)(&describe(&better));
                     best = better;
                 }
             }

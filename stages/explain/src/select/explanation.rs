@@ -1,7 +1,7 @@
 //! Explanations: a fit, the penalties of its effects, and the evidence for one explanation over another.
 
 use crate::fit::fitted::Fit;
-use crate::physics::active::{Active, Hypothesis};
+use crate::physics::active::Hypothesis;
 
 /// A fit and the penalties of its effects.
 #[derive(Debug, Clone)]
@@ -44,24 +44,24 @@ pub fn place_of(explanation: &Explanation, (hypothesis, alike_before): Piece) ->
     alike.nth(alike_before).map(|(index, _)| index)
 }
 
-/// An explanation in one line, for progress.
+/// How far an explanation has come, for the progress that people see.
 pub fn describe(explanation: &Explanation) -> String {
-    let one = |active: &Active| {
-        let place = active.hypothesis.place;
-        let values: Vec<String> = active
-            .coordinates
-            .iter()
-            .map(|v| format!("{v:.4}"))
-            .collect();
-        format!(
-            "{}@{}/{}/{} [{}]",
-            active.hypothesis.effect.name,
-            place.joint,
-            place.source,
-            place.link,
-            values.join(", ")
-        )
-    };
-    let all: Vec<String> = explanation.fit.actives.iter().map(one).collect();
-    all.join("; ")
+    let effects = explanation.fit.actives.iter().map(|a| a.hypothesis);
+    let effects: Vec<Hypothesis> = effects.filter(|h| !h.is_torque_scale()).collect();
+    match effects.as_slice() {
+        [] => "looking for what is missing".to_owned(),
+        [only] => format!("1 effect: {}", only.effect.words.title),
+        [.., last] => format!(
+            "{} effects, the last: {}",
+            effects.len(),
+            last.effect.words.title
+        ),
+    }
+}
+
+/// That an effect of an explanation is not needed, for the progress that people see.
+pub fn left_out(explanation: &Explanation, index: usize) -> String {
+    let active = explanation.fit.actives.get(index);
+    let title = active.map_or("an effect", |active| active.hypothesis.effect.words.title);
+    format!("{title} is not needed")
 }

@@ -40,7 +40,7 @@ impl Search<'_> {
             let Some(next) = self.best_of(&best, &proposals, best.fit.likelihood()) else {
                 break;
             };
-            (self.say)(&format!("+ {}", describe(&next)));
+            (self.say)(&describe(&next));
             let new = next.fit.actives.last().map(|active| active.hypothesis);
             let next = self.pruned(next);
             let once = new.is_some_and(|new| new.time_kind() == TimeKind::Once);

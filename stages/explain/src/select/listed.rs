@@ -41,7 +41,7 @@ impl Search<'_> {
             let enough = tie(best.ahead_of(&less, effective));
             let behind = best.ahead_of(&listed, effective);
             if behind < enough && !overwhelming(&best, &listed) {
-                (self.say)(&format!("~ {}", describe(&listed)));
+                (self.say)(&describe(&listed));
                 best = listed;
             }
         }

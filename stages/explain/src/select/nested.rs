@@ -29,7 +29,7 @@ impl Search<'_> {
             if let Some(simple) = self.simpler(&best, &less, index)
                 && best.ahead_of(&simple, effective) < enough
             {
-                (self.say)(&format!("~ {}", describe(&simple)));
+                (self.say)(&describe(&simple));
                 best = simple;
             }
         }

@@ -6,7 +6,7 @@ use crate::select::curve_shapes::repeats;
 use crate::select::evidence::{
     CURVE_EVIDENCE, CURVE_SIZE, LEAST_SIZE, matters, needs, overwhelming, wald,
 };
-use crate::select::explanation::Explanation;
+use crate::select::explanation::{Explanation, left_out};
 use crate::select::parallel;
 use crate::select::plausible::{is_timely, plausible};
 use crate::select::search::Search;
@@ -39,10 +39,7 @@ impl Search<'_> {
                     if self.is_needed(&best, &less, index) {
                         continue;
                     }
-                    (self.say)(&format!(
-                        "- {}",
-                        best.fit.actives[index].hypothesis.effect.name
-                    ));
+                    (self.say)(&left_out(&best, index));
                     best = self.simpler(&best, &less, index).unwrap_or(less);
                     continue 'again;
                 }
@@ -158,10 +155,7 @@ impl Search<'_> {
             else {
                 return best;
             };
-            (self.say)(&format!(
-                "- {}",
-                best.fit.actives[index].hypothesis.effect.name
-            ));
+            (self.say)(&left_out(&best, index));
             best = less;
         }
     }

@@ -36,7 +36,7 @@ impl Search<'_> {
         let mut best = self.started(start, penalties);
         best = self.with_names(best);
         if let Some(described) = self.with_curve_for_intervals(&best) {
-            (self.say)(&format!("? {}", describe(&described)));
+            (self.say)(&describe(&described));
             best = self.with_names(self.pruned(described));
         }
         // Bounded: effects may replace a free body, which would then be proposed again without end.
@@ -44,12 +44,12 @@ impl Search<'_> {
             let Some(described) = self.with_free_body(&best) else {
                 break;
             };
-            (self.say)(&format!("? {}", describe(&described)));
+            (self.say)(&describe(&described));
             best = self.with_names(described);
         }
         for joint in 0..self.problem.joints {
             if let Some(described) = self.with_curve_at(&best, joint) {
-                (self.say)(&format!("? {}", describe(&described)));
+                (self.say)(&describe(&described));
                 best = self.with_names(self.pruned(described));
             }
         }
@@ -71,7 +71,7 @@ impl Search<'_> {
             let effective = &self.problem.effective_samples;
             let mut exchanged = self.exchange(best.clone());
             if let Some(better) = self.with_one_zero(&exchanged) {
-                (self.say)(&format!("= {}", describe(&better)));
+                (self.say)(&describe(&better));
                 exchanged = better;
             }
             let gained = exchanged.ahead_of(&best, effective) > LEAST_GAIN;

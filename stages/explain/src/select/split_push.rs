@@ -31,7 +31,7 @@ impl Search<'_> {
                     penalties: best.penalties.clone(),
                 };
                 if other.ahead_of(&best, &self.problem.effective_samples) > -TIE {
-                    (self.say)(&format!("= {}", describe(&other)));
+                    (self.say)(&describe(&other));
                     best = other;
                 }
             }

@@ -14,6 +14,7 @@ use zenoh::bytes::{Encoding, ZBytes};
 use zenoh::query::Query;
 use zenoh::{Session, Wait as _};
 
+use super::Takes;
 use crate::setup::Setup;
 
 /// Commands that wait for a sample at most.
@@ -42,7 +43,11 @@ pub(super) struct Inbox {
 }
 
 impl Inbox {
-    pub fn open(endpoints: &ZenohEndpoints, setup: &Setup) -> Result<Self, LinkError> {
+    pub fn open(
+        endpoints: &ZenohEndpoints,
+        setup: &Setup,
+        takes: Takes,
+    ) -> Result<Self, LinkError> {
         let key = command::key(&setup.cell);
         let failed = |error: zenoh::Error| LinkError::Open {
             stream: key.clone(),
@@ -62,6 +67,7 @@ impl Inbox {
             queue: queue.clone(),
             answers: answers.clone(),
             has_tool_link: setup.has_tool_link,
+            takes,
         };
         let other_door = door.clone();
         session
@@ -121,6 +127,7 @@ struct Door {
     queue: Queue,
     answers: Answers,
     has_tool_link: bool,
+    takes: Takes,
 }
 
 impl Door {
@@ -158,6 +165,20 @@ impl Door {
                 "it is not known which link carries a tool; give the cell a `tool` with its `link`"
                     .to_owned(),
             );
+        }
+        if command.verb() == Some(Verb::Learn) && !self.takes.learn {
+            return Err(
+                "no detector of this cell learns while it runs; `virtual_collision_sensor` does. \
+                 What `tauscope` has learnt is learnt anew by `tauscope init`"
+                    .to_owned(),
+            );
+        }
+        let arm_kg = self.takes.arm_kg.filter(|arm_kg| command.value > *arm_kg);
+        if let Some(arm_kg) = arm_kg.filter(|_| command.verb() == Some(Verb::Payload)) {
+            return Err(format!(
+                "no arm carries {} kg that itself weighs {arm_kg:.1} kg, as its URDF says",
+                command.value
+            ));
         }
         Ok(command)
     }

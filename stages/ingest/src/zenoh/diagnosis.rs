@@ -80,11 +80,24 @@ pub(super) fn diagnose(expected: &Expected, fed: &Fed, seen: &Seen) -> Trouble {
             "the driver is up, but not connected to the robot, or it is paused".to_owned(),
         ))
     } else if fed.was_well {
-        Trouble::new(format!("the publisher of {stem} has gone"))
+        gone(expected, &stem)
     } else {
         Trouble::new(format!("nobody publishes {stem}")).likely(misnamed(expected, seen))
     };
     trouble.expects(expected.lines()).sees(lines(seen, &stem))
+}
+
+/// What came before and comes no more. Only rmw_zenoh tells whether its publisher is still there.
+fn gone(expected: &Expected, stem: &str) -> Trouble {
+    if expected.scheme.keys == Keys::RmwZenoh {
+        return Trouble::new(format!("the publisher of {stem} has gone")).likely(Some(
+            "the driver has ended, or it has lost its router".to_owned(),
+        ));
+    }
+    Trouble::new(format!("no message on {stem} any more")).likely(Some(
+        "its publisher has paused or ended: see whether the driver runs and is connected to the robot"
+            .to_owned(),
+    ))
 }
 
 fn unconnected(expected: &Expected, fed: &Fed, seen: &Seen) -> Trouble {

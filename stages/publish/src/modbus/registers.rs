@@ -9,11 +9,26 @@ use crate::message::AlarmState;
 use crate::status::Status;
 
 /// Version of the map, in the last register.
-const VERSION: u16 = 1;
+const VERSION: u16 = 2;
 /// The coil that acknowledges when 1 is written.
 pub const ACKNOWLEDGE: u16 = 16;
+/// The coil that lets detectors learn anew when 1 is written.
+pub const LEARN: u16 = 17;
 /// The holding register that mutes for so many seconds.
 pub const MUTE_SECONDS: u16 = 0;
+/// The first of the holding registers that are written only.
+pub const PAYLOAD: u16 = 16;
+/// The holding register that notes a number in the archive.
+pub const LABEL: u16 = 20;
+/// Names of the registers that are written only and read as 0, from [`PAYLOAD`] on: a payload is written alone or with
+/// its centre of mass.
+pub const WRITTEN: [&str; 5] = [
+    "payload_mass",
+    "payload_x",
+    "payload_y",
+    "payload_z",
+    "label",
+];
 /// Names of the bits, from address 0: coils and discrete inputs alike.
 pub const BITS: [&str; 6] = [
     "free",
@@ -38,6 +53,10 @@ pub const WORDS: [&str; 10] = [
 ];
 /// Forces are told in tenths of a newton.
 const PER_N: f64 = 10.0;
+/// Masses are told in hundredths of a kilogram.
+const PER_KG: f64 = 100.0;
+/// Places are told in millimetres.
+const PER_M: f64 = 1000.0;
 
 /// All that can be read, at one instant.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -58,6 +77,17 @@ pub enum Write {
         /// For so long \[s\].
         seconds: f64,
     },
+    /// Another payload.
+    Payload {
+        /// Mass \[kg\].
+        mass_kg: f64,
+        /// Centre of mass in the tool link's frame \[m\].
+        com_m: [f64; 3],
+    },
+    /// To learn anew.
+    Learn,
+    /// A number for the archive.
+    Label(u16),
 }
 
 impl Registers {
@@ -96,15 +126,15 @@ impl Registers {
         }
     }
 
-    /// `count` bits from address `at`. The acknowledge coil reads as 0.
+    /// `count` bits from address `at`. What is written only reads as 0.
     ///
     /// # Errors
     /// If one of them does not exist.
     pub fn bits(&self, at: u16, count: u16) -> Result<Vec<bool>, ExceptionCode> {
-        if (at, count) == (ACKNOWLEDGE, 1) {
-            return Ok(vec![false]);
-        }
-        part(&self.bits, at, count)
+        part(&self.bits, at, count).or_else(|error| {
+            let written = [false; (LEARN - ACKNOWLEDGE + 1) as usize];
+            part(&written, at.checked_sub(ACKNOWLEDGE).ok_or(error)?, count)
+        })
     }
 
     /// `count` registers from address `at`.
@@ -112,7 +142,10 @@ impl Registers {
     /// # Errors
     /// If one of them does not exist.
     pub fn words(&self, at: u16, count: u16) -> Result<Vec<u16>, ExceptionCode> {
-        part(&self.words, at, count)
+        part(&self.words, at, count).or_else(|error| {
+            let written = [0; WRITTEN.len()];
+            part(&written, at.checked_sub(PAYLOAD).ok_or(error)?, count)
+        })
     }
 }
 
@@ -130,22 +163,33 @@ fn part<T: Copy>(all: &[T], at: u16, count: u16) -> Result<Vec<T>, ExceptionCode
 pub fn coil(at: u16, value: bool) -> Result<Write, ExceptionCode> {
     match (at, value) {
         (ACKNOWLEDGE, true) => Ok(Write::Acknowledge),
-        (ACKNOWLEDGE, false) => Ok(Write::Nothing),
+        (LEARN, true) => Ok(Write::Learn),
+        (ACKNOWLEDGE | LEARN, false) => Ok(Write::Nothing),
         _ => Err(ExceptionCode::IllegalDataAddress),
     }
 }
 
-/// What it means to write `value` to the holding register `at`.
+/// What it means to write `values` to the holding registers from `at` on.
 ///
 /// # Errors
-/// If it cannot be written, or not this value.
-pub fn word(at: u16, value: u16) -> Result<Write, ExceptionCode> {
-    match at {
-        MUTE_SECONDS if f64::from(value) <= LONGEST_MUTE_S => Ok(Write::Mute {
+/// If they cannot be written, or not these values.
+pub fn words(at: u16, values: &[u16]) -> Result<Write, ExceptionCode> {
+    match (at, values) {
+        (MUTE_SECONDS, &[value]) if f64::from(value) <= LONGEST_MUTE_S => Ok(Write::Mute {
             seconds: f64::from(value),
         }),
-        MUTE_SECONDS => Err(ExceptionCode::IllegalDataValue),
+        (MUTE_SECONDS, [_]) => Err(ExceptionCode::IllegalDataValue),
+        (PAYLOAD, &[mass]) => Ok(payload(mass, [0; 3])),
+        (PAYLOAD, &[mass, x, y, z]) => Ok(payload(mass, [x, y, z])),
+        (LABEL, &[number]) => Ok(Write::Label(number)),
         _ => Err(ExceptionCode::IllegalDataAddress),
+    }
+}
+
+fn payload(mass: u16, com: [u16; 3]) -> Write {
+    Write::Payload {
+        mass_kg: f64::from(mass) / PER_KG,
+        com_m: com.map(|mm| f64::from(mm as i16) / PER_M),
     }
 }
 
@@ -213,9 +257,40 @@ mod tests {
         );
         assert_eq!(coil(0, true), Err(ExceptionCode::IllegalDataAddress));
         assert_eq!(coil(ACKNOWLEDGE, true), Ok(Write::Acknowledge));
-        assert_eq!(word(MUTE_SECONDS, 60), Ok(Write::Mute { seconds: 60.0 }));
-        assert_eq!(word(MUTE_SECONDS, 61), Err(ExceptionCode::IllegalDataValue));
-        assert_eq!(word(1, 0), Err(ExceptionCode::IllegalDataAddress));
+        assert_eq!(
+            words(MUTE_SECONDS, &[60]),
+            Ok(Write::Mute { seconds: 60.0 })
+        );
+        assert_eq!(
+            words(MUTE_SECONDS, &[61]),
+            Err(ExceptionCode::IllegalDataValue)
+        );
+        assert_eq!(words(1, &[0]), Err(ExceptionCode::IllegalDataAddress));
+    }
+
+    #[test]
+    fn payload_learning_and_notes_are_written_and_read_as_0() {
+        let payload = |mass_kg, com_m| Ok(Write::Payload { mass_kg, com_m });
+        assert_eq!(words(PAYLOAD, &[150]), payload(1.5, [0.0; 3]));
+        let minus_20 = -20_i16 as u16;
+        assert_eq!(
+            words(PAYLOAD, &[150, minus_20, 0, 250]),
+            payload(1.5, [-0.02, 0.0, 0.25])
+        );
+        let refused = Err(ExceptionCode::IllegalDataAddress);
+        assert_eq!(words(PAYLOAD, &[150, 0]), refused);
+        assert_eq!(words(PAYLOAD + 1, &[5]), refused);
+        assert_eq!(words(LABEL, &[17]), Ok(Write::Label(17)));
+        assert_eq!(coil(LEARN, true), Ok(Write::Learn));
+        assert_eq!(coil(LEARN, false), Ok(Write::Nothing));
+        let now = Instant::now();
+        let registers = Registers::of(&status(now), now);
+        assert_eq!(registers.words(PAYLOAD, 5), Ok(vec![0; 5]));
+        assert_eq!(registers.bits(ACKNOWLEDGE, 2), Ok(vec![false; 2]));
+        assert_eq!(
+            registers.bits(LEARN, 2),
+            Err(ExceptionCode::IllegalDataAddress)
+        );
     }
 
     #[test]
@@ -225,6 +300,12 @@ mod tests {
             let row = format!("| {at} | `{name}` |");
             assert!(page.contains(&row), "docs/publish.md has no row {row}");
         }
-        assert!(page.contains(&format!("| {ACKNOWLEDGE} | `acknowledge` |")));
+        let coils = [(ACKNOWLEDGE, "acknowledge"), (LEARN, "learn")];
+        let registers = (PAYLOAD..).zip(WRITTEN);
+        for (at, name) in registers.chain(coils) {
+            let row = format!("| {at} | `{name}` |");
+            assert!(page.contains(&row), "docs/publish.md has no row {row}");
+        }
+        assert_eq!(WRITTEN[usize::from(LABEL - PAYLOAD)], "label");
     }
 }

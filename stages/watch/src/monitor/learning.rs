@@ -189,7 +189,7 @@ impl Monitor {
     }
 
     /// Derives floors and noise from references and scales.
-    fn settle(&mut self) {
+    pub(super) fn settle(&mut self) {
         for j in 0..self.references.len() {
             let rows = Scale::LONG as f64 * f64::from(BLOCK_ROWS);
             let least = LEAST_SHARE * LEAST_SHARE * self.references[j].effort_square();

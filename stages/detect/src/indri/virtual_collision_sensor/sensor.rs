@@ -233,6 +233,11 @@ impl Detector for Sensor {
         Some(1.0)
     }
 
+    fn is_learning(&self) -> bool {
+        let learns = self.asked || self.state != LearningState::Idle;
+        self.learning.is_some() && learns
+    }
+
     fn learnt(&self) -> Option<State> {
         self.learning?;
         let joints = self.joints.iter().map(|joint| joint.bias.learnt());

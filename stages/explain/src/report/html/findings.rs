@@ -11,6 +11,7 @@ use super::number_format::{
 };
 use super::proof;
 use crate::report::schema::{Finding, Report, Verdict};
+use crate::report::sentences::error_left;
 
 /// A card a finding, or that there is none.
 pub(super) fn cards(report: &Report) -> Option<Markup> {
@@ -30,7 +31,11 @@ pub(super) fn cards(report: &Report) -> Option<Markup> {
             }
         }
         @if report.findings.len() > 1 {
-            p.lead { "By joint and link, that with the largest effort first." }
+            p.lead {
+                "By joint and link, that with the largest effort first."
+                @if let Some(units) = units(report) { " " (units) }
+                @if let Some(share) = beside(report) { " " (share) }
+            }
         }
         @for group in &groups {
             @if report.findings.len() > 1 {
@@ -40,6 +45,34 @@ pub(super) fn cards(report: &Report) -> Option<Markup> {
                 }
             }
             @for finding in &group.findings { (card(finding, unit)) }
+        }
+    })
+}
+
+/// Why some numbers are in N m and some in A.
+fn units(report: &Report) -> Option<&'static str> {
+    let in_amperes = report.findings.iter().filter(|f| f.in_amperes).count();
+    let mixed = in_amperes > 0 && in_amperes < report.findings.len();
+    mixed.then_some(
+        "Efforts are in A, as recorded. The numbers of a finding are in N m where these recordings tell how many N m \
+         an ampere is at that joint, else in A.",
+    )
+}
+
+/// What went with the torque constants, which are no finding, where that is much.
+fn beside(report: &Report) -> Option<Markup> {
+    /// Findings that explain this share of what went are the explanation.
+    /// Tuned: by hand, for the words of the page; no number depends on it.
+    const MOST: f64 = 0.8;
+    let left = error_left(&report.holdout_rms_before, &report.holdout_rms_after);
+    let gone = 1.0 - left * left;
+    let named: f64 = report.findings.iter().map(|finding| finding.explains).sum();
+    let fitted =
+        effort_unit(&report.effort_unit) == "A" && report.findings.iter().any(|f| !f.in_amperes);
+    (fitted && named < MOST * gone).then(|| {
+        html! {
+            "Together they explain " (percent(named)) " of the mismatch. Most of what else went was fitted with them and is no "
+            "finding: how many N m an ampere is at each drive, under " a href="#notes" { "Notes" } "."
         }
     })
 }
@@ -79,7 +112,11 @@ fn card(finding: &Finding, effort_unit: &str) -> Markup {
                     (list(finding.equivalent_to.iter().map(|rival| {
                         effect_at(&rival.effect, rival.joint.as_deref(), rival.link.as_deref())
                     })))
-                    ". This data fits both; the name above is the more probable one."
+                    @if finding.equivalent_to.len() == 1 {
+                        ". This data fits both; the name above is the more probable one."
+                    } @else {
+                        ". This data fits all of them; the name above is the most probable one."
+                    }
                 }
             }
         }
@@ -186,6 +223,56 @@ fn interval_picture(value: Option<f64>, [low, high]: [f64; 2]) -> Markup {
                     circle.value cx=(r(axis.px(value))) cy="8" r="3.6" {}
                 }
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report(unit: &str, in_amperes: [bool; 2], explains: f64) -> Report {
+        let finding = |in_amperes: bool| {
+            serde_json::json!({
+                "effect": "coulomb_friction", "joint": "joint1", "link": null, "parameters": {}, "intervals_95": {},
+                "in_amperes": in_amperes, "confidence": 0.9, "recording": null, "t_start": null, "t_end": null,
+                "explains": explains, "sentence": "It has friction.",
+                "equivalent_to": [{"effect": "torque_gain", "joint": "joint1", "link": null},
+                    {"effect": "torque_bias", "joint": "joint1", "link": null}],
+            })
+        };
+        let json = serde_json::json!({
+            "case": "c", "verdict": "explained", "summary": "", "effort_unit": unit,
+            "findings": in_amperes.map(finding), "rejected": [], "located": [], "undetectable": [],
+            "next_motions": [], "notes": [], "joints": ["joint1"], "holdout_rms_before": [1.0],
+            "holdout_rms_after": [0.18], "noise_floor": [0.1], "holdout_predictions": {},
+        });
+        match serde_json::from_value(json) {
+            Ok(report) => report,
+            Err(error) => panic!("{error}"),
+        }
+    }
+
+    fn page(report: &Report) -> String {
+        cards(report).map(Markup::into_string).unwrap_or_default()
+    }
+
+    #[test]
+    fn what_went_with_the_torque_constants_is_said_and_why_units_differ() {
+        let text = page(&report("A", [true, false], 0.09));
+        assert!(text.contains("Efforts are in A, as recorded."), "{text}");
+        assert!(
+            text.contains("Together they explain 18 % of the mismatch"),
+            "{text}"
+        );
+        assert!(text.contains("fits all of them"), "{text}");
+        for other in [
+            report("Nm", [false, false], 0.09),
+            report("A", [false, false], 0.48),
+        ] {
+            let text = page(&other);
+            assert!(!text.contains("Together they explain"), "{text}");
+            assert!(!text.contains("Efforts are in A"), "{text}");
         }
     }
 }

@@ -27,6 +27,11 @@ impl Group<'_> {
     }
 }
 
+/// The findings, those of the place with the largest effort first, and in a place the largest first.
+pub fn largest_first(report: &Report) -> impl Iterator<Item = &Finding> {
+    of(report).into_iter().flat_map(|group| group.findings)
+}
+
 /// The findings by place; places and what is in them by effort.
 pub(super) fn of(report: &Report) -> Vec<Group<'_>> {
     let mut groups: Vec<Group<'_>> = Vec::new();

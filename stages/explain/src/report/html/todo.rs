@@ -57,9 +57,9 @@ fn load(report: &Report, around: &Around<'_>) -> Markup {
     };
     let left = error_left(&report.holdout_rms_before, &report.holdout_rms_after);
     let in_pipeline = html! {
-        pre { code { "twin: {model: " (twin) "}" } }
+        pre { code { "twin: {model: " (yaml(twin)) "}" } }
         @if let Some(robot) = &around.corrected_robot {
-            p.muted { "Or give " code { (robot) } " as the cell’s " code { "robot:" } " in its place. With both, the correction would count twice." }
+            p.muted { "Or give " code { (yaml(robot)) } " as the cell’s " code { "robot:" } " in its place. With both, the correction would count twice." }
         }
     };
     if report.findings.iter().any(lasts) {
@@ -87,6 +87,16 @@ fn load(report: &Report, around: &Around<'_>) -> Markup {
     }
 }
 
+/// A path as it stands in a pipeline file, in quotes where YAML would take it for more than a text.
+fn yaml(path: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "/._-+@".contains(c);
+    if path.chars().all(plain) {
+        path.to_owned()
+    } else {
+        format!("'{}'", path.replace('\'', "''"))
+    }
+}
+
 /// What a mechanic looks at, the largest effort first.
 fn look_at(report: &Report) -> Markup {
     let groups = groups::of(report);
@@ -96,7 +106,7 @@ fn look_at(report: &Report) -> Markup {
         .collect();
     // Of each place the largest.
     let of_group = |group: &Group<'_>| {
-        let mut findings = group.findings.iter();
+        let mut findings = group.findings.iter().filter(|f| !may_be_nothing(f));
         findings.find_map(|finding| {
             Some((
                 part(finding)?,
@@ -125,6 +135,23 @@ fn look_at(report: &Report) -> Markup {
         }
         @if parts.len() > PARTS { p.muted { (parts.len() - PARTS) " more places are below, with smaller efforts." } }
     }
+}
+
+/// Whether each of its sizes may as well be zero: nobody is sent to the arm for that. Times are no sizes.
+fn may_be_nothing(finding: &Finding) -> bool {
+    let of = |name: &str, [low, high]: [f64; 2]| {
+        let is_change = name.contains("extra") || name.contains("delta");
+        (!name.ends_with("_s")).then_some((is_change, low <= 0.0 && high >= 0.0))
+    };
+    let sizes = finding.intervals_95.iter();
+    let sizes: Vec<(bool, bool)> = sizes.filter_map(|(name, i)| of(name, *i)).collect();
+    // Where there is a change, it is what was found, and not what it is a change of.
+    let changes = sizes.iter().any(|(is_change, _)| *is_change);
+    let mut found = sizes
+        .iter()
+        .filter(|(is_change, _)| *is_change || !changes)
+        .peekable();
+    found.peek().is_some() && found.all(|(_, may_be_zero)| *may_be_zero)
 }
 
 /// The motion that would tell more, or that none is needed.
@@ -210,5 +237,42 @@ fn made_from(around: &Around<'_>) -> Markup {
             @if !around.fit.is_empty() { "Fitted: " (list(&around.fit)) ". " }
             @if !around.holdout.is_empty() { "Held out: " (list(&around.holdout)) "." }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn finding(intervals: &[(&str, [f64; 2])]) -> Finding {
+        let json = serde_json::json!({
+            "effect": "temperature_viscous", "joint": "joint1", "link": null, "parameters": {},
+            "intervals_95": intervals.iter().copied().collect::<std::collections::BTreeMap<_, _>>(),
+            "confidence": 0.96, "recording": null, "t_start": null, "t_end": null, "explains": 0.01,
+            "equivalent_to": [], "sentence": "",
+        });
+        match serde_json::from_value(json) {
+            Ok(finding) => finding,
+            Err(error) => panic!("{error}"),
+        }
+    }
+
+    #[test]
+    fn nobody_is_sent_to_what_may_be_nothing() {
+        let warm = ("viscous_warm_nms_per_rad", [19.4, 35.6]);
+        let time = ("time_constant_s", [1.2, 4.8]);
+        let extra = |low| ("viscous_extra_cold_nms_per_rad", [low, 75.6]);
+        assert!(may_be_nothing(&finding(&[warm, time, extra(0.0)])));
+        assert!(!may_be_nothing(&finding(&[warm, time, extra(3.0)])));
+        let mass = ("mass_kg", [1.2, 1.6]);
+        let com = ("com_x_m", [-0.1, 0.1]);
+        assert!(!may_be_nothing(&finding(&[mass, com])));
+        assert!(!may_be_nothing(&finding(&[])));
+    }
+
+    #[test]
+    fn a_path_is_pasted_as_a_text() {
+        assert_eq!(yaml("/cells/a-1/twin.yaml"), "/cells/a-1/twin.yaml");
+        assert_eq!(yaml("/it's, mine/twin.yaml"), "'/it''s, mine/twin.yaml'");
     }
 }

@@ -206,5 +206,21 @@ fn a_publisher_that_went_is_not_taken_for_a_slip() {
         trouble.what.starts_with("the publisher of 0/joint_states/"),
         "{trouble}"
     );
-    assert_eq!(trouble.likely, None);
+    let likely = trouble.likely.unwrap_or_default();
+    assert!(likely.contains("the driver has ended"), "{likely}");
+}
+
+#[test]
+fn only_where_publishers_announce_themselves_has_one_gone() {
+    let fed = Fed {
+        was_well: true,
+        ..Fed::default()
+    };
+    let nothing = || seen(&[]);
+    let plain = diagnose(&expected(Keys::Ros2dds, None), &fed, &nothing()).to_string();
+    assert!(plain.contains("no message on"), "{plain}");
+    assert!(plain.contains("paused or ended"), "{plain}");
+    let rmw = diagnose(&expected(Keys::RmwZenoh, None), &fed, &nothing()).to_string();
+    assert!(rmw.contains("has gone"), "{rmw}");
+    assert!(rmw.contains("lost its router"), "{rmw}");
 }
