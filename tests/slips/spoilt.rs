@@ -26,7 +26,9 @@ fn write(path: &Path, spoil: &dyn Fn(u64, &mut JointState)) {
 }
 
 fn scaled(values: &mut [f64], factor: f64) {
-    values.iter_mut().for_each(|value| *value *= factor);
+    for value in values.iter_mut() {
+        *value *= factor;
+    }
 }
 
 /// Writes all of them into `folder`.
@@ -43,7 +45,7 @@ pub fn write_all(folder: &Path) {
     write("turned.mcap", &|_, state| scaled(&mut state.effort, -1.0));
     write("amperes.mcap", &|_, state| scaled(&mut state.effort, 0.1));
     write("milliamperes.mcap", &|_, state| {
-        scaled(&mut state.effort, 100.0)
+        scaled(&mut state.effort, 100.0);
     });
     write("standing.mcap", &|_, state| {
         scaled(&mut state.position, 0.0);

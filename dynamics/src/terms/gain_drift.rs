@@ -1,4 +1,4 @@
-//! A torque constant that changes steadily through a session: magnets lose about 0.1 % of their field per kelvin (NdFeB; J. R.
+//! A torque constant that changes steadily through a session: magnets lose about 0.1 % of their field per kelvin (`NdFeB`; J. R.
 //! Hendershot and T. J. E. Miller, *Design of Brushless Permanent-Magnet Machines*, 2010), so a motor that warms up needs more
 //! current for the same torque.
 

@@ -99,11 +99,11 @@ fn groups(problem: &Problem, fit: &Fit, joint: usize, joints: &[String]) -> Vec<
             ],
         },
     ];
-    for other in 0..problem.joints {
+    for (other, name) in joints.iter().enumerate() {
         let whose = if other == joint {
             "its own".to_owned()
         } else {
-            format!("joint {}'s", joints[other])
+            format!("joint {name}'s")
         };
         all.push(Group {
             on: format!(

@@ -87,7 +87,7 @@ pub(super) fn diagnose(expected: &Expected, fed: &Fed, seen: &Seen) -> Trouble {
     trouble.expects(expected.lines()).sees(lines(seen, &stem))
 }
 
-/// What came before and comes no more. Only rmw_zenoh tells whether its publisher is still there.
+/// What came before and comes no more. Only `rmw_zenoh` tells whether its publisher is still there.
 fn gone(expected: &Expected, stem: &str) -> Trouble {
     if expected.scheme.keys == Keys::RmwZenoh {
         return Trouble::new(format!("the publisher of {stem} has gone")).likely(Some(
