@@ -112,11 +112,8 @@ fn member(seat: &Seat, shared: &tauscope_detect::Shared) -> Result<Member, SeatE
     let cell = || cells.first().ok_or(SeatError::NoCell);
     Ok(match &told.settings {
         Settings::Ingest(config) => {
-            let robot: Option<SimulatedRobot> = told
-                .scenario
-                .as_ref()
-                .map(ScenarioFacts::robot)
-                .transpose()?;
+            let scenario = told.scenario.as_ref();
+            let robot: Option<SimulatedRobot> = scenario.map(ScenarioFacts::robot).transpose()?;
             let source = build::ingest(config, robot.as_ref(), cell()?, told.after_ns)?;
             let source = build::commanded(source, config, cell()?, told.somebody_learns)?;
             let source = Watched::new(&seat.stage, source, Plausible::new(cell()?));

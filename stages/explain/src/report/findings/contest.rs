@@ -35,9 +35,17 @@ pub fn contest(
     let effective = &search.problem.effective_samples;
     let evidence = found.ahead_of(less, effective);
     let proposals = search.rivals(&less.fit, &found.fit, active);
+    // A rarer law that contains the effect is no other answer: with the rest of it at nothing it is the effect.
+    let contains = |rival: &Hypothesis| {
+        let simpler = rival.effect.simpler.map(|simpler| simpler.effect);
+        rival.effect.traits.is_off_list
+            && rival.place == active.hypothesis.place
+            && simpler == Some(active.hypothesis.effect)
+    };
+    let is_rival = |h: &Hypothesis| *h != active.hypothesis && !contains(h);
     let rivals = proposals
         .iter()
-        .filter(|p| p.active.hypothesis != active.hypothesis && p.evidence() > 0.0);
+        .filter(|p| is_rival(&p.active.hypothesis) && p.evidence() > 0.0);
     for proposal in rivals.take(RIVALS) {
         let other = search.joined(less, proposal, found.fit.likelihood());
         let behind = found.ahead_of(&other, effective);
