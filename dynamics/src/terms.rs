@@ -61,6 +61,7 @@ mod torque_saturation;
 mod transmission_coupling;
 mod two_masses;
 mod viscous_friction;
+mod wave;
 pub mod words;
 
 use std::sync::Arc;

@@ -1,6 +1,6 @@
-//! A memory of efforts, from which they come late.
+//! A memory of efforts, from which they come late: of one joint, or of all.
 
-use super::MotionSample;
+use super::{Effect, MotionSample, Site, Term};
 
 /// How many samples are remembered: enough for a second at 1 kHz.
 /// Tuned: from the longest delay and the usual rates; not swept.
@@ -8,7 +8,7 @@ const CAPACITY: usize = 1024;
 
 /// Efforts as they were a while ago, straight between samples. Before the first sample that one is held.
 #[derive(Debug)]
-pub(super) struct DelayLine {
+struct DelayLine {
     delay_s: f64,
     joint_count: usize,
     /// Time since the reset \[s\].
@@ -24,7 +24,7 @@ pub(super) struct DelayLine {
 
 impl DelayLine {
     /// One for efforts of so many joints; a delay below zero is none \[s\].
-    pub fn new(joint_count: usize, delay_s: f64) -> Self {
+    fn new(joint_count: usize, delay_s: f64) -> Self {
         Self {
             delay_s: delay_s.max(0.0),
             joint_count,
@@ -37,14 +37,14 @@ impl DelayLine {
     }
 
     /// Forgets what came before.
-    pub fn reset(&mut self) {
+    fn reset(&mut self) {
         self.now_s = 0.0;
         self.stored = 0;
         self.oldest = 0;
     }
 
     /// Takes the efforts of the next instant, and puts those in their place that were so long ago.
-    pub fn pass(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
+    fn pass(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
         self.now_s += at.dt_s.max(0.0);
         self.store(effort);
         let wanted_s = self.now_s - self.delay_s;
@@ -86,5 +86,57 @@ impl DelayLine {
         let at = index % CAPACITY;
         self.times_s[at] = self.now_s;
         self.efforts[at * self.joint_count..][..self.joint_count].copy_from_slice(effort);
+    }
+}
+
+/// A term that delays the recorded effort of one joint, or of all. Its only coordinate is the delay \[s\].
+#[derive(Debug)]
+pub(super) struct Delayed {
+    effect: &'static Effect,
+    /// The joint that comes late; `None` for all.
+    joint: Option<usize>,
+    values: [f64; 1],
+    line: DelayLine,
+}
+
+impl Delayed {
+    /// The term of `effect` for a joint, or for all of the robot of `site`.
+    pub fn boxed(
+        effect: &'static Effect,
+        site: &Site<'_>,
+        joint: Option<usize>,
+        values: [f64; 1],
+    ) -> Box<dyn Term> {
+        let joint_count = joint.map_or(site.model.dof(), |_| 1);
+        Box::new(Self {
+            effect,
+            joint,
+            values,
+            line: DelayLine::new(joint_count, values[0]),
+        })
+    }
+}
+
+impl Term for Delayed {
+    fn effect(&self) -> &'static Effect {
+        self.effect
+    }
+
+    fn coordinates(&self) -> &[f64] {
+        &self.values
+    }
+
+    fn reset(&mut self) {
+        self.line.reset();
+    }
+
+    fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
+        match self.joint {
+            Some(joint) => {
+                let own = std::slice::from_mut(&mut effort[joint]);
+                self.line.pass(at, own);
+            }
+            None => self.line.pass(at, effort),
+        }
     }
 }

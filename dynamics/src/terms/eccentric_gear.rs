@@ -6,12 +6,8 @@ use std::f64::consts::PI;
 use super::law::joint_law;
 use super::{
     Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Scale, Simulated,
-    Traits, Words, sign,
+    Traits, Words, sign, wave,
 };
-
-/// What is off centre comes back after a revolution: its waves are whole numbers of cycles, within what is known of them.
-/// Tuned: as for torque ripple; not swept.
-const NEARLY_WHOLE: f64 = 0.15;
 
 /// Effort A sin(n q + φ) sgn(qd), searched as the factors of sin n q and cos n q. It comes on top of Coulomb friction.
 pub(super) static EFFECT: Effect = Effect {
@@ -36,13 +32,10 @@ pub(super) static EFFECT: Effect = Effect {
         Coordinate::factor("cosine_nm"),
         Coordinate::shape("cycles_per_rev", 1.0, 24.0, 24, Scale::Linear),
     ],
-    to_parameters: |c| vec![c[0].hypot(c[1]), c[2], c[1].atan2(c[0])],
-    to_coordinates: |p| {
-        let (sin, cos) = p[2].sin_cos();
-        vec![p[0] * cos, p[0] * sin, p[1]]
-    },
+    to_parameters: wave::to_parameters,
+    to_coordinates: wave::to_coordinates,
     simpler: None,
-    limit: Some(|_, x| (x[2] - x[2].round()).abs() <= NEARLY_WHOLE),
+    limit: Some(|_, x| wave::closes(x[2])),
     excitation: Excitation::Speeds,
     simulated: Simulated::Joint,
     concealed: Some(|draw| {

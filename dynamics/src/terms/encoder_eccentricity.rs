@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use super::law::array;
 use super::{
     Coordinate, CoordinateKind, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter,
-    PlaceKind, Scale, Simulated, Term, Traits, Words,
+    PlaceKind, Scale, Simulated, Term, Traits, Words, wave,
 };
 use crate::{Data, JointKind, Model, rnea};
 
@@ -16,10 +16,6 @@ const LARGEST_RAD: f64 = 0.2;
 /// A smaller one is how encoders are made and mounted \[rad\].
 /// Physical: a disc of 50 mm that is off its axis by 0.1 mm.
 const LEAST_RAD: f64 = 0.004;
-/// The error closes after a revolution: its waves are whole numbers of cycles, within what is known of them.
-/// Tuned: as for friction that varies with the angle; not swept.
-const NEARLY_WHOLE: f64 = 0.15;
-
 /// The joint stands at the recorded position q plus A sin(n q + φ), and moves accordingly: the effort of the robot there less
 /// that of the recorded motion. To first order linear in the factors of sin n q and cos n q.
 pub(super) static EFFECT: Effect = Effect {
@@ -46,15 +42,12 @@ pub(super) static EFFECT: Effect = Effect {
         factor("cosine_rad"),
         Coordinate::shape("cycles_per_rev", 1.0, 2.0, 2, Scale::Linear),
     ],
-    to_parameters: |c| vec![c[0].hypot(c[1]), c[2], c[1].atan2(c[0])],
-    to_coordinates: |p| {
-        let (sin, cos) = p[2].sin_cos();
-        vec![p[0] * cos, p[0] * sin, p[1]]
-    },
+    to_parameters: wave::to_parameters,
+    to_coordinates: wave::to_coordinates,
     simpler: None,
     limit: Some(|site, x| {
         let turns = site.model.joints()[site.joint].kind != JointKind::Prismatic;
-        let closes = (x[2] - x[2].round()).abs() <= NEARLY_WHOLE;
+        let closes = wave::closes(x[2]);
         turns && closes && (LEAST_RAD..=LARGEST_RAD).contains(&x[0].hypot(x[1]))
     }),
     excitation: Excitation::Poses,

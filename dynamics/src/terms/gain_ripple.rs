@@ -6,12 +6,9 @@ use std::f64::consts::PI;
 use super::law::array;
 use super::{
     Coordinate, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind,
-    Scale, Simulated, Term, Traits, Words,
+    Scale, Simulated, Term, Traits, Words, wave,
 };
 
-/// It comes back after a revolution: its waves are whole numbers of cycles, within what is known of them.
-/// Tuned: as for friction that varies with the angle; not swept.
-const NEARLY_WHOLE: f64 = 0.15;
 /// A torque constant varies by less than this share.
 /// Physical: a motor that lost half its torque at some angle would not be used.
 const MOST: f64 = 0.5;
@@ -41,14 +38,11 @@ pub(super) static EFFECT: Effect = Effect {
         Coordinate::factor("cosine_share"),
         Coordinate::shape("cycles_per_rev", 1.0, 8.0, 8, Scale::Linear),
     ],
-    to_parameters: |c| vec![c[0].hypot(c[1]), c[2], c[1].atan2(c[0])],
-    to_coordinates: |p| {
-        let (sin, cos) = p[2].sin_cos();
-        vec![p[0] * cos, p[0] * sin, p[1]]
-    },
+    to_parameters: wave::to_parameters,
+    to_coordinates: wave::to_coordinates,
     simpler: None,
     limit: Some(|_, x| {
-        let closes = (x[2] - x[2].round()).abs() <= NEARLY_WHOLE;
+        let closes = wave::closes(x[2]);
         closes && x[0].hypot(x[1]) <= MOST
     }),
     excitation: Excitation::Poses,

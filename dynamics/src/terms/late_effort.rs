@@ -1,10 +1,10 @@
 //! Effort of one joint that is reported late: a channel of its own, a sensor that is read less often than the others.
 
-use super::delay_line::DelayLine;
+use super::delay_line::Delayed;
 use super::law::array;
 use super::{
-    Coordinate, CoordinateKind, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter,
-    PlaceKind, Simulated, Term, Traits, Words,
+    Coordinate, CoordinateKind, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind,
+    Simulated, Traits, Words,
 };
 
 /// Delays that a channel may have beside the others \[s\]. A channel that is read every T s is late by T / 2 on average.
@@ -45,41 +45,8 @@ pub(super) static EFFECT: Effect = Effect {
         smallest_told_as: Some("delay_s"),
         ..Traits::NONE
     },
-    build: |site, values| {
-        let values: [f64; 1] = array(values);
-        Box::new(LateEffort {
-            joint: site.joint,
-            values,
-            line: DelayLine::new(1, values[0]),
-        })
-    },
+    build: |site, values| Delayed::boxed(&EFFECT, site, Some(site.joint), array(values)),
 };
-
-#[derive(Debug)]
-struct LateEffort {
-    joint: usize,
-    values: [f64; 1],
-    line: DelayLine,
-}
-
-impl Term for LateEffort {
-    fn effect(&self) -> &'static Effect {
-        &EFFECT
-    }
-
-    fn coordinates(&self) -> &[f64] {
-        &self.values
-    }
-
-    fn reset(&mut self) {
-        self.line.reset();
-    }
-
-    fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
-        self.line
-            .pass(at, std::slice::from_mut(&mut effort[self.joint]));
-    }
-}
 
 #[cfg(test)]
 mod tests {

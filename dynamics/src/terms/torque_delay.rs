@@ -1,10 +1,10 @@
 //! Effort that is reported late.
 
-use super::delay_line::DelayLine;
+use super::delay_line::Delayed;
 use super::law::array;
 use super::{
-    Coordinate, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind,
-    Scale, Simulated, Term, Traits, Words,
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Scale, Simulated,
+    Traits, Words,
 };
 
 /// Recorded effort: the true one as it was a while ago, straight between samples, the same for all
@@ -31,38 +31,8 @@ pub(super) static EFFECT: Effect = Effect {
     simulated: Simulated::Record,
     concealed: Some(|_| Drawn::new([1e-3, 0.2], |delay| vec![("delay_s", delay)])),
     traits: Traits::NONE,
-    build: |site, values| {
-        let values: [f64; 1] = array(values);
-        Box::new(TorqueDelay {
-            values,
-            line: DelayLine::new(site.model.dof(), values[0]),
-        })
-    },
+    build: |site, values| Delayed::boxed(&EFFECT, site, None, array(values)),
 };
-
-#[derive(Debug)]
-struct TorqueDelay {
-    values: [f64; 1],
-    line: DelayLine,
-}
-
-impl Term for TorqueDelay {
-    fn effect(&self) -> &'static Effect {
-        &EFFECT
-    }
-
-    fn coordinates(&self) -> &[f64] {
-        &self.values
-    }
-
-    fn reset(&mut self) {
-        self.line.reset();
-    }
-
-    fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
-        self.line.pass(at, effort);
-    }
-}
 
 #[cfg(test)]
 mod tests {
