@@ -35,6 +35,16 @@ pub struct VaryingDelay {
 /// The delay that varies in what `fit` leaves, if one does. `rate` gives the rate of change of the twin's effort at a joint
 /// \[N m/s\], a number for each row of the problem.
 pub fn varying_delay(problem: &Problem, fit: &Fit, rates: &[Vec<f64>]) -> Option<VaryingDelay> {
+    shown_by(LEAST_JOINTS, problem, fit, rates)
+}
+
+/// The same, if so many joints show it.
+fn shown_by(
+    least_joints: usize,
+    problem: &Problem,
+    fit: &Fit,
+    rates: &[Vec<f64>],
+) -> Option<VaryingDelay> {
     let joints = problem.joints;
     let (mut own_left, mut own_taken) = (vec![0.0; joints], vec![0.0; joints]);
     let (mut squares, mut count) = (0.0, 0.0_f64);
@@ -74,7 +84,7 @@ pub fn varying_delay(problem: &Problem, fit: &Fit, rates: &[Vec<f64>]) -> Option
     let rms_s = (squares / count.max(f64::MIN_POSITIVE)).sqrt();
     let time = &problem.tracks.first()?.track.time_s;
     let sample_s = time.last()? / (time.len().saturating_sub(1).max(1)) as f64;
-    let is_told = shows.len() >= LEAST_JOINTS
+    let is_told = shows.len() >= least_joints
         && all > LEAST_SHARE
         && rms_s > LEAST_S.max(LEAST_SAMPLES * sample_s);
     is_told.then_some(VaryingDelay {
@@ -93,17 +103,39 @@ mod tests {
         crate::report::remainder::rates(problem, &Fit::new(problem, Vec::new()))
     }
 
-    #[test]
-    fn two_joints_are_too_few_to_tell_a_delay_from_a_law() {
+    /// What is told of two recordings whose efforts are late by what `late_s` gives for a sample, or have slow noise where
+    /// it gives nothing.
+    fn told(late_s: impl Fn(usize) -> Option<f64>) -> Option<VaryingDelay> {
         let model = model();
         let mut noise = Noise(3);
         let recordings = [1, 2].map(|seed| {
+            let (mut k, mut before, mut slow) = (0, [0.0; 2], [0.0; 2]);
             recording(&model, seed, |_, _, effort| {
-                effort[0] += 0.1 * noise.next();
+                for j in 0..2 {
+                    let change = if k == 0 { 0.0 } else { effort[j] - before[j] };
+                    before[j] = effort[j];
+                    slow[j] = 0.98 * slow[j] + 0.2 * noise.next();
+                    // 100 samples a second.
+                    effort[j] += late_s(k).map_or(slow[j], |late_s| -late_s * change / 0.01);
+                }
+                k += 1;
             })
         });
         let problem = problem(&model, &recordings);
         let nothing = Fit::new(&problem, Vec::new());
-        assert_eq!(varying_delay(&problem, &nothing, &rates(&problem)), None);
+        shown_by(2, &problem, &nothing, &rates(&problem))
+    }
+
+    #[test]
+    fn a_delay_that_comes_and_goes_is_told_with_its_size() {
+        let told = told(|k| Some(if k / 100 % 2 == 0 { 0.02 } else { -0.02 }));
+        let told = told.expect("both joints show it");
+        assert_eq!(told.joints, [0, 1]);
+        assert!((0.01..0.03).contains(&told.rms_s), "{}", told.rms_s);
+    }
+
+    #[test]
+    fn slow_noise_of_each_joint_is_no_delay() {
+        assert_eq!(told(|_| None), None);
     }
 }
