@@ -51,7 +51,7 @@ pub(super) static EFFECT: Effect = Effect {
         turns && closes && (LEAST_RAD..=LARGEST_RAD).contains(&x[0].hypot(x[1]))
     }),
     excitation: Excitation::Poses,
-    simulated: Simulated::No("the simulated controller reads the joint's true position"),
+    simulated: Simulated::Joint,
     concealed: Some(|draw| {
         let cycles = f64::from(draw.chance.whole(1, 2));
         let phase = draw.chance.between(-PI, PI);
