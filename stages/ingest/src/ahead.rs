@@ -232,7 +232,7 @@ mod tests {
                 out.emit(&mut |sample| sample.header.stamp_ns = self.sent)?;
             }
             match self.step {
-                step if step < self.last && step % 7 == 0 => Ok(Progress::Idle),
+                step if step < self.last && step.is_multiple_of(7) => Ok(Progress::Idle),
                 step if step < self.last => Ok(Progress::More),
                 _ if self.failing => Err(StageError::Unfit("torn".to_owned())),
                 _ => Ok(Progress::End),
