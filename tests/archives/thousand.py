@@ -94,7 +94,8 @@ class Runner:
     def kill_after(self, count):
         """`kill -9` as soon as there are so many results; whether it was still at work."""
         while self.process.poll() is None and len(results(self.out)) < count:
-            time.sleep(0.01)
+            # To list a large archive takes time, which the runners should have.
+            time.sleep(min(0.1, 0.0005 * count))
         at_work = self.process.poll() is None
         self.process.kill()
         self.process.wait()
