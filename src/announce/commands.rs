@@ -2,10 +2,8 @@
 
 use std::time::Duration;
 
-use tauscope_bus::command::LONGEST_MUTE_S;
-use tauscope_bus::{
-    Emit, JointState, LinkError, Progress, Source, StageError, Trouble, Verb, shell,
-};
+use tauscope_bus::command::MuteLease;
+use tauscope_bus::{Emit, JointState, LinkError, Progress, Source, StageError, Trouble, shell};
 
 /// What holds at a source while its cell is muted.
 pub const MUTED: &str = "muted";
@@ -23,8 +21,8 @@ struct Told {
     stage: String,
     /// Stamp of the first sample, from which times are counted \[ns\].
     start_ns: Option<i64>,
-    /// When the mute ends \[ns\], while there is one.
-    muted_until_ns: Option<i64>,
+    /// The mute, while there is one.
+    mute: Option<MuteLease>,
 }
 
 impl<S> Announced<S> {
@@ -82,7 +80,7 @@ impl Emit<JointState> for Listener<'_> {
 
 impl Told {
     fn is_muted(&self) -> bool {
-        self.muted_until_ns.is_some()
+        self.mute.is_some()
     }
 
     /// What is to be said of a sample.
@@ -90,14 +88,10 @@ impl Told {
         let now_ns = state.header.stamp_ns;
         let start_ns = *self.start_ns.get_or_insert(now_ns);
         let t = (now_ns - start_ns) as f64 * 1e-9;
-        let over = self.muted_until_ns.is_some_and(|until| now_ns >= until);
-        if over {
-            self.muted_until_ns = None;
-        }
+        let over = self.mute.take_if(|mute| !mute.holds(now_ns)).is_some();
         let command = &state.command;
-        if command.verb() == Some(Verb::Mute) {
-            let lease_ns = (command.value.clamp(0.0, LONGEST_MUTE_S) * 1e9) as i64;
-            self.muted_until_ns = (lease_ns > 0).then(|| now_ns.saturating_add(lease_ns));
+        if let Some(mute) = MuteLease::of(now_ns, command) {
+            self.mute = mute.holds(now_ns).then_some(mute);
         }
         let over = over.then(|| format!("{t:8.3} s  the mute is over"));
         let taken = command.in_words();
@@ -109,7 +103,7 @@ impl Told {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tauscope_bus::Command;
+    use tauscope_bus::{Command, Verb};
 
     #[test]
     fn a_mute_is_told_when_it_begins_and_when_it_ends() {
