@@ -1,7 +1,9 @@
-//! Tells the supervisor, and so people, which commands the source of a cell has taken, and when a mute ends.
+//! Tells the supervisor, and so people, which commands the source of a cell has taken, when a mute ends, and when its
+//! clock jumps.
 
 use std::time::Duration;
 
+use super::clock::Clock;
 use tauscope_bus::command::MuteLease;
 use tauscope_bus::{Emit, JointState, LinkError, Progress, Source, StageError, Trouble, shell};
 
@@ -23,6 +25,7 @@ struct Told {
     start_ns: Option<i64>,
     /// The mute, while there is one.
     mute: Option<MuteLease>,
+    clock: Clock,
 }
 
 impl<S> Announced<S> {
@@ -93,10 +96,12 @@ impl Told {
         if let Some(mute) = MuteLease::of(now_ns, command) {
             self.mute = mute.holds(now_ns).then_some(mute);
         }
+        let jump = self.clock.line(state);
+        let jump = jump.map(|words| format!("{t:8.3} s  {words}"));
         let over = over.then(|| format!("{t:8.3} s  the mute is over"));
         let taken = command.in_words();
         let taken = taken.map(|words| format!("{t:8.3} s  {words}"));
-        over.into_iter().chain(taken)
+        jump.into_iter().chain(over).chain(taken)
     }
 }
 
@@ -112,6 +117,7 @@ mod tests {
         for n in 0..5_i64 {
             let mut state = JointState::default();
             state.header.stamp_ns = 1_000_000_000 * n;
+            state.header.received_ns = state.header.stamp_ns;
             if n == 1 {
                 state.command = Command {
                     verb: Verb::Mute as u32,

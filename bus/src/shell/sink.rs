@@ -154,6 +154,9 @@ impl SinkShell<'_> {
             return Err(error);
         }
         context.board.ends();
+        if !self.report.inputs.iter().all(|input| input.ended) {
+            self.sink.cut_short();
+        }
         self.sink.finish()?;
         self.count();
         self.health.end(&self.report)?;
