@@ -277,6 +277,15 @@ pub trait Sample: Pod + Default + std::fmt::Debug + Send + Sync + ZeroCopySend +
     /// # Errors
     /// What is wrong with it.
     fn check(&self) -> Result<(), Unsound>;
+    /// Whether those who hear it are to have it at once, though more would be cheaper together: an alarm, or what
+    /// somebody told the pipeline.
+    fn is_urgent(&self) -> bool {
+        match self.as_ref() {
+            SampleRef::JointState(state) => state.command.verb != 0,
+            SampleRef::Detection(detection) => detection.event != 0 || detection.alarm(),
+            SampleRef::TwinState(_) | SampleRef::Health(_) => false,
+        }
+    }
 }
 
 /// A sample whose type is known at run time only.

@@ -271,7 +271,11 @@ impl Planner<'_> {
                     Over::Zenoh => SPILL_ACROSS_HOSTS_BYTES,
                     Over::InProcess | Over::SharedMemory => SPILL_BYTES,
                 },
-                linger_ms: if all_take { SPILL_LINGER_MS } else { 0 },
+                linger_ms: match over {
+                    Over::Zenoh => std::env::var("GATHER").ok().and_then(|v| v.parse().ok()).unwrap_or(10),
+                    _ if all_take => SPILL_LINGER_MS,
+                    _ => 0,
+                },
                 waits: self.source_can_wait(at),
             });
             (audience != Audience::default()).then_some(OutputLink {
