@@ -18,8 +18,10 @@ use crate::sample::{Sample, flags};
 /// Most bytes of one message: what fits into one batch of Zenoh, so that it is never split.
 /// Resolution: how much is sent twice after a loss.
 const MESSAGE_BYTES: usize = 48 << 10;
-/// Samples that those who keep the newest may miss before the oldest gives way.
-const NEWEST: usize = 16;
+/// Samples that wait for those who keep the newest before the oldest gives way; half of them go out without waiting for
+/// more.
+/// Resolution: memory, against how often a message goes out.
+const NEWEST: usize = 64;
 /// How often it is looked for what did not arrive.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
