@@ -19,6 +19,7 @@ use tauscope_pipeline::results::{
     Done, Folder, Identity, Manifest, Shelf, Unit, UnitError, Wanted,
 };
 
+use super::prepared;
 use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::Output;
@@ -113,7 +114,7 @@ pub fn run(job: &Job<'_>, pipeline: &Pipeline, out: &mut Output) -> Result<Exit,
         Some(Shard { index, of }) => manifest.shard(index, of),
         None => manifest,
     };
-    let replays = replays(pipeline, &manifest, job.twin)?;
+    let replays = replays(job, pipeline, &manifest)?;
     let identity = Identity::of(pipeline, job.twin, job.with_scores)?;
     let shelf = Folder::open(&folder(job.out)?).with_context(|| job.out.to_owned())?;
     let hold = interrupt::hold();
@@ -155,15 +156,15 @@ pub fn run(job: &Job<'_>, pipeline: &Pipeline, out: &mut Output) -> Result<Exit,
 
 /// A replay for each source that the manifest names.
 fn replays<'a>(
+    job: &Job<'_>,
     pipeline: &'a Pipeline,
     manifest: &Manifest,
-    twin: TwinChoice,
 ) -> Result<BTreeMap<Option<String>, Replay<'a>>, Failure> {
     let mut replays = BTreeMap::new();
     for wanted in &manifest.wanted {
         if !replays.contains_key(&wanted.source) {
-            let replay = Replay::new(pipeline, wanted.source.as_deref(), twin)
-                .map_err(|error| Failure::rejected(error.to_string()))?;
+            let source = wanted.source.as_deref();
+            let replay = prepared(pipeline, source, job.twin, job.jobs)?;
             replays.insert(wanted.source.clone(), replay);
         }
     }
