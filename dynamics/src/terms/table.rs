@@ -165,7 +165,8 @@ impl Table {
             Against::Position => format!("{of} position"),
             Against::Velocity => format!("{of} velocity"),
             Against::Acceleration => format!("{of} acceleration"),
-            Against::Load => "its load".to_owned(),
+            Against::Load if self.of_joint == joint => "its load".to_owned(),
+            Against::Load => format!("{of} load"),
             Against::DrivenLoad => {
                 "its load, and on whether the joint drives the load or the load the joint".to_owned()
             }

@@ -63,6 +63,11 @@ pub fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
         };
         let velocity = even(Against::Velocity, of_joint, KNOTS);
         add(Against::Velocity, of_joint, velocity, signs);
+        // A bearing that another joint's load bends or presses rubs more.
+        if of_joint != joint {
+            let load = even(Against::Load, of_joint, KNOTS);
+            add(Against::Load, of_joint, load, &[true]);
+        }
     }
     for (against, count) in [
         (Against::Position, MANY_KNOTS),

@@ -4,7 +4,7 @@ use crate::data::effective_samples;
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Hypothesis, TimeKind};
 use crate::select::cross_validation::carries_over;
-use crate::select::evidence::{LEAST_EVIDENCE, REFINED, matters, needs, overwhelming};
+use crate::select::evidence::{LEAST_EVIDENCE, LEAST_GAIN, REFINED, matters, needs, overwhelming};
 use crate::select::explanation::{Explanation, describe};
 use crate::select::parallel;
 use crate::select::plausible::{is_timely, plausible};
@@ -21,6 +21,31 @@ const REFINED_UNLISTED: usize = 2;
 /// Tuned: by hand, for what it costs in time; not swept.
 const MOST_PIECES: usize = 48;
 
+/// An explanation that the search has come by.
+struct Seen {
+    hypotheses: Vec<Hypothesis>,
+    likelihood: f64,
+}
+
+impl Seen {
+    fn of(explanation: &Explanation) -> Self {
+        let actives = explanation.fit.actives.iter();
+        Self {
+            hypotheses: actives.map(|active| active.hypothesis).collect(),
+            likelihood: explanation.fit.likelihood(),
+        }
+    }
+
+    /// Whether it has the effects of an `earlier` one and explains no more: then the search goes in circles.
+    fn repeats(&self, earlier: &Self) -> bool {
+        let count = |all: &[Hypothesis], one: &Hypothesis| all.iter().filter(|h| *h == one).count();
+        let as_many = |h: &Hypothesis| count(&self.hypotheses, h) == count(&earlier.hypotheses, h);
+        self.hypotheses.len() == earlier.hypotheses.len()
+            && self.hypotheses.iter().all(as_many)
+            && self.likelihood < earlier.likelihood + LEAST_GAIN
+    }
+}
+
 impl Search<'_> {
     /// Adds effects while there is evidence for more.
     pub fn forward(&self, mut best: Explanation) -> Explanation {
@@ -32,8 +57,9 @@ impl Search<'_> {
                 .count()
         };
         let all: Vec<usize> = (0..self.problem.joints).collect();
-        // An effect that was added and removed again would be added without end.
+        // An effect that was added and removed again would be added without end, and so would several in turn.
         let mut barred: Vec<Hypothesis> = Vec::new();
+        let mut seen = vec![Seen::of(&best)];
         while pieces(&best) < MOST_PIECES {
             let mut proposals = self.proposals(&best.fit, &all);
             proposals.retain(|p| !barred.contains(&p.active.hypothesis));
@@ -51,9 +77,12 @@ impl Search<'_> {
                 self.problem.effective_samples.clone()
             };
             let evident = next.ahead_of(&best, &effective) >= LEAST_EVIDENCE;
-            if !evident && (once || !overwhelming(&next, &best)) {
+            let now = Seen::of(&next);
+            let is_old = seen.iter().any(|seen| now.repeats(seen));
+            if is_old || !evident && (once || !overwhelming(&next, &best)) {
                 barred.extend(new);
             } else {
+                seen.push(now);
                 best = next;
             }
         }
@@ -154,6 +183,19 @@ fn to_refine<'a>(promising: &[&'a Proposal]) -> Vec<&'a Proposal> {
 mod tests {
     use super::*;
     use crate::fixture::at_joint;
+
+    #[test]
+    fn the_same_effects_that_explain_no_more_are_a_circle_in_any_order() {
+        let seen = |effects: &[&str], likelihood: f64| Seen {
+            hypotheses: effects.iter().map(|name| at_joint(name, 0)).collect(),
+            likelihood,
+        };
+        let earlier = seen(&["coulomb_friction", "torque_bias"], 100.0);
+        assert!(seen(&["torque_bias", "coulomb_friction"], 100.1).repeats(&earlier));
+        assert!(!seen(&["torque_bias", "coulomb_friction"], 120.0).repeats(&earlier));
+        assert!(!seen(&["torque_bias"], 90.0).repeats(&earlier));
+        assert!(!seen(&["torque_bias", "torque_bias"], 90.0).repeats(&earlier));
+    }
 
     #[test]
     fn effects_that_the_list_lacks_do_not_crowd_out_those_of_the_list() {

@@ -1,7 +1,7 @@
 //! What is told of remainders.
 
 use super::*;
-use crate::fixture::{Noise, model, problem, recording};
+use crate::fixture::{Noise, at_joint, model, problem, recording};
 
 /// What is said of recordings of two joints in which `add` is added to the first joint's effort, given the number of
 /// the recording, its sample and the joint's position. The last recording is held out.
@@ -26,6 +26,11 @@ fn remainders(mut add: impl FnMut(u64, usize, f64) -> f64) -> Remainders {
 }
 
 fn of_all(found: Left<'_>, held: Left<'_>, before: &Fit, joints: &[String]) -> Remainders {
+    let uncorrected = Fit::new(held.problem, before.actives.clone());
+    let before = Before {
+        fit: before,
+        held: Some(&uncorrected),
+    };
     of(found, before, Some(held), &[1.0, 1.0], joints, "N m")
 }
 
@@ -93,4 +98,28 @@ fn knocks_are_told_with_their_time() {
     let found = remainders(|_, k, _| if knocked(k) { 9.0 } else { 0.0 });
     let said = &found.all[0].sentence;
     assert!(said.contains("stands out for moments"), "{said}");
+}
+
+#[test]
+fn a_correction_that_makes_held_out_recordings_worse_is_told() {
+    let model = model();
+    let mut noise = Noise(13);
+    // The friction that was fitted is not there on the held-out recording.
+    let mut of = |seed: u64| {
+        recording(&model, seed, |_, qd, effort| {
+            effort[0] += if seed < 4 { 2.0 * qd[0] } else { 0.0 } + 0.05 * noise.next();
+            effort[1] += 0.05 * noise.next();
+        })
+    };
+    let fitted = problem(&model, &[of(1), of(2), of(3)]);
+    let held = problem(&model, &[of(4)]);
+    let before = Fit::new(&fitted, Vec::new());
+    let friction = at_joint("viscous_friction", 0).with(vec![2.0]);
+    let here = Fit::new(&fitted, vec![friction.clone()]);
+    let there = Fit::new(&held, vec![friction]);
+    let joints = ["shoulder".to_owned(), "elbow".to_owned()];
+    let left = |problem, fit| Left { problem, fit };
+    let found = of_all(left(&fitted, &here), left(&held, &there), &before, &joints);
+    let said = &found.all[0].sentence;
+    assert!(said.contains("worse than the twin as it was"), "{said}");
 }

@@ -1,0 +1,61 @@
+//! What the remainder of a joint goes with, if it follows the motion.
+
+use crate::fit::fitted::Fit;
+use crate::report::history;
+use crate::report::swell::swells;
+use crate::select::evidence::PATCH;
+use crate::select::propose::Base;
+use crate::select::prune::HIDDEN;
+
+use super::{Left, clock_s, rms_rate};
+
+/// Share of that by which stamps are wrong as root mean square, where the error may follow the motion.
+/// Statistical: a stamp anywhere within its sample is off by 0.29 of it.
+const CLOCK_SHARE: f64 = 0.29;
+
+/// What the remainder of a joint goes with, if it follows the motion.
+pub(super) fn follows_motion(found: Left<'_>, before: &Fit, joint: usize) -> Option<String> {
+    let (problem, fit) = (found.problem, found.fit);
+    if fit.squares[joint] <= 0.0 || problem.tracks.len() < 2 {
+        return None;
+    }
+    let names: Vec<String> = problem.model.joint_names().map(str::to_owned).collect();
+    // What effects are known to do is not known to the last percent.
+    let known = (before.squares[joint] - fit.squares[joint]).max(0.0);
+    let hidden = HIDDEN * problem.unfiltered_noise[joint];
+    let is_worth_telling = |share: f64| {
+        let is_seen = share.sqrt() * found.rms(joint) >= hidden;
+        is_seen && share * fit.squares[joint] >= PATCH * known
+    };
+    let told = |on: &str, by: &str, share: f64| {
+        format!(
+            "what remains depends on {on}, and {by} of that predicts {:.0} % of its square in recordings that it was not fitted on.",
+            100.0 * share
+        )
+    };
+    let curve = Base::new(problem, fit, 1).propose_curve(joint);
+    let of_curve = curve.and_then(|curve| {
+        let share = curve.carried.filter(|_| curve.repeats)?;
+        let on = curve.active.curve.as_ref()?.depends_on(joint, &names);
+        is_worth_telling(share).then(|| told(&on, "a curve", share))
+    });
+    let of_arm = !problem.is_foreign;
+    // Errors of clocks and derivatives follow the motion, too.
+    let cost = || {
+        let rows = found.rows(joint);
+        CLOCK_SHARE * clock_s(&problem.tracks[0].track.time_s) * rms_rate(&rows)
+    };
+    let of_history = || {
+        let history = history::predicts(problem, fit, joint, &names).filter(|_| of_arm)?;
+        let is_more =
+            history.share.sqrt() * found.rms(joint) > cost().max(problem.white_noise[joint]);
+        (is_more && is_worth_telling(history.share))
+            .then(|| told(&history.on, "a sum", history.share))
+    };
+    let of_size = || {
+        let swell = swells(problem, fit, joint, &names).filter(|_| of_arm)?;
+        let is_told = found.rms(joint) > cost() && is_worth_telling(swell.share);
+        is_told.then(|| format!("it is larger {}, in recordings left out, too.", swell.when))
+    };
+    of_curve.or_else(of_history).or_else(of_size)
+}

@@ -1,0 +1,61 @@
+"""Makes every figure of docs/proof.md, and writes its tables between their marks.
+
+    python3 tests/proof/all.py [--only committed,coverage] [--out out/all] [--docs docs/proof.md]
+
+Needs requirements.txt. What is in `--out` already is not made again, so a part that was stopped goes on where it was. The
+whole takes some ten hours of one core; `--only committed,first_sight,first_sight_beside,nulls` half an hour.
+"""
+import argparse
+import pathlib
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "benches"))
+import performance
+
+PROGRAM = "target/release/tauscope"
+# By name: the command, in which OUT is the folder of its results. All print Markdown; --table would make nothing.
+PARTS = {
+    "committed": "tests/proof/prove.sh tests/proof/set OUT",
+    "first_sight": "python3 tests/proof/first_sight.py PROGRAM OUT --seed 41",
+    "first_sight_beside": "python3 tests/proof/first_sight.py PROGRAM OUT --seed 42 --beside friction,bodies",
+    "first_sight_topic": "python3 tests/proof/first_sight.py PROGRAM OUT --seed 43 --twin-topic --nulls 2 --kinds gear_hums_at_a_speed,"
+                         "hose_round_the_joint,grease_to_be_parted,dent_in_a_race,field_weakening,offset_by_heat,contact_is_lost,rubs_now_and_then",
+    "nulls": "python3 tests/proof/first_sight.py PROGRAM OUT --seed 41 --kinds '' --nulls 6",
+    "named": "python3 tests/proof/named.py PROGRAM OUT --count 5 --beside friction,bodies",
+    "faults": "python3 tests/proof/faults.py PROGRAM OUT --seed 611",
+    "slips": "python3 tests/proof/slips.py PROGRAM OUT --seed 501 --count 2",
+    "changed": "python3 tests/proof/changed.py PROGRAM OUT --seed 21 --count 8",
+    "coverage": "python3 tests/proof/coverage.py PROGRAM OUT --cases 102 --count 3 --first 7001",
+    "reliability": "python3 tests/proof/reliability.py PROGRAM OUT --first 6001 --cases 300 --half odd --svg docs/reliability.svg",
+}
+# What prints lines that are no Markdown.
+TEXT = {"coverage", "slips"}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", default="", help="of the parts, separated by commas: " + ", ".join(PARTS))
+    parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/all"))
+    parser.add_argument("--docs", type=pathlib.Path, default=ROOT / "docs" / "proof.md")
+    args = parser.parse_args()
+    only = [name for name in args.only.split(",") if name] or list(PARTS)
+    if unknown := set(only) - set(PARTS):
+        sys.exit(f"no such part: {', '.join(sorted(unknown))}")
+    subprocess.run(["cargo", "build", "--release", "--locked", "--quiet"], cwd=ROOT, check=True)
+    for name in only:
+        command = PARTS[name].replace("PROGRAM", PROGRAM).replace("OUT", str(args.out / name))
+        print(f"{name}: {command}", file=sys.stderr)
+        figures = finished(performance.measured(command, "text" if name in TEXT else "table"))
+        args.docs.write_text(performance.put(args.docs.read_text(), name, figures))
+
+
+def finished(markdown):
+    """Figures without the lines that tell how far a run is, which come before the first table."""
+    head, table, rest = markdown.partition("\n|")
+    return head.split("\n")[0] + "\n\n" + (table + rest).lstrip() if table else markdown
+
+
+if __name__ == "__main__":
+    main()
