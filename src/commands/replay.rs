@@ -115,7 +115,7 @@ fn of_each(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         };
         return archive::run(&job, &pipeline, out);
     }
-    let replay = prepared(&pipeline, args.source.as_deref(), args.twin, args.jobs)?;
+    let replay = archive::prepared(&pipeline, args.source.as_deref(), args.twin, args.jobs)?;
     for stage in replay.left_out() {
         out.say(&format!(
             "note: stage `{stage}` is a program of its own and not replayed; `tauscope run` runs it"
@@ -141,9 +141,7 @@ fn of_each(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         match result {
             Ok(outcome) => outcomes.push(outcome),
             Err(ReplayError::Interrupted) => interrupted = true,
-            Err(error) if error.is_input() => {
-                wrong.push((recording, error.to_string()));
-            }
+            Err(error) if error.is_input() => wrong.push((recording, error.to_string())),
             Err(error) => {
                 let why = without_path(recording, error.to_string());
                 out.say(&format!("error: {}: {why}", recording.display()));
@@ -217,18 +215,6 @@ fn check_names(args: &Args) -> Result<(), Report> {
         }
     }
     report.into_result(())
-}
-
-/// A replay of which so many run at once.
-fn prepared<'a>(
-    pipeline: &'a Pipeline,
-    source: Option<&str>,
-    twin: TwinChoice,
-    jobs: u16,
-) -> Result<Replay<'a>, Failure> {
-    let replay = Replay::new(pipeline, source, twin);
-    let replay = replay.map_err(|error| Failure::rejected(error.to_string()))?;
-    Ok(replay.reading_ahead(parallel::has_spare_core(usize::from(jobs))))
 }
 
 /// The result of each recording, in their order, whatever the number of jobs.

@@ -19,7 +19,6 @@ use tauscope_pipeline::results::{
     Done, Folder, Identity, Manifest, Shelf, Unit, UnitError, Wanted,
 };
 
-use super::prepared;
 use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::Output;
@@ -152,6 +151,18 @@ pub fn run(job: &Job<'_>, pipeline: &Pipeline, out: &mut Output) -> Result<Exit,
         Exit::Failed
     };
     Ok(Exit::from_loss(summary.lossy > 0).and(failed))
+}
+
+/// A replay of which so many run at once.
+pub fn prepared<'a>(
+    pipeline: &'a Pipeline,
+    source: Option<&str>,
+    twin: TwinChoice,
+    jobs: u16,
+) -> Result<Replay<'a>, Failure> {
+    let replay = Replay::new(pipeline, source, twin);
+    let replay = replay.map_err(|error| Failure::rejected(error.to_string()))?;
+    Ok(replay.reading_ahead(parallel::has_spare_core(usize::from(jobs))))
 }
 
 /// A replay for each source that the manifest names.
