@@ -170,21 +170,32 @@ fn of_each(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     if interrupted {
         return Err(Failure::Interrupted(how_far(args, outcomes.len())));
     }
-    if outcomes.is_empty() && failed.is_none() {
-        let mut report = Report::default();
-        for (recording, why) in wrong {
+    let others = !outcomes.is_empty() || failed.is_some();
+    let refused = tell_refused(wrong, others, out)?;
+    let lossy = outcomes.iter().any(|outcome| outcome.lost > 0);
+    Ok(Exit::from_loss(lossy)
+        .and(refused)
+        .and(failed.unwrap_or(Exit::Done)))
+}
+
+/// Tells what is wrong with recordings: as a refusal if nothing came of any, else beside the results of the others.
+fn tell_refused(
+    wrong: Vec<(&PathBuf, String)>,
+    others: bool,
+    out: &mut Output,
+) -> Result<Exit, Report> {
+    let mut report = Report::default();
+    let mut exit = Exit::Done;
+    for (recording, why) in wrong {
+        if others {
+            let why = without_path(recording, why);
+            out.say(&format!("error: {}: {why}", recording.display()));
+            exit = Exit::Rejected;
+        } else {
             report.push(Problem::of_file(recording, why));
         }
-        report.into_result(())?;
-        return Ok(Exit::Done);
     }
-    for (recording, why) in wrong {
-        let why = without_path(recording, why);
-        out.say(&format!("error: {}: {why}", recording.display()));
-        failed = Some(failed.unwrap_or(Exit::Rejected).and(Exit::Rejected));
-    }
-    let lossy = outcomes.iter().any(|outcome| outcome.lost > 0);
-    Ok(Exit::from_loss(lossy).and(failed.unwrap_or(Exit::Done)))
+    report.into_result(exit)
 }
 
 fn how_far(args: &Args, done: usize) -> String {

@@ -8,7 +8,7 @@ use tauscope_archive::whole_file;
 use tauscope_explain::report::{MOTION_PREFIX, Verdict};
 use tauscope_explain::{Outcome, html};
 
-use super::input::{Named, Request};
+use super::input::Request;
 use super::read::Kept;
 use super::{picture, provenance_of, robot, twin, write_whole};
 use crate::existing::Force;
@@ -117,20 +117,15 @@ pub fn write(
     let urdf = is_handed_out.then(|| robot_text(request, kept, outcome, &mut made));
     let urdf = urdf.flatten();
     let shown = |path: &Path| path.display().to_string();
-    // Without recordings to hold out, some of those to fit were held out.
-    let predicted = &outcome.report.holdout_predictions;
-    let recordings = request.fit.iter().chain(&request.holdout);
-    let (held_out, fitted): (Vec<&Named>, Vec<&Named>) =
-        recordings.partition(|named| predicted.contains_key(&named.name));
-    let all = |recordings: Vec<&Named>| recordings.iter().map(|named| shown(&named.path)).collect();
+    let (holdout, fit) = parted(request, &outcome.report.holdout_predictions);
     let around = html::Around {
         date: today(),
         provenance,
         model: kept.bodies.then_some(&kept.model),
         robot: request.robot_path.as_deref().map(shown),
         start: request.start.as_ref().map(|start| shown(&start.path)),
-        fit: all(fitted),
-        holdout: all(held_out),
+        fit,
+        holdout,
         twin: twin.is_some().then(|| pasted(out, TWIN)),
         corrected_robot: urdf.is_some().then(|| pasted(out, ROBOT)),
     };
@@ -160,6 +155,21 @@ pub fn write(
     }
     made.files.append(&mut predictions);
     Ok(made)
+}
+
+/// The recordings that were held out, and those that were fitted. Where none are given to hold out, some of those to
+/// fit were.
+fn parted(request: &Request, predicted: &BTreeMap<String, String>) -> (Vec<String>, Vec<String>) {
+    let (mut holdout, mut fit) = (Vec::new(), Vec::new());
+    for named in request.fit.iter().chain(&request.holdout) {
+        let part = if predicted.contains_key(&named.name) {
+            &mut holdout
+        } else {
+            &mut fit
+        };
+        part.push(named.path.display().to_string());
+    }
+    (holdout, fit)
 }
 
 /// The day, as ISO 8601 writes it, in UTC.

@@ -8,6 +8,7 @@
 mod differentiate;
 mod gather;
 mod layout;
+mod order;
 mod outcome;
 mod side;
 
@@ -21,13 +22,10 @@ use crate::setup::{Setup, Tool};
 use differentiate::Differentiator;
 use gather::{Gather, Gathered, stamp_of};
 use layout::Layouts;
+use order::{Next, Order};
 pub use outcome::{PackCounts, PackError};
 use side::Side;
 
-/// A stamp this far behind the one before is a clock that was set back; anything less is a message
-/// that came too late.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const JUMP_BACK_NS: i64 = 500_000_000;
 /// Samples that wait for their command at most.
 /// Resolution: memory; about 1 s at 1 kHz.
 const MAX_PENDING: usize = 1024;
@@ -68,9 +66,7 @@ pub struct Packer {
     /// Commands of a recording that no sample has taken yet.
     told: VecDeque<tauscope_bus::Command>,
     pending: VecDeque<JointState>,
-    newest_ns: Option<i64>,
-    /// Position and effort of the newest state.
-    newest: [JointArray; 2],
+    order: Order,
     flushed: bool,
     messages: u64,
     counts: PackCounts,
@@ -120,8 +116,7 @@ impl Packer {
             learning_asked: false,
             told: VecDeque::new(),
             pending: VecDeque::new(),
-            newest_ns: None,
-            newest: [[0.0; MAX_JOINTS]; 2],
+            order: Order::default(),
             flushed: false,
             messages: 0,
             counts: PackCounts::default(),
@@ -323,28 +318,17 @@ impl Packer {
     fn sample(&mut self, whole: &Gathered, received_ns: i64) {
         let mut flags = flags::EFFORT_MEASURED * u32::from(whole.has_effort)
             + flags::VELOCITY_MEASURED * u32::from(whole.has_velocity);
-        match self.newest_ns.map(|newest| whole.stamp_ns - newest) {
-            Some(0) if self.newest == [whole.position, whole.effort] => {
-                self.counts.repeated += 1;
-                return;
-            }
-            Some(0) => {
-                self.counts.stalled += 1;
-                return;
-            }
-            Some(step) if step < -JUMP_BACK_NS => {
+        match self.order.next(whole) {
+            Next::Follows => {}
+            Next::SetBack => {
                 self.counts.resets += 1;
                 self.state_velocity.reset();
                 flags |= flags::RESET;
             }
-            Some(step) if step < 0 => {
-                self.counts.late += 1;
-                return;
-            }
-            _ => {}
+            Next::Late => return self.counts.late += 1,
+            Next::Repeated => return self.counts.repeated += 1,
+            Next::Stalled => return self.counts.stalled += 1,
         }
-        self.newest_ns = Some(whole.stamp_ns);
-        self.newest = [whole.position, whole.effort];
         let differentiated = self.state_velocity.update(
             whole.stamp_ns,
             &whole.position,
