@@ -32,7 +32,7 @@ fn comes<T: Sample>(receiver: &mut dyn Receiver<T>, begin: Instant) -> Duration 
 }
 
 /// The first sample is heard at once, so that the ends know each other; the next has been sent since.
-fn waits_but_for_an_alarm(transports: [&impl Transport; 2]) {
+fn waits_but_for_an_alarm(transports: [&(impl Transport + Sync); 2]) {
     let [sending, receiving] = transports;
     let audience = Audience::of(Keep::Newest, 1);
     let mut sender: Box<dyn Sender<Detection>> = sending.sender("c/detect", audience).unwrap();

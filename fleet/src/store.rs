@@ -182,6 +182,20 @@ impl Store {
             .busy_timeout(if waits { WAIT } else { Duration::ZERO });
     }
 
+    /// Holds the file against all others.
+    #[cfg(test)]
+    pub fn hold(&self) -> Result<(), StoreError> {
+        let held = self.connection.execute_batch("BEGIN EXCLUSIVE;");
+        held.map_err(|error| self.failed(error))
+    }
+
+    /// Lets it go.
+    #[cfg(test)]
+    pub fn release(&self) -> Result<(), StoreError> {
+        let released = self.connection.execute_batch("COMMIT;");
+        released.map_err(|error| self.failed(error))
+    }
+
     /// Looks whether the file can be written.
     ///
     /// # Errors

@@ -219,7 +219,6 @@ def kill(program, folder, victim, times, seconds):
     lost = balance(summary)
     check(code == (3 if lost else 0), "exit code", code, "with", lost, "lost")
     slowest, load = max(took)
-    check(slowest < BACK_S * slack, f"{victim} had samples again after {slowest:.2f} s, at a load of {load:.1f}")
     whole = seconds * 1000
     check(abs(emitted(summary, "ingest") - whole) <= 2, emitted(summary, "ingest"), "of", whole, "samples emitted")
     undisturbed(summary, victim)
@@ -238,6 +237,8 @@ def kill(program, folder, victim, times, seconds):
     if victim == "record":
         told += f"; of a stream {unkept / times:.0f} samples a kill were taken and not kept; "
         told += repaired(program, folder, counts)
+    # At last, so that it is known what else holds on a machine that is too busy.
+    check(slowest < BACK_S * slack, "too late:", told)
     return told
 
 

@@ -13,7 +13,7 @@ seconds=${1:-1800}
 targets=("$@")
 [ ${#targets[@]} -gt 0 ] || targets=($(ls tests/fuzz/corpus))
 
-# Coverage for our own crates alone, so that the others need not be built again; optimised, for ten times the inputs.
+# Coverage for our own crates alone, so that the others need not be built again; optimised.
 wrapper=$PWD/tests/fuzz/instrument.sh
 RUSTC_WORKSPACE_WRAPPER=$wrapper ${CARGO:-cargo} build --release --workspace --bin fuzz --locked --features tauscope-fuzz/libfuzzer
 out=$PWD/target/fuzz

@@ -112,3 +112,43 @@ impl Keeping {
         });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture;
+    use crate::store::Store;
+    use tauscope_publish::message::Record;
+
+    #[test]
+    fn what_happens_while_somebody_holds_the_file_is_kept_later_and_the_wall_goes_on() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("fleet.sqlite");
+        let mut keeping = Keeping::new(Keeper::new(Store::open(&path).unwrap()));
+        let (wall, other) = (Wall::new(std::iter::empty()), Store::open(&path).unwrap());
+        let contact = |number| Effect::Recorded {
+            cell: "a".to_owned(),
+            instance: "x".to_owned(),
+            told_ns: 6_000_000_000,
+            record: Record::Contact(fixture::contact(number, 5)),
+        };
+        keeping.keep(&wall, contact(1), 0);
+        other.hold().unwrap();
+        let begin = Instant::now();
+        (2..10).for_each(|number| keeping.keep(&wall, contact(number), 0));
+        // It waits for the other one once, and not for each.
+        assert!(begin.elapsed() < Duration::from_secs(6), "{begin:?}");
+        let mut snapshot = wall.snapshot();
+        keeping.tick(&wall, &mut snapshot);
+        let why = snapshot.unkept.take().unwrap();
+        assert!(why.contains("another program holds it"), "{why}");
+        other.release().unwrap();
+        while keeping.failing.is_some() {
+            assert!(begin.elapsed() < Duration::from_mins(1));
+            keeping.tick(&wall, &mut snapshot);
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        assert_eq!((snapshot.unkept, keeping.lost), (None, 0));
+        assert_eq!(other.contacts("a", 100).unwrap().len(), 9);
+    }
+}

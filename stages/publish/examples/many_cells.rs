@@ -43,7 +43,7 @@ impl Cell {
             stop_after_s: 5.0,
             ..Config::default()
         };
-        let stream = |stage: &str, kind, judges_contact| StreamInfo {
+        let stream = |stage: &str, kind, judges_contact: bool| StreamInfo {
             stage: stage.to_owned(),
             kind,
             detector: judges_contact.then(|| "made_up".to_owned()),
