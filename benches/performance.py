@@ -28,6 +28,7 @@ PARTS = {
     "apart": ("python3 benches/cells.py target/release/tauscope 50 --processes cell", "table"),
     "links": (f"{BENCH} -p tauscope-bus --bench link_latency", "text"),
     "live": (f"{BENCH} --bench live", "table"),
+    "commands": ("python3 benches/commands.py target/release/tauscope", "table"),
 }
 # What stands in a folder of its own may need what is not there.
 OUTSIDE = {"pinocchio": ("benches/pinocchio/run.sh", "table"), "dora": ("benches/dora/run.sh", "table")}

@@ -87,6 +87,7 @@ fn main() {
         bare = bare.min(seconds(|| bare_read(&recording)));
         for ((_, pipeline, out), least) in cases.iter().zip(&mut least) {
             let replay = Replay::new(pipeline, None, TwinChoice::Recompute).expect("one source");
+            let replay = replay.reading_ahead(true);
             let took = seconds(|| {
                 let outcome = replay.run(&recording, *out, &mut |_| true);
                 black_box(outcome.expect("the recording"));

@@ -1,5 +1,6 @@
 //! Tells the supervisor, and so people, what a detector or a watch finds, as it finds it.
 
+mod clock;
 pub mod commands;
 
 use tauscope_bus::shell;

@@ -4,6 +4,9 @@
 //! is unfinished, says how far it got, and leaves with exit code 1. A command that has something to bring to its end,
 //! or that writes right now, takes a [`Hold`]: then the signal is only noted, the command asks for it ([`is_asked`])
 //! between its steps and says itself how far it got. A second signal ends it in any case.
+//!
+//! A command whose files are of use only together has an [`Undo`]: what it has written is taken away again where the
+//! command fails, and where a signal ends it.
 
 use std::io;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -24,14 +27,15 @@ static STATE: Mutex<State> = Mutex::new(State {
     holds: 0,
     held: false,
     doing: String::new(),
+    undo: None,
 });
 
-#[derive(Debug)]
 struct State {
     holds: usize,
     /// Somebody has brought something to its end before.
     held: bool,
     doing: String,
+    undo: Option<Box<dyn FnOnce() + Send>>,
 }
 
 /// From now on signals end the program in order.
@@ -96,10 +100,34 @@ impl Drop for Hold {
     }
 }
 
+/// Takes away what was written, unless it is kept.
+#[derive(Debug)]
+pub struct Undo(());
+
+/// `take_away` runs if the result is dropped, and if a signal ends the program before. There is one at a time.
+pub fn undo(take_away: impl FnOnce() + Send + 'static) -> Undo {
+    state().undo = Some(Box::new(take_away));
+    Undo(())
+}
+
+impl Undo {
+    /// All is written, and stays.
+    pub fn keep(&self) {
+        state().undo = None;
+    }
+}
+
+impl Drop for Undo {
+    fn drop(&mut self) {
+        let take_away = state().undo.take();
+        take_away.into_iter().for_each(|take_away| take_away());
+    }
+}
+
 fn ask() {
     let again = ASKED.swap(true, Ordering::Relaxed);
     // Nothing else begins from here on: whoever wants to hold now waits for the end.
-    let state = state();
+    let mut state = state();
     if state.holds > 0 && !again {
         return;
     }
@@ -112,7 +140,10 @@ fn ask() {
     if !state.doing.is_empty() {
         far += &format!(" ({})", state.doing);
     }
-    let left = if state.holds > 0 || state.held {
+    let left = if let Some(take_away) = state.undo.take() {
+        take_away();
+        "; what was written is removed"
+    } else if state.holds > 0 || state.held {
         "; what is there is whole, what was unfinished is removed"
     } else {
         "; no result was written"

@@ -294,3 +294,24 @@ fn the_command_line_of_the_cluster_jobs_is_one_that_the_program_takes() {
     let done = Out::of(command);
     assert_eq!(done.code, 0, "{}{}", done.stdout, done.stderr);
 }
+
+/// The short form of `tests/archives/thousand.py`; the long one replays 1,000 recordings, and asks a cluster.
+#[test]
+fn an_archive_whose_runners_are_killed_and_meet_ends_with_the_same_files() {
+    let test = "an_archive_whose_runners_are_killed_and_meet_ends_with_the_same_files";
+    if Command::new("python3").arg("--version").output().is_err() {
+        return common::skipped(test, "python3 is absent");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = Command::new("python3");
+    command.arg(root().join("tests/archives/thousand.py"));
+    command
+        .arg(env!("CARGO_BIN_EXE_tauscope"))
+        .arg(folder.path());
+    command.args(["--recordings", "24", "--seconds", "4"]);
+    let out = Out::of(command);
+    assert_eq!(out.code, 0, "{}{}", out.stdout, out.stderr);
+    let demands = out.stdout.lines().filter(|line| line.starts_with("ok  "));
+    // Its memory may be too short-lived to be seen.
+    assert!(demands.count() >= 12, "{}", out.stdout);
+}

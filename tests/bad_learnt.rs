@@ -92,7 +92,7 @@ fn what_was_learnt_at_another_rate_ends_a_replay_and_a_run_and_is_not_started_ag
     let folder = tempfile::tempdir().unwrap();
     let (arm, slow) = (arm(), slow(folder.path()));
     let file = pipeline(&arm, &slow, None).write(folder.path(), str::to_owned);
-    let said = "it has learnt from 100.0 samples a second, and here are 50.0: let `tauscope evaluate` train it";
+    let said = "it has learnt from 100.0 samples a second, and here are 50.0: let `tauscope init` or `tauscope evaluate` learn";
     let replayed = replay(&file, &slow, &folder.path().join("replayed"));
     assert_eq!(replayed.code, 1, "{}", replayed.stderr);
     assert!(replayed.stderr.contains(said), "{}", replayed.stderr);

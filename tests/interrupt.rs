@@ -205,6 +205,30 @@ stages:
 }
 
 #[test]
+fn init_takes_away_what_it_has_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let cell = folder.path().join("cell");
+    let mut init = tauscope();
+    init.arg("init").arg("--out").arg(&cell);
+    init.arg("--robot").arg(bundled().join("demo_arm.urdf"));
+    for recording in [
+        "demo_train_points.mcap",
+        "demo_train_sweep.mcap",
+        "demo_validation.mcap",
+    ] {
+        init.arg(bundled().join(recording));
+    }
+    // The twin is explained by then, and the detector learns.
+    let said = interrupted(init, "INT", || cell.join("set.yaml").exists());
+    assert_eq!(said.code, 1, "{said:?}");
+    assert!(
+        said.stderr.contains("what was written is removed"),
+        "{said:?}"
+    );
+    assert!(!cell.exists(), "{:?}", files(&cell));
+}
+
+#[test]
 fn a_stage_that_does_not_end_is_named_and_killed() {
     let folder = tempfile::tempdir().unwrap();
     let text = format!(

@@ -10,8 +10,10 @@ use serde::{Deserialize, Serialize};
 use crate::sample::{Command, Name, Verb};
 
 mod ask;
+mod mute;
 
 pub use ask::{AskError, ask, ask_signed};
+pub use mute::MuteLease;
 
 /// The longest lease of a mute \[s\].
 pub const LONGEST_MUTE_S: f64 = 60.0;

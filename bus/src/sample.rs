@@ -256,6 +256,11 @@ impl SampleKind {
             Self::Health => "tauscope/Health/1",
         }
     }
+
+    /// Whether a stream of this kind may hold an alarm.
+    pub fn may_alarm(self) -> bool {
+        self == Self::Detection
+    }
 }
 
 /// A type that can travel on a link.
@@ -277,6 +282,10 @@ pub trait Sample: Pod + Default + std::fmt::Debug + Send + Sync + ZeroCopySend +
     /// # Errors
     /// What is wrong with it.
     fn check(&self) -> Result<(), Unsound>;
+    /// As [`SampleRef::is_urgent`].
+    fn is_urgent(&self) -> bool {
+        self.as_ref().is_urgent()
+    }
 }
 
 /// A sample whose type is known at run time only.
@@ -300,6 +309,16 @@ impl SampleRef<'_> {
             Self::TwinState(sample) => &sample.header,
             Self::Detection(sample) => &sample.header,
             Self::Health(sample) => &sample.header,
+        }
+    }
+
+    /// Whether those who hear it are to have it at once, though more would be cheaper together: an alarm, or what
+    /// somebody told the pipeline.
+    pub fn is_urgent(&self) -> bool {
+        match self {
+            Self::JointState(state) => state.command.verb != 0,
+            Self::Detection(detection) => detection.event != 0 || detection.alarm(),
+            Self::TwinState(_) | Self::Health(_) => false,
         }
     }
 

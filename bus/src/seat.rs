@@ -155,6 +155,19 @@ pub struct Input {
     pub resume: Option<Position>,
 }
 
+impl Input {
+    /// How often it is looked whether samples are there, where nothing wakes the one who hears it.
+    pub(crate) fn looks(&self) -> Option<Duration> {
+        let is_woken = match self.wake {
+            Wake::EveryMs(_) => false,
+            Wake::EveryMsOrUrgent(_) => self.kind.may_alarm(),
+            Wake::Event | Wake::Spin => true,
+        };
+        let looks = self.transport == TransportKind::Iceoryx2 && !is_woken;
+        self.wake.pause().filter(|_| looks)
+    }
+}
+
 /// A stream that a stage makes.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

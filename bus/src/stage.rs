@@ -165,6 +165,10 @@ pub trait Sink: Send {
         Ok(())
     }
 
+    /// Nothing more will come, though an input has not ended: a stage before it has failed. [`finish`](Self::finish)
+    /// follows.
+    fn cut_short(&mut self) {}
+
     /// All inputs have ended: completes what was written.
     ///
     /// # Errors

@@ -128,6 +128,7 @@ fn run_chain(length: i64, stop_after: Option<Duration>) -> Chain {
                     .receiver::<JointState>("c/count", Keep::All, 16)
                     .unwrap(),
             ),
+            looks: None,
         },
         SinkInput {
             from: "delay".to_owned(),
@@ -136,6 +137,7 @@ fn run_chain(length: i64, stop_after: Option<Duration>) -> Chain {
                     .receiver::<TwinState>("c/delay", Keep::All, 16)
                     .unwrap(),
             ),
+            looks: Some(Duration::from_millis(5)),
         },
         SinkInput {
             from: "delay".to_owned(),
@@ -144,6 +146,7 @@ fn run_chain(length: i64, stop_after: Option<Duration>) -> Chain {
                     .receiver::<Health>("c/delay/health", Keep::All, 16)
                     .unwrap(),
             ),
+            looks: None,
         },
     ];
     let seen = Arc::new(Mutex::new(Seen::default()));
@@ -304,6 +307,7 @@ fn a_sink_that_is_stopped_deals_with_what_has_arrived_and_flushes_while_idle() {
                 .receiver::<Detection>("c/detect", Keep::All, 16)
                 .unwrap(),
         ),
+        looks: None,
     }];
     let seen = Arc::new(Mutex::new(Seen::default()));
     let context = Context::new("keep");

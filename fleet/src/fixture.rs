@@ -17,7 +17,7 @@ pub fn status(instance: &str, sent_s: i64) -> StatusMessage {
         effort_unit: "Nm".to_owned(),
         urdf_sha256: Some("ab".repeat(32)),
         twin_sha256: None,
-        archive: Some("out/a-{n}.mcap".to_owned()),
+        archive: Some("/home/cell/out/a-*.mcap".to_owned()),
         takes_commands: true,
         ended: false,
         alarm: AlarmMessage {

@@ -1,5 +1,6 @@
 //! The fleet host: one Zenoh session, one thread that keeps the wall, and snapshots for all who look.
 
+mod keeping;
 mod physics;
 
 use std::path::PathBuf;
@@ -21,6 +22,7 @@ use crate::mailbox::Mailbox;
 use crate::physics::CellPhysics;
 use crate::store::{Note, Store, StoreError};
 use crate::wall::{Effect, Event, Now, Snapshot, Wall};
+use keeping::Keeping;
 
 /// How often those who look are told. Resolution: a person sees no more.
 const SHOW_EVERY: Duration = Duration::from_millis(250);
@@ -128,11 +130,10 @@ impl Hub {
             session: session.clone(),
             mailbox: mailbox.clone(),
             wall,
-            keeper,
+            keeper: keeper.map(Keeping::new),
             physics: physics.clone(),
             show,
             begin,
-            unkept: false,
         };
         let stopped = stop.clone();
         let thread = std::thread::Builder::new().name("fleet".to_owned());
@@ -259,12 +260,10 @@ struct Worker {
     session: Session,
     mailbox: Arc<Mailbox<Mail>>,
     wall: Wall,
-    keeper: Option<Keeper>,
+    keeper: Option<Keeping>,
     physics: Arc<Mutex<Vec<CellPhysics>>>,
     show: watch::Sender<Arc<Snapshot>>,
     begin: Instant,
-    /// Whether it was said that nothing can be kept.
-    unkept: bool,
 }
 
 impl Worker {
@@ -292,37 +291,33 @@ impl Worker {
 
     fn open(&mut self, mail: Mail) {
         let now_ns = unix_ns();
-        let kept = match (mail, &mut self.keeper) {
-            (Mail::Event(event), _) => return self.tell(event),
-            (_, None) => return,
-            (Mail::Acknowledged { cell, by }, Some(keeper)) => {
-                keeper.store().acknowledge(&cell, &by, now_ns)
+        match (mail, &mut self.keeper) {
+            (Mail::Event(event), _) => self.tell(event),
+            (_, None) => {}
+            (Mail::Acknowledged { cell, by }, Some(keeping)) => {
+                keeping.with(|keeper| keeper.store().acknowledge(&cell, &by, now_ns));
             }
-            (Mail::Noted { cell, note }, Some(keeper)) => {
+            (Mail::Noted { cell, note }, Some(keeping)) => keeping.with(|keeper| {
                 let noted = keeper.store().note(&cell, &note);
                 noted.and_then(|()| keeper.learn(std::iter::once(cell.as_str()), now_ns))
-            }
-        };
-        self.note(kept);
+            }),
+        }
     }
 
     fn tell(&mut self, event: Event) {
         let now = self.now();
         for effect in self.wall.take(event, now) {
             self.ask(&effect);
-            if let Some(keeper) = &mut self.keeper {
-                let kept = keeper.keep(&self.wall, &effect, now.unix_ns);
-                self.note(kept);
+            if let Some(keeping) = &mut self.keeper {
+                keeping.keep(&self.wall, effect, now.unix_ns);
             }
         }
     }
 
     fn show(&mut self) {
         let mut snapshot = self.wall.snapshot();
-        if let Some(keeper) = &mut self.keeper {
-            keeper.compare(&mut snapshot);
-            let kept = keeper.tick(&snapshot);
-            self.note(kept);
+        if let Some(keeping) = &mut self.keeper {
+            keeping.tick(&self.wall, &mut snapshot);
         }
         let known = self.physics.lock().unwrap_or_else(PoisonError::into_inner);
         for view in &mut snapshot.cells {
@@ -383,16 +378,6 @@ impl Worker {
         Now {
             running_ms: u64::try_from(self.begin.elapsed().as_millis()).unwrap_or(u64::MAX),
             unix_ns: unix_ns(),
-        }
-    }
-
-    /// The wall goes on where nothing can be kept; the first time is told of.
-    fn note(&mut self, kept: Result<(), StoreError>) {
-        if let Err(error) = kept
-            && !self.unkept
-        {
-            self.unkept = true;
-            tracing::warn!("incidents are not kept: {error}; further failures are not told");
         }
     }
 }

@@ -51,6 +51,9 @@ pub fn summary(snapshot: &Snapshot) -> String {
     if snapshot.sessions_reached == 0 {
         text += "; THIS HOST REACHES NO ROUTER, nothing here is fresh";
     }
+    if let Some(why) = &snapshot.unkept {
+        text += &format!("; incidents are not kept: {why}");
+    }
     let off = snapshot.cells.iter().filter(|view| view.clock_is_off);
     for view in off.take(MOST_CLOCKS) {
         text += &format!("; {}: clock {}", view.cell, words::clock(view));

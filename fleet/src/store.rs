@@ -19,6 +19,8 @@ pub use incidents::{Incident, Kind, News};
 
 /// How long contacts, incidents and history are kept \[ns\]. Resolution: a year and some, to compare seasons.
 pub const KEPT_NS: i64 = 400 * 86_400_000_000_000;
+/// How long is waited for somebody else who holds the file.
+const WAIT: Duration = Duration::from_secs(2);
 /// Version of the tables. A file of another version is refused.
 const VERSION: i64 = 1;
 
@@ -52,7 +54,7 @@ const TABLES: &str = "
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// SQLite says no.
-    #[error("{path}: {source}")]
+    #[error("{path}: {source}{}", remedy(source))]
     Sqlite {
         /// The file.
         path: PathBuf,
@@ -67,6 +69,23 @@ pub enum StoreError {
         /// Its version.
         found: i64,
     },
+}
+
+/// What may be done about it, behind what SQLite says.
+fn remedy(error: &rusqlite::Error) -> &'static str {
+    use rusqlite::ErrorCode as Code;
+    match error.sqlite_error_code() {
+        Some(Code::NotADatabase | Code::DatabaseCorrupt) => {
+            "; move it away (`sqlite3 FILE .recover` may save a part) and begin with another file"
+        }
+        Some(Code::DatabaseBusy | Code::DatabaseLocked) => {
+            "; another program holds it: end that one, or give another file"
+        }
+        Some(Code::CannotOpen) => "; is its folder there, and may it be written to?",
+        Some(Code::DiskFull) => "; make room on its disk",
+        Some(Code::ReadOnly) => "; it may not be written to",
+        _ => "",
+    }
 }
 
 /// The file.
@@ -118,9 +137,7 @@ impl Store {
             source,
         };
         let connection = Connection::open(path).map_err(failed)?;
-        connection
-            .busy_timeout(Duration::from_secs(2))
-            .map_err(failed)?;
+        connection.busy_timeout(WAIT).map_err(failed)?;
         let found: i64 = connection
             .query_row("PRAGMA user_version", [], |row| row.get(0))
             .map_err(failed)?;
@@ -155,6 +172,23 @@ impl Store {
     /// Where it is.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Whether it is waited for somebody else who holds the file; it is at first.
+    pub fn waits_for_others(&self, waits: bool) {
+        // It only sets a number, and fails for none.
+        let _ = self
+            .connection
+            .busy_timeout(if waits { WAIT } else { Duration::ZERO });
+    }
+
+    /// Looks whether the file can be written.
+    ///
+    /// # Errors
+    /// If it cannot.
+    pub fn is_writable(&self) -> Result<(), StoreError> {
+        let looked = self.connection.execute_batch("BEGIN IMMEDIATE; ROLLBACK;");
+        looked.map_err(|error| self.failed(error))
     }
 
     fn failed(&self, source: rusqlite::Error) -> StoreError {

@@ -143,6 +143,16 @@ pub enum Effect {
     },
 }
 
+impl Effect {
+    /// Whether a fleet host keeps it.
+    pub fn is_kept(&self) -> bool {
+        match self {
+            Self::Changed { .. } | Self::Recorded { .. } | Self::Lost { .. } => true,
+            Self::AskRecords { .. } | Self::AskStatus { .. } | Self::AskClock { .. } => false,
+        }
+    }
+}
+
 /// All cells.
 #[derive(Debug, Default)]
 pub struct Wall {

@@ -38,3 +38,8 @@ pub fn map<T: Send, R: Send>(jobs: usize, items: Vec<T>, work: impl Fn(T) -> R +
         })
         .collect()
 }
+
+/// Whether a core is left beside so many jobs.
+pub fn has_spare_core(jobs: usize) -> bool {
+    std::thread::available_parallelism().is_ok_and(|cores| cores.get() > jobs)
+}

@@ -24,9 +24,12 @@ use crate::settings::Settings;
 use crate::suggest;
 use crate::yaml;
 
-/// How often a recorder looks whether samples are there \[ms\].
+/// How often a recorder or a publisher looks whether samples are there \[ms\].
 /// Resolution: how late the picture may be, against how often the machine wakes up.
-const RECORDER_LOOKS_MS: u64 = 10;
+const LOOKS_MS: u64 = 10;
+/// How many times a publisher looks at least before it takes a silence for a stop.
+/// Resolution: a look that comes late makes no stop, against how often the machine wakes up.
+const LOOKS_WITHIN_STOP: u64 = 8;
 
 /// A pipeline in which nothing is wrong as far as one can tell before it starts.
 #[derive(Debug)]
@@ -141,9 +144,8 @@ impl Pipeline {
                 },
                 wake: match entry.wake {
                     Some(WakeEntry::Spin) => Wake::Spin,
-                    // Nobody waits for a recorder.
-                    None if wiring.roles[index] == Role::Record => Wake::EveryMs(RECORDER_LOOKS_MS),
-                    Some(WakeEntry::Event) | None => Wake::Event,
+                    Some(WakeEntry::Event) => Wake::Event,
+                    None => wake(&settings),
                 },
                 restart: entry.restart.map_or_else(Restart::default, Restart::from),
                 settings,
@@ -160,6 +162,20 @@ impl Pipeline {
             stages,
             model_sha256,
         })
+    }
+}
+
+/// How a stage learns that a sample is there, where the file does not say.
+fn wake(settings: &Settings) -> Wake {
+    match settings {
+        // Nobody waits for a recorder.
+        Settings::Record(_) => Wake::EveryMs(LOOKS_MS),
+        // And for a publisher only where there is an alarm; but it must not take a pause of its own for a silence.
+        Settings::Publish { config, .. } => {
+            let often = (config.stop_after_s * 1e3) as u64 / LOOKS_WITHIN_STOP;
+            Wake::EveryMsOrUrgent(often.clamp(1, LOOKS_MS))
+        }
+        _ => Wake::Event,
     }
 }
 

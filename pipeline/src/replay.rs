@@ -74,6 +74,7 @@ pub struct Replay<'a> {
     /// That source and everything that follows from it alone, by place in the pipeline.
     members: Vec<usize>,
     twin: TwinChoice,
+    reads_ahead: bool,
 }
 
 impl<'a> Replay<'a> {
@@ -113,7 +114,16 @@ impl<'a> Replay<'a> {
             source,
             members,
             twin,
+            reads_ahead: false,
         })
+    }
+
+    /// Whether recordings are read by a thread of their own while the stages work, which takes a second core. The
+    /// result is the same.
+    #[must_use]
+    pub fn reading_ahead(mut self, ahead: bool) -> Self {
+        self.reads_ahead = ahead;
+        self
     }
 
     /// Stages that a replay leaves out although they hang on its source, because they are programs of
@@ -179,8 +189,8 @@ impl<'a> Replay<'a> {
                 .cloned();
             let stream = match (&stage.settings, input) {
                 (Settings::Ingest(config), _) => {
-                    let source = Commanded::archived(open::recording(config, recording, cell)?);
-                    Some(graph.source(&stage.name, Box::new(source)))
+                    let source = open::recording(config, recording, cell, self.reads_ahead)?;
+                    Some(graph.source(&stage.name, Box::new(Commanded::archived(source))))
                 }
                 (Settings::Twin { config, model }, Some(input)) => {
                     let model = model.as_ref();

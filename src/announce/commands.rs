@@ -1,11 +1,11 @@
-//! Tells the supervisor, and so people, which commands the source of a cell has taken, and when a mute ends.
+//! Tells the supervisor, and so people, which commands the source of a cell has taken, when a mute ends, and when its
+//! clock jumps.
 
 use std::time::Duration;
 
-use tauscope_bus::command::LONGEST_MUTE_S;
-use tauscope_bus::{
-    Emit, JointState, LinkError, Progress, Source, StageError, Trouble, Verb, shell,
-};
+use super::clock::Clock;
+use tauscope_bus::command::MuteLease;
+use tauscope_bus::{Emit, JointState, LinkError, Progress, Source, StageError, Trouble, shell};
 
 /// What holds at a source while its cell is muted.
 pub const MUTED: &str = "muted";
@@ -23,8 +23,9 @@ struct Told {
     stage: String,
     /// Stamp of the first sample, from which times are counted \[ns\].
     start_ns: Option<i64>,
-    /// When the mute ends \[ns\], while there is one.
-    muted_until_ns: Option<i64>,
+    /// The mute, while there is one.
+    mute: Option<MuteLease>,
+    clock: Clock,
 }
 
 impl<S> Announced<S> {
@@ -82,7 +83,7 @@ impl Emit<JointState> for Listener<'_> {
 
 impl Told {
     fn is_muted(&self) -> bool {
-        self.muted_until_ns.is_some()
+        self.mute.is_some()
     }
 
     /// What is to be said of a sample.
@@ -90,26 +91,24 @@ impl Told {
         let now_ns = state.header.stamp_ns;
         let start_ns = *self.start_ns.get_or_insert(now_ns);
         let t = (now_ns - start_ns) as f64 * 1e-9;
-        let over = self.muted_until_ns.is_some_and(|until| now_ns >= until);
-        if over {
-            self.muted_until_ns = None;
-        }
+        let over = self.mute.take_if(|mute| !mute.holds(now_ns)).is_some();
         let command = &state.command;
-        if command.verb() == Some(Verb::Mute) {
-            let lease_ns = (command.value.clamp(0.0, LONGEST_MUTE_S) * 1e9) as i64;
-            self.muted_until_ns = (lease_ns > 0).then(|| now_ns.saturating_add(lease_ns));
+        if let Some(mute) = MuteLease::of(now_ns, command) {
+            self.mute = mute.holds(now_ns).then_some(mute);
         }
+        let jump = self.clock.line(state);
+        let jump = jump.map(|words| format!("{t:8.3} s  {words}"));
         let over = over.then(|| format!("{t:8.3} s  the mute is over"));
         let taken = command.in_words();
         let taken = taken.map(|words| format!("{t:8.3} s  {words}"));
-        over.into_iter().chain(taken)
+        jump.into_iter().chain(over).chain(taken)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tauscope_bus::Command;
+    use tauscope_bus::{Command, Verb};
 
     #[test]
     fn a_mute_is_told_when_it_begins_and_when_it_ends() {
@@ -118,6 +117,7 @@ mod tests {
         for n in 0..5_i64 {
             let mut state = JointState::default();
             state.header.stamp_ns = 1_000_000_000 * n;
+            state.header.received_ns = state.header.stamp_ns;
             if n == 1 {
                 state.command = Command {
                     verb: Verb::Mute as u32,

@@ -134,6 +134,10 @@ fn set_up(
     let urdf = looked.cell.facts.urdf.as_deref().unwrap_or_default();
     init::write(&folder.robot(), urdf.as_bytes())?;
     folder.write_set(&looked.cell, &looked.state_topic, &fit, &holdout)?;
+    if interrupt::is_asked() {
+        let far = "before the detector learnt; what was written is removed";
+        return Err(Failure::Interrupted(far.to_owned()));
+    }
     drop(hold);
     let explained = folder.explained().join("twin.yaml");
     let explained = (outcome.report.hands_out_twin()).then_some(&*explained);

@@ -115,8 +115,7 @@ fn of_each(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         };
         return archive::run(&job, &pipeline, out);
     }
-    let replay = Replay::new(&pipeline, args.source.as_deref(), args.twin)
-        .map_err(|error| Failure::rejected(error.to_string()))?;
+    let replay = archive::prepared(&pipeline, args.source.as_deref(), args.twin, args.jobs)?;
     for stage in replay.left_out() {
         out.say(&format!(
             "note: stage `{stage}` is a program of its own and not replayed; `tauscope run` runs it"
@@ -136,15 +135,13 @@ fn of_each(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let hold = interrupt::hold();
     let results = replay_all(&replay, args);
     let mut outcomes = Vec::new();
-    let mut wrong = Report::default();
+    let mut wrong = Vec::new();
     let (mut failed, mut interrupted) = (None, false);
     for (recording, result) in args.recordings.iter().zip(results) {
         match result {
             Ok(outcome) => outcomes.push(outcome),
             Err(ReplayError::Interrupted) => interrupted = true,
-            Err(error) if error.is_input() => {
-                wrong.push(Problem::of_file(recording, error.to_string()));
-            }
+            Err(error) if error.is_input() => wrong.push((recording, error.to_string())),
             Err(error) => {
                 let why = without_path(recording, error.to_string());
                 out.say(&format!("error: {}: {why}", recording.display()));
@@ -173,7 +170,19 @@ fn of_each(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     if interrupted {
         return Err(Failure::Interrupted(how_far(args, outcomes.len())));
     }
-    wrong.into_result(())?;
+    if outcomes.is_empty() && failed.is_none() {
+        let mut report = Report::default();
+        for (recording, why) in wrong {
+            report.push(Problem::of_file(recording, why));
+        }
+        report.into_result(())?;
+        return Ok(Exit::Done);
+    }
+    for (recording, why) in wrong {
+        let why = without_path(recording, why);
+        out.say(&format!("error: {}: {why}", recording.display()));
+        failed = Some(failed.unwrap_or(Exit::Rejected).and(Exit::Rejected));
+    }
     let lossy = outcomes.iter().any(|outcome| outcome.lost > 0);
     Ok(Exit::from_loss(lossy).and(failed.unwrap_or(Exit::Done)))
 }

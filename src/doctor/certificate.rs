@@ -1,8 +1,19 @@
-//! How long a certificate holds.
+//! How long a certificate holds, and whether a private key can be used.
 
 use std::path::Path;
 
 use x509_parser::pem::Pem;
+
+/// Whether a file holds a private key that can be used, or why not.
+pub(super) fn usable_key(path: &Path) -> Result<(), String> {
+    let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
+    let mut blocks = Pem::iter_from_buffer(&bytes).filter_map(Result::ok);
+    if blocks.any(|block| block.label.ends_with("PRIVATE KEY")) {
+        Ok(())
+    } else {
+        Err("no private key (PEM) is in it".to_owned())
+    }
+}
 
 /// From when to when it holds \[s since the epoch\]: of several in one file, the time that all do.
 pub(super) fn validity(path: &Path) -> Result<(i64, i64), String> {
@@ -19,4 +30,22 @@ pub(super) fn validity(path: &Path) -> Result<(i64, i64), String> {
         valid = Some(valid.map_or((from, to), |(start, end)| (start.max(from), end.min(to))));
     }
     valid.ok_or_else(|| "no certificate (PEM) is in it".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_certificate_is_no_private_key_and_a_missing_file_is_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("own.key");
+        assert!(usable_key(&path).is_err());
+        let block = |label: &str| format!("-----BEGIN {label}-----\nAAAA\n-----END {label}-----\n");
+        std::fs::write(&path, block("CERTIFICATE")).unwrap();
+        let why = usable_key(&path).unwrap_err();
+        assert!(why.contains("no private key"), "{why}");
+        std::fs::write(&path, block("EC PRIVATE KEY")).unwrap();
+        assert_eq!(usable_key(&path), Ok(()));
+    }
 }

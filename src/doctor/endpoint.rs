@@ -19,12 +19,21 @@ pub(super) fn address(endpoint: &str) -> Option<&str> {
 
 /// The certificates in an endpoint's settings.
 pub(super) fn certificates(endpoint: &str) -> Vec<PathBuf> {
+    files(endpoint, "certificate")
+}
+
+/// The private keys in an endpoint's settings.
+pub(super) fn private_keys(endpoint: &str) -> Vec<PathBuf> {
+    files(endpoint, "private_key")
+}
+
+/// What the settings whose names end in `kind` name, `_file` or not.
+fn files(endpoint: &str, kind: &str) -> Vec<PathBuf> {
     let settings = endpoint
         .split_once('#')
         .map_or("", |(_, settings)| settings);
     let pairs = settings.split(';').filter_map(|pair| pair.split_once('='));
-    let files =
-        pairs.filter(|(key, _)| key.ends_with("certificate") || key.ends_with("certificate_file"));
+    let files = pairs.filter(|(key, _)| key.strip_suffix("_file").unwrap_or(key).ends_with(kind));
     files.map(|(_, path)| PathBuf::from(path)).collect()
 }
 
@@ -59,6 +68,7 @@ mod tests {
             certificates(endpoint),
             ["ca.pem", "own.pem"].map(PathBuf::from)
         );
+        assert_eq!(private_keys(endpoint), [PathBuf::from("k.pem")]);
         assert_eq!(address("unixsock-stream//tmp/a"), None);
         assert!(certificates("tcp/127.0.0.1:7447").is_empty());
     }

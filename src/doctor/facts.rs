@@ -42,6 +42,8 @@ pub struct Facts {
     pub endpoints: Vec<Endpoint>,
     /// Certificates, with the time they hold from and to \[s since the epoch\].
     pub certificates: Vec<(PathBuf, Validity)>,
+    /// Private keys, and whether they can be used.
+    pub private_keys: Vec<(PathBuf, Result<(), String>)>,
     /// Now \[s since the epoch\].
     pub now_s: i64,
     /// The kernel's version.
@@ -139,14 +141,19 @@ pub fn read(pipeline: Option<&Pipeline>, host: Option<&str>) -> Facts {
             );
         }
     }
-    let mut certificates = BTreeMap::new();
+    let (mut certificates, mut keys) = (BTreeMap::new(), BTreeMap::new());
     for (_, endpoint, _) in &endpoints {
         for path in endpoint::certificates(endpoint) {
             let validity = certificate::validity(&path);
             certificates.insert(path, validity);
         }
+        for path in endpoint::private_keys(endpoint) {
+            let usable = certificate::usable_key(&path);
+            keys.insert(path, usable);
+        }
     }
     facts.certificates = certificates.into_iter().collect();
+    facts.private_keys = keys.into_iter().collect();
     facts.endpoints = endpoints.into_iter().filter_map(tried).collect();
     facts
 }

@@ -49,6 +49,8 @@ pub fn all(facts: &Facts) -> Vec<Verdict> {
     verdicts.extend(facts.endpoints.iter().map(endpoint));
     let certificates = facts.certificates.iter();
     verdicts.extend(certificates.map(|(path, valid)| certificate(path, valid, facts.now_s)));
+    let keys = facts.private_keys.iter();
+    verdicts.extend(keys.map(|(path, usable)| private_key(path, usable)));
     verdicts
 }
 
@@ -259,6 +261,20 @@ fn certificate(path: &Path, valid: &Validity, now_s: i64) -> Verdict {
         Verdict::bad(CHECK, Level::Warning, found, remedy)
     } else {
         Verdict::ok(CHECK, found)
+    }
+}
+
+fn private_key(path: &Path, usable: &Result<(), String>) -> Verdict {
+    const CHECK: &str = "private key";
+    let path = path.display();
+    match usable {
+        Ok(()) => Verdict::ok(CHECK, format!("{path} can be read")),
+        Err(error) => Verdict::bad(
+            CHECK,
+            Level::Error,
+            format!("{path} cannot be used: {error}"),
+            "give the path of the key in PEM form, and let this user read it",
+        ),
     }
 }
 

@@ -117,15 +117,20 @@ pub fn write(
     let urdf = is_handed_out.then(|| robot_text(request, kept, outcome, &mut made));
     let urdf = urdf.flatten();
     let shown = |path: &Path| path.display().to_string();
-    let all = |recordings: &[Named]| recordings.iter().map(|named| shown(&named.path)).collect();
+    // Without recordings to hold out, some of those to fit were held out.
+    let predicted = &outcome.report.holdout_predictions;
+    let recordings = request.fit.iter().chain(&request.holdout);
+    let (held_out, fitted): (Vec<&Named>, Vec<&Named>) =
+        recordings.partition(|named| predicted.contains_key(&named.name));
+    let all = |recordings: Vec<&Named>| recordings.iter().map(|named| shown(&named.path)).collect();
     let around = html::Around {
         date: today(),
         provenance,
         model: kept.bodies.then_some(&kept.model),
         robot: request.robot_path.as_deref().map(shown),
         start: request.start.as_ref().map(|start| shown(&start.path)),
-        fit: all(&request.fit),
-        holdout: all(&request.holdout),
+        fit: all(fitted),
+        holdout: all(held_out),
         twin: twin.is_some().then(|| pasted(out, TWIN)),
         corrected_robot: urdf.is_some().then(|| pasted(out, ROBOT)),
     };

@@ -1,6 +1,5 @@
 //! The folder of a cell: which files it has, and the pipeline file in it.
 
-use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
@@ -12,14 +11,14 @@ use tauscope_twin::TwinFile;
 use super::write;
 use crate::existing::Force;
 use crate::exit::Failure;
+use crate::interrupt::{self, Undo};
 
-/// The folder and the names in it. Dropped before it is kept, it takes away what has come into it since, so that a
-/// failed attempt can be repeated.
+/// The folder and the names in it. Where it is not kept, what has come into it since is taken away, so that a failed
+/// or interrupted attempt can be repeated.
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
-    /// What was not there before, folders behind what is in them.
-    new: RefCell<Vec<PathBuf>>,
+    undo: Option<Undo>,
 }
 
 impl Folder {
@@ -29,9 +28,9 @@ impl Folder {
     /// # Errors
     /// If it cannot be made, or holds a pipeline already.
     pub fn prepare(path: &Path, force: Force, recordings: &[PathBuf]) -> Result<Self, Failure> {
-        let this = Self {
+        let mut this = Self {
             path: path.to_owned(),
-            new: RefCell::default(),
+            undo: None,
         };
         let mine = [
             this.pipeline(),
@@ -47,7 +46,8 @@ impl Folder {
         let made = mine.into_iter().take(6);
         let made = made.chain([this.schema(), explained, path.to_owned()]);
         let new = made.filter(|path| path.symlink_metadata().is_err());
-        this.new.replace(new.collect());
+        let (new, explained) = (Vec::from_iter(new), this.explained());
+        this.undo = Some(interrupt::undo(move || take_away(&new, &explained)));
         std::fs::create_dir_all(path).map_err(|error| {
             let problem = Problem::of_file(path, format!("cannot make the folder: {error}"));
             Failure::Rejected(problem.into())
@@ -57,7 +57,7 @@ impl Folder {
 
     /// All is written, and stays.
     pub fn keep(&self) {
-        self.new.take();
+        self.undo.iter().for_each(Undo::keep);
     }
 
     /// A path as the files of the folder name it: what is in the folder moves with it.
@@ -189,18 +189,17 @@ impl Folder {
     }
 }
 
-impl Drop for Folder {
-    fn drop(&mut self) {
-        for path in self.new.take() {
-            // What is not there was not written; a folder with recordings of `--live` in it stays.
-            let _ = if path == self.explained() {
-                std::fs::remove_dir_all(&path)
-            } else if path == self.path {
-                std::fs::remove_dir(&path)
-            } else {
-                std::fs::remove_file(&path)
-            };
-        }
+/// Removes what is `new`, folders behind what is in them. What is not there was not written.
+fn take_away(new: &[PathBuf], explained: &Path) {
+    for path in new {
+        let _ = if path == explained {
+            std::fs::remove_dir_all(path)
+        } else if path.is_dir() {
+            // One with recordings of `--live` in it stays.
+            std::fs::remove_dir(path)
+        } else {
+            std::fs::remove_file(path)
+        };
     }
 }
 

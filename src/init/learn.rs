@@ -152,7 +152,10 @@ impl Trial {
     fn sentence(&self) -> String {
         let twin = self.words();
         let force = self.force_n.map_or_else(String::new, |force_n| {
-            format!(" From {force_n:.0} N on it would find half of the pushes on the middle link.")
+            format!(
+                " In such motion it would find half of all pushes of {force_n:.0} N, whichever way they push; an arm that \
+                 stands feels smaller ones."
+            )
         });
         format!(
             "Behind {twin}, learnt from the fitted recordings alone: {} false alarm(s) in {:.0} s of held-out recordings.{force}",

@@ -19,7 +19,8 @@ const DEPTH_ALL: usize = 1024;
 /// Samples that a stage which keeps the newest may leave unread: some, so that a pause of the
 /// scheduler costs nothing.
 const DEPTH_NEWEST: usize = 16;
-/// The same for who hears several streams and tells others: a longer pause costs nothing either.
+/// The same for who hears several streams and tells others, or hears another host, whose samples come many at once: a
+/// longer pause costs nothing either.
 const DEPTH_TOLD: usize = 256;
 /// Most memory of the samples that wait for slow listeners, by stream \[bytes\]: 17 s of joint states at 1 kHz.
 /// Resolution: memory, against the pause of a recorder that costs nothing.
@@ -201,7 +202,7 @@ impl Planner<'_> {
                 keep: link.keep,
                 depth: match link.keep {
                     Keep::All => DEPTH_ALL,
-                    Keep::Newest if self.hears_health(at) => DEPTH_TOLD,
+                    Keep::Newest if self.hears_health(at) || link.over == Over::Zenoh => DEPTH_TOLD,
                     Keep::Newest => DEPTH_NEWEST,
                 },
                 wake,
@@ -271,7 +272,11 @@ impl Planner<'_> {
                     Over::Zenoh => SPILL_ACROSS_HOSTS_BYTES,
                     Over::InProcess | Over::SharedMemory => SPILL_BYTES,
                 },
-                linger_ms: if all_take { SPILL_LINGER_MS } else { 0 },
+                linger_ms: match over {
+                    Over::Zenoh => self.gather_ms(at),
+                    _ if all_take => SPILL_LINGER_MS,
+                    _ => 0,
+                },
                 waits: self.source_can_wait(at),
             });
             (audience != Audience::default()).then_some(OutputLink {
@@ -284,6 +289,13 @@ impl Planner<'_> {
             .into_iter()
             .filter_map(way)
             .collect()
+    }
+
+    /// How long samples of this stage for other hosts wait for more.
+    fn gather_ms(&self, at: usize) -> u64 {
+        let host = self.pipeline.stages[at].host.as_ref();
+        let host = host.and_then(|host| self.pipeline.hosts.get(host));
+        host.map_or(0, |host| host.gather_ms)
     }
 
     /// Whether the source of this stage's samples loses nothing while it waits: it reads a file. What a program of

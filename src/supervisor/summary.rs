@@ -131,14 +131,21 @@ impl Summary {
 
     /// How the run ended.
     pub fn exit(&self) -> Exit {
-        if self.ended == Ended::NoData || self.stages.iter().any(|stage| stage.failed) {
+        let stages = &self.stages;
+        if self.ended == Ended::NoData || self.is_empty() || stages.iter().any(|it| it.failed) {
             return Exit::Failed;
         }
-        let stages = &self.stages;
         let dropped = stages.iter().any(|it| it.dropped > 0 || it.unknown_loss);
         let balances = |link: &LinkSummary| link.dropped == 0 && link.surplus == 0;
         let whole = |link: &LinkSummary| balances(link) && link.ended != Some(false);
         Exit::from_loss(dropped || !self.links.iter().all(whole))
+    }
+
+    /// Whether the sources of this host, if there are any, all ended without a sample: then nothing was done.
+    fn is_empty(&self) -> bool {
+        let mut sources = self.stages.iter().filter(|stage| stage.is_source);
+        let is_there = self.stages.iter().any(|stage| stage.is_source);
+        is_there && sources.all(|stage| stage.reported && stage.received == 0)
     }
 
     /// As tables.
@@ -212,15 +219,9 @@ impl Summary {
     /// What else nobody should miss.
     fn warnings(&self) -> Vec<String> {
         let mut lines = Vec::new();
-        let mut sources = self
-            .stages
-            .iter()
-            .filter(|stage| stage.is_source)
-            .peekable();
-        if sources.peek().is_some() && sources.all(|stage| stage.reported && stage.received == 0) {
-            lines.push(
-                "nothing came in: this run has watched nothing and recorded nothing".to_owned(),
-            );
+        if self.is_empty() {
+            let nothing = "nothing came in: this run has watched nothing and recorded nothing";
+            lines.push(nothing.to_owned());
         }
         for stage in self.stages.iter().filter(|stage| stage.unknown_loss) {
             let name = &stage.stage;

@@ -239,19 +239,21 @@ def signal_all(run, name):
             os.kill(process, name)
 
 
-def harm(plant, victims, slack):
+def harm(plant, victims, slack, cell_of=str):
     """Kills, cuts off and stops a cell each; how soon that was known, and how soon they were back."""
     told = []
 
-    def known(cell, what, limit, begin):
+    def known(victim, what, limit, begin):
+        cell = cell_of(victim)
         wall = plant.wait(f"{cell} stale", lambda wall: wall[cell]["state"] == "stale", 60, begin)
         page = plant.wait_for_page(cell, "stale", begin)
         told.append(f"a cell that was {what}: known after {wall:.2f} s, on the page after {page:.2f} s")
         check(max(wall, page) < limit * slack, told[-1])
 
-    def back(cell):
+    def back(victim):
+        cell = cell_of(victim)
         took = plant.wait(f"{cell} back", lambda wall: wall[cell]["state"] in ALIVE, BACK_ON_WALL_S * slack)
-        told.append(f"the cell that was {cell}: back after {took:.1f} s")
+        told.append(f"the cell that was {victim}: back after {took:.1f} s")
 
     begin = time.monotonic()
     signal_all(victims["killed"], signal.SIGSTOP)

@@ -7,6 +7,7 @@
 //! | --- | --- | --- |
 //! | `<stream>/all` or `<stream>/newest` | publish-subscribe | samples, type name as in [`SampleKind::type_name`](crate::SampleKind::type_name), user header [`Joined`] |
 //! | the same | event | id 0: a sample was sent, or a sender is there: look |
+//! | the same and `/urgent`, of detections | event | id 0: a sample was sent that is urgent, or the end: look |
 //! | the same and `/back` | event | id 0: a receiver has taken the end of the stream; id 1 + (publisher id mod 255): a receiver hears this publisher |
 //!
 //! A receiver must say that it hears a sender, since iceoryx2 itself counts a subscriber that has not
@@ -48,6 +49,8 @@ pub use domain::{Domain, DomainError};
 pub use leftovers::{left_behind, remove_left_behind};
 
 const TRANSPORT: &str = "iceoryx2";
+/// What the service of events is called that come with alarms alone.
+const URGENT: &str = "/urgent";
 /// Most receivers of a stream per [`Keep`].
 /// Resolution: shared memory.
 pub const MAX_RECEIVERS: usize = 16;

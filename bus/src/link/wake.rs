@@ -13,16 +13,21 @@ pub enum Wake {
     Event,
     /// It looks at these intervals \[ms\]. The sender does not know of it, and many samples cost one look.
     EveryMs(u64),
+    /// The same, but the sender of a stream that may hold an alarm wakes it for one
+    /// ([`Sample::is_urgent`](crate::Sample::is_urgent)).
+    EveryMsOrUrgent(u64),
     /// It looks all the time: the soonest, at the price of a core.
     Spin,
 }
 
 impl Wake {
     /// How long a receiver sleeps between two looks, if it has to look.
-    pub(super) fn pause(self) -> Option<Duration> {
+    pub(crate) fn pause(self) -> Option<Duration> {
         match self {
             Self::Event => None,
-            Self::EveryMs(interval_ms) => Some(Duration::from_millis(interval_ms)),
+            Self::EveryMs(interval_ms) | Self::EveryMsOrUrgent(interval_ms) => {
+                Some(Duration::from_millis(interval_ms))
+            }
             Self::Spin => Some(Duration::ZERO),
         }
     }

@@ -237,6 +237,7 @@ fn sink_here(
         Ok(SinkInput {
             from: input.from.clone(),
             receiver: links.any_receiver(input)?,
+            looks: input.looks(),
         })
     });
     let inputs = inputs.collect::<Result<_, LinkError>>()?;

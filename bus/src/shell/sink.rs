@@ -1,4 +1,4 @@
-//! The loops around a sink: one thread per input.
+//! The loops around a sink: one thread for each input, and one for all that are looked at now and then.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -17,6 +17,8 @@ pub struct SinkInput {
     pub from: String,
     /// The link.
     pub receiver: Box<dyn AnyReceiver>,
+    /// Where nobody wakes it: how often it is looked whether samples are there.
+    pub looks: Option<Duration>,
 }
 
 /// Runs `sink` until all its inputs have ended or it is told to stop; then it first deals with what
@@ -47,15 +49,28 @@ pub fn run_sink(
     });
     // One input's failure ends the others too; the caller's own stop is not touched.
     let broken = Stop::new();
+    let ears = inputs.into_iter().enumerate().map(|(index, input)| Ear {
+        index,
+        input,
+        left_to_take: MAX_DEPTH,
+        has_ended: false,
+    });
+    let (calm, woken): (Vec<Ear>, Vec<Ear>) = ears.partition(|ear| ear.input.looks.is_some());
+    let pause = calm.iter().filter_map(|ear| ear.input.looks).min();
+    let calm = Mutex::new(calm);
+    let hall = Hall {
+        context,
+        shell: &shared,
+        broken: &broken,
+        calm: &calm,
+    };
     std::thread::scope(|scope| {
-        for (index, input) in inputs.into_iter().enumerate() {
-            let (shared, broken) = (&shared, &broken);
-            scope.spawn(move || {
-                if let Err(error) = hear(context, shared, index, input, broken) {
-                    broken.stop();
-                    lock(shared).failure.get_or_insert(error);
-                }
-            });
+        let hall = &hall;
+        if let Some(pause) = pause {
+            scope.spawn(move || hall.settle(hall.look(pause)));
+        }
+        for mut ear in woken {
+            scope.spawn(move || hall.settle(hall.hear(&mut ear)));
         }
     });
     let mut shell = shared.into_inner().unwrap_or_else(PoisonError::into_inner);
@@ -79,42 +94,113 @@ struct SinkShell<'a> {
     ledger: &'a Ledger,
 }
 
-/// Hears one input to its end.
-fn hear(
-    context: &Context,
-    shared: &Mutex<SinkShell<'_>>,
+/// What the threads around a sink share.
+struct Hall<'a, 's> {
+    context: &'a Context,
+    shell: &'a Mutex<SinkShell<'s>>,
+    broken: &'a Stop,
+    /// Inputs that are looked at. Locked before the shell.
+    calm: &'a Mutex<Vec<Ear>>,
+}
+
+/// One input.
+struct Ear {
     index: usize,
-    mut input: SinkInput,
-    broken: &Stop,
-) -> Result<(), StageError> {
-    let mut left_to_take = MAX_DEPTH;
-    while !broken.is_stopped() {
-        let stopped = context.stop.is_stopped();
-        let timeout = if stopped { Duration::ZERO } else { TICK };
+    input: SinkInput,
+    /// Samples that are still dealt with after a stop.
+    left_to_take: usize,
+    has_ended: bool,
+}
+
+impl Hall<'_, '_> {
+    fn settle(&self, heard: Result<(), StageError>) {
+        if let Err(error) = heard {
+            self.broken.stop();
+            lock(self.shell).failure.get_or_insert(error);
+        }
+    }
+
+    /// Hears an input to its end.
+    fn hear(&self, ear: &mut Ear) -> Result<(), StageError> {
+        while !self.broken.is_stopped() && !ear.has_ended {
+            if self.take(ear, TICK, true)? == Received::Nothing {
+                lock(self.shell).idle()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Looks at the calm inputs to their ends.
+    fn look(&self, pause: Duration) -> Result<(), StageError> {
+        while !self.broken.is_stopped() {
+            let is_over = {
+                let mut calm = self.calm();
+                self.drain(&mut calm)?;
+                calm.iter().all(|ear| ear.has_ended)
+            };
+            if is_over {
+                break;
+            }
+            lock(self.shell).idle()?;
+            if !self.context.stop.is_stopped() {
+                std::thread::sleep(pause);
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes what is there on the calm inputs.
+    fn drain(&self, calm: &mut [Ear]) -> Result<(), StageError> {
+        for ear in calm {
+            let mut left = MAX_DEPTH;
+            while !ear.has_ended && left > 0 && !self.broken.is_stopped() {
+                if self.take(ear, Duration::ZERO, false)? == Received::Nothing {
+                    break;
+                }
+                left -= 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes a sample, if one comes within the time. Before one that is urgent (of an input that is woken for it) comes
+    /// what is there on the calm inputs: it belongs to motions that have come already.
+    fn take(&self, ear: &mut Ear, within: Duration, woken: bool) -> Result<Received, StageError> {
+        let stopped = self.context.stop.is_stopped();
+        let within = if stopped { Duration::ZERO } else { within };
+        let Ear { index, input, .. } = ear;
         let mut accepted = Ok(());
-        let received = input.receiver.receive(timeout, &mut |sample| {
-            accepted = lock(shared).accept(index, &input.from, sample);
+        let received = input.receiver.receive(within, &mut |sample| {
+            if woken && sample.is_urgent() {
+                accepted = self.drain(&mut self.calm());
+            }
+            if accepted.is_ok() {
+                accepted = lock(self.shell).accept(*index, &input.from, sample);
+            }
         })?;
         accepted?;
-        let mut shell = lock(shared);
-        let report = &mut shell.report.inputs[index];
+        let mut shell = lock(self.shell);
+        let shell = &mut *shell;
+        let report = &mut shell.report.inputs[*index];
         report.counts = input.receiver.counts();
         report.position = input.receiver.position();
-        let (counts, position) = (report.counts, report.position);
-        shell.ledger.heard(index, &counts, position);
-        let report = &mut shell.report.inputs[index];
+        shell.ledger.heard(*index, &report.counts, report.position);
         match received {
             Received::End => {
                 report.ended = true;
-                return Ok(());
+                ear.has_ended = true;
             }
-            Received::Sample if stopped && left_to_take > 0 => left_to_take -= 1,
-            _ if stopped => return Ok(()),
-            Received::Sample => {}
-            Received::Nothing => shell.idle()?,
+            Received::Sample if stopped && ear.left_to_take > 0 => ear.left_to_take -= 1,
+            _ if stopped => ear.has_ended = true,
+            Received::Sample | Received::Nothing => {}
         }
+        Ok(received)
     }
-    Ok(())
+
+    // No code panics while it holds the lock but the sink, which takes the scope down with it.
+    fn calm(&self) -> MutexGuard<'_, Vec<Ear>> {
+        self.calm.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 impl SinkShell<'_> {
@@ -154,6 +240,9 @@ impl SinkShell<'_> {
             return Err(error);
         }
         context.board.ends();
+        if !self.report.inputs.iter().all(|input| input.ended) {
+            self.sink.cut_short();
+        }
         self.sink.finish()?;
         self.count();
         self.health.end(&self.report)?;

@@ -130,6 +130,28 @@ impl Sides for ZenohSides {
     }
 }
 
+/// The same, with samples that wait for more.
+struct GatheringSides(ZenohSides);
+
+impl Sides for GatheringSides {
+    type Transport = Zenoh;
+    const REMEMBERS: bool = true;
+    fn new(patience: Duration) -> Self {
+        let mut sides = ZenohSides::new(patience);
+        sides.sending = sides.sending.with_spill(SpillSettings {
+            linger_ms: 20,
+            ..SPILL
+        });
+        Self(sides)
+    }
+    fn sending(&self) -> &Zenoh {
+        &self.0.sending
+    }
+    fn receiving(&self) -> &Zenoh {
+        &self.0.receiving
+    }
+}
+
 /// Two sessions on two hosts, each of which has a router.
 struct ZenohHostSides {
     sides: ZenohSides,
@@ -254,4 +276,5 @@ conforms!(shared_memory, SharedMemorySides);
 conforms!(shared_memory_looked_at, LookingSides<5>);
 conforms!(shared_memory_spinning, LookingSides<0>);
 conforms!(zenoh, ZenohSides);
+conforms!(zenoh_that_gathers, GatheringSides);
 conforms!(zenoh_between_hosts, ZenohHostSides);

@@ -20,6 +20,9 @@ pub struct Snapshot {
     pub totals: Totals,
     /// Messages that were refused, by reason.
     pub refused: BTreeMap<&'static str, u64>,
+    /// Why incidents and history are not kept now; `None` where they are, or are not to be.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unkept: Option<String>,
     /// The worst first; of equals the one that is so for longest.
     pub cells: Vec<CellView>,
 }
@@ -166,6 +169,7 @@ impl Snapshot {
         Self {
             now_ns: now.unix_ns,
             sessions_reached: reached,
+            unkept: None,
             totals,
             refused,
             cells,

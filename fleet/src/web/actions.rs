@@ -19,26 +19,33 @@ const MAX_NOTE_BYTES: usize = 400;
 /// A form with nothing but the session's secret.
 #[derive(Deserialize)]
 pub struct Bare {
+    /// Empty where there is none, as in what is no form of this page.
+    #[serde(default)]
     csrf: String,
 }
 
 /// A token.
 #[derive(Deserialize)]
 pub struct Login {
+    #[serde(default)]
     token: String,
 }
 
 /// A lease.
 #[derive(Deserialize)]
 pub struct Mute {
+    #[serde(default)]
     csrf: String,
-    seconds: f64,
+    /// Nothing is muted for no time.
+    seconds: Option<f64>,
 }
 
 /// A label or a note.
 #[derive(Deserialize)]
 pub struct Written {
+    #[serde(default)]
     csrf: String,
+    #[serde(default)]
     text: String,
     /// `on`: the cell's normal is learned anew.
     baseline: Option<String>,
@@ -104,7 +111,7 @@ pub async fn mute(
     headers: HeaderMap,
     Form(form): Form<Mute>,
 ) -> Response {
-    let seconds = form.seconds;
+    let seconds = form.seconds.unwrap_or(f64::NAN);
     command(
         &shared,
         &headers,
@@ -185,7 +192,7 @@ fn may(shared: &Shared, headers: &HeaderMap, csrf: &str, cell: &str) -> Result<S
     let user = shared.sessions.of_form(headers, csrf);
     let user = user.ok_or((
         StatusCode::FORBIDDEN,
-        "log in again: this form is too old\n",
+        "log in: only users with a token may do this, and a form is good for one log-in\n",
     ))?;
     if shared.hub.snapshot().cell(cell).is_none() {
         return Err((StatusCode::NOT_FOUND, "there is no such cell\n"));

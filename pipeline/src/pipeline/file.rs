@@ -66,14 +66,31 @@ pub struct CellEntry {
 }
 
 /// How a host is reached by the others.
-#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct HostEntry {
     /// Zenoh endpoints that this host listens on, e.g. `tcp/10.0.0.1:7447`: one, or a list.
     pub listen: Endpoints,
     /// Zenoh endpoints that this host connects to: one, or a list.
     pub connect: Endpoints,
+    /// Samples for other hosts wait at most so long for more, to go in one message \[ms\]. Alarms and commands never
+    /// wait. A shorter time costs more of a core, on all hosts.
+    #[schemars(range(min = 0, max = 100))]
+    pub gather_ms: u64,
 }
+
+impl Default for HostEntry {
+    fn default() -> Self {
+        Self {
+            listen: Endpoints::default(),
+            connect: Endpoints::default(),
+            gather_ms: GATHER_MS,
+        }
+    }
+}
+
+/// Resolution: how late a sample is on another host, against the cost of a message.
+const GATHER_MS: u64 = 10;
 
 /// One endpoint or several.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use tauscope_bus::{JointState, Source};
-use tauscope_ingest::{Config, CsvConfig, FileConfig, IngestError, RecordedSource, Topics};
+use tauscope_ingest::{Ahead, Config, CsvConfig, FileConfig, IngestError, RecordedSource, Topics};
 
 use crate::build;
 use crate::cell::Cell;
@@ -13,12 +13,13 @@ pub(super) fn recording(
     config: &Config,
     recording: &Path,
     cell: &Cell,
+    ahead: bool,
 ) -> Result<Box<dyn Source<JointState>>, IngestError> {
     let setup = build::ingest_setup(cell);
     let ending = recording.extension();
     let is_table = ending.is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
     let path = recording.to_owned();
-    Ok(Box::new(match &config.csv {
+    let source = match &config.csv {
         Some(csv) if is_table => {
             let csv = CsvConfig {
                 path,
@@ -31,7 +32,11 @@ pub(super) fn recording(
             RecordedSource::open_file(&FileConfig { path, topics }, config, &setup)?
         }
         _ => RecordedSource::open_file(&file_config(config, recording), config, &setup)?,
-    }))
+    };
+    if !ahead {
+        return Ok(Box::new(source));
+    }
+    Ok(Box::new(Ahead::new(source).map_err(IngestError::Thread)?))
 }
 
 /// The pipeline's topics, for a recording of its robot.

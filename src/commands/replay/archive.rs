@@ -113,7 +113,7 @@ pub fn run(job: &Job<'_>, pipeline: &Pipeline, out: &mut Output) -> Result<Exit,
         Some(Shard { index, of }) => manifest.shard(index, of),
         None => manifest,
     };
-    let replays = replays(pipeline, &manifest, job.twin)?;
+    let replays = replays(job, pipeline, &manifest)?;
     let identity = Identity::of(pipeline, job.twin, job.with_scores)?;
     let shelf = Folder::open(&folder(job.out)?).with_context(|| job.out.to_owned())?;
     let hold = interrupt::hold();
@@ -153,17 +153,29 @@ pub fn run(job: &Job<'_>, pipeline: &Pipeline, out: &mut Output) -> Result<Exit,
     Ok(Exit::from_loss(summary.lossy > 0).and(failed))
 }
 
+/// A replay of which so many run at once.
+pub fn prepared<'a>(
+    pipeline: &'a Pipeline,
+    source: Option<&str>,
+    twin: TwinChoice,
+    jobs: u16,
+) -> Result<Replay<'a>, Failure> {
+    let replay = Replay::new(pipeline, source, twin);
+    let replay = replay.map_err(|error| Failure::rejected(error.to_string()))?;
+    Ok(replay.reading_ahead(parallel::has_spare_core(usize::from(jobs))))
+}
+
 /// A replay for each source that the manifest names.
 fn replays<'a>(
+    job: &Job<'_>,
     pipeline: &'a Pipeline,
     manifest: &Manifest,
-    twin: TwinChoice,
 ) -> Result<BTreeMap<Option<String>, Replay<'a>>, Failure> {
     let mut replays = BTreeMap::new();
     for wanted in &manifest.wanted {
         if !replays.contains_key(&wanted.source) {
-            let replay = Replay::new(pipeline, wanted.source.as_deref(), twin)
-                .map_err(|error| Failure::rejected(error.to_string()))?;
+            let source = wanted.source.as_deref();
+            let replay = prepared(pipeline, source, job.twin, job.jobs)?;
             replays.insert(wanted.source.clone(), replay);
         }
     }

@@ -258,7 +258,7 @@ impl Detector for Tauscope {
         let late = self.late.next(sample);
         let score = self.windows.score(sample, &late, drifts);
         self.moved.push(sample.header.stamp_ns, &sample.velocity);
-        let ready = self.windows.ready() && sample.header.has(flags::READY);
+        let ready = self.windows.ready() && self.rate.is_right() && sample.header.has(flags::READY);
         if !ready {
             self.watch.end();
             return Judgement {

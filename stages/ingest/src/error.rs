@@ -27,7 +27,7 @@ pub enum IngestError {
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
     /// The system has no thread left.
-    #[error("no thread for the connection: {0}")]
+    #[error("no thread for the source: {0}")]
     Thread(std::io::Error),
     /// Zenoh cannot be reached, or not be used.
     #[error("zenoh: {0}")]

@@ -38,6 +38,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod ahead;
 mod archived_twin;
 mod commanded;
 mod config;
@@ -53,6 +54,7 @@ mod tcp;
 mod ur_rtde;
 mod zenoh;
 
+pub use ahead::Ahead;
 pub use archived_twin::{ArchivedTwin, ArchivedTwinTopics};
 pub use commanded::{Commanded, Takes};
 pub use config::{

@@ -69,6 +69,8 @@ pub struct Packer {
     told: VecDeque<tauscope_bus::Command>,
     pending: VecDeque<JointState>,
     newest_ns: Option<i64>,
+    /// Position and effort of the newest state.
+    newest: [JointArray; 2],
     flushed: bool,
     messages: u64,
     counts: PackCounts,
@@ -119,6 +121,7 @@ impl Packer {
             told: VecDeque::new(),
             pending: VecDeque::new(),
             newest_ns: None,
+            newest: [[0.0; MAX_JOINTS]; 2],
             flushed: false,
             messages: 0,
             counts: PackCounts::default(),
@@ -127,7 +130,10 @@ impl Packer {
 
     /// What it has counted.
     pub fn counts(&self) -> PackCounts {
-        self.counts
+        PackCounts {
+            parted: self.state.in_vain(),
+            ..self.counts
+        }
     }
 
     /// Takes a measured state that was received at `received_ns`.
@@ -318,8 +324,12 @@ impl Packer {
         let mut flags = flags::EFFORT_MEASURED * u32::from(whole.has_effort)
             + flags::VELOCITY_MEASURED * u32::from(whole.has_velocity);
         match self.newest_ns.map(|newest| whole.stamp_ns - newest) {
-            Some(0) => {
+            Some(0) if self.newest == [whole.position, whole.effort] => {
                 self.counts.repeated += 1;
+                return;
+            }
+            Some(0) => {
+                self.counts.stalled += 1;
                 return;
             }
             Some(step) if step < -JUMP_BACK_NS => {
@@ -334,6 +344,7 @@ impl Packer {
             _ => {}
         }
         self.newest_ns = Some(whole.stamp_ns);
+        self.newest = [whole.position, whole.effort];
         let differentiated = self.state_velocity.update(
             whole.stamp_ns,
             &whole.position,

@@ -18,6 +18,7 @@
 //!   One that still lasts when the lease ends is latched then.
 //! - Before every detector has judged a sample, and while one cannot judge, nothing is free.
 
+use tauscope_bus::command::MuteLease;
 use tauscope_bus::{Command, Detection, Verb, flags};
 
 use crate::config::Latch;
@@ -56,20 +57,13 @@ struct View {
     latches: bool,
 }
 
-/// A lease, in stamps \[ns\].
-#[derive(Debug, Clone, Copy)]
-struct Lease {
-    from_ns: i64,
-    until_ns: i64,
-}
-
 /// The alarm of one cell.
 #[derive(Debug)]
 pub struct Alarm {
     latch: Latch,
     views: Vec<View>,
     latched: Latched,
-    lease: Option<Lease>,
+    lease: Option<MuteLease>,
     /// By stamp.
     waiting: Vec<(i64, Command)>,
     now_ns: i64,
@@ -148,13 +142,7 @@ impl Alarm {
                     Latched::No
                 };
             }
-            Some(Verb::Mute) => {
-                self.lease = Some(Lease {
-                    from_ns: stamp_ns,
-                    until_ns: stamp_ns.saturating_add((command.value * 1e9) as i64),
-                });
-            }
-            _ => {}
+            _ => self.lease = MuteLease::of(stamp_ns, command).or(self.lease),
         }
     }
 
@@ -185,14 +173,8 @@ impl Alarm {
 
     /// What is left of a mute \[s\]; 0 without one.
     pub fn muted_s(&self) -> f64 {
-        let left = self.lease.map_or(0, |lease| {
-            if lease.from_ns <= self.now_ns {
-                lease.until_ns - self.now_ns
-            } else {
-                0
-            }
-        });
-        left.max(0) as f64 * 1e-9
+        let left_ns = self.lease.map_or(0, |lease| lease.left_ns(self.now_ns));
+        left_ns as f64 * 1e-9
     }
 
     fn is_muted(&self) -> bool {

@@ -3,6 +3,7 @@
 //! What is read is worked out when it is read: the age of the newest sample counts, so a pipeline that hangs reads as
 //! stop, and one that is dead breaks the connection.
 
+mod guard;
 pub mod registers;
 
 use std::future::Future;
@@ -21,6 +22,7 @@ use tokio_modbus::{ExceptionCode, Request, Response};
 
 use crate::error::PublishError;
 use crate::status::Status;
+use guard::Guard;
 use registers::{Registers, Write};
 
 /// Clients at a time; a further one is turned away.
@@ -121,7 +123,7 @@ impl Modbus {
                 }
                 // Answers are small and must not wait for more; where that cannot be, they do.
                 let _ = stream.set_nodelay(true);
-                async move { Ok(client.map(|client| (client, stream))) }
+                async move { Ok(client.map(|client| (client, Guard::new(stream)))) }
             };
             let server = Server::new(listener);
             loop {

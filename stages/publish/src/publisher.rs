@@ -55,6 +55,8 @@ pub struct Publisher {
     shown: Option<(AlarmMessage, Instant)>,
     /// Messages that could not be published.
     unsent: u64,
+    /// A stage before it has failed.
+    cut_short: bool,
 }
 
 impl Publisher {
@@ -139,6 +141,7 @@ impl Publisher {
             modbus: modbus.transpose()?,
             shown: None,
             unsent: 0,
+            cut_short: false,
         })
     }
 
@@ -320,6 +323,10 @@ impl Sink for Publisher {
         Ok(())
     }
 
+    fn cut_short(&mut self) {
+        self.cut_short = true;
+    }
+
     fn finish(&mut self) -> Result<(), StageError> {
         // The run is over: nothing is known from here on.
         self.status.heard = None;
@@ -327,7 +334,7 @@ impl Sink for Publisher {
         self.shown = None;
         let now = Instant::now();
         self.announce(now);
-        self.tell_fleet(now, true);
+        self.tell_fleet(now, !self.cut_short);
         Ok(())
     }
 

@@ -93,7 +93,7 @@ impl AroundAlarms {
         let ns = |seconds: f64| (seconds * 1e9).round() as i64;
         Ok(Self {
             files,
-            contacts: Contacts::new(streams.all.len()),
+            contacts: Contacts::new(streams),
             ring: VecDeque::new(),
             bytes: 0,
             most_bytes: (settings.at_most_mb * 1e6) as usize,
@@ -155,7 +155,8 @@ impl AroundAlarms {
                 self.close(streams)?;
             }
             if let Some(waiting) = self.pop() {
-                self.contacts.push(waiting.index, waiting.sample.as_ref());
+                self.contacts
+                    .push(streams, waiting.index, waiting.sample.as_ref());
             }
         }
         Ok(())
@@ -174,7 +175,7 @@ impl AroundAlarms {
             return Ok(false);
         };
         let sample = waiting.sample.as_ref();
-        let told = self.contacts.push(waiting.index, sample);
+        let told = self.contacts.push(streams, waiting.index, sample);
         self.files.accept(streams, waiting.index, sample, told)?;
         Ok(true)
     }

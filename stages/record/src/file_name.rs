@@ -112,6 +112,16 @@ impl FileName {
         (!self.can_differ()).then(|| self.fill(cell, Timestamp::default(), 0))
     }
 
+    /// What all files of a cell match: `*` for what is only known when a file is begun, as a shell takes it.
+    pub fn pattern(&self, cell: &str) -> String {
+        let parts = self.parts.iter().map(|part| match part {
+            Part::Text(text) => text,
+            Part::Cell => cell,
+            Part::Date | Part::Time | Part::Number => "*",
+        });
+        parts.collect()
+    }
+
     /// Whether the name is known before the first sample is.
     pub fn is_known_at_start(&self) -> bool {
         !(self.parts.iter()).any(|part| matches!(part, Part::Date | Part::Time))
@@ -226,6 +236,12 @@ mod tests {
 
     /// 22 November 2026, 14:03:05.7 UTC.
     const START_NS: i64 = 1_795_356_185_700_000_000;
+
+    #[test]
+    fn a_pattern_matches_all_files_of_a_cell() {
+        let name = FileName::parse(Path::new("out/{cell}/{date}-{time}.{n}.mcap")).unwrap();
+        assert_eq!(name.pattern("press"), "out/press/*-*.*.mcap");
+    }
 
     #[test]
     fn fields_are_filled_in_with_cell_and_first_sample() {

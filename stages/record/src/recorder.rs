@@ -59,7 +59,7 @@ impl Recorder {
         let live = viewer.map(|url| LivePicture::start(url, &streams));
         let live = live.transpose()?;
         Ok(Self {
-            contacts: Contacts::new(streams.all.len()),
+            contacts: Contacts::new(&streams),
             streams,
             files,
             around_alarms: around_alarms.transpose()?,
@@ -86,7 +86,7 @@ impl Recorder {
 
     fn keep(&mut self, from: &str, sample: SampleRef<'_>) -> Result<(), RecordError> {
         let index = self.streams.find(from, &sample)?;
-        let told = self.contacts.push(index, sample);
+        let told = self.contacts.push(&self.streams, index, sample);
         self.files.accept(&self.streams, index, sample, told)?;
         if let Some(around) = &mut self.around_alarms {
             around.accept(&self.streams, index, sample)?;

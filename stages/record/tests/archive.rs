@@ -13,7 +13,7 @@ use tauscope_archive::Recording;
 use tauscope_archive::ros::{
     DiagnosticArray, Float64, InertiaStamped, JointState, Level, Message, WrenchStamped,
 };
-use tauscope_bus::{Detection, SampleRef, Sink, flags};
+use tauscope_bus::{Command, Detection, SampleRef, Sink, Verb, flags};
 use tauscope_record::{Config, RecordError, Recorder};
 
 fn recorder(path: &Path) -> Recorder {
@@ -168,6 +168,29 @@ fn a_detection_is_told_once_when_it_begins_and_once_when_it_ends() {
     assert_eq!(reports.len(), 5);
     assert_eq!(reports[3].1.status[0].name, "twin");
     assert_eq!(reports[3].1.status[0].values[0].value, "750");
+}
+
+#[test]
+fn what_happens_during_a_mute_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("demo.mcap");
+    let mut instants = motion(5.0);
+    // It begins two samples before the contact and is over before the contact is.
+    let is_onset = |i: &Instant| i.detection.event == Detection::ONSET;
+    let onset = instants.iter().position(is_onset).unwrap();
+    instants[onset - 2].state.command = Command {
+        verb: Verb::Mute as u32,
+        value: 0.5,
+        ..Command::default()
+    };
+    record(&path, &instants);
+
+    let statuses = read::<DiagnosticArray>(&path, "/detections");
+    let muted = statuses.iter().map(|(_, array)| {
+        let mut values = array.status[0].values.iter();
+        values.any(|pair| pair.key == "muted" && pair.value == "true")
+    });
+    assert_eq!(Vec::from_iter(muted), [false, false, true, false]);
 }
 
 #[test]

@@ -8,9 +8,11 @@ use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::{CallbackProgression, EventId, PortFactory as _};
 use iceoryx2::service::ipc_threadsafe::Service;
 
-use super::{END_TAKEN, Joined, MAX_SENDERS, Samples, SharedMemory, greeting, open_error, wait};
+use super::{
+    END_TAKEN, Joined, MAX_SENDERS, Samples, SharedMemory, URGENT, greeting, open_error, wait,
+};
 use crate::link::sequence::Tracker;
-use crate::link::{Keep, LinkError, MAX_DEPTH, Position, Received, Receiver, ReceiverCounts};
+use crate::link::{Keep, LinkError, MAX_DEPTH, Position, Received, Receiver, ReceiverCounts, Wake};
 use crate::sample::Sample;
 
 /// While a receiver spins: how often it looks for senders that are new.
@@ -19,8 +21,8 @@ const GREET_EVERY: Duration = Duration::from_millis(1);
 
 /// How a receiver waits, as its [`Wake`] says.
 enum Waiting {
-    /// Until an event comes.
-    Woken(Box<Listener<Service>>),
+    /// Until an event comes, or so long.
+    Woken(Box<Listener<Service>>, Duration),
     /// So long between two looks.
     Looks(Duration),
 }
@@ -43,13 +45,20 @@ impl<T: Sample> SharedMemoryReceiver<T> {
         keep: Keep,
         depth: usize,
     ) -> Result<Self, LinkError> {
-        let waiting = match transport.wake.pause() {
-            Some(pause) => Waiting::Looks(pause),
-            None => Waiting::Woken(Box::new(
-                (transport.events(stream, keep, "")?.listener_builder())
-                    .create()
-                    .map_err(|error| open_error(stream, &error))?,
-            )),
+        let events = match transport.wake {
+            Wake::Event => Some(""),
+            Wake::EveryMsOrUrgent(_) if T::KIND.may_alarm() => Some(URGENT),
+            Wake::EveryMsOrUrgent(_) | Wake::EveryMs(_) | Wake::Spin => None,
+        };
+        let pause = transport.wake.pause();
+        let waiting = match events {
+            Some(suffix) => {
+                let events = transport.events(stream, keep, suffix)?;
+                let listener = events.listener_builder().create();
+                let listener = listener.map_err(|error| open_error(stream, &error))?;
+                Waiting::Woken(Box::new(listener), pause.unwrap_or(Duration::MAX))
+            }
+            None => Waiting::Looks(pause.unwrap_or_default()),
         };
         let back = transport
             .events(stream, keep, "/back")?
@@ -161,7 +170,9 @@ impl<T: Sample> Receiver<T> for SharedMemoryReceiver<T> {
             }
             match &self.waiting {
                 // A notification that came since the look above ends this wait at once.
-                Waiting::Woken(by) => wait(by, left, |_| {}).map_err(|e| self.error(&e))?,
+                Waiting::Woken(by, pause) => {
+                    wait(by, left.min(*pause), |_| {}).map_err(|e| self.error(&e))?;
+                }
                 Waiting::Looks(Duration::ZERO) => {
                     let until = Instant::now() + left.min(GREET_EVERY);
                     while !self.has_samples()? && Instant::now() < until {

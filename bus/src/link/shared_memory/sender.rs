@@ -11,7 +11,7 @@ use iceoryx2::prelude::{CallbackProgression, EventId, PortFactory as _};
 use iceoryx2::service::ipc_threadsafe::Service;
 
 use super::backpressure::Backpressure;
-use super::{END_TAKEN, Joined, Samples, SharedMemory, greeting, open_error, wait};
+use super::{END_TAKEN, Joined, Samples, SharedMemory, URGENT, greeting, open_error, wait};
 use crate::link::{Keep, LinkError, Sender, SenderCounts};
 use crate::sample::{Sample, flags};
 
@@ -30,6 +30,8 @@ pub(super) struct SharedMemorySender<T: Sample> {
     publisher: Publisher<Service, T, Joined>,
     samples: Samples<T>,
     wake: Notifier<Service>,
+    /// For those who are woken for an alarm alone.
+    urgent: Option<Notifier<Service>>,
     back: Listener<Service>,
     greeting: EventId,
     /// Receivers that hear this sender, and those that have taken the end.
@@ -74,6 +76,11 @@ impl<T: Sample> SharedMemorySender<T> {
             .create()
             .map_err(|error| open_error(stream, &error))?;
         wake.notify().map_err(|error| open_error(stream, &error))?;
+        let urgent = T::KIND.may_alarm().then(|| {
+            (transport.events(stream, keep, URGENT)?.notifier_builder())
+                .create()
+                .map_err(|error| open_error(stream, &error))
+        });
         Ok(Self {
             stream: stream.to_owned(),
             transport: transport.clone(),
@@ -83,6 +90,7 @@ impl<T: Sample> SharedMemorySender<T> {
             publisher,
             samples,
             wake,
+            urgent: urgent.transpose()?,
             back,
             greeted: 0,
             taken: 0,
@@ -103,10 +111,15 @@ impl<T: Sample> SharedMemorySender<T> {
         write(slot.payload_mut());
         slot.payload_mut().header_mut().sequence = self.next;
         *slot.user_header_mut() = self.joined;
+        let sample = slot.payload();
+        let is_urgent = sample.is_urgent() || sample.header().has(flags::END);
         self.next += 1;
         self.backpressure.begin();
         let delivered = slot.send().map_err(|e| self.error(&e))?;
         self.wake.notify().map_err(|e| self.error(&e))?;
+        if let Some(urgent) = self.urgent.as_ref().filter(|_| is_urgent) {
+            urgent.notify().map_err(|e| self.error(&e))?;
+        }
         if self.keep == Keep::All {
             let refused = self.backpressure.refused();
             let missing = self.expected.saturating_sub(delivered).max(refused);

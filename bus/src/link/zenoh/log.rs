@@ -103,6 +103,11 @@ impl<T: Copy> Log<T> {
         self.next
     }
 
+    /// How many samples have not gone out yet.
+    pub(super) fn waiting(&self) -> usize {
+        usize::try_from(self.next.saturating_sub(self.cursor)).unwrap_or(usize::MAX)
+    }
+
     /// How many receivers are missing.
     pub(super) fn missing(&self) -> usize {
         let there = self.readers.values().filter(|reader| reader.there).count();

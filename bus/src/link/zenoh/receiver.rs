@@ -18,9 +18,12 @@ use crate::link::sequence::Tracker;
 use crate::link::{Keep, LinkError, MAX_DEPTH, Position, Received, Receiver, ReceiverCounts};
 use crate::sample::Sample;
 
-/// A receiver says so often how far it has come, at most.
-/// Resolution: the sender's memory, against the traffic.
-const TELL_EVERY: Duration = Duration::from_millis(20);
+/// A receiver says so often how far it has come, unless a quarter of its room is taken.
+/// Resolution: the sender's memory, against the traffic: each word costs as much as a message of samples.
+const TELL_EVERY: Duration = Duration::from_millis(100);
+/// It says so often at most that it misses something.
+/// Resolution: the delay after a loss, against what is sent twice.
+const MISSES_EVERY: Duration = Duration::from_millis(20);
 /// One that hears nothing repeats it so often.
 const TELL_AGAIN: Duration = Duration::from_secs(1);
 
@@ -232,7 +235,7 @@ impl<T: Sample> ZenohReceiver<T> {
     }
 
     fn tell_now_and_then(&mut self, instance: u64, next: u64, why: Why) -> Result<(), LinkError> {
-        if self.told.is_some_and(|(_, at)| at.elapsed() < TELL_EVERY) {
+        if self.told.is_some_and(|(_, at)| at.elapsed() < MISSES_EVERY) {
             return Ok(());
         }
         self.tell(Position { instance, next }, why)

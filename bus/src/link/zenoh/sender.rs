@@ -18,8 +18,10 @@ use crate::sample::{Sample, flags};
 /// Most bytes of one message: what fits into one batch of Zenoh, so that it is never split.
 /// Resolution: how much is sent twice after a loss.
 const MESSAGE_BYTES: usize = 48 << 10;
-/// Samples that those who keep the newest may miss before the oldest gives way.
-const NEWEST: usize = 16;
+/// Samples that wait for those who keep the newest before the oldest gives way; half of them go out without waiting for
+/// more.
+/// Resolution: memory, against how often a message goes out.
+const NEWEST: usize = 64;
 /// How often it is looked for what did not arrive.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
@@ -52,10 +54,23 @@ struct Shared<T> {
     changed: Condvar,
 }
 
+/// What the thread does that sends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Thread {
+    Sends,
+    /// It waits to be woken.
+    Idle,
+    /// It waits for more, so that one message carries several samples; only what is urgent wakes it.
+    Gathers,
+    /// It is not to wait any more.
+    Hurries,
+}
+
 struct State<T> {
     log: Log<T>,
-    /// The thread waits to be woken.
-    idle: bool,
+    thread: Thread,
+    /// So many samples go out without waiting for more.
+    enough: usize,
     /// Nobody sends any more; what waits is given so long.
     closed: Option<Instant>,
     failure: Option<LinkError>,
@@ -78,7 +93,8 @@ impl<T: Sample> ZenohSender<T> {
         let shared = Arc::new(Shared {
             state: Mutex::new(State {
                 log: Log::new(keep, audience, most, transport.patience),
-                idle: false,
+                thread: Thread::Sends,
+                enough: most_of_a_message::<T>().min(most / 2).max(1),
                 closed: None,
                 failure: None,
             }),
@@ -184,6 +200,10 @@ impl<T: Sample> ZenohSender<T> {
     }
 }
 
+fn most_of_a_message<T>() -> usize {
+    (MESSAGE_BYTES / size_of::<T>()).max(1)
+}
+
 /// Hears who listens.
 fn presence<T: Sample>(
     session: &zenoh::Session,
@@ -214,9 +234,13 @@ impl<T: Sample> Sender<T> for ZenohSender<T> {
         let mut state = self.room()?;
         sample.header_mut().sequence = state.log.next();
         state.log.push(sample);
-        let idle = state.idle;
+        let wakes = if sample.is_urgent() || state.log.waiting() >= state.enough {
+            state.hurry()
+        } else {
+            state.thread == Thread::Idle
+        };
         drop(state);
-        if idle {
+        if wakes {
             self.shared.filled.notify_one();
         }
         self.sent += 1;
@@ -233,6 +257,7 @@ impl<T: Sample> Sender<T> for ZenohSender<T> {
         let mut state = self.room()?;
         mark.header_mut().sequence = state.log.next();
         state.log.push_end(mark);
+        state.hurry();
         drop(state);
         self.shared.filled.notify_one();
         Ok(())
@@ -266,7 +291,10 @@ impl<T: Sample> Drop for ZenohSender<T> {
     /// What waits is still sent; a process that exits takes it along.
     fn drop(&mut self) {
         self.token = None;
-        self.shared.lock().closed = Some(Instant::now());
+        let mut state = self.shared.lock();
+        state.closed = Some(Instant::now());
+        state.hurry();
+        drop(state);
         self.shared.filled.notify_one();
     }
 }
@@ -285,8 +313,10 @@ impl<T: Sample> Shared<T> {
 
     /// Sends what waits until nobody sends any more.
     fn pump(&self, wire: &Wire, linger: Duration) -> Result<(), String> {
-        let most = (MESSAGE_BYTES / size_of::<T>()).max(1);
-        while let Some(batch) = self.next(most, linger) {
+        let most = most_of_a_message::<T>();
+        let mut not_before = None;
+        while let Some(batch) = self.next(most, not_before) {
+            not_before = Instant::now().checked_add(linger);
             let beside = Beside {
                 instance: wire.instance,
                 since: batch.since,
@@ -302,13 +332,24 @@ impl<T: Sample> Shared<T> {
         Ok(())
     }
 
-    /// What goes out next; none at the end.
-    fn next(&self, most: usize, linger: Duration) -> Option<Batch<T>> {
+    /// What goes out next, no sooner than so long after what went out before, unless it is urgent; none at the end.
+    fn next(&self, most: usize, not_before: Option<Instant>) -> Option<Batch<T>> {
         let mut state = self.lock();
         loop {
             let now = Instant::now();
             state.log.look_back(now);
+            let left = not_before.map_or(Duration::ZERO, |at| at.saturating_duration_since(now));
+            let hurries = state.thread == Thread::Hurries || state.closed.is_some();
+            if !left.is_zero() && !hurries && state.log.waiting() < state.enough {
+                // What the receivers say wakes this thread, too.
+                state.thread = Thread::Gathers;
+                state = wait(&self.filled, state, left);
+                continue;
+            }
             if let Some(batch) = state.log.batch(most, now) {
+                if !hurries || state.log.waiting() == 0 {
+                    state.thread = Thread::Sends;
+                }
                 drop(state);
                 self.changed.notify_all();
                 return Some(batch);
@@ -319,15 +360,17 @@ impl<T: Sample> Shared<T> {
             {
                 return None;
             }
-            state.idle = true;
+            state.thread = Thread::Idle;
             state = wait(&self.filled, state, LOOK_EVERY);
-            state.idle = false;
-            if !linger.is_zero() && state.closed.is_none() {
-                drop(state);
-                std::thread::sleep(linger);
-                state = self.lock();
-            }
         }
+    }
+}
+
+impl<T> State<T> {
+    /// What waits is to go out at once. Whether the thread must be woken for that.
+    fn hurry(&mut self) -> bool {
+        let before = std::mem::replace(&mut self.thread, Thread::Hurries);
+        matches!(before, Thread::Idle | Thread::Gathers)
     }
 }
 

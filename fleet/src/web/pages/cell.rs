@@ -132,7 +132,8 @@ fn actions(viewer: &Viewer, view: &CellView) -> Markup {
             form method="post" action=(to("acknowledge")) {
                 (secret)
                 button.main type="submit" { "Acknowledge" }
-                @if !takes { p.muted { "Only noted here: the cell takes no commands." } }
+                @if view.status.is_none() { p.muted { "Only noted here: the cell has told nothing yet." } }
+                @else if !takes { p.muted { "Only noted here: the cell takes no commands." } }
             }
             @if takes {
                 form method="post" action=(to("mute")) {

@@ -44,6 +44,9 @@ pub fn summary(snapshot: &Snapshot) -> Markup {
         @if snapshot.sessions_reached == 0 {
             p.refused role="alert" { strong { "This fleet host reaches no router and no cell." } " Nothing here is fresh." }
         }
+        @if let Some(why) = &snapshot.unkept {
+            p.refused role="alert" { strong { "Incidents and history are not kept now." } " " (why) }
+        }
         @if refused > 0 {
             details.muted {
                 summary { (refused) " messages were refused" }

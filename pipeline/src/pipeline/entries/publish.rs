@@ -2,6 +2,7 @@
 
 use tauscope_bus::{SampleKind, ZenohEndpoints};
 use tauscope_publish::{Config, ConfigError};
+use tauscope_record::FileName;
 
 use super::Resolver;
 use crate::pipeline::role::Role;
@@ -63,13 +64,11 @@ impl Resolver<'_> {
         let model = twin.and_then(|twin| self.models.get(&twin));
         let noise = model.iter().flat_map(|model| &model.joints);
         let writes = |at: usize| {
-            let is_here = wiring.cells[at].iter().any(|cell| cells.contains(cell));
-            self.entry(at)
-                .record
-                .as_ref()
-                .filter(|_| is_here)?
-                .mcap
-                .clone()
+            let cell = (cells.iter()).find(|cell| wiring.cells[at].contains(*cell))?;
+            let path = self.entry(at).record.as_ref()?.mcap.as_ref()?;
+            let path = self.file.resolve(path);
+            let path = std::path::absolute(&path).unwrap_or(path);
+            Some(FileName::parse(&path).ok()?.pattern(cell))
         };
         BesidePublisher {
             twin_sha256: twin
@@ -78,9 +77,7 @@ impl Resolver<'_> {
             calibrated: noise
                 .filter_map(|(name, joint)| Some((name.clone(), joint.noise?)))
                 .collect(),
-            archive: stages()
-                .find_map(writes)
-                .map(|path| path.display().to_string()),
+            archive: stages().find_map(writes),
         }
     }
 

@@ -81,7 +81,8 @@ pub trait Detector: Send {
         false
     }
 
-    /// Why it can never judge this stream, once that shows: the stage ends with it.
+    /// Why it can never judge this stream, once that shows: the stage ends with it. What may pass is no fault; the
+    /// detector is not ready while it lasts.
     fn fault(&self) -> Option<String> {
         None
     }

@@ -7,19 +7,42 @@ use super::lesson::Lesson;
 /// Steps whose median is a stream's period.
 /// Statistical: odd, so that the median is one of them, and enough that a few late ones do not move it.
 const COUNT: usize = 101;
+/// Fewer steps do, if they take longer than this many times what [`COUNT`] steps take at the rate of learning.
+/// Statistical: a stream that slow has another rate, whatever its median.
+const PATIENCE: f64 = 3.0;
+/// Of so many steps at least the median is taken.
+/// Statistical: two late ones among them do not move it.
+const LEAST: usize = 5;
+/// So many medians in a row that are wrong from the first on: it is another stream, and no spell of a publisher.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const NEVER: u32 = 5;
 /// Rates that differ by no more than this share are one.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const SAME: f64 = 0.2;
+/// A rate that goes to and fro is told of once in so long \[ns\].
+/// Resolution: what a person reads.
+const TOLD_EVERY_NS: i64 = 10_000_000_000;
 
 /// Holds the rate of a stream against the one that a detector was trained or tuned at: windows, recurrent
 /// nets and the noise of short means hold for no other. No allocation per sample.
+///
+/// The rate is looked at all the time, for a publisher may have a slow spell. While it lasts the detector cannot judge.
 #[derive(Debug, Clone)]
 pub(crate) struct Rate {
     learnt_hz: f64,
     before_ns: Option<i64>,
     periods_ns: [i64; COUNT],
     count: usize,
+    /// What the periods add up to \[ns\].
+    lasts_ns: i64,
+    /// The newest median.
     found_hz: Option<f64>,
+    /// A median was right.
+    was_right: bool,
+    /// Medians that were wrong before one was right.
+    wrong: u32,
+    /// Stamp when a change was told of last \[ns\].
+    told_ns: Option<i64>,
 }
 
 impl Rate {
@@ -30,7 +53,11 @@ impl Rate {
             before_ns: None,
             periods_ns: [0; COUNT],
             count: 0,
+            lasts_ns: 0,
             found_hz: None,
+            was_right: false,
+            wrong: 0,
+            told_ns: None,
         }
     }
 
@@ -40,10 +67,7 @@ impl Rate {
     pub fn update(&mut self, sample: &TwinState) {
         if sample.header.has(flags::RESET) {
             self.before_ns = None;
-            self.count = 0;
-        }
-        if self.count == COUNT {
-            return;
+            (self.count, self.lasts_ns) = (0, 0);
         }
         let stamp_ns = sample.header.stamp_ns;
         if let Some(before_ns) = self.before_ns.replace(stamp_ns)
@@ -51,18 +75,51 @@ impl Rate {
         {
             self.periods_ns[self.count] = stamp_ns - before_ns;
             self.count += 1;
-            if self.count == COUNT {
-                self.found_hz = Some(1e9 / median(&mut self.periods_ns));
+            self.lasts_ns += stamp_ns - before_ns;
+            let is_slow = self.count >= LEAST
+                && self.lasts_ns as f64 * 1e-9 * self.learnt_hz > PATIENCE * COUNT as f64;
+            if self.count == COUNT || is_slow {
+                self.look(stamp_ns);
             }
         }
     }
 
-    /// What is wrong with the rate, once it is known.
+    /// Takes the median of the steps that there are, and tells if it is no longer what it was.
+    fn look(&mut self, now_ns: i64) {
+        let was_right = self.is_right();
+        let found_hz = 1e9 / median(&mut self.periods_ns[..self.count]);
+        (self.count, self.lasts_ns) = (0, 0);
+        self.found_hz = Some(found_hz);
+        let is_right = self.is_right();
+        self.was_right |= is_right;
+        self.wrong += u32::from(!self.was_right);
+        let told_lately = (self.told_ns).is_some_and(|told_ns| now_ns - told_ns < TOLD_EVERY_NS);
+        if is_right == was_right || told_lately {
+            return;
+        }
+        self.told_ns = Some(now_ns);
+        let learnt_hz = self.learnt_hz;
+        if is_right {
+            tracing::warn!("a detector judges again: {found_hz:.1} samples a second");
+        } else {
+            tracing::warn!(
+                "a detector cannot judge: it has learnt from {learnt_hz:.1} samples a second, and here are {found_hz:.1}"
+            );
+        }
+    }
+
+    /// Whether the stream has the rate, as far as one knows by now.
+    pub fn is_right(&self) -> bool {
+        self.found_hz
+            .is_none_or(|found| same(self.learnt_hz, found))
+    }
+
+    /// What is wrong with a stream that never had the rate, once that shows.
     pub fn fault(&self) -> Option<String> {
         let (learnt, found) = (self.learnt_hz, self.found_hz?);
-        (!same(learnt, found)).then(|| {
+        (!self.was_right && self.wrong >= NEVER).then(|| {
             format!(
-                "it has learnt from {learnt:.1} samples a second, and here are {found:.1}: let `tauscope evaluate` train it on recordings of this rate"
+                "it has learnt from {learnt:.1} samples a second, and here are {found:.1}: let `tauscope init` or `tauscope evaluate` learn from recordings of this rate"
             )
         })
     }
@@ -89,4 +146,48 @@ pub(crate) fn same(learnt_hz: f64, found_hz: f64) -> bool {
 fn median(periods_ns: &mut [i64]) -> f64 {
     let middle = periods_ns.len() / 2;
     *periods_ns.select_nth_unstable(middle).1 as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A second of samples at `hz`, from `stamp_ns` on; gives the stamp behind them.
+    fn second(rate: &mut Rate, stamp_ns: i64, hz: i64) -> i64 {
+        let step_ns = 1_000_000_000 / hz;
+        for n in 0..hz {
+            let mut sample = TwinState::default();
+            sample.header.stamp_ns = stamp_ns + n * step_ns;
+            rate.update(&sample);
+        }
+        stamp_ns + 1_000_000_000
+    }
+
+    #[test]
+    fn a_slow_spell_is_waited_through() {
+        let mut rate = Rate::new(500.0);
+        let mut now_ns = second(&mut rate, 0, 500);
+        assert!(rate.is_right());
+        for hz in [250, 5, 5, 5] {
+            now_ns = second(&mut rate, now_ns, hz);
+            assert!(!rate.is_right() || hz == 5, "{hz}");
+        }
+        assert!(!rate.is_right());
+        now_ns = second(&mut rate, now_ns, 500);
+        second(&mut rate, now_ns, 500);
+        assert!(rate.is_right());
+        assert_eq!(rate.fault(), None);
+    }
+
+    #[test]
+    fn a_stream_that_never_has_the_rate_is_a_fault() {
+        let mut rate = Rate::new(100.0);
+        let mut now_ns = 0;
+        for _ in 0..2 {
+            now_ns = second(&mut rate, now_ns, 200);
+            assert_eq!((rate.is_right(), rate.fault()), (false, None));
+        }
+        second(&mut rate, now_ns, 200);
+        assert!(rate.fault().is_some());
+    }
 }

@@ -5,6 +5,10 @@ use tauscope_bus::{JointArray, MAX_JOINTS};
 
 use super::layout::Layout;
 
+/// Parts of a state that come apart by more than this are of publishers of which one has ceased \[ns\].
+/// Resolution: longer than two rates of one robot differ by, short against what a person misses.
+const APART_NS: i64 = 500_000_000;
+
 /// A state of all joints.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Gathered {
@@ -31,6 +35,12 @@ pub(super) struct Gather {
     all: u32,
     seen: u32,
     parts: Gathered,
+    /// When the first and the newest of these parts were received, and how many messages a newer one has replaced.
+    since_ns: i64,
+    newest_ns: i64,
+    replaced: u64,
+    /// Replaced messages of states that were whole too late.
+    in_vain: u64,
     /// Bit j: the number was finite once, or was not, for position, velocity and effort.
     finite: [u32; 3],
     not_finite: [u32; 3],
@@ -52,6 +62,10 @@ impl Gather {
             all: u32::MAX.checked_shr(32 - joint_count as u32).unwrap_or(0),
             seen: 0,
             parts: NOTHING,
+            since_ns: 0,
+            newest_ns: 0,
+            replaced: 0,
+            in_vain: 0,
             finite: [0; 3],
             not_finite: [0; 3],
         }
@@ -67,8 +81,13 @@ impl Gather {
     ) -> Option<Gathered> {
         if self.seen == 0 {
             self.parts = NOTHING;
+            self.since_ns = received_ns;
+            self.replaced = 0;
+        } else if self.seen & layout.joints != 0 {
+            self.replaced += 1;
         }
         self.seen |= layout.joints;
+        self.newest_ns = received_ns;
         let parts = &mut self.parts;
         parts.stamp_ns = parts.stamp_ns.max(stamp_of(&message.header, received_ns));
         parts.has_position &= !message.position.is_empty();
@@ -93,6 +112,7 @@ impl Gather {
         if self.seen & self.all != self.all {
             return None;
         }
+        self.in_vain = self.in_vain();
         self.seen = 0;
         // What only some parts brought is void.
         if !self.parts.has_velocity {
@@ -102,6 +122,12 @@ impl Gather {
             self.parts.effort = [0.0; MAX_JOINTS];
         }
         Some(self.parts)
+    }
+
+    /// Messages that made no state because a joint was missing for long.
+    pub fn in_vain(&self) -> u64 {
+        let waits = self.seen != 0 && self.newest_ns - self.since_ns > APART_NS;
+        self.in_vain + if waits { self.replaced } else { 0 }
     }
 
     /// The first joint and field that came and was never finite.

@@ -9,8 +9,12 @@ pub struct PackCounts {
     pub not_finite: u64,
     /// States refused because a newer one had come before.
     pub late: u64,
-    /// States with the stamp of the one before; nothing is lost by leaving them out.
+    /// States with the stamp of the one before that say the same; nothing is lost by leaving them out.
     pub repeated: u64,
+    /// States with the stamp of the one before that say something else: the publisher's clock stands still.
+    pub stalled: u64,
+    /// States without a joint that never came, or came much later.
+    pub parted: u64,
     /// Messages without what their topic is for: a state without positions, an effort that is absent.
     pub incomplete: u64,
     /// Messages about other joints than the cell's.
@@ -22,7 +26,7 @@ pub struct PackCounts {
 impl PackCounts {
     /// What is lost for good.
     pub fn dropped(&self) -> u64 {
-        self.not_finite + self.late + self.incomplete
+        self.not_finite + self.late + self.stalled + self.parted + self.incomplete
     }
 }
 

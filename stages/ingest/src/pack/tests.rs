@@ -85,6 +85,45 @@ fn two_publishers_with_a_part_of_the_arm_each_make_one_state() {
 }
 
 #[test]
+fn messages_that_lack_a_joint_for_long_are_counted_and_slower_publishers_are_not() {
+    let mut packer = packer();
+    // One publisher at 100 Hz, the other at 50: nothing is lost that could be told.
+    for n in 0..100 {
+        let at = 10 * MS * n;
+        packer.state(&message(at, "a b", &[1.0, 2.0]), at);
+        if n % 2 == 0 {
+            packer.state(&message(at + MS, "c", &[3.0]), at + MS);
+        }
+    }
+    assert_eq!(drain(&mut packer).len(), 50);
+    assert_eq!(packer.counts().dropped(), 0);
+    // The second ceases for a second, and comes back.
+    for n in 100..200 {
+        let at = 10 * MS * n;
+        packer.state(&message(at, "a b", &[1.0, 2.0]), at);
+    }
+    assert_eq!(packer.counts().parted, 100);
+    packer.state(&message(2000 * MS, "a b c", &[1.0, 2.0, 3.0]), 2000 * MS);
+    assert_eq!(drain(&mut packer).len(), 1);
+    // The message that came last is part of the new state.
+    assert_eq!(packer.counts().dropped(), 101);
+}
+
+#[test]
+fn a_clock_that_stands_still_loses_what_it_stamps() {
+    let mut packer = packer();
+    for value in [1.0, 1.0, 1.5, 2.0] {
+        packer.state(&message(MS, "a b c", &[value, 2.0, 3.0]), MS);
+    }
+    assert_eq!(drain(&mut packer).len(), 1);
+    let counts = packer.counts();
+    assert_eq!(
+        (counts.repeated, counts.stalled, counts.dropped()),
+        (1, 2, 2)
+    );
+}
+
+#[test]
 fn a_state_with_nan_is_dropped_and_counted() {
     let mut packer = packer();
     packer.state(&message(1, "a b c", &[1.0, 2.0, 3.0]), 1);

@@ -23,7 +23,8 @@ pub(super) struct Watch {
     /// What packing had counted at the newest sample.
     packed: PackCounts,
     first_sample: Option<Instant>,
-    has_effort: bool,
+    /// When a sample last had efforts.
+    effort_at: Option<Instant>,
 }
 
 impl Watch {
@@ -35,7 +36,7 @@ impl Watch {
             fed: Fed::default(),
             packed: PackCounts::default(),
             first_sample: None,
-            has_effort: false,
+            effort_at: None,
         }
     }
 
@@ -50,8 +51,11 @@ impl Watch {
 
     /// A sample went out.
     pub fn sample(&mut self, sample: &JointState, packed: PackCounts) {
-        self.has_effort |= sample.header.has(flags::EFFORT_MEASURED);
-        self.first_sample.get_or_insert_with(Instant::now);
+        let now = Instant::now();
+        if sample.header.has(flags::EFFORT_MEASURED) {
+            self.effort_at = Some(now);
+        }
+        self.first_sample.get_or_insert(now);
         self.packed = packed;
         if self.fed.messages > 0 {
             self.fed = Fed {
@@ -79,16 +83,24 @@ impl Watch {
             incomplete: packed.incomplete - self.packed.incomplete,
             never_finite: packer.never_finite(),
             not_finite: packed.not_finite - self.packed.not_finite,
-            stale: packed.late + packed.repeated - self.packed.late - self.packed.repeated,
+            stale: stale(packed) - stale(self.packed),
             ..self.fed.clone()
         };
         Some(diagnose(&self.expected, &fed, seen))
     }
 
     fn effortless(&self) -> Option<Trouble> {
-        let since = self.first_sample?;
-        if self.has_effort || since.elapsed() < EFFORTS_WITHIN {
+        let since = self.effort_at.or(self.first_sample)?;
+        if since.elapsed() < EFFORTS_WITHIN {
             return None;
+        }
+        if self.effort_at.is_some() {
+            let trouble = Trouble::new(
+                "the joint states hold no effort any more: there is nothing to compare",
+            );
+            let likely =
+                "the driver was started again with other settings, or a joint's drive is off";
+            return Some(trouble.likely(Some(likely.to_owned())));
         }
         let trouble = Trouble::new("the joint states hold no effort: there is nothing to compare");
         Some(
@@ -98,4 +110,9 @@ impl Watch {
             )),
         )
     }
+}
+
+/// States whose stamps do not advance.
+fn stale(counts: PackCounts) -> u64 {
+    counts.late + counts.repeated + counts.stalled
 }

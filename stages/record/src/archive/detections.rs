@@ -94,6 +94,7 @@ impl DetectionTopics {
                 label: &stream.label,
                 cell: &cell.name,
                 joints: &cell.joint_names,
+                muted: told.muted,
             };
             let ended = told.ended.as_ref().map(|ended| teller.end(ended));
             let now = (ended.is_none() || detection.event() == EventKind::Onset)
@@ -114,6 +115,7 @@ struct Teller<'a> {
     label: &'a str,
     cell: &'a str,
     joints: &'a [String],
+    muted: bool,
 }
 
 type Values = Vec<(&'static str, String)>;
@@ -161,13 +163,17 @@ impl Teller<'_> {
 
     fn values(&self, event: &str) -> Values {
         let detection = self.detection;
-        vec![
+        let mut values = vec![
             ("event", event.to_owned()),
             ("detector", detection.detector.to_string()),
             ("state", detection.state.to_string()),
             ("score", detection.score.to_string()),
             ("threshold", detection.threshold.to_string()),
-        ]
+        ];
+        if self.muted {
+            values.push(("muted", "true".to_owned()));
+        }
+        values
     }
 
     fn add_contact(&self, contact: &Contact, force_key: &'static str, values: &mut Values) {

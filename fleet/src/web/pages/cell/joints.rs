@@ -26,7 +26,10 @@ pub fn section(snapshot: &Snapshot, view: &CellView, kept: &Kept, unit: &str) ->
         .and_then(|status| status.residual.as_ref());
     let Some(residual) = residual else {
         return html! { p.muted {
-            "Nothing is known of the residual: the cell's " code { "publish" } " stage does not listen to its twin."
+            @if view.status.is_none() { "Nothing is known of the residual: the cell has told nothing yet." }
+            @else {
+                "Nothing is known of the residual: the cell's " code { "publish" } " stage does not listen to its twin."
+            }
         } };
     };
     let normal = |joint: &JointResidual| {

@@ -107,6 +107,7 @@ impl Detector for Learned {
         }
         self.stamp_ns = sample.header.stamp_ns;
         let score = (self.signals.update(sample)).and_then(|signal| self.scorer.score(signal));
+        let score = score.filter(|_| self.rate.is_right());
         self.judgement = score.map_or(NOT_READY, |score| Judgement {
             score,
             ready: true,

@@ -1,0 +1,114 @@
+//! A file that cannot be written for a while: what happens meanwhile waits, and it is said that it does.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use crate::keeper::Keeper;
+use crate::store::StoreError;
+use crate::wall::{Effect, Snapshot, Wall};
+
+/// What waits for the file at most. Resolution: memory; a day of a busy plant.
+const MOST: usize = 10_000;
+/// How often it is looked whether the file can be written again. Resolution: a person sees no more.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
+
+/// A keeper whose file may fail.
+#[derive(Debug)]
+pub struct Keeping {
+    keeper: Keeper,
+    failing: Option<Failing>,
+    /// What is to be kept, and when it happened \[ns since the epoch\].
+    waiting: VecDeque<(Effect, i64)>,
+    /// What had no room among those.
+    lost: u64,
+}
+
+#[derive(Debug)]
+struct Failing {
+    why: String,
+    looked: Instant,
+}
+
+impl Keeping {
+    pub fn new(keeper: Keeper) -> Self {
+        Self {
+            keeper,
+            failing: None,
+            waiting: VecDeque::new(),
+            lost: 0,
+        }
+    }
+
+    /// Keeps it, now or later.
+    pub fn keep(&mut self, wall: &Wall, effect: Effect, now_ns: i64) {
+        if self.failing.is_none() {
+            match self.keeper.keep(wall, &effect, now_ns) {
+                Ok(()) => return,
+                Err(error) => self.fails(&error),
+            }
+        }
+        if !effect.is_kept() {
+            return;
+        }
+        if self.waiting.len() == MOST {
+            self.waiting.pop_front();
+            self.lost += 1;
+        }
+        self.waiting.push_back((effect, now_ns));
+    }
+
+    /// Does with the file what cannot wait.
+    pub fn with(&mut self, work: impl FnOnce(&mut Keeper) -> Result<(), StoreError>) {
+        if let Err(error) = work(&mut self.keeper) {
+            self.fails(&error);
+        }
+    }
+
+    /// What is due by the clock; and what waits, where the file can be written again.
+    pub fn tick(&mut self, wall: &Wall, snapshot: &mut Snapshot) {
+        self.look(wall);
+        self.keeper.compare(snapshot);
+        if self.failing.is_none() {
+            self.with(|keeper| keeper.tick(snapshot));
+        }
+        snapshot.unkept = self.failing.as_ref().map(|failing| failing.why.clone());
+    }
+
+    fn look(&mut self, wall: &Wall) {
+        let Some(failing) = &mut self.failing else {
+            return;
+        };
+        if failing.looked.elapsed() < LOOK_EVERY {
+            return;
+        }
+        failing.looked = Instant::now();
+        if self.keeper.store().is_writable().is_err() {
+            return;
+        }
+        let count = self.waiting.len();
+        while let Some((effect, at_ns)) = self.waiting.pop_front() {
+            if self.keeper.keep(wall, &effect, at_ns).is_err() {
+                self.waiting.push_front((effect, at_ns));
+                return;
+            }
+        }
+        self.failing = None;
+        self.keeper.store().waits_for_others(true);
+        let lost = std::mem::take(&mut self.lost);
+        tracing::warn!("incidents are kept again: {count} that waited are kept, {lost} are lost");
+    }
+
+    fn fails(&mut self, error: &StoreError) {
+        if self.failing.is_some() {
+            return;
+        }
+        let why = error.to_string();
+        tracing::warn!("incidents are not kept: {why}; they wait until they can be");
+        // The wall does not stand still for a file that somebody else holds.
+        self.keeper.store().waits_for_others(false);
+        self.failing = Some(Failing {
+            why,
+            looked: Instant::now(),
+        });
+    }
+}

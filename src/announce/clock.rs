@@ -1,0 +1,74 @@
+//! Tells when the clock that stamps the joint states jumps against the time of their reception.
+
+use tauscope_bus::JointState;
+
+/// A clock that moves by more than this from one sample to the next was set \[ns\].
+/// Resolution: above what networks delay, below what a person sets a clock by.
+const JUMP_NS: i64 = 1_000_000_000;
+/// A clock that jumps to and fro is told of once in so long \[ns\].
+/// Resolution: what a person reads.
+const TOLD_EVERY_NS: i64 = 10_000_000_000;
+
+/// The clock of one source.
+#[derive(Debug, Default)]
+pub struct Clock {
+    /// Stamp and time of reception of the sample before \[ns\].
+    before: Option<(i64, i64)>,
+    /// When a jump was told of last, in time of reception \[ns\].
+    told_ns: Option<i64>,
+}
+
+impl Clock {
+    /// What is to be said of a sample; usually nothing.
+    pub fn line(&mut self, state: &JointState) -> Option<String> {
+        let now = (state.header.stamp_ns, state.header.received_ns);
+        let before = self.before.replace(now)?;
+        let jump_ns =
+            (now.0.saturating_sub(before.0)).saturating_sub(now.1.saturating_sub(before.1));
+        let told_lately = self
+            .told_ns
+            .is_some_and(|told_ns| now.1 - told_ns < TOLD_EVERY_NS);
+        if jump_ns.saturating_abs() < JUMP_NS || told_lately {
+            return None;
+        }
+        self.told_ns = Some(now.1);
+        let jump_s = jump_ns as f64 * 1e-9;
+        let way = if jump_ns > 0 { "ahead" } else { "back" };
+        let size_s = jump_s.abs();
+        Some(format!(
+            "the clock of the joint states jumped {way} by {size_s:.1} s: see how the robot's computer gets its time"
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn state(stamp_s: f64, received_s: f64) -> JointState {
+        let mut state = JointState::default();
+        state.header.stamp_ns = (stamp_s * 1e9) as i64;
+        state.header.received_ns = (received_s * 1e9) as i64;
+        state
+    }
+
+    #[test]
+    fn a_jump_is_told_and_a_pause_is_none() {
+        let mut clock = Clock::default();
+        let said = [
+            (0.0, 0.0),
+            (0.1, 0.1),
+            // Both clocks agree that nothing came for a minute.
+            (60.1, 60.1),
+            (3660.2, 60.2),
+            // It goes on from there, and comes back later.
+            (3660.3, 60.3),
+            (80.0, 80.0),
+        ]
+        .map(|(stamp_s, received_s)| clock.line(&state(stamp_s, received_s)));
+        let said = said.into_iter().flatten().collect::<Vec<_>>();
+        assert_eq!(said.len(), 2, "{said:?}");
+        assert!(said[0].contains("jumped ahead by 3600.0 s"), "{said:?}");
+        assert!(said[1].contains("jumped back by 3600.0 s"), "{said:?}");
+    }
+}

@@ -1,0 +1,125 @@
+//! What a client sends, looked at before tokio-modbus decodes it.
+//!
+//! That (0.17) indexes past the end of a request to write several coils (function 15) which says that it has more of
+//! them than bytes: the panic ends the client's task. Such a request ends the client here, in order.
+
+use std::io;
+use std::pin::Pin;
+use std::task::{Context, Poll, ready};
+
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+
+/// Bytes before a request: transaction, protocol and length (MODBUS Messaging on TCP/IP 1.0b, section 3.1.3).
+const BEFORE: usize = 6;
+/// Unit, function, address, number of coils, number of bytes: where the coils begin.
+const HEAD: usize = BEFORE + 7;
+const WRITE_SEVERAL_COILS: u8 = 15;
+
+/// A client's stream.
+pub(super) struct Guard<S> {
+    stream: S,
+    requests: Requests,
+}
+
+/// How far the requests have come.
+struct Requests {
+    head: [u8; HEAD],
+    /// Bytes of the present one so far.
+    at: usize,
+}
+
+impl Requests {
+    fn take(&mut self, bytes: &[u8]) -> io::Result<()> {
+        bytes.iter().try_for_each(|byte| self.step(*byte))
+    }
+
+    fn step(&mut self, byte: u8) -> io::Result<()> {
+        if let Some(place) = self.head.get_mut(self.at) {
+            *place = byte;
+        }
+        self.at += 1;
+        let number =
+            |at: usize| usize::from(u16::from_be_bytes([self.head[at], self.head[at + 1]]));
+        if self.at == HEAD && self.head[BEFORE + 1] == WRITE_SEVERAL_COILS {
+            let (coils, bytes) = (number(BEFORE + 4), usize::from(self.head[HEAD - 1]));
+            if coils > 8 * bytes {
+                let why = format!("it writes {coils} coils and has {bytes} bytes of them");
+                return Err(io::Error::new(io::ErrorKind::InvalidData, why));
+            }
+        }
+        if self.at >= BEFORE && self.at == BEFORE + number(BEFORE - 2) {
+            self.at = 0;
+        }
+        Ok(())
+    }
+}
+
+impl<S> Guard<S> {
+    pub(super) fn new(stream: S) -> Self {
+        Self {
+            stream,
+            requests: Requests {
+                head: [0; HEAD],
+                at: 0,
+            },
+        }
+    }
+}
+
+impl<S: AsyncRead + Unpin> AsyncRead for Guard<S> {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        let before = buffer.filled().len();
+        ready!(Pin::new(&mut self.stream).poll_read(context, buffer))?;
+        Poll::Ready(self.requests.take(&buffer.filled()[before..]))
+    }
+}
+
+impl<S: AsyncWrite + Unpin> AsyncWrite for Guard<S> {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        Pin::new(&mut self.stream).poll_write(context, bytes)
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_flush(context)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_shutdown(context)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Asks for one coil.
+    const SOUND: [u8; 12] = [0, 7, 0, 0, 0, 6, 1, 1, 0, 0, 0, 1];
+    /// Writes `coils` coils out of one byte.
+    const fn writes(coils: u8) -> [u8; 14] {
+        [0, 7, 0, 0, 0, 8, 1, 15, 0, 0, 0, coils, 1, 0xff]
+    }
+
+    #[test]
+    fn more_coils_than_there_are_end_a_client_however_its_bytes_come() {
+        for pieces in [1, 3, 5, 64] {
+            let mut requests = Guard::new(()).requests;
+            let sound = [&SOUND[..], &writes(8), &SOUND].concat();
+            for piece in sound.chunks(pieces) {
+                requests.take(piece).unwrap();
+            }
+            let told: Result<(), _> = writes(9)
+                .chunks(pieces)
+                .try_for_each(|piece| requests.take(piece));
+            let said = told.unwrap_err().to_string();
+            assert_eq!(said, "it writes 9 coils and has 1 bytes of them");
+        }
+    }
+}
