@@ -21,7 +21,6 @@ pub(crate) mod sentences;
 pub(crate) mod slip_words;
 pub(crate) mod slips;
 pub(crate) mod summary;
-pub(crate) mod swell;
 pub(crate) mod varying_delay;
 pub(crate) mod verdict;
 

@@ -2,7 +2,6 @@
 
 use crate::fit::fitted::Fit;
 use crate::report::history;
-use crate::report::swell::swells;
 use crate::select::evidence::PATCH;
 use crate::select::propose::Base;
 use crate::select::prune::HIDDEN;
@@ -40,22 +39,14 @@ pub(super) fn follows_motion(found: Left<'_>, before: &Fit, joint: usize) -> Opt
         is_worth_telling(share).then(|| told(&on, "a curve", share))
     });
     let of_arm = !problem.is_foreign;
-    // Errors of clocks and derivatives follow the motion, too.
-    let cost = || {
-        let rows = found.rows(joint);
-        CLOCK_SHARE * clock_s(&problem.tracks[0].track.time_s) * rms_rate(&rows)
-    };
-    let of_history = || {
+    of_curve.or_else(|| {
         let history = history::predicts(problem, fit, joint, &names).filter(|_| of_arm)?;
+        // Errors of clocks and derivatives follow the motion, too.
+        let rows = found.rows(joint);
+        let cost = CLOCK_SHARE * clock_s(&problem.tracks[0].track.time_s) * rms_rate(&rows);
         let is_more =
-            history.share.sqrt() * found.rms(joint) > cost().max(problem.white_noise[joint]);
+            history.share.sqrt() * found.rms(joint) > cost.max(problem.white_noise[joint]);
         (is_more && is_worth_telling(history.share))
             .then(|| told(&history.on, "a sum", history.share))
-    };
-    let of_size = || {
-        let swell = swells(problem, fit, joint, &names).filter(|_| of_arm)?;
-        let is_told = found.rms(joint) > cost() && is_worth_telling(swell.share);
-        is_told.then(|| format!("it is larger {}, in recordings left out, too.", swell.when))
-    };
-    of_curve.or_else(of_history).or_else(of_size)
+    })
 }
