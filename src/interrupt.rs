@@ -110,17 +110,18 @@ pub fn undo(take_away: impl FnOnce() + Send + 'static) -> Undo {
     Undo(())
 }
 
-impl Undo {
-    /// All is written, and stays.
-    pub fn keep(&self) {
-        state().undo = None;
-    }
+/// All is written, and stays.
+pub fn keep(undo: Undo) {
+    state().undo = None;
+    drop(undo);
 }
 
 impl Drop for Undo {
     fn drop(&mut self) {
         let take_away = state().undo.take();
-        take_away.into_iter().for_each(|take_away| take_away());
+        if let Some(take_away) = take_away {
+            take_away();
+        }
     }
 }
 

@@ -183,6 +183,9 @@ impl Store {
     }
 
     /// Holds the file against all others.
+    ///
+    /// # Errors
+    /// If SQLite refuses.
     #[cfg(test)]
     pub fn hold(&self) -> Result<(), StoreError> {
         let held = self.connection.execute_batch("BEGIN EXCLUSIVE;");
@@ -190,6 +193,9 @@ impl Store {
     }
 
     /// Lets it go.
+    ///
+    /// # Errors
+    /// If SQLite refuses.
     #[cfg(test)]
     pub fn release(&self) -> Result<(), StoreError> {
         let released = self.connection.execute_batch("COMMIT;");

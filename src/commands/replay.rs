@@ -1,16 +1,14 @@
 //! `tauscope replay`.
 
 pub mod archive;
+mod table;
 
 use std::collections::BTreeSet;
-use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use anyhow::Context as _;
-use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
 use tauscope_archive::{Recording, whole_file};
-use tauscope_dynamics::terms::UNKNOWN;
 use tauscope_pipeline::parallel;
 use tauscope_pipeline::pipeline::Pipeline;
 use tauscope_pipeline::recordings;
@@ -18,13 +16,13 @@ use tauscope_pipeline::replay::{Outcome, Replay, ReplayError, TwinChoice, stem};
 use tauscope_pipeline::report::{Problem, Report, without_path};
 use tauscope_pipeline::tables::{write_events, write_summary};
 use tauscope_pipeline::tally::{Event, JointRms};
-use tauscope_watch::amount;
 
 use crate::existing::Force;
 use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::Output;
 use crate::progress::Progress;
+use table::table;
 
 /// Run a pipeline's stages over recordings, in process, as fast as the machine allows: the same bytes
 /// every time. The recordings take the place of the pipeline's own source.
@@ -307,100 +305,4 @@ impl<'a> Summary<'a> {
             notes: &outcome.notes,
         }
     }
-}
-
-/// For people: per recording a line a stage, how far the twin was off, and the events.
-fn table(outcomes: &[Outcome]) -> String {
-    let mut text = String::new();
-    for outcome in outcomes {
-        let _ = writeln!(text, "{} ({:.1} s)", outcome.recording, outcome.duration_s);
-        for stage in &outcome.stages {
-            let _ = writeln!(
-                text,
-                "  {:<16} received {:>8}  emitted {:>8}  dropped {:>6}",
-                stage.stage, stage.received, stage.emitted, stage.dropped
-            );
-        }
-        for twin in &outcome.twins {
-            let moving = 100.0 * twin.moving_samples as f64 / twin.samples.max(1) as f64;
-            let _ = writeln!(
-                text,
-                "  residual of {}, RMS in {} over {} samples, {moving:.0} % of them moving:",
-                twin.stage, outcome.effort_unit, twin.samples
-            );
-            let _ = writeln!(text, "{}", rms_table(outcome, &twin.rms()));
-        }
-        for detector in &outcome.detectors {
-            let (name, events) = (&detector.detector, detector.events.len());
-            if detector.judged == 0 {
-                let _ = writeln!(
-                    text,
-                    "  {name}: judged no sample: there were no efforts, or the filters never settled"
-                );
-                continue;
-            }
-            let _ = writeln!(text, "  {name}: {events} events");
-            for event in &detector.events {
-                let line = event_line(event, &outcome.effort_unit);
-                let _ = writeln!(text, "    {line}");
-            }
-        }
-        for file in &outcome.files {
-            let _ = writeln!(text, "  wrote {}", file.display());
-        }
-        for note in &outcome.notes {
-            let _ = writeln!(text, "  warning: {note}");
-        }
-    }
-    text
-}
-
-/// A row of the table: its name, and what stands in it of a joint.
-type Row = (&'static str, fn(&JointRms) -> f64);
-
-fn rms_table(outcome: &Outcome, rms: &[JointRms]) -> Table {
-    let mut table = Table::new();
-    table.load_preset(presets::NOTHING);
-    let names = outcome.joint_names.iter().map(String::as_str);
-    table.set_header(std::iter::once("   ").chain(names));
-    let rows: [Row; 3] = [
-        ("   all samples", |rms| rms.residual_rms),
-        ("   moving", |rms| rms.residual_rms_moving),
-        ("   low-passed", |rms| rms.filtered_residual_rms),
-    ];
-    for (name, value) in rows {
-        let values = rms.iter().map(value).map(|rms| {
-            // Not a number where there was no sample of that kind.
-            if rms.is_finite() {
-                format!("{rms:.3}")
-            } else {
-                "-".to_owned()
-            }
-        });
-        table.add_row(std::iter::once(name.to_owned()).chain(values));
-    }
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table
-}
-
-fn event_line(event: &Event, effort_unit: &str) -> String {
-    let mut line = format!("{:8.3} s to {:8.3} s  {}", event.t, event.t_off, event.kind);
-    if let Some(size) = event.size.filter(|_| event.kind != UNKNOWN.name) {
-        let _ = write!(line, " {}", amount(&event.kind, size, effort_unit));
-    }
-    if let Some(link) = &event.link {
-        let _ = write!(line, " at {link}");
-    }
-    if let Some([x, y, z]) = event.force {
-        let _ = write!(line, ", {:.1} N", (x * x + y * y + z * z).sqrt());
-    }
-    if !event.joints.is_empty() {
-        let _ = write!(line, " ({})", event.joints.join(", "));
-    }
-    if event.size.is_some() {
-        let _ = write!(line, ", since {:.1} s", event.t_contact);
-    }
-    line
 }

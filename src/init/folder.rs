@@ -46,7 +46,7 @@ impl Folder {
         let made = mine.into_iter().take(6);
         let made = made.chain([this.schema(), explained, path.to_owned()]);
         let new = made.filter(|path| path.symlink_metadata().is_err());
-        let (new, explained) = (Vec::from_iter(new), this.explained());
+        let (new, explained) = (new.collect::<Vec<_>>(), this.explained());
         this.undo = Some(interrupt::undo(move || take_away(&new, &explained)));
         std::fs::create_dir_all(path).map_err(|error| {
             let problem = Problem::of_file(path, format!("cannot make the folder: {error}"));
@@ -56,8 +56,10 @@ impl Folder {
     }
 
     /// All is written, and stays.
-    pub fn keep(&self) {
-        self.undo.iter().for_each(Undo::keep);
+    pub fn keep(mut self) {
+        if let Some(undo) = self.undo.take() {
+            interrupt::keep(undo);
+        }
     }
 
     /// A path as the files of the folder name it: what is in the folder moves with it.

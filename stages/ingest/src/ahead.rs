@@ -96,10 +96,13 @@ impl<T: Sample> Batch<T> {
     }
 }
 
+/// Where batches come from, and where empty ones go back to.
+type Channels<T> = (Receiver<Batch<T>>, SyncSender<Batch<T>>);
+
 /// A source that is read ahead. Not for a live one: nobody would ask it for its trouble.
 pub struct Ahead<T> {
     /// Full ones come, empty ones go back. `None` once this ends.
-    channels: Option<(Receiver<Batch<T>>, SyncSender<Batch<T>>)>,
+    channels: Option<Channels<T>>,
     batch: Batch<T>,
     /// Steps and samples of the batch that have been handed on.
     stepped: usize,

@@ -190,7 +190,7 @@ fn what_happens_during_a_mute_says_so() {
         let mut values = array.status[0].values.iter();
         values.any(|pair| pair.key == "muted" && pair.value == "true")
     });
-    assert_eq!(Vec::from_iter(muted), [false, false, true, false]);
+    assert_eq!(muted.collect::<Vec<_>>(), [false, false, true, false]);
 }
 
 #[test]

@@ -30,7 +30,7 @@ const WORSE: f64 = 2.0;
 /// Tuned: by hand, on no recorded seeds; not swept.
 const ABOVE_NOISE: f64 = 3.0;
 /// A correction makes a joint worse if its error on held-out recordings is this many times that of the twin as it was.
-/// Tuned: by hand, with tests/proof/first_sight.py, seed 41, in view; not swept.
+/// Tuned: by hand, with `tests/proof/first_sight.py`, seed 41, in view; not swept.
 const WORSENED: f64 = 1.1;
 /// A moment stands out if its error is this many standard deviations of the calm half of the time.
 /// Statistical: a normal variable exceeds 10 in none of 1e22 rows; slow noise is as normal as fast.
