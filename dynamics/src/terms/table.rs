@@ -63,10 +63,9 @@ pub enum Against {
     Position,
     /// Velocity of a joint \[rad/s or m/s\].
     Velocity,
-    /// Velocity of a joint less that of the next one in the URDF: what two parts that rub on each other feel \[rad/s or m/s\].
+    /// Velocity of a joint less that of the next one in the URDF, as parts feel it that rub \[rad/s or m/s\].
     VelocityDifference,
-    /// Velocity of a joint plus that of the next one in the URDF: the same where their axes point in opposite directions
-    /// \[rad/s or m/s\].
+    /// The same with a plus, for axes that point in opposite directions \[rad/s or m/s\].
     VelocitySum,
     /// Acceleration of a joint \[rad/s² or m/s²\].
     Acceleration,
@@ -205,7 +204,10 @@ impl Table {
     fn of_two(&self, how: &str, joints: &[String]) -> String {
         let (one, next) = (self.of_joint, self.of_joint + 1);
         let next = joints.get(next).map_or("none", String::as_str);
-        format!("the {how} of the velocities of joints {} and {next}", joints[one])
+        format!(
+            "the {how} of the velocities of joints {} and {next}",
+            joints[one]
+        )
     }
 }
 

@@ -74,7 +74,10 @@ pub fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
         }
     }
     // Parts that rub on each other feel how fast they move against each other.
-    for of_joint in neighbours(problem, joint).into_iter().filter(|_| !problem.is_foreign) {
+    for of_joint in neighbours(problem, joint)
+        .into_iter()
+        .filter(|_| !problem.is_foreign)
+    {
         for against in [Against::VelocityDifference, Against::VelocitySum] {
             let speeds = with_jump(even(against, of_joint, KNOTS));
             add(against, of_joint, speeds, &[false]);
@@ -124,7 +127,9 @@ pub fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
 pub fn neighbours(problem: &Problem, joint: usize) -> Vec<usize> {
     let slides = |joint: usize| problem.model.joints()[joint].kind == JointKind::Prismatic;
     let pairs = joint.saturating_sub(1)..(joint + 1).min(problem.joints - 1);
-    pairs.filter(|&first| slides(first) == slides(first + 1)).collect()
+    pairs
+        .filter(|&first| slides(first) == slides(first + 1))
+        .collect()
 }
 
 /// What a curve could be drawn against, at all samples.
@@ -205,10 +210,19 @@ mod tests {
         });
         let nothing = Fit::new(&problem, Vec::new());
         for joint in [0, 1] {
-            let curve = Base::new(&problem, &nothing, 40).propose_curve(joint).unwrap();
+            let curve = Base::new(&problem, &nothing, 40)
+                .propose_curve(joint)
+                .unwrap();
             let drawn = curve.active.curve.as_ref().unwrap();
-            assert_eq!((drawn.against, drawn.of_joint), (Against::VelocityDifference, 0));
-            assert!(curve.repeats && curve.carried.unwrap() > 0.8, "{:?}", curve.carried);
+            assert_eq!(
+                (drawn.against, drawn.of_joint),
+                (Against::VelocityDifference, 0)
+            );
+            assert!(
+                curve.repeats && curve.carried.unwrap() > 0.8,
+                "{:?}",
+                curve.carried
+            );
         }
     }
 }
