@@ -23,14 +23,15 @@ const MOVES: f64 = 0.03;
 /// Physical: longer than a driver takes to switch a controller.
 const CEASED_NS: i64 = 3_000_000_000;
 
-/// A time without measured efforts, after there were some \[ns\].
+/// A time without measured efforts, after there were some.
 #[derive(Debug, Clone, Copy, Default)]
 struct Without {
-    /// When the newest measured effort was, and how long there has been none.
+    /// Stamp of the newest measured effort \[ns\].
     since_ns: Option<i64>,
+    /// How long there has been none \[ns\].
     lasts_ns: i64,
-    /// The longest: when it began, and how long it took.
-    longest_ns: (i64, i64),
+    /// The longest such time: when it began, and how long it took \[ns\].
+    longest: (i64, i64),
 }
 
 impl Without {
@@ -46,8 +47,8 @@ impl Without {
             return false;
         };
         let before_ns = std::mem::replace(&mut self.lasts_ns, stamp_ns - since_ns);
-        if self.lasts_ns > self.longest_ns.1 {
-            self.longest_ns = (since_ns, self.lasts_ns);
+        if self.lasts_ns > self.longest.1 {
+            self.longest = (since_ns, self.lasts_ns);
         }
         before_ns < CEASED_NS && self.lasts_ns >= CEASED_NS
     }
@@ -131,7 +132,7 @@ impl PlausibleTwin {
 
     /// What to say of the longest time without efforts.
     fn ceased(&self) -> Option<String> {
-        let (since_ns, lasts_ns) = self.without_effort.longest_ns;
+        let (since_ns, lasts_ns) = self.without_effort.longest;
         let at_s = (since_ns - self.first_ns?) as f64 * 1e-9;
         (lasts_ns >= CEASED_NS).then(|| {
             format!(

@@ -9,12 +9,11 @@ use crate::words;
 /// The newest that are shown. Resolution: a week of a busy plant.
 pub const MOST: u32 = 200;
 
+/// Incidents, and the labels that are about them.
+type Labelled = (Vec<Incident>, Vec<KeptLabel>);
+
 /// The page.
-pub fn page(
-    viewer: &Viewer,
-    kept: Option<Result<(Vec<Incident>, Vec<KeptLabel>), StoreError>>,
-    now_ns: i64,
-) -> Markup {
+pub fn page(viewer: &Viewer, kept: Option<Result<Labelled, StoreError>>, now_ns: i64) -> Markup {
     let content = html! {
         h1 { "Incidents" }
         p.muted { "The open ones first. What comes again within 10 minutes is the same incident." }
