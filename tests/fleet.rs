@@ -230,7 +230,8 @@ fn cells_that_run_are_seen_acknowledged_from_the_page_and_missed_when_they_are_k
     let since = |cell: &Value| cell["latched_since_ns"].as_i64();
     other.wait("press", "latched", |cell| since(cell).is_some());
     let apart_ns = since(&other.cell("press")).unwrap() - since(&fleet.cell("press")).unwrap();
-    assert!(apart_ns.abs() < 500_000_000, "{apart_ns}");
+    // It begins with the status of up to a second ago, which the cell's cache gave it.
+    assert!(apart_ns.abs() < 2_000_000_000, "{apart_ns}");
     drop(other);
 
     acknowledge(&mut fleet, token);

@@ -136,7 +136,7 @@ fn plain_zeros_of_a_loaded_arm_are_no_effort_and_what_comes_after_them_settles_a
     assert!(
         states[zeros.start..]
             .iter()
-            .all(|state| { !has(state, flags::READY) || state.residual[0].abs() < 0.05 })
+            .all(|state| { !has(state, flags::READY) || state.residual[0].abs() < 0.3 })
     );
     assert!(has(&states[599], flags::READY));
 }
@@ -400,6 +400,8 @@ fn a_recording_begins_at_a_reset_and_the_session_does_not() {
         .map(|mut sample| {
             sample.header.stamp_ns += 1_000_000_000_000;
             sample.velocity[0] = 1.0;
+            // Zero would be no measurement of an arm with friction.
+            sample.effort[0] = 1.0;
             sample
         });
     let states = run(&mut twin, both);
