@@ -201,7 +201,7 @@ fn scenes() -> impl Strategy<Value = Scene> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 12, max_global_rejects: 12, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn no_way_to_write_the_robot_changes_an_answer(
@@ -212,7 +212,8 @@ proptest! {
         seed: u64,
     ) {
         let plain = answers(&ARM, &[0, 1, 2, 3], &scene);
-        prop_assert!(plain.iter().all(|(answer, _)| !answer.onsets.is_empty()), "{plain:?}");
+        // A force that nearly passes through the joints' axes loads none of them: such a scene asks nothing.
+        prop_assume!(plain.iter().all(|(answer, _)| !answer.onsets.is_empty()));
         let mut joints = ARM.to_vec();
         joints.extend(GRIPPER.into_iter().filter(|_| gripper));
         joints.extend(SECOND_ARM.into_iter().filter(|_| second_arm));
