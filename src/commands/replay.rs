@@ -21,7 +21,7 @@ use crate::existing::Force;
 use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::Output;
-use crate::progress::Progress;
+use crate::progress::{Progress, Quiet, Show};
 use table::table;
 
 /// Run a pipeline's stages over recordings, in process, as fast as the machine allows: the same bytes
@@ -61,6 +61,8 @@ pub struct Args {
     twin: TwinChoice,
     #[command(flatten)]
     force: Force,
+    #[command(flatten)]
+    quiet: Quiet,
     /// Machine-readable.
     #[arg(long)]
     json: bool,
@@ -109,6 +111,7 @@ fn of_each(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
             jobs: args.jobs,
             twin: args.twin,
             with_scores: args.scores,
+            show: args.quiet.show(out),
             json: args.json,
         };
         return archive::run(&job, &pipeline, out);
@@ -131,7 +134,7 @@ fn of_each(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         })?;
     }
     let hold = interrupt::hold();
-    let results = replay_all(&replay, args);
+    let results = replay_all(&replay, args, args.quiet.show(out));
     let mut outcomes = Vec::new();
     let mut wrong = Vec::new();
     let (mut failed, mut interrupted) = (None, false);
@@ -227,8 +230,8 @@ fn check_names(args: &Args) -> Result<(), Report> {
 }
 
 /// The result of each recording, in their order, whatever the number of jobs.
-fn replay_all(replay: &Replay<'_>, args: &Args) -> Vec<Result<Outcome, ReplayError>> {
-    let progress = Progress::new(args.recordings.len());
+fn replay_all(replay: &Replay<'_>, args: &Args, show: Show) -> Vec<Result<Outcome, ReplayError>> {
+    let progress = Progress::new(args.recordings.len(), show);
     let recordings = args.recordings.iter().enumerate().collect();
     parallel::map(usize::from(args.jobs), recordings, |(index, recording)| {
         if interrupt::is_asked() {
