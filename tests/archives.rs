@@ -230,6 +230,17 @@ fn a_higher_threshold_makes_contacts_vanish_and_the_comparison_says_where() {
         "{}",
         same.stdout
     );
+    let said = "it is compared with itself, so that nothing can differ";
+    assert!(same.stderr.contains(said), "{}", same.stderr);
+    let above = folder.path().join("out");
+    let above = Out::answer(["diff".into(), above.clone().into_os_string(), above.into()]);
+    assert_eq!(above.code, 2);
+    assert!(above.stderr.contains(said), "{}", above.stderr);
+    let perhaps = format!(
+        "perhaps: tauscope diff {0}/out/a {0}/out/b",
+        folder.path().display()
+    );
+    assert!(above.stderr.contains(&perhaps), "{}", above.stderr);
     let words = Out::answer(["diff".into(), a.into_os_string(), b.into_os_string()]);
     assert_eq!(words.code, 2);
     assert!(words.stderr.contains("--manifest"), "{}", words.stderr);

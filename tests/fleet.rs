@@ -223,6 +223,17 @@ fn cells_that_run_are_seen_acknowledged_from_the_page_and_missed_when_they_are_k
     assert!(fleet.get("/healthz").starts_with("ok"));
     assert_eq!(fleet.ask("GET", "/cells/nobody", "", "").0[9..12], *"404");
 
+    // Another fleet host, that begins now, knows as well since when it is latched.
+    let other = folder.join("other");
+    std::fs::create_dir(&other).unwrap();
+    let other = Fleet::start(&other, &endpoint, &users);
+    let since = |cell: &Value| cell["latched_since_ns"].as_i64();
+    other.wait("press", "latched", |cell| since(cell).is_some());
+    let apart_ns = since(&other.cell("press")).unwrap() - since(&fleet.cell("press")).unwrap();
+    // It begins with the status of up to a second ago, which the cell's cache gave it.
+    assert!(apart_ns.abs() < 2_000_000_000, "{apart_ns}");
+    drop(other);
+
     acknowledge(&mut fleet, token);
     fleet.wait("press", "acknowledged by anna", |cell| {
         cell["status"]["last_contact"]["acknowledged_by"] == "anna"
@@ -238,6 +249,7 @@ fn cells_that_run_are_seen_acknowledged_from_the_page_and_missed_when_they_are_k
         assert!(page.contains(part), "{part}: {page}");
     }
     assert!(fleet.get("/incidents").contains("at link"));
+    label(&fleet, "hit <the> fixture");
 
     signal(weld.id(), "KILL");
     let known = fleet.wait("weld", "missed", |cell| cell["state"] == "stale");
@@ -294,6 +306,37 @@ fn the_clock_of_a_cell_is_measured_and_told_of_where_it_is_off() {
     let metrics = fleet.get("/metrics");
     let metric = "clock_ahead_seconds{cell=\"press\"} 3";
     assert!(metrics.contains(metric), "{metrics}");
+}
+
+/// Labels at the press: the label is shown with the contact and the incident that it is about, with who and when.
+fn label(fleet: &Fleet, text: &str) {
+    let page = fleet.get("/cells/press");
+    let secret = page.split("name=\"csrf\" value=\"").nth(1).unwrap();
+    let secret = secret.split('"').next().unwrap();
+    let text = text
+        .replace('<', "%3C")
+        .replace('>', "%3E")
+        .replace(' ', "+");
+    let (code, head) = fleet.post(
+        "/cells/press/label",
+        "",
+        &format!("csrf={secret}&text={text}"),
+    );
+    assert_eq!(code, 303, "{head}");
+    for path in ["/cells/press", "/incidents"] {
+        let begin = Instant::now();
+        let shown = loop {
+            let page = fleet.get(path);
+            let with = page.split("<div class=\"label\">").nth(1);
+            if let Some(label) = with.and_then(|label| label.split("</div>").next()) {
+                break label.to_owned();
+            }
+            assert!(begin.elapsed() < PATIENCE, "{path}: {page}");
+            std::thread::sleep(Duration::from_millis(20));
+        };
+        let is_whole = shown.contains("hit &lt;the&gt; fixture") && shown.contains("anna, <time");
+        assert!(is_whole, "{path}: {shown}");
+    }
 }
 
 /// Acknowledges at the press; forms that are not the user's own are refused.

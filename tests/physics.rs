@@ -140,7 +140,11 @@ fn a_page_of_the_week_stands_alone_and_no_table_is_replaced_without_force() {
         .arg(folder.path().join("pages"));
     let out = Out::of(command);
     assert_eq!(out.code, 0, "{}", out.stderr);
+    // The recording is of long ago.
+    let stale = "press-1: stale, the newest night was ";
+    assert!(out.stdout.contains(stale), "{}", out.stdout);
     let page = std::fs::read_to_string(folder.path().join("pages/press-1.html")).unwrap();
+    assert!(page.contains("Stale: the newest night was "), "{page}");
     assert!(
         page.contains("<style>") && page.contains("<svg") && !page.contains("href=\"/"),
         "{page}"

@@ -191,6 +191,26 @@ fn a_publisher_that_stops_and_comes_back_is_told_of() {
 }
 
 #[test]
+fn a_second_publisher_of_the_same_joints_is_told_of_and_not_heard() {
+    let folder = tempfile::tempdir().unwrap();
+    let endpoint = endpoint();
+    let session = router(&endpoint);
+    let key = rmw_key(0, "joint_states");
+    let _robot = Publisher::start_as(&session, &key, &JOINTS, Some(1));
+    pipeline(folder.path(), &endpoint, "");
+    let mut live = Live::start(folder.path(), &[]);
+    live.wait_for_part(" Hz, last 0.");
+    let _bag = Publisher::start_as(&session, &key, &JOINTS, Some(2));
+    live.wait_for("warning: stage `ingest`: two publishers send the same joints on /joint_states");
+    live.wait_for("  likely: the driver was started twice");
+    signal(live.id(), "INT");
+    let (code, summary) = live.end();
+    // What was not heard is counted.
+    assert_eq!(code, 3, "{summary}");
+    assert!(stage(&summary, "ingest")["dropped"].as_u64() > Some(0));
+}
+
+#[test]
 fn data_that_stops_ends_a_run_that_expects_some_and_the_archive_is_whole() {
     let folder = tempfile::tempdir().unwrap();
     let endpoint = endpoint();

@@ -83,8 +83,16 @@ fn joints(all: &[Series]) -> usize {
     names.len()
 }
 
-/// Whether two events may be one.
+/// Whether one of two events was certain before the other one began: they have two causes.
+fn apart(a: &Event, b: &Event) -> bool {
+    a.told < b.from || b.told < a.from
+}
+
+/// Whether the event `b` may be an effect of what began with `a`. One that was certain before that is none.
 fn together(a: &Event, b: &Event) -> bool {
+    if b.told < a.from {
+        return false;
+    }
     let over = |event: &Event| event.until.unwrap_or(f64::INFINITY) + TOGETHER_D;
     let begun_together = (a.from - b.from).abs() <= TOGETHER_D;
     begun_together || (b.from >= a.from - TOGETHER_D && over(b) <= over(a))
@@ -130,7 +138,8 @@ fn frictions(told: &mut Vec<Told<'_>>, joints: usize) -> Vec<Finding> {
         let alike = |one: &Told<'_>| {
             let same_way = one.event.size * first.event.size > 0.0;
             let begun = (one.event.from - first.event.from).abs() <= TOGETHER_D;
-            same_way && begun && one.event.until.is_some() == first.event.until.is_some()
+            let lasts_alike = one.event.until.is_some() == first.event.until.is_some();
+            same_way && begun && lasts_alike && !apart(&one.event, &first.event)
         };
         let mut names: Vec<_> = frictions.iter().filter(|one| alike(one)).collect();
         names.sort_by(|a, b| a.series.joint.cmp(&b.series.joint));
@@ -142,15 +151,25 @@ fn frictions(told: &mut Vec<Told<'_>>, joints: usize) -> Vec<Finding> {
             findings.push(common);
             frictions.retain(|one| !alike(one));
         } else {
-            let of_one = |one: &&Told<'_>| one.series.joint == first.series.joint;
-            let told = frictions.iter().filter(of_one).map(|one| one.event.told);
+            let is_same = |one: &&Told<'_>| {
+                one.series.joint == first.series.joint && is_one_change(&one.event, &first.event)
+            };
+            let told = frictions.iter().filter(is_same).map(|one| one.event.told);
             let mut own = finding(friction(&first.event), &first);
             own.told = told.fold(own.told, f64::min);
             findings.push(own);
-            frictions.retain(|one| one.series.joint != first.series.joint);
+            frictions.retain(|one| !is_same(&one));
         }
     }
     findings
+}
+
+/// Whether two changes of one joint's friction are one: Coulomb and viscous friction of a gear wear together, and a small
+/// drift is certain long after a large one.
+fn is_one_change(a: &Event, b: &Event) -> bool {
+    let drifts = |event: &Event| event.shape == Shape::Drift && event.until.is_none();
+    let both_drift = drifts(a) && drifts(b) && a.size * b.size > 0.0;
+    both_drift || !apart(a, b)
 }
 
 fn friction(event: &Event) -> Cause {

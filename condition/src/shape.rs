@@ -53,12 +53,16 @@ pub struct Change {
     pub interval: [f64; 2],
 }
 
-/// The change that fits best; `None` for too few nights. `has_slope`: the covariate counts.
-pub fn change(points: &[Point], has_slope: bool) -> Option<Change> {
+/// The change that fits best, of those that began by the day `by`; `None` for too few nights. `has_slope`: the covariate
+/// counts.
+pub fn change(points: &[Point], has_slope: bool, by: f64) -> Option<Change> {
     let last = points.last()?.day;
     let mut best: Option<(f64, Change)> = None;
     for at in LEAST_NIGHTS..points.len().saturating_sub(LEAST_NIGHTS) {
         let from = points[at].day;
+        if from > by {
+            break;
+        }
         for shape in [Shape::Step, Shape::Drift] {
             // A drift begins between two nights; the night before is its zero.
             let begin = if shape == Shape::Drift {
@@ -182,12 +186,17 @@ mod tests {
     #[test]
     fn a_step_and_a_drift_are_told_apart_beside_a_covariate() {
         let step = points(|day, x| 2.0 - 0.05 * x + if day >= 50.0 { 0.3 } else { 0.0 });
-        let found = change(&step, true).unwrap();
+        let found = change(&step, true, 79.0).unwrap();
         assert!(found.shape == Shape::Step && (found.from - 50.0).abs() < 1e-9);
         assert!((found.size - 0.3).abs() < 1e-6 && (found.slope + 0.05).abs() < 1e-6);
         let drift = points(|day, x| 2.0 - 0.05 * x + 0.01 * (day - 40.0).max(0.0));
-        let found = change(&drift, true).unwrap();
+        let found = change(&drift, true, 79.0).unwrap();
         assert!(found.shape == Shape::Drift && (found.from - 40.0).abs() < 1e-9);
         assert!((found.size - 0.39).abs() < 1e-6);
+        // What comes after the change was certain does not move its beginning.
+        let both =
+            points(|day, _| 2.0 + f64::from(day >= 40.0) * 0.3 + f64::from(day >= 60.0) * 0.9);
+        let found = change(&both, false, 45.0).unwrap();
+        assert!((found.from - 40.0).abs() <= 5.0, "{found:?}");
     }
 }

@@ -286,7 +286,9 @@ fn lasting(
     let since = begin..nights.all.len();
     let points = learned.iter().copied().chain(since.clone());
     let points: Vec<Point> = points.map(|night| nights.point(night)).collect();
-    let change = shape::change(&points, nights.has_slope)?;
+    // A change has begun by the night in which it was certain; what comes later is another one.
+    let told_day = nights.all[told].0.day;
+    let change = shape::change(&points, nights.has_slope, told_day)?;
     let off = nights.mean_off(reference, since);
     // Where the best shape denies the change, the sums are believed: it is a step.
     let (change_from, denied) = (change.from, change.size * off <= 0.0);
@@ -297,7 +299,7 @@ fn lasting(
         } else {
             change_from
         },
-        told: nights.all[told].0.day,
+        told: told_day,
         until: None,
         level: change.level,
         level_deviation: change.level_deviation,

@@ -20,7 +20,7 @@ use crate::inbox;
 use crate::keeper::Keeper;
 use crate::mailbox::Mailbox;
 use crate::physics::CellPhysics;
-use crate::store::{Note, Store, StoreError};
+use crate::store::{Label, Note, Store, StoreError};
 use crate::wall::{Effect, Event, Now, Snapshot, Wall};
 use keeping::Keeping;
 
@@ -79,6 +79,7 @@ enum Mail {
     Event(Event),
     Acknowledged { cell: String, by: String },
     Noted { cell: String, note: Note },
+    Labelled { cell: String, label: Label },
 }
 
 /// A fleet host that works until it is dropped.
@@ -106,7 +107,7 @@ impl Hub {
             let remembered = keeper.remembered()?;
             keeper.learn(remembered.iter().map(|(cell, _)| cell.as_str()), unix_ns())?;
             for (cell, seen_ns) in remembered {
-                wall.remember(&cell, seen_ns);
+                wall.remember(&cell, seen_ns, keeper.store().latched(&cell)?);
             }
         }
         let begin = Instant::now();
@@ -194,6 +195,12 @@ impl Hub {
     pub fn note(&self, cell: &str, note: Note) {
         let cell = cell.to_owned();
         self.mailbox.urgent(Mail::Noted { cell, note });
+    }
+
+    /// A cell has taken what somebody writes into its archive.
+    pub fn labelled(&self, cell: &str, label: Label) {
+        let cell = cell.to_owned();
+        self.mailbox.urgent(Mail::Labelled { cell, label });
     }
 }
 
@@ -297,6 +304,9 @@ impl Worker {
             (Mail::Acknowledged { cell, by }, Some(keeping)) => {
                 keeping.with(|keeper| keeper.store().acknowledge(&cell, &by, now_ns));
             }
+            (Mail::Labelled { cell, label }, Some(keeping)) => {
+                keeping.with(|keeper| keeper.store().label(&cell, &label));
+            }
             (Mail::Noted { cell, note }, Some(keeping)) => keeping.with(|keeper| {
                 let noted = keeper.store().note(&cell, &note);
                 noted.and_then(|()| keeper.learn(std::iter::once(cell.as_str()), now_ns))
@@ -322,7 +332,7 @@ impl Worker {
         let known = self.physics.lock().unwrap_or_else(PoisonError::into_inner);
         for view in &mut snapshot.cells {
             let own = known.iter().find(|physics| physics.cell == view.cell);
-            view.drift = own.and_then(CellPhysics::drift);
+            view.drift = own.and_then(|physics| physics.drift(snapshot.now_ns));
         }
         drop(known);
         // Nobody may look right now.

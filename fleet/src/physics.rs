@@ -15,10 +15,13 @@ use tauscope_condition::{Cause, Estimate, Finding, Quantity, Series, assess, pee
 
 pub use table::{Column, Row, TABLE, TextColumn, folder_of};
 
+const NS_A_DAY: f64 = 86_400e9;
 /// Nights whose median is the state now. Resolution: a week has each day's work once.
 const NEWEST: usize = 7;
 /// Nights whose median is the state at first, the same as are learned.
 const FIRST: usize = tauscope_condition::series::LEARNED;
+/// Numbers whose newest night is older are stale \[days\]. Resolution: a long weekend on which no cell works.
+const STALE_AFTER_D: f64 = 4.0;
 /// Days of a curve on the wall. Resolution: six weeks, in which a gear wears.
 const CURVE_D: f64 = 42.0;
 
@@ -78,6 +81,8 @@ pub struct Drift {
     pub finding: Option<String>,
     /// Whether the change is warmth.
     pub is_warmth: bool,
+    /// How old the newest night is, where it is so old that this says nothing of now \[days\].
+    pub stale_d: Option<u32>,
 }
 
 /// The physics of one cell's arm.
@@ -222,8 +227,20 @@ impl CellPhysics {
         self.findings.iter().any(of)
     }
 
-    /// The joint whose friction has changed most: one that is found first.
-    pub fn drift(&self) -> Option<Drift> {
+    /// How old the newest night is at `now_ns` \[days\].
+    pub fn age_d(&self, now_ns: i64) -> u32 {
+        (now_ns as f64 / NS_A_DAY - self.newest_day).max(0.0) as u32
+    }
+
+    /// The same, where it is so old that the numbers say nothing of now.
+    pub fn stale_d(&self, now_ns: i64) -> Option<u32> {
+        let is_stale = now_ns as f64 / NS_A_DAY - self.newest_day > STALE_AFTER_D;
+        is_stale.then(|| self.age_d(now_ns))
+    }
+
+    /// The joint whose friction has changed most: one that is found first. `now_ns`: when it is asked \[ns since the
+    /// epoch\].
+    pub fn drift(&self, now_ns: i64) -> Option<Drift> {
         let found = self
             .findings
             .iter()
@@ -252,6 +269,7 @@ impl CellPhysics {
             quantity: one.series.quantity,
             share: share(one),
             curve: newest.map(|estimate| estimate.value / one.first).collect(),
+            stale_d: self.stale_d(now_ns),
             is_warmth: self
                 .findings
                 .iter()
@@ -262,5 +280,27 @@ impl CellPhysics {
                 .find(|one| one.is_alarm())
                 .map(|one| one.sentence.clone()),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_without_a_new_night_are_stale_after_a_long_weekend() {
+        let physics = CellPhysics {
+            cell: "press".to_owned(),
+            arm: "A-17".to_owned(),
+            robot: String::new(),
+            twin_sha256: String::new(),
+            newest_day: 20_000.0,
+            findings: Vec::new(),
+            followed: Vec::new(),
+        };
+        let now_ns = |day: f64| (day * NS_A_DAY) as i64;
+        assert_eq!(physics.stale_d(now_ns(20_003.5)), None);
+        assert_eq!(physics.age_d(now_ns(20_003.5)), 3);
+        assert_eq!(physics.stale_d(now_ns(20_300.5)), Some(300));
     }
 }

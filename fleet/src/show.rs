@@ -84,6 +84,7 @@ fn row(view: &CellView, now_ns: i64) -> [String; 9] {
     let contact = status.and_then(|status| status.last_contact.as_ref());
     let state = match view.state {
         State::Muted { until_ns } => format!("muted until {}", words::time_of_day(until_ns)),
+        state if view.latched_behind().is_some() => format!("{}, latched", state.words()),
         state => state.words().to_owned(),
     };
     [

@@ -4,6 +4,8 @@
 
 mod history;
 mod incidents;
+mod labels;
+mod notes;
 #[cfg(test)]
 mod tests;
 
@@ -16,6 +18,8 @@ use tauscope_publish::message::ContactMessage;
 
 pub use history::{Day, JointNormal};
 pub use incidents::{Incident, Kind, News};
+pub use labels::{KeptLabel, Label};
+pub use notes::{Note, baselines};
 
 /// How long contacts, incidents and history are kept \[ns\]. Resolution: a year and some, to compare seasons.
 pub const KEPT_NS: i64 = 400 * 86_400_000_000_000;
@@ -95,25 +99,6 @@ pub struct Store {
     path: PathBuf,
 }
 
-/// What somebody noted of a cell.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Note {
-    /// When \[ns since the epoch\].
-    pub at_ns: i64,
-    /// Who.
-    pub by: String,
-    /// What.
-    pub text: String,
-    /// Whether the cell's normal is learned anew from here on.
-    pub baseline: bool,
-}
-
-/// When notes begin a new baseline \[days since 1970-01-01 UTC\].
-pub fn baselines(notes: &[Note]) -> Vec<f64> {
-    let begins = notes.iter().filter(|note| note.baseline);
-    begins.map(|note| note.at_ns as f64 / 86_400e9).collect()
-}
-
 /// A contact as it is kept.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct KeptContact {
@@ -155,6 +140,16 @@ impl Store {
         connection
             .execute_batch("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;")
             .map_err(failed)?;
+        let has_labels: bool = connection
+            .query_row(
+                "SELECT count(*) FROM sqlite_schema WHERE name = 'labels'",
+                [],
+                |row| row.get(0),
+            )
+            .map_err(failed)?;
+        if !has_labels {
+            connection.execute_batch(labels::TABLE).map_err(failed)?;
+        }
         Ok(Self {
             connection,
             path: path.to_owned(),
@@ -317,34 +312,6 @@ impl Store {
         })
     }
 
-    /// Keeps a note.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
-    pub fn note(&self, cell: &str, note: &Note) -> Result<(), StoreError> {
-        let text =
-            "INSERT INTO notes (cell, at_ns, by, text, baseline) VALUES (?1, ?2, ?3, ?4, ?5)";
-        let values = params![cell, note.at_ns, note.by, note.text, note.baseline];
-        let done = self.connection.execute(text, values);
-        done.map(|_| ()).map_err(|error| self.failed(error))
-    }
-
-    /// The newest notes of a cell.
-    ///
-    /// # Errors
-    /// If the file cannot be read.
-    pub fn notes(&self, cell: &str, most: u32) -> Result<Vec<Note>, StoreError> {
-        let text = "SELECT at_ns, by, text, baseline FROM notes WHERE cell = ?1 ORDER BY at_ns DESC LIMIT ?2";
-        self.rows(text, params![cell, most], |row| {
-            Ok(Note {
-                at_ns: row.get(0)?,
-                by: row.get(1)?,
-                text: row.get(2)?,
-                baseline: row.get(3)?,
-            })
-        })
-    }
-
     /// Removes what is older than it is kept.
     ///
     /// # Errors
@@ -355,6 +322,7 @@ impl Store {
             "DELETE FROM contacts WHERE onset_ns < ?1",
             "DELETE FROM incidents WHERE last_ns < ?1",
             "DELETE FROM history WHERE hour_ns < ?1",
+            "DELETE FROM labels WHERE at_ns < ?1",
             "DELETE FROM cells WHERE seen_ns < ?1",
         ];
         for text in texts {

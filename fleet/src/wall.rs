@@ -5,6 +5,7 @@
 //! arrive and a detector judges them.
 
 mod cell;
+mod latch;
 mod snapshot;
 mod state;
 #[cfg(test)]
@@ -172,10 +173,11 @@ impl Wall {
         wall
     }
 
-    /// A cell that was seen in an earlier life of the fleet host, last at `last_ns`.
-    pub fn remember(&mut self, cell: &str, last_ns: i64) {
+    /// A cell that was seen in an earlier life of the fleet host, last at `last_ns`. `latched`: the life of its publisher
+    /// that was latched, and since when \[ns since the epoch\].
+    pub fn remember(&mut self, cell: &str, last_ns: i64, latched: Option<(String, i64)>) {
         if let Some(cell) = self.cell(cell) {
-            cell.remembered_ns = Some(last_ns);
+            cell.remember(last_ns, latched);
         }
     }
 

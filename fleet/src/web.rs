@@ -243,9 +243,10 @@ pub fn week_page(physics: &CellPhysics, notes: &[Note], now_ns: i64) -> String {
 async fn incidents(State(shared): App, headers: HeaderMap) -> Response {
     let reading = shared.clone();
     let read = tokio::task::spawn_blocking(move || {
-        reading
-            .hub
-            .kept(|store| store.incidents(None, pages::incidents::MOST))
+        reading.hub.kept(|store| {
+            let incidents = store.incidents(None, pages::incidents::MOST)?;
+            Ok((incidents, store.labels(None, pages::incidents::MOST)?))
+        })
     });
     let kept = read.await.ok().flatten();
     let now_ns = shared.hub.snapshot().now_ns;

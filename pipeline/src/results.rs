@@ -11,7 +11,7 @@ mod rows;
 mod shelf;
 mod unit;
 
-pub use compare::{Change, Comparison, Counts, Difference, Told, compare};
+pub use compare::{Ambiguous, Change, Comparison, Counts, Difference, Told, compare};
 pub use identity::Identity;
 pub use manifest::{Manifest, Wanted};
 pub use read::{EventRow, ReadError, RecordingRow, Results, parquet_files, read_results};

@@ -11,7 +11,7 @@ use serde_json::Value;
 use tauscope_archive::Recording;
 use tauscope_pipeline::pipeline::Pipeline;
 use tauscope_pipeline::replay::{Replay, TwinChoice};
-use tauscope_pipeline::results::{Folder, Identity, Unit, Wanted, read_results};
+use tauscope_pipeline::results::{Folder, Identity, Unit, Wanted, parquet_files, read_results};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -101,7 +101,8 @@ fn replay_in_a_query_gives_the_rows_that_replay_gives() {
         "select t_ns, link from replay('{pipeline}', '{pattern}') where row = 'event' order by t_ns"
     );
     assert_eq!(rows(&sql, &[]), some);
-    let read = read_results(&folder.path().join("results")).unwrap();
+    let files = parquet_files(&folder.path().join("results")).unwrap();
+    let read = read_results(&files).unwrap();
     let told: Vec<_> = some
         .iter()
         .map(|row| (row["t_ns"].as_i64().unwrap(), row["link"].as_str()))

@@ -12,7 +12,7 @@ use tauscope_pipeline::pipeline::Pipeline;
 use tauscope_pipeline::replay::TwinChoice;
 use tauscope_pipeline::report::Problem;
 use tauscope_pipeline::results::{
-    Comparison, Counts, Difference, Results, compare, parquet_files, read_results,
+    Ambiguous, Comparison, Counts, Difference, Results, compare, parquet_files, read_results,
 };
 
 use super::replay::archive::{self, Job};
@@ -23,6 +23,17 @@ use crate::progress::Quiet;
 
 /// Differences that a terminal is shown; `--json` and `--html` have all.
 const MAX_SHOWN: usize = 40;
+
+/// What is told of a difference; the first column says what became of it.
+const COLUMNS: [&str; 7] = [
+    "",
+    "cell",
+    "recording",
+    "seconds",
+    "link",
+    "joints",
+    "moved",
+];
 
 /// Compare two results over the same recordings: which events appeared, vanished and moved, by cell, link and joint.
 #[derive(Debug, clap::Args)]
@@ -66,17 +77,21 @@ fn tolerance(text: &str) -> Result<f64, String> {
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let inputs = [&args.a, &args.b].into_iter().chain(&args.manifest);
     args.force.check_beside(args.html.clone(), inputs)?;
+    let note = same(&args.a, &args.b);
+    if let Some(note) = &note {
+        out.say(&format!("warning: {note}"));
+    }
     let (a, lost_a) = result(args, &args.a, "a", out)?;
     let (b, lost_b) = result(args, &args.b, "b", out)?;
-    let comparison =
-        compare(&a, &b, args.tolerance_s).map_err(|error| Failure::rejected(error.to_string()))?;
+    let ambiguous = |error: Ambiguous| ambiguous(args, &error, note.as_deref());
+    let comparison = compare(&a, &b, args.tolerance_s).map_err(ambiguous)?;
     if comparison.recordings == 0 {
         let help = "both must be results over the same recordings";
         let problem = Problem::new("the two results have no recording in common").help(help);
         return Err(Failure::Rejected(problem.into()));
     }
     if let Some(html) = &args.html {
-        let page = page::page(&comparison, &args.a, &args.b);
+        let page = page::page(&comparison, &args.a, &args.b, note.as_deref());
         whole_file::write(html, page, Existing::Replace)
             .with_context(|| html.display().to_string())?;
     }
@@ -86,6 +101,45 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         out.print(&text(&comparison))?;
     }
     Ok(lost_a.and(lost_b))
+}
+
+/// That both results are one, if they are: then nothing can differ.
+fn same(a: &Path, b: &Path) -> Option<String> {
+    let real = |path: &Path| path.canonicalize().ok();
+    let is_same = real(a).is_some_and(|real_a| real(b) == Some(real_a));
+    let name = a.display();
+    is_same.then(|| {
+        format!("A and B are both {name}: it is compared with itself, so that nothing can differ; name another B")
+    })
+}
+
+/// Why a folder is not the result of one pipeline, and which folder within it is.
+fn ambiguous(args: &Args, error: &Ambiguous, note: Option<&str>) -> Failure {
+    let folder = if error.result == "A" {
+        &args.a
+    } else {
+        &args.b
+    };
+    let files = parquet_files(folder).unwrap_or_default();
+    let own = |file: &PathBuf| {
+        let is_cell = |path: &&Path| {
+            let name = path.file_name().unwrap_or_default();
+            name.to_string_lossy().starts_with("cell=")
+        };
+        let cell = file.ancestors().find(is_cell)?;
+        Some(cell.parent()?.display().to_string())
+    };
+    let mut folders: Vec<String> = files.iter().filter_map(own).collect();
+    folders.dedup();
+    let title = format!("{error} ({} is {})", error.result, folder.display());
+    let help = match (&folders[..], note) {
+        ([first, second, ..], _) => {
+            format!("it holds several results; perhaps: tauscope diff {first} {second}")
+        }
+        (_, Some(note)) => note.to_owned(),
+        _ => "give the folder of one pipeline".to_owned(),
+    };
+    Failure::Rejected(Problem::new(title).help(&help).into())
 }
 
 /// Reads a result; one of a pipeline file is made first.
@@ -155,15 +209,7 @@ fn text(comparison: &Comparison) -> String {
     for column in counts.column_iter_mut().skip(1) {
         column.set_cell_alignment(CellAlignment::Right);
     }
-    let mut list = table([
-        "",
-        "cell",
-        "recording",
-        "seconds",
-        "link",
-        "joints",
-        "moved",
-    ]);
+    let mut list = table(COLUMNS);
     for difference in comparison.differences.iter().take(MAX_SHOWN) {
         list.add_row(row(difference));
     }

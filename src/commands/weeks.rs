@@ -74,7 +74,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     if args.json {
         out.print(&serde_json::to_string_pretty(&cells).map_err(anyhow::Error::from)?)?;
     } else {
-        out.print(&text(&cells))?;
+        out.print(&text(&cells, now_ns))?;
     }
     Ok(Exit::from_loss(!unread.is_empty()))
 }
@@ -97,9 +97,15 @@ fn notes(args: &Args) -> Result<BTreeMap<String, Vec<Note>>, Failure> {
     read().map_err(|error: StoreError| Failure::rejected(error.to_string()))
 }
 
-fn text(cells: &[CellPhysics]) -> String {
+fn text(cells: &[CellPhysics], now_ns: i64) -> String {
     let mut text = String::new();
     for cell in cells {
+        if let Some(days) = cell.stale_d(now_ns) {
+            text += &format!(
+                "{}: stale, the newest night was {days} days ago; what stands here is as of then\n",
+                cell.cell
+            );
+        }
         for finding in &cell.findings {
             text += &format!("{}: {}\n", cell.cell, finding.sentence);
         }
@@ -114,6 +120,7 @@ fn text(cells: &[CellPhysics]) -> String {
             );
         }
     }
-    let quiet = cells.iter().filter(|cell| cell.findings.is_empty()).count();
+    let is_quiet = |cell: &&CellPhysics| cell.findings.is_empty() && cell.stale_d(now_ns).is_none();
+    let quiet = cells.iter().filter(is_quiet).count();
     text + &format!("{quiet} of {} cells: nothing has changed\n", cells.len())
 }

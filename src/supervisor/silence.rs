@@ -10,6 +10,9 @@ const FIRST_REMINDER: Duration = Duration::from_secs(30);
 /// But at least this often.
 const LONGEST_REMINDER: Duration = Duration::from_mins(10);
 
+/// A source that gave nothing for so long is silent.
+const SILENT: Duration = Duration::from_secs(1);
+
 /// The trouble of one stage, as far as it was told.
 #[derive(Debug, Default)]
 pub struct Silence {
@@ -19,6 +22,8 @@ pub struct Silence {
 #[derive(Debug)]
 struct Told {
     trouble: Trouble,
+    /// Nothing came while it lasted.
+    was_silent: bool,
     since: Instant,
     reminder: Instant,
     wait: Duration,
@@ -36,7 +41,12 @@ impl Silence {
         let Some(trouble) = trouble else {
             let told = self.told.take()?;
             let lasted = (now - told.since).as_secs_f64();
-            return Some((false, format!("samples come again after {lasted:.0} s")));
+            let over = if told.was_silent {
+                format!("samples come again after {lasted:.0} s")
+            } else {
+                format!("over after {lasted:.0} s: {}", told.trouble.what)
+            };
+            return Some((false, over));
         };
         let seconds = silent_for.as_secs_f64();
         match &mut self.told {
@@ -54,16 +64,18 @@ impl Silence {
                     .map_or(now.checked_sub(silent_for).unwrap_or(now), |told| {
                         told.since
                     });
+                let is_silent = silent_for >= SILENT;
                 *told = Some(Told {
                     trouble: trouble.clone(),
+                    was_silent: is_silent,
                     since,
                     reminder: now + FIRST_REMINDER,
                     wait: FIRST_REMINDER,
                 });
-                let age = if silent_for < Duration::from_secs(1) {
-                    String::new()
-                } else {
+                let age = if is_silent {
                     format!("no usable sample for {seconds:.0} s: ")
+                } else {
+                    String::new()
                 };
                 Some((true, format!("{age}{trouble}")))
             }
@@ -108,6 +120,18 @@ mod tests {
             Some((false, "samples come again after 100 s".to_owned()))
         );
         assert_eq!(silence.note(None, Duration::ZERO, end), None);
+    }
+
+    #[test]
+    fn trouble_of_a_stream_that_flows_does_not_speak_of_silence() {
+        let start = Instant::now();
+        let mut silence = Silence::default();
+        let trouble = Trouble::new("two publishers");
+        let said = silence.note(Some(&trouble), Duration::ZERO, start);
+        assert_eq!(said, Some((true, "two publishers".to_owned())));
+        let over = silence.note(None, Duration::ZERO, start + Duration::from_secs(7));
+        let expected = "over after 7 s: two publishers";
+        assert_eq!(over, Some((false, expected.to_owned())));
     }
 
     #[test]

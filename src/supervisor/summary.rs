@@ -196,13 +196,13 @@ impl Summary {
         for stage in &self.stages {
             let name = &stage.stage;
             let when = if stage.received == 0 {
-                ""
+                " got no sample"
             } else {
-                " at the end"
+                ", at the end"
             };
             match &stage.trouble {
                 Some(trouble) => {
-                    text += &format!("\n\nwarning: stage `{name}` got no sample{when}: {trouble}");
+                    text += &format!("\n\nwarning: stage `{name}`{when}: {trouble}");
                 }
                 None if stage.is_source && stage.reported && stage.received == 0 => {
                     text += &format!("\n\nwarning: stage `{name}` got no sample");

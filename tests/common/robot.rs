@@ -64,6 +64,11 @@ pub struct Publisher {
 impl Publisher {
     /// Of these joints under this key.
     pub fn start(session: &Session, key: &str, joints: &[&str]) -> Self {
+        Self::start_as(session, key, joints, None)
+    }
+
+    /// The same, numbered and named as `rmw_zenoh` does.
+    pub fn start_as(session: &Session, key: &str, joints: &[&str], id: Option<u8>) -> Self {
         let body = |joints: &[String]| {
             let now = SystemTime::now()
                 .duration_since(SystemTime::UNIX_EPOCH)
@@ -86,8 +91,14 @@ impl Publisher {
         let (stopped, session, key) = (Arc::clone(&stop), session.clone(), key.to_owned());
         let joints: Vec<String> = joints.iter().map(ToString::to_string).collect();
         let thread = std::thread::spawn(move || {
+            let mut sequence = 0_i64;
             while !stopped.load(Ordering::Relaxed) {
-                session.put(&key, body(&joints)).wait().unwrap();
+                let put = session.put(&key, body(&joints));
+                match id {
+                    Some(id) => put.attachment(attachment(sequence, id)).wait().unwrap(),
+                    None => put.wait().unwrap(),
+                }
+                sequence += 1;
                 std::thread::sleep(Duration::from_millis(10));
             }
         });
@@ -96,6 +107,15 @@ impl Publisher {
             thread: Some(thread),
         }
     }
+}
+
+/// Number, time and publisher, as `rmw_zenoh` attaches them.
+fn attachment(sequence: i64, publisher: u8) -> Vec<u8> {
+    let mut bytes = sequence.to_le_bytes().to_vec();
+    bytes.extend(0_i64.to_le_bytes());
+    bytes.push(16);
+    bytes.extend([publisher; 16]);
+    bytes
 }
 
 impl Drop for Publisher {

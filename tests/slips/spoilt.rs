@@ -37,6 +37,11 @@ pub fn write_all(folder: &Path) {
         write(&folder.join(name), spoil);
     };
     write("zero.mcap", &|_, state| scaled(&mut state.effort, 0.0));
+    write("ceased.mcap", &|number, state| {
+        if number > 1000 {
+            state.effort.fill(0.0);
+        }
+    });
     write("one_zero.mcap", &|_, state| state.effort[1] = 0.0);
     write("degrees.mcap", &|_, state| {
         scaled(&mut state.position, 57.295_779_513);
@@ -108,6 +113,11 @@ const SLIPS: &[Slip] = &[
         typed: "replay @zero.mcap --pipeline @pipeline.yaml",
         code: 0,
         says: &["warning: the effort is zero throughout: the driver does not publish it"],
+    },
+    Slip {
+        typed: "replay @ceased.mcap --pipeline @pipeline.yaml",
+        code: 0,
+        says: &["no effort is measured from 10.0 s on"],
     },
     Slip {
         typed: "replay @one_zero.mcap --pipeline @pipeline.yaml --json",

@@ -52,6 +52,8 @@ impl Gauge {
         match self.against {
             Against::Position => at.position[joint],
             Against::Velocity => at.velocity[joint],
+            Against::VelocityDifference => at.velocity[joint] - next(at, joint),
+            Against::VelocitySum => at.velocity[joint] + next(at, joint),
             Against::Acceleration => at.acceleration[joint],
             Against::Load => at.transmitted[joint],
             Against::DrivenLoad => at.transmitted[joint] * sign(at.velocity[joint]),
@@ -79,6 +81,11 @@ impl Gauge {
             Against::SessionTime => at.session_s,
         }
     }
+}
+
+/// Velocity of the joint after `joint` in the URDF; 0 behind the last one.
+fn next(at: &MotionSample<'_>, joint: usize) -> f64 {
+    at.velocity.get(joint + 1).copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]
@@ -121,6 +128,26 @@ mod tests {
         };
         assert!(since(1) > LONG_S);
         assert!((since(4) - 0.1).abs() < 1e-9);
+    }
+
+    #[test]
+    fn two_velocities_are_taken_together_and_the_last_joint_has_no_next_one() {
+        let of_first = |against: Against| {
+            let mut gauge = Gauge::new(against, 0, 0.0);
+            gauge.read(&MotionSample {
+                dt_s: 0.05,
+                recording_s: 0.0,
+                session_s: 0.0,
+                position: &[0.0; 2],
+                velocity: &[0.5, 2.0],
+                acceleration: &[0.0; 2],
+                transmitted: &[0.0; 2],
+            })
+        };
+        assert!((of_first(Against::VelocityDifference) + 1.5).abs() < 1e-12);
+        assert!((of_first(Against::VelocitySum) - 2.5).abs() < 1e-12);
+        let of_last = readings(Against::VelocityDifference, &[(2.0, 0.0)]);
+        assert_eq!(of_last, [2.0]);
     }
 
     #[test]

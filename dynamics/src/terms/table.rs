@@ -63,6 +63,10 @@ pub enum Against {
     Position,
     /// Velocity of a joint \[rad/s or m/s\].
     Velocity,
+    /// Velocity of a joint less that of the next one in the URDF, as parts feel it that rub \[rad/s or m/s\].
+    VelocityDifference,
+    /// The same with a plus, for axes that point in opposite directions \[rad/s or m/s\].
+    VelocitySum,
     /// Acceleration of a joint \[rad/s² or m/s²\].
     Acceleration,
     /// Effort that a joint's gear transmits \[N m or N\].
@@ -164,6 +168,8 @@ impl Table {
         let against = match self.against {
             Against::Position => format!("{of} position"),
             Against::Velocity => format!("{of} velocity"),
+            Against::VelocityDifference => self.of_two("difference", joints),
+            Against::VelocitySum => self.of_two("sum", joints),
             Against::Acceleration => format!("{of} acceleration"),
             Against::Load if self.of_joint == joint => "its load".to_owned(),
             Against::Load => format!("{of} load"),
@@ -190,6 +196,18 @@ impl Table {
             format!(", and repeats every {period} s ({rate} Hz)")
         });
         format!("{against}{direction}{repeated}")
+    }
+}
+
+impl Table {
+    /// Two velocities taken together, in words.
+    fn of_two(&self, how: &str, joints: &[String]) -> String {
+        let (one, next) = (self.of_joint, self.of_joint + 1);
+        let next = joints.get(next).map_or("none", String::as_str);
+        format!(
+            "the {how} of the velocities of joints {} and {next}",
+            joints[one]
+        )
     }
 }
 

@@ -179,6 +179,23 @@ impl Store {
         done.map(|_| ()).map_err(|error| self.failed(error))
     }
 
+    /// The life of a cell's publisher whose latch nobody has acknowledged, and since when there is an incident of it
+    /// \[ns since the epoch\]; `None` where the newest contact is none that is latched.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn latched(&self, cell: &str) -> Result<Option<(String, i64)>, StoreError> {
+        let text = "SELECT instance, opened_ns FROM
+                    (SELECT * FROM contacts WHERE cell = ?1 ORDER BY onset_ns DESC LIMIT 1) AS contact
+                    JOIN incidents ON incidents.cell = ?1 AND incidents.kind = ?2 AND place = detector
+                    WHERE latched AND contact.acknowledged_ns IS NULL
+                    AND closed_ns IS NULL AND incidents.acknowledged_ns IS NULL ORDER BY opened_ns LIMIT 1";
+        let values = params![cell, Kind::Contact.as_str()];
+        let row = |row: &rusqlite::Row<'_>| Ok((row.get(0)?, row.get(1)?));
+        let found = self.connection.query_row(text, values, row).optional();
+        found.map_err(|error| self.failed(error))
+    }
+
     /// Incidents of a cell, or of all: the open ones first, then the newest.
     ///
     /// # Errors

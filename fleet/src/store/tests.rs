@@ -128,3 +128,77 @@ fn a_file_that_is_none_of_ours_is_refused() {
     .unwrap();
     assert!(Store::open(&folder.path().join("text")).is_err());
 }
+
+#[test]
+fn a_label_is_kept_with_the_contact_and_the_incident_that_it_is_about() {
+    let (_folder, store) = store();
+    let label = |stamp_ns: i64, text: &str| Label {
+        at_ns: stamp_ns,
+        stamp_ns,
+        by: "anna".to_owned(),
+        text: text.to_owned(),
+    };
+    store.label("a", &label(MIN, "before all")).unwrap();
+    let contact = fixture::contact(1, 120);
+    store.contact("a", "x", &contact, "pc", None).unwrap();
+    store.raise(&news("tauscope", 2, Severity::Notice)).unwrap();
+    store
+        .label("a", &label(3 * MIN, "hit the fixture"))
+        .unwrap();
+    store.label("a", &label(3 * DAY, "new gripper")).unwrap();
+    store
+        .label("b", &label(3 * MIN, "of another cell"))
+        .unwrap();
+    // What comes later takes no label over.
+    let later = fixture::contact(2, 600);
+    store.contact("a", "x", &later, "pc", None).unwrap();
+    let kept = store.labels(Some("a"), 10).unwrap();
+    let about = |text: &str| {
+        let one = kept.iter().find(|one| one.label.text == text).unwrap();
+        (one.onset_ns, one.incident)
+    };
+    assert_eq!(kept.len(), 3);
+    let incident = store.incidents(Some("a"), 10).unwrap()[0].id;
+    let own = (Some(contact.onset_ns), Some(incident));
+    assert_eq!(about("hit the fixture"), own);
+    assert_eq!(about("before all"), (None, None));
+    assert_eq!(about("new gripper"), (None, None));
+    assert_eq!(kept[0].label.by, "anna");
+    store.prune(KEPT_NS + 2 * DAY).unwrap();
+    assert_eq!(store.labels(Some("a"), 10).unwrap().len(), 1);
+}
+
+#[test]
+fn a_file_of_before_gets_a_table_of_labels() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("fleet.sqlite");
+    let store = Store::open(&path).unwrap();
+    store
+        .connection
+        .execute_batch("DROP TABLE labels;")
+        .unwrap();
+    drop(store);
+    assert_eq!(Store::open(&path).unwrap().labels(None, 1).unwrap(), []);
+}
+
+#[test]
+fn a_latch_is_known_until_it_is_acknowledged() {
+    let (_folder, store) = store();
+    let mut contact = fixture::contact(1, 60);
+    contact.latched = true;
+    store.contact("a", "x", &contact, "pc", None).unwrap();
+    store
+        .raise(&news("tauscope", 1, Severity::Critical))
+        .unwrap();
+    let latched = Some(("x".to_owned(), MIN));
+    assert_eq!(store.latched("a").unwrap(), latched);
+    assert_eq!(store.latched("b").unwrap(), None);
+    contact.acknowledged_ns = Some(2 * MIN);
+    store.contact("a", "x", &contact, "pc", None).unwrap();
+    assert_eq!(store.latched("a").unwrap(), None);
+    // A contact behind it that is not latched.
+    store
+        .contact("a", "x", &fixture::contact(2, 120), "pc", None)
+        .unwrap();
+    assert_eq!(store.latched("a").unwrap(), None);
+}

@@ -5,8 +5,9 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use tauscope_bus::clock::{ClockFilter, Offset};
 use tauscope_publish::message::{AlarmState, RecordMessage, StatusMessage};
 
+use super::latch::Latch;
 use super::snapshot::{CellView, ResidualView};
-use super::state::{StaleWhy, State, UnknownWhy};
+use super::state::{Severity, StaleWhy, State, UnknownWhy};
 use super::{CLOCK_LIMIT_NS, Effect, Now, STALE_AFTER_MS};
 
 /// Lives of one cell that are followed at a time. Resolution: one is right, two are a fault; a stranger may not fill
@@ -26,11 +27,12 @@ pub struct Watched {
     /// Whether it was named at the start.
     pub expected: bool,
     /// When it was seen last, in an earlier life of the fleet host \[ns since the epoch\].
-    pub remembered_ns: Option<i64>,
+    remembered_ns: Option<i64>,
     lives: BTreeSet<String>,
     /// When its last token went.
     gone: Option<Now>,
     status: Option<(StatusMessage, Now)>,
+    latch: Latch,
     /// The last number of a record, of the life that the status tells of.
     records: u64,
     /// Lost samples by stage, as last told.
@@ -45,6 +47,13 @@ pub struct Watched {
 }
 
 impl Watched {
+    /// In an earlier life of the fleet host it was seen last at `last_ns`, and a life of its publisher was latched since
+    /// then \[ns since the epoch\].
+    pub fn remember(&mut self, last_ns: i64, latched: Option<(String, i64)>) {
+        self.remembered_ns = Some(last_ns);
+        self.latch.remember(latched);
+    }
+
     /// A token is there; `false` where it is one too many.
     pub fn alive(&mut self, instance: String) -> bool {
         if self.lives.len() >= MAX_LIVES && !self.lives.contains(&instance) {
@@ -122,6 +131,8 @@ impl Watched {
             });
         }
         self.note_residual(&status);
+        self.latch
+            .take(&status.alarm, &status.instance, now.unix_ns);
         self.status = Some((status, now));
     }
 
@@ -297,6 +308,7 @@ impl Watched {
         let state = self.state(reached, now);
         let since_ns = match state {
             State::Stale { since_ns, .. } => Some(since_ns),
+            State::Stopped { .. } => self.latch.since_ns(),
             _ => self.settled.map(|(_, since_ns)| since_ns),
         };
         let age_ms = |at: &Now| now.running_ms.saturating_sub(at.running_ms);
@@ -310,8 +322,12 @@ impl Watched {
         CellView {
             cell: name.to_owned(),
             state,
-            severity: state.severity(),
+            severity: match self.latch.since_ns() {
+                Some(_) => Severity::Critical,
+                None => state.severity(),
+            },
             since_ns,
+            latched_since_ns: self.latch.since_ns(),
             status_age_ms,
             sample_age_ms,
             clock_ahead_ms: clock.map(|clock| ms(clock.ahead_ns)),

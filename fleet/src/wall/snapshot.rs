@@ -38,11 +38,13 @@ pub struct CellView {
     /// Where it stands.
     #[serde(flatten)]
     pub state: State,
-    /// How much that matters.
+    /// How much that matters: a cell that is latched is critical, whatever else it is.
     pub severity: Severity,
     /// Since when it is in that state \[ns since the epoch\].
     #[serde(rename = "state_since_ns")]
     pub since_ns: Option<i64>,
+    /// Since when a collision is latched, also while the cell is stale; `None` where nothing is \[ns since the epoch\].
+    pub latched_since_ns: Option<i64>,
     /// Time since the newest status arrived \[ms\].
     pub status_age_ms: Option<u64>,
     /// Time since the newest sample arrived in the cell \[ms\].
@@ -81,6 +83,12 @@ pub struct ResidualView {
 }
 
 impl CellView {
+    /// Since when it is latched, where its state does not say so \[ns since the epoch\].
+    pub fn latched_behind(&self) -> Option<i64> {
+        let is_said = matches!(self.state, State::Stopped { .. });
+        self.latched_since_ns.filter(|_| !is_said)
+    }
+
     /// Now, by the clock of the cell's samples: ages of what has a stamp are against this \[ns since the epoch\].
     /// A recording that is played has another time than the fleet host.
     pub fn stream_now_ns(&self) -> Option<i64> {
@@ -156,7 +164,8 @@ impl Snapshot {
         cells.sort_by(|a, b| {
             let key = |cell: &CellView| {
                 let good = cell.severity == Severity::Good;
-                (cell.severity, if good { None } else { cell.since_ns })
+                let since_ns = cell.latched_since_ns.or(cell.since_ns);
+                (cell.severity, if good { None } else { since_ns })
             };
             key(a)
                 .cmp(&key(b))

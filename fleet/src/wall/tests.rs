@@ -196,6 +196,50 @@ fn a_latched_alarm_stands_first_and_a_mute_ends_by_itself() {
 }
 
 #[test]
+fn a_latch_is_as_old_as_it_is_whatever_the_fleet_host_has_missed() {
+    let mut story = Story::new(&[]);
+    let latched = |ms: u64| {
+        move |status: &mut StatusMessage| {
+            status.alarm.state = AlarmState::Collision;
+            status.alarm.latched_for_ms = Some(ms);
+        }
+    };
+    let shown = |story: &Story| story.wall.snapshot().cells.remove(0);
+    // A fleet host that was started an hour after the latch.
+    let since_ns = story.now.unix_ns - 3_600_000 * 1_000_000;
+    story.alive("x").status(latched(3_600_000));
+    assert_eq!(shown(&story).since_ns, Some(since_ns));
+    // Silence, and a cut: the cell is stale, and latched nevertheless.
+    story.wait(5_000).is("stale");
+    assert_eq!(shown(&story).latched_since_ns, Some(since_ns));
+    assert_eq!(shown(&story).severity, Severity::Critical);
+    story.status(|status| {
+        latched(3_605_000)(status);
+        status.alarm.state = AlarmState::Silent;
+    });
+    story.is("stale").wait(1_000);
+    story.status(latched(3_606_000)).is("stopped by latch");
+    assert_eq!(shown(&story).since_ns, Some(since_ns));
+    // The publisher is started again, and does not know since when.
+    story.wait(1_000).gone("x").alive("y").status(|status| {
+        status.instance = "y".to_owned();
+        latched(10)(status);
+    });
+    assert_eq!(shown(&story).since_ns, Some(since_ns));
+    // It is released, and latched anew.
+    story.wait(1_000);
+    story.status(|status| status.instance = "y".to_owned());
+    assert_eq!(shown(&story).latched_since_ns, None);
+    assert_eq!(shown(&story).severity, Severity::Good);
+    story.wait(1_000).status(|status| {
+        status.instance = "y".to_owned();
+        latched(100)(status);
+    });
+    let anew_ns = story.now.unix_ns - 100_000_000;
+    assert_eq!(shown(&story).since_ns, Some(anew_ns));
+}
+
+#[test]
 fn a_run_that_ended_in_order_is_no_failure() {
     let mut story = Story::new(&[]);
     story
@@ -274,9 +318,15 @@ fn records_that_were_missed_are_asked_for() {
 #[test]
 fn a_cell_that_was_there_in_an_earlier_life_is_stale_since_then() {
     let mut story = Story::new(&[]);
-    story.wall.remember("a", 5);
+    story.wall.remember("a", 5, None);
     story.is("stale");
     assert_eq!(story.wall.snapshot().cells[0].since_ns, Some(5));
+    // One of an older version does not tell how old its latch is.
+    story.wall.remember("a", 5, Some(("x".to_owned(), 3)));
+    assert_eq!(story.wall.snapshot().cells[0].latched_since_ns, Some(3));
+    story.alive("x");
+    story.status(|status| status.alarm.state = AlarmState::Collision);
+    assert_eq!(story.wall.snapshot().cells[0].since_ns, Some(3));
 }
 
 #[test]

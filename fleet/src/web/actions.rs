@@ -9,7 +9,7 @@ use serde::Deserialize;
 use tauscope_bus::command::{Answer, Request, Signed};
 
 use super::{App, Shared, page, pages};
-use crate::store::Note;
+use crate::store::{Label, Note};
 use crate::wall::State as CellState;
 use crate::words;
 
@@ -95,7 +95,8 @@ pub async fn acknowledge(
         Err(refused) => return refused.into_response(),
     };
     let told = if hears(&shared, &cell) {
-        send(&shared, &cell, Request::Acknowledge, &user).await
+        let taken = send(&shared, &cell, Request::Acknowledge, &user).await;
+        taken.map(holds_from)
     } else {
         Ok("noted here only: the cell takes no commands now".to_owned())
     };
@@ -112,14 +113,9 @@ pub async fn mute(
     Form(form): Form<Mute>,
 ) -> Response {
     let seconds = form.seconds.unwrap_or(f64::NAN);
-    command(
-        &shared,
-        &headers,
-        &form.csrf,
-        &cell,
-        Request::Mute { seconds },
-    )
-    .await
+    let request = Request::Mute { seconds };
+    let done = |_: &str, stamp_ns| holds_from(stamp_ns);
+    command(&shared, &headers, &form.csrf, &cell, request, done).await
 }
 
 pub async fn label(
@@ -129,14 +125,18 @@ pub async fn label(
     Form(form): Form<Written>,
 ) -> Response {
     let text = form.text.trim().to_owned();
-    command(
-        &shared,
-        &headers,
-        &form.csrf,
-        &cell,
-        Request::Label { text },
-    )
-    .await
+    let request = Request::Label { text: text.clone() };
+    let done = |user: &str, stamp_ns| {
+        let label = Label {
+            at_ns: shared.hub.snapshot().now_ns,
+            stamp_ns,
+            by: user.to_owned(),
+            text,
+        };
+        shared.hub.labelled(&cell, label);
+        format!("it is in the archive at {}", words::time(stamp_ns))
+    };
+    command(&shared, &headers, &form.csrf, &cell, request, done).await
 }
 
 pub async fn note(
@@ -174,13 +174,15 @@ async fn command(
     csrf: &str,
     cell: &str,
     request: Request,
+    done: impl FnOnce(&str, i64) -> String,
 ) -> Response {
     let user = match may(shared, headers, csrf, cell) {
         Ok(user) => user,
         Err(refused) => return refused.into_response(),
     };
     let told = if hears(shared, cell) {
-        send(shared, cell, request, &user).await
+        let taken = send(shared, cell, request, &user).await;
+        taken.map(|stamp_ns| done(&user, stamp_ns))
     } else {
         Err("the cell takes no commands now".to_owned())
     };
@@ -218,13 +220,19 @@ fn hears(shared: &Shared, cell: &str) -> bool {
     takes && !is_gone
 }
 
-/// What came of a command, in words.
+/// What is told of a command that was taken.
+fn holds_from(stamp_ns: i64) -> String {
+    let at = words::time(stamp_ns);
+    format!("the cell has taken it; it holds from {at} on")
+}
+
+/// Sends a command; the stamp from which it holds \[ns since the epoch\].
 async fn send(
     shared: &Arc<Shared>,
     cell: &str,
     request: Request,
     user: &str,
-) -> Result<String, String> {
+) -> Result<i64, String> {
     let signed = Signed {
         request,
         by: Some(user.to_owned()),
@@ -233,10 +241,7 @@ async fn send(
     let (hub, asked) = (shared.hub.clone(), cell.to_owned());
     let answer = tokio::task::spawn_blocking(move || hub.send(&asked, &signed)).await;
     match answer.map_err(|_| "the command could not be sent".to_owned())? {
-        Ok(Answer::Taken { stamp_ns }) => Ok(format!(
-            "the cell has taken it; it holds from {} on",
-            words::time(stamp_ns)
-        )),
+        Ok(Answer::Taken { stamp_ns }) => Ok(stamp_ns),
         Ok(Answer::Refused { reason }) => Err(format!("the cell refuses: {reason}")),
         Err(error) => Err(error.to_string()),
     }

@@ -2,7 +2,7 @@
 //! that passes everything.
 
 use tauscope_archive::{ArchiveError, Recording};
-use tauscope_bus::TwinState;
+use tauscope_bus::{TwinState, flags};
 use tauscope_dynamics::effort_scale::{self, EffortScale, ScaleFault};
 use tauscope_twin::{Calibration, Filters, TwinFile, telling_slopes};
 
@@ -19,6 +19,41 @@ const TELLING: f64 = 0.7;
 /// Physical: above the velocity noise of encoders.
 const MOVES: f64 = 0.03;
 
+/// Efforts that are away for so long have ceased \[ns\].
+/// Physical: longer than a driver takes to switch a controller.
+const CEASED_NS: i64 = 3_000_000_000;
+
+/// A time without measured efforts, after there were some.
+#[derive(Debug, Clone, Copy, Default)]
+struct Without {
+    /// Stamp of the newest measured effort \[ns\].
+    since_ns: Option<i64>,
+    /// How long there has been none \[ns\].
+    lasts_ns: i64,
+    /// The longest such time: when it began, and how long it took \[ns\].
+    longest: (i64, i64),
+}
+
+impl Without {
+    /// Takes a sample; tells whether efforts have just ceased.
+    fn add(&mut self, sample: &TwinState) -> bool {
+        let stamp_ns = sample.header.stamp_ns;
+        if sample.header.has(flags::EFFORT_MEASURED) {
+            self.since_ns = Some(stamp_ns);
+            self.lasts_ns = 0;
+            return false;
+        }
+        let Some(since_ns) = self.since_ns else {
+            return false;
+        };
+        let before_ns = std::mem::replace(&mut self.lasts_ns, stamp_ns - since_ns);
+        if self.lasts_ns > self.longest.1 {
+            self.longest = (since_ns, self.lasts_ns);
+        }
+        before_ns < CEASED_NS && self.lasts_ns >= CEASED_NS
+    }
+}
+
 /// Follows the samples of a twin.
 #[derive(Debug)]
 pub struct PlausibleTwin {
@@ -27,7 +62,9 @@ pub struct PlausibleTwin {
     /// Whether measured and expected effort are in one unit.
     is_alike: bool,
     filters: Filters,
+    first_ns: Option<i64>,
     last_ns: Option<i64>,
+    without_effort: Without,
     /// Steps without pauses, and how long they are together \[ns\].
     steps: u64,
     steps_ns: i64,
@@ -44,15 +81,19 @@ impl PlausibleTwin {
             calibration: Calibration::new(facts.joint_names.len(), false),
             is_alike: in_nm || model.is_some(),
             filters: config.filters(model.map(|model| model.filters)),
+            first_ns: None,
             last_ns: None,
+            without_effort: Without::default(),
             steps: 0,
             steps_ns: 0,
         }
     }
 
-    /// Takes a sample.
-    pub fn add(&mut self, sample: &TwinState) {
+    /// Takes a sample; tells whether the efforts have just ceased, which is worth a look at once.
+    pub fn add(&mut self, sample: &TwinState) -> bool {
         let stamp_ns = sample.header.stamp_ns;
+        self.first_ns.get_or_insert(stamp_ns);
+        let have_ceased = self.without_effort.add(sample);
         if let Some(last_ns) = self.last_ns.replace(stamp_ns) {
             let step_ns = stamp_ns - last_ns;
             if (1..PAUSE_NS).contains(&step_ns) {
@@ -65,6 +106,7 @@ impl PlausibleTwin {
         if velocities.iter().any(|velocity| velocity.abs() > MOVES) {
             self.calibration.add(sample);
         }
+        have_ceased
     }
 
     /// Samples per second.
@@ -85,7 +127,20 @@ impl PlausibleTwin {
                 "the measured effort is {slope:.3} times what the twin expects: its unit is another than the twin's"
             ),
         });
-        cutoffs.chain(scale).collect()
+        cutoffs.chain(scale).chain(self.ceased()).collect()
+    }
+
+    /// What to say of the longest time without efforts.
+    fn ceased(&self) -> Option<String> {
+        let (since_ns, lasts_ns) = self.without_effort.longest;
+        let at_s = (since_ns - self.first_ns?) as f64 * 1e-9;
+        (lasts_ns >= CEASED_NS).then(|| {
+            format!(
+                "no effort is measured from {at_s:.1} s on, for {:.1} s or more: the driver publishes none or plain \
+                 zeros, or the drives are off; meanwhile no contact can be found",
+                lasts_ns as f64 * 1e-9
+            )
+        })
     }
 
     fn scale_fault(&self) -> Option<ScaleFault> {

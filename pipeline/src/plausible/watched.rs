@@ -135,8 +135,8 @@ impl<S> WatchedTwin<S> {
     ) -> R {
         let (stage, plausible, told) = (&self.stage, &mut self.plausible, &mut self.told);
         let see = &mut |sample: &TwinState| {
-            plausible.add(sample);
-            if told.is_time(sample.header.stamp_ns) {
+            let have_ceased = plausible.add(sample);
+            if told.is_time(sample.header.stamp_ns) || have_ceased {
                 for text in plausible.oddities() {
                     // The words, without the numbers that go on changing.
                     let key = text.replace(|c: char| c.is_ascii_digit() || c == '.', "");

@@ -138,6 +138,11 @@ impl Packer {
         }
     }
 
+    /// Which of the cell's joints a message names: bit j is joint j.
+    pub(crate) fn joints_of(&mut self, message: &ros::JointState) -> u32 {
+        self.layouts.of(&message.name).joints
+    }
+
     /// Takes a measured state that was received at `received_ns`.
     pub fn state(&mut self, message: &ros::JointState, received_ns: i64) {
         self.messages += 1;

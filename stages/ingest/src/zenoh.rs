@@ -9,6 +9,7 @@ mod diagnosis;
 mod joint_names;
 mod keys;
 mod publication;
+mod rivals;
 mod scout;
 mod waiting;
 mod watch;
@@ -29,6 +30,7 @@ use crate::setup::Setup;
 use attachment::{Attachment, Losses};
 use diagnosis::Expected;
 use keys::KeyScheme;
+use rivals::Rivals;
 use waiting::{Role, Waiting};
 use watch::Watch;
 
@@ -59,6 +61,8 @@ pub struct ZenohCounts {
     pub lost: u64,
     /// Messages that are not what their topic says.
     pub undecodable: u64,
+    /// States of a second publisher of the same joints.
+    pub rival: u64,
 }
 
 /// A source that listens. It has no end; a publisher that comes back is heard again.
@@ -68,6 +72,7 @@ pub struct ZenohSource {
     queue: Arc<Queue<Waiting>>,
     packer: Packer,
     losses: Losses,
+    rivals: Rivals,
     hashes: keys::HashWatch,
     message: ros::JointState,
     /// By role, because each topic has its own type.
@@ -137,6 +142,7 @@ impl ZenohSource {
             queue,
             packer: Packer::new(setup, settings)?,
             losses: Losses::default(),
+            rivals: Rivals::default(),
             hashes: keys::HashWatch::new(&scheme),
             message: ros::JointState::default(),
             decoders: BTreeMap::new(),
@@ -158,6 +164,7 @@ impl ZenohSource {
         ZenohCounts {
             overflowed: self.queue.overflowed(),
             lost: self.losses.lost(),
+            rival: self.rivals.refused(),
             ..self.counts
         }
     }
@@ -222,7 +229,13 @@ impl ZenohSource {
         }
         let (packer, received_ns) = (&mut self.packer, waiting.received_ns);
         match waiting.role {
-            Role::State => packer.state(&self.message, received_ns),
+            Role::State => {
+                let joints = packer.joints_of(&self.message);
+                let publisher = waiting.attachment.map(|attachment| attachment.publisher);
+                if publisher.is_none_or(|it| self.rivals.admits(it, joints, received_ns)) {
+                    packer.state(&self.message, received_ns);
+                }
+            }
             Role::Command => packer.command(&self.message, received_ns),
             Role::Reference => packer.reference(&self.message, received_ns),
             Role::Tool => packer.tool(&self.tool, received_ns),
@@ -262,11 +275,13 @@ impl Source<JointState> for ZenohSource {
     fn dropped(&self) -> u64 {
         let counts = self.counts();
         // A message that overflowed leaves a hole in the numbers too, where there are numbers.
-        self.packer.counts().dropped() + counts.undecodable + counts.overflowed.max(counts.lost)
+        let packed = self.packer.counts();
+        packed.dropped() + counts.undecodable + counts.rival + counts.overflowed.max(counts.lost)
     }
 
     fn trouble(&mut self, silent_for: Duration) -> Option<Trouble> {
-        self.watch.trouble(silent_for, &self.session, &self.packer)
+        let trouble = self.watch.trouble(silent_for, &self.session, &self.packer);
+        trouble.or_else(|| self.rivals.are_there(now_ns()).then(|| self.watch.rivals()))
     }
 }
 

@@ -85,11 +85,16 @@ pub fn of_alarm(alarm: &AlarmMessage, cell: &str) -> DiagnosticArray {
     } else {
         alarm.state.as_str().replace('_', " ")
     };
+    let words = match alarm.state {
+        AlarmState::Silent if alarm.latched_for_ms.is_some() => format!("{words}, still latched"),
+        _ => words,
+    };
     let values = vec![
         ("state", alarm.state.as_str().to_owned()),
         ("free", alarm.free.to_string()),
         ("contact", alarm.contact.to_string()),
         ("muted_s", alarm.muted_s.to_string()),
+        ("latched", alarm.latched_for_ms.is_some().to_string()),
     ];
     array(alarm.stamp_ns, level, "alarm", words, cell, values)
 }

@@ -26,6 +26,10 @@ pub struct AlarmMessage {
     pub contact: bool,
     /// What is left of a mute \[s\]; 0 without one.
     pub muted_s: f64,
+    /// Time since a collision was latched, by a clock of the cell's computer that only runs \[ms\]: also while the
+    /// detectors are silent, until the latch is released. Left out where nothing is latched.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub latched_for_ms: Option<u64>,
     /// The touched link; left out where there is none, or it is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub link: Option<String>,
@@ -43,6 +47,7 @@ impl AlarmMessage {
             free: false,
             contact: false,
             muted_s: 0.0,
+            latched_for_ms: None,
             link: None,
             force_n: None,
         }

@@ -119,7 +119,7 @@ impl Publisher {
             )?),
             _ => None,
         };
-        let status = Status::silent(Duration::from_secs_f64(config.stop_after_s));
+        let (alarm, status) = before_all(config, judges, setup.restarted);
         let board = Board::new(status.clone());
         let commands = session
             .filter(|_| setup.commands.is_some())
@@ -131,7 +131,7 @@ impl Publisher {
         let modbus = modbus.map(|modbus| Modbus::serve(modbus.listen, &board, commands));
         Ok(Self {
             cell: setup.cell.clone(),
-            alarm: Alarm::new(config.latch, judges, setup.restarted),
+            alarm,
             detectors,
             status,
             poses,
@@ -221,16 +221,13 @@ impl Publisher {
             .as_deref()
             .and_then(|link| self.poses.as_ref()?.link(link));
         self.status.link_number = number.map_or(0, |at| u16::try_from(at + 1).unwrap_or(u16::MAX));
+        self.status.latch(self.alarm.state(), Instant::now());
         self.status.alarm = AlarmMessage {
-            stamp_ns: self.alarm.now_ns(),
-            state: AlarmState::from(self.alarm.state()),
-            free: self.alarm.is_free(),
-            contact: self.alarm.in_contact(),
-            muted_s: self.alarm.muted_s(),
             link,
             force_n: touched
                 .filter(|detection| detection.header.has(tauscope_bus::flags::FORCE))
                 .map(|detection| detection.force_n),
+            ..of_alarm(&self.alarm)
         };
         self.board.show(&self.status);
         self.announce(Instant::now());
@@ -340,6 +337,27 @@ impl Sink for Publisher {
 
     fn dropped(&self) -> u64 {
         self.unsent
+    }
+}
+
+/// The alarm of so many detectors, and what is shown before anything is heard: a latch of an earlier life holds already.
+fn before_all(config: &Config, judges: usize, restarted: bool) -> (Alarm, Status) {
+    let alarm = Alarm::new(config.latch, judges, restarted);
+    let mut status = Status::silent(Duration::from_secs_f64(config.stop_after_s));
+    status.latch(alarm.state(), Instant::now());
+    status.alarm = of_alarm(&alarm);
+    (alarm, status)
+}
+
+/// Where the alarm stands, without what is touched.
+fn of_alarm(alarm: &Alarm) -> AlarmMessage {
+    AlarmMessage {
+        stamp_ns: alarm.now_ns(),
+        state: AlarmState::from(alarm.state()),
+        free: alarm.is_free(),
+        contact: alarm.in_contact(),
+        muted_s: alarm.muted_s(),
+        ..AlarmMessage::silent()
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use crate::alarm::State;
 use crate::message::{AlarmMessage, AlarmState};
 
 /// The alarm at the newest detection, and when that came.
@@ -15,6 +16,8 @@ pub struct Status {
     pub detections: u64,
     /// When the detector that was heard longest ago was heard; `None` before each has been.
     pub heard: Option<Instant>,
+    /// Since when a collision is latched, acknowledged or not.
+    latched: Option<Instant>,
     stop_after: Duration,
 }
 
@@ -26,6 +29,7 @@ impl Status {
             link_number: 0,
             detections: 0,
             heard: None,
+            latched: None,
             stop_after,
         }
     }
@@ -35,15 +39,58 @@ impl Status {
         self.heard.map(|heard| now.saturating_duration_since(heard))
     }
 
-    /// What it says at the instant `now`: when it is too old, that nothing is known.
+    /// Notes that the alarm stands at `state` from `now` on. A collision behind an acknowledged one is another latch.
+    pub fn latch(&mut self, state: State, now: Instant) {
+        let is_new = state == State::Collision && self.alarm.state == AlarmState::Acknowledged;
+        let is_latched = matches!(state, State::Collision | State::Acknowledged);
+        let before = self.latched.filter(|_| !is_new);
+        self.latched = is_latched.then(|| before.unwrap_or(now));
+    }
+
+    /// What it says at the instant `now`: when it is too old, that nothing is known but a latch, which stays.
     pub fn at(&self, now: Instant) -> AlarmMessage {
-        if self.age(now).is_some_and(|age| age <= self.stop_after) {
-            return self.alarm.clone();
+        let is_fresh = self.age(now).is_some_and(|age| age <= self.stop_after);
+        let latched = self
+            .latched
+            .map(|since| now.saturating_duration_since(since));
+        let alarm = AlarmMessage {
+            latched_for_ms: latched.map(|age| u64::try_from(age.as_millis()).unwrap_or(u64::MAX)),
+            ..self.alarm.clone()
+        };
+        if is_fresh {
+            return alarm;
         }
         AlarmMessage {
             state: AlarmState::Silent,
             free: false,
-            ..self.alarm.clone()
+            ..alarm
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_latch_ages_through_silence_and_acknowledgement_until_it_is_released_or_comes_again() {
+        let begin = Instant::now();
+        let at = |s| begin + Duration::from_secs(s);
+        let mut status = Status::silent(Duration::from_secs(1));
+        let mut told = |state: State, s| {
+            status.latch(state, at(s));
+            status.alarm.state = AlarmState::from(state);
+            status.heard = Some(at(s));
+            // Half a minute later nothing has been heard.
+            let alarm = status.at(at(s + 30));
+            assert_eq!(alarm.state, AlarmState::Silent);
+            alarm.latched_for_ms
+        };
+        assert_eq!(told(State::Free, 0), None);
+        assert_eq!(told(State::Collision, 10), Some(30_000));
+        assert_eq!(told(State::Collision, 20), Some(40_000));
+        assert_eq!(told(State::Acknowledged, 30), Some(50_000));
+        assert_eq!(told(State::Collision, 40), Some(30_000));
+        assert_eq!(told(State::Free, 50), None);
     }
 }

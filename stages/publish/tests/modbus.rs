@@ -7,6 +7,7 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 use common::{Answering, endpoint, feed, publisher, says};
+use tauscope_bus::Sink as _;
 use tauscope_bus::command::{Answer, Request};
 use tokio_modbus::ExceptionCode;
 use tokio_modbus::client::{Context, tcp};
@@ -59,6 +60,24 @@ async fn a_plc_reads_the_alarm_as_it_is_now() {
     tokio::time::sleep(Duration::from_millis(350)).await;
     let bits = plc.read_coils(0, BITS).await.unwrap().unwrap();
     assert!(!bits[ALIVE] && !bits[FREE], "silence reads as stop");
+    assert!(bits[COLLISION], "and releases no latch");
+    feed(&mut publisher, &says(20, "free"));
+    let bits = plc.read_coils(0, BITS).await.unwrap().unwrap();
+    assert!(bits[ALIVE] && bits[COLLISION] && !bits[FREE]);
+    publisher.finish().unwrap();
+    let bits = plc.read_coils(0, BITS).await.unwrap().unwrap();
+    assert!(
+        !bits[ALIVE] && bits[COLLISION] && !bits[FREE],
+        "nor does the end of the run"
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_publisher_that_was_started_again_is_latched_before_anything_is_heard() {
+    let publisher = common::restarted(&format!("{{{ANY_PORT}}}"));
+    let mut plc = client(publisher.modbus_address().unwrap()).await;
+    let bits = plc.read_coils(0, BITS).await.unwrap().unwrap();
+    assert!(bits[COLLISION] && !bits[FREE] && !bits[ALIVE]);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -53,6 +53,7 @@
 mod calibration;
 mod config;
 mod motion;
+mod plain_zeros;
 mod stage;
 mod twin_file;
 

@@ -8,6 +8,7 @@ use tauscope_dynamics::{Data, Inertia, Model, lowpass::Butterworth2, rnea};
 
 use crate::config::{Config, Expected};
 use crate::motion::MotionTracker;
+use crate::plain_zeros::PlainZeros;
 use crate::twin_file::Correction;
 
 /// What the twin must know of its cell.
@@ -62,6 +63,7 @@ pub struct Twin {
     /// N m per model unit: 1, or the torque constant.
     nm_per_unit: Vec<f64>,
     motion: MotionTracker,
+    plain_zeros: PlainZeros,
     measured_filters: Vec<Butterworth2>,
     expected_filters: Vec<Butterworth2>,
     /// Stamp of the sample before, and of the last reset.
@@ -106,6 +108,7 @@ impl Twin {
             physics,
             nm_per_unit,
             motion,
+            plain_zeros: PlainZeros::default(),
             measured_filters: vec![effort_filter.clone(); joint_count],
             expected_filters: vec![effort_filter; joint_count],
             previous_ns: None,
@@ -227,9 +230,6 @@ impl Stage<JointState, TwinState> for Twin {
         // A time that runs backwards, a gap, or a source that says so: what the filters hold is void.
         let go_on = matches!(dt_s, Some(dt) if (0.0..=self.max_gap_s).contains(&dt))
             && !sample.header.has(flags::RESET);
-        let known = self.motion.knows(sample)
-            && sample.header.has(flags::EFFORT_MEASURED)
-            && (self.expected == Expected::Model || sample.header.has(flags::REFERENCE));
 
         self.follow_tool(sample)?;
         self.start_ns.get_or_insert(stamp_ns);
@@ -242,6 +242,10 @@ impl Stage<JointState, TwinState> for Twin {
             self.reset_ns = stamp_ns;
         }
         let expected = self.expected_effort(dt_s, sample);
+        let has_expected = self.expected == Expected::Model || sample.header.has(flags::REFERENCE);
+        let is_measured = sample.header.has(flags::EFFORT_MEASURED)
+            && !(has_expected && self.plain_zeros.are(&sample.effort[..n], &expected[..n]));
+        let known = self.motion.knows(sample) && is_measured && has_expected;
         let (mut filtered, mut filtered_expected) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
         for j in 0..n {
             let (measured, model) = (&mut self.measured_filters[j], &mut self.expected_filters[j]);
@@ -264,6 +268,9 @@ impl Stage<JointState, TwinState> for Twin {
             ..sample.header
         };
         header.flags &= !(flags::READY | flags::RESET);
+        if !is_measured {
+            header.flags &= !flags::EFFORT_MEASURED;
+        }
         if known && go_on && settled {
             header.flags |= flags::READY;
         }

@@ -117,6 +117,31 @@ fn it_is_ready_when_its_filters_have_settled_and_not_before() {
 }
 
 #[test]
+fn plain_zeros_of_a_loaded_arm_are_no_effort_and_what_comes_after_them_settles_anew() {
+    let zeros = 300..400;
+    let samples = swing(0.8).enumerate().map(|(i, mut sample)| {
+        if zeros.contains(&i) {
+            sample.effort[0] = 0.0;
+        }
+        sample
+    });
+    let states = run(&mut twin(&Config::default()), samples);
+    let has = |state: &TwinState, flag| state.header.has(flag);
+    let lacking: Vec<usize> = (0..states.len())
+        .filter(|i| !has(&states[*i], flags::EFFORT_MEASURED))
+        .collect();
+    // Where the arm hangs down it bears nothing, and zero is what it measures.
+    assert!(lacking.len() > 80, "{lacking:?}");
+    assert!(lacking.iter().all(|i| zeros.contains(i)), "{lacking:?}");
+    assert!(
+        states[zeros.start..]
+            .iter()
+            .all(|state| { !has(state, flags::READY) || state.residual[0].abs() < 0.3 })
+    );
+    assert!(has(&states[599], flags::READY));
+}
+
+#[test]
 fn the_same_low_pass_runs_over_both_efforts() {
     // Measured effort equal to the expected one, however wild: the residual stays zero.
     let mut first = twin(&Config::default());
@@ -375,6 +400,8 @@ fn a_recording_begins_at_a_reset_and_the_session_does_not() {
         .map(|mut sample| {
             sample.header.stamp_ns += 1_000_000_000_000;
             sample.velocity[0] = 1.0;
+            // Zero would be no measurement of an arm with friction.
+            sample.effort[0] = 1.0;
             sample
         });
     let states = run(&mut twin, both);

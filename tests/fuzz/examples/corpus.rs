@@ -104,6 +104,7 @@ fn status() -> StatusMessage {
             free: true,
             contact: false,
             muted_s: 0.0,
+            latched_for_ms: None,
             link: None,
             force_n: None,
         },

@@ -8,7 +8,7 @@ use tauscope_publish::message::StatusMessage;
 use super::{Viewer, incidents, layout, physics, tile};
 use crate::hub::Hub;
 use crate::physics::CellPhysics;
-use crate::store::{Day, Incident, JointNormal, KeptContact, Note};
+use crate::store::{Day, Incident, JointNormal, KeptContact, KeptLabel, Note};
 use crate::wall::{CellView, Snapshot, State};
 use crate::words;
 
@@ -28,6 +28,7 @@ pub struct Kept {
     contacts: Vec<KeptContact>,
     incidents: Vec<Incident>,
     notes: Vec<Note>,
+    labels: Vec<KeptLabel>,
     physics: Option<CellPhysics>,
     /// Why something is missing.
     trouble: Option<String>,
@@ -44,6 +45,7 @@ impl Kept {
                 contacts: store.contacts(cell, MOST)?,
                 incidents: store.incidents(Some(cell), MOST)?,
                 notes: store.notes(cell, MOST)?,
+                labels: store.labels(Some(cell), MOST)?,
                 physics: None,
                 trouble: None,
             })
@@ -88,15 +90,15 @@ pub fn page(viewer: &Viewer, snapshot: &Snapshot, name: &str, kept: &Kept) -> Ma
         }
         section aria-labelledby="physics" {
             h2 #physics { "Physics over weeks" }
-            (physics::section(kept.physics.as_ref(), &kept.notes))
+            (physics::section(kept.physics.as_ref(), &kept.notes, snapshot.now_ns))
         }
         section aria-labelledby="contacts" {
             h2 #contacts { "Contacts" }
-            (contacts(&kept.contacts, snapshot.now_ns))
+            (contacts(kept, snapshot.now_ns))
         }
         section aria-labelledby="incidents" {
             h2 #incidents { "Incidents" }
-            (incidents::table(&kept.incidents, snapshot.now_ns, false))
+            (incidents::table(&kept.incidents, &kept.labels, snapshot.now_ns, false))
         }
         section aria-labelledby="notes" {
             h2 #notes { "Maintenance notes" }
@@ -153,30 +155,49 @@ fn actions(viewer: &Viewer, view: &CellView) -> Markup {
     }
 }
 
-fn contacts(contacts: &[KeptContact], now_ns: i64) -> Markup {
-    if contacts.is_empty() {
-        return html! { p.muted { "none" } };
+fn contacts(kept: &Kept, now_ns: i64) -> Markup {
+    let onset = |one: &KeptContact| one.contact.onset_ns;
+    let is_shown = |label: &&KeptLabel| {
+        kept.contacts
+            .iter()
+            .any(|one| label.onset_ns == Some(onset(one)))
+    };
+    let (_, others): (Vec<&KeptLabel>, Vec<&KeptLabel>) = kept.labels.iter().partition(is_shown);
+    html! {
+        @if kept.contacts.is_empty() { p.muted { "none" } }
+        @else { (contacts_table(kept, now_ns)) }
+        @if !others.is_empty() {
+            p.muted { "Labels in the archive that are about none of these contacts:" }
+            ul.notes { @for one in others { li { (incidents::label(one)) } } }
+        }
     }
+}
+
+fn contacts_table(kept: &Kept, now_ns: i64) -> Markup {
     html! {
         div.wide role="region" aria-label="Contacts" tabindex="0" {
-            table {
+            table.fold {
                 thead { tr {
                     th scope="col" { "When" } th scope="col" { "What" } th.num scope="col" { "Lasted" }
                     th scope="col" { "Acknowledged" } th scope="col" { "In the archive" }
                 } }
-                tbody { @for KeptContact { contact, host, archive } in contacts { tr {
-                    td { (tile::stamp(contact.onset_ns, &words::time(contact.onset_ns))) }
-                    td { (words::contact(contact)) @if contact.latched { span.muted { ", latched" } } }
-                    td.num { @match contact.end_ns {
+                tbody { @for KeptContact { contact, host, archive } in &kept.contacts { tr {
+                    td.full data-label="When" { (tile::stamp(contact.onset_ns, &words::time(contact.onset_ns))) }
+                    td.full data-label="What" { (words::contact(contact)) @if contact.latched { span.muted { ", latched" } }
+                        @for one in kept.labels.iter().filter(|one| one.onset_ns == Some(contact.onset_ns)) {
+                            div.label { (incidents::label(one)) }
+                        }
+                    }
+                    td.num data-label="Lasted" { @match contact.end_ns {
                         Some(end_ns) => (format!("{:.2} s", (end_ns - contact.onset_ns).max(0) as f64 * 1e-9)),
                         None => "lasts",
                     } }
-                    td { @match (&contact.acknowledged_by, contact.acknowledged_ns) {
+                    td data-label="Acknowledged" { @match (&contact.acknowledged_by, contact.acknowledged_ns) {
                         (Some(by), _) => (by),
                         (None, Some(at_ns)) => (tile::stamp(at_ns, &words::age_at(at_ns, now_ns))) ,
                         (None, None) => span.muted { "no" },
                     } }
-                    td { @match archive {
+                    td.full data-label="In the archive" { @match archive {
                         Some(archive) => {
                             code { @if !host.is_empty() { (host) ":" } (archive) } br;
                             span.muted { (words::time_of_day(contact.begin_ns - AROUND_NS)) " to "
@@ -231,17 +252,17 @@ fn facts(view: &CellView, status: &StatusMessage, now_ns: i64) -> Markup {
             dt { "URDF, SHA-256" } dd { code { (status.urdf_sha256.as_ref().unwrap_or(&none)) } }
         }
         div.wide role="region" aria-label="Stages" tabindex="0" {
-            table {
+            table.fold {
                 thead { tr {
                     th scope="col" { "Stage" } th.num scope="col" { "Received" } th.num scope="col" { "Emitted" }
                     th.num scope="col" { "Lost" } th.num scope="col" { "Restarts" } th scope="col" { "As of" }
                 } }
                 tbody { @for stage in &status.stages { tr {
                     th scope="row" { (stage.stage) }
-                    td.num { (stage.received) } td.num { (stage.emitted) }
-                    td.num.warn[stage.dropped > 0] { (stage.dropped) }
-                    td.num { (stage.restarts) }
-                    td { (tile::stamp(stage.stamp_ns, &words::time_of_day(stage.stamp_ns))) }
+                    td.num data-label="Received" { (stage.received) } td.num data-label="Emitted" { (stage.emitted) }
+                    td.num.warn[stage.dropped > 0] data-label="Lost" { (stage.dropped) }
+                    td.num data-label="Restarts" { (stage.restarts) }
+                    td data-label="As of" { (tile::stamp(stage.stamp_ns, &words::time_of_day(stage.stamp_ns))) }
                 } } }
             }
         }

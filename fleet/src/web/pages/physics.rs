@@ -14,7 +14,7 @@ const DAYS: f64 = 182.0;
 const DAYS_OF_A_WEEK: f64 = 7.0;
 
 /// The section of the cell's page; `None` where nothing is followed.
-pub fn section(physics: Option<&CellPhysics>, notes: &[Note]) -> Markup {
+pub fn section(physics: Option<&CellPhysics>, notes: &[Note], now_ns: i64) -> Markup {
     let Some(physics) = physics else {
         return html! { p.muted {
             "No nightly numbers: run " code { "tauscope physics" } " every night, and start the fleet host with "
@@ -22,12 +22,16 @@ pub fn section(physics: Option<&CellPhysics>, notes: &[Note]) -> Markup {
         } };
     };
     html! {
-        p.muted { "Arm " (physics.arm) ", newest night " (day(physics.newest_day)) ", twin "
+        p.muted { "Arm " (physics.arm) ", newest night " (day(physics.newest_day)) ", "
+            (age(physics, now_ns)) ", twin "
             code { (words::short_hash(Some(&physics.twin_sha256).filter(|hash| !hash.is_empty()))) }
             ". Bars: 95 % intervals. Dashed: the first two weeks since the baseline. Peers: arms of the same robot." }
-        (findings(physics, f64::NEG_INFINITY))
-        (table(physics))
-        (curves(physics, notes))
+        (stale(physics, now_ns))
+        div.old[physics.stale_d(now_ns).is_some()] {
+            (findings(physics, f64::NEG_INFINITY))
+            (table(physics))
+            (curves(physics, notes))
+        }
         p { a href={ "/cells/" (physics.cell) "/week" } { "The page of the week" } }
     }
 }
@@ -70,6 +74,7 @@ fn week_content(physics: &CellPhysics, notes: &[Note], now_ns: i64) -> Markup {
         .filter(|note| note.at_ns as f64 / NS_A_DAY >= week);
     html! {
         h1 { (physics.cell) ", week to " (day(physics.newest_day)) }
+        (stale(physics, now_ns))
         p.summary {
             span { "Arm " (physics.arm) ", robot " (physics.robot) }
             @if new > 0 { span.count data-severity="serious" { strong { (new) } " new this week" } }
@@ -87,6 +92,26 @@ fn week_content(physics: &CellPhysics, notes: &[Note], now_ns: i64) -> Markup {
         ul.notes { @for note in of_week { li { (words::time(note.at_ns)) ", " (note.by) ": " (note.text) } } }
         p.muted { "Made " (words::time(now_ns)) ". Of a hundred arms in which nothing changes, one is told of in about ten years." }
     }
+}
+
+/// How old the newest night is.
+fn age(physics: &CellPhysics, now_ns: i64) -> String {
+    match physics.age_d(now_ns) {
+        0 => "less than a day ago".to_owned(),
+        1 => "1 day ago".to_owned(),
+        days => format!("{days} days ago"),
+    }
+}
+
+/// That the numbers are of long ago, if they are.
+fn stale(physics: &CellPhysics, now_ns: i64) -> Markup {
+    html! { @if physics.stale_d(now_ns).is_some() {
+        p.refused role="alert" {
+            strong { "Stale: the newest night was " (age(physics, now_ns)) "." }
+            " All numbers, findings and forecasts here are as of " (day(physics.newest_day)) "; what has changed since is \
+                not known. Does " code { "tauscope physics" } " still run, and do its tables arrive?"
+        }
+    } }
 }
 
 fn day(day: f64) -> String {
@@ -112,7 +137,7 @@ fn name(one: &Followed) -> String {
 fn table(physics: &CellPhysics) -> Markup {
     html! {
         div.wide role="region" aria-label="Numbers" tabindex="0" {
-            table {
+            table.fold {
                 thead { tr {
                     th scope="col" { "Number" } th.num scope="col" { "Newest night" } th.num scope="col" { "95 % interval" }
                     th.num scope="col" { "At first" } th.num scope="col" { "Last week" } th.num scope="col" { "Change" }
@@ -120,12 +145,12 @@ fn table(physics: &CellPhysics) -> Markup {
                 } }
                 tbody { @for one in &physics.followed { @if let Some(newest) = one.series.estimates.last() { tr {
                     th scope="row" { (name(one)) }
-                    td.num { (format!("{:.3} {}", newest.value, one.unit)) }
-                    td.num { (format!("{:.3} to {:.3}", newest.low, newest.high)) }
-                    td.num { (format!("{:.3}", one.first)) }
-                    td.num { (format!("{:.3}", one.now)) }
-                    td.num { (change(one)) }
-                    td { @match one.peers_median {
+                    td.num data-label="Newest night" { (format!("{:.3} {}", newest.value, one.unit)) }
+                    td.num data-label="95 %" { (format!("{:.3} to {:.3}", newest.low, newest.high)) }
+                    td.num data-label="At first" { (format!("{:.3}", one.first)) }
+                    td.num data-label="Last week" { (format!("{:.3}", one.now)) }
+                    td.num data-label="Change" { (change(one)) }
+                    td data-label="Peers" { @match one.peers_median {
                         Some(median) => { @if one.is_outlier { strong.warn { "outlier" } ", " } "median " (format!("{median:.3}")) }
                         None => span.muted { "too few" },
                     } }

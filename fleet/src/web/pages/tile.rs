@@ -21,6 +21,10 @@ pub fn tile(view: &CellView, now_ns: i64) -> Markup {
                 (badge(view.state))
             }
             p.reason { (reason(view, now_ns)) }
+            @if let Some(since_ns) = view.latched_behind() { p.reason {
+                "Its alarm was latched " (stamp(since_ns, &words::age_at(since_ns, now_ns)))
+                " ago; nobody has told that it is released."
+            } }
             @if let Some(status) = status { (facts(view, status, view.stream_now_ns().unwrap_or(now_ns))) }
         }
     }
@@ -97,9 +101,11 @@ fn facts(view: &CellView, status: &StatusMessage, now_ns: i64) -> Markup {
             }
             @if let Some(drift) = &view.drift {
                 dt { "Friction" }
-                dd.warn[drift.finding.is_some()] title=[drift.finding.as_ref()] {
+                @let is_stale = drift.stale_d.is_some();
+                dd.warn[drift.finding.is_some() && !is_stale].muted[is_stale] title=[drift.finding.as_ref()] {
                     (drift.joint) ", " (drift.quantity.words()) " " (format!("{:+.0} %", 100.0 * drift.share))
                     @if drift.is_warmth { " (warmth)" }
+                    @if let Some(days) = drift.stale_d { ", " (days) " d ago: stale" }
                     @if drift.curve.len() > 2 { (chart::spark("friction over its first", &drift.curve, "six weeks")) }
                 }
             }

@@ -86,7 +86,8 @@ impl Rate {
             self.lasts_ns += stamp_ns - before_ns;
             let is_slow = self.count >= LEAST
                 && self.lasts_ns as f64 * 1e-9 * self.learnt_hz > PATIENCE * COUNT as f64;
-            if self.count == COUNT || is_slow {
+            let is_first = self.found_hz.is_none() && self.count == LEAST;
+            if self.count == COUNT || is_slow || is_first {
                 self.look(stamp_ns);
             }
         }
@@ -94,7 +95,7 @@ impl Rate {
 
     /// Takes the median of the steps that there are, and tells if it is no longer what it was.
     fn look(&mut self, now_ns: i64) {
-        let was_right = self.is_right();
+        let was_right = self.found_hz.is_none() || self.is_right();
         let found_hz = 1e9 / median(&mut self.periods_ns[..self.count]);
         (self.count, self.lasts_ns) = (0, 0);
         self.found_hz = Some(found_hz);
@@ -120,10 +121,10 @@ impl Rate {
         )
     }
 
-    /// Whether the stream has the rate, as far as one knows by now.
+    /// Whether the stream has the rate. Of the first few samples nobody knows yet.
     pub fn is_right(&self) -> bool {
         self.found_hz
-            .is_none_or(|found| same(self.learnt_hz, found))
+            .is_some_and(|found| same(self.learnt_hz, found))
     }
 
     /// What is wrong with a stream that never had the rate, once that shows.
@@ -206,6 +207,17 @@ mod tests {
         second(&mut rate, now_ns, 500);
         assert!(rate.is_right());
         assert_eq!(rate.fault(), None);
+    }
+
+    #[test]
+    fn nothing_is_judged_before_the_rate_is_known() {
+        let mut rate = Rate::new(500.0);
+        for n in 0..3_i64 {
+            let mut sample = TwinState::default();
+            sample.header.stamp_ns = n * 200_000_000;
+            rate.update(&sample);
+            assert!(!rate.is_right(), "{n}");
+        }
     }
 
     #[test]

@@ -42,6 +42,9 @@ fn of_curve(finding: &Finding) -> Option<&'static str> {
         (Against::Velocity, _) => {
             "Joint {place}: lubricant and bearings; is the grease cold, old or too much?"
         }
+        (Against::VelocityDifference | Against::VelocitySum, _) => {
+            "Joint {place}, and the joint that it moves against: do parts of the two rub on each other, such as seals, covers or cables?"
+        }
         (Against::Acceleration, _) => {
             "Joint {place}: coupling, belt and screws between motor and link; does something give or swing?"
         }

@@ -5,11 +5,13 @@
 //!
 //! - it follows the motion, and a curve of that, or a sum over the last moments of it (`history.rs`), predicts it in
 //!   recordings that it was not fitted on;
+//! - it jumps where joints turn round (`remainder/turns.rs`), as friction does that comes and goes;
 //! - it is far larger on held-out recordings than on fitted ones, although their efforts change no faster, or larger there
 //!   than what the twin left before it was corrected;
 //! - it stands out for moments.
 
 mod follows;
+mod turns;
 
 use crate::context::Context;
 use crate::data::problem::Problem;

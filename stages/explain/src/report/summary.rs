@@ -57,10 +57,10 @@ fn proof(joints: &[String], [before, after]: [&[f64]; 2]) -> String {
         return String::new();
     }
     let all = if left < 0.01 {
-        " On recordings that were not fitted the error falls to less than 1 %.".to_owned()
+        " On recordings that were not fitted the error (RMS) falls to less than 1 %.".to_owned()
     } else if left < UNCHANGED {
         format!(
-            " On recordings that were not fitted the error falls to {:.0} %.",
+            " On recordings that were not fitted the error (RMS) falls to {:.0} %.",
             100.0 * left
         )
     } else {

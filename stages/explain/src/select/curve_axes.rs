@@ -1,5 +1,6 @@
 //! What a curve in a joint is tried against, and where its knots are.
 
+use tauscope_dynamics::JointKind;
 use tauscope_dynamics::terms::{Against, Gauge, MotionSample, Table};
 
 use crate::data::problem::Problem;
@@ -16,6 +17,9 @@ const LEAST_KNOTS: usize = 3;
 /// Knots nearer than this share of their mean spacing are merged.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_SPACING: f64 = 0.2;
+/// Friction between two joints changes its sign within this share of their fastest motion against each other.
+/// Resolution: as for standstills, 0.01 rad/s, of a motion at 0.5 rad/s.
+const JUMP_SHARE: f64 = 0.02;
 /// Bands of a hysteresis that are tried, in standard deviations of the load.
 /// Resolution: steps of about three; the knots resolve what lies between.
 const HYSTERESIS: [f64; 3] = [0.1, 0.3, 1.0];
@@ -69,6 +73,16 @@ pub fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
             add(Against::Load, of_joint, load, &[true]);
         }
     }
+    // Parts that rub on each other feel how fast they move against each other.
+    for of_joint in neighbours(problem, joint)
+        .into_iter()
+        .filter(|_| !problem.is_foreign)
+    {
+        for against in [Against::VelocityDifference, Against::VelocitySum] {
+            let speeds = with_jump(even(against, of_joint, KNOTS));
+            add(against, of_joint, speeds, &[false]);
+        }
+    }
     for (against, count) in [
         (Against::Position, MANY_KNOTS),
         (Against::Acceleration, KNOTS),
@@ -87,26 +101,40 @@ pub fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
             add(Against::LoadTurned, joint, knots.collect(), &[false]);
         }
     }
+    let rested = since_rest_knots(problem, joint);
+    add(Against::SinceRest, joint, rested, &[false, true]);
+    // A straight line: what bends over the session cannot be told from slow noise.
+    if let Some(ends) = session_ends(problem, joint) {
+        add(Against::SessionTime, joint, ends.to_vec(), &[false, true]);
+    }
+    all
+}
+
+/// Times since the last rest \[s\], each twice the one before, as far as the joint moves.
+fn since_rest_knots(problem: &Problem, joint: usize) -> Vec<f64> {
     let since_rest = readings(problem, Against::SinceRest, joint);
     let longest = since_rest.iter().copied().filter(|t| *t < SETTLED_S);
     let longest = longest.fold(0.0, f64::max);
-    let mut knots = vec![0.0];
     let times = (0..).map(|k| FIRST_S * f64::from(1 << k));
-    knots.extend(times.take_while(|t| *t <= longest));
-    add(Against::SinceRest, joint, knots, &[false, true]);
-    // A straight line: what bends over the session cannot be told from slow noise.
+    let times = times.take_while(|t| *t <= longest);
+    std::iter::once(0.0).chain(times).collect()
+}
+
+/// The first and the last time of the session \[s\], where it lasts.
+fn session_ends(problem: &Problem, joint: usize) -> Option<[f64; 2]> {
     let session = readings(problem, Against::SessionTime, joint);
     let first = session.iter().copied().fold(f64::INFINITY, f64::min);
     let last = session.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if first < last {
-        add(
-            Against::SessionTime,
-            joint,
-            vec![first, last],
-            &[false, true],
-        );
-    }
-    all
+    (first < last).then_some([first, last])
+}
+
+/// The first joint of each pair of neighbours in the URDF that `joint` is one of and whose velocities have one unit.
+pub fn neighbours(problem: &Problem, joint: usize) -> Vec<usize> {
+    let slides = |joint: usize| problem.model.joints()[joint].kind == JointKind::Prismatic;
+    let pairs = joint.saturating_sub(1)..(joint + 1).min(problem.joints - 1);
+    pairs
+        .filter(|&first| slides(first) == slides(first + 1))
+        .collect()
 }
 
 /// What a curve could be drawn against, at all samples.
@@ -139,10 +167,67 @@ fn with_zero(mut knots: Vec<f64>) -> Vec<f64> {
     knots
 }
 
+/// Knots with two beside zero in place of those that are nearer to it, so that a curve can jump there as friction does.
+fn with_jump(mut knots: Vec<f64>) -> Vec<f64> {
+    let [Some(first), Some(last)] = [knots.first().copied(), knots.last().copied()] else {
+        return knots;
+    };
+    let beside = JUMP_SHARE * first.abs().max(last.abs());
+    if !(first < -beside && last > beside) {
+        return knots;
+    }
+    knots.retain(|knot| knot.abs() > beside);
+    let middle = knots.partition_point(|knot| *knot < 0.0);
+    knots.splice(middle..middle, [-beside, beside]);
+    knots
+}
+
 /// Standard deviation.
 fn deviation(values: &[f64]) -> f64 {
     let count = values.len().max(1) as f64;
     let mean = values.iter().sum::<f64>() / count;
     let squares = values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>();
     (squares / count).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::fitted::Fit;
+    use crate::fixture::problem_with;
+    use crate::select::propose::Base;
+
+    #[test]
+    fn a_curve_may_jump_at_zero_and_only_there() {
+        assert_eq!(
+            with_jump(vec![-2.0, -0.5, 0.01, 0.7, 1.0]),
+            [-2.0, -0.5, -0.04, 0.04, 0.7, 1.0]
+        );
+        assert_eq!(with_jump(vec![0.1, 0.5, 1.0]), [0.1, 0.5, 1.0]);
+    }
+
+    #[test]
+    fn joints_that_rub_on_each_other_are_drawn_over_how_fast_they_move_against_each_other() {
+        let problem = problem_with(4, |_, qd, effort| {
+            let rubs = 1.5 * (qd[0] - qd[1]).signum();
+            effort[0] += rubs;
+            effort[1] -= rubs;
+        });
+        let nothing = Fit::new(&problem, Vec::new());
+        for joint in [0, 1] {
+            let curve = Base::new(&problem, &nothing, 40)
+                .propose_curve(joint)
+                .unwrap();
+            let drawn = curve.active.curve.as_ref().unwrap();
+            assert_eq!(
+                (drawn.against, drawn.of_joint),
+                (Against::VelocityDifference, 0)
+            );
+            assert!(
+                curve.repeats && curve.carried.unwrap() > 0.8,
+                "{:?}",
+                curve.carried
+            );
+        }
+    }
 }

@@ -90,6 +90,17 @@ impl Watch {
         Some(diagnose(&self.expected, &fed, seen))
     }
 
+    /// What to say of a second publisher.
+    pub fn rivals(&self) -> Trouble {
+        let topic = &self.expected.topic;
+        let trouble = Trouble::new(format!(
+            "two publishers send the same joints on {topic}: only the one that spoke first is heard"
+        ));
+        trouble.likely(Some(
+            "the driver was started twice, or a recording is played beside the robot".to_owned(),
+        ))
+    }
+
     fn effortless(&self) -> Option<Trouble> {
         let since = self.effort_at.or(self.first_sample)?;
         if since.elapsed() < EFFORTS_WITHIN {

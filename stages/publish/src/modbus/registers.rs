@@ -96,6 +96,7 @@ impl Registers {
         let alarm = status.at(now);
         let state = alarm.state;
         let alive = state != AlarmState::Silent;
+        // Silence releases no latch: the bits of one are those of the newest detection.
         let [x, y, z] = alarm.force_n.unwrap_or_default();
         let length = (x * x + y * y + z * z).sqrt();
         let signed = |newton: f64| (newton * PER_N).round() as i16 as u16;
@@ -106,8 +107,8 @@ impl Registers {
             bits: [
                 alarm.free,
                 alarm.contact,
-                state == AlarmState::Collision,
-                state == AlarmState::Acknowledged,
+                status.alarm.state == AlarmState::Collision,
+                status.alarm.state == AlarmState::Acknowledged,
                 alarm.muted_s > 0.0,
                 alive,
             ],
@@ -227,6 +228,22 @@ mod tests {
         assert_eq!(word_of(&read(1_000_000), "age_ms"), u16::MAX);
         let never = Registers::of(&Status::silent(Duration::from_secs(1)), now);
         assert!(!bit(&never, "free"));
+    }
+
+    #[test]
+    fn a_latch_reads_as_one_also_while_the_detector_is_silent() {
+        let now = Instant::now();
+        let mut status = status(now);
+        for (state, name) in [
+            (AlarmState::Collision, "collision"),
+            (AlarmState::Acknowledged, "acknowledged"),
+        ] {
+            status.alarm.state = state;
+            status.alarm.free = false;
+            let silent = Registers::of(&status, now + Duration::from_mins(1));
+            assert!(bit(&silent, name) && !bit(&silent, "free") && !bit(&silent, "alive"));
+            assert_eq!(word_of(&silent, "state"), AlarmState::Silent.number());
+        }
     }
 
     #[test]

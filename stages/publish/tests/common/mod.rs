@@ -40,6 +40,15 @@ pub fn session(endpoint: &str) -> zenoh::Session {
 
 /// A publisher of one detector, `twin_regression` of the stage `detect`.
 pub fn publisher(yaml: &str, commands: Option<&str>) -> Publisher {
+    made(yaml, commands, false)
+}
+
+/// The same without commands, after one that died.
+pub fn restarted(yaml: &str) -> Publisher {
+    made(yaml, None, true)
+}
+
+fn made(yaml: &str, commands: Option<&str>, restarted: bool) -> Publisher {
     let config: Config = serde_saphyr::from_str(yaml).unwrap();
     let stream = |stage: &str, kind| StreamInfo {
         stage: stage.to_owned(),
@@ -61,7 +70,7 @@ pub fn publisher(yaml: &str, commands: Option<&str>) -> Publisher {
             connect: Vec::new(),
         }),
         facts: Facts::default(),
-        restarted: false,
+        restarted,
     };
     Publisher::new(&config, &setup).unwrap()
 }

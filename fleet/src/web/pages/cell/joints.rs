@@ -43,23 +43,26 @@ pub fn section(snapshot: &Snapshot, view: &CellView, kept: &Kept, unit: &str) ->
         p.muted { "Residual (" (unit) ") of the last " (format!("{:.0}", residual.window_s)) " s without a contact, up to "
             (super::tile::stamp(residual.stamp_ns, &words::time(residual.stamp_ns))) ". Peers: cells with the same robot." }
         div.wide role="region" aria-label="Joints" tabindex="0" {
-            table {
+            table.fold {
                 thead { tr {
                     th scope="col" { "Joint" } th.num scope="col" { "RMS" } th.num scope="col" { "Normal" }
                     th.num scope="col" { "Ratio" } th.num scope="col" { "Mean" } th scope="col" { "Among peers" }
                 } }
                 tbody { @for joint in &residual.joints { tr {
                     th scope="row" { (joint.name) }
-                    td.num { (format!("{:.3}", joint.rms)) }
+                    td.num data-label="RMS" { (format!("{:.3}", joint.rms)) }
                     @match normal(joint).filter(|normal| *normal > 0.0) {
                         Some(normal) => {
-                            td.num { (format!("{normal:.3}")) }
-                            td.num.warn[joint.rms > 2.0 * normal] { (format!("{:.2} ×", joint.rms / normal)) }
+                            td.num data-label="Normal" { (format!("{normal:.3}")) }
+                            td.num.warn[joint.rms > 2.0 * normal] data-label="Ratio" { (format!("{:.2} ×", joint.rms / normal)) }
                         }
-                        None => { td.num.muted { "not known" } td.num.muted { "-" } }
+                        None => {
+                            td.num.muted data-label="Normal" { "not known" }
+                            td.num.muted data-label="Ratio" { "-" }
+                        }
                     }
-                    td.num { (format!("{:+.3}", joint.mean)) }
-                    td { (among_peers(snapshot, view, joint)) }
+                    td.num data-label="Mean" { (format!("{:+.3}", joint.mean)) }
+                    td.full data-label="Among peers" { (among_peers(snapshot, view, joint)) }
                 } } }
             }
         }

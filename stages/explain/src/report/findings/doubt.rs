@@ -27,6 +27,13 @@ const SAME_TIME_S: f64 = 0.3;
 /// Tuned: by hand, on no recorded seeds; not swept.
 const TOO_OFTEN: usize = 3;
 
+/// What warms up within a shorter time is no gear \[s\].
+/// Physical: kilograms of steel and some ten watts of loss, so minutes.
+const LEAST_WARMING_S: f64 = 10.0;
+/// What fades within this share of the longest recording is over soon after its start, and is not followed further.
+/// Physical: after three times that, 5 % are left; the rest of the recording shows nothing of it.
+const SOON: f64 = 0.2;
+
 fn doubt_it(finding: &mut Finding) {
     finding.confidence = finding.confidence.min(DOUBTED);
 }
@@ -34,10 +41,13 @@ fn doubt_it(finding: &mut Finding) {
 /// Lowers the confidence of doubtful findings and adds notes with the reasons.
 pub fn doubt(named: &mut Named, problem: &Problem, actives: &[Active]) {
     let said = actives.iter().filter(|a| !a.hypothesis.is_torque_scale());
+    let lengths_s = problem.tracks.iter().map(|track| track.track.time_s.last());
+    let longest_s = lengths_s.flatten().copied().fold(0.0, f64::max);
     for (finding, active) in named.findings.iter_mut().zip(said) {
         if is_shadowed(&problem.model, actives, active.hypothesis) {
             doubt_it(finding);
         }
+        doubt_warming(finding, longest_s);
     }
     if problem.is_foreign {
         doubt_below(PATCH_OF_FOREIGN, &mut named.findings);
@@ -45,6 +55,25 @@ pub fn doubt(named: &mut Named, problem: &Problem, actives: &[Active]) {
     let pushed = doubt_pushes(&mut named.findings, problem.tracks.len());
     named.notes.extend(pushed);
     doubt_patched_pushes(&mut named.findings);
+}
+
+/// Doubts that a joint warms up with a time constant that recordings of at most `longest_s` do not show, and says what
+/// they show.
+fn doubt_warming(finding: &mut Finding, longest_s: f64) {
+    let time_s = finding.parameters.get("time_constant_s");
+    let Some(time_s) = time_s.and_then(serde_json::Value::as_f64) else {
+        return;
+    };
+    let says = if time_s > longest_s {
+        " This time is longer than each recording, so the recordings do not show where the friction ends: a drift as well."
+    } else if time_s < LEAST_WARMING_S.min(SOON * longest_s) {
+        " No gear warms up so fast: it is something that passes soon after the start of each recording, such as a brake or \
+         grease that has set."
+    } else {
+        return;
+    };
+    finding.sentence += says;
+    doubt_it(finding);
 }
 
 /// Doubts a push that only corrects another finding: one that lasts exactly as long as a picked-up payload is held, and
@@ -241,6 +270,32 @@ mod tests {
         doubt_patches(&mut found);
         let confidence = found.map(|finding| finding.confidence);
         assert!(confidence[0] > 0.9 && confidence[1] > 0.9 && confidence[2] <= DOUBTED);
+    }
+
+    #[test]
+    fn a_joint_that_warms_up_within_seconds_or_longer_than_it_was_seen_is_doubted() {
+        let at = |time_s: f64| {
+            let mut warm = push("a", 2.0);
+            let time = serde_json::Value::from(time_s);
+            warm.parameters.insert("time_constant_s".to_owned(), time);
+            doubt_warming(&mut warm, 30.0);
+            (warm.confidence <= DOUBTED, warm.sentence)
+        };
+        let (doubted, said) = at(3.5);
+        assert!(doubted && said.contains("soon after the start"), "{said}");
+        let (doubted, said) = at(70.0);
+        assert!(
+            doubted && said.contains("longer than each recording"),
+            "{said}"
+        );
+        assert_eq!(at(12.0), (false, String::new()));
+        // In short recordings of a simulated cell nothing else can be seen.
+        let mut short = push("a", 2.0);
+        short
+            .parameters
+            .insert("time_constant_s".to_owned(), serde_json::Value::from(5.0));
+        doubt_warming(&mut short, 10.0);
+        assert!(short.confidence > 0.9);
     }
 
     #[test]

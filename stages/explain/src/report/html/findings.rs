@@ -34,7 +34,7 @@ pub(super) fn cards(report: &Report) -> Option<Markup> {
             p.lead {
                 "By joint and link, that with the largest effort first."
                 @if let Some(units) = units(report) { " " (units) }
-                @if let Some(share) = beside(report) { " " (share) }
+                @if let Some(shares) = shares(report) { " " (shares) }
             }
         }
         @for group in &groups {
@@ -59,20 +59,23 @@ fn units(report: &Report) -> Option<&'static str> {
     )
 }
 
-/// What went with the torque constants, which are no finding, where that is much.
-fn beside(report: &Report) -> Option<Markup> {
-    /// Findings that explain this share of what went are the explanation.
+/// How the shares of the findings are to be read, where they do not add up to what the correction takes.
+fn shares(report: &Report) -> Option<Markup> {
+    /// Shares that come to this part of what went add up, as far as a reader sees.
     /// Tuned: by hand, for the words of the page; no number depends on it.
     const MOST: f64 = 0.8;
     let left = error_left(&report.holdout_rms_before, &report.holdout_rms_after);
     let gone = 1.0 - left * left;
-    let named: f64 = report.findings.iter().map(|finding| finding.explains).sum();
+    let alone: f64 = report.findings.iter().map(|finding| finding.explains).sum();
     let fitted =
         effort_unit(&report.effort_unit) == "A" && report.findings.iter().any(|f| !f.in_amperes);
-    (fitted && named < MOST * gone).then(|| {
+    (alone < MOST * gone).then(|| {
         html! {
-            "Together they explain " (percent(named)) " of the mismatch. Most of what else went was fitted with them and is no "
-            "finding: how many N m an ampere is at each drive, under " a href="#notes" { "Notes" } "."
+            "The shares below do not add up to what the correction takes: if one finding is left out, the others are fitted "
+            "again and take over part of what it explained."
+            @if fitted {
+                " So do the torque constants, which are no findings: see " a href="#notes" { "Notes" } "."
+            }
         }
     })
 }
@@ -99,7 +102,10 @@ fn card(finding: &Finding, effort_unit: &str) -> Markup {
                 @if finding.effort_rms > 0.0 {
                     span { "Effort " b { (number_text(finding.effort_rms)) " " (effort_unit) } " RMS" }
                 }
-                span { "Explains " b { (percent(finding.explains)) } " of the mismatch " (meter(finding.explains)) }
+                span {
+                    "Without it " b { (percent(finding.explains)) } " of the mismatch (squared, in units of noise) would return "
+                    (meter(finding.explains))
+                }
                 span { "Confidence " b { (almost_all(finding.confidence)) } }
                 @if let Some(when) = when { span { (when) } }
             }
@@ -258,21 +264,22 @@ mod tests {
     }
 
     #[test]
-    fn what_went_with_the_torque_constants_is_said_and_why_units_differ() {
+    fn shares_that_do_not_add_up_are_said_to_and_why_units_differ() {
         let text = page(&report("A", [true, false], 0.09));
         assert!(text.contains("Efforts are in A, as recorded."), "{text}");
         assert!(
-            text.contains("Together they explain 18 % of the mismatch"),
+            text.contains("do not add up") && text.contains("So do the torque constants"),
             "{text}"
         );
+        assert!(
+            text.contains("Without it <b>9 %</b> of the mismatch"),
+            "{text}"
+        );
+        let in_nm = page(&report("Nm", [false, false], 0.09));
+        assert!(in_nm.contains("do not add up") && !in_nm.contains("torque constants"));
         assert!(text.contains("fits all of them"), "{text}");
-        for other in [
-            report("Nm", [false, false], 0.09),
-            report("A", [false, false], 0.48),
-        ] {
-            let text = page(&other);
-            assert!(!text.contains("Together they explain"), "{text}");
-            assert!(!text.contains("Efforts are in A"), "{text}");
-        }
+        let text = page(&report("A", [false, false], 0.48));
+        assert!(!text.contains("do not add up"), "{text}");
+        assert!(!text.contains("Efforts are in A"), "{text}");
     }
 }

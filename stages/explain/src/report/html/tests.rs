@@ -342,16 +342,18 @@ fn the_verdicts_colour_follows_the_share_that_has_no_name() {
     report.verdict = Verdict::UnknownRemains;
     report.findings[1].effect = "unknown".to_owned();
     for (explains, left, class, text) in [
-        (0.0, 0.1, "explained", "Explained but for less than 1 %"),
-        (0.05, 0.1, "nothing", "Explained but for 5 %"),
-        (0.4, 0.1, "remains", "Something unknown remains: 40 %"),
-        (0.0, 0.8, "remains", "Something unknown remains: 62 %"),
+        (0.0, 0.1, "explained", "Something unknown remains: "),
+        (0.05, 0.1, "nothing", "remains: 22 % of the error (RMS)"),
+        (0.4, 0.1, "remains", "remains: 63 % of the error (RMS)"),
+        (0.0, 0.8, "remains", "remains: 79 % of the error (RMS)"),
     ] {
         report.findings[1].explains = explains;
         report.holdout_rms_after = vec![left, 0.1];
         let page = page(&report, &[], &Around::default());
         assert!(page.contains(&format!("verdict {class}")), "{class}");
         assert!(page.contains(text), "{text}");
+        assert!(page.contains(": Something unknown remains</title>"));
+        assert!(!page.contains("Explained but"));
     }
 }
 

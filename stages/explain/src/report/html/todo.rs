@@ -71,7 +71,7 @@ fn load(report: &Report, around: &Around<'_>) -> Markup {
         return html! {
             p {
                 "The corrected twin, in your pipeline file"
-                @if left < UNCHANGED { ". It leaves " (percent(left)) " of the error on recordings that were not fitted" }
+                @if left < UNCHANGED { ". It leaves " (percent(left)) " of the error (RMS) on recordings that were not fitted" }
                 ":"
             }
             (in_pipeline)

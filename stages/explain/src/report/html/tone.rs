@@ -1,4 +1,4 @@
-//! The verdict's colour, sign and words: they follow the share of the mismatch that has no name.
+//! The verdict's colour, sign and words: the colour follows the share of the error that has no name.
 
 use tauscope_dynamics::terms::UNKNOWN;
 
@@ -7,12 +7,12 @@ use super::proof::rows;
 use super::verdict_text;
 use crate::report::schema::{Report, Verdict};
 
-/// Below this share what is unknown is as good as nothing.
+/// Below this share of the error (RMS) what is unknown is as good as nothing.
 /// Tuned: by hand, on no recorded seeds; not swept.
-const HARDLY: f64 = 0.01;
-/// Below this share it is little.
+const HARDLY: f64 = 0.1;
+/// Below this share of the error (RMS) it is little.
 /// Tuned: by hand, on no recorded seeds; not swept.
-const LITTLE: f64 = 0.1;
+const LITTLE: f64 = 0.3;
 
 /// How a verdict looks: it must not hang on colour alone.
 pub(super) struct Tone {
@@ -41,27 +41,26 @@ impl Tone {
     }
 
     fn unknown(share: f64) -> Self {
-        let (class, sign, text) = if share < HARDLY {
-            (
-                "explained",
-                "✓",
-                "Explained but for less than 1 %".to_owned(),
-            )
+        let class = if share < HARDLY {
+            "explained"
         } else if share < LITTLE {
-            let text = format!("Explained but for {}", percent(share));
-            ("nothing", "✓", text)
-        } else if share.is_finite() {
-            let text = format!("Something unknown remains: {}", percent(share));
-            ("remains", "?", text)
+            "nothing"
         } else {
-            let text = verdict_text(Verdict::UnknownRemains).to_owned();
-            ("remains", "?", text)
+            "remains"
         };
+        // The badge begins as the title of the page does, and measures as every other error on it.
+        let verdict = verdict_text(Verdict::UnknownRemains);
+        let text = if share.is_finite() {
+            format!("{verdict}: {} of the error (RMS)", percent(share))
+        } else {
+            verdict.to_owned()
+        };
+        let sign = "?";
         Self { class, sign, text }
     }
 }
 
-/// Share of the squared mismatch that has no name: what a curve without a name describes, and what is left on held-out data
+/// Share of the error (RMS) that has no name: what a curve without a name describes, and what is left on held-out data
 /// beyond the noise. Not a number where neither is known.
 fn unknown_share(report: &Report) -> f64 {
     let known = rows(report).into_iter();
@@ -81,10 +80,10 @@ fn unknown_share(report: &Report) -> f64 {
         .filter(|f| f.known_as() == UNKNOWN.name);
     let described: f64 = unnamed.map(|finding| finding.explains).sum();
     if before > 0.0 {
-        (described + left / before).min(1.0)
+        (described + left / before).min(1.0).sqrt()
     } else if report.findings.is_empty() {
         f64::NAN
     } else {
-        described
+        described.min(1.0).sqrt()
     }
 }

@@ -6,11 +6,19 @@ use crate::select::evidence::PATCH;
 use crate::select::propose::Base;
 use crate::select::prune::HIDDEN;
 
+use super::turns::turns;
 use super::{Left, clock_s, rms_rate};
 
 /// Share of that by which stamps are wrong as root mean square, where the error may follow the motion.
 /// Statistical: a stamp anywhere within its sample is off by 0.29 of it.
 const CLOCK_SHARE: f64 = 0.29;
+
+/// A remainder that jumps where joints turn round is told from this many times the white noise on.
+/// Tuned: as the note on what remains; clocks and smoothing leave less at reversals.
+const LOUD: f64 = 5.0;
+/// And from this share of its square that changes its sign there.
+/// Tuned: as the share that a sum must predict; not swept.
+const LEAST_OF_TURNS: f64 = 0.1;
 
 /// What the remainder of a joint goes with, if it follows the motion.
 pub(super) fn follows_motion(found: Left<'_>, before: &Fit, joint: usize) -> Option<String> {
@@ -39,7 +47,7 @@ pub(super) fn follows_motion(found: Left<'_>, before: &Fit, joint: usize) -> Opt
         is_worth_telling(share).then(|| told(&on, "a curve", share))
     });
     let of_arm = !problem.is_foreign;
-    of_curve.or_else(|| {
+    let of_history = || {
         let history = history::predicts(problem, fit, joint, &names).filter(|_| of_arm)?;
         // Errors of clocks and derivatives follow the motion, too.
         let rows = found.rows(joint);
@@ -48,5 +56,19 @@ pub(super) fn follows_motion(found: Left<'_>, before: &Fit, joint: usize) -> Opt
             history.share.sqrt() * found.rms(joint) > cost.max(problem.white_noise[joint]);
         (is_more && is_worth_telling(history.share))
             .then(|| told(&history.on, "a sum", history.share))
-    })
+    };
+    let of_turns = || {
+        let rms = found.rms(joint);
+        let is_loud = of_arm && rms > LOUD * problem.white_noise[joint];
+        let turns = is_loud.then(|| turns(found, joint, &names)).flatten()?;
+        let share = (turns.half_jump / rms).powi(2).min(1.0);
+        let is_told = share > LEAST_OF_TURNS && is_worth_telling(share);
+        is_told.then(|| {
+            format!(
+                "{}: friction that comes and goes, or between two joints.",
+                turns.at
+            )
+        })
+    };
+    of_curve.or_else(of_history).or_else(of_turns)
 }

@@ -1,0 +1,124 @@
+//! Publishers that tell of the same joints on one topic: a driver that was started twice, or a bag that is played
+//! beside the robot. Their states mixed would be the motion of no arm.
+
+/// A publisher that has been silent for so long may be replaced \[ns\], or for longer where it speaks seldom.
+/// Physical: shorter than the start of a driver.
+const SILENT_NS: i64 = 500_000_000;
+/// So many of its own periods.
+/// Statistical: two messages may be lost.
+const SILENT_PERIODS: i64 = 3;
+/// Publishers that are heard at once; a robot's joints may be spread over several.
+/// Resolution: memory; more than arms have joints.
+const MAX_HEARD: usize = 32;
+
+/// A publisher that is heard.
+#[derive(Debug, Clone, Copy)]
+struct Heard {
+    publisher: [u8; 16],
+    /// Bit j: it tells of joint j.
+    joints: u32,
+    last_ns: i64,
+    period_ns: i64,
+}
+
+impl Heard {
+    fn speaks(&self, now_ns: i64) -> bool {
+        let patience_ns = SILENT_NS.max(self.period_ns.saturating_mul(SILENT_PERIODS));
+        // A clock of reception that was set back does not make it speak for ever.
+        (now_ns - self.last_ns).saturating_abs() < patience_ns
+    }
+}
+
+/// Hears one publisher for each joint: the one that spoke first, until it ceases.
+#[derive(Debug, Default)]
+pub(super) struct Rivals {
+    heard: Vec<Heard>,
+    refused: u64,
+    refused_ns: Option<i64>,
+}
+
+impl Rivals {
+    /// Whether a message of `publisher` about these joints, received at `now_ns`, is to be heard.
+    pub fn admits(&mut self, publisher: [u8; 16], joints: u32, now_ns: i64) -> bool {
+        let is_rival = |other: &Heard| {
+            other.publisher != publisher && other.joints & joints != 0 && other.speaks(now_ns)
+        };
+        if self.heard.iter().any(is_rival) {
+            self.refused += 1;
+            self.refused_ns = Some(now_ns);
+            return false;
+        }
+        if let Some(heard) = self.heard.iter_mut().find(|it| it.publisher == publisher) {
+            heard.period_ns = (now_ns - heard.last_ns).max(0);
+            heard.last_ns = now_ns;
+            heard.joints |= joints;
+            return true;
+        }
+        self.heard.retain(|other| other.speaks(now_ns));
+        if self.heard.len() < MAX_HEARD {
+            self.heard.push(Heard {
+                publisher,
+                joints,
+                last_ns: now_ns,
+                period_ns: 0,
+            });
+        }
+        true
+    }
+
+    /// Messages that were not heard.
+    pub fn refused(&self) -> u64 {
+        self.refused
+    }
+
+    /// Whether one was refused lately.
+    pub fn are_there(&self, now_ns: i64) -> bool {
+        self.refused_ns
+            .is_some_and(|refused_ns| (now_ns - refused_ns).saturating_abs() < 2 * SILENT_NS)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: i64 = 1_000_000;
+
+    #[test]
+    fn the_first_publisher_of_a_joint_is_heard_until_it_ceases() {
+        let mut rivals = Rivals::default();
+        let (robot, bag) = ([1; 16], [2; 16]);
+        for ms in 0..1000 {
+            assert!(rivals.admits(robot, 0b11, ms * MS));
+            assert!(!rivals.admits(bag, 0b10, ms * MS), "{ms}");
+        }
+        assert_eq!(rivals.refused(), 1000);
+        assert!(rivals.are_there(1000 * MS));
+        // The robot's driver has ended: who goes on is heard.
+        assert!(!rivals.admits(bag, 0b10, 1400 * MS));
+        assert!(rivals.admits(bag, 0b10, 1600 * MS));
+        assert!(!rivals.admits(robot, 0b11, 1700 * MS));
+        assert!(!rivals.are_there(5000 * MS));
+    }
+
+    #[test]
+    fn publishers_of_different_joints_are_all_heard() {
+        let mut rivals = Rivals::default();
+        for ms in 0..100 {
+            assert!(rivals.admits([1; 16], 0b01, ms * MS));
+            assert!(rivals.admits([2; 16], 0b10, ms * MS));
+        }
+        assert_eq!(rivals.refused(), 0);
+    }
+
+    #[test]
+    fn a_publisher_that_speaks_seldom_is_not_taken_for_one_that_has_ceased() {
+        let mut rivals = Rivals::default();
+        for s in 0..10 {
+            assert!(rivals.admits([1; 16], 1, s * 1000 * MS));
+            if s > 0 {
+                assert!(!rivals.admits([2; 16], 1, (s * 1000 + 700) * MS), "{s}");
+            }
+        }
+    }
+}
