@@ -134,7 +134,7 @@ impl Told {
 
     /// What is known of a contact that is over.
     fn over(&self, contact: &Contact) -> String {
-        let mut text = format!("over after {:.2} s", contact.duration_s());
+        let mut text = format!("over after {}", contact.duration_in_words());
         if contact.peak().is_some() {
             text += &format!("; at its strongest {contact}");
         }

@@ -132,7 +132,7 @@ fn ask() {
     if state.holds > 0 && !again {
         return;
     }
-    whole_file::remove_unfinished();
+    let _leaving = whole_file::remove_unfinished_and_leave();
     let percent = PERCENT.load(Ordering::Relaxed);
     let mut far = String::new();
     if percent <= 100 {

@@ -19,21 +19,20 @@ mod program_beside;
 mod progress;
 mod supervisor;
 mod terminal;
+mod warnings;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{CommandFactory as _, Parser};
 use rustix::process::{Signal, set_parent_process_death_signal};
-use tracing_subscriber::filter::{LevelFilter, Targets};
-use tracing_subscriber::prelude::*;
 
 use cli::{Cli, Command};
 use output::Output;
 
 /// The program: its arguments are the command line, its words go to the terminal.
 pub fn main() -> ExitCode {
-    show_warnings(terminal::has_colour());
+    warnings::show(terminal::has_colour());
     match Cli::parse().command.unwrap_or_default() {
         Command::Stage(args) => commands::stage::run(&args),
         Command::Exec(args) => commands::stage::exec(&args),
@@ -50,21 +49,6 @@ pub fn main() -> ExitCode {
             ExitCode::from(exit::code(outcome, &mut out))
         }
     }
-}
-
-/// What stages warn of, and what libraries fail in, goes where errors go.
-fn show_warnings(coloured: bool) {
-    let targets = Targets::new()
-        .with_default(LevelFilter::ERROR)
-        .with_target("tauscope", LevelFilter::WARN);
-    let lines = tracing_subscriber::fmt::layer()
-        .with_writer(std::io::stderr)
-        .with_ansi(coloured)
-        .without_time()
-        .with_target(false);
-    tracing_subscriber::registry()
-        .with(lines.with_filter(targets))
-        .init();
 }
 
 /// What a command answered.
@@ -129,7 +113,7 @@ pub fn answer(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> Answe
 pub fn answer_alone(
     arguments: impl IntoIterator<Item = impl Into<OsString>>,
 ) -> std::io::Result<Answer> {
-    show_warnings(false);
+    warnings::show(false);
     set_parent_process_death_signal(Some(Signal::TERM))?;
     interrupt::listen()?;
     Ok(answer(arguments))

@@ -1,19 +1,59 @@
-//! A progress bar over recordings, sources or the steps of a computation: on a terminal, none in a pipe.
+//! How far a computation is: a bar on a terminal; elsewhere, as in a pipe or a log, now and then a line.
 
-use std::sync::{Mutex, PoisonError};
+mod lines;
+
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use crate::output::Output;
 use crate::{interrupt, terminal};
+use lines::Lines;
 
 /// Steps of the bar; a recording's part is at least one of them.
 const STEPS: f64 = 10_000.0;
+/// How often it is looked whether a line is due.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
+
+/// Whether progress is told.
+#[derive(Debug, Clone, Copy, Default, clap::Args)]
+pub struct Quiet {
+    /// Show no progress: only results, warnings and errors.
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// What is shown of the progress.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Show {
+    /// Nothing.
+    Nothing,
+    /// A bar, where standard error is a terminal.
+    Bar,
+    /// A bar, or lines where there is no terminal.
+    BarOrLines,
+}
+
+impl Quiet {
+    /// What a command that writes to `out` shows. Where its words go to memory, nobody reads lines meanwhile.
+    pub fn show(self, out: &Output) -> Show {
+        match (self.quiet, out) {
+            (true, _) => Show::Nothing,
+            (false, Output::Terminal) => Show::BarOrLines,
+            (false, Output::Memory(..)) => Show::Bar,
+        }
+    }
+}
 
 /// How far the recordings are, together.
 #[derive(Debug)]
 pub struct Progress {
     bar: ProgressBar,
-    done: Mutex<Parts>,
+    done: Arc<Mutex<Parts>>,
+    /// Ends the thread that writes lines, by being dropped.
+    _ends: Option<mpsc::Sender<()>>,
 }
 
 /// How far each recording is.
@@ -24,6 +64,8 @@ struct Parts {
     sum: f64,
     /// The step that was told last.
     what: String,
+    /// How far the work said that it is, and when it came to that.
+    said: (f64, Instant),
 }
 
 /// Standard error, where it can redraw.
@@ -36,25 +78,35 @@ pub fn draw_target() -> ProgressDrawTarget {
 }
 
 impl Progress {
-    /// A bar over `count` recordings.
-    pub fn new(count: usize) -> Self {
-        let bar = ProgressBar::with_draw_target(Some(STEPS as u64), draw_target());
+    /// Over `count` recordings.
+    pub fn new(count: usize, show: Show) -> Self {
+        let target = match show {
+            Show::Nothing => ProgressDrawTarget::hidden(),
+            Show::Bar | Show::BarOrLines => draw_target(),
+        };
+        let bar = ProgressBar::with_draw_target(Some(STEPS as u64), target);
         let style = ProgressStyle::with_template("{bar:40} {percent:>3} % {elapsed} (left: {eta})");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        let began = Instant::now();
+        let done = Arc::new(Mutex::new(Parts {
+            fractions: vec![0.0; count],
+            sum: 0.0,
+            what: String::new(),
+            said: (0.0, began),
+        }));
+        let lines = show == Show::BarOrLines && !terminal::can_redraw();
+        let ends = lines.then(|| tell_lines(&done, began));
         Self {
             bar,
-            done: Mutex::new(Parts {
-                fractions: vec![0.0; count],
-                sum: 0.0,
-                what: String::new(),
-            }),
+            done,
+            _ends: ends,
         }
     }
 
-    /// A bar over one piece of work that says what it does ([`Progress::doing`]). Nobody knows how long
-    /// its steps take, so it does not say what is left.
-    pub fn of_work() -> Self {
-        let this = Self::new(1);
+    /// Over one piece of work that says what it does ([`Progress::doing`]). Nobody knows how long
+    /// its steps take, so the bar does not say what is left.
+    pub fn of_work(show: Show) -> Self {
+        let this = Self::new(1, show);
         let style = ProgressStyle::with_template("{bar:40} {percent:>3} % {elapsed} {wide_msg}");
         this.bar
             .set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
@@ -67,7 +119,8 @@ impl Progress {
     pub fn doing(&self, fraction: f64, what: &str) {
         const CREEP: f64 = 0.02;
         let shown = {
-            let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut done = locked(&self.done);
+            done.say(fraction);
             let is_next = done.what != what;
             if is_next {
                 what.clone_into(&mut done.what);
@@ -87,16 +140,63 @@ impl Progress {
 
     /// Recording `index` has come to `fraction`.
     pub fn set(&self, index: usize, fraction: f64) {
-        let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut done = locked(&self.done);
         let Some(own) = done.fractions.get_mut(index) else {
             return;
         };
         let more = fraction - std::mem::replace(own, fraction);
         done.sum += more;
         let mean = done.sum / done.fractions.len() as f64;
+        done.say(mean);
         interrupt::far(mean);
         self.bar.set_position((mean * STEPS) as u64);
     }
+}
+
+impl Parts {
+    fn say(&mut self, fraction: f64) {
+        if fraction > self.said.0 {
+            self.said = (fraction, Instant::now());
+        }
+    }
+
+    /// Of several recordings, how many are done.
+    fn counted(&self) -> Option<(usize, usize)> {
+        let whole = self.fractions.iter().filter(|fraction| **fraction >= 1.0);
+        let all = self.fractions.len();
+        (all > 1).then(|| (whole.count(), all))
+    }
+}
+
+/// Nothing in here can be left half done, so a panic elsewhere does not matter.
+fn locked(parts: &Mutex<Parts>) -> MutexGuard<'_, Parts> {
+    parts.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Writes lines to standard error until the result is dropped. A thread of its own, because a step may take minutes.
+fn tell_lines(done: &Arc<Mutex<Parts>>, began: Instant) -> mpsc::Sender<()> {
+    let (ends, ended) = mpsc::channel::<()>();
+    let done = Arc::clone(done);
+    std::thread::spawn(move || {
+        let mut lines = Lines::default();
+        while ended.recv_timeout(LOOK_EVERY) == Err(RecvTimeoutError::Timeout) {
+            let due = {
+                let done = locked(&done);
+                let (fraction, at) = done.said;
+                let far = lines::Far {
+                    what: &done.what,
+                    fraction,
+                    reached: at - began,
+                    counted: done.counted(),
+                };
+                lines.due(began.elapsed(), &far)
+            };
+            if let Some(line) = due {
+                eprintln!("{line}");
+            }
+        }
+    });
+    ends
 }
 
 impl Drop for Progress {
@@ -115,7 +215,7 @@ mod tests {
 
     #[test]
     fn a_step_that_is_told_again_and_again_moves_nothing() {
-        let progress = Progress::of_work();
+        let progress = Progress::of_work(Show::Nothing);
         for _ in 0..1000 {
             progress.doing(0.1, "fitting the twin");
         }
@@ -128,5 +228,17 @@ mod tests {
         assert!(shown(&progress) > 0.1, "it is seen to live");
         progress.doing(0.6, "the next step");
         assert!((shown(&progress) - 0.6).abs() < 1e-3);
+        // What is left is told from what the work said, not from how the bar crept.
+        assert!((locked(&progress.done).said.0 - 0.6).abs() < 1e-9);
+    }
+
+    #[test]
+    fn only_a_command_that_speaks_to_people_tells_lines() {
+        let loud = Quiet::default();
+        let memory = Output::Memory(String::new(), String::new());
+        assert_eq!(loud.show(&Output::Terminal), Show::BarOrLines);
+        assert_eq!(loud.show(&memory), Show::Bar);
+        let quiet = Quiet { quiet: true };
+        assert_eq!(quiet.show(&Output::Terminal), Show::Nothing);
     }
 }

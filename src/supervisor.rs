@@ -3,7 +3,8 @@
 //! Stages of one process that hear each other are a tree: they begin, end and die together, alone or with their process.
 //! A stage that dies is started again, at once the first time and later the more often it dies; one
 //! that dies too often is given up, and with it the run. On Ctrl-C or SIGTERM the sources are ended
-//! and the rest finishes with what it has; a second time ends everything at once. A stage that does not
+//! and the rest finishes with what it has; a second time everything ends at once, but for recorders, which complete their
+//! files; a third time they end, too. A stage that does not
 //! end is named and then killed. Nothing outlives the supervisor: a stage ends when its standard input
 //! closes, and Linux kills it when its parent dies.
 //!
@@ -129,6 +130,7 @@ async fn supervise(
         shared_memory,
         sender,
         stopping: false,
+        hurried: false,
         ended: Ended::Completed,
         view: View::new(care.verbosity, now.into_std()),
         service: Service::new(),
@@ -150,6 +152,8 @@ struct Supervisor<'a> {
     shared_memory: Option<SharedMemory>,
     sender: mpsc::Sender<(Mark, Event)>,
     stopping: bool,
+    /// Everything was to end at once, but for recorders.
+    hurried: bool,
     /// Why it ends.
     ended: Ended,
     view: View,
@@ -256,17 +260,38 @@ impl Supervisor<'_> {
 
     fn interrupted(&mut self) {
         if self.stopping {
-            self.view.note("ending everything at once");
-            for stage in &mut self.stages {
-                stage.is_to_end(false);
-            }
-            self.crews.iter().for_each(Crew::kill);
-            return;
+            return self.end_at_once();
         }
         self.ended = Ended::Interrupted;
         self.view
             .note("ending the sources; the other stages finish (again to end everything)");
         self.stop();
+    }
+
+    /// Somebody does not want to wait. A recorder that is killed would leave a `.part`, so it is asked to complete what
+    /// it has; the next time nobody is spared.
+    fn end_at_once(&mut self) {
+        let spares = !std::mem::replace(&mut self.hurried, true);
+        let records = |crew: &Crew| crew.stages.iter().any(|&index| self.is_recorder(index));
+        let spared: Vec<bool> = self.crews.iter().map(|it| spares && records(it)).collect();
+        self.view.note(if spared.contains(&true) {
+            "ending everything at once; recorders complete their files (again to end them, too)"
+        } else {
+            "ending everything at once"
+        });
+        for (crew, is_spared) in spared.into_iter().enumerate() {
+            for index in self.crews[crew].stages.clone() {
+                if is_spared {
+                    let recorder = self.is_recorder(index);
+                    self.ask_to_end(index, recorder);
+                } else {
+                    self.stages[index].is_to_end(false);
+                }
+            }
+            if !is_spared {
+                self.crews[crew].kill();
+            }
+        }
     }
 
     /// Ends the stages that listen to nobody here; the others follow as their inputs end.

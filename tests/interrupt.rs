@@ -256,3 +256,34 @@ stages:
     assert_eq!(stage(&summary, "record")["killed"], false, "{summary}");
     assert!(!folder.path().join("out.mcap.part").exists());
 }
+
+#[test]
+fn a_second_signal_ends_a_run_at_once_and_leaves_no_unfinished_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = format!(
+        "version: 1
+cells: {{demo: {{robot: {robot}}}}}
+stages:
+- {{name: ingest, ingest: {{file: {{path: {recording}}}, rate: realtime}}}}
+- {{name: twin, input: ingest, twin: {{}}}}
+- {{name: record, inputs: [ingest, twin], record: {{mcap: out.mcap, rerun: {{file: out.rrd}}}}}}
+",
+        robot = bundled().join("demo_arm.urdf").display(),
+        recording = bundled().join("demo.mcap").display(),
+    );
+    write(&folder.path().join("pipeline.yaml"), &text);
+    let mut live = Live::start(folder.path(), &["--verbose"]);
+    live.wait_for("stage `ingest` begins");
+    let part = folder.path().join("out.mcap.part");
+    wait_until("the recording has begun", || part.exists());
+    signal(live.id(), "INT");
+    live.wait_for("ending the sources");
+    signal(live.id(), "INT");
+    let (_, summary) = live.end();
+    assert_eq!(stage(&summary, "record")["failed"], false, "{summary}");
+    let left = files(folder.path());
+    let named: Vec<PathBuf> = ["out.mcap", "out.rrd", "pipeline.yaml"]
+        .map(Into::into)
+        .into();
+    assert_eq!(left, named);
+}

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::damage::{Damage, seconds};
 use crate::error::ArchiveError;
-use crate::joint_facts::{JointFacts, JointTallies};
+use crate::joint_facts::{JointFacts, JointTallies, Twice};
 use crate::recording::{Message, Recording, RecordingKind};
 use crate::ros::{JointState, JointStateDecoder};
 use crate::topic::Topic;
@@ -89,6 +89,8 @@ pub struct JointsInfo {
     pub repeated_messages: u64,
     /// Messages stamped before the one that they follow.
     pub backward_messages: u64,
+    /// Messages that name a joint more than once.
+    pub twice: Option<Twice>,
     /// By joint, what its values are.
     pub joints: Vec<JointFacts>,
 }
@@ -220,6 +222,7 @@ impl Tally {
             joints: self.joints.map(|joints| JointsInfo {
                 repeated_messages: self.values.repeated,
                 backward_messages: self.values.backward,
+                twice: self.values.twice().cloned(),
                 joints: self.values.facts(),
                 ..joints
             }),
@@ -230,7 +233,7 @@ impl Tally {
 impl JointsInfo {
     /// What is odd about the values, in words.
     pub fn remarks(&self) -> Vec<String> {
-        let mut remarks: Vec<String> = self.joints.iter().filter_map(JointFacts::remark).collect();
+        let mut remarks: Vec<String> = self.joints.iter().flat_map(JointFacts::remarks).collect();
         let zero = self.joints.iter().filter(|joint| joint.effort_is_zero);
         let zero: Vec<&str> = zero.map(|joint| joint.name.as_str()).collect();
         if !zero.is_empty() {
@@ -253,18 +256,20 @@ impl JointsInfo {
 
     /// What is odd about the messages as such, in words.
     pub fn row_remarks(&self) -> Vec<String> {
-        let mut remarks = Vec::new();
-        if self.repeated_messages > 0 {
-            let count = self.repeated_messages;
-            remarks.push(format!(
+        let mut remarks: Vec<String> = self.twice.iter().map(ToString::to_string).collect();
+        match self.repeated_messages {
+            0 => {}
+            1 => remarks.push("1 message repeats the values of the one before".to_owned()),
+            count => remarks.push(format!(
                 "{count} messages repeat the values of the one before"
-            ));
+            )),
         }
-        if self.backward_messages > 0 {
-            let count = self.backward_messages;
-            remarks.push(format!(
+        match self.backward_messages {
+            0 => {}
+            1 => remarks.push("1 message is stamped before the one that it follows".to_owned()),
+            count => remarks.push(format!(
                 "{count} messages are stamped before the one that they follow"
-            ));
+            )),
         }
         remarks
     }
@@ -287,15 +292,33 @@ fn in_seconds(ns: i64) -> f64 {
     ns as f64 * 1e-9
 }
 
+fn messages(count: u64) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} message{plural}")
+}
+
+/// What fits on a line of a terminal; a simulated archive holds its whole scenario.
+fn shortened(value: &str) -> String {
+    /// Resolution: what a person reads of a line.
+    const LONGEST: usize = 80;
+    let count = value.chars().count();
+    if count <= LONGEST && !value.contains('\n') {
+        return value.to_owned();
+    }
+    let line = value.lines().next().unwrap_or_default();
+    let start: String = line.chars().take(LONGEST).collect();
+    format!("{start}... ({count} characters; --json shows all)")
+}
+
 impl fmt::Display for Info {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "{}: {}, {} bytes, {} messages in {:.3} s",
+            "{}: {}, {} bytes, {} in {:.3} s",
             self.path.display(),
             self.kind,
             self.bytes,
-            self.message_count,
+            messages(self.message_count),
             self.duration_s
         )?;
         if let Some((start_ns, end_ns)) = self.start_ns.zip(self.end_ns) {
@@ -305,7 +328,7 @@ impl fmt::Display for Info {
             write!(f, "{topic}")?;
         }
         for (key, value) in self.provenance.iter().flatten() {
-            writeln!(f, "made by: {key}: {value}")?;
+            writeln!(f, "made by: {key}: {}", shortened(value))?;
         }
         for damage in &self.damage {
             writeln!(f, "damage: {damage}")?;
@@ -340,7 +363,9 @@ impl fmt::Display for TopicInfo {
             writeln!(f, "  a gap of {:.3} s at {:.3} s", gap.duration_s, gap.at_s)?;
         }
         if self.undecodable > 0 {
-            writeln!(f, "  {} messages are not of that type", self.undecodable)?;
+            let are = if self.undecodable == 1 { "is" } else { "are" };
+            let count = messages(self.undecodable);
+            writeln!(f, "  {count} {are} not of that type")?;
         }
         Ok(())
     }
@@ -363,7 +388,7 @@ impl fmt::Display for JointsInfo {
             given.join(", ")
         )?;
         if self.nan_messages > 0 {
-            write!(f, "; NaN in {} messages", self.nan_messages)?;
+            write!(f, "; NaN in {}", messages(self.nan_messages))?;
         }
         Ok(())
     }

@@ -1,8 +1,17 @@
 //! What is odd about the joint states of a recording, joint by joint, found in one pass with bounded memory.
 
+mod jumps;
+mod not_finite;
+mod twice;
+
 use serde::Serialize;
 
 use crate::ros::JointState;
+pub use jumps::Jump;
+use jumps::{Jumps, Span};
+pub use not_finite::{FIELDS, FieldTally, NotFinite};
+pub use twice::Twice;
+use twice::TwiceTally;
 
 /// Positions are compared with the integral of the velocity over at least this long \[ns\].
 /// Physical: ten samples at 100 Hz, so that an encoder's step is small beside the motion.
@@ -35,6 +44,12 @@ pub struct JointFacts {
     pub effort_is_zero: bool,
     /// Whether no effort is given that is a number.
     pub lacks_effort: bool,
+    /// By field, what is NaN or infinite.
+    pub not_finite: Vec<NotFinite>,
+    /// Where the position changes by more than the velocity explains, in the order of time.
+    pub jumps: Vec<Jump>,
+    /// Whether there are more jumps than these: then nothing is said of the velocity.
+    pub more_jumps: bool,
 }
 
 impl JointFacts {
@@ -44,7 +59,29 @@ impl JointFacts {
         slope.is_some_and(|slope| (slope / RADIANS_PER_DEGREE - 1.0).abs() < ODD_SHARE)
     }
 
-    /// What is odd about it, in words.
+    /// What is odd about it, in words: values that are no numbers, jumps, a velocity that is not the derivative.
+    pub fn remarks(&self) -> Vec<String> {
+        let bad = self.not_finite.iter();
+        // An effort that is never a number is one that the recording does not have.
+        let bad = bad.filter(|it| !(self.lacks_effort && it.field == FIELDS[2]));
+        let bad = bad.map(|it| it.in_words(&self.name));
+        bad.chain(self.jump_remark()).chain(self.remark()).collect()
+    }
+
+    /// Where its position jumps, in words.
+    pub fn jump_remark(&self) -> Option<String> {
+        let (first, others) = self.jumps.split_first()?;
+        let mut text = format!("the position of {} jumps {}", self.name, first.in_words());
+        let at_least = if self.more_jumps { "at least " } else { "" };
+        match others.len() {
+            0 => {}
+            1 => text += "; it does so once more",
+            more => text += &format!("; it does so {at_least}{more} more times"),
+        }
+        Some(text)
+    }
+
+    /// What is odd about its velocity, in words.
     pub fn remark(&self) -> Option<String> {
         let slope = self
             .velocity_slope
@@ -72,6 +109,9 @@ pub struct JointTallies {
     pub repeated: u64,
     /// Messages stamped before the one that they follow.
     pub backward: u64,
+    twice: TwiceTally,
+    /// Stamp of the first message \[ns\].
+    first_ns: Option<i64>,
 }
 
 /// One joint.
@@ -83,12 +123,20 @@ struct JointTally {
     zeros: u64,
     /// Position and stamp at which the span of the comparison begins, and the velocity integrated since.
     from: Option<(f64, i64)>,
-    before: Option<(f64, i64)>,
+    before: Option<Before>,
     integral: f64,
-    /// Sums over spans: position change squared, times the integral, and absolute.
-    squares: f64,
-    products: f64,
-    moved: f64,
+    /// Sums over spans without a suspected jump.
+    sums: Span,
+    jumps: Jumps,
+    fields: [FieldTally; 3],
+}
+
+/// The sample before.
+#[derive(Debug, Clone, Copy)]
+struct Before {
+    position: f64,
+    velocity: f64,
+    stamp_ns: i64,
 }
 
 impl JointTally {
@@ -101,14 +149,19 @@ impl JointTally {
             from: None,
             before: None,
             integral: 0.0,
-            squares: 0.0,
-            products: 0.0,
-            moved: 0.0,
+            sums: Span::default(),
+            jumps: Jumps::default(),
+            fields: <_>::default(),
         }
     }
 
     /// Takes position, velocity and effort, as far as they are given and numbers.
     fn add(&mut self, stamp_ns: i64, values: [Option<f64>; 3]) {
+        for (field, value) in self.fields.iter_mut().zip(values) {
+            if let Some(value) = value {
+                field.add(stamp_ns, value);
+            }
+        }
         let [position, velocity, effort] = values.map(|value| value.filter(|it| it.is_finite()));
         if let Some(effort) = effort {
             self.efforts += 1;
@@ -129,37 +182,59 @@ impl JointTally {
     }
 
     fn add_velocity(&mut self, stamp_ns: i64, position: f64, velocity: f64) {
-        let step_ns = self.before.map(|(_, before_ns)| stamp_ns - before_ns);
+        let step_ns = self.before.map(|before| stamp_ns - before.stamp_ns);
         match (self.before, step_ns, self.from) {
-            (Some((before, _)), Some(step_ns), Some((from, from_ns)))
+            (Some(before), Some(step_ns), Some((from, from_ns)))
                 if (0..PAUSE_NS).contains(&step_ns) =>
             {
-                self.integral += 0.5 * (before + velocity) * step_ns as f64 * 1e-9;
+                let step = 0.5 * (before.velocity + velocity) * step_ns as f64 * 1e-9;
+                self.integral += step;
+                let miss = position - before.position - step;
+                self.jumps.step(stamp_ns, step_ns, miss);
                 if stamp_ns - from_ns >= SPAN_NS {
                     let change = position - from;
-                    self.squares += change * change;
-                    self.products += change * self.integral;
-                    self.moved += change.abs();
+                    let ended = self.jumps.end_span(Span {
+                        squares: change * change,
+                        products: change * self.integral,
+                        moved: change.abs(),
+                    });
+                    self.sums.add(&ended.unwrap_or_default());
                     self.from = Some((position, stamp_ns));
                     self.integral = 0.0;
                 }
             }
             _ => {
+                self.jumps.begin_span();
                 self.from = Some((position, stamp_ns));
                 self.integral = 0.0;
             }
         }
-        self.before = Some((velocity, stamp_ns));
+        self.before = Some(Before {
+            position,
+            velocity,
+            stamp_ns,
+        });
     }
 
-    fn facts(&self) -> JointFacts {
+    /// Times count from `first_ns` on.
+    fn facts(&self, first_ns: i64) -> JointFacts {
+        let mut sums = self.sums;
+        sums.add(&self.jumps.without_jump());
+        let (jumps, more_jumps) = self.jumps.found(first_ns);
+        let tells = sums.moved > TELLING_MOTION && !more_jumps;
+        let fields = self.fields.iter().zip(FIELDS);
         JointFacts {
             name: self.name.clone(),
             position_range: self.range,
-            velocity_slope: (self.moved > TELLING_MOTION).then(|| self.products / self.squares),
-            travel: self.moved,
+            velocity_slope: tells.then(|| sums.products / sums.squares),
+            travel: sums.moved,
             lacks_effort: self.efforts == 0,
             effort_is_zero: self.efforts > 0 && self.zeros == self.efforts,
+            not_finite: fields
+                .filter_map(|(tally, field)| tally.found(field, first_ns))
+                .collect(),
+            jumps,
+            more_jumps,
         }
     }
 }
@@ -168,8 +243,12 @@ impl JointTallies {
     /// Takes a message.
     pub fn add(&mut self, state: &JointState) {
         let stamp_ns = state.header.stamp.ns();
-        if let Some(last) = &self.last {
-            let same = last.name == state.name
+        self.first_ns.get_or_insert(stamp_ns);
+        let last = self.last.as_ref();
+        let is_like_before = last.is_some_and(|last| last.name == state.name);
+        self.twice.add(state, is_like_before);
+        if let Some(last) = last {
+            let same = is_like_before
                 && last.position == state.position
                 && last.velocity == state.velocity
                 && last.effort == state.effort;
@@ -206,10 +285,16 @@ impl JointTallies {
         velocity: &[f64],
         effort: &[f64],
     ) {
+        self.first_ns.get_or_insert(stamp_ns);
         for (at, joint) in self.joints.iter_mut().enumerate() {
             let of = |values: &[f64]| values.get(at).copied();
             joint.add(stamp_ns, [of(position), of(velocity), of(effort)]);
         }
+    }
+
+    /// Messages that name a joint more than once, and the first of these joints.
+    pub fn twice(&self) -> Option<&Twice> {
+        self.twice.found.as_ref()
     }
 
     fn place(&mut self, name: &str) -> usize {
@@ -222,73 +307,11 @@ impl JointTallies {
 
     /// By joint, in the order of their first message.
     pub fn facts(&self) -> Vec<JointFacts> {
-        self.joints.iter().map(JointTally::facts).collect()
+        let first_ns = self.first_ns.unwrap_or(0);
+        let joints = self.joints.iter();
+        joints.map(|joint| joint.facts(first_ns)).collect()
     }
 }
 
 #[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
-
-    use super::*;
-    use crate::ros::{Header, Time};
-
-    /// A joint that swings by half a radian, its recorded velocity `slope` times the true one, positions in `units`.
-    fn swing(slope: f64, units: f64) -> JointFacts {
-        let mut tallies = JointTallies::default();
-        for i in 0..1000_u32 {
-            let t = f64::from(i) * 0.01;
-            let state = JointState {
-                header: Header {
-                    stamp: Time::from_ns(i64::from(i) * 10_000_000),
-                    ..Header::default()
-                },
-                name: vec!["elbow".to_owned()],
-                position: vec![0.5 * t.sin() * units],
-                velocity: vec![0.5 * t.cos() * slope],
-                effort: vec![0.0],
-            };
-            tallies.add(&state);
-        }
-        tallies.facts().remove(0)
-    }
-
-    #[test]
-    fn a_velocity_that_is_the_derivative_is_not_remarked() {
-        let facts = swing(1.0, 1.0);
-        assert!((facts.velocity_slope.unwrap() - 1.0).abs() < 1e-3);
-        assert_eq!(facts.remark(), None);
-        assert!(facts.effort_is_zero);
-    }
-
-    #[test]
-    fn half_a_velocity_a_turned_one_and_degrees_are_remarked() {
-        assert!(swing(0.5, 1.0).remark().unwrap().contains("0.500 times"));
-        assert!(swing(-1.0, 1.0).remark().unwrap().contains("other sign"));
-        assert!(
-            swing(1.0, 180.0 / std::f64::consts::PI)
-                .remark()
-                .unwrap()
-                .contains("degrees")
-        );
-    }
-
-    #[test]
-    fn repeats_and_stamps_that_step_back_are_counted() {
-        let at = |ns: i64, position: f64| JointState {
-            header: Header {
-                stamp: Time::from_ns(ns),
-                ..Header::default()
-            },
-            name: vec!["elbow".to_owned()],
-            position: vec![position],
-            velocity: Vec::new(),
-            effort: Vec::new(),
-        };
-        let mut tallies = JointTallies::default();
-        for state in [at(10, 0.0), at(10, 0.0), at(20, 0.1), at(15, 0.2)] {
-            tallies.add(&state);
-        }
-        assert_eq!((tallies.repeated, tallies.backward), (1, 1));
-    }
-}
+mod tests;

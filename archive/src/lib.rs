@@ -28,7 +28,7 @@ pub use damage::{Damage, DamageKind};
 pub use error::ArchiveError;
 pub use file_kind::file_kind;
 pub use info::{Gap, Info, JointsInfo, TopicInfo};
-pub use joint_facts::{JointFacts, JointTallies};
+pub use joint_facts::{FIELDS, FieldTally, JointFacts, JointTallies, Jump, NotFinite, Twice};
 pub use lerobot_error::{LerobotError, LerobotProblem};
 pub use mcap_write::{
     CHUNK_SPAN_NS, Compression, McapWriter, PROVENANCE, TopicWriter, WriteError, Written,

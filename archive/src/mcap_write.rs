@@ -122,15 +122,14 @@ impl McapWriter {
             whole_file::create_folder(folder).map_err(io(folder))?;
         }
         let set_aside = whole_file::set_part_aside(&path).map_err(io(&part))?;
-        let file = OpenOptions::new()
+        let new = OpenOptions::new()
             .read(true)
             .write(true)
             .create_new(true)
-            .open(&part)
-            .map_err(io(&part))?;
+            .clone();
+        let file = whole_file::create(&part, &new).map_err(io(&part))?;
         whole_file::hold(&file).map_err(io(&part))?;
         whole_file::sync_folder_of(&part).map_err(io(&part))?;
-        whole_file::begin(&part);
         let twin = file.try_clone().map_err(io(&part))?;
         let writer = options(compression)
             .profile("ros2")

@@ -126,14 +126,13 @@ fn write_held(
         let path = to.to_owned();
         return Err(RepairError::NothingThere { path });
     };
-    whole_file::begin(work);
-    let file = OpenOptions::new()
+    let anew = OpenOptions::new()
         .read(true)
         .write(true)
         .create(true)
         .truncate(true)
-        .open(work)
-        .map_err(mcap_write::io(work))?;
+        .clone();
+    let file = whole_file::create(work, &anew).map_err(mcap_write::io(work))?;
     let writer = mcap_write::options(Compression::Zstd)
         .profile(&first.profile)
         .library(&first.library)

@@ -25,7 +25,7 @@ pub use dynamic_joint_state::{DynamicJointState, InterfaceValue};
 pub use float64::Float64;
 pub use header::{Header, Time};
 pub use inertia_stamped::{Inertia, InertiaStamped};
-pub use joint_state::JointState;
+pub use joint_state::{JointState, first_twice};
 pub use joint_state_type::{JointStateDecoder, JointStateType};
 pub use std_bool::Bool;
 pub use temperature::Temperature;

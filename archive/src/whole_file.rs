@@ -7,10 +7,10 @@
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use rustix::fs::{Access, AtFlags, CWD, RenameFlags, renameat_with};
 use rustix::io::Errno;
@@ -34,20 +34,29 @@ static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 /// The folders that this process has made, each after the one that it is in.
 static FOLDERS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// This process begins to write `part`.
-pub fn begin(part: &Path) {
-    let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+/// Nothing in here can be left half done, so a panic elsewhere does not matter.
+fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Opens `part`, which this process begins to write. In one step, so that no [`remove_unfinished`] comes between.
+///
+/// # Errors
+/// If it cannot be opened so; then it is none of this process's files.
+pub fn create(part: &Path, options: &OpenOptions) -> io::Result<File> {
+    let mut unfinished = unfinished();
+    let file = options.open(part)?;
     unfinished.insert(part.to_owned());
+    Ok(file)
 }
 
 fn end(part: &Path) {
-    let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
-    unfinished.remove(part);
+    unfinished().remove(part);
 }
 
 /// `path` is there, but belongs to a result that is not whole yet: until [`keep`] it counts as unfinished.
 pub fn is_part_of_unfinished(path: &Path) {
-    begin(path);
+    unfinished().insert(path.to_owned());
 }
 
 /// `path` belongs to a result that is whole now.
@@ -58,8 +67,26 @@ pub fn keep(path: &Path) {
 /// Removes what this process has begun and not finished: what it would have held is made again by doing
 /// the same again. Not for recordings of a live robot.
 pub fn remove_unfinished() {
-    let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
-    for part in std::mem::take(&mut *unfinished) {
+    remove(&mut unfinished());
+}
+
+/// The program leaves: as [`remove_unfinished`], and while the result lives no other thread begins a file or gives one
+/// its name, but waits.
+#[must_use = "others go on to write once it is gone"]
+pub fn remove_unfinished_and_leave() -> Leaving {
+    let mut unfinished = unfinished();
+    remove(&mut unfinished);
+    Leaving(unfinished)
+}
+
+/// Keeps others from beginning to write.
+#[derive(Debug)]
+pub struct Leaving(
+    #[expect(dead_code, reason = "it is held, not read")] MutexGuard<'static, BTreeSet<PathBuf>>,
+);
+
+fn remove(unfinished: &mut BTreeSet<PathBuf>) {
+    for part in std::mem::take(unfinished) {
         // One that is not there any more need not be removed.
         let _ = fs::remove_file(part);
     }
@@ -97,8 +124,12 @@ pub fn write(path: &Path, contents: impl AsRef<[u8]>, existing: Existing) -> io:
         create_folder(folder)?;
     }
     let part = part_of(path);
-    begin(&part);
-    let written = File::create(&part).and_then(|mut file| {
+    let options = OpenOptions::new()
+        .write(true)
+        .create(true)
+        .truncate(true)
+        .clone();
+    let written = create(&part, &options).and_then(|mut file| {
         file.write_all(contents.as_ref())?;
         file.sync_all()
     });
@@ -118,11 +149,13 @@ pub fn write(path: &Path, contents: impl AsRef<[u8]>, existing: Existing) -> io:
 /// If it cannot be renamed; [`io::ErrorKind::AlreadyExists`] if there is a file of that name and it
 /// is to be kept.
 pub fn put_in_place(part: &Path, path: &Path, existing: Existing) -> io::Result<()> {
+    let mut unfinished = unfinished();
     match existing {
         Existing::Replace => fs::rename(part, path)?,
         Existing::Keep => rename_to_new(part, path)?,
     }
-    end(part);
+    unfinished.remove(part);
+    drop(unfinished);
     sync_folder_of(path)
 }
 
@@ -298,71 +331,4 @@ fn rename_to_new(part: &Path, path: &Path) -> io::Result<()> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// What is unfinished is the process's own, so one test at a time may write.
-    static WRITING: Mutex<()> = Mutex::new(());
-
-    #[test]
-    fn a_file_that_is_there_stays_unless_it_is_to_be_replaced() {
-        let _alone = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("new/twin.yaml");
-        write(&path, "old", Existing::Keep).unwrap();
-        let refused = write(&path, "new", Existing::Keep).unwrap_err();
-        assert_eq!(refused.kind(), io::ErrorKind::AlreadyExists);
-        assert_eq!(fs::read_to_string(&path).unwrap(), "old");
-        write(&path, "new", Existing::Replace).unwrap();
-        assert_eq!(fs::read_to_string(&path).unwrap(), "new");
-        assert!(!part_of(&path).exists(), "nothing unfinished stays");
-    }
-
-    #[test]
-    fn what_is_unfinished_is_removed_and_what_is_whole_stays() {
-        let _alone = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
-        let folder = tempfile::tempdir().unwrap();
-        let (whole, torn) = (
-            folder.path().join("a.json"),
-            folder.path().join("b.mcap.part"),
-        );
-        write(&whole, "all", Existing::Keep).unwrap();
-        begin(&torn);
-        fs::write(&torn, "hal").unwrap();
-        remove_unfinished();
-        assert!(whole.exists() && !torn.exists());
-    }
-
-    #[test]
-    fn a_part_whose_writer_lives_is_not_moved_out_of_the_way() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.mcap");
-        let part = File::create(part_of(&path)).unwrap();
-        hold(&part).unwrap();
-        let refused = set_part_aside(&path).unwrap_err();
-        assert_eq!(refused.kind(), io::ErrorKind::ResourceBusy);
-        drop(part);
-        let aside = set_part_aside(&path).unwrap().unwrap();
-        assert_eq!(aside, folder.path().join("a.1.mcap.part"));
-    }
-
-    #[test]
-    fn the_room_of_a_folder_that_is_not_there_yet_is_that_of_the_one_above_it() {
-        let folder = tempfile::tempdir().unwrap();
-        let below = folder.path().join("not/there/yet");
-        assert!(free_bytes(&below).unwrap() > 0);
-        create_folder(&below).unwrap();
-        assert!(below.is_dir());
-    }
-
-    #[test]
-    fn an_unused_name_is_the_first_that_no_file_has() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.mcap");
-        assert_eq!(unused_name(&path).unwrap(), path);
-        for name in ["a.mcap", "a.1.mcap"] {
-            File::create(folder.path().join(name)).unwrap();
-        }
-        assert_eq!(unused_name(&path).unwrap(), folder.path().join("a.2.mcap"));
-    }
-}
+mod tests;

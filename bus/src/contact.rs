@@ -115,6 +115,17 @@ impl Contact {
     }
 }
 
+impl Contact {
+    /// How long it lasted: `0.84 s`, or `one sample` where the score reached the threshold only once.
+    pub fn duration_in_words(&self) -> String {
+        match self.duration_s() {
+            0.0 => "one sample".to_owned(),
+            short if short < 0.01 => format!("{short:.3} s"),
+            usual => format!("{usual:.2} s"),
+        }
+    }
+}
+
 /// Where and how hard, in the words that every output has: `24 N at link5`.
 impl fmt::Display for Contact {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -203,6 +214,22 @@ mod tests {
         assert!((ended.duration_s() - 35e-9).abs() < 1e-15);
         assert!(contacts.open().is_none());
         assert!(contacts.push(&end).is_none());
+    }
+
+    #[test]
+    fn a_contact_of_one_sample_is_not_said_to_last_no_time() {
+        let ended = |last_high: i64| {
+            let mut contacts = ContactFollower::default();
+            contacts.push(&sample(10, Detection::ONSET, 9.0, "link2", 4.0));
+            let mut low = sample(last_high, 0, 9.0, "link2", 4.0);
+            low.threshold = 5.0;
+            contacts.push(&low);
+            contacts.push(&sample(2_000_000_000, Detection::OFFSET, 1.0, "", 0.0))
+        };
+        let words = |last_high| ended(last_high).map(|it| it.duration_in_words());
+        assert_eq!(words(10).as_deref(), Some("one sample"));
+        assert_eq!(words(4_000_010).as_deref(), Some("0.004 s"));
+        assert_eq!(words(840_000_010).as_deref(), Some("0.84 s"));
     }
 
     #[test]

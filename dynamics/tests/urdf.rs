@@ -162,6 +162,11 @@ fn what_is_no_urdf_is_told_apart() {
         refusal("<robot name='r'>\n  <link name='a'>\n</robot>"),
         "not well-formed XML at line 3, column 1: expected 'link' tag, not 'robot' at 3:1"
     );
+    // A file that was not copied to its end.
+    assert_eq!(
+        refusal("<robot name='r'>\n  <link name='a"),
+        "not well-formed XML at line 2, column 16: the file ends in the middle of it"
+    );
     assert_eq!(
         refusal("<?xml version='1.0'?>\n<sdf version='1.9'/>"),
         "line 2: the document is a <sdf>, a URDF is a <robot>"

@@ -263,7 +263,10 @@ fn learn(
     let done = AtomicUsize::new(0);
     let share = || done.load(Ordering::Relaxed) as f64 / all.max(1) as f64;
     let results = parallel::map(request.jobs, pupils, |(entry, seed)| {
-        let what = format!("{} learns", entry.name);
+        let what = match seeds(entry) {
+            1 => format!("{} learns", entry.name),
+            all => format!("{} learns (seed {} of {all})", entry.name, seed + 1),
+        };
         progress(share(), &what);
         let file = format!("{}.{}.{seed}", twin.name, entry.name);
         let task = Task {

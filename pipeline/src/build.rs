@@ -242,6 +242,7 @@ pub fn detect_setup(
             (name.clone(), score)
         });
     Ok(tauscope_detect::Setup {
+        cell: cell.facts.name.clone(),
         joints: joints.collect(),
         joint_names: cell.facts.joint_names.clone(),
         model: cell.model.clone(),
@@ -298,7 +299,11 @@ pub fn recorder(
     streams: &[StreamFacts],
     provenance: &BTreeMap<String, String>,
 ) -> Result<Recorder, RecordError> {
-    let cells: Vec<CellInfo> = cells
+    let units = |name: &str| {
+        let cell = cells.iter().find(|cell| cell.facts.name == name);
+        cell.map(|cell| cell.facts.effort_unit).unwrap_or_default()
+    };
+    let infos: Vec<CellInfo> = cells
         .iter()
         .map(|cell| CellInfo {
             name: cell.facts.name.clone(),
@@ -314,9 +319,19 @@ pub fn recorder(
             cell: stream.cell.clone(),
             kind: stream.kind,
             detector: stream.detector.clone(),
+            score_unit: score_unit(stream, units(&stream.cell)).to_owned(),
         })
         .collect();
-    Recorder::new(config, &cells, &streams, provenance)
+    Recorder::new(config, &infos, &streams, provenance)
+}
+
+/// What the scores in a stream are measured in; empty for none, and where nobody knows.
+fn score_unit(stream: &StreamFacts, effort: EffortUnit) -> &'static str {
+    let entry = stream
+        .detector
+        .as_deref()
+        .and_then(tauscope_detect::Entry::find);
+    entry.map_or("", |entry| entry.score_unit.in_words(effort))
 }
 
 /// A publisher of `streams` of one cell. `restarted`: it is not its first life.

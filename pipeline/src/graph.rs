@@ -61,7 +61,7 @@ impl HealthOutlet {
 pub struct StageCounts {
     /// The stage.
     pub stage: String,
-    /// Samples that came in.
+    /// Samples that came in; for a source, those that it read.
     pub received: u64,
     /// Samples that went out.
     pub emitted: u64,
@@ -128,11 +128,12 @@ impl<T: Sample> Node for SourceNode<T> {
     }
 
     fn counts(&self) -> StageCounts {
+        let (emitted, dropped) = (self.out.lane.sent(), self.source.dropped());
         StageCounts {
             stage: self.name.clone(),
-            received: 0,
-            emitted: self.out.lane.sent(),
-            dropped: self.source.dropped(),
+            received: emitted + dropped,
+            emitted,
+            dropped,
         }
     }
 

@@ -1,5 +1,5 @@
-//! What cannot be in joint states: efforts that are plain zeros, positions in degrees, a velocity that is not the
-//! derivative of the position, a pause. Whoever reads joint states asks it, and says it: `run` while they come,
+//! What cannot be in joint states: efforts that are plain zeros, positions in degrees, a position that jumps, a
+//! velocity that is not the derivative of the position, a pause. Whoever reads joint states asks it, and says it: `run` while they come,
 //! `replay` and `calibrate` of each recording. Memory does not grow with the samples.
 
 mod twin;
@@ -65,6 +65,13 @@ pub enum Oddity {
         /// What is odd.
         remark: String,
     },
+    /// A position changes by more than its velocity explains: what [`JointFacts::jump_remark`] says.
+    Jump {
+        /// The joint.
+        joint: String,
+        /// Where and how large.
+        remark: String,
+    },
     /// The longest pause.
     Pause {
         /// How long \[s\].
@@ -83,6 +90,7 @@ impl Oddity {
             Self::Pause { .. } => "pause".to_owned(),
             Self::Beyond { joint, .. } => format!("limits of {joint}"),
             Self::Velocity { joint, .. } => format!("velocity of {joint}"),
+            Self::Jump { joint, .. } => format!("jump of {joint}"),
         }
     }
 
@@ -119,7 +127,7 @@ impl fmt::Display for Oddity {
                 f,
                 "the position of {joint} reaches {position:.2}, beyond the URDF's limits of {lower:.2} and {upper:.2}"
             ),
-            Self::Velocity { remark, .. } => f.write_str(remark),
+            Self::Velocity { remark, .. } | Self::Jump { remark, .. } => f.write_str(remark),
             Self::Pause { duration_s, at_s } => {
                 write!(f, "a gap of {duration_s:.3} s at {at_s:.3} s")
             }
@@ -222,6 +230,11 @@ impl Plausible {
         let named = || facts.iter().zip(&self.limits);
         let degrees = named().filter(|(facts, limits)| in_degrees(facts, **limits));
         let degrees: Vec<String> = degrees.map(|(facts, _)| facts.name.clone()).collect();
+        let jumps = facts.iter().filter_map(|facts| {
+            let (joint, remark) = (facts.name.clone(), facts.jump_remark()?);
+            Some(Oddity::Jump { joint, remark })
+        });
+        all.extend(jumps);
         if degrees.is_empty() {
             all.extend(named().filter_map(|(facts, limits)| beyond(facts, (*limits)?)));
             let remarks = facts.iter().filter_map(|facts| {
@@ -248,12 +261,14 @@ fn in_degrees(facts: &JointFacts, limits: Option<[f64; 2]>) -> bool {
     let far = |[low, high]: [f64; 2], [lower, upper]: [f64; 2]| {
         high.max(-low) > THREE_TURNS.max(DEGREES * upper.max(-lower))
     };
-    let told = facts.position_range.zip(limits);
+    // Where it jumped to is no motion of the arm.
+    let range = facts.position_range.filter(|_| facts.jumps.is_empty());
+    let told = range.zip(limits);
     facts.is_in_degrees() || told.is_some_and(|(range, limits)| far(range, limits))
 }
 
 fn beyond(facts: &JointFacts, limits: [f64; 2]) -> Option<Oddity> {
-    let [low, high] = facts.position_range?;
+    let [low, high] = facts.position_range.filter(|_| facts.jumps.is_empty())?;
     let [lower, upper] = limits;
     let (below, above) = (lower - low, high - upper);
     (below.max(above) > BEYOND_RAD).then(|| Oddity::Beyond {

@@ -1,7 +1,7 @@
 //! `summary.parquet` and `events.parquet`: the results over all replayed recordings, flat, so that
 //! any SQL tool reads them.
 
-use std::fs::File;
+use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -184,8 +184,12 @@ pub fn write_table(
     };
     let batch = RecordBatch::try_from_iter(columns)?;
     let part = whole_file::part_of(path);
-    whole_file::begin(&part);
-    let file = File::create(&part).map_err(failed)?;
+    let anew = OpenOptions::new()
+        .write(true)
+        .create(true)
+        .truncate(true)
+        .clone();
+    let file = whole_file::create(&part, &anew).map_err(failed)?;
     let properties = WriterProperties::builder()
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
         .set_created_by("tauscope".to_owned())

@@ -19,7 +19,7 @@ use crate::existing::Force;
 use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::Output;
-use crate::progress::Progress;
+use crate::progress::{Progress, Quiet};
 
 /// Below this share of the measured effort's variance that the model explains, the gain is worth
 /// little.
@@ -68,6 +68,8 @@ pub struct Args {
     effort_cutoff_hz: f64,
     #[command(flatten)]
     force: Force,
+    #[command(flatten)]
+    quiet: Quiet,
     /// Machine-readable.
     #[arg(long)]
     json: bool,
@@ -136,7 +138,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         fit: &args.recordings,
         validation: &args.validation,
     };
-    let progress = Progress::new(job.recordings());
+    let progress = Progress::new(job.recordings(), args.quiet.show(out));
     let result = job.run(&|index, fraction| progress.set(index, fraction));
     drop(progress);
     let mut calibrated = result.map_err(|error| {

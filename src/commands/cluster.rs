@@ -4,7 +4,24 @@ use std::ffi::OsString;
 
 use crate::exit::{Exit, Failure};
 use crate::output::Output;
-use crate::program_beside;
+use crate::program_beside::{self, Program};
+
+/// What runs. Its own `--help` says more, where it is built.
+const PROGRAM: Program = Program {
+    name: "tauscope-cluster",
+    help: "\
+Queries over archives on several machines (docs/query.md)
+
+Usage: tauscope cluster <COMMAND>
+
+Commands:
+  scheduler  Splits queries into tasks and hands them out
+  executor   Does tasks
+  query      Asks, as `tauscope query` does on one machine
+
+Options:
+  -h, --help  Print help",
+};
 
 /// Queries on several machines: a scheduler, its executors, and who asks: `tauscope cluster --help` (docs/query.md).
 #[derive(Debug, clap::Args)]
@@ -17,5 +34,5 @@ pub struct Args {
 
 /// Runs it.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
-    program_beside::run("tauscope-cluster", &args.arguments, out)
+    program_beside::run(PROGRAM, &args.arguments, out)
 }

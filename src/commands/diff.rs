@@ -19,6 +19,7 @@ use super::replay::archive::{self, Job};
 use crate::existing::Force;
 use crate::exit::{Exit, Failure};
 use crate::output::Output;
+use crate::progress::Quiet;
 
 /// Differences that a terminal is shown; `--json` and `--html` have all.
 const MAX_SHOWN: usize = 40;
@@ -162,6 +163,7 @@ fn result(
                 twin: TwinChoice::Recompute,
                 with_scores: false,
                 json: false,
+                show: Quiet::default().show(out),
             };
             let mut told = Output::Memory(String::new(), String::new());
             let replayed = archive::run(&job, &Pipeline::load_to_replay(given)?, &mut told);

@@ -10,7 +10,7 @@ use crate::existing::Force;
 use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::Output;
-use crate::progress::Progress;
+use crate::progress::{Progress, Quiet};
 
 /// Train, threshold and score detectors on a labelled set; print the papers' tables.
 #[derive(Debug, clap::Args)]
@@ -40,6 +40,8 @@ pub struct Args {
     jobs: u16,
     #[command(flatten)]
     force: Force,
+    #[command(flatten)]
+    quiet: Quiet,
     /// Machine-readable.
     #[arg(long)]
     json: bool,
@@ -69,7 +71,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let results = tauscope_evaluate::results(&args.out, &request);
     args.force.check_beside(results, inputs)?;
     tauscope_evaluate::prepare(&args.out)?;
-    let progress = Progress::of_work();
+    let progress = Progress::of_work(args.quiet.show(out));
     let result = tauscope_evaluate::run(request, &args.out, &|share, what| {
         progress.doing(share, what);
     });

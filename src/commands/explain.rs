@@ -12,7 +12,7 @@ use crate::exit::{Exit, Failure};
 use crate::explain::{self, Arguments, Kept, Request};
 use crate::interrupt;
 use crate::output::Output;
-use crate::progress::Progress;
+use crate::progress::{Progress, Quiet};
 
 /// Shares of the bar: reading ends here, and here the engine.
 const READ: f64 = 0.05;
@@ -57,6 +57,8 @@ pub struct Args {
     without: Vec<String>,
     #[command(flatten)]
     force: Force,
+    #[command(flatten)]
+    quiet: Quiet,
     /// Print the report as `report.json` holds it.
     #[arg(long)]
     json: bool,
@@ -122,7 +124,7 @@ impl Args {
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let request = args.request()?;
     explain::refuse_to_replace(&args.out, &request, args.force)?;
-    let progress = Progress::of_work();
+    let progress = Progress::of_work(args.quiet.show(out));
     let input = explain::read(&request, &|share, what| progress.doing(READ * share, what))?;
     explain::make(&args.out)?;
     let kept = Kept::of(&input);

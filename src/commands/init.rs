@@ -12,7 +12,7 @@ use crate::explain::{self, Arguments, Kept};
 use crate::init::{self, Folder, Live, Looked, Told};
 use crate::interrupt;
 use crate::output::Output;
-use crate::progress::Progress;
+use crate::progress::{Progress, Quiet};
 
 /// Set up a cell from contact-free recordings: a pipeline with the explained twin and a detector that has learnt.
 ///
@@ -53,6 +53,8 @@ pub struct Args {
     state_topic: Option<String>,
     #[command(flatten)]
     force: Force,
+    #[command(flatten)]
+    quiet: Quiet,
 }
 
 /// Shares of the bar.
@@ -74,7 +76,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
             live.record(&folder, out)?
         }
     };
-    let progress = Progress::of_work();
+    let progress = Progress::of_work(args.quiet.show(out));
     progress.doing(0.0, "looking at the recordings");
     let told = Told {
         robot: &args.robot,

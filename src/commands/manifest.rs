@@ -13,7 +13,7 @@ use tauscope_pipeline::results::{Manifest, Wanted};
 use crate::existing::Force;
 use crate::exit::{Exit, Failure};
 use crate::output::Output;
-use crate::progress::Progress;
+use crate::progress::{Progress, Quiet};
 
 /// Write down which recordings are wanted, with their hashes: what `replay --manifest` works through.
 #[derive(Debug, clap::Args)]
@@ -34,6 +34,8 @@ pub struct Args {
     jobs: u16,
     #[command(flatten)]
     force: Force,
+    #[command(flatten)]
+    quiet: Quiet,
 }
 
 /// Writes it.
@@ -41,7 +43,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let recordings = expand(&args.recordings)?;
     args.force.check_beside([args.out.clone()], &recordings)?;
     let folder = absolute(args.out.parent().unwrap_or(Path::new("")))?;
-    let progress = Progress::new(recordings.len());
+    let progress = Progress::new(recordings.len(), args.quiet.show(out));
     let numbered = recordings.iter().enumerate().collect();
     let read = parallel::map(usize::from(args.jobs), numbered, |(index, recording)| {
         let wanted = Wanted::of(recording, args.source.as_deref());

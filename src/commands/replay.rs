@@ -4,7 +4,7 @@ pub mod archive;
 mod table;
 
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use serde::Serialize;
@@ -21,7 +21,7 @@ use crate::existing::Force;
 use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::Output;
-use crate::progress::Progress;
+use crate::progress::{Progress, Quiet, Show};
 use table::table;
 
 /// Run a pipeline's stages over recordings, in process, as fast as the machine allows: the same bytes
@@ -61,6 +61,8 @@ pub struct Args {
     twin: TwinChoice,
     #[command(flatten)]
     force: Force,
+    #[command(flatten)]
+    quiet: Quiet,
     /// Machine-readable.
     #[arg(long)]
     json: bool,
@@ -109,6 +111,7 @@ fn of_each(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
             jobs: args.jobs,
             twin: args.twin,
             with_scores: args.scores,
+            show: args.quiet.show(out),
             json: args.json,
         };
         return archive::run(&job, &pipeline, out);
@@ -121,17 +124,10 @@ fn of_each(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     }
     check_recordings(args)?;
     if let Some(folder) = &args.out {
-        let of = |recording| replay.files(recording, folder);
-        let tables = ["summary.parquet", "events.parquet"].map(|name| folder.join(name));
-        let files = args.recordings.iter().flat_map(|recording| of(recording));
-        let inputs = args.recordings.iter().chain([&args.pipeline]);
-        args.force.check_beside(files.chain(tables), inputs)?;
-        std::fs::create_dir_all(folder).map_err(|error| {
-            Failure::rejected(format!("cannot make {}: {error}", folder.display()))
-        })?;
+        make_folder(&replay, args, folder)?;
     }
     let hold = interrupt::hold();
-    let results = replay_all(&replay, args);
+    let results = replay_all(&replay, args, args.quiet.show(out));
     let mut outcomes = Vec::new();
     let mut wrong = Vec::new();
     let (mut failed, mut interrupted) = (None, false);
@@ -174,6 +170,17 @@ fn of_each(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     Ok(Exit::from_loss(lossy)
         .and(refused)
         .and(failed.unwrap_or(Exit::Done)))
+}
+
+/// Makes the folder of the results, if nothing in it would be replaced that may not.
+fn make_folder(replay: &Replay, args: &Args, folder: &Path) -> Result<(), Failure> {
+    let of = |recording| replay.files(recording, folder);
+    let tables = ["summary.parquet", "events.parquet"].map(|name| folder.join(name));
+    let files = args.recordings.iter().flat_map(|recording| of(recording));
+    let inputs = args.recordings.iter().chain([&args.pipeline]);
+    args.force.check_beside(files.chain(tables), inputs)?;
+    std::fs::create_dir_all(folder)
+        .map_err(|error| Failure::rejected(format!("cannot make {}: {error}", folder.display())))
 }
 
 /// Tells what is wrong with recordings: as a refusal if nothing came of any, else beside the results of the others.
@@ -227,8 +234,8 @@ fn check_names(args: &Args) -> Result<(), Report> {
 }
 
 /// The result of each recording, in their order, whatever the number of jobs.
-fn replay_all(replay: &Replay<'_>, args: &Args) -> Vec<Result<Outcome, ReplayError>> {
-    let progress = Progress::new(args.recordings.len());
+fn replay_all(replay: &Replay<'_>, args: &Args, show: Show) -> Vec<Result<Outcome, ReplayError>> {
+    let progress = Progress::new(args.recordings.len(), show);
     let recordings = args.recordings.iter().enumerate().collect();
     parallel::map(usize::from(args.jobs), recordings, |(index, recording)| {
         if interrupt::is_asked() {

@@ -16,7 +16,7 @@ use crate::existing::Force;
 use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::Output;
-use crate::progress::Progress;
+use crate::progress::{Progress, Quiet};
 
 /// Make recordings of a simulated cell, with the physics and the contacts that a scenario chooses.
 #[derive(Debug, clap::Args)]
@@ -30,6 +30,8 @@ pub struct Args {
     out: PathBuf,
     #[command(flatten)]
     force: Force,
+    #[command(flatten)]
+    quiet: Quiet,
     /// Machine-readable.
     #[arg(long)]
     json: bool,
@@ -54,7 +56,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
             provenance::sha256(facts.urdf.as_bytes()),
         ),
     ]);
-    let progress = Progress::new(1);
+    let progress = Progress::new(1, args.quiet.show(out));
     let hold = interrupt::hold();
     let mut far = 0.0;
     let made = simulated::simulate(

@@ -12,7 +12,7 @@ use tokio::time::Instant;
 
 use super::Supervisor;
 use super::crew::Crew;
-use super::local::Local;
+use super::local::{FAILED, Local};
 use super::process::{self, Process};
 use crate::plan::{self, Link};
 
@@ -176,11 +176,19 @@ impl Supervisor<'_> {
         let again = root
             .filter(|_| may_return)
             .and_then(|root| self.stages[root].note_death());
+        let mut with_it = Vec::new();
         for (index, how) in running.into_iter().zip(deaths) {
             let stage = &mut self.stages[index];
-            let how = how.unwrap_or_else(|| "ended with the others".to_owned());
-            self.view.warn(&died(&stage.seat.stage, &how, again));
+            let name = &stage.seat.stage;
+            match how.filter(|_| !stage.fell_with_another()) {
+                Some(how) => self.view.warn(&died(name, &how, again)),
+                None => with_it.push(format!("`{name}`")),
+            }
             stage.die(again);
+        }
+        // What follows from it comes behind the cause.
+        if !with_it.is_empty() {
+            self.view.warn(&fell_with_it(&with_it.join(", "), again));
         }
         if again.is_none() {
             self.stop();
@@ -224,11 +232,42 @@ impl Supervisor<'_> {
 
 fn died(name: &str, how: &str, again: Option<Duration>) -> String {
     match again {
+        // What it said itself is a sentence of its own.
+        None if how.starts_with(FAILED) => {
+            format!("error: stage `{name}` {how}\n  it is not started again, and the run ends")
+        }
         None => format!("error: stage `{name}` {how} and is not started again"),
         Some(Duration::ZERO) => format!("warning: stage `{name}` {how}: starting it again"),
         Some(wait) => {
             let wait = wait.as_millis();
             format!("warning: stage `{name}` {how}: starting it again in {wait} ms")
         }
+    }
+}
+
+/// Of stages that ended because another one of their tree did.
+fn fell_with_it(names: &str, again: Option<Duration>) -> String {
+    match again {
+        None => format!("  what runs with it ended, too: {names}"),
+        Some(_) => format!("  what runs with it is started again, too: {names}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cause_of_a_death_comes_first_and_what_follows_on_a_line_of_its_own() {
+        let told = died("detect", "failed: learnt at another rate: learn anew", None);
+        assert_eq!(
+            told,
+            "error: stage `detect` failed: learnt at another rate: learn anew\n  it is not started again, and the run ends"
+        );
+        let told = died("detect", "was killed by signal 9", None);
+        assert_eq!(
+            told,
+            "error: stage `detect` was killed by signal 9 and is not started again"
+        );
     }
 }

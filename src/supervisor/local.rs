@@ -226,11 +226,17 @@ impl Local {
             return Some("did not end when it was told to, was killed".to_owned());
         }
         match (failed, exit) {
-            (Some(why), _) => Some(format!("failed: {why}")),
+            (Some(why), _) => Some(format!("{FAILED}: {why}")),
             (None, None) => None,
             (None, Some(Ok(status))) => Some(words_for(*status)),
             (None, Some(Err(error))) => Some(format!("cannot be waited for: {error}")),
         }
+    }
+
+    /// Whether it says that it ended because another stage of its tree did.
+    pub fn fell_with_another(&self) -> bool {
+        let outcome = self.tally.newest().outcome.as_ref();
+        outcome.is_some_and(Outcome::is_of_another)
     }
 
     /// Whether another life could fare better. One that says itself why it cannot even begin would say the same again,
@@ -374,6 +380,9 @@ impl Local {
         self.killed = true;
     }
 }
+
+/// How [`Local::death`] begins where a stage says itself why.
+pub const FAILED: &str = "failed";
 
 fn words_for(status: ExitStatus) -> String {
     use std::os::unix::process::ExitStatusExt;

@@ -231,7 +231,9 @@ impl Summary {
         }
         for link in &self.links {
             let LinkSummary { from, to, .. } = link;
-            if link.ended == Some(false) {
+            // Of one that failed that is no news.
+            let has_failed = |it: &StageSummary| it.stage == *to && it.failed;
+            if link.ended == Some(false) && !self.stages.iter().any(has_failed) {
                 lines.push(format!(
                     "stage `{to}` has not heard the end of the stream of `{from}`: more may have been sent"
                 ));

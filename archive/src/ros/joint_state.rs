@@ -1,5 +1,7 @@
 //! `sensor_msgs/msg/JointState`.
 
+use std::collections::BTreeMap;
+
 use byteorder::ByteOrder;
 use cdr_encoding::CdrDeserializer;
 use serde::{Deserialize, Serialize};
@@ -71,6 +73,12 @@ impl Message for JointState {
 }
 
 impl JointState {
+    /// Places in `name` of the first joint that stands there more than once: its first and its second. Which of their
+    /// values hold, nobody knows.
+    pub fn named_twice(&self) -> Option<[usize; 2]> {
+        first_twice(&self.name)
+    }
+
     /// Stamp and numbers of a message that names the same frame and joints as `self`; `None` if it does not, or ends
     /// otherwise than its counts say.
     fn read_numbers(&mut self, from: &mut Walk<'_>) -> Option<()> {
@@ -124,6 +132,13 @@ impl Walk<'_> {
         }
         Some(())
     }
+}
+
+/// Places of the first name that stands there more than once: its first and its second.
+pub fn first_twice(names: &[String]) -> Option<[usize; 2]> {
+    let mut seen = BTreeMap::new();
+    let mut places = names.iter().enumerate();
+    places.find_map(|(at, name)| seen.insert(name, at).map(|first| [first, at]))
 }
 
 #[cfg(test)]

@@ -11,6 +11,9 @@ use crate::shell::pulse::Pulse;
 use crate::stage::StageError;
 use crate::trouble::Trouble;
 
+/// What is said of the stage that failed, to those that end with it.
+const OF_ANOTHER: &str = ", which runs with it, failed";
+
 /// What a stage has done so far.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Report {
@@ -108,6 +111,16 @@ impl Outcome {
             StageError::Unfit(_) => Self::Unfit(why),
             StageError::Failed(_) | StageError::Link(_) => Self::Failed(why),
         }
+    }
+
+    /// Of a stage that ended because `other`, of the same tree, failed.
+    pub(super) fn with(other: &str) -> Self {
+        Self::Failed(format!("stage `{other}`{OF_ANOTHER}"))
+    }
+
+    /// Whether it could not go on because another stage of its tree failed, which says why.
+    pub fn is_of_another(&self) -> bool {
+        self.failure().is_some_and(|why| why.ends_with(OF_ANOTHER))
     }
 
     /// Why it could not go on, if it could not.

@@ -193,7 +193,7 @@ pub(super) fn fell(reports: &mut [Report], stage: &str, outcome: &Outcome) {
         report.outcome = Some(if report.stage == stage {
             outcome.clone()
         } else {
-            Outcome::Failed(format!("stage `{stage}`, which runs with it, failed"))
+            Outcome::with(stage)
         });
     }
 }

@@ -83,6 +83,15 @@ fn parse(xml: &str) -> Result<Document<'_>, ModelError> {
             found: MAX_NODES as usize + 1,
             limit: MAX_NODES as usize,
         },
+        // Its place is that of the first letter.
+        Error::UnexpectedEndOfStream => {
+            let last = xml.lines().last().unwrap_or_default();
+            ModelError::Xml {
+                line: xml.lines().count().max(1) as u32,
+                column: last.chars().count() as u32 + 1,
+                reason: "the file ends in the middle of it".to_owned(),
+            }
+        }
         error => not_xml(&error),
     })
 }

@@ -1,6 +1,6 @@
 //! Where results are kept.
 
-use std::fs::{self, File};
+use std::fs::{self, File, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -89,8 +89,12 @@ impl Shelf for Folder {
             self.runner
         );
         let part = self.unfinished.join(name);
-        whole_file::begin(&part);
-        let file = File::create_new(&part)?;
+        let new = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create_new(true)
+            .clone();
+        let file = whole_file::create(&part, &new)?;
         whole_file::hold(&file)?;
         Ok((part, file))
     }

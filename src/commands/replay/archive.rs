@@ -22,7 +22,7 @@ use tauscope_pipeline::results::{
 use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::Output;
-use crate::progress::Progress;
+use crate::progress::{Progress, Show};
 use crate::terminal;
 
 /// Time between two lines that say how far it is, where no bar can be drawn.
@@ -76,6 +76,8 @@ pub struct Job<'a> {
     pub with_scores: bool,
     /// Machine-readable.
     pub json: bool,
+    /// What is shown of the progress.
+    pub show: Show,
 }
 
 /// What came of it.
@@ -200,8 +202,13 @@ type Work<'a> = dyn Fn(&Wanted, &mut dyn FnMut(f64) -> bool) -> Result<Done, Uni
 /// What became of each recording.
 fn replay_all(job: &Job<'_>, manifest: &Manifest, work: &Work<'_>) -> Vec<End> {
     let count = manifest.wanted.len();
-    let progress = Progress::new(count);
-    let log = Log::new(count);
+    // It has lines of its own.
+    let bar = match job.show {
+        Show::BarOrLines => Show::Bar,
+        other => other,
+    };
+    let progress = Progress::new(count, bar);
+    let log = Log::new(count, job.show);
     // Runners that meet begin at different places, so that they seldom do the same.
     let first = std::hash::BuildHasher::hash_one(
         &std::collections::hash_map::RandomState::new(),
@@ -236,6 +243,7 @@ fn replay_all(job: &Job<'_>, manifest: &Manifest, work: &Work<'_>) -> Vec<End> {
 /// Lines that say how far it is, where no bar can be drawn: the log of a cluster's job.
 struct Log {
     count: usize,
+    show: Show,
     begun: Instant,
     told: Mutex<Instant>,
     ended: AtomicUsize,
@@ -245,9 +253,10 @@ struct Log {
 }
 
 impl Log {
-    fn new(count: usize) -> Self {
+    fn new(count: usize, show: Show) -> Self {
         Self {
             count,
+            show,
             begun: Instant::now(),
             told: Mutex::new(Instant::now()),
             ended: AtomicUsize::new(0),
@@ -264,7 +273,8 @@ impl Log {
         let failed = count(&self.failed, matches!(end, End::Failed(_)));
         let replayed = count(&self.replayed, !matches!(end, End::Done(Done::Before)));
         let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
-        if terminal::can_redraw() || told.elapsed() < TOLD_EVERY {
+        let has_lines = self.show == Show::BarOrLines && !terminal::can_redraw();
+        if !has_lines || told.elapsed() < TOLD_EVERY {
             return;
         }
         *told = Instant::now();

@@ -38,7 +38,8 @@ pub fn table(outcomes: &[Outcome]) -> String {
                 );
                 continue;
             }
-            let _ = writeln!(text, "  {name}: {events} events");
+            let plural = if events == 1 { "" } else { "s" };
+            let _ = writeln!(text, "  {name}: {events} event{plural}");
             for event in &detector.events {
                 let line = event_line(event, &outcome.effort_unit);
                 let _ = writeln!(text, "    {line}");

@@ -3,7 +3,7 @@
 
 use schemars::{Schema, SchemaGenerator};
 
-use crate::frame::{AnySettings, DetectorSettings, Setup, Suits, Trained, Training};
+use crate::frame::{AnySettings, DetectorSettings, ScoreUnit, Setup, Suits, Trained, Training};
 use crate::{indri, salt_ducaju, tajiri, tauscope};
 
 /// All detectors, in the order of an evaluation's tables.
@@ -33,6 +33,8 @@ pub struct Entry {
     pub about: &'static str,
     /// Standard deviations from the mean score to its alarm where the file names no threshold.
     pub sigmas: f64,
+    /// What its score is measured in.
+    pub score_unit: ScoreUnit,
     /// What its training is.
     pub training: Training,
     /// Whether chance has a part in its training.
@@ -65,6 +67,7 @@ impl Entry {
             name: S::NAME,
             about: S::ABOUT,
             sigmas: S::SIGMAS,
+            score_unit: S::SCORE_UNIT,
             training: S::TRAINING,
             random: S::RANDOM,
             suits: S::SUITS,

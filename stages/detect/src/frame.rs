@@ -38,7 +38,7 @@ pub use error::ConfigError;
 pub use here_or_file::HereOrFile;
 pub use isolation::{Contact, Isolation};
 pub use lesson::{ContactKind, LabelledContact, LearnError, Lesson, Lessons, Task};
-pub use settings::{AnySettings, DetectorSettings, Suits, Training};
+pub use settings::{AnySettings, DetectorSettings, ScoreUnit, Suits, Training};
 pub use setup::{Impedance, JointSetup, Setup};
 pub use shared::Shared;
 pub(crate) use shared::Tap;

@@ -56,6 +56,6 @@ pub use detectors::{DETECTORS, Entry};
 pub use frame::{
     AnySettings, ConfigError, Contact, ContactKind, Details, Detect, Detector, DetectorSettings,
     HereOrFile, Impedance, Isolation, JointSetup, Judgement, LabelledContact, LearnError, Lesson,
-    Lessons, ScoreStatistics, Seen, Setup, Shared, State, Suits, Sweeps, Task, Threshold, Trained,
-    TrainedError, Training, Verdict,
+    Lessons, ScoreStatistics, ScoreUnit, Seen, Setup, Shared, State, Suits, Sweeps, Task,
+    Threshold, Trained, TrainedError, Training, Verdict,
 };

@@ -297,7 +297,7 @@ impl Tauscope {
         let mut windows = Windows::new(learnt, settings.follow());
         windows.seek(threshold, per_hour);
         Self {
-            rate: Rate::new(learnt.rate_hz),
+            rate: Rate::new(Settings::NAME, setup, learnt.rate_hz),
             late: Late::new(setup),
             windows,
             moved: Ring::new(),

@@ -217,13 +217,12 @@ fn what_was_learnt_at_one_rate_does_not_judge_another_and_ends_where_there_is_no
     for (i, sample) in slow.iter_mut().enumerate() {
         sample.header.stamp_ns = i as i64 * 20_000_000;
     }
-    // A hundred steps and one tell that it is another rate; five times as many, that it is no spell.
-    let (first, spell) = slow.split_at(101);
-    assert!(run(&mut stage, first)[100].header.has(flags::READY));
-    let detections = run(&mut stage, &spell[..404]);
-    assert!(detections.iter().all(|it| !it.header.has(flags::READY)));
     let mut out = Out::default();
-    let error = stage.accept(&spell[404], &mut out).unwrap_err().to_string();
+    let error = (slow.iter()).find_map(|sample| stage.accept(sample, &mut out).err());
+    let error = error.unwrap().to_string();
+    // A spell of a few seconds is waited through.
+    assert!((300..600).contains(&out.0.len()), "{}", out.0.len());
+    assert!(out.0.iter().all(|it| !it.header.has(flags::READY)));
     assert!(error.contains("and here are 50.0"), "{error}");
 }
 

@@ -10,6 +10,7 @@ mod gather;
 mod layout;
 mod order;
 mod outcome;
+mod refused;
 mod side;
 
 use std::collections::VecDeque;
@@ -24,6 +25,7 @@ use gather::{Gather, Gathered, stamp_of};
 use layout::Layouts;
 use order::{Next, Order};
 pub use outcome::{PackCounts, PackError};
+use refused::Told;
 use side::Side;
 
 /// Samples that wait for their command at most.
@@ -70,6 +72,9 @@ pub struct Packer {
     flushed: bool,
     messages: u64,
     counts: PackCounts,
+    /// The first joint that a message names more than once.
+    twice: Option<(usize, [usize; 2])>,
+    told_refused: Told,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -120,6 +125,8 @@ impl Packer {
             flushed: false,
             messages: 0,
             counts: PackCounts::default(),
+            twice: None,
+            told_refused: Told::default(),
         })
     }
 
@@ -261,39 +268,6 @@ impl Packer {
         self.flushed = true;
     }
 
-    /// The first joint, and its field, that came in the states and was never finite.
-    pub fn never_finite(&self) -> Option<(String, &'static str)> {
-        let (joint, field) = self.state.never_finite()?;
-        Some((self.layouts.joint_name(joint).to_owned(), field))
-    }
-
-    /// Says, after the last message, why there was no sample if there was none.
-    ///
-    /// # Errors
-    /// What kept every message from becoming a sample.
-    pub fn verdict(&self) -> Result<(), PackError> {
-        if self.counts.packed > 0 || !self.pending.is_empty() {
-            return Ok(());
-        }
-        let messages = self.messages;
-        if let Some((joint, field)) = self.never_finite() {
-            return Err(PackError::NotFiniteThroughout {
-                joint,
-                field,
-                messages,
-            });
-        }
-        let missing = self.layouts.never_named();
-        if messages > 0 && !missing.is_empty() {
-            let found = self.layouts.names_found();
-            return Err(PackError::JointsMissing { missing, found });
-        }
-        if messages > 0 && self.counts.incomplete == messages {
-            return Err(PackError::NoPositions { messages });
-        }
-        Err(PackError::NoSample { messages })
-    }
-
     /// Adds a message to what its topic brought; gives the state of all joints once it is whole.
     fn gather(
         &mut self,
@@ -304,6 +278,11 @@ impl Packer {
         let layout = self.layouts.of(&message.name);
         if layout.joints == 0 {
             self.counts.foreign += 1;
+            return None;
+        }
+        if let Some(twice) = layout.twice {
+            self.counts.ambiguous += 1;
+            self.twice.get_or_insert(twice);
             return None;
         }
         let gather = match topic {

@@ -49,6 +49,7 @@ pub struct RecordedSource {
     log_times_ns: (i64, i64),
     now_ns: i64,
     ended: bool,
+    told_refused: bool,
     damage: Vec<Damage>,
     undecodable: u64,
     first_undecodable: Option<ArchiveError>,
@@ -122,6 +123,7 @@ impl RecordedSource {
             log_times_ns,
             now_ns: log_times_ns.0,
             ended: false,
+            told_refused: false,
             damage: recording.damage().to_vec(),
             undecodable: 0,
             first_undecodable: None,
@@ -242,6 +244,14 @@ impl RecordedSource {
         Ok(())
     }
 
+    /// Says what could not be used, once all has been read.
+    fn tell_refused(&mut self) {
+        if let Some(refused) = self.packer.refused().filter(|_| !self.told_refused) {
+            tracing::warn!("{}: {refused}", self.path.display());
+        }
+        self.told_refused = true;
+    }
+
     /// The commands of a message of an archive. What is none of ours is told of and left alone.
     fn take_told(&mut self) {
         for status in &self.told.status {
@@ -303,11 +313,11 @@ impl Source<JointState> for RecordedSource {
             }
             let due = self.read_on(MESSAGES_PER_STEP);
             if !due.map_err(StageError::failed)? {
-                return Ok(if self.ended {
-                    Progress::End
-                } else {
-                    Progress::More
-                });
+                if !self.ended {
+                    return Ok(Progress::More);
+                }
+                self.tell_refused();
+                return Ok(Progress::End);
             }
             let packer = &mut self.packer;
             out.emit(&mut |slot| packer.pop_into(slot))?;

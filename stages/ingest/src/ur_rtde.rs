@@ -120,6 +120,9 @@ impl UrRtdeSource {
         fill(&mut self.message.velocity, Part::Velocity);
         fill(&mut self.message.effort, Part::Effort);
         self.packer.state(&self.message, received_ns);
+        if let Some(refused) = self.packer.newly_refused(received_ns) {
+            tracing::warn!("{}: {refused}", self.settings.host);
+        }
     }
 
     /// Tells of the payload when it changes.

@@ -241,6 +241,9 @@ impl ZenohSource {
             Role::Tool => packer.tool(&self.tool, received_ns),
             Role::Learn => packer.learn(self.learn),
         }
+        if let Some(refused) = packer.newly_refused(received_ns) {
+            tracing::warn!("{}: {refused}", waiting.key);
+        }
     }
 }
 

@@ -44,6 +44,8 @@ pub struct StreamInfo {
     pub kind: SampleKind,
     /// The detector that speaks in it, where that is known.
     pub detector: Option<String>,
+    /// What its scores are measured in; empty for nothing, and where that is not known.
+    pub score_unit: String,
 }
 
 /// A stream with its place among the others.
@@ -54,6 +56,8 @@ pub(crate) struct Stream {
     pub kind: SampleKind,
     /// What tells it from its like in the cell: the detector, or else the stage.
     pub label: String,
+    /// What a detector's scores are measured in; empty for nothing, and where that is not known.
+    pub score_unit: String,
     /// Topic of the effort, the twin's effort or the detections; see [`Streams`].
     pub topic: String,
 }
@@ -142,6 +146,7 @@ impl Streams {
                 cell,
                 kind,
                 label,
+                score_unit: stream.score_unit.clone(),
                 topic,
             });
         }
@@ -249,6 +254,7 @@ mod tests {
             cell: cell.to_owned(),
             kind,
             detector,
+            score_unit: String::new(),
         }
     }
 

@@ -59,7 +59,7 @@ pub(crate) fn over(ended: &Contact) -> String {
         return "learned: the rule from now on".to_owned();
     }
     let kind = ended.kind.as_str().replace('_', " ");
-    let mut text = format!("{kind} ended after {:.2} s", ended.duration_s());
+    let mut text = format!("{kind} ended after {}", ended.duration_in_words());
     if ended.peak().is_some() {
         text += &format!(", at its strongest {ended}");
     }

@@ -54,6 +54,36 @@ fn read(path: &Path) -> (BTreeMap<String, Vec<Chunk>>, BTreeSet<String>) {
     (recording, blueprint)
 }
 
+/// All that the blueprint says, as text.
+fn blueprint_text(path: &Path) -> String {
+    let reader = BufReader::new(File::open(path).unwrap());
+    let mut text = String::new();
+    for message in DecoderApp::decode_eager(reader).unwrap() {
+        if let LogMsg::ArrowMsg(store, message) = message.unwrap()
+            && store.is_blueprint()
+        {
+            text += &format!("{:?}", message.batch);
+        }
+    }
+    text
+}
+
+#[test]
+fn the_plot_of_a_score_names_its_unit_and_the_value_of_its_threshold() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("demo.rrd");
+    let cells = [cell("demo", Some(arm(false)))];
+    let mut recorder = recorder(to_file(&path), &cells, &streams("demo", "")).unwrap();
+    for instant in motion(5.0) {
+        instant.feed(&mut recorder, "");
+    }
+    recorder.finish().unwrap();
+    let text = blueprint_text(&path);
+    assert!(text.contains("Score of twin_regression [(N m)²]"), "{text}");
+    let threshold = format!("threshold {} (alarm from here on)", synthetic::THRESHOLD);
+    assert!(text.contains(&threshold), "{text}");
+}
+
 fn rows(chunks: &[Chunk]) -> usize {
     chunks
         .iter()

@@ -3,6 +3,7 @@
 use tauscope_bus::{TwinState, flags};
 
 use super::lesson::Lesson;
+use super::setup::Setup;
 
 /// Steps whose median is a stream's period.
 /// Statistical: odd, so that the median is one of them, and enough that a few late ones do not move it.
@@ -29,6 +30,8 @@ const TOLD_EVERY_NS: i64 = 10_000_000_000;
 /// The rate is looked at all the time, for a publisher may have a slow spell. While it lasts the detector cannot judge.
 #[derive(Debug, Clone)]
 pub(crate) struct Rate {
+    /// The detector and its cell, for the warnings.
+    who: String,
     learnt_hz: f64,
     before_ns: Option<i64>,
     periods_ns: [i64; COUNT],
@@ -46,9 +49,14 @@ pub(crate) struct Rate {
 }
 
 impl Rate {
-    /// For what was learnt at `learnt_hz`.
-    pub fn new(learnt_hz: f64) -> Self {
+    /// For what the detector `name` of the cell in `setup` learnt at `learnt_hz`.
+    pub fn new(name: &str, setup: &Setup, learnt_hz: f64) -> Self {
+        let cell = match setup.cell.as_str() {
+            "" => String::new(),
+            cell => format!(" of cell `{cell}`"),
+        };
         Self {
+            who: format!("detector `{name}`{cell}"),
             learnt_hz,
             before_ns: None,
             periods_ns: [0; COUNT],
@@ -99,14 +107,18 @@ impl Rate {
             return;
         }
         self.told_ns = Some(now_ns);
-        let learnt_hz = self.learnt_hz;
-        if is_right {
-            tracing::warn!("a detector judges again: {found_hz:.1} samples a second");
-        } else {
-            tracing::warn!(
-                "a detector cannot judge: it has learnt from {learnt_hz:.1} samples a second, and here are {found_hz:.1}"
-            );
+        tracing::warn!("{}", self.told(found_hz));
+    }
+
+    /// What a person reads of a rate that has changed to `found_hz`.
+    fn told(&self, found_hz: f64) -> String {
+        let (who, learnt_hz) = (&self.who, self.learnt_hz);
+        if same(learnt_hz, found_hz) {
+            return format!("{who} judges again: {found_hz:.1} samples a second");
         }
+        format!(
+            "{who} cannot judge: it has learnt from {learnt_hz:.1} samples a second, and here are {found_hz:.1}"
+        )
     }
 
     /// Whether the stream has the rate. Of the first few samples nobody knows yet.
@@ -164,9 +176,27 @@ mod tests {
         stamp_ns + 1_000_000_000
     }
 
+    fn rate(learnt_hz: f64) -> Rate {
+        Rate::new("tauscope", &Setup::default(), learnt_hz)
+    }
+
+    #[test]
+    fn a_warning_names_the_detector_and_its_cell() {
+        let setup = Setup {
+            cell: "press_3".to_owned(),
+            ..Setup::default()
+        };
+        let rate = Rate::new("window_ocsvm", &setup, 500.0);
+        let who = "detector `window_ocsvm` of cell `press_3`";
+        let cannot = "cannot judge: it has learnt from 500.0 samples a second, and here are 100.0";
+        assert_eq!(rate.told(100.0), format!("{who} {cannot}"));
+        let again = "judges again: 499.0 samples a second";
+        assert_eq!(rate.told(499.0), format!("{who} {again}"));
+    }
+
     #[test]
     fn a_slow_spell_is_waited_through() {
-        let mut rate = Rate::new(500.0);
+        let mut rate = rate(500.0);
         let mut now_ns = second(&mut rate, 0, 500);
         assert!(rate.is_right());
         for hz in [250, 5, 5, 5] {
@@ -181,7 +211,7 @@ mod tests {
 
     #[test]
     fn nothing_is_judged_before_the_rate_is_known() {
-        let mut rate = Rate::new(500.0);
+        let mut rate = rate(500.0);
         for n in 0..3_i64 {
             let mut sample = TwinState::default();
             sample.header.stamp_ns = n * 200_000_000;
@@ -192,7 +222,7 @@ mod tests {
 
     #[test]
     fn a_stream_that_never_has_the_rate_is_a_fault() {
-        let mut rate = Rate::new(100.0);
+        let mut rate = rate(100.0);
         let mut now_ns = 0;
         for _ in 0..2 {
             now_ns = second(&mut rate, now_ns, 200);

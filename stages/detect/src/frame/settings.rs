@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use tauscope_bus::EffortUnit;
 
 use super::detector::{Detector, State};
 use super::error::ConfigError;
@@ -36,6 +37,8 @@ pub trait DetectorSettings:
     /// Standard deviations from the mean score of contact-free data to its alarm where the file names no
     /// threshold: equation 7 of Tajiri and Iwamoto.
     const SIGMAS: f64 = 4.0;
+    /// What its score is measured in.
+    const SCORE_UNIT: ScoreUnit = ScoreUnit::None;
     /// What its training is.
     const TRAINING: Training = Training::None;
     /// Whether chance has a part in its training.
@@ -129,6 +132,31 @@ pub trait DetectorSettings:
     /// If that is the state of another detector.
     fn resume(&mut self, _state: State) -> Result<(), serde_json::Error> {
         Ok(())
+    }
+}
+
+/// What a detector's score is measured in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ScoreUnit {
+    /// Nothing: it is a ratio, or what a net makes of scaled numbers.
+    None,
+    /// The square of the effort's unit.
+    SquaredEffort,
+    /// The square of a torque, whatever the effort is.
+    SquaredTorque,
+    /// Newton.
+    Newton,
+}
+
+impl ScoreUnit {
+    /// For a cell whose efforts are in this unit; empty where there is none.
+    pub fn in_words(self, effort: EffortUnit) -> &'static str {
+        match (self, effort) {
+            (Self::None, _) => "",
+            (Self::SquaredEffort, EffortUnit::Nm) | (Self::SquaredTorque, _) => "(N m)²",
+            (Self::SquaredEffort, EffortUnit::A) => "A²",
+            (Self::Newton, _) => "N",
+        }
     }
 }
 

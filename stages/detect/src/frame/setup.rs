@@ -13,6 +13,8 @@ use super::trained::{ScoreStatistics, Trained};
 /// What a detector must know of its cell and its twin.
 #[derive(Debug, Clone, Default)]
 pub struct Setup {
+    /// The cell's name, for warnings; empty where there is none.
+    pub cell: String,
     /// By joint in URDF order.
     pub joints: Vec<JointSetup>,
     /// Their names: what was learnt by joint belongs to them.

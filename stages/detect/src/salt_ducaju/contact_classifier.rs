@@ -14,8 +14,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::frame::{
-    ClassSweep, ConfigError, ContactKind, Detector, DetectorSettings, LearnError, Lessons, Setup,
-    Suits, Sweeps, Task, Trained, Training,
+    ClassSweep, ConfigError, ContactKind, Detector, DetectorSettings, LearnError, Lessons,
+    ScoreUnit, Setup, Suits, Sweeps, Task, Trained, Training,
 };
 use crate::salt_ducaju::contact_machine::{ContactDetector, MachineSettings, NewContact, Rule};
 use crate::salt_ducaju::contact_signals::{SignalSettings, Signals};
@@ -58,6 +58,7 @@ impl Default for Settings {
 impl DetectorSettings for Settings {
     const NAME: &'static str = NAME;
     const ABOUT: &'static str = "Collision or cooperation, by the force's frequency content and direction (Salt Ducaju et al.).";
+    const SCORE_UNIT: ScoreUnit = ScoreUnit::Newton;
     const TRAINING: Training = Training::Own;
     const SUITS: Suits = Suits::Kinds;
 

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::frame::{
     ConfigError, ContactKind, Detector, DetectorSettings, Discriminant, LearnError, Lessons,
-    Moments, Setup, Suits, Task, Trained, Training,
+    Moments, ScoreUnit, Setup, Suits, Task, Trained, Training,
 };
 use crate::salt_ducaju::contact_machine::{
     ContactDetector, MachineSettings, NewContact, Rule, unit,
@@ -40,6 +40,7 @@ pub struct Settings {
 impl DetectorSettings for Settings {
     const NAME: &'static str = NAME;
     const ABOUT: &'static str = "The same detection, told apart by Fisher's linear discriminant.";
+    const SCORE_UNIT: ScoreUnit = ScoreUnit::Newton;
     const TRAINING: Training = Training::Own;
     const SUITS: Suits = Suits::Kinds;
 

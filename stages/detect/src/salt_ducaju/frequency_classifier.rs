@@ -13,7 +13,7 @@ use tauscope_bus::TwinState;
 
 use crate::frame::{
     ConfigError, ContactKind, Details, Detector, DetectorSettings, Judgement, LearnError, Lessons,
-    Setup, Suits, Tap, Task, Trained, Training,
+    ScoreUnit, Setup, Suits, Tap, Task, Trained, Training,
 };
 use crate::salt_ducaju::contact_machine::{
     Machine, MachineSettings, NewContact, Ongoing, Rule, judgement,
@@ -56,6 +56,7 @@ impl Default for Settings {
 impl DetectorSettings for Settings {
     const NAME: &'static str = NAME;
     const ABOUT: &'static str = "The same detection, told apart by the frequency content alone.";
+    const SCORE_UNIT: ScoreUnit = ScoreUnit::Newton;
     const TRAINING: Training = Training::Own;
     const SUITS: Suits = Suits::Kinds;
 

@@ -23,7 +23,8 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::frame::{
-    ConfigError, Detector, DetectorSettings, LearnError, Setup, Suits, Task, Trained, Training,
+    ConfigError, Detector, DetectorSettings, LearnError, ScoreUnit, Setup, Suits, Task, Trained,
+    Training,
 };
 
 pub(crate) use autoencoder::Autoencoder;
@@ -39,6 +40,8 @@ pub(crate) trait TrainedSettings: Clone + Default {
     const ABOUT: &'static str;
     /// Whether chance has a part in its training.
     const RANDOM: bool;
+    /// What its score is measured in.
+    const SCORE_UNIT: ScoreUnit = ScoreUnit::None;
     /// Reads what scores from the file.
     const LOAD: Load;
 
@@ -73,6 +76,7 @@ where
     S: Send + Sync + 'static,
 {
     const NAME: &'static str = <S as TrainedSettings>::NAME;
+    const SCORE_UNIT: ScoreUnit = <S as TrainedSettings>::SCORE_UNIT;
     const ABOUT: &'static str = <S as TrainedSettings>::ABOUT;
     const TRAINING: Training = Training::Own;
     const RANDOM: bool = <S as TrainedSettings>::RANDOM;

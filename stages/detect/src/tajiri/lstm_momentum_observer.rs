@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::frame::{LearnError, SignalSettings, Task, Trained};
+use crate::frame::{LearnError, ScoreUnit, SignalSettings, Task, Trained};
 use crate::tajiri::learned::{self, GivenTraining, Load, Lstm, TrainedSettings, TrainingSettings};
 
 /// Settings of `lstm_momentum_observer`. All but `model` are those of its training.
@@ -55,6 +55,7 @@ impl TrainedSettings for Settings {
     const NAME: &'static str = "lstm_momentum_observer";
     const ABOUT: &'static str =
         "Momentum observer less what an LSTM expects of it (Tajiri and Iwamoto, after Lim et al.).";
+    const SCORE_UNIT: ScoreUnit = ScoreUnit::SquaredTorque;
     const RANDOM: bool = true;
     const LOAD: Load = Lstm::scorer;
 

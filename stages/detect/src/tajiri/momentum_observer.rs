@@ -11,7 +11,9 @@ use tauscope_bus::{MAX_JOINTS, TwinState, flags};
 use tauscope_dynamics::lowpass::Butterworth2;
 
 use crate::frame::momentum::{DEFAULT_GAIN_PER_S, MomentumObserver};
-use crate::frame::{ConfigError, Detector, DetectorSettings, JointSetup, Judgement, Setup};
+use crate::frame::{
+    ConfigError, Detector, DetectorSettings, JointSetup, Judgement, ScoreUnit, Setup,
+};
 
 /// Canonical name.
 pub(crate) const NAME: &str = "momentum_observer";
@@ -47,6 +49,7 @@ impl DetectorSettings for Settings {
     const NAME: &'static str = NAME;
     const ABOUT: &'static str =
         "Squared length of the external torque that a momentum observer of the rigid body sees.";
+    const SCORE_UNIT: ScoreUnit = ScoreUnit::SquaredTorque;
     const SIGMAS: f64 = SIGMAS;
 
     fn build(&self, setup: &Setup, _hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {

@@ -4,7 +4,7 @@
 //! The twin's low-pass is linear with gain 1 at rest, so the regression can be undone behind it; one
 //! twin stage serves both detectors.
 
-use crate::frame::{ConfigError, Detector, DetectorSettings, Judgement, Setup};
+use crate::frame::{ConfigError, Detector, DetectorSettings, Judgement, ScoreUnit, Setup};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tauscope_bus::{MAX_JOINTS, TwinState, flags};
@@ -20,6 +20,7 @@ pub struct Settings {}
 impl DetectorSettings for Settings {
     const NAME: &'static str = NAME;
     const ABOUT: &'static str = "The same without the regression: gain 1, offset 0.";
+    const SCORE_UNIT: ScoreUnit = ScoreUnit::SquaredEffort;
 
     fn build(&self, setup: &Setup, _hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {
         let mut regression = [(1.0, 0.0); MAX_JOINTS];

@@ -6,7 +6,9 @@
 //! that). The alarm is raised where it reaches mean + 4 standard deviations of the score on
 //! contact-free data.
 
-use crate::frame::{ConfigError, Detector, DetectorSettings, Judgement, Setup, Training};
+use crate::frame::{
+    ConfigError, Detector, DetectorSettings, Judgement, ScoreUnit, Setup, Training,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tauscope_bus::{TwinState, flags};
@@ -23,6 +25,7 @@ impl DetectorSettings for Settings {
     const NAME: &'static str = NAME;
     const ABOUT: &'static str =
         "Squared length of the residual after the twin's regression (Tajiri and Iwamoto).";
+    const SCORE_UNIT: ScoreUnit = ScoreUnit::SquaredEffort;
     const TRAINING: Training = Training::Twin;
 
     fn build(&self, _setup: &Setup, _hold_s: f64) -> Result<Box<dyn Detector>, ConfigError> {

@@ -1,6 +1,6 @@
 //! Puts together the state of all joints, which one message may bring or several.
 
-use tauscope_archive::ros;
+use tauscope_archive::{FIELDS, FieldTally, NotFinite, ros};
 use tauscope_bus::{JointArray, MAX_JOINTS};
 
 use super::layout::Layout;
@@ -41,9 +41,12 @@ pub(super) struct Gather {
     replaced: u64,
     /// Replaced messages of states that were whole too late.
     in_vain: u64,
-    /// Bit j: the number was finite once, or was not, for position, velocity and effort.
-    finite: [u32; 3],
-    not_finite: [u32; 3],
+    /// By joint, its position, velocity and effort: how many are not finite.
+    fields: Vec<[FieldTally; 3]>,
+    /// Stamp of the first message \[ns\].
+    first_ns: Option<i64>,
+    /// Numbers that were not finite.
+    bad: u64,
 }
 
 const NOTHING: Gathered = Gathered {
@@ -66,8 +69,9 @@ impl Gather {
             newest_ns: 0,
             replaced: 0,
             in_vain: 0,
-            finite: [0; 3],
-            not_finite: [0; 3],
+            fields: vec![<_>::default(); joint_count],
+            first_ns: None,
+            bad: 0,
         }
     }
 
@@ -88,8 +92,10 @@ impl Gather {
         }
         self.seen |= layout.joints;
         self.newest_ns = received_ns;
+        let stamp_ns = stamp_of(&message.header, received_ns);
+        self.first_ns.get_or_insert(stamp_ns);
         let parts = &mut self.parts;
-        parts.stamp_ns = parts.stamp_ns.max(stamp_of(&message.header, received_ns));
+        parts.stamp_ns = parts.stamp_ns.max(stamp_ns);
         parts.has_position &= !message.position.is_empty();
         parts.has_velocity &= !message.velocity.is_empty();
         parts.has_effort &= !message.effort.is_empty();
@@ -102,11 +108,8 @@ impl Gather {
             for (&value, place) in values.iter().zip(&layout.places) {
                 let Some(j) = *place else { continue };
                 target[j] = value;
-                if value.is_finite() {
-                    self.finite[field] |= 1 << j;
-                } else {
-                    self.not_finite[field] |= 1 << j;
-                }
+                self.fields[j][field].add(stamp_ns, value);
+                self.bad += u64::from(!value.is_finite());
             }
         }
         if self.seen & self.all != self.all {
@@ -132,13 +135,26 @@ impl Gather {
 
     /// The first joint and field that came and was never finite.
     pub fn never_finite(&self) -> Option<(usize, &'static str)> {
-        ["position", "velocity", "effort"]
-            .into_iter()
-            .zip(self.not_finite.iter().zip(&self.finite))
-            .find_map(|(field, (bad, good))| {
-                let never = bad & !good;
-                (never != 0).then(|| (never.trailing_zeros() as usize, field))
-            })
+        (0..FIELDS.len()).find_map(|field| {
+            let mut joints = self.fields.iter();
+            let joint = joints.position(|fields| fields[field].is_never_finite())?;
+            Some((joint, FIELDS[field]))
+        })
+    }
+
+    /// How many numbers were not finite.
+    pub fn bad(&self) -> u64 {
+        self.bad
+    }
+
+    /// By joint and field, what was not finite; times count from the first message on.
+    pub fn not_finite(&self) -> impl Iterator<Item = (usize, NotFinite)> {
+        let first_ns = self.first_ns.unwrap_or(0);
+        let joints = self.fields.iter().enumerate();
+        joints.flat_map(move |(joint, fields)| {
+            let fields = fields.iter().zip(FIELDS);
+            fields.filter_map(move |(tally, field)| Some((joint, tally.found(field, first_ns)?)))
+        })
     }
 }
 

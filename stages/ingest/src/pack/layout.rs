@@ -15,6 +15,8 @@ pub(super) struct Layout {
     pub places: Vec<Option<usize>>,
     /// Bit j: the message has joint j.
     pub joints: u32,
+    /// A joint of the cell that the message names more than once, and its first and second place.
+    pub twice: Option<(usize, [usize; 2])>,
 }
 
 /// The layouts of all publishers that were heard.
@@ -64,6 +66,7 @@ impl Layouts {
             .collect();
         let joints = places.iter().flatten().fold(0, |mask, &j| mask | (1 << j));
         self.named |= joints;
+        let twice = first_twice(&places);
         for name in names {
             if self.found.len() < MAX_FOUND && !self.found.contains(name) {
                 self.found.push(name.clone());
@@ -76,6 +79,7 @@ impl Layouts {
             names: names.to_vec(),
             places,
             joints,
+            twice,
         });
         self.known.len() - 1
     }
@@ -98,4 +102,14 @@ impl Layouts {
     pub fn names_found(&self) -> Vec<String> {
         self.found.clone()
     }
+}
+
+/// The first joint of the cell that stands at more than one place, and the first two of these.
+fn first_twice(places: &[Option<usize>]) -> Option<(usize, [usize; 2])> {
+    let mut named = places.iter().enumerate();
+    named.find_map(|(second, place)| {
+        let joint = (*place)?;
+        let first = places.iter().position(|other| *other == Some(joint))?;
+        (first < second).then_some((joint, [first, second]))
+    })
 }

@@ -1,5 +1,7 @@
 //! What came of packing.
 
+use tauscope_archive::Twice;
+
 /// What a [`Packer`](super::Packer) has counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PackCounts {
@@ -17,6 +19,8 @@ pub struct PackCounts {
     pub parted: u64,
     /// Messages without what their topic is for: a state without positions, an effort that is absent.
     pub incomplete: u64,
+    /// Messages that name a joint of the cell more than once.
+    pub ambiguous: u64,
     /// Messages about other joints than the cell's.
     pub foreign: u64,
     /// Times that the clock was set back.
@@ -26,7 +30,7 @@ pub struct PackCounts {
 impl PackCounts {
     /// What is lost for good.
     pub fn dropped(&self) -> u64 {
-        self.not_finite + self.late + self.stalled + self.parted + self.incomplete
+        self.not_finite + self.late + self.stalled + self.parted + self.incomplete + self.ambiguous
     }
 }
 
@@ -43,6 +47,9 @@ pub enum PackError {
         /// How many messages were read.
         messages: u64,
     },
+    /// A joint that messages name more than once.
+    #[error("{0}: which of its values hold is not known; let the driver send each joint once")]
+    NamedTwice(Twice),
     /// Joints of the cell that no message names.
     #[error(
         "no joint state names {}; the messages name {}",

@@ -138,6 +138,50 @@ fn a_state_with_nan_is_dropped_and_counted() {
 }
 
 #[test]
+fn what_is_refused_is_told_by_joint_and_field_with_count_and_time() {
+    let mut packer = packer();
+    let mut told = Vec::new();
+    for n in 0..200 {
+        let stamp_ns = 1_000_000_000 * n;
+        let mut state = message(stamp_ns.max(1), "a b c", &[1.0, 2.0, 3.0]);
+        if (100..110).contains(&n) {
+            state.effort[1] = f64::NAN;
+        }
+        if n == 105 {
+            state.position[2] = f64::INFINITY;
+        }
+        packer.state(&state, stamp_ns);
+        told.extend(packer.newly_refused(stamp_ns));
+    }
+    // A live source says it at once, and what came since at most once a minute.
+    assert_eq!(told.len(), 2, "{told:?}");
+    let first = "the effort of b is NaN in 1 message at 100.000 s: refused, and counted as dropped";
+    assert_eq!(told[0], first);
+    let all = "the effort of b is NaN in 10 messages from 100.000 s to 109.000 s; \
+               the position of c is NaN or infinite in 1 message at 105.000 s: \
+               refused, and counted as dropped";
+    assert_eq!(packer.refused().unwrap(), all);
+    assert_eq!(told[1], all);
+}
+
+#[test]
+fn a_message_that_names_a_joint_twice_is_refused_and_named() {
+    let mut packer = packer();
+    packer.state(&message(1, "a b c b", &[1.0, 2.0, 3.0, 4.0]), 1);
+    packer.state(&message(2, "a b c b", &[1.0, 2.0, 3.0, 4.0]), 2);
+    let named = "2 messages name joint `b` twice, as entries 2 and 4 of `name`";
+    let verdict = packer.verdict().unwrap_err().to_string();
+    assert!(verdict.starts_with(named), "{verdict}");
+    assert_eq!(packer.counts().dropped(), 2);
+    assert!(packer.refused().unwrap().starts_with(named));
+    // Another arm's joints are not ours.
+    packer.state(&message(3, "a x b x c", &[1.0, 8.0, 2.0, 9.0, 3.0]), 3);
+    let samples = drain(&mut packer);
+    assert_eq!(samples.len(), 1);
+    assert_eq!(samples[0].position[..3], [1.0, 2.0, 3.0]);
+}
+
+#[test]
 fn a_joint_that_is_nan_throughout_is_named() {
     let mut packer = packer();
     for stamp in 1..100 {

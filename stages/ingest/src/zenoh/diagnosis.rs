@@ -1,5 +1,6 @@
 //! From what was waited for, what came and what was seen to the likeliest slip. Pure.
 
+use tauscope_archive::Twice;
 use tauscope_archive::ros::JointStateType;
 use tauscope_bus::Trouble;
 
@@ -39,6 +40,8 @@ pub(super) struct Fed {
     pub not_finite: u64,
     /// A joint and the field of it that came and was never finite.
     pub never_finite: Option<(String, &'static str)>,
+    /// A joint that messages name more than once.
+    pub twice: Option<Twice>,
     pub stale: u64,
 }
 
@@ -151,6 +154,19 @@ fn unusable(expected: &Expected, fed: &Fed, stem: &str, own: Option<&Publication
             "the driver has no measurement yet, or does not measure the {field} of this joint: make the joint `fixed` \
              in the URDF"
         )));
+    }
+    if let Some(Twice {
+        joint,
+        entries: [first, second],
+        ..
+    }) = &fed.twice
+    {
+        return Trouble::new(format!(
+            "the joint states on {stem} name joint `{joint}` twice, as entries {first} and {second} of `name`: they are refused"
+        ))
+        .likely(Some(
+            "two lists of joints are joined in one message: let the driver send each joint once".to_owned(),
+        ));
     }
     if fed.not_finite > 0 {
         return Trouble::new(format!("the joint states on {stem} hold NaN or infinity")).likely(

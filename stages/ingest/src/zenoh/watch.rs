@@ -82,6 +82,7 @@ impl Watch {
             foreign: packed.foreign - self.packed.foreign,
             incomplete: packed.incomplete - self.packed.incomplete,
             never_finite: packer.never_finite(),
+            twice: packer.twice(),
             not_finite: packed.not_finite - self.packed.not_finite,
             stale: stale(packed) - stale(self.packed),
             ..self.fed.clone()

@@ -225,12 +225,15 @@ impl Layout<'_> {
                     ])
                     .with_override(norms, &looks)
             } else {
-                TimeSeriesView::new(format!("Score of {label}"))
+                TimeSeriesView::new(format!("Score of {label}{}", unit_of(stream)))
                     .with_contents([score.to_string(), threshold.to_string()])
                     .with_override(score, &line("score", SCORE))
             };
             let view = view
-                .with_override(threshold, &line("threshold", CONTACT))
+                .with_override(
+                    threshold,
+                    &line(&threshold_name(self.painter.threshold(index)), CONTACT),
+                )
                 .into();
             self.properties.plot(&view, true, self.window_ns());
             plots.push(view);
@@ -241,6 +244,30 @@ impl Layout<'_> {
     fn window_ns(&self) -> Option<i64> {
         (self.purpose == Purpose::Live).then_some(LIVE_WINDOW_NS)
     }
+}
+
+/// What the axis of a detector's score shows.
+fn unit_of(stream: &Stream) -> String {
+    match stream.score_unit.as_str() {
+        "" => " (no unit)".to_owned(),
+        unit => format!(" [{unit}]"),
+    }
+}
+
+/// What the legend says of the threshold: its value, once that is known.
+fn threshold_name(value: Option<f64>) -> String {
+    let value = value.filter(|value| value.is_finite());
+    let value = value.map_or_else(String::new, |value| {
+        if value != 0.0 && value.abs() < 1e-3 {
+            return format!(" {value:.2e}");
+        }
+        let digits = format!(" {value:.4}");
+        digits
+            .trim_end_matches('0')
+            .trim_end_matches('.')
+            .to_owned()
+    });
+    format!("threshold{value} (alarm from here on)")
 }
 
 /// Two plots a row, more where there would be more than five rows.

@@ -45,6 +45,7 @@ pub(super) struct DetectionTracks {
     told: Option<(Name, i64)>,
     /// Where the arrow of the force ends: it moves with the touched link \[m\].
     arrow_m: Option<[f64; 3]>,
+    newest_threshold: Option<f64>,
 }
 
 /// The force's frequency content, and the states behind it.
@@ -137,9 +138,15 @@ impl DetectionTracks {
             force: ArrowTrack::new(force),
             directions: ArrowTrack::new(directions),
             content: None,
+            newest_threshold: None,
             told: None,
             arrow_m: None,
         })
+    }
+
+    /// The newest threshold.
+    pub fn newest_threshold(&self) -> Option<f64> {
+        self.newest_threshold
     }
 
     /// Whether the detector tells of the force's frequency content.
@@ -162,6 +169,7 @@ impl DetectionTracks {
             self.score.push(header, &[detection.score]);
         }
         self.threshold.push(header, &[detection.threshold]);
+        self.newest_threshold = Some(detection.threshold);
         let as_told = |(state, told_ns): (Name, i64)| {
             state == detection.state && header.stamp_ns.abs_diff(told_ns) < STATE_PERIOD_NS
         };

@@ -1,6 +1,6 @@
 //! The picture in a file.
 
-use std::fs::File;
+use std::fs::{File, OpenOptions};
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
@@ -42,10 +42,10 @@ impl PictureFile {
             whole_file::create_folder(folder).map_err(|error| failed(&error))?;
         }
         whole_file::set_part_aside(path).map_err(|error| failed(&error))?;
-        let file = File::create_new(&part).map_err(|error| failed(&error))?;
+        let new = OpenOptions::new().write(true).create_new(true).clone();
+        let file = whole_file::create(&part, &new).map_err(|error| failed(&error))?;
         whole_file::hold(&file).map_err(|error| failed(&error))?;
         whole_file::sync_folder_of(&part).map_err(|error| failed(&error))?;
-        whole_file::begin(&part);
         let twin = file.try_clone().map_err(|error| failed(&error))?;
         let encoder = Encoder::new_eager(
             CrateVersion::LOCAL,

@@ -138,6 +138,14 @@ impl Painter {
         matches!(&self.tracks[stream], Tracks::Detection(tracks) if tracks.has_content())
     }
 
+    /// The newest threshold of the detector of a stream.
+    pub fn threshold(&self, stream: usize) -> Option<f64> {
+        match &self.tracks[stream] {
+            Tracks::Detection(tracks) => tracks.newest_threshold(),
+            _ => None,
+        }
+    }
+
     /// Takes a sample of the stream number `index`, with what is known of its contact.
     pub fn accept(
         &mut self,

@@ -87,6 +87,7 @@ pub fn streams(cell: &str, suffix: &str) -> Vec<StreamInfo> {
         cell: cell.to_owned(),
         kind,
         detector,
+        score_unit: "(N m)²".to_owned(),
     })
     .into()
 }

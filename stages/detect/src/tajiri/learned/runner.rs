@@ -58,7 +58,7 @@ pub(crate) fn build(
     })?;
     Ok(Box::new(Learned {
         name,
-        rate: Rate::new(facts.rate_hz),
+        rate: Rate::new(name, setup, facts.rate_hz),
         signals,
         scorer,
         stamp_ns: i64::MIN,

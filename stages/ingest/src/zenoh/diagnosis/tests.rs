@@ -179,6 +179,17 @@ fn messages_that_cannot_be_used_are_told_of() {
             "have no positions",
         ),
         (
+            fed(&|fed| {
+                fed.twice = Some(tauscope_archive::Twice {
+                    joint: "joint1".to_owned(),
+                    entries: [1, 3],
+                    messages: 7500,
+                });
+            }),
+            "joint1 joint2",
+            "name joint `joint1` twice, as entries 1 and 3 of `name`",
+        ),
+        (
             fed(&|fed| fed.not_finite = 7500),
             "joint1 joint2",
             "NaN or infinity",
