@@ -2,6 +2,7 @@
 
 use std::fs::{self, File, OpenOptions};
 use std::io;
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -57,9 +58,11 @@ impl Folder {
         whole_file::create_folder(&unfinished)?;
         for entry in fs::read_dir(&unfinished)? {
             let path = entry?.path();
-            // One that another runner finishes at this moment is none of ours.
-            let dead = File::open(&path).is_ok_and(|file| file.try_lock().is_ok());
-            if dead {
+            // One that another runner finishes at this moment is none of ours. It is locked until it is gone, so that
+            // a runner that has just made it notices.
+            if let Ok(file) = File::open(&path)
+                && file.try_lock().is_ok()
+            {
                 let _ = fs::remove_file(&path);
             }
         }
@@ -82,21 +85,24 @@ impl Shelf for Folder {
 
     fn begin(&self, name: &str) -> io::Result<(PathBuf, File)> {
         let file_name = Path::new(name).file_name().unwrap_or_default();
-        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
-        let name = format!(
-            "{}.{}.{number}.part",
-            file_name.to_string_lossy(),
-            self.runner
-        );
-        let part = self.unfinished.join(name);
+        let file_name = file_name.to_string_lossy();
         let new = OpenOptions::new()
             .read(true)
             .write(true)
             .create_new(true)
             .clone();
-        let file = whole_file::create(&part, &new)?;
-        whole_file::hold(&file)?;
-        Ok((part, file))
+        loop {
+            let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+            let name = format!("{file_name}.{}.{number}.part", self.runner);
+            let part = self.unfinished.join(name);
+            let file = whole_file::create(&part, &new)?;
+            whole_file::hold(&file)?;
+            if file.metadata()?.nlink() > 0 {
+                return Ok((part, file));
+            }
+            // Before it was locked, a runner that begins took it for one of a dead runner.
+            let _ = whole_file::discard(&part);
+        }
     }
 
     fn place(&self, part: &Path, name: &str) -> io::Result<bool> {
@@ -149,6 +155,29 @@ mod tests {
         assert!(one.holds(name).unwrap());
         assert_eq!(fs::read_to_string(folder.path().join(name)).unwrap(), "1");
         assert_eq!(fs::read_dir(&one.unfinished).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn runners_that_begin_take_nothing_from_one_that_works() {
+        let folder = tempfile::tempdir().unwrap();
+        let working = Folder::open(folder.path()).unwrap();
+        let done = std::sync::atomic::AtomicBool::new(false);
+        let results: Vec<_> = std::thread::scope(|scope| {
+            scope.spawn(|| {
+                while !done.load(Ordering::Relaxed) {
+                    Folder::open(folder.path()).unwrap();
+                }
+            });
+            let results = (0..20_000).map(|_| {
+                let (part, _file) = working.begin("a.parquet")?;
+                fs::remove_file(&part)
+            });
+            let results = results.collect();
+            done.store(true, Ordering::Relaxed);
+            results
+        });
+        let lost: Vec<_> = results.into_iter().filter(io::Result::is_err).collect();
+        assert!(lost.is_empty(), "{}: {:?}", lost.len(), lost[0]);
     }
 
     #[test]
