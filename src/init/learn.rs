@@ -36,12 +36,12 @@ struct Trial {
     alarms: usize,
     /// Of the recordings without contacts \[s\].
     seen_s: f64,
-    /// The middle one of the links' smallest forces that are found \[N\].
-    force_n: Option<f64>,
+    /// The outermost link that a push is told on, and the force that is found in half of all directions \[N\].
+    push: Option<(String, f64)>,
 }
 
 /// Lets the detector learn from the set at `set`, behind the twin at `explained` or behind a regression, whichever
-/// gives fewer false alarms on the validation recordings or, with as many, finds the smaller force. Writes what it
+/// gives fewer false alarms on the validation recordings or, with as many, finds the weaker push. Writes what it
 /// has learnt to `out`.
 ///
 /// # Errors
@@ -63,7 +63,8 @@ pub fn learn(
     })?;
     let mut trials = trials(&tried, &twins);
     trials.sort_by(|a, b| {
-        let force = |trial: &Trial| trial.force_n.unwrap_or(f64::INFINITY);
+        let force =
+            |trial: &Trial| (trial.push.as_ref()).map_or(f64::INFINITY, |(_, force_n)| *force_n);
         a.alarms.cmp(&b.alarms).then(force(a).total_cmp(&force(b)))
     });
     let best = trials.first().context("no detector has learnt")?;
@@ -123,17 +124,14 @@ fn trials(evaluation: &Evaluation, twins: &[String]) -> Vec<Trial> {
         let settings = runner.config.settings::<tauscope::Settings>();
         let forces =
             settings.map(|settings| settings.smallest_forces(settings.false_alarms_per_hour));
-        let mut forces: Vec<f64> = forces
-            .iter()
-            .flatten()
-            .filter_map(|link| link.half_n)
-            .collect();
-        forces.sort_by(f64::total_cmp);
+        // From the base on: the last is the one that is touched most.
+        let outermost =
+            (forces.into_iter().flatten()).filter_map(|link| Some((link.link, link.half_n?)));
         Trial {
             twin: twins[run.twin].clone(),
             alarms: unseen().map(|output| output.events.len()).sum(),
             seen_s: unseen().map(Output::duration_s).sum(),
-            force_n: forces.get(forces.len() / 2).copied(),
+            push: outermost.last(),
         }
     });
     trials.collect()
@@ -151,10 +149,10 @@ impl Trial {
 
     fn sentence(&self) -> String {
         let twin = self.words();
-        let force = self.force_n.map_or_else(String::new, |force_n| {
+        let force = self.push.as_ref().map_or_else(String::new, |(link, force_n)| {
             format!(
-                " In such motion it would find half of all pushes of {force_n:.0} N, whichever way they push; an arm that \
-                 stands feels smaller ones."
+                " While the arm moves as it does there, it finds a push on {link} from {force_n:.0} N on, in half of \
+                 all directions; while the arm stands it finds weaker ones."
             )
         });
         format!(

@@ -93,6 +93,9 @@ fn motions(report: &Report) -> Vec<String> {
     }
     let told = told.into_iter();
     told.map(|(sentence, joints)| match &joints[..] {
+        all if all.len() > 1 && all.len() == report.joints.len() => {
+            sentence.replace(ITS, "every joint ")
+        }
         [first @ .., last] if !first.is_empty() => {
             let all = format!("each of the joints {} and {last} ", first.join(", "));
             sentence.replace(ITS, &all)

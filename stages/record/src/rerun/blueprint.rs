@@ -18,7 +18,7 @@ use self::properties::Properties;
 use super::detections::{
     content_entity, events_entity, norms_entity, score_entity, state_entity, threshold_entity,
 };
-use super::painter::{Painter, commands_entity};
+use super::painter::{FILTERED_EXPECTED, Painter, commands_entity};
 use super::palette::{AXES, CONTACT, EXPECTED, MEASURED, RESIDUAL, SCORE};
 use super::store::entity;
 use super::tracks::STAMP;
@@ -162,14 +162,13 @@ impl Layout<'_> {
             SampleKind::JointState => {
                 vec![(entity(&stream.topic, &["effort"]), "measured", MEASURED)]
             }
-            SampleKind::TwinState => vec![
-                (entity(&stream.topic, &["effort"]), "expected", EXPECTED),
-                (
-                    entity(&streams.residual_topic(stream), &["effort"]),
-                    "residual",
-                    RESIDUAL,
-                ),
-            ],
+            SampleKind::TwinState => {
+                let of_residual = |field| entity(&streams.residual_topic(stream), &[field]);
+                vec![
+                    (of_residual(FILTERED_EXPECTED), "expected", EXPECTED),
+                    (of_residual("effort"), "residual", RESIDUAL),
+                ]
+            }
             _ => Vec::new(),
         };
         let series: Vec<_> = self

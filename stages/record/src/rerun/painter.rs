@@ -12,6 +12,9 @@ use crate::contacts::Told;
 use crate::error::RecordError;
 use crate::streams::{Stream, Streams};
 
+/// What the filtered expected effort is called, beside the residual.
+pub(super) const FILTERED_EXPECTED: &str = "filtered_expected";
+
 /// How much is gathered before it is sent.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pace {
@@ -70,6 +73,8 @@ enum Tracks {
     },
     TwinState {
         expected: ScalarTrack,
+        /// The same, filtered as it is for the residual: what friction does as a joint turns round is noise before.
+        filtered_expected: ScalarTrack,
         residual: ScalarTrack,
         draws_robot: bool,
     },
@@ -241,6 +246,7 @@ impl Tracks {
             },
             SampleKind::TwinState => Self::TwinState {
                 expected: track(&stream.topic, "effort")?,
+                filtered_expected: track(&streams.residual_topic(stream), FILTERED_EXPECTED)?,
                 residual: track(&streams.residual_topic(stream), "effort")?,
                 draws_robot: !streams
                     .all
@@ -278,6 +284,7 @@ impl Tracks {
     fn twin_state(&mut self, state: &TwinState, robot: Option<&mut Robot>) {
         let Self::TwinState {
             expected,
+            filtered_expected,
             residual,
             draws_robot,
         } = self
@@ -287,6 +294,7 @@ impl Tracks {
         expected.push(&state.header, &state.expected_effort);
         // Before the filters have settled it is their transient, which would set the plots' scale.
         if state.header.has(flags::READY) {
+            filtered_expected.push(&state.header, &state.filtered_expected_effort);
             residual.push(&state.header, &state.residual);
         }
         if let (true, Some(robot)) = (*draws_robot, robot) {
@@ -306,9 +314,13 @@ impl Tracks {
                 effort.flush(store, out)
             }
             Self::TwinState {
-                expected, residual, ..
+                expected,
+                filtered_expected,
+                residual,
+                ..
             } => {
                 expected.flush(store, out)?;
+                filtered_expected.flush(store, out)?;
                 residual.flush(store, out)
             }
             Self::Detection(tracks) => tracks.flush(store, out),
