@@ -82,6 +82,10 @@ pub fn stamp(ns: i64, shown: &str) -> Markup {
     html! { time datetime=(words::iso(ns)) title=(words::time(ns)) { (shown) } }
 }
 
+/// A joint's residual that is so many times its normal is shown in a warning's colour.
+/// Resolution: what a person of a hundred cells should look at; nothing is decided by it.
+const UNUSUAL: f64 = 2.0;
+
 fn facts(view: &CellView, status: &StatusMessage, now_ns: i64) -> Markup {
     html! {
         dl {
@@ -96,8 +100,9 @@ fn facts(view: &CellView, status: &StatusMessage, now_ns: i64) -> Markup {
             dt.brief { "Residual" }
             dd.brief { (residual(view)) }
             @if let Some(residual) = &view.residual {
-                dt { "Drifts most" }
-                dd { (residual.joint) ", " (format!("{:.2}", residual.joint_ratio)) " × normal" }
+                @let is_unusual = residual.joint_ratio >= UNUSUAL;
+                dt.warn[is_unusual] { "Drifts most" }
+                dd.warn[is_unusual] { (residual.joint) ", " (format!("{:.2}", residual.joint_ratio)) " × normal" }
             }
             @if let Some(drift) = &view.drift {
                 dt { "Friction" }
