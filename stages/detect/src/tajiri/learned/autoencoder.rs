@@ -5,7 +5,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::runner::{Course, Scorer};
-use super::training::{Layers, fit};
+use super::training::{DenseNet, fit};
 use super::vectors::{VectorModel, VectorScorer, Vectors};
 use super::{TrainingSettings, demand};
 use crate::frame::{LearnError, SignalSettings, Task, Trained, TrainedError};
@@ -67,11 +67,11 @@ impl Autoencoder {
     ) -> Self {
         let dimensions = vectors.dimensions();
         let sizes = sizes(dimensions, middle);
-        let mut net = Layers::start(&sizes, settings.dropout, rng);
+        let mut net = DenseNet::start(&sizes, settings.dropout, rng);
         let rows: Vec<f32> = vectors.rows().iter().map(|&x| x as f32).collect();
         let count = rows.len() / dimensions;
         let examples = |_: &mut ChaCha8Rng| (0..count).collect();
-        let learn = |net: &mut Layers<f32>, batch: &[usize], rng: &mut ChaCha8Rng| {
+        let learn = |net: &mut DenseNet<f32>, batch: &[usize], rng: &mut ChaCha8Rng| {
             net.learn(&rows, batch, rng);
         };
         fit(settings, &mut net, rng, &examples, &learn);
@@ -79,7 +79,7 @@ impl Autoencoder {
     }
 
     /// What was trained.
-    fn of(net: &Layers<f32>) -> Self {
+    fn of(net: &DenseNet<f32>) -> Self {
         let layers = net.numbers().map(|[weight, bias]| Dense {
             inputs: weight.len() / bias.len(),
             weight: weight.to_vec(),
@@ -206,7 +206,7 @@ mod tests {
     #[test]
     fn its_loops_compute_what_training_computes() {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
-        let mut training = Layers::start(&[3, 8, 1, 8, 3], 0.0, &mut rng);
+        let mut training = DenseNet::start(&[3, 8, 1, 8, 3], 0.0, &mut rng);
         let mut net = Autoencoder::of(&training);
         for x in [[0.1f32, 0.9, 0.4], [2.0, -1.0, 0.0]] {
             training.learn(&x, &[0], &mut rng);

@@ -3,6 +3,9 @@
 //!
 //! Nothing here allocates per batch, but where a batch has another size than the one before. The arithmetic
 //! is generic so that tests hold the gradients against differences of 64-bit numbers; nets train with 32 bits.
+//!
+//! Matrices that must be turned over are copied, not viewed: `gemm` of nalgebra 0.34.2 reads and writes beyond
+//! small matrices whose rows are apart in memory (its `axcpy` takes the slice's length for the vector's).
 
 mod adam;
 mod dense;
@@ -19,7 +22,7 @@ use rand_chacha::ChaCha8Rng;
 use super::TrainingSettings;
 use adam::{Adam, Weight};
 
-pub(crate) use layers::Layers;
+pub(crate) use layers::DenseNet;
 pub(crate) use recurrent::{Recurrent, Sequence};
 
 /// The numbers of a net.

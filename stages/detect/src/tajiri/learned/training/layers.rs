@@ -9,7 +9,7 @@ use super::dense::Dense;
 use super::{Net, Real, drop_out, number};
 
 /// The layers in training.
-pub(crate) struct Layers<T> {
+pub(crate) struct DenseNet<T> {
     layers: Vec<Dense<T>>,
     dropout: f64,
     room: Room<T>,
@@ -45,8 +45,8 @@ impl<T: Real> Room<T> {
     }
 }
 
-impl<T: Real> Layers<T> {
-    /// Layers between neighbours of `sizes`, before training. `sizes` holds at least two.
+impl<T: Real> DenseNet<T> {
+    /// DenseNet between neighbours of `sizes`, before training. `sizes` holds at least two.
     pub fn start(sizes: &[usize], dropout: f64, rng: &mut ChaCha8Rng) -> Self {
         let layers: Vec<_> = (sizes.windows(2))
             .map(|pair| Dense::start(pair[0], pair[1], rng))
@@ -136,7 +136,7 @@ impl<T: Real> Layers<T> {
     }
 }
 
-impl<T: Real> Net<T> for Layers<T> {
+impl<T: Real> Net<T> for DenseNet<T> {
     fn weights(&mut self) -> Vec<&mut Weight<T>> {
         let layers = self.layers.iter_mut();
         layers
@@ -158,8 +158,8 @@ mod tests {
         for (dropout, batch) in [(0.0, vec![0, 3, 1]), (0.3, vec![2, 0, 1, 3, 4, 4, 5, 6])] {
             let mut rng = ChaCha8Rng::seed_from_u64(7);
             let rows: Vec<f64> = (0..7 * 8).map(|_| rng.random_range(-1.0..1.0)).collect();
-            let mut net = Layers::<f64>::start(&[8, 6, 3, 7, 8], dropout, &mut rng);
-            let loss = |net: &mut Layers<f64>| {
+            let mut net = DenseNet::<f64>::start(&[8, 6, 3, 7, 8], dropout, &mut rng);
+            let loss = |net: &mut DenseNet<f64>| {
                 net.learn(&rows, &batch, &mut rng.clone());
                 let inputs = batch.iter().map(|&row| &rows[row * 8..][..8]);
                 let errors = (net.output().row_iter().zip(inputs))

@@ -2,9 +2,9 @@
 //! Schmidhuber and Cummins, Learning to Forget, 2000) and a dense layer behind it, trained by
 //! backpropagation through time (Goodfellow, Bengio and Courville, Deep Learning, section 10.2.2).
 //!
-//! With the sums s = Wx x(t) + Wh h(t-1) + b, of which each gate has a quarter:
+//! With the sums s = Wx x(t) + Wh h(t-1) + b, of which each gate has a quarter, s₁ to s₄:
 //!
-//! i = σ(sᵢ), f = σ(s_f), g = tanh(s_g), o = σ(sₒ);  c(t) = f c(t-1) + i g;  h(t) = o tanh(c(t))
+//! i = σ(s₁), f = σ(s₂), g = tanh(s₃), o = σ(s₄);  c(t) = f c(t-1) + i g;  h(t) = o tanh(c(t))
 
 use nalgebra::DMatrix;
 use rand::Rng;
