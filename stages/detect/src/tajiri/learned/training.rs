@@ -9,9 +9,9 @@
 
 mod adam;
 mod dense;
+mod dense_net;
 #[cfg(test)]
 mod differences;
-mod layers;
 mod recurrent;
 
 use nalgebra::RealField;
@@ -22,7 +22,7 @@ use rand_chacha::ChaCha8Rng;
 use super::TrainingSettings;
 use adam::{Adam, Weight};
 
-pub(crate) use layers::DenseNet;
+pub(crate) use dense_net::DenseNet;
 pub(crate) use recurrent::{Recurrent, Sequence};
 
 /// The numbers of a net.

@@ -46,7 +46,7 @@ impl<T: Real> Room<T> {
 }
 
 impl<T: Real> DenseNet<T> {
-    /// DenseNet between neighbours of `sizes`, before training. `sizes` holds at least two.
+    /// Layers between neighbours of `sizes`, before training. `sizes` holds at least two.
     pub fn start(sizes: &[usize], dropout: f64, rng: &mut ChaCha8Rng) -> Self {
         let layers: Vec<_> = (sizes.windows(2))
             .map(|pair| Dense::start(pair[0], pair[1], rng))
