@@ -1,8 +1,8 @@
 //! How the nets are trained: batches in a new order in every epoch, gradients by backpropagation
 //! (Goodfellow, Bengio and Courville, Deep Learning, 2016, sections 6.5 and 10.2), a step of Adam a batch.
 //!
-//! Nothing here allocates per batch, but where a batch has another size than the one before. The arithmetic
-//! is generic so that tests hold the gradients against differences of 64-bit numbers; nets train with 32 bits.
+//! The matrices of a batch serve the next one, too, if it has the same size. The arithmetic is generic so that
+//! tests hold the gradients against differences of 64-bit numbers; nets train with 32 bits.
 //!
 //! Matrices that must be turned over are copied, not viewed: `gemm` of nalgebra 0.34.2 reads and writes beyond
 //! small matrices whose rows are apart in memory (its `axcpy` takes the slice's length for the vector's).
