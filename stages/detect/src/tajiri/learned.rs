@@ -2,7 +2,7 @@
 //! see, equation 8's scaling, the support vector machine, the nets and how they are trained, and the
 //! file that a trained detector is kept in ([`crate::Trained`]).
 //!
-//! The support vector machine is libsvm-rs's; nets are trained by [`training`], on whole batches. A trained
+//! The support vector machine is libsvm-rs's; nets are trained by [`mod@training`], on whole batches. A trained
 //! net is run by loops of its own, a sample at a time. Tests hold the two against each other.
 
 mod autoencoder;
