@@ -47,10 +47,7 @@ for tool in $needed; do
     command -v "$tool" >/dev/null || { echo "error: $tool is missing; the head of $0 says what to install" >&2; exit 2; }
 done
 
-# Without optimisation this crate's half-precision kernels are not inlined into the functions that may use them.
-config=()
-[ "$arch" != aarch64 ] || config=(--config "profile.$profile.package.gemm-f16.opt-level=3")
-cargo build --locked --profile "$profile" "${config[@]}" "${target[@]}" --bin tauscope
+cargo build --locked --profile "$profile" "${target[@]}" --bin tauscope
 program=$folder/$profile/tauscope
 version=$(cargo metadata --no-deps --format-version 1 --locked |
     sed -n 's/.*"name":"tauscope","version":"\([^"]*\)".*/\1/p')

@@ -2,9 +2,8 @@
 //! see, equation 8's scaling, the support vector machine, the nets and how they are trained, and the
 //! file that a trained detector is kept in ([`crate::Trained`]).
 //!
-//! Training uses libsvm-rs and candle. A trained net is run by hand-written loops over its weights: for
-//! nets this small a framework's bookkeeping costs many times the arithmetic. Tests hold the two against
-//! each other.
+//! The support vector machine is libsvm-rs's; nets are trained by [`mod@training`], on whole batches. A trained
+//! net is run by loops of its own, a sample at a time. Tests hold the two against each other.
 
 mod autoencoder;
 mod lstm;

@@ -1,12 +1,11 @@
 //! The autoencoder: dense layers that narrow and widen again, `ReLU` behind each middle layer, the
 //! output as it is. It learns to give back its input; what it cannot give back is unlike its training.
 
-use candle_core::{Device, Tensor, Var};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::runner::{Course, Scorer};
-use super::training::{drop_out, fit, numbers, start};
+use super::training::{DenseNet, fit};
 use super::vectors::{VectorModel, VectorScorer, Vectors};
 use super::{TrainingSettings, demand};
 use crate::frame::{LearnError, SignalSettings, Task, Trained, TrainedError};
@@ -48,7 +47,6 @@ impl Autoencoder {
         let vectors = Vectors::new(&course, window, stride);
         let mut rng = ChaCha8Rng::seed_from_u64(task.seed);
         let net = Self::fit(&vectors, layers, training, &mut rng);
-        let net = net.map_err(|error| course.failed(error))?;
         course.end(|trained| vectors.save(&net, trained), Self::scorer)
     }
 
@@ -61,45 +59,33 @@ impl Autoencoder {
     }
 
     /// Trains with middle layers of `middle` units.
-    ///
-    /// # Errors
-    /// What candle says.
     pub fn fit(
         vectors: &Vectors,
         middle: &[usize],
         settings: &TrainingSettings,
         rng: &mut ChaCha8Rng,
-    ) -> candle_core::Result<Self> {
+    ) -> Self {
         let dimensions = vectors.dimensions();
         let sizes = sizes(dimensions, middle);
-        let mut weights = Vec::new();
-        for pair in sizes.windows(2) {
-            weights.push(start(&[pair[1], pair[0]], pair[0], rng)?);
-            weights.push(start(&[pair[1]], pair[0], rng)?);
-        }
+        let mut net = DenseNet::start(&sizes, settings.dropout, rng);
         let rows: Vec<f32> = vectors.rows().iter().map(|&x| x as f32).collect();
         let count = rows.len() / dimensions;
-        let loss = |batch: &[usize], rng: &mut ChaCha8Rng| {
-            let input: Vec<f32> = (batch.iter())
-                .flat_map(|&row| &rows[row * dimensions..][..dimensions])
-                .copied()
-                .collect();
-            let input = Tensor::from_vec(input, (batch.len(), dimensions), &Device::Cpu)?;
-            let output = forward(&weights, &input, settings.dropout, rng)?;
-            (output - input)?.sqr()?.mean_all()
-        };
         let examples = |_: &mut ChaCha8Rng| (0..count).collect();
-        fit(settings, weights.clone(), rng, &examples, &loss)?;
-        let layers = (weights.chunks_exact(2).zip(&sizes))
-            .map(|(pair, &inputs)| {
-                Ok(Dense {
-                    inputs,
-                    weight: numbers(&pair[0])?,
-                    bias: numbers(&pair[1])?,
-                })
-            })
-            .collect::<candle_core::Result<_>>()?;
-        Ok(Self::new(layers))
+        let learn = |net: &mut DenseNet<f32>, batch: &[usize], rng: &mut ChaCha8Rng| {
+            net.learn(&rows, batch, rng);
+        };
+        fit(settings, &mut net, rng, &examples, &learn);
+        Self::of(&net)
+    }
+
+    /// What was trained.
+    fn of(net: &DenseNet<f32>) -> Self {
+        let layers = net.numbers().map(|[weight, bias]| Dense {
+            inputs: weight.len() / bias.len(),
+            weight: weight.to_vec(),
+            bias: bias.to_vec(),
+        });
+        Self::new(layers.collect())
     }
 
     fn new(layers: Vec<Dense>) -> Self {
@@ -170,24 +156,6 @@ fn sizes(dimensions: usize, middle: &[usize]) -> Vec<usize> {
     ends.clone().chain(middle).chain(ends).copied().collect()
 }
 
-/// The output for a batch, `weights` being weight and bias by layer.
-fn forward(
-    weights: &[Var],
-    input: &Tensor,
-    dropout: f64,
-    rng: &mut ChaCha8Rng,
-) -> candle_core::Result<Tensor> {
-    let mut units = input.clone();
-    let last = weights.len() / 2 - 1;
-    for (index, pair) in weights.chunks_exact(2).enumerate() {
-        units = units.matmul(&pair[0].t()?)?.broadcast_add(&pair[1])?;
-        if index < last {
-            units = drop_out(units.relu()?, dropout, rng)?;
-        }
-    }
-    Ok(units)
-}
-
 #[cfg(test)]
 mod tests {
     use rand::Rng;
@@ -215,7 +183,7 @@ mod tests {
     fn trained(seed: u64) -> Autoencoder {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let vectors = Vectors::unscaled(3, curve());
-        Autoencoder::fit(&vectors, &[8, 1, 8], &SETTINGS, &mut rng).unwrap()
+        Autoencoder::fit(&vectors, &[8, 1, 8], &SETTINGS, &mut rng)
     }
 
     #[test]
@@ -236,23 +204,15 @@ mod tests {
     }
 
     #[test]
-    fn its_own_loops_compute_what_candle_computes() {
+    fn its_loops_compute_what_training_computes() {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
-        let mut net = trained(4);
-        let weights: Vec<Var> = (net.layers.iter())
-            .flat_map(|layer| {
-                let shape = (layer.bias.len(), layer.inputs);
-                [
-                    Var::from_vec(layer.weight.clone(), shape, &Device::Cpu).unwrap(),
-                    Var::from_vec(layer.bias.clone(), shape.0, &Device::Cpu).unwrap(),
-                ]
-            })
-            .collect();
+        let mut training = DenseNet::start(&[3, 8, 1, 8, 3], 0.0, &mut rng);
+        let mut net = Autoencoder::of(&training);
         for x in [[0.1f32, 0.9, 0.4], [2.0, -1.0, 0.0]] {
-            let input = Tensor::new(&[x], &Device::Cpu).unwrap();
-            let output = forward(&weights, &input, 0.0, &mut rng).unwrap();
-            let error = (output - input).unwrap().sqr().unwrap().mean_all().unwrap();
-            let error = f64::from(error.to_scalar::<f32>().unwrap());
+            training.learn(&x, &[0], &mut rng);
+            let pairs = training.output().iter().zip(&x);
+            let squares = pairs.map(|(y, x)| f64::from(y - x).powi(2));
+            let error = squares.sum::<f64>() / 3.0;
             let own = net.score(&x.map(f64::from));
             assert!((own - error).abs() < 1e-5 * (1.0 + error), "{own} {error}");
         }

@@ -1,15 +1,13 @@
 //! The recurrent net of `lstm_momentum_observer`: one LSTM layer and a dense one behind it, which
 //! estimate the external torque of a contact-free arm from its motion.
 
-use candle_core::{D, DType, Device, Tensor, Var};
-use candle_nn::ops::sigmoid;
-use rand::{Rng, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::runner::{Course, Scorer};
 use super::scaling::Scaling;
 use super::signals::Signal;
-use super::training::{drop_out, fit, numbers, start};
+use super::training::{Recurrent, Sequence, fit};
 use super::{TrainingSettings, demand};
 use crate::frame::{LearnError, SignalSettings, Task, Trained, TrainedError};
 
@@ -35,13 +33,6 @@ pub(crate) struct Lstm {
     bias_output: Vec<f32>,
 }
 
-/// One stretch of training data, scaled.
-struct Sequence {
-    inputs: Vec<f32>,
-    outputs: Vec<f32>,
-    len: usize,
-}
-
 impl Lstm {
     /// The detector `name` with so many hidden units, on sequences of so many samples.
     ///
@@ -59,7 +50,6 @@ impl Lstm {
         let course = Course::new(name, signals, length, task)?;
         let mut rng = ChaCha8Rng::seed_from_u64(task.seed);
         let net = Self::fit(&course, hidden, length, training, &mut rng);
-        let net = net.map_err(|error| course.failed(error))?;
         course.end(|trained| net.save(trained), Self::scorer)
     }
 
@@ -72,16 +62,13 @@ impl Lstm {
     }
 
     /// Trains on sequences of `length` samples, with `hidden` units.
-    ///
-    /// # Errors
-    /// What candle says.
     pub fn fit(
         course: &Course<'_>,
         hidden: usize,
         length: usize,
         settings: &TrainingSettings,
         rng: &mut ChaCha8Rng,
-    ) -> candle_core::Result<Self> {
+    ) -> Self {
         let joints = course.joint_count();
         let (inputs, outputs): (Vec<_>, Vec<_>) = (course.stretches().iter().flatten())
             .map(|signal| {
@@ -93,65 +80,46 @@ impl Lstm {
             .unzip();
         let input_scaling = Scaling::fit(INPUTS * joints, inputs.iter().map(Vec::as_slice));
         let output_scaling = Scaling::fit(joints, outputs.iter().map(Vec::as_slice));
-        let sequences: Vec<Sequence> = (course.stretches().iter())
+        let sequences: Vec<Sequence<f32>> = (course.stretches().iter())
             .map(|stretch| sequence(stretch, joints, &input_scaling, &output_scaling))
             .collect();
 
-        let weights = vec![
-            start(&[INPUTS * joints, 4 * hidden], hidden, rng)?,
-            start(&[hidden, 4 * hidden], hidden, rng)?,
-            start(&[4 * hidden], hidden, rng)?,
-            start(&[joints, hidden], hidden, rng)?,
-            start(&[joints], hidden, rng)?,
-        ];
-        // Disjoint sequences, which begin elsewhere in every epoch.
-        let examples = |rng: &mut ChaCha8Rng| {
-            let mut all = Vec::new();
-            for (index, sequence) in sequences.iter().enumerate() {
-                let last = sequence.len - length;
-                let first = rng.random_range(0..length.min(last + 1));
-                all.extend((first..=last).step_by(length).map(|at| (index, at)));
-            }
-            all
-        };
-        let loss = |batch: &[(usize, usize)], rng: &mut ChaCha8Rng| {
-            let gather = |size: usize, of: fn(&Sequence) -> &[f32]| {
-                let values: Vec<f32> = (0..length)
-                    .flat_map(|k| batch.iter().map(move |&(index, at)| (index, at + k)))
-                    .flat_map(|(index, at)| &of(&sequences[index])[at * size..][..size])
-                    .copied()
-                    .collect();
-                Tensor::from_vec(values, (length, batch.len(), size), &Device::Cpu)
-            };
-            let input = gather(INPUTS * joints, |sequence| &sequence.inputs)?;
-            let wanted = gather(joints, |sequence| &sequence.outputs)?;
-            let output = forward(&weights, &input, settings.dropout, rng)?;
-            (output - wanted)?.sqr()?.mean_all()
+        let sizes = [INPUTS * joints, hidden, joints];
+        let mut net = Recurrent::start(sizes, length, settings.dropout, rng);
+        let examples = |rng: &mut ChaCha8Rng| Recurrent::<f32>::examples(&sequences, length, rng);
+        let learn = |net: &mut Recurrent<f32>, batch: &[_], rng: &mut ChaCha8Rng| {
+            net.learn(&sequences, batch, rng);
         };
         let settings = TrainingSettings {
             // A batch is counted in samples.
             batch: (settings.batch / length).max(1),
             ..*settings
         };
-        fit(&settings, weights.clone(), rng, &examples, &loss)?;
+        fit(&settings, &mut net, rng, &examples, &learn);
+        Self::of(&net, [input_scaling, output_scaling])
+    }
+
+    /// What was trained, with the scaling of its inputs and outputs.
+    fn of(net: &Recurrent<f32>, [input_scaling, output_scaling]: [Scaling; 2]) -> Self {
+        let numbers = net.numbers().map(<[f32]>::to_vec);
         let [
             weight_input,
             weight_hidden,
             bias,
             weight_output,
             bias_output,
-        ] = [0, 1, 2, 3, 4].map(|index| numbers(&weights[index]));
-        Ok(Self {
-            joints,
-            hidden,
+        ] = numbers;
+        Self {
+            joints: bias_output.len(),
+            hidden: bias.len() / 4,
             input_scaling,
             output_scaling,
-            weight_input: weight_input?,
-            weight_hidden: weight_hidden?,
-            bias: bias?,
-            weight_output: weight_output?,
-            bias_output: bias_output?,
-        })
+            weight_input,
+            weight_hidden,
+            bias,
+            weight_output,
+            bias_output,
+        }
     }
 
     /// Keeps scaling and weights.
@@ -238,7 +206,12 @@ fn input(signal: &Signal, joints: usize) -> impl Iterator<Item = f64> + '_ {
         .flat_map(move |part| part[..joints].iter().copied())
 }
 
-fn sequence(stretch: &[Signal], joints: usize, inputs: &Scaling, outputs: &Scaling) -> Sequence {
+fn sequence(
+    stretch: &[Signal],
+    joints: usize,
+    inputs: &Scaling,
+    outputs: &Scaling,
+) -> Sequence<f32> {
     let mut sequence = Sequence {
         inputs: Vec::with_capacity(stretch.len() * INPUTS * joints),
         outputs: Vec::with_capacity(stretch.len() * joints),
@@ -253,34 +226,6 @@ fn sequence(stretch: &[Signal], joints: usize, inputs: &Scaling, outputs: &Scali
         sequence.outputs.extend(row.iter().map(|&x| x as f32));
     }
     sequence
-}
-
-/// Outputs at every sample of a batch of sequences, `[length, batch, ·]`, from a state of zeros.
-fn forward(
-    weights: &[Var],
-    input: &Tensor,
-    dropout: f64,
-    rng: &mut ChaCha8Rng,
-) -> candle_core::Result<Tensor> {
-    let (length, batch, _) = input.dims3()?;
-    let units = weights[1].dim(0)?;
-    let mut hidden = Tensor::zeros((batch, units), DType::F32, &Device::Cpu)?;
-    let mut cell = hidden.clone();
-    let mut all = Vec::with_capacity(length);
-    for k in 0..length {
-        let sum = (input.get(k)?.matmul(&weights[0])? + hidden.matmul(&weights[1])?)?;
-        let gates = sum.broadcast_add(&weights[2])?.chunk(4, D::Minus1)?;
-        let forgotten = (sigmoid(&gates[1])? * cell)?;
-        cell = (forgotten + (sigmoid(&gates[0])? * gates[2].tanh()?)?)?;
-        hidden = (sigmoid(&gates[3])? * cell.tanh()?)?;
-        all.push(hidden.clone());
-    }
-    let hidden = Tensor::stack(&all, 0)?.reshape((length * batch, units))?;
-    let hidden = drop_out(hidden, dropout, rng)?;
-    let output = hidden
-        .matmul(&weights[3].t()?)?
-        .broadcast_add(&weights[4])?;
-    output.reshape((length, batch, ()))
 }
 
 /// Holds the net's estimate against the observer's, with the net's state carried from sample to sample.
@@ -353,44 +298,28 @@ mod tests {
     use super::*;
 
     #[test]
-    fn its_own_loops_compute_what_candle_computes() {
+    fn its_loops_compute_what_training_computes() {
         let (joints, hidden, length) = (2, 5, 7);
         let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let weights: Vec<Var> = [
-            vec![INPUTS * joints, 4 * hidden],
-            vec![hidden, 4 * hidden],
-            vec![4 * hidden],
-            vec![joints, hidden],
-            vec![joints],
-        ]
-        .iter()
-        .map(|shape| start(shape, 2, &mut rng).unwrap())
-        .collect();
-        let all: Vec<Vec<f32>> = weights.iter().map(|w| numbers(w).unwrap()).collect();
-        let unscaled = |n: usize| {
+        let sizes = [INPUTS * joints, hidden, joints];
+        let mut training = Recurrent::start(sizes, length, 0.0, &mut rng);
+        let scalings = [INPUTS * joints, joints].map(|n| {
             let rows = [vec![0.0; n], vec![1.0; n]];
             Scaling::fit(n, rows.iter().map(Vec::as_slice))
-        };
-        let net = Lstm {
-            joints,
-            hidden,
-            input_scaling: unscaled(INPUTS * joints),
-            output_scaling: unscaled(joints),
-            weight_input: all[0].clone(),
-            weight_hidden: all[1].clone(),
-            bias: all[2].clone(),
-            weight_output: all[3].clone(),
-            bias_output: all[4].clone(),
-        };
+        });
+        let net = Lstm::of(&training, scalings);
         let inputs: Vec<f64> = (0..length * INPUTS * joints)
             .map(|k| (k as f64).sin())
             .collect();
-        let floats = inputs.iter().map(|&x| x as f32).collect();
-        let batch = Tensor::from_vec(floats, (length, 1, INPUTS * joints), &Device::Cpu).unwrap();
-        let theirs = forward(&weights, &batch, 0.0, &mut rng).unwrap();
-        let theirs: Vec<Vec<f32>> = theirs.squeeze(1).unwrap().to_vec2().unwrap();
+        let sequence = Sequence {
+            inputs: inputs.iter().map(|&x| x as f32).collect(),
+            outputs: vec![0.0; length * joints],
+            len: length,
+        };
+        training.learn(&[sequence], &[(0, 0)], &mut rng);
         let (mut state, mut cell, mut gates) = ([0.0; 5], [0.0; 5], [0.0; 20]);
-        for (input, theirs) in inputs.chunks_exact(INPUTS * joints).zip(theirs) {
+        let samples = inputs.chunks_exact(INPUTS * joints);
+        for (input, theirs) in samples.zip(training.outputs().row_iter()) {
             net.step(input, &mut state, &mut cell, &mut gates);
             for (joint, theirs) in theirs.iter().enumerate() {
                 assert!((net.output(joint, &state) - theirs).abs() < 1e-6);

@@ -179,7 +179,7 @@ impl<'a> Course<'a> {
         self.joints.len()
     }
 
-    /// An error of the net's library.
+    /// An error of the training.
     pub fn failed(&self, error: impl std::fmt::Display) -> LearnError {
         LearnError::Failed {
             detector: self.name,
