@@ -50,4 +50,5 @@ pub mod search;
 pub mod split_push;
 pub mod trial;
 pub mod wall;
+pub mod waves_named;
 pub mod windows;

@@ -247,6 +247,11 @@ impl Active {
         curve.is_some_and(|curve| curve.is_friction_of(self.hypothesis.place.joint))
     }
 
+    /// Whether it is a curve that turns its sign with the direction of motion, so that plain friction may be part of it.
+    pub fn is_like_friction(&self) -> bool {
+        self.is_friction_curve() || self.curve.as_ref().is_some_and(|curve| curve.by_direction)
+    }
+
     /// Whether its effort jumps where its joint reverses.
     pub fn is_set_valued(&self, model: &Model) -> bool {
         match &self.curve {

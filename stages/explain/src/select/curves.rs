@@ -54,12 +54,12 @@ impl Search<'_> {
         if !own.is_empty() {
             let bare = self.stripped(best, &own, joint);
             let mut instead = self.with_curve(&bare, joint);
-            // Plain friction stays beside a curve of friction.
+            // Plain friction stays beside a curve that turns its sign with the direction of motion.
             let shaped = |i: &usize| !best.fit.actives[*i].hypothesis.is_plain_friction();
             let shaped: Vec<usize> = own.iter().copied().filter(shaped).collect();
             let plain = self.with_plain_friction(&self.stripped(best, &shaped, joint), joint);
             let bent = self.with_curve(&plain, joint);
-            let bent = bent.filter(|e| e.fit.actives.last().is_some_and(Active::is_friction_curve));
+            let bent = bent.filter(|e| e.fit.actives.last().is_some_and(Active::is_like_friction));
             if let Some(bent) = bent
                 && instead
                     .as_ref()

@@ -1,0 +1,42 @@
+//! Whether a joint leaves far more than the others do, each in units of its white noise.
+//!
+//! The slow noise of a measurement may be any number of times its fast noise. But drives and sensors of one arm are of one
+//! kind, so that number is about the same at all joints. What one joint alone leaves is no noise of the measurement.
+
+use tauscope_dynamics::terms::words::number;
+
+use super::follows::clock_cost;
+use super::{LOUD, Left};
+
+/// A joint leaves far more than the others from this many times the median of theirs on.
+/// Tuned: by hand, with `tests/proof/first_sight.py`, seeds 71 and 72, in view, where arms without a fault stay below 2; not
+/// swept.
+const FAR_MORE: f64 = 3.0;
+
+/// How many times its white noise a joint leaves, and how many times theirs the others do, if that is far less.
+fn far_more(left: Left<'_>, joint: usize) -> Option<[f64; 2]> {
+    let white = &left.problem.white_noise;
+    let times = |j: usize| left.rms(j) / white[j];
+    let is_told = |j: &usize| white[*j] > 0.0 && left.fit.count[*j] > 0.0;
+    let mut others: Vec<f64> = (0..left.problem.joints)
+        .filter(|j| *j != joint && is_told(j))
+        .map(times)
+        .collect();
+    others.sort_by(f64::total_cmp);
+    let usual = others.get(others.len().saturating_sub(1) / 2)?.max(1.0);
+    // Errors of clocks and derivatives grow with the rate of the effort, which differs from joint to joint.
+    let is_clear = left.rms(joint) > LOUD * white[joint].max(clock_cost(left, joint));
+    (is_told(&joint) && is_clear && times(joint) > FAR_MORE * usual).then(|| [times(joint), usual])
+}
+
+/// What is said of a joint that leaves far more than the others.
+pub(super) fn beside_others(left: Left<'_>, joint: usize) -> Option<String> {
+    let [times, usual] = far_more(left, joint)?;
+    Some(format!(
+        "That is {} times its white noise, where most joints leave {} times theirs: something acts there that has no name. No curve of \
+         the motion predicts it from one recording to the next, so it depends on something that was not recorded, or on what was \
+         long before.",
+        number(times),
+        number(usual)
+    ))
+}
