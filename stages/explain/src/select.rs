@@ -28,6 +28,7 @@
 
 pub mod candidates;
 pub mod carried;
+pub mod closed_waves;
 pub mod cross_validation;
 pub mod curve_axes;
 pub mod curve_shapes;
@@ -50,5 +51,4 @@ pub mod search;
 pub mod split_push;
 pub mod trial;
 pub mod wall;
-pub mod waves_named;
 pub mod windows;

@@ -165,6 +165,11 @@ impl Hypothesis {
             && self.effect.traits.most_at_one_place == 1
     }
 
+    /// Whether it is a wave over its joint's position, of which there may be several.
+    pub fn is_wave(&self) -> bool {
+        self.is_of_position() && self.effect.traits.most_at_one_place > 1
+    }
+
     /// How it depends on time.
     pub fn time_kind(&self) -> TimeKind {
         self.effect.time()
@@ -245,11 +250,6 @@ impl Active {
     pub fn is_friction_curve(&self) -> bool {
         let curve = self.curve.as_ref();
         curve.is_some_and(|curve| curve.is_friction_of(self.hypothesis.place.joint))
-    }
-
-    /// Whether it is a curve that turns its sign with the direction of motion, so that plain friction may be part of it.
-    pub fn is_like_friction(&self) -> bool {
-        self.is_friction_curve() || self.curve.as_ref().is_some_and(|curve| curve.by_direction)
     }
 
     /// Whether its effort jumps where its joint reverses.

@@ -5,8 +5,7 @@
 //!
 //! - it follows the motion, and a curve of that, or a sum over the last moments of it (`history.rs`), predicts it in
 //!   recordings that it was not fitted on;
-//! - it jumps where joints turn round (`remainder/turns.rs`), as friction does that comes and goes, or follows the motion in
-//!   each stretch of time by a factor that changes (`remainder/in_stretches.rs`);
+//! - it jumps where joints turn round (`remainder/turns.rs`), as friction does that comes and goes;
 //! - it is far larger on held-out recordings than on fitted ones, although their efforts change no faster, or larger there
 //!   than what the twin left before it was corrected;
 //! - it stands out for moments;
@@ -14,7 +13,6 @@
 
 mod beside_others;
 mod follows;
-mod in_stretches;
 mod turns;
 
 use crate::context::Context;
@@ -262,7 +260,7 @@ fn of(
             ));
         }
         if sentences.is_empty()
-            && let Some(said) = beside_others(found, j)
+            && let Some(said) = beside_others(found, j, &told)
         {
             sentences.push(format!("{} remain at joint {joint}. {said}", told(here)));
         }

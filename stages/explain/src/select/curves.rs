@@ -54,12 +54,12 @@ impl Search<'_> {
         if !own.is_empty() {
             let bare = self.stripped(best, &own, joint);
             let mut instead = self.with_curve(&bare, joint);
-            // Plain friction stays beside a curve that turns its sign with the direction of motion.
+            // Plain friction stays beside a curve of friction.
             let shaped = |i: &usize| !best.fit.actives[*i].hypothesis.is_plain_friction();
             let shaped: Vec<usize> = own.iter().copied().filter(shaped).collect();
             let plain = self.with_plain_friction(&self.stripped(best, &shaped, joint), joint);
             let bent = self.with_curve(&plain, joint);
-            let bent = bent.filter(|e| e.fit.actives.last().is_some_and(Active::is_like_friction));
+            let bent = bent.filter(|e| e.fit.actives.last().is_some_and(Active::is_friction_curve));
             if let Some(bent) = bent
                 && instead
                     .as_ref()
@@ -194,7 +194,8 @@ impl Search<'_> {
 
     /// Removes the effects of a joint that together only imitate a curve, and puts a curve in their place. Such are
     /// more than `MOST_OF_POSITION` effects of position, waves that no gear makes, and effects that leave much more
-    /// of the variance on recordings left out than on fitted ones.
+    /// of the variance on recordings left out than on fitted ones. Waves that do as well with whole numbers of cycles as a
+    /// curve does get these.
     pub fn with_names_that_hold(&self, found: Explanation) -> Explanation {
         let pieces = found.fit.actives.len();
         let mut best = found;
@@ -217,7 +218,7 @@ impl Search<'_> {
             let open = names.iter().any(|&i| is_open_wave(&best.fit.actives[i]));
             let springs = names.iter().filter(|&&i| of(i).is_spring()).count();
             if (of_position > MOST_OF_POSITION || springs > MOST_SPRINGS || open)
-                && let Some(curve) = self.with_curve(&bare, joint)
+                && let Some(curve) = self.in_place_of_waves(&best, &names, &bare, joint)
             {
                 best = curve;
                 continue;
@@ -239,6 +240,29 @@ impl Search<'_> {
             best = self.pruned(best);
         }
         best
+    }
+
+    /// What does best in the place of effects of a joint's position that no gear makes: a curve instead of all effects `names`
+    /// of the joint, which `bare` lacks; a curve beside those that are no function of position; or waves that close.
+    fn in_place_of_waves(
+        &self,
+        best: &Explanation,
+        names: &[usize],
+        bare: &Explanation,
+        joint: usize,
+    ) -> Option<Explanation> {
+        let of_position = |i: &usize| best.fit.actives[*i].hypothesis.is_of_position();
+        let waves: Vec<usize> = names.iter().copied().filter(of_position).collect();
+        let mut able = vec![self.with_curve(bare, joint)];
+        if waves.len() < names.len() {
+            able.push(self.with_curve(&self.stripped(best, &waves, joint), joint));
+        }
+        if waves.len() <= MOST_OF_POSITION {
+            able.push(self.with_closed_waves(best, names, joint));
+        }
+        let white = vec![1.0; self.problem.joints];
+        let able = able.into_iter().flatten();
+        able.max_by(|a, b| a.ahead_of(b, &white).total_cmp(&0.0))
     }
 }
 

@@ -3,14 +3,10 @@
 use tauscope_dynamics::terms::Family;
 
 use crate::physics::active::Hypothesis;
-use crate::select::evidence::{LEAST_SIZE, matters, overwhelming, tie};
+use crate::select::evidence::{overwhelming, tie};
 use crate::select::explanation::{Explanation, describe, pieces, place_of};
 use crate::select::propose::Proposal;
 use crate::select::search::Search;
-
-/// Where much more than noise remains, a body without a name explains this share of that more than a name does.
-/// Tuned: as the least share of a small effect there; not swept.
-const MUCH: f64 = 0.5;
 
 /// Whether a report calls it unknown although it has a law.
 fn is_unlisted(hypothesis: &Hypothesis) -> bool {
@@ -44,10 +40,7 @@ impl Search<'_> {
             let listed = self.pruned(listed);
             let enough = tie(best.ahead_of(&less, effective));
             let behind = best.ahead_of(&listed, effective);
-            let is_as_good = behind < enough && !overwhelming(&best, &listed);
-            // What a name leaves beyond a body without one may be an error of other effects, which ten parameters take up.
-            let more = matters(self.problem, &best.fit, &listed.fit, LEAST_SIZE, MUCH);
-            if is_as_good || body && !more {
+            if behind < enough && !overwhelming(&best, &listed) {
                 (self.say)(&describe(&listed));
                 best = listed;
             }

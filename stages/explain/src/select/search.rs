@@ -53,8 +53,7 @@ impl Search<'_> {
                 best = self.with_names(self.pruned(described));
             }
         }
-        best = self.with_waves_named(self.with_drifts_named(best));
-        best = self.with_listed_names(best);
+        best = self.with_listed_names(self.with_drifts_named(best));
         // So far it was refined only as far as comparisons needed. Now its parameters are refined fully.
         best.fit = best.fit.refined(self.problem);
         self.without_hidden(self.with_split_pushes(self.with_names_that_hold(best)))

@@ -6,12 +6,16 @@
 use tauscope_dynamics::terms::words::number;
 
 use super::follows::clock_cost;
-use super::{LOUD, Left};
+use super::{LOUD, Left, Row, rms_error};
 
 /// A joint leaves far more than the others from this many times the median of theirs on.
 /// Tuned: by hand, with `tests/proof/first_sight.py`, seeds 71 and 72, in view, where arms without a fault stay below 2; not
 /// swept.
 const FAR_MORE: f64 = 3.0;
+
+/// What is told of the time is the worst of spans this long \[s\].
+/// Resolution: as long as what people find again in a recording.
+const SPAN_S: f64 = 1.0;
 
 /// How many times its white noise a joint leaves, and how many times theirs the others do, if that is far less.
 fn far_more(left: Left<'_>, joint: usize) -> Option<[f64; 2]> {
@@ -29,13 +33,37 @@ fn far_more(left: Left<'_>, joint: usize) -> Option<[f64; 2]> {
     (is_told(&joint) && is_clear && times(joint) > FAR_MORE * usual).then(|| [times(joint), usual])
 }
 
-/// What is said of a joint that leaves far more than the others.
-pub(super) fn beside_others(left: Left<'_>, joint: usize) -> Option<String> {
+/// Recording, time \[s\] and root mean square of the second in which a joint leaves most.
+fn most(left: Left<'_>, joint: usize) -> Option<(String, f64, f64)> {
+    let rows = left.rows(joint);
+    let is_same = |a: &Row, b: &Row| {
+        a.recording == b.recording && (a.time_s / SPAN_S).floor() == (b.time_s / SPAN_S).floor()
+    };
+    let each = rows
+        .chunk_by(is_same)
+        .map(|rows| (&rows[0], rms_error(rows)));
+    let (row, rms) = each.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    let name = left.problem.tracks[row.recording].track.name.clone();
+    Some((name, (row.time_s / SPAN_S).floor() * SPAN_S, rms))
+}
+
+/// What is said of a joint that leaves far more than the others. `told` gives efforts in the recording's unit.
+pub(super) fn beside_others(
+    left: Left<'_>,
+    joint: usize,
+    told: &dyn Fn(f64) -> String,
+) -> Option<String> {
     let [times, usual] = far_more(left, joint)?;
+    let when = most(left, joint).map_or_else(String::new, |(name, time_s, rms)| {
+        format!(
+            ", most of it ({}) in {name} in the second after {time_s:.0} s",
+            told(rms)
+        )
+    });
     Some(format!(
-        "That is {} times its white noise, where most joints leave {} times theirs: something acts there that has no name. No curve of \
-         the motion predicts it from one recording to the next, so it depends on something that was not recorded, or on what was \
-         long before.",
+        "That is {} times its white noise, where most joints leave {} times theirs{when}. So it is no noise of the measurement, and \
+         it has no name. No curve of the motion predicts it from one recording to the next: it comes and goes, or depends on \
+         something that was not recorded.",
         number(times),
         number(usual)
     ))

@@ -6,7 +6,6 @@ use crate::select::evidence::PATCH;
 use crate::select::propose::Base;
 use crate::select::prune::HIDDEN;
 
-use super::in_stretches::{STRETCH_S, in_stretches};
 use super::turns::turns;
 use super::{LOUD, Left, clock_s, rms_rate};
 
@@ -67,22 +66,7 @@ pub(super) fn follows_motion(found: Left<'_>, before: &Fit, joint: usize) -> Opt
             )
         })
     };
-    let of_stretches = || {
-        let is_loud = of_arm && found.rms(joint) > LOUD * problem.white_noise[joint];
-        let goes = is_loud.then(|| in_stretches(found, joint)).flatten()?;
-        let is_more = goes.share.sqrt() * found.rms(joint) > clock_cost(found, joint);
-        (is_more && is_worth_telling(goes.share)).then(|| {
-            let percent = 100.0 * goes.share;
-            format!(
-                "within each {STRETCH_S:.0} s {percent:.0} % of the square of what remains goes with {}.",
-                goes.with
-            )
-        })
-    };
-    of_curve
-        .or_else(of_history)
-        .or_else(of_turns)
-        .or_else(of_stretches)
+    of_curve.or_else(of_history).or_else(of_turns)
 }
 
 /// What stamps that are wrong by a part of a sample may leave at a joint \[N m or N\].

@@ -41,7 +41,7 @@ pub(super) struct Turns {
 }
 
 /// What a joint leaves in one recording, row by row; `None` where it does not count.
-pub(super) type Series = Vec<Option<f64>>;
+type Series = Vec<Option<f64>>;
 
 /// A change of a series: from one row to a later one of the same recording.
 #[derive(Debug, Clone, Copy)]
@@ -110,7 +110,7 @@ enum Signal {
     Difference(usize),
 }
 
-pub(super) fn series(left: Left<'_>, joint: usize) -> Vec<Series> {
+fn series(left: Left<'_>, joint: usize) -> Vec<Series> {
     let (problem, first) = (left.problem, left.problem.joint_rows(joint).start);
     let of_track = |track: &FitTrack| {
         let value = |row: usize| {
