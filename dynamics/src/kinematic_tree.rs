@@ -92,10 +92,15 @@ mod tests {
     #[test]
     fn a_link_is_at_least_as_long_as_to_the_joint_that_it_carries() {
         let model = model();
+        let mut data = Data::new(&model);
+        forward_kinematics(&model, &mut data, &vec![0.0; model.dof()]);
         for joint in model.joints() {
             let link = joint.child_link;
             let com = nalgebra::Vector3::from(model.links()[link].com_m());
             assert!(length_m(&model, link) >= com.norm() - 1e-12);
+            let origin = |link: usize| link_pose(&model, &data, link).translation.vector;
+            let apart_m = (origin(link) - origin(joint.parent_link)).norm();
+            assert!(length_m(&model, joint.parent_link) >= apart_m - 1e-12);
         }
         assert_eq!(moving_link(&model, model.base_link()), model.base_link());
     }

@@ -313,4 +313,29 @@ mod tests {
         let beside = needs(at_joint("viscous_friction", 1), &with).1;
         assert!(beside > needs(at_joint("viscous_friction", 1), &nothing).1);
     }
+
+    #[test]
+    fn a_wave_that_no_gear_makes_does_not_take_friction_with_it() {
+        let problem = problem_with(4, |q, qd, effort| {
+            let bump = (-0.5 * ((q[1] - 0.3) / 0.2).powi(2)).exp();
+            effort[1] += 2.0 * qd[1].signum() + 1.5 * qd[1] + 0.4 * bump;
+        });
+        let plain = ["coulomb_friction", "viscous_friction"].map(|name| at_joint(name, 1));
+        let search = Search {
+            problem: &problem,
+            hypotheses: &plain,
+            unnamed_bodies: &[],
+            say: &|_| {},
+        };
+        let wave = at_joint("torque_ripple", 1).with(vec![0.1, 0.1, 2.6]);
+        let friction = plain.map(|h| h.with(vec![1.0]));
+        let actives = [&friction[..], &[wave]].concat();
+        let found = search.with_names_that_hold(Explanation {
+            fit: Fit::new(&problem, actives).refined(&problem),
+            penalties: vec![10.0; 3],
+        });
+        let holds = |h: &Hypothesis| found.fit.actives.iter().any(|a| a.hypothesis == *h);
+        assert!(plain.iter().all(holds));
+        assert!(!found.fit.actives.iter().any(is_open_wave));
+    }
 }
