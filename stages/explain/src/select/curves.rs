@@ -243,7 +243,8 @@ impl Search<'_> {
     }
 
     /// What does best in the place of effects of a joint's position that no gear makes: a curve instead of all effects `names`
-    /// of the joint, which `bare` lacks; a curve beside those that are no function of position; or waves that close.
+    /// of the joint, which `bare` lacks; a curve beside those that are no function of position, or nothing where it would only
+    /// patch these; or waves that close.
     fn in_place_of_waves(
         &self,
         best: &Explanation,
@@ -255,7 +256,16 @@ impl Search<'_> {
         let waves: Vec<usize> = names.iter().copied().filter(of_position).collect();
         let mut able = vec![self.with_curve(bare, joint)];
         if waves.len() < names.len() {
-            able.push(self.with_curve(&self.stripped(best, &waves, joint), joint));
+            let beside = self.stripped(best, &waves, joint);
+            let known = self.scaled(best).squares[joint] - best.fit.squares[joint];
+            let is_patch = |with: &Explanation| {
+                beside.fit.squares[joint] - with.fit.squares[joint] < PATCH * known
+            };
+            let curve = self
+                .with_curve(&beside, joint)
+                .filter(|with| !is_patch(with));
+            let needs_none = is_patch(best);
+            able.push(curve.or_else(|| needs_none.then_some(beside)));
         }
         if waves.len() <= MOST_OF_POSITION {
             able.push(self.with_closed_waves(best, names, joint));

@@ -36,15 +36,14 @@ fn far_more(left: Left<'_>, joint: usize) -> Option<[f64; 2]> {
 /// Recording, time \[s\] and root mean square of the second in which a joint leaves most.
 fn most(left: Left<'_>, joint: usize) -> Option<(String, f64, f64)> {
     let rows = left.rows(joint);
-    let is_same = |a: &Row, b: &Row| {
-        a.recording == b.recording && (a.time_s / SPAN_S).floor() == (b.time_s / SPAN_S).floor()
-    };
+    let span = |row: &Row| (row.time_s / SPAN_S) as usize;
+    let is_same = |a: &Row, b: &Row| a.recording == b.recording && span(a) == span(b);
     let each = rows
         .chunk_by(is_same)
         .map(|rows| (&rows[0], rms_error(rows)));
     let (row, rms) = each.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
     let name = left.problem.tracks[row.recording].track.name.clone();
-    Some((name, (row.time_s / SPAN_S).floor() * SPAN_S, rms))
+    Some((name, span(row) as f64 * SPAN_S, rms))
 }
 
 /// What is said of a joint that leaves far more than the others. `told` gives efforts in the recording's unit.
