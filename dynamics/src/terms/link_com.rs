@@ -6,10 +6,10 @@ use super::{
     Simulated, Traits, Words,
 };
 use crate::Inertia;
-use crate::kinematic_tree::extent_m;
+use crate::kinematic_tree::length_m;
 
-/// A link's centre of mass stays within the link: it is off by less than this many radii of gyration, or than the link
-/// extends by its frames. Physical: a uniform rod ends the root of 3 radii of gyration from its centre (its moment of
+/// A link's centre of mass stays within the link: it is off by less than this many radii of gyration, or than the link is
+/// long by its frames: from one end to the other. Physical: a uniform rod ends the root of 3 radii of gyration from its centre (its moment of
 /// inertia is m l²/12), a plumper body nearer.
 const MOST_GYRATIONS: f64 = 1.732;
 /// How far it may be off in a URDF, in radii of gyration.
@@ -49,7 +49,7 @@ pub(super) static EFFECT: Effect = Effect {
     limit: Some(|site, x| {
         let shift_m = x.iter().map(|d| d * d).sum::<f64>().sqrt();
         let gyration_m = site.model.links()[site.link].gyration_radius_m();
-        shift_m < extent_m(site.model, site.link).max(MOST_GYRATIONS * gyration_m)
+        shift_m < length_m(site.model, site.link).max(MOST_GYRATIONS * gyration_m)
     }),
     excitation: Excitation::Poses,
     simulated: Simulated::Model,

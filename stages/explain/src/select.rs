@@ -28,6 +28,7 @@
 
 pub mod candidates;
 pub mod carried;
+pub mod closed_waves;
 pub mod cross_validation;
 pub mod curve_axes;
 pub mod curve_shapes;

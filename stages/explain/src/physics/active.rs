@@ -165,6 +165,11 @@ impl Hypothesis {
             && self.effect.traits.most_at_one_place == 1
     }
 
+    /// Whether it is a wave over its joint's position, of which there may be several.
+    pub fn is_wave(&self) -> bool {
+        self.is_of_position() && self.effect.traits.most_at_one_place > 1
+    }
+
     /// How it depends on time.
     pub fn time_kind(&self) -> TimeKind {
         self.effect.time()

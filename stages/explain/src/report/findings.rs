@@ -134,7 +134,10 @@ pub fn of(
             sentence = sentences::in_amperes(&sentence);
         }
         let equivalent_to = named.keep_rivals(active, contest, input, joints);
-        let grounds = Grounds::of(fit, &less.fit, active, evidence);
+        let explained = mismatch(&less.fit, fit, before);
+        let effort_rms = effort_rms(&less.fit, fit, input);
+        let (bare, of_both) = without_twin(search, found, less, index, evidence);
+        let grounds = Grounds::of(fit, &bare.fit, active, of_both);
         named.findings.push(Finding {
             effect: active.hypothesis.said().to_owned(),
             joint,
@@ -146,10 +149,10 @@ pub fn of(
             recording: when.recording,
             t_start: when.start,
             t_end: when.end,
-            explains: (mismatch(&less.fit, fit, before) / total).clamp(0.0, 1.0),
+            explains: (explained / total).clamp(0.0, 1.0),
             over_rest: grounds.over_rest,
             evidence_nats: evidence,
-            effort_rms: effort_rms(&less.fit, fit, input),
+            effort_rms,
             equivalent_to,
             sentence,
         });
@@ -160,6 +163,26 @@ pub fn of(
         .findings
         .sort_by(|a, b| b.explains.total_cmp(&a.explains));
     named
+}
+
+/// An explanation that lacks the effect at `index` in `found`, and the evidence for the effect: `less` and its `evidence`,
+/// or, where the effect is one of two waves, without the other one as well. The two are one finding, and without the one
+/// the other would take its place in part.
+fn without_twin(
+    search: &Search<'_>,
+    found: &Explanation,
+    less: Explanation,
+    index: usize,
+    evidence: f64,
+) -> (Explanation, f64) {
+    let own = found.fit.actives[index].hypothesis;
+    let twin = less.fit.actives.iter().position(|a| a.hypothesis == own);
+    let Some(twin) = twin.filter(|_| own.is_wave()) else {
+        return (less, evidence);
+    };
+    let bare = search.without(&less, twin);
+    let of_both = found.ahead_of(&bare, &search.problem.effective_samples);
+    (bare, of_both)
 }
 
 impl Named {

@@ -29,6 +29,9 @@ const SWING_STEP: f64 = 1.1;
 /// Damping of what swings, as a share of the critical one.
 /// Physical: steel structures have 0.01 to 0.05, liquids in tanks about as much.
 const SWING_DAMPING: f64 = 0.04;
+/// How long what a joint has worked keeps it warm \[s\].
+/// Resolution: steps of about three; a winding or a sensor of a few grams, seen in recordings of ten seconds.
+const WARM_S: [f64; 3] = [1.0, 3.0, 10.0];
 /// Share of the remainder's squares that a group must predict in recordings left out.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_SHARE: f64 = 0.1;
@@ -82,6 +85,10 @@ fn groups(problem: &Problem, fit: &Fit, joint: usize, joints: &[String]) -> Vec<
         let late = |lag_s: &f64| column(problem, &late_by(problem, &signal, *lag_s), joint);
         LAGS_S.iter().map(late).collect()
     };
+    let warm = |warm_s: &f64| {
+        let heat = signals(problem, &load, joint, &|_, load| load * load);
+        column(problem, &faded(problem, &heat, *warm_s), joint)
+    };
     let now = |read: &Reading| column(problem, &signals(problem, &load, joint, read), joint);
     let mut all = vec![
         Group {
@@ -99,6 +106,10 @@ fn groups(problem: &Problem, fit: &Fit, joint: usize, joints: &[String]) -> Vec<
             ],
         },
     ];
+    all.push(Group {
+        on: "how hard it has worked in the last seconds, as heat does: a motor, a drive or a sensor that warms up".to_owned(),
+        columns: WARM_S.iter().map(warm).collect(),
+    });
     for (other, name) in joints.iter().enumerate() {
         let whose = if other == joint {
             "its own".to_owned()
@@ -196,6 +207,22 @@ fn late_by(problem: &Problem, signal: &[Vec<f64>], lag_s: f64) -> Vec<Vec<f64>> 
     problem.tracks.iter().zip(signal).map(of_track).collect()
 }
 
+/// A signal that is kept for a while, and fades with this time constant.
+fn faded(problem: &Problem, signal: &[Vec<f64>], constant_s: f64) -> Vec<Vec<f64>> {
+    let of_track = |(track, signal): (&crate::data::track::FitTrack, &Vec<f64>)| {
+        let time = &track.track.time_s;
+        let mut kept = 0.0;
+        let mut values = Vec::with_capacity(signal.len());
+        for (k, value) in signal.iter().enumerate() {
+            let step_s = time[k] - time[k.saturating_sub(1)];
+            kept += (1.0 - (-step_s / constant_s).exp()) * (value - kept);
+            values.push(kept);
+        }
+        values
+    };
+    problem.tracks.iter().zip(signal).map(of_track).collect()
+}
+
 /// A signal as a column of a joint.
 fn column(problem: &Problem, signal: &[Vec<f64>], joint: usize) -> Column {
     let n = problem.joints;
@@ -266,6 +293,22 @@ mod tests {
         });
         let said = said.expect("it follows from the motion");
         assert!(said.on.contains("Hz"), "{}", said.on);
+    }
+
+    #[test]
+    fn a_zero_that_follows_the_heat_is_told_with_it() {
+        let (mut heat, mut before) = (0.0, 0);
+        let said = said(|efforts| {
+            if efforts.len() < before {
+                heat = 0.0;
+            }
+            before = efforts.len();
+            let load = efforts[efforts.len() - 1];
+            heat += 0.01 / 3.0 * (load * load - heat);
+            0.01 * heat
+        });
+        let said = said.expect("it follows from the load");
+        assert!(said.on.contains("heat"), "{}", said.on);
     }
 
     #[test]

@@ -194,7 +194,8 @@ impl Search<'_> {
 
     /// Removes the effects of a joint that together only imitate a curve, and puts a curve in their place. Such are
     /// more than `MOST_OF_POSITION` effects of position, waves that no gear makes, and effects that leave much more
-    /// of the variance on recordings left out than on fitted ones.
+    /// of the variance on recordings left out than on fitted ones. Waves that do as well with whole numbers of cycles as a
+    /// curve does get these.
     pub fn with_names_that_hold(&self, found: Explanation) -> Explanation {
         let pieces = found.fit.actives.len();
         let mut best = found;
@@ -217,7 +218,7 @@ impl Search<'_> {
             let open = names.iter().any(|&i| is_open_wave(&best.fit.actives[i]));
             let springs = names.iter().filter(|&&i| of(i).is_spring()).count();
             if (of_position > MOST_OF_POSITION || springs > MOST_SPRINGS || open)
-                && let Some(curve) = self.with_curve(&bare, joint)
+                && let Some(curve) = self.in_place_of_waves(&best, &names, &bare, joint)
             {
                 best = curve;
                 continue;
@@ -239,6 +240,39 @@ impl Search<'_> {
             best = self.pruned(best);
         }
         best
+    }
+
+    /// What does best in the place of effects of a joint's position that no gear makes: a curve instead of all effects `names`
+    /// of the joint, which `bare` lacks; a curve beside those that are no function of position, or nothing where it would only
+    /// patch these; or waves that close.
+    fn in_place_of_waves(
+        &self,
+        best: &Explanation,
+        names: &[usize],
+        bare: &Explanation,
+        joint: usize,
+    ) -> Option<Explanation> {
+        let of_position = |i: &usize| best.fit.actives[*i].hypothesis.is_of_position();
+        let waves: Vec<usize> = names.iter().copied().filter(of_position).collect();
+        let mut able = vec![self.with_curve(bare, joint)];
+        if waves.len() < names.len() {
+            let beside = self.stripped(best, &waves, joint);
+            let known = self.scaled(best).squares[joint] - best.fit.squares[joint];
+            let is_patch = |with: &Explanation| {
+                beside.fit.squares[joint] - with.fit.squares[joint] < PATCH * known
+            };
+            let curve = self
+                .with_curve(&beside, joint)
+                .filter(|with| !is_patch(with));
+            let needs_none = is_patch(best);
+            able.push(curve.or_else(|| needs_none.then_some(beside)));
+        }
+        if waves.len() <= MOST_OF_POSITION {
+            able.push(self.with_closed_waves(best, names, joint));
+        }
+        let white = vec![1.0; self.problem.joints];
+        let able = able.into_iter().flatten();
+        able.max_by(|a, b| a.ahead_of(b, &white).total_cmp(&0.0))
     }
 }
 
@@ -288,5 +322,30 @@ mod tests {
         // An effect of the library must explain much more beside a curve.
         let beside = needs(at_joint("viscous_friction", 1), &with).1;
         assert!(beside > needs(at_joint("viscous_friction", 1), &nothing).1);
+    }
+
+    #[test]
+    fn a_wave_that_no_gear_makes_does_not_take_friction_with_it() {
+        let problem = problem_with(4, |q, qd, effort| {
+            let bump = (-0.5 * ((q[1] - 0.3) / 0.2).powi(2)).exp();
+            effort[1] += 2.0 * qd[1].signum() + 1.5 * qd[1] + 0.4 * bump;
+        });
+        let plain = ["coulomb_friction", "viscous_friction"].map(|name| at_joint(name, 1));
+        let search = Search {
+            problem: &problem,
+            hypotheses: &plain,
+            unnamed_bodies: &[],
+            say: &|_| {},
+        };
+        let wave = at_joint("torque_ripple", 1).with(vec![0.1, 0.1, 2.6]);
+        let friction = plain.map(|h| h.with(vec![1.0]));
+        let actives = [&friction[..], &[wave]].concat();
+        let found = search.with_names_that_hold(Explanation {
+            fit: Fit::new(&problem, actives).refined(&problem),
+            penalties: vec![10.0; 3],
+        });
+        let holds = |h: &Hypothesis| found.fit.actives.iter().any(|a| a.hypothesis == *h);
+        assert!(plain.iter().all(holds));
+        assert!(!found.fit.actives.iter().any(is_open_wave));
     }
 }

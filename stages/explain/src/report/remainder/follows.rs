@@ -7,16 +7,13 @@ use crate::select::propose::Base;
 use crate::select::prune::HIDDEN;
 
 use super::turns::turns;
-use super::{Left, clock_s, rms_rate};
+use super::{LOUD, Left, clock_s, rms_rate};
 
 /// Share of that by which stamps are wrong as root mean square, where the error may follow the motion.
 /// Statistical: a stamp anywhere within its sample is off by 0.29 of it.
 const CLOCK_SHARE: f64 = 0.29;
 
-/// A remainder that jumps where joints turn round is told from this many times the white noise on.
-/// Tuned: as the note on what remains; clocks and smoothing leave less at reversals.
-const LOUD: f64 = 5.0;
-/// And from this share of its square that changes its sign there.
+/// A remainder that jumps where joints turn round is told from this share of its square that changes its sign there.
 /// Tuned: as the share that a sum must predict; not swept.
 const LEAST_OF_TURNS: f64 = 0.1;
 
@@ -50,8 +47,7 @@ pub(super) fn follows_motion(found: Left<'_>, before: &Fit, joint: usize) -> Opt
     let of_history = || {
         let history = history::predicts(problem, fit, joint, &names).filter(|_| of_arm)?;
         // Errors of clocks and derivatives follow the motion, too.
-        let rows = found.rows(joint);
-        let cost = CLOCK_SHARE * clock_s(&problem.tracks[0].track.time_s) * rms_rate(&rows);
+        let cost = clock_cost(found, joint);
         let is_more =
             history.share.sqrt() * found.rms(joint) > cost.max(problem.white_noise[joint]);
         (is_more && is_worth_telling(history.share))
@@ -71,4 +67,10 @@ pub(super) fn follows_motion(found: Left<'_>, before: &Fit, joint: usize) -> Opt
         })
     };
     of_curve.or_else(of_history).or_else(of_turns)
+}
+
+/// What stamps that are wrong by a part of a sample may leave at a joint \[N m or N\].
+pub(super) fn clock_cost(left: Left<'_>, joint: usize) -> f64 {
+    let sample_s = clock_s(&left.problem.tracks[0].track.time_s);
+    CLOCK_SHARE * sample_s * rms_rate(&left.rows(joint))
 }
