@@ -125,13 +125,13 @@ fn trials(evaluation: &Evaluation, twins: &[String]) -> Vec<Trial> {
         let forces =
             settings.map(|settings| settings.smallest_forces(settings.false_alarms_per_hour));
         // From the base on: the last is the one that is touched most.
-        let outermost =
+        let mut outermost =
             (forces.into_iter().flatten()).filter_map(|link| Some((link.link, link.half_n?)));
         Trial {
             twin: twins[run.twin].clone(),
             alarms: unseen().map(|output| output.events.len()).sum(),
             seen_s: unseen().map(Output::duration_s).sum(),
-            push: outermost.last(),
+            push: outermost.next_back(),
         }
     });
     trials.collect()
