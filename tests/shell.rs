@@ -79,10 +79,16 @@ fn a_program_that_is_built_apart_and_is_not_there_is_told_with_what_builds_it() 
             continue;
         }
         let out = Out::of({
-            asked.arg(command).arg("--help").env("PATH", empty.path());
+            asked.arg(command).arg("query").env("PATH", empty.path());
             asked
         });
         assert_eq!(out.code, 2, "{out:?}");
         assert!(out.stderr.contains(&format!("-p {program}")), "{out:?}");
+        // What it is for is told without it.
+        let mut asked = common::tauscope();
+        asked.arg(command).arg("--help").env("PATH", empty.path());
+        let help = Out::of(asked);
+        assert_eq!(help.code, 0, "{help:?}");
+        assert!(help.stdout.contains(&format!("-p {program}")), "{help:?}");
     }
 }
