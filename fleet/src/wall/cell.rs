@@ -43,7 +43,7 @@ pub struct Watched {
     minutes: VecDeque<f64>,
     minute: Option<i64>,
     /// The state as of the last settling, and since when \[ns since the epoch\].
-    settled: Option<(State, i64)>,
+    settled: Option<(State, Option<i64>)>,
 }
 
 impl Watched {
@@ -293,7 +293,13 @@ impl Watched {
         let before = self.settled.map(|(state, _)| state);
         let changed = before.is_none_or(|before| !before.same_as(state));
         if changed {
-            self.settled = Some((state, now.unix_ns));
+            // What a cell did before this host first heard of it has lasted nobody knows how long.
+            let is_found = matches!(
+                before,
+                None | Some(State::Unknown { .. } | State::NeverSeen)
+            );
+            let lasts_long = is_found && !matches!(state, State::Unknown { .. } | State::NeverSeen);
+            self.settled = Some((state, (!lasts_long).then_some(now.unix_ns)));
         }
         let before = before.filter(|_| changed)?;
         Some(Effect::Changed {
@@ -309,7 +315,7 @@ impl Watched {
         let since_ns = match state {
             State::Stale { since_ns, .. } => Some(since_ns),
             State::Stopped { .. } => self.latch.since_ns(),
-            _ => self.settled.map(|(_, since_ns)| since_ns),
+            _ => self.settled.and_then(|(_, since_ns)| since_ns),
         };
         let age_ms = |at: &Now| now.running_ms.saturating_sub(at.running_ms);
         let clock = self.clock.best(now.running_ms);

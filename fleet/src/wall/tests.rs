@@ -103,6 +103,21 @@ fn a_status_without_a_token_is_not_green() {
 }
 
 #[test]
+fn a_cell_that_ran_before_this_host_began_runs_for_nobody_knows_how_long() {
+    let shown = |story: &Story| story.wall.snapshot().cells.remove(0);
+    let mut story = Story::new(&[]);
+    story.alive("x").status(|_| {}).is("running");
+    assert_eq!(shown(&story).since_ns, None);
+    story
+        .wait(1)
+        .status(|status| status.alarm.state = AlarmState::NotReady);
+    story.is("not ready");
+    assert_eq!(shown(&story).since_ns, Some(story.now.unix_ns));
+    story.wait(1).status(|_| {}).is("running");
+    assert_eq!(shown(&story).since_ns, Some(story.now.unix_ns));
+}
+
+#[test]
 fn a_token_that_goes_is_known_at_once_and_a_cut_cell_within_five_seconds() {
     let mut story = Story::new(&[]);
     story.alive("x").status(|_| {}).is("running");
