@@ -48,7 +48,7 @@ def options():
 
 def names(o):
     """(case, fault or None, seed) of each case."""
-    kinds = [k for k in o.kinds.split(",") if k]
+    kinds = [k.strip() for k in o.kinds.split(",") if k.strip()]
     for k in kinds:
         yield f"{k}-{o.seed}", k, [o.seed, list(unforeseen.FAULTS).index(k)]
     for k in range(o.nulls):
