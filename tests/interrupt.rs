@@ -228,21 +228,29 @@ fn init_takes_away_what_it_has_written() {
     assert!(!cell.exists(), "{:?}", files(&cell));
 }
 
-#[test]
-fn a_stage_that_does_not_end_is_named_and_killed() {
+/// A folder with a `pipeline.yaml` that plays the bundled recording in real time into these `stages`.
+fn realtime(stages: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let text = format!(
         "version: 1
 cells: {{demo: {{robot: {robot}}}}}
 stages:
 - {{name: ingest, ingest: {{file: {{path: {recording}}}, rate: realtime}}}}
-- {{name: deaf, input: ingest, outside: {{command: [sleep, \"1000\"]}}}}
-- {{name: record, inputs: [ingest], record: {{mcap: out.mcap}}}}
-",
+{stages}",
         robot = bundled().join("demo_arm.urdf").display(),
         recording = bundled().join("demo.mcap").display(),
     );
     write(&folder.path().join("pipeline.yaml"), &text);
+    folder
+}
+
+#[test]
+fn a_stage_that_does_not_end_is_named_and_killed() {
+    let folder = realtime(
+        r#"- {name: deaf, input: ingest, outside: {command: [sleep, "1000"]}}
+- {name: record, inputs: [ingest], record: {mcap: out.mcap}}
+"#,
+    );
     let mut live = Live::start(folder.path(), &[]);
     live.wait_for("warning: stage `deaf` has not begun after 4 s");
     signal(live.id(), "INT");
@@ -259,19 +267,11 @@ stages:
 
 #[test]
 fn a_second_signal_ends_a_run_at_once_and_leaves_no_unfinished_file() {
-    let folder = tempfile::tempdir().unwrap();
-    let text = format!(
-        "version: 1
-cells: {{demo: {{robot: {robot}}}}}
-stages:
-- {{name: ingest, ingest: {{file: {{path: {recording}}}, rate: realtime}}}}
-- {{name: twin, input: ingest, twin: {{}}}}
-- {{name: record, inputs: [ingest, twin], record: {{mcap: out.mcap, rerun: {{file: out.rrd}}}}}}
+    let folder = realtime(
+        "- {name: twin, input: ingest, twin: {}}
+- {name: record, inputs: [ingest, twin], record: {mcap: out.mcap, rerun: {file: out.rrd}}}
 ",
-        robot = bundled().join("demo_arm.urdf").display(),
-        recording = bundled().join("demo.mcap").display(),
     );
-    write(&folder.path().join("pipeline.yaml"), &text);
     let mut live = Live::start(folder.path(), &["--verbose"]);
     live.wait_for("stage `ingest` begins");
     let part = folder.path().join("out.mcap.part");

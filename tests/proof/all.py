@@ -2,8 +2,9 @@
 
     python3 tests/proof/all.py [--only committed,coverage] [--out out/all] [--docs docs/proof.md]
 
-Needs requirements.txt. What is in `--out` already is not made again, so a part that was stopped goes on where it was. The
-whole takes some ten hours of one core; `--only committed,first_sight,first_sight_beside,nulls` four minutes of two cores.
+Needs requirements.txt. What is in `--out` already is not made again, so a part that was stopped goes on where it was.
+The whole takes some ten hours of one core; `--only committed,first_sight,first_sight_beside,nulls` takes four minutes
+of two.
 """
 import argparse
 import pathlib

@@ -42,7 +42,7 @@ pub struct Watched {
     clock_asked: Option<u64>,
     minutes: VecDeque<f64>,
     minute: Option<i64>,
-    /// The state as of the last settling, and since when \[ns since the epoch\].
+    /// The state as of the last settling, and since when, if this host saw it begin \[ns since the epoch\].
     settled: Option<(State, Option<i64>)>,
 }
 
@@ -293,13 +293,10 @@ impl Watched {
         let before = self.settled.map(|(state, _)| state);
         let changed = before.is_none_or(|before| !before.same_as(state));
         if changed {
-            // What a cell did before this host first heard of it has lasted nobody knows how long.
-            let is_found = matches!(
-                before,
-                None | Some(State::Unknown { .. } | State::NeverSeen)
-            );
-            let lasts_long = is_found && !matches!(state, State::Unknown { .. } | State::NeverSeen);
-            self.settled = Some((state, (!lasts_long).then_some(now.unix_ns)));
+            // What a cell was in before this host first heard of it has lasted nobody knows how long.
+            let is_untold = |state| matches!(state, State::Unknown { .. } | State::NeverSeen);
+            let began_unseen = before.is_none_or(is_untold) && !is_untold(state);
+            self.settled = Some((state, (!began_unseen).then_some(now.unix_ns)));
         }
         let before = before.filter(|_| changed)?;
         Some(Effect::Changed {

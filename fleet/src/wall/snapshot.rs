@@ -40,7 +40,7 @@ pub struct CellView {
     pub state: State,
     /// How much that matters: a cell that is latched is critical, whatever else it is.
     pub severity: Severity,
-    /// Since when it is in that state \[ns since the epoch\].
+    /// Since when it is in that state; `None` where it was before this host first heard of it \[ns since the epoch\].
     #[serde(rename = "state_since_ns")]
     pub since_ns: Option<i64>,
     /// Since when a collision is latched, also while the cell is stale; `None` where nothing is \[ns since the epoch\].
