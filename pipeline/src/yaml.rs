@@ -109,9 +109,12 @@ pub fn examine<T: DeserializeOwned + JsonSchema>(path: &Path) -> Result<Examined
     let (mut value, spans) = tree::parse(&source)?;
     let mismatches = structure::check::<T>(&source, &value, &spans);
     let wrong = structure::prune::<T>(&mut value);
-    let (Some(wrong), Ok(value)) = (wrong, T::deserialize(&value)) else {
-        mismatches.into_result(())?;
-        return Err(misread::<T>(value, &source, &spans));
+    let (wrong, value) = match (wrong, deserialize::<T>(&value, &source, &spans)) {
+        (Some(wrong), Ok(value)) => (wrong, value),
+        (_, read) => {
+            mismatches.into_result(())?;
+            return Err(read.err().unwrap_or_default());
+        }
     };
     let entries = wrong
         .iter()
@@ -131,19 +134,18 @@ pub fn examine<T: DeserializeOwned + JsonSchema>(path: &Path) -> Result<Examined
     })
 }
 
-/// What deserialising says of a value that the schema lets pass.
-fn misread<T: DeserializeOwned>(
-    value: serde_json::Value,
+/// A value that the schema lets pass, as a `T`.
+///
+/// The only place that deserialises a file: each further one doubles the code that is made to read all types.
+fn deserialize<T: DeserializeOwned>(
+    value: &serde_json::Value,
     source: &Arc<Source>,
     spans: &Spans,
-) -> Report {
-    match serde_path_to_error::deserialize::<_, T>(value) {
-        Ok(_) => Report::default(),
-        Err(error) => {
-            let place = Place::from_serde(error.path());
-            Problem::at(source, spans.value(&place), error.inner().to_string()).into()
-        }
-    }
+) -> Result<T, Report> {
+    serde_path_to_error::deserialize(value).map_err(|error| {
+        let place = Place::from_serde(error.path());
+        Problem::at(source, spans.value(&place), error.inner().to_string()).into()
+    })
 }
 
 /// The same from a text that was read from `path`.
@@ -158,7 +160,7 @@ pub fn parse<T: DeserializeOwned + JsonSchema>(
     let (value, spans) = tree::parse(&source)?;
     let mismatches = structure::check::<T>(&source, &value, &spans);
     mismatches.into_result(())?;
-    let value = T::deserialize(&value).map_err(|_| misread::<T>(value.clone(), &source, &spans))?;
+    let value = deserialize(&value, &source, &spans)?;
     Ok(Located {
         value,
         path: path.to_owned(),
