@@ -1,11 +1,10 @@
 //! Inverse dynamics as a matrix: what each inertial parameter adds to each joint's effort.
 
-use nalgebra::{DMatrix, Matrix3, SMatrix, Vector3};
+use nalgebra::{DMatrix, Matrix3, RowVector3, Vector3};
 
-use crate::data::Data;
-use crate::data::check_lengths;
+use crate::data::{Data, Slot, check_lengths};
 use crate::inertia::PARAMETERS_PER_BODY;
-use crate::model::Model;
+use crate::model::{Body, Model};
 use crate::rnea::accelerate;
 
 /// The joint-torque regressor Y of the motion, with effort = Y θ: n x 10 n. Row i is joint i; columns
@@ -30,66 +29,99 @@ pub fn regressor<'d>(
         slots, regressor, ..
     } = data;
     // A body loads only the joints that carry it.
-    regressor.fill(0.0);
+    let n = model.dof();
+    let entries = regressor.as_mut_slice();
+    entries.fill(0.0);
     for (i, body) in model.bodies.iter().enumerate() {
-        let slot = &slots[i + 1];
-        // The body's motion along the child link's axes.
-        let to_link = body.alignment.transpose();
-        let (force, moment) = body_columns(
-            &(to_link * slot.omega),
-            &(to_link * slot.alpha),
-            &(to_link * slot.linear),
-            &(to_link * slot.spin * body.alignment),
-        );
-        let (mut force, mut moment) = (body.alignment * force, body.alignment * moment);
-        let first = PARAMETERS_PER_BODY * body.joint;
+        let motion = Motion::of(body, &slots[i + 1]);
+        let first = PARAMETERS_PER_BODY * body.joint * n;
+        // From the child link's axes to those of the joint at hand, and where the body's origin is there.
+        let (mut rotation, mut origin) = (body.alignment, Vector3::zeros());
         let mut at = i + 1;
-        while at > 0 {
+        loop {
             let (here, slot) = (&model.bodies[at - 1], &slots[at]);
-            let row = if here.prismatic {
-                force.row(2)
+            // A unit velocity of the joint about or along its axis z, along the child link's axes.
+            let axis = rotation.row(2).transpose();
+            let (angular, linear) = if here.prismatic {
+                (Vector3::zeros(), axis)
             } else {
-                moment.row(2)
+                let lever: RowVector3<f64> =
+                    rotation.row(1) * origin.x - rotation.row(0) * origin.y;
+                (axis, lever.transpose())
             };
-            regressor
-                .fixed_view_mut::<1, PARAMETERS_PER_BODY>(here.joint, first)
-                .copy_from(&row);
-            force = slot.rotation * force;
-            moment = slot.rotation * moment + slot.translation.cross_matrix() * force;
+            let columns = entries[first..].chunks_exact_mut(n);
+            for (column, value) in columns.zip(motion.power(&angular, &linear)) {
+                column[here.joint] = value;
+            }
+            if here.parent == 0 {
+                break;
+            }
+            rotation = slot.rotation * rotation;
+            origin = slot.rotation * origin + slot.translation;
             at = here.parent;
         }
     }
     regressor
 }
 
-type Columns = SMatrix<f64, 3, PARAMETERS_PER_BODY>;
-
-/// Force and moment about the origin by each parameter of one body.
-fn body_columns(
-    w: &Vector3<f64>,
-    alpha: &Vector3<f64>,
-    a: &Vector3<f64>,
-    spin: &Matrix3<f64>,
-) -> (Columns, Columns) {
-    let (mut force, mut moment) = (Columns::zeros(), Columns::zeros());
-    force.set_column(0, a);
-    force.fixed_view_mut::<3, 3>(0, 1).copy_from(spin);
-    moment
-        .fixed_view_mut::<3, 3>(0, 1)
-        .copy_from(&-a.cross_matrix());
-    let euler = inertia_columns(alpha) + w.cross_matrix() * inertia_columns(w);
-    moment.fixed_view_mut::<3, 6>(0, 4).copy_from(&euler);
-    (force, moment)
+/// The motion of a body, along the axes of its link.
+struct Motion {
+    /// Angular velocity \[rad/s\].
+    omega: Vector3<f64>,
+    /// Angular acceleration \[rad/s²\].
+    alpha: Vector3<f64>,
+    /// Acceleration of the origin less gravity \[m/s²\].
+    linear: Vector3<f64>,
+    /// What a place on the body is accelerated by beside `linear`, by the place \[1/s²\].
+    spin: Matrix3<f64>,
 }
 
-/// The matrix L(v) with I v = L(v) (xx, xy, xz, yy, yz, zz).
-fn inertia_columns(v: &Vector3<f64>) -> SMatrix<f64, 3, 6> {
-    let (x, y, z) = (v.x, v.y, v.z);
-    #[rustfmt::skip]
-    let columns = SMatrix::<f64, 3, 6>::new(
-        x,   y,   z,   0.0, 0.0, 0.0,
-        0.0, x,   0.0, y,   z,   0.0,
-        0.0, 0.0, x,   0.0, y,   z,
-    );
-    columns
+impl Motion {
+    fn of(body: &Body, slot: &Slot) -> Self {
+        let to_link = body.alignment.transpose();
+        Self {
+            omega: to_link * slot.omega,
+            alpha: to_link * slot.alpha,
+            linear: to_link * slot.linear,
+            spin: to_link * slot.spin * body.alignment,
+        }
+    }
+
+    /// The power that each inertial parameter takes where the body moves with `angular` and `linear`: the body's force and
+    /// moment about its origin by each parameter, times these. A joint feels what its unit velocity takes (Jourdain).
+    ///
+    /// The force is \[a, S, 0\], the moment \[0, -a×, L(α) + ω× L(ω)\], with I v = L(v) (xx, xy, xz, yy, yz, zz). A matrix
+    /// of 3 x 10 for each would have to be turned from joint to joint.
+    fn power(&self, angular: &Vector3<f64>, linear: &Vector3<f64>) -> [f64; PARAMETERS_PER_BODY] {
+        let of_mass = self.linear.dot(linear);
+        let of_first_moment = self.spin.tr_mul(linear) + self.linear.cross(angular);
+        let of_alpha = inertia_power(&self.alpha, angular);
+        let of_omega = inertia_power(&self.omega, &angular.cross(&self.omega));
+        let inertia = |k: usize| of_alpha[k] + of_omega[k];
+        let [x, y, z] = of_first_moment.into();
+        [
+            of_mass,
+            x,
+            y,
+            z,
+            inertia(0),
+            inertia(1),
+            inertia(2),
+            inertia(3),
+            inertia(4),
+            inertia(5),
+        ]
+    }
+}
+
+/// L(v)ᵀ w: w·I v by the inertia's xx, xy, xz, yy, yz, zz.
+fn inertia_power(v: &Vector3<f64>, w: &Vector3<f64>) -> [f64; 6] {
+    [
+        v.x * w.x,
+        v.y * w.x + v.x * w.y,
+        v.z * w.x + v.x * w.z,
+        v.y * w.y,
+        v.z * w.y + v.y * w.z,
+        v.z * w.z,
+    ]
 }

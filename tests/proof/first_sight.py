@@ -166,13 +166,15 @@ def attempt(o, name, kind, robot, rng):
         joint, parts, turned = made
     slow, clock = bool(rng.random() < 0.5), str(rng.choice(["even", "jitter", "uneven"]))
     rate, has_speed = int(rng.choice([100, 125, 250, 500])), bool(rng.random() < 0.7)
+    # The other simulation is one program: its friction and its lateness are the same in all recordings.
+    own, late = (rng.uniform(0.85, 1.15, (2, out)), float(rng.uniform(0.005, 0.02))) if o.twin_topic else (None, None)
     folder = o.out / "cases" / name
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "arm.urdf").write_text(robot.stripped_urdf())
     squares = np.zeros(out)
     for k, m in enumerate(all_):
         write(o, folder / f"rec_{k}.mcap", robot, m, parts[k], None if turned is None else (joint, turned[k]), sigma, friction,
-              {"slow": slow, "clock": clock, "rate": rate, "speed": has_speed}, rng)
+              {"slow": slow, "clock": clock, "rate": rate, "speed": has_speed, "own": own, "late": late}, rng)
         squares += (parts[k]**2).mean(0) / count
     case = {"case": name, "robot": "arm.urdf", "effort_unit": "Nm", "topics": {"state": "/joint_states"},
             "fit": [f"rec_{k}.mcap" for k in range(count) if fit[k]], "holdout": [f"rec_{held}.mcap"]}
@@ -207,10 +209,9 @@ def write(o, path, robot, m, part, turned, sigma, friction, around, rng):
     v = np.round((at(v) + make.SPEED_NOISE * rng.normal(size=(len(t), n))) * 1024) / 1024
     twin = None
     if o.twin_topic:
-        own = rng.uniform(0.85, 1.15, (2, n)) * friction
+        own = around["own"] * friction
         effort = robot.nominal.rnea(m.q, m.v, m.a) + own[0] * np.tanh(m.v / 0.002) + own[1] * m.v
-        late = float(rng.uniform(0.005, 0.02))
-        twin = make.spikes(np.stack([np.interp(t - late, m.t, c) for c in effort.T], 1), rng)
+        twin = make.spikes(np.stack([np.interp(t - around["late"], m.t, c) for c in effort.T], 1), rng)
     ns = np.round((1.77e9 + m.session[0] + told) * 1e9).astype(np.int64)
     record.write(str(path), robot.names, np.maximum.accumulate(ns), q, v if around["speed"] else None, at(m.effort + part) + sigma * noise, None, twin)
 
@@ -288,8 +289,9 @@ def show(o):
         row["n"] += 1
         row[best] += 1
         row["wrong"] += len(wrong)
-        wanted = "unknown_remains" if kind else "explained" if o.beside else "nothing_missing"
-        row["verdict"] += report["verdict"] == wanted
+        # How far the other simulation's friction is off decides whether it is told.
+        wanted = {"unknown_remains"} if kind else {"explained"} if o.beside else {"nothing_missing"} | {"explained"} if o.twin_topic else {"nothing_missing"}
+        row["verdict"] += report["verdict"] in wanted
         if o.cases:
             text = [f"{f['parameters'].get('kind') or f['effect']}{'/' + f['parameters']['against'] if 'against' in f['parameters'] else ''}"
                     f"@{f.get('joint') or f.get('link') or ''} {f['confidence']:.2f}{' WRONG' if f in wrong else ''}" for f in report["findings"]]
