@@ -22,7 +22,7 @@ PARTS = {
     "committed": "tests/proof/prove.sh tests/proof/set OUT",
     "first_sight": "python3 tests/proof/first_sight.py PROGRAM OUT --seed 41",
     "first_sight_beside": "python3 tests/proof/first_sight.py PROGRAM OUT --seed 42 --beside friction,bodies",
-    "first_sight_topic": "python3 tests/proof/first_sight.py PROGRAM OUT --seed 43 --twin-topic --nulls 2 "
+    "first_sight_topic": "python3 tests/proof/first_sight.py PROGRAM OUT --seed 43 --twin-topic --nulls 6 "
                          "--kinds 'gear_hums_at_a_speed, hose_round_the_joint, grease_to_be_parted, dent_in_a_race, "
                          "field_weakening, offset_by_heat, contact_is_lost, rubs_now_and_then'",
     "nulls": "python3 tests/proof/first_sight.py PROGRAM OUT --seed 41 --kinds '' --nulls 6",
