@@ -133,7 +133,7 @@ fn open(way: &str, place: &str, send: &str, receive: &str) -> Box<dyn Side> {
         "link, shared memory" => {
             let domain = Domain::new(place).unwrap();
             let links = SharedMemory::open(&domain).unwrap();
-            Box::new(Linked::open(&links, send, receive))
+            Box::new(Linked::open(links, send, receive))
         }
         "bare zenoh" => Box::new(BareZenoh::open(place, send, receive)),
         _ => {
@@ -145,18 +145,20 @@ fn open(way: &str, place: &str, send: &str, receive: &str) -> Box<dyn Side> {
                 endpoints.connect = endpoint;
             }
             let links = Zenoh::open(&endpoints, PATIENCE).unwrap();
-            Box::new(Linked::open(&links, send, receive))
+            Box::new(Linked::open(links, send, receive))
         }
     }
 }
 
-struct Linked {
+struct Linked<L> {
     sender: Box<dyn Sender<TwinState>>,
     receiver: Box<dyn Receiver<TwinState>>,
+    /// Whose session ends with it.
+    _links: L,
 }
 
-impl Linked {
-    fn open(links: &impl Transport, send: &str, receive: &str) -> Self {
+impl<L: Transport> Linked<L> {
+    fn open(links: L, send: &str, receive: &str) -> Self {
         let mut receiver = links.receiver(receive, Keep::All, 8).unwrap();
         let one = Audience::of(Keep::All, 1);
         let mut sender: Box<dyn Sender<TwinState>> = links.sender(send, one).unwrap();
@@ -168,11 +170,15 @@ impl Linked {
                 .receive(Duration::ZERO, &mut |_: &TwinState| {})
                 .unwrap();
         }
-        Self { sender, receiver }
+        Self {
+            sender,
+            receiver,
+            _links: links,
+        }
     }
 }
 
-impl Side for Linked {
+impl<L: Transport> Side for Linked<L> {
     fn send(&mut self, number: i64) {
         self.sender
             .send_with(&mut |sample| sample.header.stamp_ns = number)
