@@ -33,7 +33,7 @@ COULOMB_NM = [0.9, 0.9, 0.6, 0.5, 0.25, 0.2, 0.1]
 
 def scenario():
     """The arm and its recordings."""
-    physics = ["- {effect: payload, link: tool, parameters: {mass_kg: 1.2}}"]
+    physics = ["- {effect: payload, link: tool, parameters: {mass_kg: 1.2, com_x_m: 0.01, com_y_m: 0.0, com_z_m: 0.06}}"]
     for joint, coulomb in enumerate(COULOMB_NM, 1):
         physics.append(f"- {{effect: coulomb_friction, joint: joint{joint}, parameters: {{coulomb_nm: {coulomb}}}}}")
         viscous = f"{{viscous_nms_per_rad: {1.5 * coulomb:.3f}}}"
