@@ -33,7 +33,8 @@ COULOMB_NM = [0.9, 0.9, 0.6, 0.5, 0.25, 0.2, 0.1]
 
 def scenario():
     """The arm and its recordings."""
-    physics = ["- {effect: payload, link: tool, parameters: {mass_kg: 1.2, com_x_m: 0.01, com_y_m: 0.0, com_z_m: 0.06}}"]
+    payload = "{mass_kg: 1.2, com_x_m: 0.01, com_y_m: 0.0, com_z_m: 0.06}"
+    physics = [f"- {{effect: payload, link: tool, parameters: {payload}}}"]
     for joint, coulomb in enumerate(COULOMB_NM, 1):
         physics.append(f"- {{effect: coulomb_friction, joint: joint{joint}, parameters: {{coulomb_nm: {coulomb}}}}}")
         viscous = f"{{viscous_nms_per_rad: {1.5 * coulomb:.3f}}}"
@@ -50,7 +51,7 @@ def measured(command, folder):
     said = process.stderr.read()
     _, status, usage = os.wait4(process.pid, 0)
     if status:
-        raise SystemExit(f"{command[1]} failed: {said}")
+        raise SystemExit(f"{' '.join(map(str, command[:3]))} failed: {said}")
     return time.monotonic() - begun, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
 
 
@@ -68,8 +69,9 @@ def main():
                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         recordings = sorted((folder / "made").glob("*.mcap"))
         robot = ["--robot", DATA / "demo_arm.urdf"]
+        info_each = 'for recording; do "$0" info "$recording" || exit; done'
         commands = {
-            "`info`: each recording read once (floor)": [program, "info", *recordings],
+            "`info`: each recording read once (floor)": ["sh", "-c", info_each, program, *recordings],
             "`explain`": [program, "explain", *recordings, *robot, "--out", "report", "--force"],
             "`init`": [program, "init", *recordings, *robot, "--out", "cell", "--force"],
         }

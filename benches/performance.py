@@ -15,6 +15,7 @@ import re
 import shlex
 import subprocess
 import sys
+import textwrap
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -54,7 +55,7 @@ def measured(command, kind):
     if done.returncode != 0:
         why = (done.stderr.strip().splitlines() or ["no word of why"])[-1]
         print(done.stderr, file=sys.stderr)
-        return f"Not measured: `{command}` ended with {done.returncode}: {why}"
+        return textwrap.fill(f"Not measured: `{command}` ended with {done.returncode}: {why}", 120)
     output = done.stdout.strip()
     if kind == "text":
         return f"{took}\n\n```text\n{output}\n```"
