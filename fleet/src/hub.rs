@@ -115,7 +115,7 @@ impl Hub {
             running_ms: 0,
             unix_ns: unix_ns(),
         });
-        let session = options.endpoints.lookout()?;
+        let session = options.endpoints.session()?;
         let mailbox = Arc::new(Mailbox::default());
         listen(&session, &mailbox)?;
         let (show, snapshots) = watch::channel(Arc::new(wall.snapshot()));

@@ -52,11 +52,18 @@ def main(endpoint, domain, namespace):
         if alarm["state"] == "silent" and alarm["stamp_ns"] > 0:
             ended.set()
 
-    config = zenoh.Config()
-    config.insert_json5("mode", '"router"')
-    config.insert_json5("listen/endpoints", json.dumps([endpoint]))
-    config.insert_json5("scouting/multicast/enabled", "false")
-    with zenoh.open(config) as session:
+    def settings(mode, **endpoints):
+        """Those of a router, or of a node behind it, which is a peer."""
+        config = zenoh.Config()
+        config.insert_json5("mode", json.dumps(mode))
+        for kind in ("listen", "connect"):
+            config.insert_json5(f"{kind}/endpoints", json.dumps(endpoints.get(kind, [])))
+        config.insert_json5("scouting/multicast/enabled", "false")
+        return config
+
+    router = settings("router", listen=[endpoint])
+    node = settings("peer", connect=[endpoint], listen=["tcp/127.0.0.1:0"])
+    with zenoh.open(router), zenoh.open(node) as session:
         ros = session.declare_subscriber(f"{domain}/{namespace}/**", on_ros)
         alarm = session.declare_subscriber(f"{namespace}/alarm", on_alarm)
         print("ready", flush=True)

@@ -91,20 +91,13 @@ pub struct ZenohEndpoints {
 }
 
 impl ZenohEndpoints {
-    /// A session of its own there, for other traffic than streams; what it connects to need not be there yet.
+    /// A session of its own there, for other traffic than streams; what it connects to need not be there yet. Its mode is
+    /// `router`: a router passes on what peers say, as sessions of ROS 2 are, to routers and clients, but not to other
+    /// peers, and a client cannot begin before its router is there.
     ///
     /// # Errors
     /// As [`Zenoh::open`].
     pub fn session(&self) -> Result<zenoh::Session, LinkError> {
-        open_session("peer", self, PATIENCE)
-    }
-
-    /// A session that hears what others say by way of a router, or is that router itself: a router passes on to routers
-    /// and clients, but not from peer to peer, and a client cannot begin before its router is there.
-    ///
-    /// # Errors
-    /// As [`Zenoh::open`].
-    pub fn lookout(&self) -> Result<zenoh::Session, LinkError> {
         open_session("router", self, PATIENCE)
     }
 

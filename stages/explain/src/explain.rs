@@ -18,7 +18,7 @@ use crate::read::input::Input;
 use crate::read::start::Start;
 use crate::report::schema::{Report, Verdict};
 use crate::report::slips::Slips;
-use crate::report::{findings, locate, notes, summary, verdict};
+use crate::report::{findings, handed_out, locate, notes, summary, verdict};
 
 use judged::{Judged, Stop};
 
@@ -153,6 +153,7 @@ fn conclude(
     } = judged;
     progress(0.95, "proof");
     let mut proof = context.proof(&problem, &before, &found)?;
+    handed_out::reject_not_carried(&mut named, &found, &proof.kept, joints);
     let noise_floor: Vec<f64> = (0..joints.len())
         .map(|j| white_noise(&input.fit, j, joints.len()))
         .collect();

@@ -334,7 +334,9 @@ fn session_config(zenoh: &ZenohConfig) -> Result<zenoh::Config, ConfigError> {
     let mut config = zenoh::Config::default();
     let list = |endpoints: &[String]| serde_json::Value::from(endpoints).to_string();
     let settings = [
-        ("mode", "\"peer\"".to_owned()),
+        // A router passes on what peers say, as sessions of rmw_zenoh are, to routers and clients, but not to other peers.
+        // A client cannot begin before its router is there.
+        ("mode", "\"router\"".to_owned()),
         ("connect/endpoints", list(&zenoh.connect)),
         ("listen/endpoints", list(&zenoh.listen)),
         ("connect/timeout_ms", "-1".to_owned()),

@@ -30,13 +30,28 @@ fn endpoint() -> String {
 }
 
 fn publisher(listen: &str) -> Session {
+    open(&[
+        ("mode", "\"router\""),
+        ("listen/endpoints", &format!("[\"{listen}\"]")),
+    ])
+}
+
+/// A session as a node of `rmw_zenoh` has it behind its router.
+fn node(router: &str) -> Session {
+    open(&[
+        ("mode", "\"peer\""),
+        ("connect/endpoints", &format!("[\"{router}\"]")),
+        ("listen/endpoints", "[\"tcp/127.0.0.1:0\"]"),
+    ])
+}
+
+fn open(settings: &[(&str, &str)]) -> Session {
     let mut config = zenoh::Config::default();
-    for (key, value) in [
-        ("mode", "\"router\"".to_owned()),
-        ("listen/endpoints", format!("[\"{listen}\"]")),
-        ("scouting/multicast/enabled", "false".to_owned()),
-    ] {
-        config.insert_json5(key, &value).unwrap();
+    for (key, value) in settings
+        .iter()
+        .chain(&[("scouting/multicast/enabled", "false")])
+    {
+        config.insert_json5(key, value).unwrap();
     }
     zenoh::open(config).wait().unwrap()
 }
@@ -163,6 +178,17 @@ fn rmw_zenoh_with_commands_and_lost_messages() {
     assert_eq!(source.counts().lost, 1);
     assert_eq!(source.counts().undecodable, 0);
     assert_eq!(source.dropped(), 1);
+}
+
+#[test]
+fn a_node_behind_a_router_is_heard() {
+    let endpoint = endpoint();
+    let _router = publisher(&endpoint);
+    let session = node(&endpoint);
+    let mut source = source(&endpoint, Keys::RmwZenoh, Topics::default());
+    let (dds_type, hash) = (ros::JointState::dds_type(), ros::JointState::TYPE_HASH);
+    let key = format!("0/joint_states/{dds_type}/{hash}");
+    meet(&session, &key, &mut source);
 }
 
 #[test]

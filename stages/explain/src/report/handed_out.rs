@@ -4,11 +4,16 @@
 //! correction does worse than none on fitted recordings, each left out in turn. The written twin may be judged by the
 //! held-out recordings, too.
 
+use tauscope_dynamics::terms::UNKNOWN;
+
 use crate::context::Context;
 use crate::data::problem::Problem;
 use crate::data::track::Track;
 use crate::fit::fitted::Fit;
+use crate::physics::active::{Hypothesis, TimeKind};
 use crate::read::recording::Recording;
+use crate::report::findings::Named;
+use crate::report::schema::{Finding, Rejected};
 use crate::report::sentences::UNCHANGED;
 use crate::select::cross_validation::left_elsewhere;
 
@@ -33,6 +38,37 @@ pub fn not_carried(problem: &Problem, before: &Fit, found: &Fit) -> Vec<usize> {
     };
     let all = (0..problem.joints).filter(changed);
     all.filter(no_better).collect()
+}
+
+/// Moves the effects of joints that are `not_carried` from the findings to what is rejected: they fit what is peculiar to
+/// single recordings, as slow noise is. What acts once is not expected in other recordings, and `unknown` names no cause
+/// that could be wrong.
+pub fn reject_not_carried(
+    named: &mut Named,
+    found: &Fit,
+    not_carried: &[usize],
+    joints: &[String],
+) {
+    let is_its_own = |finding: &Finding, hypothesis: &Hypothesis| {
+        let joint = hypothesis.only_joint().filter(|j| not_carried.contains(j));
+        joint.is_some_and(|j| finding.joint.as_ref() == Some(&joints[j]))
+            && hypothesis.said() == finding.effect
+            && matches!(hypothesis.time_kind(), TimeKind::Always)
+    };
+    let refuted = named.findings.extract_if(.., |finding| {
+        finding.effect != UNKNOWN.name
+            && (found.actives.iter()).any(|active| is_its_own(finding, &active.hypothesis))
+    });
+    named.rejected.extend(refuted.map(|finding| {
+        Rejected {
+            effect: finding.effect,
+            joint: finding.joint,
+            link: finding.link,
+            reason:
+                "it fits these recordings, but does not predict one that is left out of the fit"
+                    .to_owned(),
+        }
+    }));
 }
 
 /// A correction that is left out of the written twin.
