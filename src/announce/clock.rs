@@ -16,6 +16,8 @@ pub struct Clock {
     before: Option<(i64, i64)>,
     /// When a jump was told of last, in time of reception \[ns\].
     told_ns: Option<i64>,
+    /// Jumps that were not told of yet, and their sum \[ns\].
+    untold: (usize, i64),
 }
 
 impl Clock {
@@ -25,18 +27,26 @@ impl Clock {
         let before = self.before.replace(now)?;
         let jump_ns =
             (now.0.saturating_sub(before.0)).saturating_sub(now.1.saturating_sub(before.1));
+        if jump_ns.saturating_abs() >= JUMP_NS {
+            self.untold = (self.untold.0 + 1, self.untold.1.saturating_add(jump_ns));
+        }
         let told_lately = self
             .told_ns
             .is_some_and(|told_ns| now.1 - told_ns < TOLD_EVERY_NS);
-        if jump_ns.saturating_abs() < JUMP_NS || told_lately {
+        if self.untold.0 == 0 || told_lately {
             return None;
         }
         self.told_ns = Some(now.1);
-        let jump_s = jump_ns as f64 * 1e-9;
-        let way = if jump_ns > 0 { "ahead" } else { "back" };
-        let size_s = jump_s.abs();
+        let (times, sum_ns) = std::mem::take(&mut self.untold);
+        let way = if sum_ns > 0 { "ahead" } else { "back" };
+        let size_s = sum_ns.unsigned_abs() as f64 * 1e-9;
+        let how_often = if times > 1 {
+            format!(" in {times} jumps")
+        } else {
+            String::new()
+        };
         Some(format!(
-            "the clock of the joint states jumped {way} by {size_s:.1} s: see how the robot's computer gets its time"
+            "the clock of the joint states jumped {way} by {size_s:.1} s{how_often}: see how the robot's computer gets its time"
         ))
     }
 }
@@ -63,7 +73,10 @@ mod tests {
             (3660.2, 60.2),
             // It goes on from there, and comes back later.
             (3660.3, 60.3),
+            // Soon after the first, so it is told later.
+            (62.0, 62.0),
             (80.0, 80.0),
+            (80.1, 80.1),
         ]
         .map(|(stamp_s, received_s)| clock.line(&state(stamp_s, received_s)));
         let said = said.into_iter().flatten().collect::<Vec<_>>();

@@ -6,6 +6,7 @@
 
 mod attachment;
 mod diagnosis;
+mod frozen;
 mod joint_names;
 mod keys;
 mod publication;

@@ -34,7 +34,10 @@ impl Heard {
 pub(super) struct Rivals {
     heard: Vec<Heard>,
     refused: u64,
-    refused_ns: Option<i64>,
+    /// The publisher that was refused last, and when.
+    newest_refused: Option<([u8; 16], i64)>,
+    /// When one that is heard last spoke beside one that is refused: a driver that was started again speaks instead.
+    beside_ns: Option<i64>,
 }
 
 impl Rivals {
@@ -45,10 +48,15 @@ impl Rivals {
         };
         if self.heard.iter().any(is_rival) {
             self.refused += 1;
-            self.refused_ns = Some(now_ns);
+            self.newest_refused = Some((publisher, now_ns));
             return false;
         }
         if let Some(heard) = self.heard.iter_mut().find(|it| it.publisher == publisher) {
+            let is_other =
+                |&(other, at_ns): &([u8; 16], i64)| other != publisher && is_recent(at_ns, now_ns);
+            if self.newest_refused.as_ref().is_some_and(is_other) {
+                self.beside_ns = Some(now_ns);
+            }
             heard.period_ns = (now_ns - heard.last_ns).max(0);
             heard.last_ns = now_ns;
             heard.joints |= joints;
@@ -71,11 +79,14 @@ impl Rivals {
         self.refused
     }
 
-    /// Whether one was refused lately.
+    /// Whether two spoke of the same joints lately.
     pub fn are_there(&self, now_ns: i64) -> bool {
-        self.refused_ns
-            .is_some_and(|refused_ns| (now_ns - refused_ns).saturating_abs() < 2 * SILENT_NS)
+        self.beside_ns.is_some_and(|at_ns| is_recent(at_ns, now_ns))
     }
+}
+
+fn is_recent(at_ns: i64, now_ns: i64) -> bool {
+    (now_ns - at_ns).saturating_abs() < 2 * SILENT_NS
 }
 
 #[cfg(test)]
@@ -99,6 +110,19 @@ mod tests {
         assert!(rivals.admits(bag, 0b10, 1600 * MS));
         assert!(!rivals.admits(robot, 0b11, 1700 * MS));
         assert!(!rivals.are_there(5000 * MS));
+    }
+
+    #[test]
+    fn a_driver_that_is_started_again_is_no_second_one() {
+        let mut rivals = Rivals::default();
+        for ms in 0..1000 {
+            assert!(rivals.admits([1; 16], 1, ms * MS));
+        }
+        for ms in 1100..3000 {
+            rivals.admits([2; 16], 1, ms * MS);
+            assert!(!rivals.are_there(ms * MS), "{ms}");
+        }
+        assert!(rivals.admits([2; 16], 1, 3000 * MS));
     }
 
     #[test]

@@ -6,6 +6,7 @@ use tauscope_bus::{JointState, Trouble, flags};
 use zenoh::Session;
 
 use super::diagnosis::{Expected, Fed, diagnose};
+use super::frozen::Frozen;
 use super::scout::Scout;
 use crate::pack::{PackCounts, Packer};
 
@@ -25,6 +26,7 @@ pub(super) struct Watch {
     first_sample: Option<Instant>,
     /// When a sample last had efforts.
     effort_at: Option<Instant>,
+    frozen: Frozen,
 }
 
 impl Watch {
@@ -37,6 +39,7 @@ impl Watch {
             packed: PackCounts::default(),
             first_sample: None,
             effort_at: None,
+            frozen: Frozen::default(),
         }
     }
 
@@ -56,6 +59,7 @@ impl Watch {
             self.effort_at = Some(now);
         }
         self.first_sample.get_or_insert(now);
+        self.frozen.sample(sample);
         self.packed = packed;
         if self.fed.messages > 0 {
             self.fed = Fed {
@@ -74,7 +78,7 @@ impl Watch {
     ) -> Option<Trouble> {
         if silent_for < SILENT_AFTER {
             self.scout.rest();
-            return self.effortless();
+            return self.effortless().or_else(|| self.frozen.trouble());
         }
         let packed = packer.counts();
         let seen = self.scout.look(session)?;
