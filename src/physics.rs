@@ -65,7 +65,10 @@ pub fn rows(request: &Request, night: &Night<'_>) -> Result<(Vec<Row>, u64), Fai
         None => String::new(),
     };
     let robot = request.cell.model.as_ref().map_or("", |model| model.name());
-    let effort = if in_nm { "N m" } else { "A" };
+    let effort = |joint: Option<usize>| {
+        let is_known = joint.is_none_or(|joint| in_nm[joint]);
+        if is_known { "N m" } else { "A" }
+    };
     let rows = numbers.into_iter().map(|number| Row {
         cell: night.cell.to_owned(),
         robot: robot.to_owned(),
@@ -75,7 +78,8 @@ pub fn rows(request: &Request, night: &Night<'_>) -> Result<(Vec<Row>, u64), Fai
             .map(|joint| joints[joint].clone())
             .unwrap_or_default(),
         quantity: number.name.to_owned(),
-        unit: Quantity::of_name(number.name).map_or_else(String::new, |one| one.unit(effort)),
+        unit: Quantity::of_name(number.name)
+            .map_or_else(String::new, |one| one.unit(effort(number.joint))),
         twin_sha256: twin_sha256.clone(),
         stamp_ns: u64::try_from(stamp_ns).unwrap_or(0),
         recordings: input.fit.len() as u64,

@@ -160,7 +160,13 @@ fn set_up(
     let live = args.live.is_some().then_some(&*args.source);
     let is_explained = learnt.is_explained;
     folder.write_pipeline(&looked.cell, &looked.state_topic, shown, live, is_explained)?;
-    let page = init::page(folder, looked, &outcome.report, &learnt, live.is_some());
+    let page = init::page(
+        folder,
+        looked,
+        &outcome.report,
+        &learnt,
+        (live.is_some(), kept.lost),
+    );
     init::write(&folder.page(), page.as_bytes())?;
     drop(hold);
     drop(progress);

@@ -1,6 +1,6 @@
 //! `tauscope physics`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use tauscope_fleet::physics::Row;
 use tauscope_pipeline::cell::EffortUnit;
@@ -156,6 +156,9 @@ fn request(args: &Args, recordings: &[PathBuf]) -> Result<(Request, String), Fai
         Settings::Twin { config, .. } => config.model.clone(),
         _ => None,
     });
+    // As `run` and `replay` do, from where the file stands.
+    let folder = pipeline.path.parent().unwrap_or(Path::new(""));
+    let model = model.map(|path| folder.join(path));
     let twin = args.twin.clone().or_else(|| model.into_iter().next());
     let request = Request::of_cell(cell.clone(), &args.state_topic, twin, recordings)?;
     Ok((

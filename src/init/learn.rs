@@ -5,6 +5,7 @@ use std::path::Path;
 
 use anyhow::Context as _;
 use tauscope_detect::{Config, tauscope};
+use tauscope_dynamics::terms::words::number;
 use tauscope_evaluate::{Evaluation, Options, Output, Progress, Role};
 use tauscope_twin::TwinFile;
 
@@ -151,8 +152,9 @@ impl Trial {
         let twin = self.words();
         let force = self.push.as_ref().map_or_else(String::new, |(link, force_n)| {
             format!(
-                " While the arm moves as it does there, it finds a push on {link} from {force_n:.0} N on, in half of \
-                 all directions; while the arm stands it finds weaker ones."
+                " While the arm moves as it does there, it finds a push on {link} from {} N on, in half of \
+                 all directions; while the arm stands it finds weaker ones.",
+                number(*force_n)
             )
         });
         format!(

@@ -1,6 +1,7 @@
 //! What was found, on one page.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use tauscope_explain::html;
 use tauscope_explain::report::{Report, Verdict};
@@ -10,16 +11,24 @@ use super::learn::Learnt;
 use super::look::Looked;
 
 /// The page as Markdown: what the recordings are, what the twin leaves out, what the detector has learnt, what to
-/// record next, and how to go on. `is_live` tells that the pipeline listens to the robot.
+/// record next, and how to go on. `is_live` tells that the pipeline listens to the robot, `lost` how many rows could not be used.
 pub fn page(
     folder: &Folder,
     looked: &Looked,
     report: &Report,
     learnt: &Learnt,
-    is_live: bool,
+    (is_live, lost): (bool, u64),
 ) -> String {
     let mut text = format!("# {}\n", looked.cell.facts.name);
     section(&mut text, "Recordings", &looked.sentences);
+    if lost > 0 {
+        let page = folder.explained().join("report.html");
+        let say = format!(
+            "{lost} rows or parts of them could not be used: {} says which.",
+            page.display()
+        );
+        list(&mut text, &[say]);
+    }
 
     let mut twin = vec![report.summary.clone()];
     if report.verdict != Verdict::NotEvaluated {
@@ -47,8 +56,7 @@ pub fn page(
 
 /// What to do with the folder.
 fn go_on(folder: &Folder, report: &Report, learnt: &Learnt, is_live: bool) -> Vec<String> {
-    let pipeline = folder.pipeline();
-    let pipeline = pipeline.display();
+    let pipeline = for_a_shell(&folder.pipeline());
     let search = format!(
         "Search recordings for contacts: `tauscope replay RECORDING... --pipeline {pipeline} --out results`."
     );
@@ -74,6 +82,17 @@ fn go_on(folder: &Folder, report: &Report, learnt: &Learnt, is_live: bool) -> Ve
     let page = folder.explained().join("report.html");
     let read = format!("Read {what}: {}.", page.display());
     first.into_iter().chain([read]).collect()
+}
+
+/// A path as a shell takes it.
+fn for_a_shell(path: &Path) -> String {
+    let text = path.display().to_string();
+    let is_plain = |c: char| c.is_alphanumeric() || "/._-".contains(c);
+    if text.chars().all(is_plain) {
+        text
+    } else {
+        format!("'{}'", text.replace('\'', r"'\''"))
+    }
 }
 
 /// The motions to record next; a motion that is the same for several joints is told once.

@@ -16,7 +16,7 @@ const OFTEN_ON: f64 = 0.01;
 /// equals the one that is in alarm for less time, then the faster one. One that is in alarm for long is none, unless all
 /// are. `None` where nothing was scored or no test recording holds a contact.
 pub(super) fn best<'a, 'b>(judged: &'b [Judged<'a>]) -> Option<&'b Judged<'a>> {
-    let of = |judged: &Judged<'_>| rank(judged.first());
+    let of = |judged: &Judged<'_>| rank(judged);
     let scored = judged.iter().filter(|j| !j.scored.is_empty());
     scored
         .filter(|judged| judged.first().events > 0)
@@ -28,19 +28,23 @@ pub(super) fn best<'a, 'b>(judged: &'b [Judged<'a>]) -> Option<&'b Judged<'a>> {
 }
 
 /// What detectors are ordered by; the smallest is the best.
-fn rank(numbers: &Numbers) -> (bool, usize, f64, f64) {
+fn rank(judged: &Judged<'_>) -> (bool, f64, f64, f64) {
+    let numbers = judged.first();
     let share = numbers.free_share_in_alarm;
     let delay = numbers.delay_s.p50;
     (
         share > ALWAYS_ON,
-        mistakes(numbers),
+        mistakes(judged),
         if share.is_finite() { share } else { 0.0 },
         if delay.is_finite() { delay } else { f64::MAX },
     )
 }
 
-fn mistakes(numbers: &Numbers) -> usize {
-    numbers.events - numbers.found + numbers.false_alarms
+/// Mean over the seeds, for a net that does well with one seed may do badly with the next.
+fn mistakes(judged: &Judged<'_>) -> f64 {
+    let of = |numbers: &Numbers| numbers.events - numbers.found + numbers.false_alarms;
+    let sum: usize = judged.numbers.iter().map(of).sum();
+    sum as f64 / judged.numbers.len() as f64
 }
 
 /// The recommendation in a sentence; every number in it is of the one detector.
@@ -51,25 +55,34 @@ pub(super) fn sentence(judged: &[Judged<'_>]) -> String {
             judged.len()
         );
     };
-    let numbers = best.first();
     let reason = if judged.len() == 1 {
         "It is the only one that ran:".to_owned()
-    } else if rank(numbers).0 {
+    } else if rank(best).0 {
         "All are in alarm for much of the time without contact; it makes the fewest mistakes of them:".to_owned()
     } else {
-        let alike = |other: &&Numbers| {
-            mistakes(other) == mistakes(numbers) && other.free_share_in_alarm <= ALWAYS_ON
+        let alike = |other: &&Judged<'_>| {
+            mistakes(other) <= mistakes(best) && other.first().free_share_in_alarm <= ALWAYS_ON
         };
         let others = judged.iter().filter(|one| one.label != best.label);
-        let alike = others.map(Judged::first).filter(alike).map(share_and_delay);
-        ahead_of(share_and_delay(numbers), &alike.collect::<Vec<_>>())
+        let alike = others.filter(alike).map(share_and_delay);
+        ahead_of(share_and_delay(best), &alike.collect::<Vec<_>>())
     };
-    format!("Take {}. {reason} {}.", best.label, said_of(numbers))
+    let seeds = best.numbers.len();
+    let of_which = if seeds > 1 {
+        format!(" (of {seeds} seeds, the first)")
+    } else {
+        String::new()
+    };
+    format!(
+        "Take {}. {reason} {}{of_which}.",
+        best.label,
+        said_of(best.first())
+    )
 }
 
 /// Share of the contact-free time in alarm, and delay, of those that make as few mistakes.
-fn share_and_delay(numbers: &Numbers) -> (f64, f64) {
-    let (_, _, share, delay) = rank(numbers);
+fn share_and_delay(judged: &Judged<'_>) -> (f64, f64) {
+    let (_, _, share, delay) = rank(judged);
     (share, delay)
 }
 

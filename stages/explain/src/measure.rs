@@ -49,9 +49,9 @@ pub struct Number {
 pub struct Measured {
     /// The numbers, joint by joint.
     pub numbers: Vec<Number>,
-    /// Whether efforts are in N m. Otherwise they are in A, although the names of numbers say N m: nobody knows the torque
-    /// constants.
-    pub in_nm: bool,
+    /// By joint, whether its efforts are in N m. Otherwise they are in A, although the names of numbers say N m: nobody knows
+    /// its torque constant.
+    pub in_nm: Vec<bool>,
 }
 
 /// Measures. `Ok(Err(reason))` where the recordings allow no numbers.
@@ -108,9 +108,8 @@ pub fn measure(input: &Input) -> Result<Result<Measured, String>, TermError> {
             fit = Fit::new(&problem, with).refined(&problem);
         }
     }
-    let in_nm = input.effort_unit != "A"
-        || input.torque_constants_nm_per_a.is_some()
-        || (input.start.is_some() && context.unscaled.is_empty());
+    let is_known = |joint| context.unscaled.iter().all(|(other, _)| *other != joint);
+    let in_nm = (0..n).map(is_known).collect();
     let numbers = numbers(&context, &problem, &fit);
     Ok(Ok(Measured { numbers, in_nm }))
 }
@@ -256,7 +255,7 @@ mod tests {
     #[test]
     fn a_night_has_every_number_with_an_interval_that_holds_the_true_one() {
         let measured = measure(&night(3, 1.5)).unwrap().unwrap();
-        assert!(measured.in_nm);
+        assert_eq!(measured.in_nm, [true]);
         let number = |joint: Option<usize>, name: &str| {
             let found = measured
                 .numbers

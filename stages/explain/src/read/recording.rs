@@ -273,7 +273,12 @@ impl Reader<'_> {
         if self.order.is_empty() || message.name != self.names {
             self.known = message.name.join(", ");
             let Ok(order) = indices(&message.name, self.joint_names) else {
-                recording.losses.incomplete += 1;
+                // What names none of the joints tells of another device, such as a gripper.
+                let is_of_robot = message
+                    .name
+                    .iter()
+                    .any(|name| self.joint_names.contains(name));
+                recording.losses.incomplete += u64::from(is_of_robot);
                 self.skip_row();
                 return;
             };

@@ -27,6 +27,7 @@ use crate::select::search::Search;
 use clipping::is_clipped;
 use confidence::{Grounds, confidence};
 use contest::{Contest, contest};
+use doubt::DOUBTED;
 pub use doubt::doubt_patches;
 use scales::{Scales, StartScales};
 pub use undetectable::undetectable;
@@ -129,7 +130,9 @@ pub fn of(
         drop_no_force(&mut parameters, &mut intervals);
         let in_amperes = scales.to_nm(active.hypothesis, &mut parameters, &mut intervals);
         of_start.widen(active.hypothesis, &parameters, &mut intervals);
+        let or_scale = scales.doubt_body(active.hypothesis, &parameters, &mut intervals);
         let mut sentence = sentences::sentence(active, &place, &parameters, &intervals, joints);
+        sentence += or_scale.unwrap_or_default();
         if in_amperes {
             sentence = sentences::in_amperes(&sentence);
         }
@@ -145,7 +148,7 @@ pub fn of(
             parameters,
             intervals_95: intervals,
             in_amperes,
-            confidence: confidence(grounds),
+            confidence: or_scale.map_or(1.0, |_| DOUBTED).min(confidence(grounds)),
             recording: when.recording,
             t_start: when.start,
             t_end: when.end,

@@ -15,7 +15,7 @@ use super::Named;
 
 /// Highest confidence of a doubted finding.
 /// Statistical: just below even odds.
-const DOUBTED: f64 = 0.45;
+pub(super) const DOUBTED: f64 = 0.45;
 /// What explains less than this share of the largest finding is doubted beside another simulation, whose own errors are
 /// larger than those of smoothing.
 /// Tuned: by hand, on no recorded seeds; not swept.
