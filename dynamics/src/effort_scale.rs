@@ -34,8 +34,13 @@ pub struct Slope {
 pub enum EffortScale {
     /// No joint tells.
     Untold,
-    /// These joints measure with the other sign than the robot's model has.
-    Turned(Vec<String>),
+    /// Joints measure with the other sign than the robot's model has.
+    Turned {
+        /// Which.
+        joints: Vec<String>,
+        /// How many joints measure with the model's sign.
+        others: usize,
+    },
     /// N m; `sure` if the slopes leave no doubt.
     Torque {
         /// The middle slope.
@@ -63,7 +68,11 @@ impl EffortScale {
         let turned = slopes.iter().filter(|one| one.slope < 0.0);
         let turned: Vec<String> = turned.map(|one| one.joint.clone()).collect();
         if !turned.is_empty() {
-            return Self::Turned(turned);
+            let others = slopes.len() - turned.len();
+            return Self::Turned {
+                joints: turned,
+                others,
+            };
         }
         let all: Vec<f64> = slopes.iter().map(|one| one.slope).collect();
         Self::of_positive(&all)
@@ -94,7 +103,10 @@ impl EffortScale {
     pub fn fault_in_nm(&self) -> Option<ScaleFault> {
         match self {
             Self::Untold | Self::Torque { .. } => None,
-            Self::Turned(joints) => Some(ScaleFault::Turned(joints.clone())),
+            Self::Turned { joints, others } => Some(ScaleFault::Turned {
+                joints: joints.clone(),
+                others: *others,
+            }),
             Self::Current { nm_per_unit, .. } => Some(ScaleFault::WrongUnit {
                 slope: 1.0 / nm_per_unit,
             }),
@@ -105,7 +117,10 @@ impl EffortScale {
     /// Why an effort that is said to be in A cannot be.
     pub fn fault_in_a(&self) -> Option<ScaleFault> {
         match self {
-            Self::Turned(joints) => Some(ScaleFault::Turned(joints.clone())),
+            Self::Turned { joints, others } => Some(ScaleFault::Turned {
+                joints: joints.clone(),
+                others: *others,
+            }),
             Self::TooLarge { slope } if *slope > TOO_MUCH_CURRENT => {
                 Some(ScaleFault::NoCurrent { slope: *slope })
             }
@@ -123,8 +138,13 @@ impl EffortScale {
 /// Why an effort cannot be this robot's in N m.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ScaleFault {
-    /// The efforts of these joints fall where the model's rise.
-    Turned(Vec<String>),
+    /// Efforts fall where the model's rise.
+    Turned {
+        /// Of which joints.
+        joints: Vec<String>,
+        /// How many joints have the model's sign.
+        others: usize,
+    },
     /// The measured effort is so many times what the motion requires.
     WrongUnit {
         /// The middle slope of the joints that bear weight.
@@ -140,7 +160,13 @@ pub enum ScaleFault {
 impl fmt::Display for ScaleFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Turned(joints) => write!(
+            Self::Turned { joints, others: 0 } if joints.len() > 1 => write!(
+                f,
+                "the effort of {} has the other sign than this robot's motion requires, at each joint that bears weight: either \
+                 the robot hangs upside down, and the base must be turned in the URDF, or the driver turns all signs",
+                joints.join(", ")
+            ),
+            Self::Turned { joints, .. } => write!(
                 f,
                 "the effort of {} has the other sign than this robot's motion requires: turn its sign in the driver, \
                  or the joint's axis in the URDF",
@@ -201,7 +227,10 @@ mod tests {
         );
         assert_eq!(
             of(&[1.0, -1.0, 1.0]),
-            EffortScale::Turned(vec!["joint2".to_owned()])
+            EffortScale::Turned {
+                joints: vec!["joint2".to_owned()],
+                others: 1
+            }
         );
         assert!(matches!(of(&[1000.0]), EffortScale::TooLarge { .. }));
     }

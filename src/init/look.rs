@@ -18,6 +18,10 @@ use tauscope_pipeline::suggest;
 use self::slopes::{Slopes, signs, telling, turned_in_some};
 use crate::exit::Failure;
 
+/// A joint's torque constant is below this \[N m/A\].
+/// Physical: 1 N m/A of a large motor behind a gear of 300.
+const MOST_NM_PER_A: f64 = 300.0;
+
 /// The arm and its recordings, before anything is fitted.
 #[derive(Debug)]
 pub struct Looked {
@@ -255,6 +259,14 @@ impl Told<'_> {
                 );
                 Ok((EffortUnit::Nm, sentence))
             }
+            EffortScale::Current { nm_per_unit, .. } if *nm_per_unit > MOST_NM_PER_A => {
+                let problem = Problem::new(format!(
+                    "the unit of the effort cannot be told: the robot's weight requires {nm_per_unit:.0} N m for each unit, \
+                     more than any motor gives for an ampere"
+                ));
+                let help = "the masses of a URDF are in kg, not in g; efforts are in N m or A, not in kN m. Or give --effort-unit";
+                Err(Failure::Rejected(problem.help(help).into()))
+            }
             EffortScale::Current {
                 nm_per_unit,
                 joints,
@@ -299,7 +311,7 @@ fn undecided(scale: &EffortScale) -> Problem {
         .help(format!(
             "a payload, or a URDF with other masses, would do that to N m; {give}"
         )),
-        EffortScale::TooLarge { .. } | EffortScale::Turned(_) => {
+        EffortScale::TooLarge { .. } | EffortScale::Turned { .. } => {
             let fault = scale.fault_in_nm();
             Problem::new(fault.map_or_else(String::new, |fault| fault.to_string()))
         }

@@ -62,6 +62,18 @@ pub fn write_all(folder: &Path) {
             state.position[1] += 1.5;
         }
     });
+    let urdf = std::fs::read_to_string(bundled().join("demo_arm.urdf")).unwrap();
+    let in_grams = |part: &str| {
+        let (mass_kg, rest) = part.split_once('"').unwrap();
+        format!(
+            "mass value=\"{}\"{rest}",
+            1000.0 * mass_kg.parse::<f64>().unwrap()
+        )
+    };
+    let mut parts = urdf.split("mass value=\"");
+    let first = parts.next().unwrap_or_default().to_owned();
+    let grams: String = std::iter::once(first).chain(parts.map(in_grams)).collect();
+    std::fs::write(folder.join("grams.urdf"), grams).unwrap();
     write("twice.mcap", &|_, state| {
         state.name[2] = state.name[1].clone();
     });
@@ -219,6 +231,11 @@ const SLIPS: &[Slip] = &[
         typed: "init @turned.mcap @demo_validation.mcap --robot @demo_arm.urdf --out @x12",
         code: 2,
         says: &["turned.mcap", "other sign", "not in the others"],
+    },
+    Slip {
+        typed: "init @demo.mcap @demo_validation.mcap --robot @grams.urdf --out @x12",
+        code: 2,
+        says: &["N m for each unit", "in kg, not in g"],
     },
     Slip {
         typed: "init @degrees.mcap @demo_validation.mcap --robot @demo_arm.urdf --out @x12",

@@ -119,7 +119,7 @@ impl PlausibleTwin {
         let rate_hz = self.rate_hz().into_iter();
         let cutoffs = rate_hz.flat_map(|rate_hz| cutoffs_above_half(self.filters, rate_hz));
         let scale = self.scale_fault().map(|fault| match fault {
-            ScaleFault::Turned(joints) => format!(
+            ScaleFault::Turned { joints, .. } => format!(
                 "the effort of {} has the other sign than the twin's: turn its sign in the driver",
                 joints.join(", ")
             ),
@@ -155,7 +155,7 @@ impl PlausibleTwin {
         }
         let scale = EffortScale::of(&telling_slopes(&self.names, &fits));
         let fault = scale.fault_in_nm()?;
-        let tells = self.is_alike || matches!(fault, ScaleFault::Turned(_));
+        let tells = self.is_alike || matches!(fault, ScaleFault::Turned { .. });
         tells.then_some(fault)
     }
 }

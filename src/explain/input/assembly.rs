@@ -1,13 +1,15 @@
 //! The parts of a request put together, and everything that is wrong with them.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
+use std::fs::Metadata;
+use std::path::{Path, PathBuf};
 
 use tauscope_archive::{is_there, name_of, recordings_at};
 use tauscope_dynamics::Model;
 use tauscope_pipeline::cell::{
     Cell, CellFacts, ConstantSpot, EffortUnit, first_joint_names, torque_constants,
 };
+use tauscope_pipeline::provenance::sha256_of_file;
 use tauscope_pipeline::report::{Problem, Report};
 use tauscope_pipeline::{urdf, yaml};
 use tauscope_twin::TwinFile;
@@ -38,6 +40,8 @@ pub struct Assembly<'a> {
     pub constants: Option<BTreeMap<String, f64>>,
     /// The joints, where there is no robot that has them.
     pub joint_names: Option<Vec<String>>,
+    /// The robot, where it has been read already.
+    pub model: Option<Model>,
     /// The corrected twin to start from.
     pub twin: Option<PathBuf>,
     /// Topic of somebody else's twin.
@@ -73,7 +77,8 @@ impl Assembly<'_> {
         let joint_names = self.joint_names(model.as_ref(), &fit)?;
         let constants = self.torque_constants(&joint_names, &mut report);
         if let Some(start) = &start {
-            self.twin_fits(&start.file, model.as_ref(), &joint_names, &mut report);
+            let model = model.as_ref().or(self.model.as_ref());
+            self.twin_fits(&start.file, model, &joint_names, &mut report);
         }
         let name = case.unwrap_or_else(|| {
             let of_robot = model.as_ref().map(|model| model.name().to_owned());
@@ -108,6 +113,7 @@ impl Assembly<'_> {
     fn recordings(&self, report: &mut Report) -> (Vec<Named>, Vec<Named>) {
         let mut seen = BTreeSet::new();
         let mut names = BTreeSet::new();
+        let mut all_paths: Vec<PathBuf> = Vec::new();
         let mut named = |paths: &[PathBuf], spot: fn(usize) -> Spot<'static>| {
             let mut all = Vec::new();
             let given = paths.iter().enumerate();
@@ -133,6 +139,16 @@ impl Assembly<'_> {
                     report.push((self.problem)(spot(index), title));
                     continue;
                 }
+                if let Some(same) = same_bytes(&path, &all_paths) {
+                    let title = format!(
+                        "{} holds the same bytes as {}: a copy shows nothing that the other does not",
+                        path.display(),
+                        same.display()
+                    );
+                    report.push((self.problem)(spot(index), title));
+                    continue;
+                }
+                all_paths.push(path.clone());
                 let stem = name_of(&path);
                 let mut name = stem.clone();
                 let mut number = 2;
@@ -236,4 +252,18 @@ impl Assembly<'_> {
             }
         }
     }
+}
+
+/// The file among `others` that is a copy of `path`. What cannot be read is told of by who opens it.
+fn same_bytes<'a>(path: &Path, others: &'a [PathBuf]) -> Option<&'a PathBuf> {
+    let size = |path: &Path| {
+        path.metadata()
+            .ok()
+            .filter(Metadata::is_file)
+            .map(|it| it.len())
+    };
+    let own = size(path)?;
+    let mut alike = others.iter().filter(|other| size(other) == Some(own));
+    let hash = |path: &Path| sha256_of_file(path).ok();
+    alike.find(|other| hash(other).is_some_and(|theirs| Some(theirs) == hash(path)))
 }
