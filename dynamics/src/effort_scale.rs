@@ -160,10 +160,11 @@ pub enum ScaleFault {
 impl fmt::Display for ScaleFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Turned { joints, others: 0 } if joints.len() > 1 => write!(
+            // An axis that stands upright bears no weight, and tells by inertia.
+            Self::Turned { joints, others } if joints.len() > others + 1 => write!(
                 f,
-                "the effort of {} has the other sign than this robot's motion requires, at each joint that bears weight: either \
-                 the robot hangs upside down, and the base must be turned in the URDF, or the driver turns all signs",
+                "the effort of {} has the other sign than this robot's motion requires: either the robot hangs upside down, and \
+                 the base must be turned in the URDF, or the driver turns their signs",
                 joints.join(", ")
             ),
             Self::Turned { joints, .. } => write!(
@@ -220,6 +221,9 @@ mod tests {
             of(&[2.5]),
             EffortScale::Torque { sure: false, .. }
         ));
+        let said = |slopes: &[f64]| of(slopes).fault_in_nm().unwrap().to_string();
+        assert!(said(&[1.0, -0.9, 1.1]).contains("or the joint's axis"));
+        assert!(said(&[1.0, -0.9, -1.1, -1.0]).contains("upside down"));
         // The published constants of a UR10e's shoulder lift and elbow.
         let current = of(&[1.0 / 10.7, 1.0 / 8.46]);
         assert!(

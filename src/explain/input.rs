@@ -202,7 +202,6 @@ pub fn from_arguments(
         constants: (!constants.is_empty()).then(|| constants.clone()),
         joint_names: None,
         model: None,
-        model: None,
         twin: arguments.twin.map(Path::to_owned),
         twin_topic: arguments.twin_topic.map(str::to_owned),
         state_topic: arguments.state_topic.to_owned(),
