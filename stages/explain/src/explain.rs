@@ -153,12 +153,12 @@ fn conclude(
     } = judged;
     progress(0.95, "proof");
     let mut proof = context.proof(&problem, &before, &found)?;
-    handed_out::reject_not_carried(&mut named, &found, &proof.kept, joints);
+    let kept = handed_out::reject(&proof.withheld, &mut named, &problem, &found, joints);
     let noise_floor: Vec<f64> = (0..joints.len())
         .map(|j| white_noise(&input.fit, j, joints.len()))
         .collect();
     let unit = if input.effort_unit == "A" { "A" } else { "N m" };
-    let remainders = context.remainders((&problem, &found), &before, &rests_count, unit)?;
+    let remainders = context.remainders((&problem, &kept), &before, &rests_count, unit)?;
     let twin_is_topic = !input.bodies;
     if !remainders.elsewhere.is_empty() {
         findings::doubt_patches(&mut named.findings);

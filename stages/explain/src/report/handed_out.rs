@@ -10,7 +10,6 @@ use crate::context::Context;
 use crate::data::problem::Problem;
 use crate::data::track::Track;
 use crate::fit::fitted::Fit;
-use crate::physics::active::{Hypothesis, TimeKind};
 use crate::read::recording::Recording;
 use crate::report::findings::Named;
 use crate::report::schema::{Finding, Rejected};
@@ -40,35 +39,42 @@ pub fn not_carried(problem: &Problem, before: &Fit, found: &Fit) -> Vec<usize> {
     all.filter(no_better).collect()
 }
 
-/// Moves the effects of joints that are `not_carried` from the findings to what is rejected: they fit what is peculiar to
-/// single recordings, as slow noise is. What acts once is not expected in other recordings, and `unknown` names no cause
-/// that could be wrong.
-pub fn reject_not_carried(
+/// Moves the effects of one joint that are `withheld` from the findings to what is rejected, and returns the fit without
+/// them. They fit what is peculiar to single recordings, as slow noise is. `unknown` names no cause that could be wrong.
+pub fn reject(
+    withheld: &[Withheld],
     named: &mut Named,
+    problem: &Problem,
     found: &Fit,
-    not_carried: &[usize],
     joints: &[String],
-) {
-    let is_its_own = |finding: &Finding, hypothesis: &Hypothesis| {
-        let joint = hypothesis.only_joint().filter(|j| not_carried.contains(j));
-        joint.is_some_and(|j| finding.joint.as_ref() == Some(&joints[j]))
-            && hypothesis.said() == finding.effect
-            && matches!(hypothesis.time_kind(), TimeKind::Always)
-    };
-    let refuted = named.findings.extract_if(.., |finding| {
-        finding.effect != UNKNOWN.name
-            && (found.actives.iter()).any(|active| is_its_own(finding, &active.hypothesis))
-    });
-    named.rejected.extend(refuted.map(|finding| {
-        Rejected {
-            effect: finding.effect,
-            joint: finding.joint,
-            link: finding.link,
-            reason:
-                "it fits these recordings, but does not predict one that is left out of the fit"
-                    .to_owned(),
+) -> Fit {
+    let mut kept = found.clone();
+    let mut refuted: Vec<usize> = withheld.iter().map(|one| one.effect).collect();
+    refuted.sort_unstable();
+    for &index in refuted.iter().rev() {
+        let hypothesis = found.actives[index].hypothesis;
+        let Some(joint) = hypothesis.only_joint().map(|joint| &joints[joint]) else {
+            continue;
+        };
+        let is_it = |finding: &mut Finding| {
+            finding.effect == hypothesis.said()
+                && finding.effect != UNKNOWN.name
+                && finding.joint.as_ref() == Some(joint)
+        };
+        let rejected: Vec<Finding> = named.findings.extract_if(.., is_it).collect();
+        if !rejected.is_empty() {
+            kept = kept.without(problem, index);
         }
-    }));
+        named
+            .rejected
+            .extend(rejected.into_iter().map(|finding| Rejected {
+                effect: finding.effect,
+                joint: finding.joint,
+                link: finding.link,
+                reason: "the held-out recordings are predicted better without it".to_owned(),
+            }));
+    }
+    kept
 }
 
 /// A correction that is left out of the written twin.
@@ -141,5 +147,43 @@ impl HeldOut<'_> {
             keep[next.effect] = false;
             withheld.push(next);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+    use crate::fixture::{at_joint, model, problem_with};
+
+    #[test]
+    fn what_the_held_out_recordings_refute_is_rejected_and_what_only_describes_stays() {
+        let problem = problem_with(3, |_, _, _| ());
+        let joints: Vec<String> = model().joint_names().map(str::to_owned).collect();
+        let bias = at_joint("torque_bias", 1);
+        let found = Fit::new(&problem, vec![bias.with(vec![0.1])]);
+        let finding = |effect: &str| -> Finding {
+            serde_json::from_value(json!({
+                "effect": effect, "joint": "elbow", "link": null, "parameters": {}, "intervals_95": {},
+                "confidence": 0.6, "recording": null, "t_start": null, "t_end": null, "explains": 1.0,
+                "equivalent_to": [], "sentence": "",
+            }))
+            .unwrap()
+        };
+        let mut named = Named {
+            findings: vec![finding("torque_bias"), finding("unknown")],
+            ..Named::default()
+        };
+        let withheld = [Withheld {
+            effect: 0,
+            joint: 1,
+        }];
+        let kept = reject(&withheld, &mut named, &problem, &found, &joints);
+        let left: Vec<&str> = named.findings.iter().map(|f| &*f.effect).collect();
+        assert_eq!(left, ["unknown"]);
+        assert_eq!(named.rejected[0].joint.as_deref(), Some("elbow"));
+        assert!(named.rejected[0].reason.contains("held-out"));
+        assert!(kept.actives.is_empty());
     }
 }

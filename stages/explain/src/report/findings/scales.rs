@@ -285,3 +285,41 @@ fn note(scale: &Scale, joints: &[String]) -> String {
         number(1.0 / (gain - half))
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scale(unloaded: Option<f64>, deviation: f64) -> Scale {
+        Scale {
+            joint: 0,
+            gain: 0.068,
+            deviation,
+            unloaded,
+        }
+    }
+
+    #[test]
+    fn two_scales_are_rivals_if_they_differ_and_the_recordings_do_not_tell_which() {
+        // As on a real arm: 14.7 N m/A with a payload that was not there, 10.1 without.
+        assert_eq!(scale(Some(0.099), 0.024).rival(), Some(0.099));
+        assert_eq!(scale(Some(0.099), 0.002).rival(), None);
+        assert_eq!(scale(Some(0.069), 0.024).rival(), None);
+        assert_eq!(scale(None, 0.024).rival(), None);
+    }
+
+    #[test]
+    fn a_note_gives_both_and_says_what_would_tell() {
+        let said = note(&scale(Some(0.099), 0.024), &["pan".to_owned()]);
+        assert!(
+            said.contains("14.7 N m/A") && said.contains("10.1 N m/A"),
+            "{said}"
+        );
+        assert!(
+            said.contains("payload of known mass") && said.contains("are in A"),
+            "{said}"
+        );
+        let said = note(&scale(Some(0.099), 0.002), &["pan".to_owned()]);
+        assert!(said.contains("95 % interval"), "{said}");
+    }
+}
