@@ -159,7 +159,6 @@ fn conclude(
         .collect();
     let unit = if input.effort_unit == "A" { "A" } else { "N m" };
     let remainders = context.remainders((&problem, &kept), &before, &rests_count, unit)?;
-    let twin_is_topic = !input.bodies;
     if !remainders.elsewhere.is_empty() {
         findings::doubt_patches(&mut named.findings);
     }
@@ -177,7 +176,7 @@ fn conclude(
     notes.splice(0..0, slips.note());
     findings.append(&mut named.findings);
     slips.undo(&mut proof);
-    let verdict = verdict::verdict(&findings, &remainders.all, twin_is_topic);
+    let verdict = verdict::verdict(&findings, &remainders.all, !input.bodies);
     let report = Report {
         case: input.case.clone(),
         verdict,

@@ -274,11 +274,8 @@ impl Reader<'_> {
             self.known = message.name.join(", ");
             let Ok(order) = indices(&message.name, self.joint_names) else {
                 // What names none of the joints tells of another device, such as a gripper.
-                let is_of_robot = message
-                    .name
-                    .iter()
-                    .any(|name| self.joint_names.contains(name));
-                recording.losses.incomplete += u64::from(is_of_robot);
+                let is_own = |name| self.joint_names.contains(name);
+                recording.losses.incomplete += u64::from(message.name.iter().any(is_own));
                 self.skip_row();
                 return;
             };
