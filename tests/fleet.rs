@@ -251,6 +251,21 @@ fn cells_that_run_are_seen_acknowledged_from_the_page_and_missed_when_they_are_k
     assert!(fleet.get("/incidents").contains("at link"));
     label(&fleet, "hit <the> fixture");
 
+    // Of two that have one name neither takes a command.
+    let second = folder.join("second");
+    std::fs::create_dir(&second).unwrap();
+    let second = cell(&second, "weld", &endpoint);
+    fleet.wait("weld", "there twice", |cell| cell["state"] == "unknown");
+    let form = own_form(&fleet, "/cells/press");
+    assert_eq!(fleet.post("/cells/weld/acknowledge", "", &form).0, 303);
+    let page = fleet.get("/cells/weld");
+    assert!(
+        page.contains("two publishers have this name, and both"),
+        "{page}"
+    );
+    signal(second.id(), "KILL");
+    fleet.wait("weld", "there once", |cell| cell["state"] != "unknown");
+
     signal(weld.id(), "KILL");
     let known = fleet.wait("weld", "missed", |cell| cell["state"] == "stale");
     // The token tells it: without it, the missing status would after 3.5 s.
@@ -339,6 +354,13 @@ fn label(fleet: &Fleet, text: &str) {
     }
 }
 
+/// What shows that a form is the user's own, from a page that has one.
+fn own_form(fleet: &Fleet, page: &str) -> String {
+    let page = fleet.get(page);
+    let secret = page.split("name=\"csrf\" value=\"").nth(1).unwrap();
+    format!("csrf={}", secret.split('"').next().unwrap())
+}
+
 /// Acknowledges at the press; forms that are not the user's own are refused.
 fn acknowledge(fleet: &mut Fleet, token: &str) {
     let to = "/cells/press/acknowledge";
@@ -351,9 +373,7 @@ fn acknowledge(fleet: &mut Fleet, token: &str) {
         .find_map(|line| line.strip_prefix("set-cookie: "));
     let pair = cookie.unwrap().split(';').next();
     fleet.cookie = pair.unwrap_or_default().into();
-    let page = fleet.get("/cells/press");
-    let secret = page.split("name=\"csrf\" value=\"").nth(1).unwrap();
-    let form = format!("csrf={}", secret.split('"').next().unwrap());
+    let form = own_form(fleet, "/cells/press");
     let elsewhere = "Origin: http://elsewhere.example\r\n";
     assert_eq!(fleet.post(to, elsewhere, &form).0, 403);
     assert_eq!(fleet.post(to, "", "csrf=00").0, 403);

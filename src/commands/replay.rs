@@ -179,6 +179,17 @@ fn make_folder(replay: &Replay, args: &Args, folder: &Path) -> Result<(), Failur
     let files = args.recordings.iter().flat_map(|recording| of(recording));
     let inputs = args.recordings.iter().chain([&args.pipeline]);
     args.force.check_beside(files.chain(tables), inputs)?;
+    let is_of_archive =
+        |entry: std::fs::DirEntry| entry.file_name().to_string_lossy().starts_with("cell=");
+    if std::fs::read_dir(folder).is_ok_and(|all| all.flatten().any(is_of_archive)) {
+        let problem = Problem::new(format!(
+            "{} holds results of `replay --manifest`, which would no longer be one result",
+            folder.display()
+        ));
+        return Err(Failure::Rejected(
+            problem.help("give another folder with --out").into(),
+        ));
+    }
     std::fs::create_dir_all(folder)
         .map_err(|error| Failure::rejected(format!("cannot make {}: {error}", folder.display())))
 }

@@ -10,7 +10,7 @@ use tauscope_bus::command::{Answer, Request, Signed};
 
 use super::{App, Shared, page, pages};
 use crate::store::{Label, Note};
-use crate::wall::State as CellState;
+use crate::wall::{State as CellState, UnknownWhy};
 use crate::words;
 
 /// Resolution: a sentence or two.
@@ -226,6 +226,15 @@ fn holds_from(stamp_ns: i64) -> String {
     format!("the cell has taken it; it holds from {at} on")
 }
 
+/// Whether two cells go by this name.
+fn is_doubled(shared: &Shared, cell: &str) -> bool {
+    let two = CellState::Unknown {
+        why: UnknownWhy::TwoPublishers,
+    };
+    let snapshot = shared.hub.snapshot();
+    snapshot.cell(cell).is_some_and(|view| view.state == two)
+}
+
 /// Sends a command; the stamp from which it holds \[ns since the epoch\].
 async fn send(
     shared: &Arc<Shared>,
@@ -238,6 +247,9 @@ async fn send(
         by: Some(user.to_owned()),
     };
     signed.command().map_err(|refusal| refusal.to_string())?;
+    if is_doubled(shared, cell) {
+        return Err("two publishers have this name, and both would take the command".to_owned());
+    }
     let (hub, asked) = (shared.hub.clone(), cell.to_owned());
     let answer = tokio::task::spawn_blocking(move || hub.send(&asked, &signed)).await;
     match answer.map_err(|_| "the command could not be sent".to_owned())? {
