@@ -325,18 +325,12 @@ fn the_clock_of_a_cell_is_measured_and_told_of_where_it_is_off() {
 
 /// Labels at the press: the label is shown with the contact and the incident that it is about, with who and when.
 fn label(fleet: &Fleet, text: &str) {
-    let page = fleet.get("/cells/press");
-    let secret = page.split("name=\"csrf\" value=\"").nth(1).unwrap();
-    let secret = secret.split('"').next().unwrap();
+    let form = own_form(fleet, "/cells/press");
     let text = text
         .replace('<', "%3C")
         .replace('>', "%3E")
         .replace(' ', "+");
-    let (code, head) = fleet.post(
-        "/cells/press/label",
-        "",
-        &format!("csrf={secret}&text={text}"),
-    );
+    let (code, head) = fleet.post("/cells/press/label", "", &format!("{form}&text={text}"));
     assert_eq!(code, 303, "{head}");
     for path in ["/cells/press", "/incidents"] {
         let begin = Instant::now();
