@@ -166,8 +166,6 @@ stages:
         .arg(&long)
         .arg("--out")
         .arg(&twin);
-    let again = folder.path().join("again.mcap");
-    std::fs::copy(&long, &again).unwrap();
     let mut explain = tauscope();
     explain
         .arg("explain")
@@ -175,7 +173,7 @@ stages:
         .arg(&robot)
         .arg("--fit")
         .arg(&long)
-        .arg(&again);
+        .arg(bundled().join("demo_validation.mcap"));
     explain.arg("--out").arg(&report);
     for (command, result) in [(calibrate, &twin), (explain, &report.join("report.json"))] {
         let began = std::time::Instant::now();
