@@ -233,7 +233,7 @@ mod tests {
             of(&[1.0, -1.0, 1.0]),
             EffortScale::Turned {
                 joints: vec!["joint2".to_owned()],
-                others: 1
+                others: 2
             }
         );
         assert!(matches!(of(&[1000.0]), EffortScale::TooLarge { .. }));

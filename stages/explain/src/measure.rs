@@ -255,7 +255,7 @@ mod tests {
     #[test]
     fn a_night_has_every_number_with_an_interval_that_holds_the_true_one() {
         let measured = measure(&night(3, 1.5)).unwrap().unwrap();
-        assert_eq!(measured.in_nm, [true]);
+        assert_eq!(measured.in_nm, [true, true]);
         let number = |joint: Option<usize>, name: &str| {
             let found = measured
                 .numbers
