@@ -165,7 +165,8 @@ fn set_up(
         looked,
         &outcome.report,
         &learnt,
-        (live.is_some(), kept.lost),
+        live.is_some(),
+        kept.lost,
     );
     init::write(&folder.page(), page.as_bytes())?;
     drop(hold);

@@ -11,13 +11,15 @@ use super::learn::Learnt;
 use super::look::Looked;
 
 /// The page as Markdown: what the recordings are, what the twin leaves out, what the detector has learnt, what to
-/// record next, and how to go on. `is_live` tells that the pipeline listens to the robot, `lost` how many rows could not be used.
+/// record next, and how to go on. `is_live` tells that the pipeline listens to the robot, `lost` how many rows could not
+/// be used.
 pub fn page(
     folder: &Folder,
     looked: &Looked,
     report: &Report,
     learnt: &Learnt,
-    (is_live, lost): (bool, u64),
+    is_live: bool,
+    lost: u64,
 ) -> String {
     let mut text = format!("# {}\n", looked.cell.facts.name);
     section(&mut text, "Recordings", &looked.sentences);

@@ -16,13 +16,12 @@ const OFTEN_ON: f64 = 0.01;
 /// equals the one that is in alarm for less time, then the faster one. One that is in alarm for long is none, unless all
 /// are. `None` where nothing was scored or no test recording holds a contact.
 pub(super) fn best<'a, 'b>(judged: &'b [Judged<'a>]) -> Option<&'b Judged<'a>> {
-    let of = |judged: &Judged<'_>| rank(judged);
     let scored = judged.iter().filter(|j| !j.scored.is_empty());
     scored
         .filter(|judged| judged.first().events > 0)
         .min_by(|a, b| {
-            of(a)
-                .partial_cmp(&of(b))
+            rank(a)
+                .partial_cmp(&rank(b))
                 .unwrap_or(std::cmp::Ordering::Equal)
         })
 }
@@ -69,7 +68,7 @@ pub(super) fn sentence(judged: &[Judged<'_>]) -> String {
     };
     let seeds = best.numbers.len();
     let of_which = if seeds > 1 {
-        format!(" (of {seeds} seeds, the first)")
+        format!(" (the first of {seeds} seeds)")
     } else {
         String::new()
     };
