@@ -6,12 +6,14 @@ use crate::inertia::Inertia;
 
 mod document;
 mod error;
+mod fix;
 mod places;
 mod shape;
 mod tree;
 mod urdf;
 
 pub use error::ModelError;
+pub use fix::fix_joints;
 pub use shape::{Geometry, Shape};
 
 /// Standard gravity as simulators take it \[m/s²\]; along the world's -z.
@@ -49,6 +51,9 @@ pub struct Joint {
     pub axis: [f64; 3],
     /// Its limits as far as the URDF gives them.
     pub limits: Limits,
+    /// The joint that it is coupled to by its `<mimic>`. To the algorithms it is a joint like any other: what it costs is
+    /// not added to the effort of the joint that it follows.
+    pub follows: Option<String>,
 }
 
 /// What a joint lets move.

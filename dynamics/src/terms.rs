@@ -6,6 +6,7 @@
 //! them. A fit does not search in the parameters but in [`Coordinate`]s in which the effort is as
 //! linear as it can be, e.g. `A sin(q - q0)` by the factors of `sin q` and `cos q`.
 
+mod absent_tool;
 mod asymmetric_coulomb;
 mod backlash;
 mod base_tilt;
@@ -110,6 +111,7 @@ pub static EFFECTS: &[&Effect] = &[
     &cable_spring::EFFECT,
     &torque_ripple::EFFECT,
     &payload::EFFECT,
+    &absent_tool::EFFECT,
     &link_mass::EFFECT,
     &link_com::EFFECT,
     &link_inertia::EFFECT,

@@ -3,7 +3,9 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![allow(clippy::float_cmp, reason = "numbers are read as they are written")]
 
-use tauscope_dynamics::{Data, Geometry, JointKind, Limits, Model, forward_kinematics, link_pose};
+use tauscope_dynamics::{
+    Data, Geometry, JointKind, Limits, Model, fix_joints, forward_kinematics, link_pose,
+};
 
 const INERTIAL: &str = "<inertial><origin xyz='0 0 0.1'/><mass value='2'/>\
     <inertia ixx='0.1' ixy='0' ixz='0' iyy='0.1' iyz='0' izz='0.1'/></inertial>";
@@ -200,11 +202,6 @@ fn each_fault_is_refused_by_name_and_line() {
             "line 19: joint `right_arm` is planar; revolute, continuous, prismatic and fixed joints are supported",
         ),
         (
-            "<limit velocity=\"2\" effort=\"10\"/>",
-            "<mimic joint=\"left_arm\"/>",
-            "line 19: joint `right_arm` mimics `left_arm`; coupled joints are not supported: make it fixed, or take out <mimic>",
-        ),
-        (
             "<axis xyz=\"0 0 2\"/>",
             "<axis xyz=\"0 0 0\"/>",
             "line 5: the axis of joint `left_arm` is zero",
@@ -299,4 +296,42 @@ fn masses_must_be_there_and_not_below_zero() {
         refusal(&with(&INERTIAL.replace("'2'", "'inf'"))),
         "line 30: <mass> of link `hand` has value=\"inf\": not a number"
     );
+}
+
+#[test]
+fn a_joint_that_mimics_another_is_a_joint_and_says_so() {
+    let limit = "<limit velocity=\"2\" effort=\"10\"/>";
+    let mimic = robot().replace(limit, "<mimic joint=\"left_arm\"/>");
+    let model = Model::from_urdf(&mimic).unwrap();
+    assert_eq!(model.dof(), 3);
+    assert_eq!(model.joints()[2].follows.as_deref(), Some("left_arm"));
+    assert_eq!(model.joints()[0].follows, None);
+}
+
+/// The pose of `link` at these positions of all joints.
+fn pose_of(model: &Model, link: &str, positions: &[f64]) -> [f64; 12] {
+    let mut data = Data::new(model);
+    forward_kinematics(model, &mut data, positions);
+    let pose = link_pose(model, &data, model.link_index(link).unwrap());
+    let matrix = pose.to_matrix();
+    std::array::from_fn(|at| matrix[(at % 3, at / 3)])
+}
+
+#[test]
+fn fixed_joints_stand_where_they_stood_and_the_others_stay() {
+    // Limits keep two joints from zero.
+    let xml = robot()
+        .replace("lower=\"-1\" upper=\"1.5\"", "lower=\"0.4\" upper=\"1.5\"")
+        .replace("lower=\"0\" upper=\"0.6\"", "lower=\"-0.6\" upper=\"-0.2\"");
+    let whole = Model::from_urdf(&xml).unwrap();
+    let fixed = fix_joints(&xml, &["left_arm", "hoist", "weld", "nobody"]).unwrap();
+    let fixed = Model::from_urdf(&fixed).unwrap();
+    assert!(fixed.joint_names().eq(["right_arm"]));
+    for link in ["column", "left", "hand", "right"] {
+        let before = pose_of(&whole, link, &[0.4, -0.2, 1.1]);
+        let after = pose_of(&fixed, link, &[1.1]);
+        for (a, b) in before.iter().zip(after) {
+            assert!((a - b).abs() < 1e-12, "{link}: {before:?} {after:?}");
+        }
+    }
 }

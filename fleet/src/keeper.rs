@@ -132,7 +132,12 @@ impl Keeper {
                     self.store.raise(&news)
                 }
             }
-            _ => self.store.close(cell, Kind::Silence, "", now_ns),
+            _ => {
+                if matches!(now, State::Ended { .. }) {
+                    self.store.run_ended(cell, now_ns)?;
+                }
+                self.store.close(cell, Kind::Silence, "", now_ns)
+            }
         }
     }
 

@@ -13,7 +13,7 @@ use tauscope_bus::MAX_JOINTS;
 use tauscope_dynamics::Model;
 
 pub use constants::{ConstantSpot, torque_constants};
-pub use joints::first_joint_names;
+pub use joints::{Fixed, first_joint_names};
 
 use crate::report::{Problem, Report};
 use crate::urdf;
@@ -106,6 +106,21 @@ impl Cell {
             impedance: None,
         };
         report.into_result(Self { facts, model: None })
+    }
+
+    /// The same cell with those joints fixed that are not `recorded`, and what is said of it; see [`Fixed::unrecorded`].
+    #[must_use]
+    pub fn without_unrecorded(mut self, recorded: &[String]) -> (Self, Option<String>) {
+        let robot = self.facts.urdf.as_deref().zip(self.model.as_ref());
+        let fixed = robot.and_then(|(urdf, model)| Fixed::unrecorded(urdf, model, recorded));
+        let Some(fixed) = fixed else {
+            return (self, None);
+        };
+        let note = fixed.note();
+        self.facts.joint_names = fixed.model.joint_names().map(str::to_owned).collect();
+        self.facts.urdf = Some(fixed.urdf);
+        self.model = Some(fixed.model);
+        (self, Some(note))
     }
 
     /// The link the tool is attached to.

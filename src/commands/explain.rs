@@ -124,6 +124,9 @@ impl Args {
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let request = args.request()?;
     explain::refuse_to_replace(&args.out, &request, args.force)?;
+    if let Some(note) = &request.note {
+        out.say(&format!("note: {note}"));
+    }
     let progress = Progress::of_work(args.quiet.show(out));
     let input = explain::read(&request, &|share, what| progress.doing(READ * share, what))?;
     explain::make(&args.out)?;

@@ -36,6 +36,8 @@ pub struct Request {
     pub holdout: Vec<Named>,
     /// Effects that are left out of the library.
     pub without: BTreeSet<String>,
+    /// What was changed in what was given, to be said.
+    pub note: Option<String>,
     /// How much of each recording is read \[s\].
     pub longest_s: f64,
 }

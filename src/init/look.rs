@@ -82,11 +82,13 @@ impl Told<'_> {
             let help = "record the arm at least twice, better five times, with different motions and nothing touching it";
             return Err(Failure::Rejected(problem.help(help).into()));
         };
-        let cell = self.cell(EffortUnit::A)?;
+        let cell = self.cell()?;
         let state_topic = match self.state_topic {
             Some(topic) => topic.to_owned(),
             None => self.find_topic(&cell)?,
         };
+        let recorded = first_joint_names(&self.recordings[0], &state_topic);
+        let (cell, fixed) = cell.without_unrecorded(&recorded.unwrap_or_default());
         self.check_joints(&cell, &state_topic)?;
         let mut sentences = vec![format!(
             "{} joints of {} on {state_topic} in {} recording(s).",
@@ -94,6 +96,8 @@ impl Told<'_> {
             cell.facts.name,
             self.recordings.len()
         )];
+        sentences.extend(fixed.map(|note| format!("{note}.")));
+        sentences.extend(coupled(&cell));
         let mut travel = Vec::new();
         for path in self.recordings {
             let (far, remarks) = oddities(path, &state_topic)?;
@@ -110,17 +114,20 @@ impl Told<'_> {
         let (unit, sentence) = self.unit(&EffortScale::of(&slopes.all))?;
         sentences.push(sentence);
         sentences.extend(signs(&slopes.all));
+        let mut cell = cell;
+        cell.facts.effort_unit = unit;
         Ok(Looked {
-            cell: self.cell(unit)?,
+            cell,
             state_topic,
             sentences,
             travel,
         })
     }
 
-    fn cell(&self, unit: EffortUnit) -> Result<Cell, Report> {
+    /// The robot. Its effort is taken for a current until the unit is known: that needs no torque constants.
+    fn cell(&self) -> Result<Cell, Report> {
         let problem = |_: ConstantSpot<'_>, title| Problem::new(title);
-        Cell::from_urdf(self.robot, unit, &BTreeMap::new(), &problem)
+        Cell::from_urdf(self.robot, EffortUnit::A, &BTreeMap::new(), &problem)
     }
 
     /// The topic of joint states with positions whose messages name most of the robot's joints.
@@ -282,6 +289,16 @@ impl Told<'_> {
             other => Err(Failure::Rejected(undecided(other).into())),
         }
     }
+}
+
+/// A sentence for each joint that is coupled to another.
+fn coupled(cell: &Cell) -> Vec<String> {
+    let joints = cell.model.iter().flat_map(tauscope_dynamics::Model::joints);
+    let coupled = joints.filter_map(|joint| Some((&joint.name, joint.follows.as_ref()?)));
+    let sentence = |(joint, leader)| {
+        format!("Joint {joint} follows {leader}: its load is not counted as effort of {leader}.")
+    };
+    coupled.map(sentence).collect()
 }
 
 /// How far the joints move in a recording, and what is odd about its messages.

@@ -65,7 +65,7 @@ pub(super) fn inspect(xml: &str) -> Result<Marks, ModelError> {
 }
 
 /// The document, unless it is larger than any robot's.
-fn parse(xml: &str) -> Result<Document<'_>, ModelError> {
+pub(super) fn parse(xml: &str) -> Result<Document<'_>, ModelError> {
     if xml.len() > MAX_BYTES {
         return Err(ModelError::TooLarge {
             what: "bytes",
@@ -258,7 +258,7 @@ fn joint_marks(joint: Node) -> JointMarks {
     }
 }
 
-fn elements<'a, 'i>(node: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> {
+pub(super) fn elements<'a, 'i>(node: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> {
     node.children().filter(Node::is_element)
 }
 

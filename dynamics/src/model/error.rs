@@ -109,18 +109,6 @@ pub enum ModelError {
         /// Its kind.
         kind: &'static str,
     },
-    /// A joint that is coupled to another.
-    #[error(
-        "line {line}: joint `{joint}` mimics `{leader}`; coupled joints are not supported: make it fixed, or take out <mimic>"
-    )]
-    Mimic {
-        /// Line.
-        line: u32,
-        /// The joint.
-        joint: String,
-        /// The joint it follows.
-        leader: String,
-    },
     /// A movable joint without a direction.
     #[error("line {line}: the axis of joint `{joint}` is zero")]
     ZeroAxis {

@@ -73,6 +73,7 @@ impl Model {
                 child_link: j + 1,
                 axis: [0.0, 0.0, 1.0],
                 limits: Limits::default(),
+                follows: None,
             });
             // Behind link j, moved by joint j.
             model.links.push(link(format!("{name}_link"), Some(j)));

@@ -157,6 +157,7 @@ fn movable_joints(robot: &Robot) -> Vec<Joint> {
             child_link: raw.child,
             axis: movable.axis.into(),
             limits: movable.limits,
+            follows: movable.follows.clone(),
         })
     };
     robot.joints.iter().filter_map(joint).collect()

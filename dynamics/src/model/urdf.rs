@@ -43,6 +43,8 @@ pub(super) struct Movable {
     /// Of length 1.
     pub axis: Vector3<f64>,
     pub limits: Limits,
+    /// The joint in its `<mimic>`.
+    pub follows: Option<String>,
 }
 
 /// Reads the document.
@@ -145,13 +147,6 @@ fn read_joint(
     let movable = match kind {
         None => None,
         Some(kind) => {
-            if let Some(mimic) = joint.mimic {
-                return Err(ModelError::Mimic {
-                    line,
-                    joint: name,
-                    leader: mimic.joint,
-                });
-            }
             let axis = Vector3::from(*joint.axis.xyz);
             let Some(axis) = axis.try_normalize(f64::MIN_POSITIVE) else {
                 return Err(ModelError::ZeroAxis { line, joint: name });
@@ -160,6 +155,7 @@ fn read_joint(
                 kind,
                 axis,
                 limits: limits(kind, &joint.limit, marks),
+                follows: joint.mimic.map(|mimic| mimic.joint),
             })
         }
     };

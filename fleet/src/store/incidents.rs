@@ -167,6 +167,22 @@ impl Store {
         done.map(|_| ()).map_err(|error| self.failed(error))
     }
 
+    /// The run of a cell has ended in order: what touched its robot and latched nothing is over, as far as anybody will
+    /// know.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn run_ended(&self, cell: &str, at_ns: i64) -> Result<(), StoreError> {
+        let text =
+            "UPDATE incidents SET closed_ns = ?4, words = words || '; it lasted when the run ended'
+                    WHERE cell = ?1 AND kind = ?2 AND severity < ?3 AND closed_ns IS NULL";
+        let (kind, latched) = (Kind::Contact.as_str(), number(Severity::Critical));
+        let done = self
+            .connection
+            .execute(text, params![cell, kind, latched, at_ns]);
+        done.map(|_| ()).map_err(|error| self.failed(error))
+    }
+
     /// Somebody has seen what is open at a cell. A change of the arm ends with that: nothing else tells its end.
     ///
     /// # Errors

@@ -49,6 +49,23 @@ fn a_cause_that_comes_again_within_ten_minutes_is_the_same_incident() {
 }
 
 #[test]
+fn a_contact_that_lasts_when_its_run_ends_is_over_unless_it_is_latched() {
+    let (_folder, store) = store();
+    store.raise(&news("link5", 0, Severity::Notice)).unwrap();
+    store.raise(&news("link2", 0, Severity::Critical)).unwrap();
+    store.run_ended("b", MIN).unwrap();
+    store.run_ended("a", MIN).unwrap();
+    let all = store.incidents(None, 10).unwrap();
+    let of = |place: &str| all.iter().find(|one| one.words.contains(place)).unwrap();
+    assert_eq!(of("link5").closed_ns, Some(MIN));
+    assert_eq!(
+        of("link5").words,
+        "contact at link5; it lasted when the run ended"
+    );
+    assert_eq!(of("link2").closed_ns, None);
+}
+
+#[test]
 fn a_contact_is_kept_once_with_all_that_becomes_known_of_it() {
     let (_folder, store) = store();
     let mut contact = fixture::contact(1, 5);

@@ -1,10 +1,12 @@
-//! The joints that a recording names.
+//! The joints that a recording names, and those of the robot that it does not.
 
 use std::path::Path;
 
 use tauscope_archive::Recording;
+use tauscope_dynamics::{Model, fix_joints};
 
 use crate::report::{Problem, Report};
+use crate::suggest;
 
 /// The joints of the first message that can be read, in its order.
 ///
@@ -27,4 +29,140 @@ pub fn first_joint_names(path: &Path, topic: &str) -> Result<Vec<String>, Report
     Err(wrong(format!(
         "{path}: no message on `{topic}` names its joints"
     )))
+}
+
+/// A robot with joints fixed that nobody records.
+#[derive(Debug)]
+pub struct Fixed {
+    /// Its URDF.
+    pub urdf: String,
+    /// The robot.
+    pub model: Model,
+    /// The joints that are fixed now.
+    pub joints: Vec<String>,
+}
+
+impl Fixed {
+    /// The robot `model` of `urdf` with those joints fixed that are not `recorded`, such as a gripper's. None if all are
+    /// recorded, or if they may have been recorded by other names or carry a joint that was.
+    pub fn unrecorded(urdf: &str, model: &Model, recorded: &[String]) -> Option<Self> {
+        let is_recorded = |name: &str| recorded.iter().any(|other| other == name);
+        let unrecorded: Vec<&str> = model
+            .joint_names()
+            .filter(|name| !is_recorded(name))
+            .collect();
+        let are_known = recorded
+            .iter()
+            .all(|name| model.joint_index(name).is_some());
+        if unrecorded.is_empty() || recorded.is_empty() || !are_known {
+            return None;
+        }
+        let carries_one = (0..model.dof())
+            .filter(|&joint| is_recorded(&model.joints()[joint].name))
+            .any(|joint| {
+                let before = std::iter::successors(Some(joint), |&at| {
+                    model.links()[model.joints()[at].parent_link].joint
+                });
+                before
+                    .skip(1)
+                    .any(|at| !is_recorded(&model.joints()[at].name))
+            });
+        if carries_one {
+            return None;
+        }
+        let urdf = fix_joints(urdf, &unrecorded).ok()?;
+        let model = Model::from_urdf(&urdf).ok()?;
+        let joints = unrecorded.into_iter().map(str::to_owned).collect();
+        Some(Self {
+            urdf,
+            model,
+            joints,
+        })
+    }
+
+    /// What is said of it.
+    pub fn note(&self) -> String {
+        let joints: Vec<&str> = self.joints.iter().map(String::as_str).collect();
+        format!(
+            "no recording names {} of the robot: fixed at position zero, or the next to it within the limits",
+            suggest::some(&joints)
+        )
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::*;
+
+    const INERTIAL: &str = "<inertial><mass value='1'/>\
+        <inertia ixx='1' ixy='0' ixz='0' iyy='1' iyz='0' izz='1'/></inertial>";
+
+    /// A shoulder that carries an elbow that carries a finger and the thumb that mimics it.
+    fn fixed(recorded: &[&str]) -> Option<Fixed> {
+        let links = ["upper", "lower", "finger", "thumb"]
+            .map(|name| format!("<link name='{name}'>{INERTIAL}</link>"));
+        let joint = |name, parent, child, rest| {
+            format!(
+                "<joint name='{name}' type='revolute'><parent link='{parent}'/><child link='{child}'/>{rest}</joint>"
+            )
+        };
+        let urdf = format!(
+            "<robot name='r'><link name='base'/>{}{}{}{}{}</robot>",
+            links.concat(),
+            joint(
+                "shoulder",
+                "base",
+                "upper",
+                "<limit lower='-1' upper='1' effort='1' velocity='1'/>"
+            ),
+            joint(
+                "elbow",
+                "upper",
+                "lower",
+                "<limit lower='-1' upper='1' effort='1' velocity='1'/>"
+            ),
+            joint(
+                "finger",
+                "lower",
+                "finger",
+                "<limit lower='0' upper='1' effort='1' velocity='1'/>"
+            ),
+            joint(
+                "thumb",
+                "lower",
+                "thumb",
+                "<limit lower='0' upper='1' effort='1' velocity='1'/><mimic joint='finger'/>"
+            ),
+        );
+        let model = Model::from_urdf(&urdf).unwrap();
+        let recorded: Vec<String> = recorded.iter().map(|&name| name.to_owned()).collect();
+        Fixed::unrecorded(&urdf, &model, &recorded)
+    }
+
+    #[test]
+    fn a_gripper_that_nobody_records_is_fixed() {
+        let fixed = fixed(&["elbow", "shoulder"]).unwrap();
+        assert_eq!(fixed.joints, ["finger", "thumb"]);
+        assert!(fixed.model.joint_names().eq(["shoulder", "elbow"]));
+        // Its mass stays.
+        assert_eq!(fixed.model.body_parameters(1)[0], 3.0);
+        assert!(
+            fixed.note().contains("`finger` and `thumb`"),
+            "{}",
+            fixed.note()
+        );
+    }
+
+    #[test]
+    fn a_robot_that_is_recorded_whole_stays_as_it_is() {
+        assert!(fixed(&["shoulder", "elbow", "finger", "thumb"]).is_none());
+    }
+
+    #[test]
+    fn what_carries_a_recorded_joint_or_may_have_another_name_is_not_fixed() {
+        assert!(fixed(&["elbow", "finger", "thumb"]).is_none());
+        assert!(fixed(&["shoulder", "elbow", "gripper"]).is_none());
+        assert!(fixed(&[]).is_none());
+    }
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use tauscope_archive::{is_there, name_of, recordings_at};
 use tauscope_dynamics::Model;
 use tauscope_pipeline::cell::{
-    Cell, CellFacts, ConstantSpot, EffortUnit, first_joint_names, torque_constants,
+    Cell, CellFacts, ConstantSpot, EffortUnit, Fixed, first_joint_names, torque_constants,
 };
 use tauscope_pipeline::provenance::sha256_of_file;
 use tauscope_pipeline::report::{Problem, Report};
@@ -73,6 +73,7 @@ impl Assembly<'_> {
         report.into_result(())?;
 
         let mut report = Report::default();
+        let (robot, fixed) = self.as_recorded(robot, &fit);
         let (urdf, model) = robot.unzip();
         let joint_names = self.joint_names(model.as_ref(), &fit)?;
         let constants = self.torque_constants(&joint_names, &mut report);
@@ -105,6 +106,7 @@ impl Assembly<'_> {
             fit,
             holdout,
             without,
+            note: fixed,
             longest_s: f64::INFINITY,
         })
     }
@@ -174,6 +176,27 @@ impl Assembly<'_> {
                 report.push((self.problem)(Spot::Robot, title));
                 None
             }
+        }
+    }
+
+    /// The robot without the joints that the first recording to fit does not name, and what is said of it.
+    fn as_recorded(
+        &self,
+        robot: Option<(String, Model)>,
+        fit: &[Named],
+    ) -> (Option<(String, Model)>, Option<String>) {
+        let recorded = fit
+            .first()
+            .and_then(|first| first_joint_names(&first.path, &self.state_topic).ok());
+        let (Some((urdf, model)), Some(recorded)) = (&robot, recorded) else {
+            return (robot, None);
+        };
+        match Fixed::unrecorded(urdf, model, &recorded) {
+            Some(fixed) => {
+                let note = fixed.note();
+                (Some((fixed.urdf, fixed.model)), Some(note))
+            }
+            None => (robot, None),
         }
     }
 
