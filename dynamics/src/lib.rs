@@ -50,6 +50,7 @@ mod regressor;
 mod rnea;
 mod sines;
 pub mod terms;
+mod unwrap;
 
 pub use aba::{Wrench, forward_dynamics};
 pub use crba::mass_matrix;
@@ -60,3 +61,4 @@ pub use kinematics::{forward_kinematics, link_jacobian, link_pose, point_jacobia
 pub use model::{Geometry, Joint, JointKind, Limits, Link, Model, ModelError, Shape, fix_joints};
 pub use regressor::regressor;
 pub use rnea::{gravity_effort, rnea};
+pub use unwrap::Unwrap;

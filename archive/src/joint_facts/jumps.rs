@@ -47,7 +47,7 @@ impl Jump {
         }
         let turns = (by / TAU).round();
         if turns != 0.0 && (by - turns * TAU).abs() < LIKE_A_TURN * by.abs() {
-            text += " (a whole turn: it wraps)";
+            text += " (a whole turn: it wraps, and is read as one motion)";
         }
         text
     }

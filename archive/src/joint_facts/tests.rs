@@ -99,7 +99,7 @@ fn a_jump_is_named_in_place_of_the_velocity() {
         let turns = [0.0, 1.0, 2.0][(i / 400) as usize];
         state.position[0] += turns * std::f64::consts::TAU;
     });
-    let remark = "the position of elbow jumps by 6.283 rad or m at 4.000 s (a whole turn: it wraps); it does so once more";
+    let remark = "the position of elbow jumps by 6.283 rad or m at 4.000 s (a whole turn: it wraps, and is read as one motion); it does so once more";
     assert_eq!(wraps.remarks(), [remark]);
 }
 

@@ -43,7 +43,9 @@ pub fn explain(
     let mut slips = if at_rest {
         Slips::default()
     } else {
-        Slips::new(remedies::of_velocity(&input.fit, n))
+        let mut all = remedies::of_velocity(&input.fit, n);
+        all.extend(remedies::of_unmeasured(&input.fit, n));
+        Slips::new(all)
     };
     input.mend(&slips.all);
     loop {

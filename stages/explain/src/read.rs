@@ -7,5 +7,6 @@
 
 pub mod audit;
 pub mod input;
+pub mod losses;
 pub mod recording;
 pub mod start;

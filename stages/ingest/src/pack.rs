@@ -17,6 +17,7 @@ use std::collections::VecDeque;
 
 use tauscope_archive::ros;
 use tauscope_bus::{Header, JointArray, JointState, MAX_JOINTS, flags};
+use tauscope_dynamics::Unwrap;
 
 use crate::config::ConfigError;
 use crate::setup::{Setup, Tool};
@@ -57,6 +58,8 @@ pub struct Packer {
     state: Gather,
     command: Gather,
     reference: Gather,
+    /// Whole turns that the driver has taken off, of measured and of commanded positions.
+    turns: [[Unwrap; MAX_JOINTS]; 2],
     state_velocity: Differentiator,
     command_velocity: Differentiator,
     commands: Side<Command>,
@@ -112,6 +115,7 @@ impl Packer {
             state: Gather::new(joint_count),
             command: Gather::new(joint_count),
             reference: Gather::new(joint_count),
+            turns: <[[Unwrap; MAX_JOINTS]; 2]>::default(),
             state_velocity: differentiator(),
             command_velocity: differentiator(),
             commands: Side::default(),
@@ -165,13 +169,14 @@ impl Packer {
             self.counts.incomplete += 1;
             return;
         }
+        let position = self.unwrapped(Topic::Command, &whole);
         let differentiated = self.command_velocity.update(
             whole.stamp_ns,
-            &whole.position,
+            &position,
             whole.has_velocity.then_some(&whole.velocity),
         );
         let command = Command {
-            position: whole.position,
+            position,
             velocity: differentiated.velocity,
             velocity_given: whole.has_velocity,
         };
@@ -298,6 +303,16 @@ impl Packer {
         Some(whole)
     }
 
+    /// Positions without the wraps of the driver.
+    fn unwrapped(&mut self, topic: Topic, whole: &Gathered) -> JointArray {
+        let mut position = whole.position;
+        let turns = &mut self.turns[usize::from(matches!(topic, Topic::Command))];
+        for (position, turns) in position.iter_mut().zip(turns).take(self.joint_count) {
+            *position = turns.next(whole.stamp_ns, *position);
+        }
+        position
+    }
+
     /// Puts a whole state among the samples that wait.
     fn sample(&mut self, whole: &Gathered, received_ns: i64) {
         let mut flags = flags::EFFORT_MEASURED * u32::from(whole.has_effort)
@@ -306,6 +321,7 @@ impl Packer {
             Next::Follows => {}
             Next::SetBack => {
                 self.counts.resets += 1;
+                self.turns = Default::default();
                 self.state_velocity.reset();
                 flags |= flags::RESET;
             }
@@ -313,9 +329,10 @@ impl Packer {
             Next::Repeated => return self.counts.repeated += 1,
             Next::Stalled => return self.counts.stalled += 1,
         }
+        let position = self.unwrapped(Topic::State, whole);
         let differentiated = self.state_velocity.update(
             whole.stamp_ns,
-            &whole.position,
+            &position,
             whole.has_velocity.then_some(&whole.velocity),
         );
         if differentiated.restarted && self.counts.packed + self.pending.len() as u64 > 0 {
@@ -332,7 +349,7 @@ impl Packer {
                 flags,
                 joint_count: self.joint_count as u32,
             },
-            position: whole.position,
+            position,
             velocity: differentiated.velocity,
             effort: whole.effort,
             command: self.told.pop_front().unwrap_or_default(),

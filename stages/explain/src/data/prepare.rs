@@ -10,6 +10,7 @@ use crate::data::noise::white_variance;
 use crate::data::problem::Problem;
 use crate::data::smoother::LowPass;
 use crate::data::track::{FitTrack, Track, moving_joints, spaced, thinned};
+use crate::read::audit::is_unmeasured;
 use crate::read::recording::Recording;
 
 /// Efforts are compared below this frequency, or below [`CUTOFF_OF_RATE`] where recordings are slow \[Hz\].
@@ -33,6 +34,10 @@ const ALIASING_RATIO: f64 = 5.0;
 /// Noise bandwidth of the comparison's filter over its cutoff.
 /// Tuned: by hand, on no recorded seeds; not swept. The response `1 / (1 + (f / fc)^6)` alone has 0.873.
 const NOISE_BANDWIDTH: f64 = 0.95;
+
+/// No driver tells an effort better than this share of its largest.
+/// Resolution: that of a number in single precision.
+const RESOLUTION: f64 = 1e-7;
 
 impl Problem {
     /// The frequency below which these recordings are compared \[Hz\].
@@ -75,7 +80,10 @@ impl Problem {
             let compared = spaced(&track.time_s, 0.5 / cutoff_hz);
             let mut filters = Vec::with_capacity(n);
             for j in 0..n {
-                let counts = track.counts(j, moves[j] && !rests_count[j], cutoff_hz);
+                let mut counts = track.counts(j, moves[j] && !rests_count[j], cutoff_hz);
+                if is_unmeasured(recording, j, n) {
+                    counts.fill(false);
+                }
                 let filter = LowPass::weighted(&track.time_s, cutoff_hz, |k| counts[k]);
                 let of_joint = (0..full.len()).map(|k| k * n + j);
                 let largest = of_joint.clone().fold(0.0_f64, |most, at| {
@@ -122,8 +130,9 @@ impl Problem {
             }
             variances[j].sort_by(|(a, _), (b, _)| a.total_cmp(b));
             let (filtered, unfiltered) = variances[j][variances[j].len() / 2];
-            problem.white_noise[j] = filtered.sqrt();
-            problem.unfiltered_noise[j] = unfiltered.sqrt();
+            let least = RESOLUTION * problem.largest_effort[j];
+            problem.white_noise[j] = filtered.sqrt().max(least);
+            problem.unfiltered_noise[j] = unfiltered.sqrt().max(least);
         }
         problem.effective_samples = per_row(&problem);
         problem

@@ -3,6 +3,7 @@
 mod mend;
 mod scale;
 mod trial;
+mod unmeasured;
 mod velocity;
 
 use tauscope_dynamics::JointKind;
@@ -11,6 +12,7 @@ use crate::data::problem::Problem;
 
 pub use scale::of_scale;
 use trial::{Left, Trial};
+pub use unmeasured::of_unmeasured;
 pub use velocity::of_velocity;
 
 /// A remedy must divide the error that friction and a gain leave by this, all joints together.
@@ -35,6 +37,8 @@ pub enum Remedy {
     Payload(f64),
     /// The efforts of two joints are swapped.
     Swapped(usize, usize),
+    /// Two joints have each other's name: position, velocity and effort are swapped.
+    NamesSwapped(usize, usize),
     /// The effort of a joint has the other sign.
     EffortTurned(usize),
     /// The position of a joint has the other sign.
@@ -55,6 +59,8 @@ pub enum Remedy {
     ConstantsScaled(f64),
     /// The torque constants are wrong, and by no common factor.
     ConstantsWrong,
+    /// The effort of a joint is one number throughout: it is left out.
+    Unmeasured(usize, f64),
     /// The recorded velocity is so many times the change of position: of a joint, or of all.
     Velocity(Option<usize>, f64),
 }
@@ -85,6 +91,8 @@ pub struct Slip {
 struct Reading {
     /// By joint, the joint whose effort column holds its effort.
     column: Vec<usize>,
+    /// By joint, the joint whose position column holds its position.
+    place: Vec<usize>,
     /// By joint, the factor of its effort.
     effort: Vec<f64>,
     /// By joint, the factor of its position.
@@ -97,6 +105,7 @@ impl Reading {
     fn as_recorded(joints: usize) -> Self {
         Self {
             column: (0..joints).collect(),
+            place: (0..joints).collect(),
             effort: vec![1.0; joints],
             position: vec![1.0; joints],
             weighs: true,
@@ -108,6 +117,10 @@ impl Reading {
         let mut new = self.clone();
         match *remedy {
             Remedy::Swapped(a, b) => new.column.swap(a, b),
+            Remedy::NamesSwapped(a, b) => {
+                new.column.swap(a, b);
+                new.place.swap(a, b);
+            }
             Remedy::EffortTurned(j) => new.effort[j] *= -1.0,
             Remedy::PositionTurned(j) => new.position[j] *= -1.0,
             Remedy::JointTurned(j) => {
@@ -166,7 +179,8 @@ pub fn audit(problem: &Problem, is_scaled: bool) -> Audit {
         let mut best: Option<(Slip, Reading, Vec<f64>, f64)> = None;
         for remedy in candidates(n, &turns, &reading) {
             let new = reading.with(&remedy, &turns);
-            let moved = new.position != reading.position || new.weighs != reading.weighs;
+            let moved = (&new.position, &new.place, new.weighs)
+                != (&reading.position, &reading.place, reading.weighs);
             let model = if moved {
                 trial.model(&new)
             } else {
@@ -202,7 +216,9 @@ pub fn audit(problem: &Problem, is_scaled: bool) -> Audit {
 fn candidates(n: usize, turns: &[bool], reading: &Reading) -> Vec<Remedy> {
     let mut all = Vec::new();
     for a in 0..n {
-        all.extend((a + 1..n).map(|b| Remedy::Swapped(a, b)));
+        for b in a + 1..n {
+            all.extend([Remedy::Swapped(a, b), Remedy::NamesSwapped(a, b)]);
+        }
         all.push(Remedy::EffortTurned(a));
         all.push(Remedy::PositionTurned(a));
         all.push(Remedy::JointTurned(a));
@@ -259,124 +275,4 @@ fn slip(remedy: Remedy, before: &[Option<Left>], after: &[Option<Left>]) -> Slip
 }
 
 #[cfg(test)]
-mod tests {
-    use tauscope_dynamics::{Inertia, Model};
-
-    use super::mend::scale;
-    use super::*;
-    use crate::fixture::{self, Noise};
-    use crate::read::recording::Recording;
-
-    /// What is found in two recordings of the small arm, with friction, that `spoil` has changed.
-    fn found(spoil: impl Fn(&mut Recording)) -> Audit {
-        let model = fixture::model();
-        let mut noise = Noise(7);
-        let recordings = [4, 5].map(|seed| {
-            let mut recording = fixture::recording(&model, seed, |_, qd, effort| {
-                effort[0] += 2.0 * qd[0].signum() + 0.05 * noise.next();
-                effort[1] += 0.5 * qd[1].signum() + 0.05 * noise.next();
-            });
-            spoil(&mut recording);
-            recording
-        });
-        audit(&fixture::problem(&model, &recordings), true)
-    }
-
-    fn remedies(audit: Audit) -> Vec<Remedy> {
-        assert_eq!(audit.physics, None);
-        audit.slips.into_iter().map(|slip| slip.remedy).collect()
-    }
-
-    fn turn(rows: &mut [f64], joint: usize) {
-        scale(rows, joint, 2, -1.0);
-    }
-
-    #[test]
-    fn what_fits_needs_no_remedy() {
-        assert_eq!(remedies(found(|_| {})), []);
-    }
-
-    #[test]
-    fn swapped_efforts_turned_signs_and_degrees_are_told() {
-        let swap = |r: &mut Recording| r.effort.chunks_mut(2).for_each(|row| row.swap(0, 1));
-        assert_eq!(remedies(found(swap)), [Remedy::Swapped(0, 1)]);
-        assert_eq!(
-            remedies(found(|r| turn(&mut r.effort, 1))),
-            [Remedy::EffortTurned(1)]
-        );
-        let both = found(|r| {
-            turn(&mut r.effort, 0);
-            turn(&mut r.effort, 1);
-        });
-        let both = remedies(both);
-        assert!(
-            both.len() == 2 && both.contains(&Remedy::EffortTurned(0)),
-            "{both:?}"
-        );
-        let counts = remedies(found(|r| {
-            for all in [&mut r.position, &mut r.velocity, &mut r.effort] {
-                turn(all, 0);
-            }
-        }));
-        // Seen in a mirror, this arm with one joint turned is the one with the other turned.
-        assert!(matches!(counts[..], [Remedy::JointTurned(_)]), "{counts:?}");
-        let degrees = remedies(found(|r| {
-            let angles = r.position.iter_mut().chain(&mut r.velocity);
-            angles.for_each(|x| *x = x.to_degrees());
-        }));
-        assert_eq!(degrees, [Remedy::Degrees]);
-    }
-
-    #[test]
-    fn a_mended_recording_is_as_it_was_and_a_prediction_for_it_finds_back() {
-        let model = fixture::model();
-        let whole = fixture::recording(&model, 4, |_, _, _| {});
-        for remedy in [
-            Remedy::Swapped(0, 1),
-            Remedy::EffortTurned(1),
-            Remedy::JointTurned(0),
-            Remedy::EffortScaled(100.0),
-        ] {
-            // Each of these undoes itself, but for a factor.
-            let mut spoilt = whole.clone();
-            remedy.undo(&mut spoilt.effort, 2);
-            let recorded = spoilt.effort.clone();
-            if let Remedy::JointTurned(j) = remedy {
-                turn(&mut spoilt.position, j);
-                turn(&mut spoilt.velocity, j);
-            }
-            remedy.mend(&mut spoilt, 2);
-            let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
-            assert!(near(&spoilt.effort, &whole.effort), "{remedy:?}");
-            assert!(near(&spoilt.position, &whole.position), "{remedy:?}");
-            remedy.undo(&mut spoilt.effort, 2);
-            assert!(near(&spoilt.effort, &recorded), "{remedy:?}");
-        }
-    }
-
-    #[test]
-    fn a_turned_base_and_a_heavy_payload_are_physics_with_their_numbers() {
-        let told = |change: &dyn Fn(&mut Model)| {
-            let model = fixture::model();
-            let mut real = model.clone();
-            change(&mut real);
-            let recordings = [4, 5].map(|seed| fixture::recording(&real, seed, |_, _, _| {}));
-            audit(&fixture::problem(&model, &recordings), true).physics
-        };
-        let ceiling = told(&|real| real.set_gravity([0.0, 0.0, 9.81]));
-        let Some(Remedy::BaseTurned([roll, pitch])) = ceiling else {
-            panic!("{ceiling:?}");
-        };
-        assert!((roll.abs() - std::f64::consts::PI).abs() < 1e-3 && pitch.abs() < 1e-3);
-        let heavy = told(&|real| {
-            let mut parameters = [0.0; 10];
-            (parameters[0], parameters[3]) = (15.0, 15.0 * 0.6);
-            (parameters[4], parameters[7]) = (15.0 * 0.37, 15.0 * 0.37);
-            real.attach(real.tool_link(), Inertia::from_parameters(parameters));
-        });
-        assert!(
-            matches!(heavy, Some(Remedy::Payload(mass)) if mass > 0.0),
-            "{heavy:?}"
-        );
-    }
-}
+mod tests;

@@ -68,6 +68,13 @@ pub fn is_frozen(recording: &Recording, n: usize) -> bool {
     (0..n).all(|j| range(recording, j, n) <= 0.0)
 }
 
+/// Whether a joint's effort stays the same to the last bit while the joint moves: nobody measures it.
+pub fn is_unmeasured(recording: &Recording, joint: usize, n: usize) -> bool {
+    let mut efforts = recording.effort.iter().skip(joint).step_by(n);
+    let first = efforts.next();
+    range(recording, joint, n) > LEAST_RANGE && efforts.all(|effort| Some(effort) == first)
+}
+
 /// How far a joint moves in a recording \[rad or m\].
 fn range(recording: &Recording, joint: usize, n: usize) -> f64 {
     let positions = recording.position.iter().skip(joint).step_by(n);

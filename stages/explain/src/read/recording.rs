@@ -3,6 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use tauscope_archive::{ArchiveError, Recording as Archive, name_of};
+use tauscope_dynamics::Unwrap;
+
+pub use super::losses::Losses;
 
 /// A longer time between two samples is a gap \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
@@ -31,30 +34,6 @@ pub struct Recording {
     pub sample_of_row: Vec<usize>,
     /// What was dropped on reading.
     pub losses: Losses,
-}
-
-/// What was left out on reading.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Losses {
-    /// Rows whose numbers are not finite.
-    pub not_finite: u64,
-    /// Rows that repeat the stamp of the row before.
-    pub repeated: u64,
-    /// Rows whose stamp lies before that of the row before.
-    pub backward: u64,
-    /// Rows in which a joint of the robot is missing.
-    pub incomplete: u64,
-    /// Messages that could not be read.
-    pub unreadable: u64,
-    /// Parts of the file that cannot be read, e.g. a torn tail.
-    pub damaged: u64,
-}
-
-impl Losses {
-    /// Rows of data that are lost, repeats not counted.
-    pub fn lost(&self) -> u64 {
-        self.not_finite + self.backward + self.incomplete + self.unreadable + self.damaged
-    }
 }
 
 /// Why a recording cannot be used.
@@ -136,6 +115,7 @@ impl Recording {
             finite_position: vec![false; joint_names.len()],
             finite_effort: vec![false; joint_names.len()],
             last_ns: None,
+            turns: vec![Unwrap::default(); joint_names.len()],
             has_velocity: true,
             has_effort: true,
         };
@@ -263,6 +243,8 @@ struct Reader<'a> {
     finite_position: Vec<bool>,
     finite_effort: Vec<bool>,
     last_ns: Option<i64>,
+    /// By joint, whole turns that the driver has taken off.
+    turns: Vec<Unwrap>,
     has_velocity: bool,
     has_effort: bool,
 }
@@ -326,8 +308,10 @@ impl Reader<'_> {
             .time_s
             .push((stamp_ns - recording.start_ns) as f64 * 1e-9);
         recording.sample_of_row.push(recording.time_s.len() - 1);
-        for &at in &self.order {
-            recording.position.push(message.position[at]);
+        for (turns, &at) in self.turns.iter_mut().zip(&self.order) {
+            recording
+                .position
+                .push(turns.next(stamp_ns, message.position[at]));
         }
         match velocity {
             Some(velocity) if self.has_velocity => {

@@ -12,13 +12,29 @@ pub struct SlipWords {
 }
 
 /// All kinds of faults, by the `kind` of their findings.
-static KINDS: [(&str, SlipWords); 9] = [
+static KINDS: [(&str, SlipWords); 11] = [
     (
         "efforts_swapped",
         SlipWords {
             title: "Efforts swapped",
             meaning: "Each of two joints has the effort of the other.",
             look_at: "Joints {place} and {source}: exchange their efforts in the driver, or the connectors of their sensors.",
+        },
+    ),
+    (
+        "names_swapped",
+        SlipWords {
+            title: "Names swapped",
+            meaning: "Each of two joints has the name of the other.",
+            look_at: "Joints {place} and {source}: exchange their names in the driver, or in the URDF.",
+        },
+    ),
+    (
+        "effort_constant",
+        SlipWords {
+            title: "Effort that never changes",
+            meaning: "The effort of a joint is one number while the joint moves: it is no measurement.",
+            look_at: "Joint {place}: its torque sensor, or what the driver fills in where it measures nothing.",
         },
     ),
     (

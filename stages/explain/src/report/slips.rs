@@ -118,6 +118,7 @@ fn finding(slip: &Slip, joints: &[String], unit: &str) -> Finding {
 fn named(remedy: &Remedy) -> (&'static str, Option<usize>, Option<usize>) {
     match *remedy {
         Remedy::Swapped(a, b) => ("efforts_swapped", Some(a), Some(b)),
+        Remedy::NamesSwapped(a, b) => ("names_swapped", Some(a), Some(b)),
         Remedy::EffortTurned(j) => ("effort_sign", Some(j), None),
         Remedy::PositionTurned(j) => ("position_sign", Some(j), None),
         Remedy::JointTurned(j) => ("joint_sign", Some(j), None),
@@ -128,6 +129,7 @@ fn named(remedy: &Remedy) -> (&'static str, Option<usize>, Option<usize>) {
         }
         Remedy::ConstantsScaled(_) | Remedy::ConstantsWrong => ("torque_constant", None, None),
         Remedy::Velocity(joint, _) => ("velocity_scale", joint, None),
+        Remedy::Unmeasured(joint, _) => ("effort_constant", Some(joint), None),
         // These are physics, and become findings of the search.
         Remedy::BaseTurned(_) | Remedy::Payload(_) => (UNKNOWN.name, None, None),
     }
@@ -140,6 +142,10 @@ fn sentence(slip: &Slip, joints: &[String], unit: &str) -> String {
         Remedy::Swapped(a, b) => (
             format!("The efforts of {} and {} are swapped.", name(a), name(b)),
             "Exchange them in the driver.".to_owned(),
+        ),
+        Remedy::NamesSwapped(a, b) => (
+            format!("Joints {} and {} have each other's name.", name(a), name(b)),
+            "Exchange the names in the driver, or in the URDF.".to_owned(),
         ),
         Remedy::EffortTurned(j) => (
             format!("The effort of {} has the other sign.", name(j)),
@@ -188,6 +194,15 @@ fn sentence(slip: &Slip, joints: &[String], unit: &str) -> String {
                 number(factor)
             ),
             format!("Divide it by {} in the driver.", number(factor)),
+        ),
+        Remedy::Unmeasured(joint, effort) => (
+            format!(
+                "The effort of {} is {} {unit} in every sample, while the joint moves: nothing measures it, and nothing is \
+                 said of the joint.",
+                name(joint),
+                number(effort)
+            ),
+            "Look at its sensor, or at what the driver fills in.".to_owned(),
         ),
         Remedy::BaseTurned(_) | Remedy::Payload(_) => (String::new(), String::new()),
     };

@@ -29,9 +29,10 @@ pub fn summary(
             format!("Something remains without a named cause. {remains}")
         }
         Verdict::Explained | Verdict::UnknownRemains => {
-            // That with the largest effort, as far as sizes are known.
+            // A fault of the recordings, or else that with the largest effort.
             let larger = |a: &&Finding, b: &&Finding| a.effort_rms.total_cmp(&b.effort_rms);
-            let first = findings.iter().rev().max_by(larger);
+            let fault = findings.iter().find(|finding| finding.is_fault());
+            let first = fault.or_else(|| findings.iter().rev().max_by(larger));
             let part = first.filter(|_| has_changed).and_then(look_at);
             let part = part.map_or_else(String::new, |part| format!(" Look there first: {part}"));
             let first = first.map_or("", |finding| finding.sentence.as_str());

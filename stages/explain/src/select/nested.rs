@@ -1,6 +1,9 @@
 //! Effects that contain a simpler one. The simpler one is reported unless the other is much likelier.
 
+use tauscope_dynamics::terms::{CoordinateKind, Scale};
+
 use crate::fit::fitted::Fit;
+use crate::fit::interval::{covariance, half_width_95};
 use crate::physics::active::{Active, Hypothesis};
 use crate::select::evidence::{LEAST_EVIDENCE, overwhelming, tie};
 use crate::select::explanation::{Explanation, describe};
@@ -12,7 +15,8 @@ use crate::select::search::Search;
 
 impl Search<'_> {
     /// Replaces an effect by the simpler one that it contains, unless it is ahead by `enough` \[nats\], a function of
-    /// the evidence for the effect. An effect with a shape at the end of its range must be ahead by [`tie`].
+    /// the evidence for the effect. An effect with a shape at the end of its range, or that nothing determines, must be
+    /// ahead by [`tie`].
     pub fn simplified(&self, mut best: Explanation, enough: impl Fn(f64) -> f64) -> Explanation {
         for piece in pieces(&best) {
             let Some(index) = place_of(&best, piece) else {
@@ -21,7 +25,7 @@ impl Search<'_> {
             let less = self.without(&best, index);
             let effective = &self.problem.effective_samples;
             let evidence = best.ahead_of(&less, effective);
-            let enough = if at_bound(&best.fit.actives[index]) {
+            let enough = if at_bound(&best.fit.actives[index]) || self.is_vague(&best.fit, index) {
                 tie(evidence)
             } else {
                 enough(evidence)
@@ -34,6 +38,30 @@ impl Search<'_> {
             }
         }
         best
+    }
+
+    /// Whether the interval of one of an effect's shapes with a logarithmic range reaches down to zero: the effect fits, but
+    /// nothing shows its form.
+    fn is_vague(&self, fit: &Fit, index: usize) -> bool {
+        let active = &fit.actives[index];
+        let of_form = |c: &usize| {
+            let scale = Scale::Log;
+            matches!(active.kind(*c), CoordinateKind::Shape { scale: s, .. } if s == scale)
+        };
+        let forms: Vec<usize> = (0..active.coordinates.len()).filter(of_form).collect();
+        if forms.is_empty() || active.hypothesis.effect.simpler.is_none() {
+            return false;
+        }
+        let before: usize = fit.actives[..index]
+            .iter()
+            .map(|a| a.coordinates.len())
+            .sum();
+        let spread = covariance(self.problem, fit);
+        let half_width = half_width_95(self.problem);
+        forms.into_iter().any(|c| {
+            let deviation = spread[(before + c, before + c)].max(0.0).sqrt();
+            half_width * deviation >= active.coordinates[c].abs()
+        })
     }
 
     /// The explanation `less` plus the simpler effect that the effect at `index` in `best` contains, if there is

@@ -63,6 +63,15 @@ impl Remedy {
                 .effort
                 .chunks_exact_mut(n)
                 .for_each(|row| row.swap(a, b)),
+            Self::NamesSwapped(a, b) => {
+                for rows in [
+                    &mut recording.position,
+                    &mut recording.velocity,
+                    &mut recording.effort,
+                ] {
+                    rows.chunks_exact_mut(n).for_each(|row| row.swap(a, b));
+                }
+            }
             Self::EffortTurned(j) => scale(&mut recording.effort, j, n, -1.0),
             Self::PositionTurned(j) | Self::JointTurned(j) => {
                 scale(&mut recording.position, j, n, -1.0);
@@ -87,7 +96,9 @@ impl Remedy {
     /// From efforts of mended recordings back to the recorded columns: rows of `n` numbers.
     pub fn undo(&self, rows: &mut [f64], n: usize) {
         match *self {
-            Self::Swapped(a, b) => rows.chunks_exact_mut(n).for_each(|row| row.swap(a, b)),
+            Self::Swapped(a, b) | Self::NamesSwapped(a, b) => {
+                rows.chunks_exact_mut(n).for_each(|row| row.swap(a, b))
+            }
             Self::EffortTurned(j) | Self::JointTurned(j) => scale(rows, j, n, -1.0),
             Self::EffortScaled(factor) => rows.iter_mut().for_each(|x| *x *= factor),
             _ => {}

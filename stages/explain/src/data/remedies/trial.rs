@@ -100,8 +100,8 @@ impl<'a> Trial<'a> {
         }
         let mut data = Data::new(&model);
         let times = |all: &[f64]| -> Vec<f64> {
-            let pairs = all.iter().zip(&reading.position);
-            pairs.map(|(x, factor)| x * factor).collect()
+            let pairs = reading.place.iter().zip(&reading.position);
+            pairs.map(|(&at, factor)| all[at] * factor).collect()
         };
         self.efforts(|track| {
             let mut effort = Vec::with_capacity(track.position.len());
@@ -120,7 +120,8 @@ impl<'a> Trial<'a> {
     }
 
     fn left_of(&self, joint: usize, model: &[f64], reading: &Reading) -> Option<Left> {
-        let rows = &self.rows[joint];
+        // Its motion, and the rows that count by it, stand where its position does.
+        let rows = &self.rows[reading.place[joint]];
         let from = self.problem.joint_rows(reading.column[joint]).start;
         let own = self.problem.joint_rows(joint).start;
         let measured = rows

@@ -1,0 +1,134 @@
+use tauscope_dynamics::{Inertia, Model};
+
+use super::mend::scale;
+use super::*;
+use crate::fixture::{self, Noise};
+use crate::read::recording::Recording;
+
+/// What is found in two recordings of the small arm, with friction, that `spoil` has changed.
+fn found(spoil: impl Fn(&mut Recording)) -> Audit {
+    let model = fixture::model();
+    let mut noise = Noise(7);
+    let recordings = [4, 5].map(|seed| {
+        let mut recording = fixture::recording(&model, seed, |_, qd, effort| {
+            effort[0] += 2.0 * qd[0].signum() + 0.05 * noise.next();
+            effort[1] += 0.5 * qd[1].signum() + 0.05 * noise.next();
+        });
+        spoil(&mut recording);
+        recording
+    });
+    audit(&fixture::problem(&model, &recordings), true)
+}
+
+fn remedies(audit: Audit) -> Vec<Remedy> {
+    assert_eq!(audit.physics, None);
+    audit.slips.into_iter().map(|slip| slip.remedy).collect()
+}
+
+fn turn(rows: &mut [f64], joint: usize) {
+    scale(rows, joint, 2, -1.0);
+}
+
+#[test]
+fn what_fits_needs_no_remedy() {
+    assert_eq!(remedies(found(|_| {})), []);
+}
+
+#[test]
+fn swapped_efforts_turned_signs_and_degrees_are_told() {
+    let swap = |r: &mut Recording| r.effort.chunks_mut(2).for_each(|row| row.swap(0, 1));
+    assert_eq!(remedies(found(swap)), [Remedy::Swapped(0, 1)]);
+    let names = |r: &mut Recording| {
+        for rows in [&mut r.position, &mut r.velocity, &mut r.effort] {
+            rows.chunks_mut(2).for_each(|row| row.swap(0, 1));
+        }
+    };
+    assert_eq!(remedies(found(names)), [Remedy::NamesSwapped(0, 1)]);
+    assert_eq!(
+        remedies(found(|r| turn(&mut r.effort, 1))),
+        [Remedy::EffortTurned(1)]
+    );
+    let both = found(|r| {
+        turn(&mut r.effort, 0);
+        turn(&mut r.effort, 1);
+    });
+    let both = remedies(both);
+    assert!(
+        both.len() == 2 && both.contains(&Remedy::EffortTurned(0)),
+        "{both:?}"
+    );
+    let counts = remedies(found(|r| {
+        for all in [&mut r.position, &mut r.velocity, &mut r.effort] {
+            turn(all, 0);
+        }
+    }));
+    // Seen in a mirror, this arm with one joint turned is the one with the other turned.
+    assert!(matches!(counts[..], [Remedy::JointTurned(_)]), "{counts:?}");
+    let degrees = remedies(found(|r| {
+        let angles = r.position.iter_mut().chain(&mut r.velocity);
+        angles.for_each(|x| *x = x.to_degrees());
+    }));
+    assert_eq!(degrees, [Remedy::Degrees]);
+}
+
+#[test]
+fn a_mended_recording_is_as_it_was_and_a_prediction_for_it_finds_back() {
+    let model = fixture::model();
+    let whole = fixture::recording(&model, 4, |_, _, _| {});
+    for remedy in [
+        Remedy::Swapped(0, 1),
+        Remedy::NamesSwapped(0, 1),
+        Remedy::EffortTurned(1),
+        Remedy::JointTurned(0),
+        Remedy::EffortScaled(100.0),
+    ] {
+        // Each of these undoes itself, but for a factor.
+        let mut spoilt = whole.clone();
+        remedy.undo(&mut spoilt.effort, 2);
+        let recorded = spoilt.effort.clone();
+        match remedy {
+            Remedy::JointTurned(j) => {
+                turn(&mut spoilt.position, j);
+                turn(&mut spoilt.velocity, j);
+            }
+            Remedy::NamesSwapped(..) => {
+                for rows in [&mut spoilt.position, &mut spoilt.velocity] {
+                    rows.chunks_mut(2).for_each(|row| row.swap(0, 1));
+                }
+            }
+            _ => {}
+        }
+        remedy.mend(&mut spoilt, 2);
+        let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
+        assert!(near(&spoilt.effort, &whole.effort), "{remedy:?}");
+        assert!(near(&spoilt.position, &whole.position), "{remedy:?}");
+        remedy.undo(&mut spoilt.effort, 2);
+        assert!(near(&spoilt.effort, &recorded), "{remedy:?}");
+    }
+}
+
+#[test]
+fn a_turned_base_and_a_heavy_payload_are_physics_with_their_numbers() {
+    let told = |change: &dyn Fn(&mut Model)| {
+        let model = fixture::model();
+        let mut real = model.clone();
+        change(&mut real);
+        let recordings = [4, 5].map(|seed| fixture::recording(&real, seed, |_, _, _| {}));
+        audit(&fixture::problem(&model, &recordings), true).physics
+    };
+    let ceiling = told(&|real| real.set_gravity([0.0, 0.0, 9.81]));
+    let Some(Remedy::BaseTurned([roll, pitch])) = ceiling else {
+        panic!("{ceiling:?}");
+    };
+    assert!((roll.abs() - std::f64::consts::PI).abs() < 1e-3 && pitch.abs() < 1e-3);
+    let heavy = told(&|real| {
+        let mut parameters = [0.0; 10];
+        (parameters[0], parameters[3]) = (15.0, 15.0 * 0.6);
+        (parameters[4], parameters[7]) = (15.0 * 0.37, 15.0 * 0.37);
+        real.attach(real.tool_link(), Inertia::from_parameters(parameters));
+    });
+    assert!(
+        matches!(heavy, Some(Remedy::Payload(mass)) if mass > 0.0),
+        "{heavy:?}"
+    );
+}
