@@ -22,6 +22,9 @@ pub use state::{Severity, StaleWhy, State, UnknownWhy};
 
 /// Resolution: ten times the thousand cells that a host is meant for.
 pub const MAX_CELLS: usize = 10_000;
+/// For so long after its token went, the last status of a cell may still come \[ms\].
+/// Resolution: both leave the cell together; one that was killed is still known within half a second.
+pub const PARTING_MS: u64 = 200;
 /// A status comes once a second: three that are missing are a silence \[ms\].
 /// Resolution: a pause of a busy host is shorter, and what is cut off is known within 5 s.
 pub const STALE_AFTER_MS: u64 = 3_500;

@@ -174,3 +174,63 @@ fn a_link_that_is_another_body_is_described_where_no_name_fits() {
     assert!(read("twin.yaml").contains("link_inertia"));
     assert_ne!(read("robot.urdf"), std::fs::read_to_string(&robot).unwrap());
 }
+
+/// The bundled arm with something of 0.3 kg at its tool and a finger that nobody records: a gripper that is not mounted.
+fn with_gripper(folder: &Path) -> std::path::PathBuf {
+    let body = |mass: f64, z: f64, inertia: f64| {
+        format!(
+            "<inertial><origin xyz='0 0 {z}'/><mass value='{mass}'/><inertia ixx='{inertia}' ixy='0' ixz='0' \
+             iyy='{inertia}' iyz='0' izz='{inertia}'/></inertial>"
+        )
+    };
+    let gripper = format!(
+        "<link name='gripper'>{}</link><link name='finger'>{}</link>\
+         <joint name='flange' type='fixed'><parent link='tool'/><child link='gripper'/></joint>\
+         <joint name='grip' type='prismatic'><parent link='gripper'/><child link='finger'/><axis xyz='0 1 0'/>\
+         <limit lower='0' upper='0.04' effort='20' velocity='1'/></joint></robot>",
+        body(0.29, 0.06, 8e-4),
+        body(0.01, 0.1, 1e-5),
+    );
+    let urdf = std::fs::read_to_string(bundled().join("demo_arm.urdf")).unwrap();
+    write(
+        &folder.join("gripper.urdf"),
+        &urdf.replace("</robot>", &gripper),
+    )
+}
+
+#[test]
+fn a_gripper_of_the_urdf_that_is_not_mounted_is_told_with_its_mass() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let text = scenario();
+    let (head, tail) = text.split_once("physics:").unwrap();
+    let (_, tail) = tail.split_once("sensors:").unwrap();
+    simulate(folder.path(), &format!("{head}sensors:{tail}"));
+    let recordings = ["r0.mcap", "r1.mcap", "r2.mcap", "r3.mcap"].map(path);
+    let [r0, r1, r2, r3] = recordings.each_ref().map(|path| path.to_str().unwrap());
+    let (robot, out) = (with_gripper(folder.path()), path("out"));
+    let robot = robot.to_str().unwrap();
+    let said = explain(
+        &out,
+        &["--robot", robot, "--fit", r0, r1, r2, "--holdout", r3],
+    );
+    assert!(
+        said.stderr.contains("no recording names grip"),
+        "{}",
+        said.stderr
+    );
+    let report = report(&out);
+    let findings = report["findings"].as_array().unwrap();
+    assert_eq!(findings.len(), 1, "{findings:?}");
+    let found = &findings[0];
+    assert_eq!(
+        (&found["effect"], &found["link"]),
+        (&"unknown".into(), &"tool".into())
+    );
+    assert_eq!(found["parameters"]["kind"], "absent_tool");
+    let [low, high] = [0, 1].map(|end| found["intervals_95"]["mass_kg"][end].as_f64().unwrap());
+    assert!(
+        low <= 0.3 && 0.3 <= high && high - low < 0.05,
+        "{low} {high}"
+    );
+}

@@ -30,6 +30,7 @@ pub static EFFECT: Effect = Effect {
     // What can be taken off depends on the URDF.
     concealed: None,
     traits: Traits {
+        is_off_list: true,
         smallest_told_as: Some("mass_kg"),
         ..Traits::NONE
     },

@@ -8,7 +8,7 @@ use tauscope_publish::message::{AlarmState, RecordMessage, StatusMessage};
 use super::latch::Latch;
 use super::snapshot::{CellView, ResidualView};
 use super::state::{Severity, StaleWhy, State, UnknownWhy};
-use super::{CLOCK_LIMIT_NS, Effect, Now, STALE_AFTER_MS};
+use super::{CLOCK_LIMIT_NS, Effect, Now, PARTING_MS, STALE_AFTER_MS};
 
 /// Lives of one cell that are followed at a time. Resolution: one is right, two are a fault; a stranger may not fill
 /// the memory.
@@ -223,7 +223,10 @@ impl Watched {
         if reached == 0 && (self.gone.is_some() || age_ms > STALE_AFTER_MS) {
             return stale(at.unix_ns, StaleWhy::Connection);
         }
-        if let Some(gone) = self.gone {
+        // The last status of a run that ends in order comes with the end of its token, sooner or later.
+        let parts = |gone: &Now| now.running_ms.saturating_sub(gone.running_ms) < PARTING_MS;
+        let is_parting = self.gone.as_ref().is_some_and(parts);
+        if let Some(gone) = self.gone.filter(|_| !is_parting) {
             // One that has long been silent is not fresher because the network has noticed that, too.
             let silent_ms = gone.running_ms.saturating_sub(at.running_ms);
             let was_silent = silent_ms > STALE_AFTER_MS;
@@ -237,10 +240,10 @@ impl Watched {
         if age_ms > STALE_AFTER_MS {
             return stale(at.unix_ns, StaleWhy::Status);
         }
-        if self.lives.is_empty() {
+        if self.lives.is_empty() && !is_parting {
             return unknown(UnknownWhy::NoToken);
         }
-        if !self.lives.contains(&status.instance) {
+        if !is_parting && !self.lives.contains(&status.instance) {
             return unknown(UnknownWhy::NoStatus);
         }
         let muted_ms = (status.alarm.muted_s * 1e3) as u64;
@@ -344,6 +347,7 @@ impl Watched {
             curve: self.minutes.iter().copied().collect(),
             trend: Vec::new(),
             drift: None,
+            urdf_differs: false,
             status: self.newest().cloned(),
         }
     }

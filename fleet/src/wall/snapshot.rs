@@ -65,6 +65,8 @@ pub struct CellView {
     pub trend: Vec<f64>,
     /// The joint whose friction has changed most over weeks; `None` where no nightly numbers are followed.
     pub drift: Option<Drift>,
+    /// Whether more cells with a robot of this name have another URDF, which they share.
+    pub urdf_differs: bool,
     /// What it said last; as old as `status_age_ms`.
     pub status: Option<StatusMessage>,
 }
@@ -87,6 +89,15 @@ impl CellView {
     pub fn latched_behind(&self) -> Option<i64> {
         let is_said = matches!(self.state, State::Stopped { .. });
         self.latched_since_ns.filter(|_| !is_said)
+    }
+
+    /// Until when alarms of a latched cell cause no further stop, where its state does not say so; `None` where they do
+    /// \[ns since the epoch\].
+    pub fn muted_behind(&self, now_ns: i64) -> Option<i64> {
+        let is_latched = matches!(self.state, State::Stopped { .. });
+        let muted_s = self.status.as_ref().filter(|_| is_latched)?.alarm.muted_s;
+        let left_ms = (muted_s * 1e3) as i64 - i64::try_from(self.status_age_ms?).ok()?;
+        (left_ms > 0).then(|| now_ns.saturating_add(left_ms.saturating_mul(1_000_000)))
     }
 
     /// Now, by the clock of the cell's samples: ages of what has a stamp are against this \[ns since the epoch\].
@@ -133,6 +144,25 @@ impl ResidualView {
     }
 }
 
+/// Marks the cells whose URDF is not the one that most cells with a robot of that name have.
+fn mark_other_urdfs(cells: &mut [CellView]) {
+    let own = |cell: &CellView| {
+        let status = cell.status.as_ref()?;
+        Some((status.robot.clone(), status.urdf_sha256.clone()?))
+    };
+    let mut counts: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
+    for (robot, urdf) in cells.iter().filter_map(own) {
+        *counts.entry(robot).or_default().entry(urdf).or_default() += 1;
+    }
+    for cell in cells {
+        let most = own(cell).is_some_and(|(robot, urdf)| {
+            let of_robot = &counts[&robot];
+            of_robot.values().any(|count| *count > of_robot[&urdf])
+        });
+        cell.urdf_differs = most;
+    }
+}
+
 /// A name as people sort it, `press-2` before `press-10`: its words, with the number behind each.
 fn natural(name: &str) -> Vec<(&str, u64, usize)> {
     let mut parts = Vec::new();
@@ -171,6 +201,7 @@ impl Snapshot {
                 .cmp(&key(b))
                 .then_with(|| natural(&a.cell).cmp(&natural(&b.cell)))
         });
+        mark_other_urdfs(&mut cells);
         let mut totals: Totals = State::NAMES.iter().map(|name| (*name, 0)).collect();
         for cell in &cells {
             *totals.entry(cell.state.name()).or_default() += 1;

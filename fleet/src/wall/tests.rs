@@ -46,7 +46,9 @@ impl Story {
 
     fn gone(&mut self, instance: &str) -> &mut Self {
         let (cell, instance) = ("a".to_owned(), instance.to_owned());
-        self.tell(Event::Gone { cell, instance })
+        self.tell(Event::Gone { cell, instance });
+        // Until then its last status may come.
+        self.wait(PARTING_MS)
     }
 
     fn status(&mut self, change: impl FnOnce(&mut StatusMessage)) -> &mut Self {
@@ -442,4 +444,49 @@ fn equals_stand_in_the_order_in_which_people_count() {
             "press", "press-2", "press-2b", "press-02", "press-10", "weld"
         ]
     );
+}
+
+#[test]
+fn a_cell_with_another_urdf_than_the_others_of_its_robot_is_marked() {
+    let mut story = Story::new(&[]);
+    for (cell, urdf) in [("a", "11"), ("b", "11"), ("c", "22")] {
+        let mut status = fixture::status("x", 0);
+        status.urdf_sha256 = Some(urdf.repeat(32));
+        story.tell(Event::Status {
+            cell: cell.to_owned(),
+            status: Box::new(status),
+        });
+    }
+    let snapshot = story.wall.snapshot();
+    let marked = snapshot.cells.iter().filter(|cell| cell.urdf_differs);
+    assert!(marked.map(|cell| cell.cell.as_str()).eq(["c"]));
+}
+
+#[test]
+fn a_mute_of_a_latched_cell_is_told_until_it_ends() {
+    let mut story = Story::new(&["a"]);
+    story.alive("x").status(|status| {
+        status.alarm.state = AlarmState::Collision;
+        status.alarm.muted_s = 30.0;
+    });
+    let until = |story: &Story| {
+        let snapshot = story.wall.snapshot();
+        snapshot.cells[0].muted_behind(snapshot.now_ns)
+    };
+    let first = until(&story);
+    assert!(first.is_some());
+    story.wait(2_000).is("stopped");
+    assert_eq!(until(&story), first);
+    story.wait(29_000);
+    assert_eq!(until(&story), None);
+}
+
+#[test]
+fn a_run_that_ends_in_order_is_never_silent_in_whatever_order_its_end_is_heard() {
+    let mut story = Story::new(&["a"]);
+    story.alive("x").status(|_| {}).is("running");
+    let (cell, instance) = ("a".to_owned(), "x".to_owned());
+    story.tell(Event::Gone { cell, instance }).is("running");
+    story.status(|status| status.ended = true).is("ended");
+    story.wait(10_000).is("ended");
 }

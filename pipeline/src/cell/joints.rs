@@ -147,11 +147,7 @@ mod tests {
         assert!(fixed.model.joint_names().eq(["shoulder", "elbow"]));
         // Its mass stays.
         assert_eq!(fixed.model.body_parameters(1)[0], 3.0);
-        assert!(
-            fixed.note().contains("`finger` and `thumb`"),
-            "{}",
-            fixed.note()
-        );
+        assert!(fixed.note().contains("finger, thumb"), "{}", fixed.note());
     }
 
     #[test]

@@ -25,6 +25,9 @@ pub fn tile(view: &CellView, now_ns: i64) -> Markup {
                 "Its alarm was latched " (stamp(since_ns, &words::age_at(since_ns, now_ns)))
                 " ago; nobody has told that it is released."
             } }
+            @if let Some(until_ns) = view.muted_behind(now_ns) { p.reason {
+                "Muted until " (stamp(until_ns, &words::time_of_day(until_ns))) ": until then a new contact stops nothing."
+            } }
             @if let Some(status) = status { (facts(view, status, view.stream_now_ns().unwrap_or(now_ns))) }
         }
     }
@@ -122,9 +125,10 @@ fn facts(view: &CellView, status: &StatusMessage, now_ns: i64) -> Markup {
                 dt.warn { "Clock" }
                 dd.warn { (words::clock(view)) }
             }
-            dt { "Twin, URDF" }
-            dd { code title=[status.twin_sha256.as_ref()] { (words::short_hash(status.twin_sha256.as_ref())) }
-                 ", " code title=[status.urdf_sha256.as_ref()] { (words::short_hash(status.urdf_sha256.as_ref())) } }
+            dt.warn[view.urdf_differs] { "Twin, URDF" }
+            dd.warn[view.urdf_differs] { code title=[status.twin_sha256.as_ref()] { (words::short_hash(status.twin_sha256.as_ref())) }
+                 ", " code title=[status.urdf_sha256.as_ref()] { (words::short_hash(status.urdf_sha256.as_ref())) }
+                 @if view.urdf_differs { ": other cells with " (status.robot) " have another URDF" } }
         }
     }
 }

@@ -129,7 +129,7 @@ impl Hypothesis {
     }
 
     /// Whether its first ten coordinates are those of a body, see [`Inertia::parameters`].
-    fn is_body(&self) -> bool {
+    pub fn is_body(&self) -> bool {
         self.effect.place == PlaceKind::Tool && self.effect.coordinates.len() >= BODY
     }
 

@@ -31,7 +31,7 @@ pub fn summary(
         Verdict::Explained | Verdict::UnknownRemains => {
             // A fault of the recordings, or else that with the largest effort.
             let larger = |a: &&Finding, b: &&Finding| a.effort_rms.total_cmp(&b.effort_rms);
-            let fault = findings.iter().find(|finding| finding.is_fault());
+            let fault = findings.iter().find(|finding| finding.is_slip());
             let first = fault.or_else(|| findings.iter().rev().max_by(larger));
             let part = first.filter(|_| has_changed).and_then(look_at);
             let part = part.map_or_else(String::new, |part| format!(" Look there first: {part}"));

@@ -85,6 +85,12 @@ impl Search<'_> {
         if same >= hypothesis.effect.traits.most_at_one_place || is_drawn_already(fit, hypothesis) {
             return false;
         }
+        // What is put on the tool and what is taken off it are one body.
+        let is_tool = |h: Hypothesis| h.is_body() && h.lasts();
+        let other = |a: &Active| is_tool(a.hypothesis) && a.hypothesis != hypothesis;
+        if is_tool(hypothesis) && fit.actives.iter().any(other) {
+            return false;
+        }
         let excess = |j: usize| {
             fit.variance[j] > QUIET * self.problem.white_noise[j] * self.problem.white_noise[j]
         };

@@ -196,6 +196,10 @@ fn record(report: &Report) -> Markup {
             left.join(", "),
             if left.len() == 1 { "it" } else { "them" }
         ),
+        _ if (report.findings.iter()).any(|finding| !finding.equivalent_to.is_empty()) => {
+            "No motion is known that would tell apart what these recordings leave open: the findings below name their rivals."
+                .to_owned()
+        }
         _ => "Nothing more is needed.".to_owned(),
     };
     html! { p { (text) } }
