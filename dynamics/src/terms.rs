@@ -40,6 +40,7 @@ mod link_mass;
 mod load_dependent_friction;
 mod load_squared_friction;
 mod payload;
+mod payload_in_recording;
 mod payload_pickup;
 mod physics;
 mod presliding_hysteresis;
@@ -124,6 +125,7 @@ pub static EFFECTS: &[&Effect] = &[
     &external_push::EFFECT,
     &contact_wall::EFFECT,
     &payload_pickup::EFFECT,
+    &payload_in_recording::EFFECT,
     &torque_delay::EFFECT,
     &torque_lowpass::EFFECT,
     &torque_saturation::EFFECT,

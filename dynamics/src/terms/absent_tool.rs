@@ -1,6 +1,6 @@
 //! A body that the twin carries and the arm does not.
 
-use super::ghost::Ghost;
+use super::ghost::{Ghost, While};
 use super::law::array;
 use super::payload::{BODY_COORDINATES, BODY_PARAMETERS, inertia, parameters};
 use super::{Effect, Excitation, Family, Layer, PlaceKind, Simulated, Traits, Words};
@@ -36,7 +36,7 @@ pub static EFFECT: Effect = Effect {
     },
     build: |site, values| {
         let lacking = Inertia::zero() - Inertia::from_parameters(array(values));
-        Ghost::boxed(&EFFECT, site, values, lacking, None)
+        Ghost::boxed(&EFFECT, site, values, lacking, While::Always)
     },
 };
 

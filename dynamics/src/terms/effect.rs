@@ -246,6 +246,8 @@ pub struct Traits {
     pub is_made_by_gears: fn(&[f64]) -> bool,
     /// By how much each of its coordinates may be off in a URDF that nobody has measured, of this link.
     pub off_in_urdf: Option<fn(&Link) -> f64>,
+    /// It acts through the whole of one recording: its two times are those of a recording's ends.
+    pub fills_recording: bool,
     /// It is estimated every night, whether it is there or not, and followed over weeks.
     pub is_followed: bool,
     /// What the smallest size that would have been found is told as: its first factor. `None` if that does not make it.
@@ -270,6 +272,7 @@ impl Traits {
         bends: false,
         is_made_by_gears: |_| true,
         off_in_urdf: None,
+        fills_recording: false,
         is_followed: false,
         smallest_told_as: None,
     };

@@ -3,6 +3,17 @@
 use super::{Effect, MotionSample, Site, Term};
 use crate::{Data, Inertia, Model, rnea};
 
+/// When a body is there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum While {
+    /// For good.
+    Always,
+    /// Between two times of each recording \[s from its start\].
+    InEachRecording([f64; 2]),
+    /// Between two times of the session \[s\].
+    InSession([f64; 2]),
+}
+
 /// An inertia at a link, for good or for a while. The cost of bodies is linear in their inertias, so a
 /// robot that is weightless but for this one gives it.
 #[derive(Debug)]
@@ -11,8 +22,7 @@ pub(super) struct Ghost {
     coordinates: Vec<f64>,
     link: usize,
     inertia: Inertia,
-    /// In each recording \[s from its start\]; `None` for good.
-    window_s: Option<[f64; 2]>,
+    there: While,
     model: Model,
     data: Data,
 }
@@ -23,7 +33,7 @@ impl Ghost {
         site: &Site<'_>,
         coordinates: &[f64],
         inertia: Inertia,
-        window_s: Option<[f64; 2]>,
+        there: While,
     ) -> Box<dyn Term> {
         let model = site.model.ghost(site.link, inertia);
         Box::new(Self {
@@ -31,7 +41,7 @@ impl Ghost {
             coordinates: coordinates.to_vec(),
             link: site.link,
             inertia,
-            window_s,
+            there,
             data: Data::new(&model),
             model,
         })
@@ -48,8 +58,12 @@ impl Term for Ghost {
     }
 
     fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
-        let there = |[start, end]: [f64; 2]| start <= at.recording_s && at.recording_s < end;
-        if !self.window_s.is_none_or(there) {
+        let (now_s, [start, end]) = match self.there {
+            While::Always => (0.0, [0.0, 1.0]),
+            While::InEachRecording(window_s) => (at.recording_s, window_s),
+            While::InSession(window_s) => (at.session_s, window_s),
+        };
+        if !(start <= now_s && now_s < end) {
             return;
         }
         let added = rnea(
@@ -65,7 +79,7 @@ impl Term for Ghost {
     }
 
     fn alter(&self, model: &mut Model) -> bool {
-        if self.window_s.is_some() {
+        if self.there != While::Always {
             return false;
         }
         model.attach(self.link, self.inertia);
@@ -73,6 +87,6 @@ impl Term for Ghost {
     }
 
     fn inertia(&self) -> Option<(usize, Inertia)> {
-        self.window_s.is_none().then_some((self.link, self.inertia))
+        (self.there == While::Always).then_some((self.link, self.inertia))
     }
 }

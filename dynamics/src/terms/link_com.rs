@@ -1,6 +1,6 @@
 //! A link whose centre of mass is not where its URDF says.
 
-use super::ghost::Ghost;
+use super::ghost::{Ghost, While};
 use super::{
     Coordinate, CoordinateKind, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind,
     Simulated, Traits, Words,
@@ -66,7 +66,13 @@ pub(super) static EFFECT: Effect = Effect {
         let (mass_kg, com_m) = (link.mass_kg(), link.com_m());
         let shifted = std::array::from_fn(|i| com_m[i] + values[i]);
         let body = |com_m| Inertia::new(mass_kg, com_m, [0.0; 6]);
-        Ghost::boxed(&EFFECT, site, values, body(shifted) - body(com_m), None)
+        Ghost::boxed(
+            &EFFECT,
+            site,
+            values,
+            body(shifted) - body(com_m),
+            While::Always,
+        )
     },
 };
 

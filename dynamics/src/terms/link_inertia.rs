@@ -1,6 +1,6 @@
 //! A link that is another body than its URDF says.
 
-use super::ghost::Ghost;
+use super::ghost::{Ghost, While};
 use super::law::array;
 use super::{
     Coordinate, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated, Traits, Words,
@@ -58,6 +58,6 @@ pub(super) static EFFECT: Effect = Effect {
     },
     build: |site, values| {
         let inertia = Inertia::from_parameters(array(values));
-        Ghost::boxed(&EFFECT, site, values, inertia, None)
+        Ghost::boxed(&EFFECT, site, values, inertia, While::Always)
     },
 };

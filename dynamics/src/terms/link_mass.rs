@@ -1,6 +1,6 @@
 //! A link that is heavier or lighter than its URDF says.
 
-use super::ghost::Ghost;
+use super::ghost::{Ghost, While};
 use super::{
     Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated, Traits,
     Words,
@@ -50,6 +50,6 @@ pub(super) static EFFECT: Effect = Effect {
     build: |site, values| {
         let com_m = site.model.links()[site.link].com_m();
         let inertia = Inertia::new(values[0], com_m, [0.0; 6]);
-        Ghost::boxed(&EFFECT, site, values, inertia, None)
+        Ghost::boxed(&EFFECT, site, values, inertia, While::Always)
     },
 };

@@ -1,6 +1,6 @@
 //! A body that the arm carries all the time.
 
-use super::ghost::Ghost;
+use super::ghost::{Ghost, While};
 use super::law::array;
 use super::{
     Coordinate, Draw, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated,
@@ -39,7 +39,7 @@ pub static EFFECT: Effect = Effect {
     },
     build: |site, values| {
         let inertia = Inertia::from_parameters(array(values));
-        Ghost::boxed(&EFFECT, site, values, inertia, None)
+        Ghost::boxed(&EFFECT, site, values, inertia, While::Always)
     },
 };
 

@@ -1,6 +1,6 @@
 //! A body that the arm picks up and drops again.
 
-use super::ghost::Ghost;
+use super::ghost::{Ghost, While};
 use super::law::array;
 use super::payload::{BODY_COORDINATES, BODY_PARAMETERS, drawn, inertia, parameters};
 use super::{
@@ -22,28 +22,18 @@ pub static EFFECT: Effect = Effect {
     family: Family::Body,
     place: PlaceKind::Tool,
     layer: Layer::Body,
-    parameters: &{
-        let mut all = [Parameter::any("t_start_s"); 12];
-        let mut i = 0;
-        while i < 10 {
-            all[i] = BODY_PARAMETERS[i];
-            i += 1;
-        }
-        all[11] = Parameter::any("t_end_s");
-        all
-    },
-    coordinates: &{
-        let mut all = [time("t_start_s"); 12];
-        let mut i = 0;
-        while i < 10 {
-            all[i] = BODY_COORDINATES[i];
-            i += 1;
-        }
-        all[11] = time("t_end_s");
-        all
-    },
-    to_parameters: |c| [&parameters(&array(c))[..], &c[10..]].concat(),
-    to_coordinates: |p| [&inertia(&array(p)).parameters()[..], &p[10..]].concat(),
+    parameters: &with_times(
+        BODY_PARAMETERS,
+        Parameter::any("t_start_s"),
+        Parameter::any("t_end_s"),
+    ),
+    coordinates: &with_times(
+        BODY_COORDINATES,
+        time("t_start_s", CoordinateKind::RecordingTime),
+        time("t_end_s", CoordinateKind::RecordingTime),
+    ),
+    to_parameters: parameters_with_times,
+    to_coordinates: coordinates_with_times,
     simpler: None,
     limit: None,
     excitation: Excitation::Poses,
@@ -52,16 +42,27 @@ pub static EFFECT: Effect = Effect {
     traits: Traits::NONE,
     build: |site, values| {
         let inertia = Inertia::from_parameters(array(values));
-        let window_s = Some(array(&values[10..]));
-        Ghost::boxed(&EFFECT, site, values, inertia, window_s)
+        let there = While::InEachRecording(array(&values[10..]));
+        Ghost::boxed(&EFFECT, site, values, inertia, there)
     },
 };
 
-const fn time(name: &'static str) -> Coordinate {
-    Coordinate {
-        name,
-        kind: CoordinateKind::RecordingTime,
-    }
+/// Ten entries of a body and those of two times behind them.
+pub(super) const fn with_times<T: Copy>(body: [T; 10], start: T, end: T) -> [T; 12] {
+    let [mass, x, y, z, a, b, c, d, e, f] = body;
+    [mass, x, y, z, a, b, c, d, e, f, start, end]
+}
+
+pub(super) const fn time(name: &'static str, kind: CoordinateKind) -> Coordinate {
+    Coordinate { name, kind }
+}
+
+pub(super) fn parameters_with_times(c: &[f64]) -> Vec<f64> {
+    [&parameters(&array(c))[..], &c[10..]].concat()
+}
+
+pub(super) fn coordinates_with_times(p: &[f64]) -> Vec<f64> {
+    [&inertia(&array(p)).parameters()[..], &p[10..]].concat()
 }
 
 #[cfg(test)]

@@ -475,7 +475,7 @@ fn a_mute_of_a_latched_cell_is_told_until_it_ends() {
     };
     let first = until(&story);
     assert!(first.is_some());
-    story.wait(2_000).is("stopped");
+    story.wait(2_000).is("stopped by latch");
     assert_eq!(until(&story), first);
     story.wait(29_000);
     assert_eq!(until(&story), None);
@@ -487,6 +487,9 @@ fn a_run_that_ends_in_order_is_never_silent_in_whatever_order_its_end_is_heard()
     story.alive("x").status(|_| {}).is("running");
     let (cell, instance) = ("a".to_owned(), "x".to_owned());
     story.tell(Event::Gone { cell, instance }).is("running");
-    story.status(|status| status.ended = true).is("ended");
+    story
+        .wait(1)
+        .status(|status| status.ended = true)
+        .is("ended");
     story.wait(10_000).is("ended");
 }

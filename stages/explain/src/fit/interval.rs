@@ -98,7 +98,12 @@ pub fn covariance(problem: &Problem, fit: &Fit) -> DMatrix<f64> {
     let (known, _) = body_prior::normal(&problem.model, &fit.actives, &fit.parameters());
     normal += &known;
     scores += known;
-    let scale: Vec<f64> = (0..p).map(|a| normal[(a, a)].max(1e-300).sqrt()).collect();
+    // What no row depends on has no scale of its own, such as an end that lies beside a recording.
+    let scale = |a: usize| normal[(a, a)].max(0.0).sqrt();
+    let scale: Vec<f64> = (0..p)
+        .map(scale)
+        .map(|s| if s > 0.0 { s } else { 1.0 })
+        .collect();
     let mut scaled = DMatrix::from_fn(p, p, |a, b| normal[(a, b)] / (scale[a] * scale[b]));
     for a in 0..p {
         scaled[(a, a)] += RIDGE;

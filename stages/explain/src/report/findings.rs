@@ -362,7 +362,8 @@ fn when(
                 .tracks
                 .iter()
                 .map(|track| &track.track)
-                .rfind(|track| track.session_s <= middle);
+                .filter(|track| track.session_s <= middle)
+                .max_by(|a, b| a.session_s.total_cmp(&b.session_s));
             let Some(track) = track else { return none };
             for name in ["t_start_s", "t_end_s"] {
                 if let Some(value) = get(name) {

@@ -48,7 +48,8 @@ pub fn is_timely(problem: &Problem, active: &Active) -> bool {
                 let first_s = track.session_s;
                 let length_s = track.time_s.last().copied().unwrap_or(0.0);
                 let within = start_s > first_s - BESIDE_S && end_s < first_s + length_s + BESIDE_S;
-                within && end_s - start_s <= LONGEST_SHARE * length_s
+                let fills = active.hypothesis.effect.traits.fills_recording;
+                within && (fills || end_s - start_s <= LONGEST_SHARE * length_s)
             })
         }
         TimeKind::Always | TimeKind::Step | TimeKind::EveryRecording => true,

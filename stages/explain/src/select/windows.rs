@@ -38,6 +38,9 @@ const SAME_STEPS: usize = 4;
 /// Factors that are scanned. The inertias of a payload come after them and hardly change the effort.
 /// Physical: a payload's mass and first moments of mass.
 const SCANNED_FACTORS: usize = 4;
+/// An effect of a whole recording begins so long before it and ends so long after it \[s\].
+/// Resolution: the ends lie where no row is, so that the fit leaves them there.
+const BESIDE_S: f64 = 0.02;
 /// Added to the diagonal of an interval's normal equations, as a share of their trace.
 /// Resolution: guards the factorisation of dependent columns.
 const RIDGE: f64 = 1e-9;
@@ -54,7 +57,10 @@ impl Base<'_> {
             TimeKind::Step => self.propose_step(hypothesis),
             TimeKind::EveryRecording => self.propose_interval(hypothesis, None),
             TimeKind::Once => (0..self.problem.tracks.len())
-                .filter_map(|track| self.propose_interval(hypothesis, Some(track)))
+                .filter_map(|track| match hypothesis.effect.traits.fills_recording {
+                    true => self.propose_recording(hypothesis, track),
+                    false => self.propose_interval(hypothesis, Some(track)),
+                })
                 .max_by(|a, b| a.evidence().total_cmp(&b.evidence())),
         }
     }
@@ -127,6 +133,13 @@ impl Base<'_> {
         });
         let (best, _) = best_of(scores)?;
         self.propose_within(hypothesis, intervals[best], only)
+    }
+
+    /// The best factors for the whole of one recording, where there are others.
+    fn propose_recording(&self, hypothesis: Hypothesis, track: usize) -> Option<Proposal> {
+        let (first_s, last_s) = (-BESIDE_S, self.longest_s(Some(track)) + BESIDE_S);
+        let others = self.problem.tracks.len() > 1;
+        others.then(|| self.propose_within(hypothesis, (first_s, last_s), Some(track)))?
     }
 
     /// The best factors within an interval of recording time \[s\], in one recording or in all.

@@ -1,0 +1,86 @@
+//! A body that the arm carries through one recording and not through the others.
+
+use super::ghost::{Ghost, While};
+use super::law::array;
+use super::payload::{BODY_COORDINATES, BODY_PARAMETERS};
+use super::payload_pickup::{coordinates_with_times, parameters_with_times, time, with_times};
+use super::{
+    CoordinateKind, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated, Traits,
+    Words,
+};
+use crate::Inertia;
+
+/// As a payload, between two times of the session that enclose a recording.
+pub static EFFECT: Effect = Effect {
+    name: "payload_in_recording",
+    words: Words::new(
+        "Payload in one recording",
+        "a payload in one recording",
+        "In one recording the arm carries something that it does not carry in the others.",
+        "The tool in that recording: what was mounted or held? Explain recordings with it and without it apart.",
+        "In one recording the arm carries {mass_kg} more than in the others.",
+    ),
+    family: Family::Body,
+    place: PlaceKind::Tool,
+    layer: Layer::Body,
+    parameters: &with_times(
+        BODY_PARAMETERS,
+        Parameter::any("t_start_s"),
+        Parameter::any("t_end_s"),
+    ),
+    coordinates: &with_times(
+        BODY_COORDINATES,
+        time("t_start_s", CoordinateKind::SessionTime),
+        time("t_end_s", CoordinateKind::SessionTime),
+    ),
+    to_parameters: parameters_with_times,
+    to_coordinates: coordinates_with_times,
+    simpler: None,
+    limit: None,
+    excitation: Excitation::Poses,
+    simulated: Simulated::No(
+        "simulate the recordings with it by a scenario of their own that has a `payload`",
+    ),
+    concealed: None,
+    traits: Traits {
+        is_off_list: true,
+        fills_recording: true,
+        most_at_one_place: 8,
+        ..Traits::NONE
+    },
+    build: |site, values| {
+        let body = Inertia::from_parameters(array(values));
+        Ghost::boxed(
+            &EFFECT,
+            site,
+            values,
+            body,
+            While::InSession(array(&values[10..])),
+        )
+    },
+};
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{Instant, TwoJoints, motion, run};
+    use super::*;
+
+    #[test]
+    fn is_there_in_its_part_of_the_session() {
+        let robot = TwoJoints::new();
+        let site = robot.site_for(PlaceKind::Tool);
+        let mut values = vec![2.0, 0.1, 0.0, 0.2, 0.1, 0.0, 0.0, 0.1, 0.0, 0.05];
+        let mut payload = (super::super::payload::EFFECT.build)(&site, &values);
+        let motion = motion(&robot.model, 100);
+        let session_s = |at: &Instant| at.view().session_s;
+        let (first, last) = (session_s(&motion[0]), session_s(&motion[99]));
+        values.extend([first - 0.1, 0.5 * (first + last)]);
+        let mut there = (EFFECT.build)(&site, &values);
+        let always = run(&mut *payload, &motion);
+        for (i, (at, now)) in motion.iter().zip(run(&mut *there, &motion)).enumerate() {
+            let is_there = session_s(at) < 0.5 * (first + last);
+            assert_eq!(now, if is_there { always[i] } else { [0.0; 2] });
+        }
+        assert!(there.inertia().is_none());
+    }
+}
