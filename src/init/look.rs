@@ -88,7 +88,7 @@ impl Told<'_> {
             None => self.find_topic(&cell)?,
         };
         let recorded = first_joint_names(&self.recordings[0], &state_topic);
-        let (cell, fixed) = cell.without_unrecorded(&recorded.unwrap_or_default());
+        let (mut cell, fixed) = cell.without_unrecorded(&recorded.unwrap_or_default());
         self.check_joints(&cell, &state_topic)?;
         let mut sentences = vec![format!(
             "{} joints of {} on {state_topic} in {} recording(s).",
@@ -114,7 +114,6 @@ impl Told<'_> {
         let (unit, sentence) = self.unit(&EffortScale::of(&slopes.all))?;
         sentences.push(sentence);
         sentences.extend(signs(&slopes.all));
-        let mut cell = cell;
         cell.facts.effort_unit = unit;
         Ok(Looked {
             cell,

@@ -66,6 +66,19 @@ def swapped(q, v, tau, j, rng):
     return q, v, out
 
 
+def renamed(q, v, tau, j, rng):
+    k = j + 1 if j + 1 < tau.shape[1] else j - 1
+    order = np.arange(tau.shape[1])
+    order[[j, k]] = order[[k, j]]
+    return q[:, order], v[:, order], tau[:, order]
+
+
+def dead(q, v, tau, j, rng):
+    out = tau.copy()
+    out[:, j] = round(float(tau[0, j]), 2)
+    return q, v, out
+
+
 def shifted(x, j, by):
     out = x.copy()
     out[:, j] += by
@@ -110,6 +123,8 @@ FAULTS = [
     Fault("drive_limit_lowered", "torque_saturation", ("torque_saturation",), "limit"),
     Fault("effort_filter_on", "torque_lowpass", ("torque_lowpass", "torque_delay"), "smooth|clock|time"),
     Fault("connectors_swapped", None, ("efforts_swapped",), "exchange|connector", changes=swapped),
+    Fault("names_swapped_in_driver", None, ("names_swapped",), "name", changes=renamed),
+    Fault("torque_sensor_dead", None, ("effort_constant",), "sensor", changes=dead),
     Fault("drive_sign_turned", None, ("effort_sign",), "sign", changes=lambda q, v, tau, j, rng: (q, v, scaled(tau, j, -1.))),
     Fault("joint_counts_backwards", None, ("joint_sign", "position_sign", "effort_sign"), "axis|sign|turn",
           changes=lambda q, v, tau, j, rng: (scaled(q, j, -1.), scaled(v, j, -1.), scaled(tau, j, -1.))),
@@ -245,7 +260,7 @@ def verdict(fault, robot, report, new, joint):
     def here(f):
         if fault.everywhere or name_of(f) in judge.NOWHERE or joint is None and link is None:
             return True
-        if name_of(f) in ("efforts_swapped", "transmission_coupling"):
+        if name_of(f) in ("efforts_swapped", "names_swapped", "transmission_coupling"):
             return joint in (place(f), where.get(f["parameters"].get("source_joint")))
         if joint is None:
             return f["effect"] == "unknown" or place(f) is None or abs(place(f) - link) <= 1

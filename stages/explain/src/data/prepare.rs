@@ -81,9 +81,7 @@ impl Problem {
             let mut filters = Vec::with_capacity(n);
             for j in 0..n {
                 let mut counts = track.counts(j, moves[j] && !rests_count[j], cutoff_hz);
-                if is_unmeasured(recording, j, n) {
-                    counts.fill(false);
-                }
+                leave_out_unmeasured(&mut counts, recording, j, n);
                 let filter = LowPass::weighted(&track.time_s, cutoff_hz, |k| counts[k]);
                 let of_joint = (0..full.len()).map(|k| k * n + j);
                 let largest = of_joint.clone().fold(0.0_f64, |most, at| {
@@ -130,9 +128,8 @@ impl Problem {
             }
             variances[j].sort_by(|(a, _), (b, _)| a.total_cmp(b));
             let (filtered, unfiltered) = variances[j][variances[j].len() / 2];
-            let least = RESOLUTION * problem.largest_effort[j];
-            problem.white_noise[j] = filtered.sqrt().max(least);
-            problem.unfiltered_noise[j] = unfiltered.sqrt().max(least);
+            problem.white_noise[j] = deviation(filtered, problem.largest_effort[j]);
+            problem.unfiltered_noise[j] = deviation(unfiltered, problem.largest_effort[j]);
         }
         problem.effective_samples = per_row(&problem);
         problem
@@ -162,4 +159,16 @@ impl Problem {
             expansions: vec![OnceLock::new(); n],
         }
     }
+}
+
+/// No row of a joint counts in a recording that does not measure its effort.
+fn leave_out_unmeasured(counts: &mut [bool], recording: &Recording, joint: usize, n: usize) {
+    if is_unmeasured(recording, joint, n) {
+        counts.fill(false);
+    }
+}
+
+/// Standard deviation of a noise, no less than what the numbers of a driver resolve.
+fn deviation(variance: f64, largest_effort: f64) -> f64 {
+    variance.sqrt().max(RESOLUTION * largest_effort)
 }

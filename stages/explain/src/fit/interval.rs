@@ -115,8 +115,9 @@ pub fn covariance(problem: &Problem, fit: &Fit) -> DMatrix<f64> {
     let mut covariance = &inverse * scores * &inverse;
     for a in 0..p {
         let (robust, white) = (covariance[(a, a)], inverse[(a, a)]);
-        if robust < white {
-            let grow = (white / robust.max(1e-300)).sqrt();
+        // Zero is what no row depends on: it stays so.
+        if robust > 0.0 && robust < white {
+            let grow = (white / robust).sqrt();
             for b in 0..p {
                 covariance[(a, b)] *= grow;
                 covariance[(b, a)] *= grow;

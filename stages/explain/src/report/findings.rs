@@ -131,7 +131,8 @@ pub fn of(
         let in_amperes = scales.to_nm(active.hypothesis, &mut parameters, &mut intervals);
         of_start.widen(active.hypothesis, &parameters, &mut intervals);
         let or_scale = scales.doubt_body(active.hypothesis, &parameters, &mut intervals);
-        let mut sentence = sentences::sentence(active, &place, &parameters, &intervals, joints);
+        let place = when.whole(active).unwrap_or(&place);
+        let mut sentence = sentences::sentence(active, place, &parameters, &intervals, joints);
         sentence += or_scale.unwrap_or_default();
         if in_amperes {
             sentence = sentences::in_amperes(&sentence);
@@ -322,10 +323,19 @@ fn effort_rms(without: &Fit, with: &Fit, input: &Input) -> f64 {
     (0..with.squares.len()).map(at).fold(0.0, f64::max)
 }
 
+#[derive(Default)]
 struct When {
     recording: Option<String>,
     start: Option<f64>,
     end: Option<f64>,
+}
+
+impl When {
+    /// Of what fills a recording, the recording: the place that tells something.
+    fn whole(&self, active: &Active) -> Option<&str> {
+        let fills = active.hypothesis.effect.traits.fills_recording;
+        self.recording.as_deref().filter(|_| fills)
+    }
 }
 
 /// The times of a finding. Where they hold for one recording, its parameters are changed to that recording's time.
@@ -335,11 +345,7 @@ fn when(
     parameters: &mut BTreeMap<String, Value>,
     intervals: &mut BTreeMap<String, [f64; 2]>,
 ) -> When {
-    let mut none = When {
-        recording: None,
-        start: None,
-        end: None,
-    };
+    let mut none = When::default();
     let known = parameters.clone();
     let get = |name: &str| known.get(name).and_then(Value::as_f64);
     match active.hypothesis.time_kind() {
@@ -365,6 +371,15 @@ fn when(
                 .filter(|track| track.session_s <= middle)
                 .max_by(|a, b| a.session_s.total_cmp(&b.session_s));
             let Some(track) = track else { return none };
+            if active.hypothesis.effect.traits.fills_recording {
+                parameters.retain(|name, _| !name.starts_with("t_"));
+                intervals.retain(|name, _| !name.starts_with("t_"));
+                return When {
+                    recording: Some(track.name.clone()),
+                    start: Some(0.0),
+                    end: track.time_s.last().copied(),
+                };
+            }
             for name in ["t_start_s", "t_end_s"] {
                 if let Some(value) = get(name) {
                     parameters.insert(name.to_owned(), number(value - track.session_s));

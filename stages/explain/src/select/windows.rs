@@ -57,9 +57,12 @@ impl Base<'_> {
             TimeKind::Step => self.propose_step(hypothesis),
             TimeKind::EveryRecording => self.propose_interval(hypothesis, None),
             TimeKind::Once => (0..self.problem.tracks.len())
-                .filter_map(|track| match hypothesis.effect.traits.fills_recording {
-                    true => self.propose_recording(hypothesis, track),
-                    false => self.propose_interval(hypothesis, Some(track)),
+                .filter_map(|track| {
+                    if hypothesis.effect.traits.fills_recording {
+                        self.propose_recording(hypothesis, track)
+                    } else {
+                        self.propose_interval(hypothesis, Some(track))
+                    }
                 })
                 .max_by(|a, b| a.evidence().total_cmp(&b.evidence())),
         }

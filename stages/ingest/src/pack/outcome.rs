@@ -52,7 +52,7 @@ pub enum PackError {
     NamedTwice(Twice),
     /// Joints of the cell that no message names.
     #[error(
-        "no joint state names {}; the messages name {}",
+        "no joint state names {}; the messages name {}. Make a joint that nobody records `fixed`, as `init` does",
         list(missing),
         list(found)
     )]

@@ -205,7 +205,7 @@ fn joints_that_nobody_names_are_told() {
     packer.state(&message(2, "y", &[1.0]), 2);
     assert_eq!(
         packer.verdict().unwrap_err().to_string(),
-        "no joint state names b, c; the messages name a, x, y"
+        "no joint state names b, c; the messages name a, x, y. Make a joint that nobody records `fixed`, as `init` does"
     );
     let nothing = Packer::new(&setup(), settings()).unwrap();
     assert_eq!(nothing.verdict(), Err(PackError::NoSample { messages: 0 }));
@@ -247,6 +247,40 @@ fn an_absent_velocity_is_differentiated_on_any_clock() {
     for (velocity, slope) in last.velocity.iter().zip(slope) {
         assert!((velocity - slope).abs() < 1e-6, "{velocity} {slope}");
     }
+}
+
+#[test]
+fn a_position_that_the_driver_wraps_goes_on_and_so_does_its_command() {
+    let mut packer = Packer::new(
+        &setup(),
+        PackSettings {
+            expects_command: true,
+            ..settings()
+        },
+    )
+    .unwrap();
+    let wrapped = |x: f64| x - std::f64::consts::TAU * (x / std::f64::consts::TAU).round();
+    for i in 0..400_i64 {
+        let (stamp_ns, q) = (i * 10 * MS, 2.0 + 0.01 * i as f64);
+        let mut state = message(stamp_ns, "a b c", &[wrapped(q), 0.0, 0.0]);
+        state.velocity.clear();
+        packer.command(
+            &message(stamp_ns, "a b c", &[wrapped(q + 0.1), 0.0, 0.0]),
+            stamp_ns,
+        );
+        packer.state(&state, stamp_ns);
+    }
+    let all = drain(&mut packer);
+    for (sample, q) in all.iter().zip((0..).map(|i| 2.0 + 0.01 * f64::from(i))) {
+        assert!((sample.position[0] - q).abs() < 1e-9);
+        assert!((sample.command_position[0] - q - 0.1).abs() < 1e-9);
+    }
+    let settled = all.iter().skip(50);
+    assert!(
+        settled
+            .map(|s| s.velocity[0])
+            .all(|v| (v - 1.0).abs() < 0.01)
+    );
 }
 
 #[test]

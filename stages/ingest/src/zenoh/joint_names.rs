@@ -23,7 +23,7 @@ pub(super) fn slip(wanted: &[String], found: &[String]) -> Option<String> {
                 .to_owned()
         } else {
             format!(
-                "no message names {}: another publisher sends them, or the robot has no such joint (make it `fixed`)",
+                "no message names {}: another publisher sends them, or the robot has no such joint (make it `fixed`, as `init` does)",
                 list(missing.iter().copied())
             )
         });
