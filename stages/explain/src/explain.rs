@@ -160,7 +160,9 @@ fn conclude(
         .map(|j| white_noise(&input.fit, j, joints.len()))
         .collect();
     let unit = if input.effort_unit == "A" { "A" } else { "N m" };
-    let remainders = context.remainders((&problem, &kept), &before, &rests_count, unit)?;
+    let of_proof = (&proof.after[..], &named.findings[..]);
+    let remainders =
+        context.remainders((&problem, &kept), &before, &rests_count, unit, of_proof)?;
     if !remainders.elsewhere.is_empty() {
         findings::doubt_patches(&mut named.findings);
     }

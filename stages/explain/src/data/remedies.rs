@@ -51,6 +51,8 @@ pub enum Remedy {
     GravitySubtracted,
     /// The effort that is said to be in N m is motor current.
     IsCurrent,
+    /// The effort that is said to be in N m is a share of something that differs from joint to joint, such as the rated torque.
+    IsOfRating,
     /// The effort that is said to be motor current is in N m.
     IsTorque,
     /// The effort is so many times a N m at every joint.
@@ -66,6 +68,11 @@ pub enum Remedy {
 }
 
 impl Remedy {
+    /// Whether it says that each joint's effort has a scale of its own.
+    pub fn is_of_each_joint(&self) -> bool {
+        matches!(self, Self::IsCurrent | Self::IsOfRating)
+    }
+
     /// Whether it is physics that the search can name, and no fault of the recording.
     pub fn is_physics(&self) -> bool {
         matches!(self, Self::BaseTurned(_) | Self::Payload(_))
@@ -163,7 +170,7 @@ pub fn audit(problem: &Problem, is_scaled: bool) -> Audit {
     // Each joint may be turned and be in another's place; more is another robot.
     while found.slips.len() < 2 * n {
         let now = trial.left(&model, &reading);
-        if !now.iter().flatten().any(|left| left.share() > SUSPECT) {
+        if !now.iter().flatten().any(Left::is_suspect) {
             break;
         }
         let physics = if found.slips.is_empty() {
@@ -212,6 +219,11 @@ pub fn audit(problem: &Problem, is_scaled: bool) -> Audit {
     found
 }
 
+/// Whether efforts that look like another unit are torques of a robot with one wrong body: a decimal point that slipped.
+pub fn is_one_body(problem: &Problem) -> bool {
+    Trial::new(problem, true).is_one_body()
+}
+
 /// All remedies that can be tried on a reading.
 fn candidates(n: usize, turns: &[bool], reading: &Reading) -> Vec<Remedy> {
     let mut all = Vec::new();
@@ -233,18 +245,18 @@ fn candidates(n: usize, turns: &[bool], reading: &Reading) -> Vec<Remedy> {
     all
 }
 
-/// By how much the error falls, as the logarithm of its factor, all joints together. Nothing if a joint or a recording says
-/// otherwise.
+/// By how much the error falls, as the logarithm of its factor, over all joints that told it before. Nothing if a joint or a
+/// recording says otherwise; a joint that told nothing before says so if it has got an effort that its motion leaves.
 fn total_gain(before: &[Option<Left>], after: &[Option<Left>]) -> Option<f64> {
-    let pairs = || {
-        before
-            .iter()
-            .zip(after)
-            .filter_map(|(a, b)| a.as_ref().zip(b.as_ref()))
+    let known = before.iter().zip(after);
+    let known = known.filter_map(|(a, b)| a.as_ref().zip(b.as_ref()));
+    let is_worse = |(before, after): (&Left, &Left)| {
+        after.rms() > HARMLESS * before.rms() && (before.tells || after.is_suspect())
     };
-    if pairs().any(|(before, after)| after.rms() > HARMLESS * before.rms()) {
+    if known.clone().any(is_worse) {
         return None;
     }
+    let pairs = || known.clone().filter(|(before, _)| before.tells);
     let recordings = pairs().map(|(left, _)| left.squares.len()).max()?;
     let in_recording = |r: usize| -> f64 {
         let gain = |(a, b): (&Left, &Left)| 0.5 * (a.squares[r] / b.squares[r]).ln();
@@ -258,7 +270,8 @@ fn total_gain(before: &[Option<Left>], after: &[Option<Left>]) -> Option<f64> {
 
 fn slip(remedy: Remedy, before: &[Option<Left>], after: &[Option<Left>]) -> Slip {
     let pairs = before.iter().zip(after).enumerate();
-    let known = pairs.filter_map(|(j, (a, b))| Some((j, [a.as_ref()?.rms(), b.as_ref()?.rms()])));
+    let telling = |left: &Option<Left>| left.clone().filter(|left| left.tells);
+    let known = pairs.filter_map(|(j, (a, b))| Some((j, [telling(a)?.rms(), b.as_ref()?.rms()])));
     let known: Vec<(usize, [f64; 2])> = known.collect();
     let sum = |of: usize| -> f64 {
         let scaled = |(_, errors): &(usize, [f64; 2])| (errors[of] / errors[1]).powi(2);

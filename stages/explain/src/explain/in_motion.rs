@@ -5,7 +5,7 @@ use tauscope_dynamics::terms::{PlaceKind, TermError};
 
 use crate::context::Context;
 use crate::data::problem::Problem;
-use crate::data::remedies::{self, Remedy};
+use crate::data::remedies::{self, Remedy, Slip};
 use crate::data::same_robot::Likeness;
 use crate::explain::judged::{Judged, Stop};
 use crate::fit::fitted::Fit;
@@ -103,10 +103,14 @@ impl Context<'_> {
         if !audit.slips.is_empty() {
             return Err(Stop::Slips(audit.slips));
         }
+        // A scale of each joint is in doubt where one body explains the efforts as well.
+        let scale = remedies::of_scale(input, &likeness.slopes);
+        let is_of_each = |slip: &Slip| slip.remedy.is_of_each_joint();
+        let scale = scale.filter(|slip| !is_of_each(slip) || !remedies::is_one_body(problem));
         match audit.physics {
             Some(Remedy::BaseTurned(turn)) => return Ok(Some(turn)),
-            Some(_) => return Ok(None),
-            None => {}
+            Some(_) if !scale.as_ref().is_some_and(is_of_each) => return Ok(None),
+            _ => {}
         }
         // A corrected twin was made of this robot, and in its unit.
         if input.start.is_some() {
@@ -115,7 +119,7 @@ impl Context<'_> {
         if let Some(reason) = likeness.of_another_robot() {
             return Err(Stop::Reason(reason));
         }
-        match remedies::of_scale(input, &likeness.slopes) {
+        match scale {
             Some(slip) => Err(Stop::Slips(vec![slip])),
             None => Ok(None),
         }

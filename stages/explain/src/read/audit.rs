@@ -119,6 +119,10 @@ pub fn losses(input: &Input) -> Vec<String> {
             "rows run backwards in time and were dropped",
         );
         add(losses.incomplete, "rows lack a joint and were dropped");
+        add(
+            losses.unmeasured,
+            "rows hold no effort, or plain zeros at all joints, and were dropped: another publisher, or drives that were off",
+        );
         add(losses.unreadable, "messages could not be read");
         add(
             losses.damaged,

@@ -1,5 +1,7 @@
 //! What a recording loses on reading.
 
+use super::recording::Recording;
+
 /// What was left out on reading.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Losses {
@@ -11,6 +13,8 @@ pub struct Losses {
     pub backward: u64,
     /// Rows in which a joint of the robot is missing.
     pub incomplete: u64,
+    /// Rows without efforts, or with plain zeros at all joints, among others that have some.
+    pub unmeasured: u64,
     /// Messages that could not be read.
     pub unreadable: u64,
     /// Parts of the file that cannot be read, e.g. a torn tail.
@@ -20,6 +24,58 @@ pub struct Losses {
 impl Losses {
     /// Rows of data that are lost, repeats not counted.
     pub fn lost(&self) -> u64 {
-        self.not_finite + self.backward + self.incomplete + self.unreadable + self.damaged
+        self.not_finite
+            + self.backward
+            + self.incomplete
+            + self.unmeasured
+            + self.unreadable
+            + self.damaged
+    }
+}
+
+impl Recording {
+    /// Leaves out the samples that are not `measured`: nobody measured their efforts. Their rows are answered by the sample
+    /// before.
+    pub(super) fn keep(&mut self, measured: &[bool]) {
+        let n = self.position.len() / measured.len().max(1);
+        let kept: Vec<usize> = (0..measured.len()).filter(|&k| measured[k]).collect();
+        self.losses.unmeasured += (measured.len() - kept.len()) as u64;
+        let rows = |all: &[f64]| -> Vec<f64> {
+            let row = |&k: &usize| all.get(k * n..(k + 1) * n).unwrap_or_default().iter();
+            kept.iter().flat_map(row).copied().collect()
+        };
+        for all in [&mut self.position, &mut self.velocity, &mut self.effort] {
+            *all = rows(all);
+        }
+        let start_s = kept.first().map_or(0.0, |&first| self.time_s[first]);
+        self.start_ns += (start_s * 1e9).round() as i64;
+        self.time_s = kept.iter().map(|&k| self.time_s[k] - start_s).collect();
+        let now_at = |sample: usize| kept.partition_point(|&k| k <= sample).saturating_sub(1);
+        for sample in &mut self.sample_of_row {
+            *sample = now_at(*sample);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::fixture;
+
+    #[test]
+    fn samples_without_a_measurement_are_left_out_and_their_rows_answered_by_the_one_before() {
+        let mut recording = fixture::recording(&fixture::model(), 3, |_, _, _| {});
+        let whole = recording.clone();
+        let count = whole.len();
+        recording.sample_of_row = (0..count).collect();
+        let measured: Vec<bool> = (0..count).map(|k| k > 0 && k % 3 != 0).collect();
+        recording.keep(&measured);
+        assert_eq!(recording.losses.unmeasured as usize, count.div_ceil(3));
+        assert_eq!(recording.len(), count - count.div_ceil(3));
+        assert_eq!(
+            recording.position[..4],
+            [&whole.position[2..4], &whole.position[4..6]].concat()
+        );
+        assert!(recording.time_s[0] == 0.0 && recording.start_ns > whole.start_ns);
+        assert_eq!(recording.sample_of_row[..6], [0, 0, 1, 1, 2, 3]);
     }
 }

@@ -10,6 +10,9 @@ pub use super::losses::Losses;
 /// A longer time between two samples is a gap \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 pub const MAX_GAP_S: f64 = 0.25;
+/// Efforts that are plain zeros at all of so many joints are no measurement. Fewer may be zero by chance, in coarse steps.
+/// Physical: of three joints one bears weight.
+const LEAST_JOINTS: usize = 3;
 
 /// One recording. Matrices are row-major: `joint_count` numbers per sample.
 #[derive(Debug, Clone)]
@@ -117,7 +120,8 @@ impl Recording {
             last_ns: None,
             turns: vec![Unwrap::default(); joint_names.len()],
             has_velocity: true,
-            has_effort: true,
+            has_effort: false,
+            measured: Vec::new(),
         };
         // What is known on opening, and what is found on the way.
         let mut damage = archive.damage().to_vec();
@@ -247,6 +251,8 @@ struct Reader<'a> {
     turns: Vec<Unwrap>,
     has_velocity: bool,
     has_effort: bool,
+    /// By sample, whether some effort is not zero.
+    measured: Vec<bool>,
 }
 
 impl Reader<'_> {
@@ -320,13 +326,14 @@ impl Reader<'_> {
             }
             _ => self.has_velocity = false,
         }
-        match effort {
-            Some(effort) if self.has_effort => {
-                let own = self.order.iter().map(|&at| effort[at]);
-                recording.effort.extend(own);
-            }
-            _ => self.has_effort = false,
-        }
+        let first = recording.effort.len();
+        let of = |at: &usize| effort.map_or(0.0, |effort| effort[*at]);
+        recording.effort.extend(self.order.iter().map(of));
+        self.has_effort |= effort.is_some();
+        let is_measured = recording.effort[first..]
+            .iter()
+            .any(|effort| *effort != 0.0);
+        self.measured.push(is_measured);
     }
 
     /// A row that is left out is answered by the sample before it.
@@ -377,6 +384,11 @@ impl Reader<'_> {
         }
         if !self.has_effort {
             self.recording.effort.clear();
+        } else if self.joint_names.len() >= LEAST_JOINTS
+            && self.measured.contains(&true)
+            && self.measured.contains(&false)
+        {
+            self.recording.keep(&self.measured);
         }
         Ok(self.recording)
     }

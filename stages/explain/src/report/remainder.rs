@@ -9,16 +9,18 @@
 //! - it is far larger on held-out recordings than on fitted ones, although their efforts change no faster, or larger there
 //!   than what the twin left before it was corrected;
 //! - it stands out for moments;
-//! - one joint leaves far more than the others (`remainder/beside_others.rs`).
+//! - one joint leaves far more than the others (`remainder/beside_others.rs`);
+//! - more is missing while a joint stands than its friction holds (`remainder/standing.rs`).
 
 mod beside_others;
 mod follows;
+mod standing;
 mod turns;
 
 use crate::context::Context;
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
-use crate::report::schema::Remaining;
+use crate::report::schema::{Finding, Remaining};
 use crate::report::sentences::UNCHANGED;
 use crate::report::varying_delay::varying_delay;
 use tauscope_dynamics::terms::TermError;
@@ -191,6 +193,7 @@ impl Context<'_> {
         before: &Fit,
         rests_count: &[bool],
         unit: &str,
+        (after, findings): (&[f64], &[Finding]),
     ) -> Result<Remainders, TermError> {
         if self.at_rest {
             return Ok(Remainders::default());
@@ -206,7 +209,11 @@ impl Context<'_> {
             fit: before,
             held: uncorrected.as_ref(),
         };
-        Ok(of(found, before, held, self.unit_nm, &joints, unit))
+        let mut remainders = of(found, before, held, self.unit_nm, &joints, unit);
+        if let Some(held) = held.filter(|_| self.input.bodies) {
+            remainders.add_standing(found, held, self.unit_nm, (after, findings), unit);
+        }
+        Ok(remainders)
     }
 }
 

@@ -124,7 +124,7 @@ fn named(remedy: &Remedy) -> (&'static str, Option<usize>, Option<usize>) {
         Remedy::JointTurned(j) => ("joint_sign", Some(j), None),
         Remedy::Degrees => ("degrees", None, None),
         Remedy::GravitySubtracted => ("gravity_subtracted", None, None),
-        Remedy::IsCurrent | Remedy::IsTorque | Remedy::EffortScaled(_) => {
+        Remedy::IsCurrent | Remedy::IsOfRating | Remedy::IsTorque | Remedy::EffortScaled(_) => {
             ("effort_unit", None, None)
         }
         Remedy::ConstantsScaled(_) | Remedy::ConstantsWrong => ("torque_constant", None, None),
@@ -170,6 +170,11 @@ fn sentence(slip: &Slip, joints: &[String], unit: &str) -> String {
         Remedy::IsCurrent => (
             "The effort is no torque in N m: it is motor current, or a torque on the motor's side of the gear.".to_owned(),
             "Give --effort-unit A.".to_owned(),
+        ),
+        Remedy::IsOfRating => (
+            "The effort is no torque in N m: it is larger at every joint, and at each by another factor, as a share of the joint's \
+             rated torque would be.".to_owned(),
+            "Give --effort-unit A: a scale of each joint is then found from the recordings.".to_owned(),
         ),
         Remedy::IsTorque => (
             "The effort is torque in N m and not motor current in A. Drives of geared joints give 3 N m/A and more.".to_owned(),

@@ -259,6 +259,7 @@ fn a_position_that_the_driver_wraps_goes_on_and_so_does_its_command() {
         },
     )
     .unwrap();
+    let mut all = Vec::new();
     let wrapped = |x: f64| x - std::f64::consts::TAU * (x / std::f64::consts::TAU).round();
     for i in 0..400_i64 {
         let (stamp_ns, q) = (i * 10 * MS, 2.0 + 0.01 * i as f64);
@@ -269,8 +270,8 @@ fn a_position_that_the_driver_wraps_goes_on_and_so_does_its_command() {
             stamp_ns,
         );
         packer.state(&state, stamp_ns);
+        all.extend(drain(&mut packer));
     }
-    let all = drain(&mut packer);
     for (sample, q) in all.iter().zip((0..).map(|i| 2.0 + 0.01 * f64::from(i))) {
         assert!((sample.position[0] - q).abs() < 1e-9);
         assert!((sample.command_position[0] - q - 0.1).abs() < 1e-9);

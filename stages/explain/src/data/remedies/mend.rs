@@ -14,7 +14,7 @@ impl Input {
             let recordings = self.fit.iter_mut().chain(&mut self.holdout);
             match slip.remedy {
                 Remedy::GravitySubtracted => self.model.set_gravity([0.0; 3]),
-                Remedy::IsCurrent => "A".clone_into(&mut self.effort_unit),
+                Remedy::IsCurrent | Remedy::IsOfRating => "A".clone_into(&mut self.effort_unit),
                 Remedy::IsTorque => "Nm".clone_into(&mut self.effort_unit),
                 Remedy::ConstantsScaled(factor) => {
                     for constant in self.torque_constants_nm_per_a.iter_mut().flatten() {

@@ -14,6 +14,9 @@ const OFF: f64 = 1.4;
 /// Joints that must agree.
 /// Physical: one joint's factor is that of its own drive.
 const LEAST_JOINTS: usize = 2;
+/// Every joint measures at least so many times the torque that the motion requires.
+/// Physical: per cent and per mille of ratings up to 1000 N m are above it.
+const LEAST_RATING: f64 = 3.0;
 /// The same for a factor that a wrong body might have, too.
 /// Physical: a wrong mass of the last link weighs on two joints alike.
 const LEAST_JOINTS_NEAR_1: usize = 3;
@@ -39,7 +42,11 @@ pub fn of_scale(input: &Input, slopes: &[(usize, f64)]) -> Option<Slip> {
         (true, true) if common_off => Some(Remedy::ConstantsScaled(1.0 / middle)),
         (true, true) => wrong.then_some(Remedy::ConstantsWrong),
         (false, _) if common_off => Some(Remedy::EffortScaled(middle)),
-        (false, _) => matches!(scale, EffortScale::Current { .. }).then_some(Remedy::IsCurrent),
+        (false, _) => match scale {
+            EffortScale::Current { .. } => Some(Remedy::IsCurrent),
+            EffortScale::TooLarge { .. } => of_rating(&sorted).then_some(Remedy::IsOfRating),
+            _ => None,
+        },
     };
     remedy.map(|remedy| Slip {
         remedy,
@@ -47,6 +54,11 @@ pub fn of_scale(input: &Input, slopes: &[(usize, f64)]) -> Option<Slip> {
         share: 1.0 - (1.0 - (middle - 1.0).abs().min(1.0)).powi(2),
         slopes: slopes.to_vec(),
     })
+}
+
+/// Whether these slopes, in order, are shares of ratings: each far above what the masses of an arm may be off.
+fn of_rating(sorted: &[f64]) -> bool {
+    sorted.len() >= LEAST_JOINTS_NEAR_1 && sorted[0] > LEAST_RATING
 }
 
 #[cfg(test)]
@@ -98,6 +110,14 @@ mod tests {
             wrong("Nm", false, &[101.0, 99.0, 100.0]),
             Some(Remedy::EffortScaled(100.0))
         );
+    }
+
+    #[test]
+    fn per_mille_of_what_each_joint_is_rated_for_is_told() {
+        let slopes = [12.0, 3.6, 8.1, 25.0];
+        assert_eq!(wrong("Nm", false, &slopes), Some(Remedy::IsOfRating));
+        // One joint is as required: that is a body.
+        assert_eq!(wrong("Nm", false, &[12.0, 1.1, 8.1, 25.0]), None);
     }
 
     #[test]

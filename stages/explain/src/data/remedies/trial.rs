@@ -1,9 +1,9 @@
 //! The fit of a robot to the data after a change, beside offset, gain, Coulomb and viscous friction in each joint.
 
 use nalgebra::{DMatrix, DVector, Vector3};
-use tauscope_dynamics::{Data, Inertia, Model, gravity_effort, rnea};
+use tauscope_dynamics::{Data, Inertia, Link, Model, gravity_effort, rnea};
 
-use super::{Reading, Remedy};
+use super::{Reading, Remedy, SUSPECT};
 use crate::data::efforts::TrackEfforts;
 use crate::data::problem::Problem;
 use crate::data::track::Track;
@@ -56,12 +56,19 @@ pub(super) struct Left {
     pub count: f64,
     /// Sum of squares that friction alone leaves.
     pub beside_friction: f64,
+    /// Whether the effort varies far above its noise: only then the joint says what is wrong.
+    pub tells: bool,
 }
 
 impl Left {
     /// RMS error.
     pub fn rms(&self) -> f64 {
         (self.squares.iter().sum::<f64>() / self.count).sqrt()
+    }
+
+    /// Whether the motion leaves much of an effort that tells.
+    pub fn is_suspect(&self) -> bool {
+        self.tells && self.share() > SUSPECT
     }
 
     /// Share of the variance beside friction that is left.
@@ -113,7 +120,7 @@ impl<'a> Trial<'a> {
         })
     }
 
-    /// By joint, what `model` leaves of the effort that a reading takes for its. Nothing for joints with hardly any effort.
+    /// By joint, what `model` leaves of the effort that a reading takes for its. Nothing for joints with hardly any row.
     pub fn left(&self, model: &[f64], reading: &Reading) -> Vec<Option<Left>> {
         let of = |joint: usize| self.left_of(joint, model, reading);
         (0..self.problem.joints).map(of).collect()
@@ -135,7 +142,7 @@ impl<'a> Trial<'a> {
         let noise = self.problem.white_noise[reading.column[joint]].max(f64::MIN_POSITIVE);
         let enough = rows.len() > LEAST_ROWS;
         let strong = beside.norm_squared() > (STRONG * noise).powi(2) * rows.len() as f64;
-        if !enough || !strong {
+        if !enough {
             return None;
         }
         let residual = self.residual(&friction, &measured, &required, self.is_known(joint));
@@ -148,6 +155,7 @@ impl<'a> Trial<'a> {
             squares,
             count: rows.len() as f64,
             beside_friction: beside.norm_squared(),
+            tells: strong,
         })
     }
 
@@ -271,11 +279,36 @@ impl<'a> Trial<'a> {
 
     /// Mass of the body on the tool that fits best.
     fn payload(&self) -> Option<(Remedy, Vec<f64>)> {
+        let (found, loaded) = self.with_body(self.problem.model.tool_link())?;
+        let may_be = found[0] > 0.0 && found[0] < self.mass_kg();
+        may_be.then_some((Remedy::Payload(found[0]), loaded))
+    }
+
+    /// Mass of the arm by its URDF \[kg\]: no arm carries more, and no link is wrong by more.
+    fn mass_kg(&self) -> f64 {
+        self.problem.model.links().iter().map(Link::mass_kg).sum()
+    }
+
+    /// Whether one link of another mass, centre or inertia than in the URDF makes all efforts torques of the motion.
+    pub fn is_one_body(&self) -> bool {
+        let joints = self.problem.model.joints().iter();
+        let reading = Reading::as_recorded(self.problem.joints);
+        joints.map(|joint| joint.child_link).any(|link| {
+            let fitted = self.with_body(link);
+            fitted.is_some_and(|(found, model)| {
+                let left = self.left(&model, &reading);
+                found[0].abs() < self.mass_kg() && !left.iter().flatten().any(Left::is_suspect)
+            })
+        })
+    }
+
+    /// The ten parameters of a body on a link that fit best, and the effort that the robot then needs.
+    fn with_body(&self, link: usize) -> Option<(DVector<f64>, Vec<f64>)> {
         let robot = &self.problem.model;
         let unit = |k: usize| {
             let mut parameters = [0.0; 10];
             parameters[k] = 1.0;
-            let ghost: Model = robot.ghost(robot.tool_link(), Inertia::from_parameters(parameters));
+            let ghost: Model = robot.ghost(link, Inertia::from_parameters(parameters));
             let mut data = Data::new(&ghost);
             self.efforts(|track| {
                 let mut effort = Vec::with_capacity(track.position.len());
@@ -287,8 +320,7 @@ impl<'a> Trial<'a> {
             })
         };
         let columns: Vec<Vec<f64>> = (0..10).map(unit).collect();
-        let (found, loaded) = self.fitted(self.problem.rigid(), &columns)?;
-        (found[0] > 0.0).then_some((Remedy::Payload(found[0]), loaded))
+        self.fitted(self.problem.rigid(), &columns)
     }
 }
 
