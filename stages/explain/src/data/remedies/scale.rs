@@ -17,6 +17,9 @@ const LEAST_JOINTS: usize = 2;
 /// Every joint measures at least so many times the torque that the motion requires.
 /// Physical: per cent and per mille of ratings up to 1000 N m are above it.
 const LEAST_RATING: f64 = 3.0;
+/// The same where fewer joints than [`LEAST_JOINTS_NEAR_1`] tell.
+/// Physical: no arm carries ten times its own weight.
+const RATING_OF_FEW: f64 = 10.0;
 /// The same for a factor that a wrong body might have, too.
 /// Physical: a wrong mass of the last link weighs on two joints alike.
 const LEAST_JOINTS_NEAR_1: usize = 3;
@@ -58,7 +61,12 @@ pub fn of_scale(input: &Input, slopes: &[(usize, f64)]) -> Option<Slip> {
 
 /// Whether these slopes, in order, are shares of ratings: each far above what the masses of an arm may be off.
 fn of_rating(sorted: &[f64]) -> bool {
-    sorted.len() >= LEAST_JOINTS_NEAR_1 && sorted[0] > LEAST_RATING
+    let least = if sorted.len() < LEAST_JOINTS_NEAR_1 {
+        RATING_OF_FEW
+    } else {
+        LEAST_RATING
+    };
+    sorted.first().is_some_and(|slope| *slope > least)
 }
 
 #[cfg(test)]

@@ -280,13 +280,14 @@ impl<'a> Trial<'a> {
     /// Mass of the body on the tool that fits best.
     fn payload(&self) -> Option<(Remedy, Vec<f64>)> {
         let (found, loaded) = self.with_body(self.problem.model.tool_link())?;
-        let may_be = found[0] > 0.0 && found[0] < self.mass_kg();
-        may_be.then_some((Remedy::Payload(found[0]), loaded))
+        (found[0] > 0.0 && self.is_bearable(&found)).then_some((Remedy::Payload(found[0]), loaded))
     }
 
-    /// Mass of the arm by its URDF \[kg\]: no arm carries more, and no link is wrong by more.
-    fn mass_kg(&self) -> f64 {
-        self.problem.model.links().iter().map(Link::mass_kg).sum()
+    /// Whether a body is no heavier than the arm is by its URDF, and no further out than a metre: no arm carries more, and no
+    /// link is wrong by more.
+    fn is_bearable(&self, body: &DVector<f64>) -> bool {
+        let arm_kg: f64 = self.problem.model.links().iter().map(Link::mass_kg).sum();
+        body.rows(0, 4).iter().all(|moment| moment.abs() < arm_kg)
     }
 
     /// Whether one link of another mass, centre or inertia than in the URDF makes all efforts torques of the motion.
@@ -297,7 +298,7 @@ impl<'a> Trial<'a> {
             let fitted = self.with_body(link);
             fitted.is_some_and(|(found, model)| {
                 let left = self.left(&model, &reading);
-                found[0].abs() < self.mass_kg() && !left.iter().flatten().any(Left::is_suspect)
+                self.is_bearable(&found) && !left.iter().flatten().any(Left::is_suspect)
             })
         })
     }
