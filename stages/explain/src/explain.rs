@@ -156,9 +156,7 @@ fn conclude(
     progress(0.95, "proof");
     let mut proof = context.proof(&problem, &before, &found)?;
     let kept = handed_out::reject(&proof.withheld, &mut named, &problem, &found, joints);
-    let noise_floor: Vec<f64> = (0..joints.len())
-        .map(|j| white_noise(&input.fit, j, joints.len()))
-        .collect();
+    let noise_floor = noise_floor(input);
     let unit = if input.effort_unit == "A" { "A" } else { "N m" };
     let of_proof = (&proof.after[..], &named.findings[..]);
     let remainders =
@@ -218,6 +216,12 @@ fn conclude(
         pictures: proof.pictures,
         trajectories: named.trajectories,
     })
+}
+
+/// White noise of the measured effort, by joint \[effort unit\].
+fn noise_floor(input: &Input) -> Vec<f64> {
+    let n = input.model.dof();
+    (0..n).map(|j| white_noise(&input.fit, j, n)).collect()
 }
 
 /// One in this many recordings is held out where the user names none.

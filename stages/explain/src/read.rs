@@ -7,6 +7,5 @@
 
 pub mod audit;
 pub mod input;
-pub mod losses;
 pub mod recording;
 pub mod start;

@@ -1,11 +1,13 @@
 //! A recording as columns: what was measured, sample by sample, in the robot's joint order.
 
+mod losses;
+
 use std::path::{Path, PathBuf};
 
 use tauscope_archive::{ArchiveError, Recording as Archive, name_of};
 use tauscope_dynamics::Unwrap;
 
-pub use super::losses::Losses;
+pub use losses::Losses;
 
 /// A longer time between two samples is a gap \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.

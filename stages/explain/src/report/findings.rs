@@ -4,6 +4,7 @@ mod clipping;
 mod confidence;
 mod contest;
 mod doubt;
+mod far_out;
 mod scales;
 mod undetectable;
 mod waves;

@@ -210,7 +210,8 @@ impl Context<'_> {
             held: uncorrected.as_ref(),
         };
         let mut remainders = of(found, before, held, self.unit_nm, &joints, unit);
-        if let Some(held) = held.filter(|_| self.input.bodies) {
+        // Where nobody knows an effort's scale, friction in N m is no measure for it.
+        if let Some(held) = held.filter(|_| self.input.bodies && self.unscaled.is_empty()) {
             remainders.add_standing(found, held, self.unit_nm, (after, findings), unit);
         }
         Ok(remainders)

@@ -12,6 +12,7 @@ use crate::select::evidence::PATCH;
 use tauscope_dynamics::kinematic_tree::bearing;
 
 use super::Named;
+use super::far_out::far_out;
 
 /// Highest confidence of a doubted finding.
 /// Statistical: just below even odds.
@@ -48,6 +49,10 @@ pub fn doubt(named: &mut Named, problem: &Problem, actives: &[Active]) {
             doubt_it(finding);
         }
         doubt_warming(finding, longest_s);
+        if let Some(says) = far_out(finding, &problem.model) {
+            finding.sentence += says;
+            doubt_it(finding);
+        }
     }
     if problem.is_foreign {
         doubt_below(PATCH_OF_FOREIGN, &mut named.findings);

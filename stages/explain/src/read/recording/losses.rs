@@ -1,6 +1,6 @@
 //! What a recording loses on reading.
 
-use super::recording::Recording;
+use super::Recording;
 
 /// What was left out on reading.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
