@@ -97,7 +97,7 @@ impl Remedy {
     pub fn undo(&self, rows: &mut [f64], n: usize) {
         match *self {
             Self::Swapped(a, b) | Self::NamesSwapped(a, b) => {
-                rows.chunks_exact_mut(n).for_each(|row| row.swap(a, b))
+                rows.chunks_exact_mut(n).for_each(|row| row.swap(a, b));
             }
             Self::EffortTurned(j) | Self::JointTurned(j) => scale(rows, j, n, -1.0),
             Self::EffortScaled(factor) => rows.iter_mut().for_each(|x| *x *= factor),

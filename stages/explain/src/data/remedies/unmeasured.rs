@@ -16,7 +16,7 @@ pub fn of_unmeasured(recordings: &[Recording], n: usize) -> Vec<Slip> {
                 .iter()
                 .skip(joint)
                 .step_by(n)
-                .all(|x| *x == first)
+                .all(|x| x.to_bits() == first.to_bits())
         };
         with_effort().all(same).then_some(first)
     };
