@@ -15,6 +15,9 @@ pub const MAX_GAP_S: f64 = 0.25;
 /// Efforts that are plain zeros at all of so many joints are no measurement. Fewer may be zero by chance, in coarse steps.
 /// Physical: of three joints one bears weight.
 const LEAST_JOINTS: usize = 3;
+/// Fewer rows of plain zeros are no other publisher, and harm no fit.
+/// Resolution: a tenth of a second at 100 Hz.
+const LEAST_ROWS: usize = 10;
 
 /// One recording. Matrices are row-major: `joint_count` numbers per sample.
 #[derive(Debug, Clone)]
@@ -292,6 +295,7 @@ impl Reader<'_> {
             }
         }
         let effort = (message.effort.len() == count).then_some(&message.effort);
+        self.has_effort |= effort.is_some();
         let velocity = (message.velocity.len() == count).then_some(&message.velocity);
         let mut finite = true;
         for (j, &at) in self.order.iter().enumerate() {
@@ -331,7 +335,6 @@ impl Reader<'_> {
         let first = recording.effort.len();
         let of = |at: &usize| effort.map_or(0.0, |effort| effort[*at]);
         recording.effort.extend(self.order.iter().map(of));
-        self.has_effort |= effort.is_some();
         let is_measured = recording.effort[first..]
             .iter()
             .any(|effort| *effort != 0.0);
@@ -388,7 +391,7 @@ impl Reader<'_> {
             self.recording.effort.clear();
         } else if self.joint_names.len() >= LEAST_JOINTS
             && self.measured.contains(&true)
-            && self.measured.contains(&false)
+            && self.measured.iter().filter(|is| !**is).count() >= LEAST_ROWS
         {
             self.recording.keep(&self.measured);
         }
