@@ -15,11 +15,9 @@ const SAME_GRAVITY: f64 = 0.1;
 /// A base that is turned by less is found by the search as a tilt \[rad\].
 /// Physical: beyond it a sine is no longer near its angle.
 const TURNED_RAD: f64 = 0.5;
-/// A joint is compared if its effort varies by at least this many times the noise.
+/// A joint tells if its effort varies by at least this many times the noise, and is compared with this many rows.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const STRONG: f64 = 5.0;
-/// A joint with fewer rows than this is not compared.
-/// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_ROWS: usize = 20;
 /// A measured torque is between these times the required one: gain errors of sensors and wrong bodies.
 /// Physical: as `effort_scale::SURE_SCALE`.
@@ -27,6 +25,9 @@ const GAINS_OF_TORQUE: [f64; 2] = [0.5, 2.0];
 /// A current may be any share of the torque, of the same sign.
 /// Physical: torque constants are positive.
 const GAINS_OF_CURRENT: [f64; 2] = [0.0, f64::INFINITY];
+/// No arm carries more than this many times its own mass, and no link is wrong by more.
+/// Physical: light arms carry as much as they weigh; the rest is for a URDF that is too light.
+const BEARS: f64 = 4.0;
 /// Added to the diagonal of the normal equations, as a share of their trace.
 /// Resolution: far above the rounding of f64, far below what the noise hides.
 const RIDGE: f64 = 1e-9;
@@ -283,24 +284,23 @@ impl<'a> Trial<'a> {
         (found[0] > 0.0 && self.is_bearable(&found)).then_some((Remedy::Payload(found[0]), loaded))
     }
 
-    /// Whether a body is no heavier than the arm is by its URDF, and no further out than a metre: no arm carries more, and no
-    /// link is wrong by more.
+    /// Whether a body is no heavier than [`BEARS`] times the arm by its URDF, and no further out than a metre.
     fn is_bearable(&self, body: &DVector<f64>) -> bool {
         let arm_kg: f64 = self.problem.model.links().iter().map(Link::mass_kg).sum();
-        body.rows(0, 4).iter().all(|moment| moment.abs() < arm_kg)
+        body.rows(0, 4)
+            .iter()
+            .all(|moment| moment.abs() < BEARS * arm_kg)
     }
 
     /// Whether one link of another mass, centre or inertia than in the URDF makes all efforts torques of the motion.
     pub fn is_one_body(&self) -> bool {
-        let joints = self.problem.model.joints().iter();
         let reading = Reading::as_recorded(self.problem.joints);
-        joints.map(|joint| joint.child_link).any(|link| {
-            let fitted = self.with_body(link);
-            fitted.is_some_and(|(found, model)| {
-                let left = self.left(&model, &reading);
-                self.is_bearable(&found) && !left.iter().flatten().any(Left::is_suspect)
-            })
-        })
+        let explains = |(found, model): (DVector<f64>, Vec<f64>)| {
+            let left = self.left(&model, &reading);
+            self.is_bearable(&found) && !left.iter().flatten().any(Left::is_suspect)
+        };
+        let mut joints = self.problem.model.joints().iter();
+        joints.any(|joint| self.with_body(joint.child_link).is_some_and(explains))
     }
 
     /// The ten parameters of a body on a link that fit best, and the effort that the robot then needs.
@@ -314,8 +314,8 @@ impl<'a> Trial<'a> {
             self.efforts(|track| {
                 let mut effort = Vec::with_capacity(track.position.len());
                 track.each(|_, at| {
-                    let of = rnea(&ghost, &mut data, at.position, at.velocity, at.acceleration);
-                    effort.extend_from_slice(of);
+                    let [q, qd, qdd] = [at.position, at.velocity, at.acceleration];
+                    effort.extend_from_slice(rnea(&ghost, &mut data, q, qd, qdd));
                 });
                 effort
             })
