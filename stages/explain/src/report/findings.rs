@@ -129,6 +129,7 @@ pub fn of(
         let place = link.clone().or_else(|| joint.clone()).unwrap_or_default();
         let when = when(search, active, &mut parameters, &mut intervals);
         drop_no_force(&mut parameters, &mut intervals);
+        far_out::drop_nowhere(&mut parameters, &mut intervals);
         let in_amperes = scales.to_nm(active.hypothesis, &mut parameters, &mut intervals);
         of_start.widen(active.hypothesis, &parameters, &mut intervals);
         let or_scale = scales.doubt_body(active.hypothesis, &parameters, &mut intervals);

@@ -1,5 +1,7 @@
 //! Centres of mass where no body is: what looks like a body there is the geometry.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Vector3;
 use serde_json::Value;
 use tauscope_dynamics::{Data, Model, forward_kinematics, link_pose};
@@ -9,49 +11,90 @@ use crate::report::schema::Finding;
 /// The centre of what is at the tool is no further out \[m\].
 /// Physical: grippers and spindles are shorter.
 const FURTHEST_M: f64 = 0.5;
+/// A centre that is further away is nowhere \[m\].
+/// Physical: longer than any arm; what is determined at all is nearer.
+const NOWHERE_M: f64 = 10.0;
 /// A link's centre is no further from its frame than this many times the next joint.
 /// Physical: motors stand out beyond a joint by a little.
 const BEYOND: f64 = 1.1;
+/// Another length moves the centre towards the next joint, by at least this share of the whole move.
+/// Physical: links are straight, and bodies differ across them by little.
+const STRAIGHT: f64 = 0.95;
 
 /// Why the centre of mass of a finding cannot be where it says, if so.
 pub(super) fn far_out(finding: &Finding, model: &Model) -> Option<&'static str> {
-    let vector = |prefix: &str| {
-        let of = |axis| {
-            finding
-                .parameters
-                .get(&format!("{prefix}_{axis}_m"))
-                .and_then(Value::as_f64)
-        };
-        Some(Vector3::new(of("x")?, of("y")?, of("z")?))
-    };
-    if vector("com").is_some_and(|com| com.norm() > FURTHEST_M) {
+    if vector(finding, "com", least).is_some_and(|com| com.norm() > FURTHEST_M) {
         return Some(
             " So far out is no body: the tool is rather turned, or mounted elsewhere than the URDF says.",
         );
     }
     let link = model.link_index(finding.link.as_deref()?)?;
-    let of_urdf = Vector3::from(model.links()[link].com_m());
-    let end_m = BEYOND * next_joint_m(model, link)?;
+    let delta = vector(finding, "delta_com", |value, _| value)?;
+    let next = next_joint(model, link)?;
+    let (along, end_m) = (next.normalize(), BEYOND * next.norm());
+    let of_urdf = Vector3::from(model.links()[link].com_m()).dot(&along);
+    let moves = delta.dot(&along);
     // A wrist's centre may be beyond its next joint in the URDF already.
-    let leaves = of_urdf.norm() < end_m && (of_urdf + vector("delta_com")?).norm() > end_m;
+    let leaves = of_urdf < end_m && of_urdf + moves > end_m && moves > STRAIGHT * delta.norm();
     leaves.then_some(
         " That is beyond the next joint, where the link ends: check whether the URDF has the lengths of this arm.",
     )
 }
 
-/// How far the nearest joint that hangs on a link is from the link's frame \[m\]; none at the end of an arm.
-fn next_joint_m(model: &Model, link: usize) -> Option<f64> {
+/// Removes where the centre of a body is along an axis that the motion does not tell anything of: a fit leaves it anywhere.
+pub(super) fn drop_nowhere(
+    parameters: &mut BTreeMap<String, Value>,
+    intervals: &mut BTreeMap<String, [f64; 2]>,
+) {
+    let is_nowhere = |(name, value): (&String, &Value)| {
+        name.starts_with("com_") && value.as_f64().is_some_and(|x| x.abs() > NOWHERE_M)
+    };
+    let nowhere: Vec<String> = (parameters.iter().filter(|one| is_nowhere(*one)))
+        .map(|(name, _)| name.clone())
+        .collect();
+    for name in nowhere {
+        parameters.remove(&name);
+        intervals.remove(&name);
+    }
+}
+
+/// The three parameters of a finding that begin so \[m\], each as `of` its value and its interval.
+fn vector(
+    finding: &Finding,
+    prefix: &str,
+    of: fn(f64, Option<&[f64; 2]>) -> f64,
+) -> Option<Vector3<f64>> {
+    let axis = |axis: &str| {
+        let name = format!("{prefix}_{axis}_m");
+        let value = finding.parameters.get(&name).and_then(Value::as_f64)?;
+        Some(of(value, finding.intervals_95.get(&name)))
+    };
+    Some(Vector3::new(axis("x")?, axis("y")?, axis("z")?))
+}
+
+/// The value in an interval that is nearest to zero; zero where the motion does not determine it.
+fn least(_: f64, interval: Option<&[f64; 2]>) -> f64 {
+    interval.map_or(0.0, |[low, high]| {
+        0.0_f64.clamp(low.min(*high), high.max(*low))
+    })
+}
+
+/// Where the nearest joint that hangs on a link is, in the link's frame \[m\]; none at the end of an arm.
+fn next_joint(model: &Model, link: usize) -> Option<Vector3<f64>> {
     let mut data = Data::new(model);
     forward_kinematics(model, &mut data, &vec![0.0; model.dof()]);
-    let at = |link: usize| link_pose(model, &data, link).translation.vector;
+    let own = link_pose(model, &data, link).inverse();
     let hangs = model.joints().iter().filter(|joint| {
         let carrier = model.links()[joint.parent_link].joint;
         carrier.is_some_and(|carrier| model.joints()[carrier].child_link == link)
     });
-    let distances = hangs.map(|joint| (at(joint.child_link) - at(link)).norm());
-    distances
-        .min_by(f64::total_cmp)
-        .filter(|distance| *distance > 0.0)
+    let places = hangs.map(|joint| {
+        (own * link_pose(model, &data, joint.child_link))
+            .translation
+            .vector
+    });
+    let nearest = places.min_by(|a, b| a.norm().total_cmp(&b.norm()));
+    nearest.filter(|place| place.norm() > 0.0)
 }
 
 #[cfg(test)]
@@ -64,7 +107,30 @@ mod tests {
         let model = fixture::model();
         let first = model.joints()[0].child_link;
         let second = model.joints()[1].child_link;
-        assert!(next_joint_m(&model, first).is_some_and(|distance| distance > 0.1));
-        assert!(next_joint_m(&model, second).is_none());
+        let next = next_joint(&model, first).unwrap();
+        assert!(
+            (next - Vector3::new(0.0, 0.0, 0.4)).norm() < 1e-12,
+            "{next}"
+        );
+        assert!(next_joint(&model, second).is_none());
+    }
+
+    #[test]
+    fn an_axis_that_the_motion_does_not_tell_is_not_told() {
+        let all = [("com_x_m", 0.02), ("com_z_m", -3.7e7), ("mass_kg", 1.9)];
+        let mut parameters = all
+            .map(|(name, x)| (name.to_owned(), Value::from(x)))
+            .into();
+        let mut intervals = all.map(|(name, x)| (name.to_owned(), [x, x])).into();
+        drop_nowhere(&mut parameters, &mut intervals);
+        assert!(parameters.keys().eq(["com_x_m", "mass_kg"]));
+        assert!(intervals.keys().eq(["com_x_m", "mass_kg"]));
+    }
+
+    #[test]
+    fn what_the_motion_does_not_determine_is_nowhere() {
+        assert!(least(-4e7, Some(&[-9e7, 3e7])).abs() < 1e-12);
+        assert!((least(0.6, Some(&[0.55, 0.65])) - 0.55).abs() < 1e-12);
+        assert!(least(-4e7, None).abs() < 1e-12);
     }
 }
