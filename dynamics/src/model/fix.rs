@@ -1,6 +1,5 @@
 //! Joints of a URDF made fixed, in its text: those of a gripper that nobody records.
 
-use std::fmt::Write as _;
 use std::ops::Range;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
@@ -32,10 +31,9 @@ pub fn fix_joints(xml: &str, joints: &[&str]) -> Result<String, ModelError> {
         let Some(text) = origin_at_rest(joint, movable) else {
             continue;
         };
-        let parent = elements(node).next().map(|first| first.range().start);
-        let place = origin
-            .map(|origin| origin.range())
-            .or(parent.map(|at| at..at));
+        let first = elements(node).next().map(|first| first.range().start);
+        let place = origin.map(|origin| origin.range());
+        let place = place.or(first.map(|at| at..at));
         edits.extend(place.map(|place| (place, text)));
     }
     let mut fixed = xml.to_owned();
@@ -63,11 +61,7 @@ fn origin_at_rest(joint: &RawJoint, movable: &Movable) -> Option<String> {
     let pose = joint.origin * moved;
     let (roll, pitch, yaw) = pose.rotation.euler_angles();
     let [x, y, z] = pose.translation.vector.into();
-    let mut text = String::new();
-    // Writing to a text cannot fail.
-    let _ = write!(
-        text,
+    Some(format!(
         r#"<origin xyz="{x} {y} {z}" rpy="{roll} {pitch} {yaw}"/>"#
-    );
-    Some(text)
+    ))
 }

@@ -132,3 +132,44 @@ fn a_turned_base_and_a_heavy_payload_are_physics_with_their_numbers() {
         "{heavy:?}"
     );
 }
+
+#[test]
+fn an_effort_that_a_quiet_joint_cannot_need_is_no_remedy() {
+    let left = |square: f64, beside_friction: f64, tells: bool| {
+        Some(Left {
+            squares: vec![square],
+            count: 1.0,
+            beside_friction,
+            tells,
+        })
+    };
+    let before = [left(9.0, 10.0, true), left(0.01, 0.01, false)];
+    // The quiet joint gets an effort that its motion leaves: the error only moves.
+    let moved = [left(0.01, 0.01, false), left(9.0, 10.0, true)];
+    assert_eq!(total_gain(&before, &moved), None);
+    // Its motion needs that effort.
+    let mended = [left(0.01, 0.01, false), left(0.02, 10.0, true)];
+    assert!(total_gain(&before, &mended).is_some_and(|gain| gain > LEAST_GAIN.ln()));
+}
+
+#[test]
+fn one_wrong_mass_is_a_body_and_a_scale_of_each_joint_is_none() {
+    let model = fixture::model();
+    let is_body = |real: &Model, scale: [f64; 2]| {
+        let recordings = [4, 5].map(|seed| {
+            fixture::recording(real, seed, |_, _, effort| {
+                effort
+                    .iter_mut()
+                    .zip(scale)
+                    .for_each(|(effort, scale)| *effort *= scale);
+            })
+        });
+        is_one_body(&fixture::problem(&model, &recordings))
+    };
+    let mut light = model.clone();
+    let lower = light.joints()[1].child_link;
+    let [_, .., z] = light.links()[lower].com_m();
+    light.attach(lower, Inertia::new(-1.8, [0.0, 0.0, z], [0.0; 6]));
+    assert!(is_body(&light, [1.0; 2]));
+    assert!(!is_body(&model, [0.02, 0.3]));
+}
