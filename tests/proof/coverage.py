@@ -91,8 +91,10 @@ ANYWHERE = {"torque_delay", "torque_lowpass", "base_tilt", "payload", "payload_p
 
 def named(effect):
     """Effect and place."""
-    where = None if effect["effect"] in ANYWHERE else effect.get("joint") or effect.get("link")
-    return effect["effect"], where
+    # What the list of names lacks is an `unknown` of a kind.
+    name = effect["parameters"].get("kind") or effect["effect"]
+    where = None if name in ANYWHERE else effect.get("joint") or effect.get("link")
+    return name, where
 
 
 def holds(name, truth, interval):
