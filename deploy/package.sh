@@ -3,7 +3,7 @@
 #
 #     deploy/package.sh [--arch x86_64|aarch64] [--profile dist|release] [--out DIR]
 #
-#   tauscope-VERSION-ARCH.tar.gz   program, documentation, completions, manual pages, systemd unit
+#   tauscope-VERSION-ARCH.tar.gz   program, documentation, completions, manual pages, systemd units
 #   tauscope_VERSION_ARCH.deb      the same as a Debian package
 #   tauscope-VERSION-ARCH.oci.tar  a container image file: `podman load -i`, `skopeo copy oci-archive:...`
 #
@@ -70,7 +70,7 @@ completion bash share/bash-completion/completions/tauscope
 completion zsh share/zsh/vendor-completions/_tauscope
 completion fish share/fish/vendor_completions.d/tauscope.fish
 install -Dm644 -t "$root/lib/systemd/system" deploy/systemd/tauscope@.service \
-    deploy/systemd/tauscope-physics@.service deploy/systemd/tauscope-physics@.timer
+    deploy/systemd/tauscope-fleet.service deploy/systemd/tauscope-physics@.service deploy/systemd/tauscope-physics@.timer
 install -Dm644 deploy/systemd/sysusers.conf "$root/lib/sysusers.d/tauscope.conf"
 install -Dm644 -t "$root/share/doc/tauscope" README.md CHANGELOG.md LICENSE-APACHE LICENSE-MIT docs/*.md docs/*.png docs/*.svg
 install -Dm644 -t "$root/share/doc/tauscope/examples" pipeline.yaml tests/data/demo_arm.urdf tests/data/demo.mcap \
@@ -120,6 +120,8 @@ install -Dm755 /dev/stdin "$work/root/DEBIAN/postinst" <<'END'
 set -e
 if [ "$1" = configure ] && command -v systemd-sysusers >/dev/null; then
     systemd-sysusers tauscope.conf
+    # For trials as this user, before a unit has started.
+    install -d -o tauscope -g tauscope /var/lib/tauscope
 fi
 if [ -d /run/systemd/system ]; then
     systemctl daemon-reload

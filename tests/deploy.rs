@@ -60,21 +60,64 @@ fn every_command_line_is_one() {
     is_command_line(&words(
         &set["spec"]["template"]["spec"]["containers"][0]["args"],
     ));
-    let unit = text("systemd/tauscope@.service");
-    let mut commands = 0;
-    for line in unit.lines() {
-        let Some(line) = line
-            .strip_prefix("Exec")
-            .and_then(|line| line.split_once('='))
-        else {
-            continue;
-        };
-        let mut command = line.1.split(' ').map(str::to_owned);
-        assert_eq!(command.next().unwrap(), "/usr/bin/tauscope");
-        is_command_line(&command.collect::<Vec<_>>());
-        commands += 1;
+    for (unit, expected) in [
+        ("tauscope@.service", 2),
+        ("tauscope-physics@.service", 1),
+        ("tauscope-fleet.service", 1),
+    ] {
+        let unit = text(&format!("systemd/{unit}")).replace("$FLEET_OPTIONS", &fleet_options());
+        let mut commands = 0;
+        for line in unit.lines() {
+            let Some(line) = line
+                .strip_prefix("Exec")
+                .and_then(|line| line.split_once('='))
+            else {
+                continue;
+            };
+            let mut command = line.1.split(' ').map(str::to_owned);
+            assert_eq!(command.next().unwrap(), "/usr/bin/tauscope");
+            is_command_line(&command.collect::<Vec<_>>());
+            commands += 1;
+        }
+        assert_eq!(commands, expected, "{unit}");
     }
-    assert_eq!(commands, 2);
+}
+
+fn plants_page() -> String {
+    fs::read_to_string(root().join("docs/plant.md")).unwrap()
+}
+
+/// What the plant's page puts into the file of the fleet's unit, as systemd joins its lines.
+fn fleet_options() -> String {
+    let page = plants_page();
+    let (_, rest) = page.split_once("FLEET_OPTIONS=\"").unwrap();
+    let (options, _) = rest.split_once('"').unwrap();
+    let options = options.replace("\\\n", "");
+    assert!(options.contains("--connect tls/") && options.contains("--expect "));
+    options
+}
+
+/// A pipeline whose file names no hosts refuses `--host`.
+#[test]
+fn the_unit_runs_the_pipeline_of_the_plants_page() {
+    let page = plants_page();
+    let (_, rest) = page.split_once("```yaml\n").unwrap();
+    let (plant, _) = rest.split_once("```").unwrap();
+    let unit = text("systemd/tauscope@.service");
+    let run = unit.lines().find(|line| line.starts_with("ExecStart="));
+    assert!(!plant.contains("hosts:") && !run.unwrap().contains("--host"));
+}
+
+#[test]
+fn the_package_brings_every_unit() {
+    let package = text("package.sh");
+    for entry in fs::read_dir(deploy("systemd")).unwrap() {
+        let name = entry.unwrap().file_name().into_string().unwrap();
+        assert!(
+            package.contains(&format!("deploy/systemd/{name}")),
+            "{name}"
+        );
+    }
 }
 
 /// What stands behind `tls/host:`.
@@ -187,17 +230,19 @@ fn every_file_that_is_mounted_is_there_or_made() {
 
 #[test]
 fn the_cells_of_the_containers_and_of_the_plants_page_are_pipelines() {
-    let page = fs::read_to_string(root().join("docs/plant.md")).unwrap();
+    let page = plants_page();
     let (_, rest) = page.split_once("```yaml\n").unwrap();
     let (plant, _) = rest.split_once("```").unwrap();
-    let plant = plant.replace("demo_arm.urdf", "robot.urdf");
-    for text in [text("container/cell7.yaml"), plant] {
+    for text in [text("container/cell7.yaml"), plant.to_owned()] {
         let folder = tempfile::tempdir().unwrap();
-        fs::copy(
-            bundled().join("demo_arm.urdf"),
-            folder.path().join("robot.urdf"),
-        )
-        .unwrap();
+        // As `tauscope init` names them.
+        for (from, to) in [
+            ("demo_arm.urdf", "robot.urdf"),
+            ("demo.explained.yaml", "twin.yaml"),
+            ("demo.learnt.yaml", "learnt.yaml"),
+        ] {
+            fs::copy(bundled().join(from), folder.path().join(to)).unwrap();
+        }
         let there = format!("{}/", folder.path().display());
         let text = text.replace("/var/lib/tauscope/", &there);
         let file = write(&folder.path().join("cell.yaml"), &text);
@@ -220,18 +265,27 @@ fn the_image_holds_the_package_and_its_user() {
 }
 
 #[test]
-fn systemd_takes_the_unit_and_finds_it_confined() {
+fn systemd_takes_the_units_and_finds_them_confined() {
+    for (unit, instance) in [
+        ("tauscope@.service", "tauscope@cell7.service"),
+        ("tauscope-fleet.service", "tauscope-fleet.service"),
+    ] {
+        is_taken_and_confined(unit, instance);
+    }
+}
+
+fn is_taken_and_confined(unit: &str, instance: &str) {
     let folder = tempfile::tempdir().unwrap();
     // It looks whether the programs are there.
-    let unit = text("systemd/tauscope@.service").replace("/usr/bin/tauscope", "/bin/true");
-    let file = write(&folder.path().join("tauscope@cell7.service"), &unit);
+    let unit = text(&format!("systemd/{unit}")).replace("/usr/bin/tauscope", "/bin/true");
+    let file = write(&folder.path().join(instance), &unit);
     let analyze = |words: &[&str]| {
         let mut command = Command::new("systemd-analyze");
         command.args(words).arg(&file).output()
     };
     let Ok(verified) = analyze(&["verify", "--recursive-errors=no"]) else {
         skipped(
-            "systemd_takes_the_unit_and_finds_it_confined",
+            "systemd_takes_the_units_and_finds_them_confined",
             "systemd-analyze is absent",
         );
         return;
