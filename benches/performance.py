@@ -43,7 +43,7 @@ def machine():
     load = os.getloadavg()[0]
     return (
         f"Commit {commit.strip()}, {rust.strip()}, {os.cpu_count()} cores ({cpu[1] if cpu else platform.machine()}),\n"
-        f"Linux {platform.release()}, load before the first run {load:.1f}, {time.strftime('%Y-%m-%d', time.gmtime())}."
+        f"Linux {platform.release().split('-')[0]}, load before the first run {load:.1f}, {time.strftime('%Y-%m-%d', time.gmtime())}."
     )
 
 

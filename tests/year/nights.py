@@ -11,8 +11,8 @@ truth of each night and the table the script prints, by quantity:
     scatter     standard deviation of (estimate - truth) over that of the interval; 1 is honest, more is too narrow
     lag 1       correlation of that error, less its mean over the nights, with the one of the night before; white errors
                 have none. A constant error hides no change
-    wild        share of nights beyond 3 standard deviations; a normal variable has 0.3 %
-    share       median half width of the interval over the true value
+    beyond 3 σ  share of nights with an error beyond 3 standard deviations; a normal variable has 0.3 %
+    half width  median half width of the interval over the true value
 
 The year of a hundred cells in condition/tests/year.rs uses errors of this kind. Then two changes are made, friction that
 rises at joint3 and a mass on the tool, each for one night, and what the table says of them is printed. Exit code 1 if
@@ -121,7 +121,7 @@ def main():
             print(f"night {night + 1} of {asked.nights}", file=sys.stderr)
         worn = measured(asked.tauscope, os.path.join(work, "worn"), scenario(10_000 * asked.seed + 9_001, frictions(0.0, 2, 0.3)), None)
         loaded = measured(asked.tauscope, os.path.join(work, "loaded"), scenario(10_000 * asked.seed + 9_002, frictions(0.0), 1.0), None)
-    print("| quantity | nights x joints | coverage | scatter | lag 1 | wild | share |")
+    print("| quantity | nights x joints | coverage | scatter | lag 1 | beyond 3 σ | half width |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
     ok = True
     for quantity in ["coulomb_nm", "viscous_nms_per_rad", "gain", "bias_nm", "mass_kg"]:
