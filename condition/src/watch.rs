@@ -81,8 +81,8 @@ impl Nights<'_> {
         reference.deviate(estimate, covariate)
     }
 
-    /// Mean of value less expectation over some nights.
-    fn mean_off(&self, reference: &Reference, nights: std::ops::Range<usize>) -> f64 {
+    /// Mean of value less expectation over some nights, and the half width of its 95 % interval.
+    fn mean_off(&self, reference: &Reference, nights: std::ops::Range<usize>) -> (f64, f64) {
         let (mut sum, mut weights) = (0.0, 0.0);
         for (estimate, covariate) in &self.all[nights] {
             if let Some(expected) = reference.expects(*covariate, estimate.deviation()) {
@@ -91,7 +91,11 @@ impl Nights<'_> {
                 weights += weight;
             }
         }
-        if weights > 0.0 { sum / weights } else { 0.0 }
+        if weights > 0.0 {
+            (sum / weights, 1.96 * reference.scatter() / weights.sqrt())
+        } else {
+            (0.0, 0.0)
+        }
     }
 
     fn point(&self, night: usize) -> Point {
@@ -217,7 +221,7 @@ fn told(nights: &Nights<'_>, reference: &Reference, open: &mut Option<Open>, nig
         return;
     };
     let newest = change.begin.max((night + 1).saturating_sub(NEWEST))..night + 1;
-    let off = nights.mean_off(reference, newest);
+    let (off, _) = nights.mean_off(reference, newest);
     let level = reference.coefficients().map_or(0.0, |[level, _]| level);
     if off.abs() >= nights.quantity.relevant(level) {
         change.told = Some(night);
@@ -289,7 +293,7 @@ fn lasting(
     // A change has begun by the night in which it was certain; what comes later is another one.
     let told_day = nights.all[told].0.day;
     let change = shape::change(&points, nights.has_slope, told_day)?;
-    let off = nights.mean_off(reference, since);
+    let (off, half) = nights.mean_off(reference, since);
     // Where the best shape denies the change, the sums are believed: it is a step.
     let (change_from, denied) = (change.from, change.size * off <= 0.0);
     Some(Event {
@@ -304,7 +308,11 @@ fn lasting(
         level: change.level,
         level_deviation: change.level_deviation,
         size: if denied { off } else { change.size },
-        interval: change.interval,
+        interval: if denied {
+            [off - half, off + half]
+        } else {
+            change.interval
+        },
         slope: change.slope,
         centre: nights.centre,
     })

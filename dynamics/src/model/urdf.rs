@@ -172,6 +172,8 @@ fn read_joint(
 fn limits(kind: JointKind, limit: &urdf_rs::JointLimit, marks: &JointMarks) -> Limits {
     let known = |given: bool, value: f64| (given && value.is_finite()).then_some(value);
     let bounded = kind != JointKind::Continuous;
+    // Limits that leave no room are a slip of the pen: nobody knows what was meant.
+    let bounded = bounded && limit.lower < limit.upper;
     Limits {
         lower: known(bounded && marks.lower, limit.lower),
         upper: known(bounded && marks.upper, limit.upper),

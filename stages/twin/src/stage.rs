@@ -11,6 +11,10 @@ use crate::motion::MotionTracker;
 use crate::plain_zeros::PlainZeros;
 use crate::twin_file::Correction;
 
+/// A pause this long begins another recording, with motors that may have cooled; a shorter one is a gap \[ns\].
+/// Physical: drives cool in minutes, and drivers and networks come back in seconds.
+const PAUSE_NS: i64 = 60_000_000_000;
+
 /// What the twin must know of its cell.
 #[derive(Debug, Clone)]
 pub struct Setup {
@@ -69,6 +73,9 @@ pub struct Twin {
     /// Stamp of the sample before, and of the last reset.
     previous_ns: Option<i64>,
     reset_ns: i64,
+    /// The newest stamp, and where the recording begins.
+    last_ns: Option<i64>,
+    recording_ns: i64,
     /// The first stamp of all: where the session begins.
     start_ns: Option<i64>,
 }
@@ -113,6 +120,8 @@ impl Twin {
             expected_filters: vec![effort_filter; joint_count],
             previous_ns: None,
             reset_ns: 0,
+            last_ns: None,
+            recording_ns: 0,
             start_ns: None,
         })
     }
@@ -178,7 +187,7 @@ impl Twin {
         }
         let at = MotionSample {
             dt_s,
-            recording_s: since_s(self.reset_ns),
+            recording_s: since_s(self.recording_ns),
             session_s: since_s(self.start_ns.unwrap_or(stamp_ns)),
             position,
             velocity,
@@ -233,6 +242,12 @@ impl Stage<JointState, TwinState> for Twin {
 
         self.follow_tool(sample)?;
         self.start_ns.get_or_insert(stamp_ns);
+        // A short gap makes no motor cold.
+        let since_last = self.last_ns.map(|last| stamp_ns - last);
+        if !since_last.is_some_and(|ns| (0..PAUSE_NS).contains(&ns)) {
+            self.recording_ns = stamp_ns;
+        }
+        self.last_ns = Some(stamp_ns);
         let dt_s = if go_on { dt_s.unwrap_or(0.0) } else { 0.0 };
         if go_on {
             self.motion.update(dt_s, sample);
