@@ -50,6 +50,7 @@ mod sensor_hysteresis;
 mod spec;
 mod split_joint;
 mod stribeck_friction;
+mod subtracted_friction;
 mod table;
 mod temperature_viscous;
 #[cfg(test)]
@@ -104,6 +105,7 @@ pub static EFFECTS: &[&Effect] = &[
     &friction_step::EFFECT,
     &friction_drift::EFFECT,
     &late_brake::EFFECT,
+    &subtracted_friction::EFFECT,
     &rotor_inertia::EFFECT,
     &torque_gain::EFFECT,
     &torque_bias::EFFECT,

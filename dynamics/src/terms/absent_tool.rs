@@ -3,8 +3,21 @@
 use super::ghost::{Ghost, While};
 use super::law::array;
 use super::payload::{BODY_COORDINATES, BODY_PARAMETERS, inertia, parameters};
-use super::{Effect, Excitation, Family, Layer, PlaceKind, Simulated, Traits, Words};
+use super::{Effect, Excitation, Family, Layer, PlaceKind, Simulated, Site, Traits, Words};
 use crate::Inertia;
+
+/// No more than this share of what the last joint carries is absent.
+/// Physical: the mass of the URDF and the estimate may both be off by a tenth.
+const MOST_ABSENT: f64 = 1.2;
+
+/// Mass of all that the last joint before the tool carries \[kg\].
+fn carried_kg(site: &Site<'_>) -> f64 {
+    let links = site.model.links();
+    let same = links
+        .iter()
+        .filter(|link| link.joint == links[site.link].joint);
+    same.map(|link| link.inertia.mass_kg()).sum()
+}
 
 /// A payload that is taken off: the URDF has a gripper that is not mounted, or one that is heavier than the real one.
 pub static EFFECT: Effect = Effect {
@@ -24,7 +37,8 @@ pub static EFFECT: Effect = Effect {
     to_parameters: |c| parameters(&array(c)).to_vec(),
     to_coordinates: |p| inertia(&array(p)).parameters().to_vec(),
     simpler: None,
-    limit: None,
+    // More than there is cannot be absent.
+    limit: Some(|site, x| x[0] <= MOST_ABSENT * carried_kg(site)),
     excitation: Excitation::Poses,
     simulated: Simulated::Model,
     // What can be taken off depends on the URDF.
