@@ -89,6 +89,11 @@ impl Against {
     pub fn is_of_load(self) -> bool {
         matches!(self, Self::Load | Self::DrivenLoad | Self::LoadTurned)
     }
+
+    /// Whether it is the time since a start that another run does not share.
+    pub fn is_of_start(self) -> bool {
+        matches!(self, Self::RecordingTime | Self::SessionTime)
+    }
 }
 
 /// A curve through knots, straight between them and held at the ends, or repeated.

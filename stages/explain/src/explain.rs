@@ -167,6 +167,7 @@ fn conclude(
     let mut notes = named.notes;
     notes.extend(notes::late_twin(context.twin_late_s));
     notes.extend(notes::not_handed_out(&proof, &found, joints, unit));
+    notes.extend(notes::over_time(&found, joints));
     notes.extend(notes::notes(
         input,
         &problem,
@@ -174,7 +175,7 @@ fn conclude(
         &rests_count,
         &remainders.all,
     ));
-    let mut findings = slips.findings(joints, unit);
+    let mut findings = slips.findings(joints, unit, context.unit_nm);
     notes.splice(0..0, slips.note());
     findings.append(&mut named.findings);
     slips.undo(&mut proof);

@@ -6,10 +6,11 @@
 //! with Gauss-Newton steps and Levenberg's damping (Nocedal and Wright, *Numerical Optimization*, 2006, section 10.3).
 //! Bodies stay physically consistent through a smooth prior over their pseudo-inertia (Wensing, Kim and Slotine, 2018;
 //! Lee, Wensing and Park, 2020; see `body_prior.rs`). Intervals come from the sandwich covariance (White, "A
-//! Heteroskedasticity-Consistent Covariance Matrix Estimator", *Econometrica* 48, 1980; Newey and West, 1987).
+//! Heteroskedasticity-Consistent Covariance Matrix Estimator", *Econometrica* 48, 1980; see `covariance.rs`).
 
 pub mod body_prior;
 pub mod body_step;
+pub mod covariance;
 pub mod fitted;
 pub mod interval;
 pub mod jacobian;

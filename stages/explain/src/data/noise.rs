@@ -4,7 +4,7 @@ use crate::read::recording::Recording;
 
 /// Median of the absolute value of a normal variable, in standard deviations.
 /// Statistical: the 75 % quantile of the standard normal distribution.
-const MEDIAN_OF_ABS_NORMAL: f64 = 0.6745;
+pub const MEDIAN_OF_ABS_NORMAL: f64 = 0.6745;
 /// Variance of the fourth difference of white noise with variance 1.
 /// Statistical: the sum of the squared coefficients, 1 + 16 + 36 + 16 + 1.
 const FOURTH_DIFFERENCE_VARIANCE: f64 = 70.0;
@@ -23,6 +23,28 @@ pub fn white_variance(signal: &[f64]) -> f64 {
     deviation * deviation / FOURTH_DIFFERENCE_VARIANCE
 }
 
+/// Variance of the white noise on an effort, and the share of its samples that are new.
+///
+/// A driver may repeat an effort until it has another one, or tell it in coarse steps. Then most differences are zero and
+/// say nothing of the noise: only samples that differ from the one before are compared, and a step hides what is
+/// smaller than it.
+pub fn of_effort(signal: &[f64]) -> (f64, f64) {
+    let mut new = signal.to_vec();
+    new.dedup();
+    if 2 * new.len() > signal.len() {
+        return (white_variance(signal), 1.0);
+    }
+    let steps = new.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    let step = steps.fold(f64::INFINITY, f64::min);
+    let of_step = if step.is_finite() {
+        step * step / 12.0
+    } else {
+        0.0
+    };
+    let share = new.len() as f64 / signal.len().max(1) as f64;
+    (white_variance(&new).max(of_step), share)
+}
+
 /// White noise of the measured effort of a joint \[effort unit\].
 pub fn white_noise(recordings: &[Recording], joint: usize, n: usize) -> f64 {
     let mut all: Vec<f64> = recordings
@@ -35,9 +57,41 @@ pub fn white_noise(recordings: &[Recording], joint: usize, n: usize) -> f64 {
                 .step_by(n)
                 .copied()
                 .collect();
-            white_variance(&signal).sqrt()
+            of_effort(&signal).0.sqrt()
         })
         .collect();
     all.sort_by(f64::total_cmp);
     all.get(all.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::Noise;
+
+    /// A slow motion's effort with noise of 0.1, each value told `times` times.
+    fn told(times: usize) -> Vec<f64> {
+        let mut noise = Noise(5);
+        let of = |k: usize| (0.02 * k as f64).sin() + 0.1 * noise.next();
+        let values: Vec<f64> = (0..2000).map(of).collect();
+        let each = values.iter();
+        each.flat_map(|value| std::iter::repeat_n(*value, times))
+            .collect()
+    }
+
+    #[test]
+    fn an_effort_that_is_told_ten_times_has_the_noise_of_one_that_is_told_once() {
+        let ((once, all), (often, few)) = (of_effort(&told(1)), of_effort(&told(10)));
+        assert!((once.sqrt() - 0.1).abs() < 0.01, "{once}");
+        assert!((often / once - 1.0).abs() < 1e-9, "{often}");
+        assert!(all == 1.0 && (few - 0.1).abs() < 1e-9, "{few}");
+    }
+
+    #[test]
+    fn a_step_hides_what_is_smaller() {
+        let coarse = |k: usize| (0.01 * k as f64).floor() * 0.5;
+        let signal: Vec<f64> = (0..2000).map(coarse).collect();
+        assert!((of_effort(&signal).0 - 0.25 / 12.0).abs() < 1e-12);
+        assert_eq!(of_effort(&[3.0; 100]).0, 0.0);
+    }
 }

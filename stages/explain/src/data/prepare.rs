@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use tauscope_dynamics::Model;
 
 use crate::data::effective_samples::per_row;
-use crate::data::noise::white_variance;
+use crate::data::noise::of_effort;
 use crate::data::problem::Problem;
 use crate::data::smoother::LowPass;
 use crate::data::track::{FitTrack, Track, moving_joints, spaced, thinned};
@@ -42,8 +42,8 @@ const RESOLUTION: f64 = 1e-7;
 impl Problem {
     /// The frequency below which these recordings are compared \[Hz\].
     pub fn cutoff_hz(recordings: &[Recording]) -> f64 {
-        let rate = |r: &Recording| (r.len() - 1) as f64 / r.duration_s().max(1e-3);
-        let slowest = recordings.iter().map(rate).fold(f64::INFINITY, f64::min);
+        let rates = recordings.iter().map(Recording::rate_hz);
+        let slowest = rates.fold(f64::INFINITY, f64::min);
         CUTOFF_HZ.min(CUTOFF_OF_RATE * slowest)
     }
 
@@ -91,11 +91,9 @@ impl Problem {
                 let mut signal: Vec<f64> = of_joint
                     .map(|at| (recording.effort[at] - full.beside[at]) * unit_nm[j])
                     .collect();
-                let rate = (full.len() - 1) as f64 / recording.duration_s();
-                let (white, share) = (
-                    white_variance(&signal),
-                    cutoff_hz * NOISE_BANDWIDTH / (0.5 * rate),
-                );
+                let (white, new) = of_effort(&signal);
+                let rate = new * recording.rate_hz();
+                let share = (cutoff_hz * NOISE_BANDWIDTH / (0.5 * rate)).min(1.0);
                 variances[j].push((white * share, white));
                 if kept.len() < full.len() {
                     // Against aliasing.

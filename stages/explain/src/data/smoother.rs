@@ -9,6 +9,8 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::read::recording::mean_step_s;
+
 /// Weight of a sample that is passed over, where others have 1. It is not 0, so that a long gap stays determined.
 /// Resolution: far below 1, so that nothing leaks, and far above the rounding of f64.
 const PASSED_OVER: f64 = 1e-6;
@@ -137,8 +139,7 @@ impl MotionSmoother {
         for (i, pair) in time_s.windows(2).enumerate() {
             steps_s[i + 1] = pair[1] - pair[0];
         }
-        let mean = (time_s.last().copied().unwrap_or(0.0) - time_s.first().copied().unwrap_or(0.0))
-            / (n.max(2) - 1) as f64;
+        let mean = mean_step_s(time_s);
         // With measurement noise of variance 1 every `mean` seconds, a jerk of this spectral density puts
         // the half-amplitude point at the cutoff.
         let density = omega.powi(6) * mean;

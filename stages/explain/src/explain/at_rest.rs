@@ -224,13 +224,13 @@ impl Context<'_> {
             };
             let before = Fit::new(&problem, Vec::new());
             let found = pushes(&search);
-            let mut own = findings::of(&search, &found, &before, input, &joints);
+            let mut own = findings::of(&search, &found, &before, self, &joints);
             // No further motion tells more about a push that is over.
             own.next_motions.clear();
             own.trajectories.clear();
             named.extend(own);
             if undetectable.is_empty() {
-                undetectable = findings::undetectable(&search, &found, input, &joints);
+                undetectable = findings::undetectable(&search, &found, self, &joints);
             }
             actives.extend(found.fit.actives);
         }

@@ -77,8 +77,8 @@ impl Context<'_> {
         let found = search.run(moving.fit.actives, moving.penalties);
         progress(0.8, "rivals");
         let before = Fit::new(&problem, scales()).refined(&problem);
-        let named = findings::of(&search, &found, &before, input, &joints);
-        let undetectable = findings::undetectable(&search, &found, input, &joints);
+        let named = findings::of(&search, &found, &before, self, &joints);
+        let undetectable = findings::undetectable(&search, &found, self, &joints);
         Ok(Ok(Judged {
             before,
             found: found.fit,

@@ -5,6 +5,7 @@
 //! from the edge without a bound.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix4, SMatrix, SVector};
+use tauscope_dynamics::kinematic_tree::reach_m;
 use tauscope_dynamics::{Inertia, Model};
 
 use crate::physics::active::{Active, BODY};
@@ -84,6 +85,13 @@ pub fn make_consistent(model: &Model, actives: &mut [Active]) -> bool {
         if let Some((body, of_urdf)) = active.body(model) {
             let least_m2 = FIRST_SHARE * USUAL_SPREAD_M * USUAL_SPREAD_M;
             let mut nearest = body.nearest_consistent(least_m2);
+            // A motion that shows the mass alone may leave the centre anywhere, and no step comes back from there.
+            let from_link_m = nearest.com_m().iter().map(|x| x * x).sum::<f64>().sqrt();
+            if of_urdf.is_none() && from_link_m > reach_m(model, active.hypothesis.place.link) {
+                let mass = nearest.mass_kg();
+                let moment = 2.0 * mass * USUAL_SPREAD_M * USUAL_SPREAD_M;
+                nearest = Inertia::new(mass, [0.0; 3], [moment, 0.0, 0.0, moment, 0.0, moment]);
+            }
             if let Some(link) = of_urdf
                 && nearest.mass_kg() <= 0.0
             {

@@ -1,16 +1,14 @@
-//! Covariance and 95 % intervals of the numbers of an explanation.
+//! 95 % intervals of the numbers of an explanation, from their covariance.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use tauscope_dynamics::terms::CoordinateKind;
 
 use crate::data::problem::Problem;
-use crate::fit::body_prior;
-use crate::fit::fitted::{Fit, LEAST_VARIANCE};
+use crate::fit::covariance::LAGS;
+use crate::fit::fitted::Fit;
 use crate::physics::active::Active;
+use crate::physics::parameter_units::unit;
 
-/// Lags over which the residual is taken to be correlated, in compared samples.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const LAGS: usize = 6;
 /// Standard deviation of a number from smoothing and differentiation, as a share of the number.
 /// Tuned: on arms simulated by another engine, on no recorded seeds; not swept.
 const SYSTEMATIC: f64 = 0.003;
@@ -27,9 +25,6 @@ pub const HALF_WIDTH_95: f64 = 1.96;
 /// Statistical: Kiefer and Vogelsang, "A New Asymptotic Theory for Heteroskedasticity-Autocorrelation Robust Tests",
 /// 2005, table 1.
 const BARTLETT_97_5: [f64; 3] = [2.9694, 0.4160, -0.5324];
-/// Added to the diagonal of the normal matrix, scaled to 1.
-/// Resolution: far above the rounding of f64, far below what the noise hides.
-const RIDGE: f64 = 1e-9;
 /// Step of the difference quotient of a parameter, as a share of its coordinate's standard deviation.
 /// Resolution: between the curvature over a long step and the rounding over a short one.
 const STEP_OF_DEVIATION: f64 = 1e-3;
@@ -37,7 +32,8 @@ const STEP_OF_DEVIATION: f64 = 1e-3;
 /// Resolution: above the rounding of f64.
 const LEAST_RELATIVE_STEP: f64 = 1e-9;
 
-/// Half width of a 95 % interval of a number, in its standard deviations by [`covariance`].
+/// Half width of a 95 % interval of a number, in its standard deviations by
+/// [`covariance`](crate::fit::covariance::covariance).
 ///
 /// The covariance is itself an estimate from a limited number of rows. On average it is too small, the more so the
 /// larger the share b of its lags in the rows is.
@@ -46,85 +42,6 @@ pub fn half_width_95(problem: &Problem) -> f64 {
     let b = lags.min(1.0);
     let [first, second, third] = BARTLETT_97_5;
     HALF_WIDTH_95 + b * (first + b * (second + b * third))
-}
-
-/// Covariance of all free coordinates of a fit, in the order of [`Fit::parameters`].
-///
-/// The sandwich `A⁻¹ B A⁻¹` with A the normal matrix and B the covariance of the scores, autocorrelation within
-/// each recording counted with Bartlett's weights (Newey and West, "A Simple, Positive Semi-Definite,
-/// Heteroskedasticity and Autocorrelation Consistent Covariance Matrix", 1987), but never less than white noise
-/// of the variance that is left gives.
-pub fn covariance(problem: &Problem, fit: &Fit) -> DMatrix<f64> {
-    let jacobian = fit.jacobian(problem);
-    let p = jacobian.len();
-    let mut normal = DMatrix::<f64>::zeros(p, p);
-    let mut scores = DMatrix::<f64>::zeros(p, p);
-    for j in 0..problem.joints {
-        let touching: Vec<(usize, &[f64])> = jacobian
-            .iter()
-            .enumerate()
-            .filter_map(|(a, column)| Some((a, column.of_joint(j, problem.rows)?)))
-            .collect();
-        let variance = fit.squares[j] / (fit.count[j] - touching.len() as f64).max(1.0);
-        let variance = variance.max(LEAST_VARIANCE);
-        let rows = problem.joint_rows(j);
-        for track in &problem.tracks {
-            let mut past: Vec<DVector<f64>> = Vec::new();
-            for row in track.rows() {
-                let mut score = DVector::zeros(p);
-                let at = rows.start + row;
-                if problem.weight[at] > 0.0 {
-                    let mut column = DVector::zeros(p);
-                    for (a, values) in &touching {
-                        column[*a] = values[row];
-                    }
-                    normal.ger(1.0 / variance, &column, &column, 1.0);
-                    score = column * (fit.residual[at] / variance);
-                }
-                scores.ger(1.0, &score, &score, 1.0);
-                for (lag, earlier) in past.iter().rev().take(LAGS).enumerate() {
-                    let weight = 1.0 - (lag + 1) as f64 / (LAGS + 1) as f64;
-                    scores.ger(weight, &score, earlier, 1.0);
-                    scores.ger(weight, earlier, &score, 1.0);
-                }
-                past.push(score);
-                if past.len() > LAGS {
-                    past.remove(0);
-                }
-            }
-        }
-    }
-    // The prior counts as if it had been measured, too.
-    let (known, _) = body_prior::normal(&problem.model, &fit.actives, &fit.parameters());
-    normal += &known;
-    scores += known;
-    // What no row depends on has no scale of its own, such as an end that lies beside a recording.
-    let scale = |a: usize| normal[(a, a)].max(0.0).sqrt();
-    let scale: Vec<f64> = (0..p)
-        .map(scale)
-        .map(|s| if s > 0.0 { s } else { 1.0 })
-        .collect();
-    let mut scaled = DMatrix::from_fn(p, p, |a, b| normal[(a, b)] / (scale[a] * scale[b]));
-    for a in 0..p {
-        scaled[(a, a)] += RIDGE;
-    }
-    let Some(inverse) = scaled.try_inverse() else {
-        return DMatrix::from_diagonal_element(p, p, f64::INFINITY);
-    };
-    let inverse = DMatrix::from_fn(p, p, |a, b| inverse[(a, b)] / (scale[a] * scale[b]));
-    let mut covariance = &inverse * scores * &inverse;
-    for a in 0..p {
-        let (robust, white) = (covariance[(a, a)], inverse[(a, a)]);
-        // Zero is what no row depends on: it stays so.
-        if robust > 0.0 && robust < white {
-            let grow = (white / robust).sqrt();
-            for b in 0..p {
-                covariance[(a, b)] *= grow;
-                covariance[(b, a)] *= grow;
-            }
-        }
-    }
-    covariance
 }
 
 /// Standard deviations of the parameters of one effect, from the covariance of its coordinates. Systematic errors are
@@ -148,6 +65,12 @@ pub fn parameter_deviations(
         own[(c, c)] += between_rows(problem, active, c).powi(2) / 12.0;
     }
     let centre = active.parameters();
+    let effect = active.hypothesis.effect;
+    // A curve has more numbers than names.
+    let is_angle = |row: usize| {
+        let parameter = effect.parameters.get(row);
+        parameter.is_some_and(|parameter| unit(parameter.name) == "rad")
+    };
     let mut slopes = DMatrix::<f64>::zeros(centre.len(), count);
     for c in 0..count {
         let step = (STEP_OF_DEVIATION * own[(c, c)].max(0.0).sqrt())
@@ -161,7 +84,7 @@ pub fn parameter_deviations(
         for (row, (a, b)) in there.parameters().iter().zip(&centre).enumerate() {
             let mut change = a - b;
             // Angles may wrap between the two.
-            if change.abs() > std::f64::consts::PI {
+            if is_angle(row) && change.abs() > std::f64::consts::PI {
                 change -= change.signum() * std::f64::consts::TAU;
             }
             slopes[(row, c)] = change / step;
@@ -227,6 +150,7 @@ fn between_rows(problem: &Problem, active: &Active, c: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fit::covariance::covariance;
     use crate::fixture::{at_joint, problem_with};
 
     const TRUE: f64 = 0.8;

@@ -308,6 +308,12 @@ impl Active {
         self.curve.is_some() || self.hypothesis.is_unnamed_body()
     }
 
+    /// Whether it is a curve over the time since a start that another run does not share.
+    pub fn is_curve_over_time(&self) -> bool {
+        let curve = self.curve.as_ref();
+        curve.is_some_and(|curve| curve.against.is_of_start())
+    }
+
     /// Its parameters, as reports hold them.
     pub fn parameters(&self) -> Vec<f64> {
         (self.hypothesis.effect.to_parameters)(&self.coordinates)

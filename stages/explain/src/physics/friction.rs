@@ -5,7 +5,7 @@ use tauscope_dynamics::terms::{Effect, Layer, PlaceKind, TermSpec};
 
 use crate::data::problem::Problem;
 use crate::physics::active::Hypothesis;
-use crate::physics::parameter_units::is_of_effort;
+use crate::physics::parameter_units::power_of_effort;
 
 /// The plain friction that an effect is or contains, and the effect's parameters that are proportional to it.
 fn contained(effect: &'static Effect) -> Option<(&'static Effect, Vec<&'static str>)> {
@@ -61,9 +61,7 @@ pub fn in_recorded_units(term: &TermSpec, model: &Model, units_nm: &[f64]) -> Te
         return term;
     };
     for (name, value) in &mut term.parameters {
-        if is_of_effort(name) {
-            *value /= units_nm[joint];
-        }
+        *value *= units_nm[joint].powi(-power_of_effort(name));
     }
     if effect.place == PlaceKind::TwoJoints
         && let Some(source) = at(&term.source_joint)

@@ -7,10 +7,14 @@ pub fn unit(parameter: &str) -> &'static str {
     words::unit(parameter).map_or("", |(_, unit)| unit)
 }
 
-/// Whether a parameter is an effort, or an effort per something.
-pub fn is_of_effort(parameter: &str) -> bool {
-    let unit = unit(parameter);
-    unit.starts_with("N m") || unit == "kg m²"
+/// The power of an effort that a parameter is proportional to: 1 for an effort, or an effort per something, -1 for something
+/// per effort.
+pub fn power_of_effort(parameter: &str) -> i32 {
+    match unit(parameter) {
+        "1/(N m)" => -1,
+        unit if unit.starts_with("N m") || unit == "kg m²" => 1,
+        _ => 0,
+    }
 }
 
 /// Whether a parameter of a body or a force is proportional to the effort that it is estimated from.

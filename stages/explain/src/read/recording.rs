@@ -44,6 +44,19 @@ pub struct Recording {
     pub losses: Losses,
 }
 
+/// Mean time between samples, apart from gaps \[s\]: a pause makes no recording slower. All times count where each is a gap.
+pub fn mean_step_s(time_s: &[f64]) -> f64 {
+    let steps = time_s.windows(2).map(|pair| pair[1] - pair[0]);
+    let (sum, count) = steps
+        .filter(|step| *step <= MAX_GAP_S)
+        .fold((0.0, 0), |(sum, count), step| (sum + step, count + 1));
+    if count > 0 {
+        return sum / f64::from(count);
+    }
+    let whole = time_s.last().unwrap_or(&0.0) - time_s.first().unwrap_or(&0.0);
+    whole / (time_s.len().max(2) - 1) as f64
+}
+
 /// Why a recording cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
@@ -151,6 +164,11 @@ impl Recording {
             recording.read_reference(&archive, topic, joint_names)?;
         }
         Ok(recording)
+    }
+
+    /// Samples a second, apart from gaps \[Hz\].
+    pub fn rate_hz(&self) -> f64 {
+        1.0 / mean_step_s(&self.time_s).max(1e-6)
     }
 
     /// Number of samples.

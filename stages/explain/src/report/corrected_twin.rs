@@ -59,7 +59,7 @@ impl Context<'_> {
         bodies.map(|active| self.spec(active)).collect()
     }
 
-    /// The terms of the corrected twin: all but temporary effects and those `withheld`.
+    /// The terms of the corrected twin: all but temporary effects, curves over time and those `withheld`.
     pub fn lasting_terms(&self, found: &Fit, withheld: &[Withheld]) -> Vec<TermSpec> {
         let mut terms = self
             .input
@@ -68,7 +68,8 @@ impl Context<'_> {
             .map_or_else(Vec::new, |start| start.terms.clone());
         for (index, active) in found.actives.iter().enumerate() {
             let is_withheld = withheld.iter().any(|withheld| withheld.effect == index);
-            if active.hypothesis.is_torque_scale() || !active.hypothesis.lasts() || is_withheld {
+            let lasts = active.hypothesis.lasts() && !active.is_curve_over_time();
+            if active.hypothesis.is_torque_scale() || !lasts || is_withheld {
                 continue;
             }
             let term = self.spec(active);

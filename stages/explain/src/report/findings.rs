@@ -14,9 +14,11 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 use tauscope_dynamics::terms::PlaceKind;
 
+use crate::context::Context;
 use crate::data::problem::Problem;
+use crate::fit::covariance::{covariance, covariance_beside_bodies};
 use crate::fit::fitted::Fit;
-use crate::fit::interval::{covariance, half_width_95, parameter_deviations};
+use crate::fit::interval::{half_width_95, parameter_deviations};
 use crate::physics::active::{Active, Hypothesis, TimeKind};
 use crate::physics::friction::least;
 use crate::read::input::Input;
@@ -37,6 +39,10 @@ use waves::merge_waves;
 /// A time with a larger standard deviation than this has no interval \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const VAGUE_S: f64 = 5.0;
+
+/// Confidence of a body whose mass may be nothing, at most.
+/// Physical: an arm that turns about vertical axes alone hardly shows a mass; one that lifts does.
+const UNSURE_BODY: f64 = 0.85;
 
 /// The findings of an explanation, and what belongs to them.
 #[derive(Debug, Default)]
@@ -96,19 +102,33 @@ fn rival(input: &Input, joints: &[String], hypothesis: &Hypothesis) -> Rival {
     }
 }
 
+/// Whether a body was found whose mass may as well be nothing: another one may cancel it.
+fn may_weigh_nothing(problem: &Problem, active: &Active, deviations: &[f64]) -> bool {
+    let effect = active.hypothesis.effect;
+    let mass = effect.parameters.first();
+    let is_mass = mass.is_some_and(|parameter| parameter.name.ends_with("mass_kg"));
+    let value = active.parameters().first().copied().unwrap_or(0.0);
+    is_mass && value.abs() <= half_width_95(problem) * deviations[0]
+}
+
 /// The findings for every effect in `found`.
 pub fn of(
     search: &Search<'_>,
     found: &Explanation,
     before: &Fit,
-    input: &Input,
+    context: &Context<'_>,
     joints: &[String],
 ) -> Named {
-    let fit = &found.fit;
+    let (input, fit) = (context.input, &found.fit);
     let effective = &search.problem.effective_samples;
-    let spread = covariance(search.problem, fit);
+    let by_noise = covariance(search.problem, fit);
+    let spread = if input.bodies {
+        covariance_beside_bodies(search.problem, fit)
+    } else {
+        by_noise.clone()
+    };
     let total = mismatch(before, fit, before);
-    let scales = Scales::of(search.problem, fit, &spread);
+    let scales = Scales::of(search.problem, fit, &by_noise);
     let of_start = StartScales::of(input);
     let mut named = Named {
         notes: scales.notes(joints),
@@ -120,6 +140,12 @@ pub fn of(
             continue;
         }
         let deviations = parameter_deviations(search.problem, fit, &spread, index);
+        let by_noise = parameter_deviations(search.problem, fit, &by_noise, index);
+        let sure = if may_weigh_nothing(search.problem, active, &by_noise) {
+            UNSURE_BODY
+        } else {
+            1.0
+        };
         let less = search.without(found, index);
         let evidence = found.ahead_of(&less, effective);
         let contest = contest(search, found, &less, active);
@@ -141,7 +167,7 @@ pub fn of(
         }
         let equivalent_to = named.keep_rivals(active, contest, input, joints);
         let explained = mismatch(&less.fit, fit, before);
-        let effort_rms = effort_rms(&less.fit, fit, input);
+        let effort_rms = effort_rms(&less.fit, fit, context.unit_nm);
         let (bare, of_both) = without_twin(search, found, less, index, evidence);
         let grounds = Grounds::of(fit, &bare.fit, active, of_both);
         named.findings.push(Finding {
@@ -151,7 +177,10 @@ pub fn of(
             parameters,
             intervals_95: intervals,
             in_amperes,
-            confidence: or_scale.map_or(1.0, |_| DOUBTED).min(confidence(grounds)),
+            confidence: or_scale
+                .map_or(1.0, |_| DOUBTED)
+                .min(sure)
+                .min(confidence(grounds)),
             recording: when.recording,
             t_start: when.start,
             t_end: when.end,
@@ -236,7 +265,7 @@ fn numbers(
     for ((parameter, value), deviation) in effect.parameters.iter().zip(&values).zip(deviations) {
         parameters.insert(parameter.name.to_owned(), number(*value));
         // The time of a change between two recordings is not known any better.
-        let vague = parameter.name.contains("time") && *deviation > VAGUE_S;
+        let vague = parameter.name.starts_with("change_time") && *deviation > VAGUE_S;
         if deviation.is_finite() && !vague {
             let half = half_width_95(problem) * deviation;
             let least = least(problem, active.hypothesis, parameter.minimum);
@@ -316,11 +345,11 @@ fn mismatch(without: &Fit, with: &Fit, count: &Fit) -> f64 {
 }
 
 /// What `without` leaves less what `with` leaves, as root mean square at the joint where that is most \[effort unit\].
-fn effort_rms(without: &Fit, with: &Fit, input: &Input) -> f64 {
-    let constants = input.torque_constants_nm_per_a.as_deref();
+/// `unit_nm` are N m per that unit, by joint.
+fn effort_rms(without: &Fit, with: &Fit, unit_nm: &[f64]) -> f64 {
     let at = |j: usize| {
         let square = (without.squares[j] - with.squares[j]).max(0.0) / with.count[j].max(1.0);
-        square.sqrt() / constants.map_or(1.0, |constants| constants[j])
+        square.sqrt() / unit_nm[j]
     };
     (0..with.squares.len()).map(at).fold(0.0, f64::max)
 }

@@ -127,9 +127,12 @@ impl Context<'_> {
             try_it(Smoothing { motion_hz, ..start }, &mut best)?;
         }
         let motion_hz = best.1.motion_hz;
-        let rate_hz = |r: &Recording| r.len().saturating_sub(1) as f64 / r.duration_s().max(1e-9);
         let fit = &self.input.fit;
-        let most_hz = MOST_OF_RATE * fit.iter().map(rate_hz).fold(f64::INFINITY, f64::min);
+        let most_hz = MOST_OF_RATE
+            * fit
+                .iter()
+                .map(Recording::rate_hz)
+                .fold(f64::INFINITY, f64::min);
         let sharper = VELOCITY_CUTOFFS.map(|times| (times * motion_hz).min(most_hz));
         let mut velocities: Vec<Velocity> = sharper.into_iter().map(Velocity::Smoothed).collect();
         let is_recorded = |r: &Recording| {

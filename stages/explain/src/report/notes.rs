@@ -59,6 +59,17 @@ pub fn not_handed_out(proof: &Proof, found: &Fit, names: &[String], unit: &str) 
     notes
 }
 
+/// Notes on the curves over time: another run begins at another time of whatever they follow.
+pub fn over_time(found: &Fit, names: &[String]) -> impl Iterator<Item = String> {
+    let curves = (found.actives.iter()).filter(|active| active.is_curve_over_time());
+    curves.map(|active| {
+        format!(
+            "The curve of joint {} over time is not in twin.yaml: how it goes on is not known.",
+            names[active.hypothesis.place.joint]
+        )
+    })
+}
+
 /// The notes on an input and on the fit `found`.
 pub fn notes(
     input: &Input,

@@ -41,12 +41,17 @@ impl Slips {
         self.as_recorded.get_or_insert(errors);
     }
 
-    /// A finding for each.
-    pub fn findings(&self, joints: &[String], unit: &str) -> Vec<Finding> {
-        self.all
-            .iter()
-            .map(|slip| finding(slip, joints, unit))
-            .collect()
+    /// A finding for each. Its errors are in the recordings' `unit`, of which `unit_nm` are N m, by joint.
+    pub fn findings(&self, joints: &[String], unit: &str, unit_nm: &[f64]) -> Vec<Finding> {
+        let as_recorded = |slip: &Slip| {
+            let mut slip = slip.clone();
+            for (joint, errors) in &mut slip.mended {
+                *errors = errors.map(|error| error / unit_nm[*joint]);
+            }
+            slip
+        };
+        let all = self.all.iter().map(as_recorded);
+        all.map(|slip| finding(&slip, joints, unit)).collect()
     }
 
     /// That all else is of mended recordings.

@@ -2,10 +2,11 @@
 
 use tauscope_dynamics::terms::{CoordinateKind, Scale};
 
+use crate::fit::covariance::covariance;
 use crate::fit::fitted::Fit;
-use crate::fit::interval::{covariance, half_width_95};
-use crate::physics::active::{Active, Hypothesis};
-use crate::select::evidence::{LEAST_EVIDENCE, overwhelming, tie};
+use crate::fit::interval::half_width_95;
+use crate::physics::active::{Active, Hypothesis, TimeKind};
+use crate::select::evidence::{LEAST_EVIDENCE, overwhelming, tie, worse_joints};
 use crate::select::explanation::{Explanation, describe};
 use crate::select::explanation::{pieces, place_of};
 use crate::select::plausible::at_bound;
@@ -13,9 +14,17 @@ use crate::select::propose::penalty;
 
 use crate::select::search::Search;
 
+/// Whether the effect at `index` in `best` is not worth its further number: it only divides what the simple one sums up, as
+/// friction of each direction does, and leaves no less at any joint. Gears of all makes turn a little harder one way.
+fn is_slight(best: &Explanation, simple: &Explanation, index: usize) -> bool {
+    let hypothesis = &best.fit.actives[index].hypothesis;
+    let divides = hypothesis.is_linear() && hypothesis.time_kind() == TimeKind::Always;
+    divides && worse_joints(&simple.fit, &best.fit).is_empty()
+}
+
 impl Search<'_> {
     /// Replaces an effect by the simpler one that it contains, unless it is ahead by `enough` \[nats\], a function of
-    /// the evidence for the effect. An effect with a shape at the end of its range, or that nothing determines, must be
+    /// the evidence for the effect, and leaves less at some joint. An effect with a shape at the end of its range, or that nothing determines, must be
     /// ahead by [`tie`].
     pub fn simplified(&self, mut best: Explanation, enough: impl Fn(f64) -> f64) -> Explanation {
         for piece in pieces(&best) {
@@ -31,7 +40,7 @@ impl Search<'_> {
                 enough(evidence)
             };
             if let Some(simple) = self.simpler(&best, &less, index)
-                && best.ahead_of(&simple, effective) < enough
+                && (best.ahead_of(&simple, effective) < enough || is_slight(&best, &simple, index))
             {
                 (self.say)(&describe(&simple));
                 best = simple;

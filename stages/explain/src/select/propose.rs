@@ -133,6 +133,11 @@ impl<'a> Base<'a> {
         Trial::new(self.problem, self.fit, own, alone, columns)
     }
 
+    /// The square of a column at each joint, after the fit's own columns have taken what they can of it.
+    pub fn squares_beside(&self, column: &Column) -> Option<Vec<f64>> {
+        self.trial(None, &[column]).squares_beside(&self.factored)
+    }
+
     /// First-order score of a hypothesis with these columns, at the fit's variances: it ranks many candidates quickly.
     pub fn first_order_score<C: Borrow<Column>>(
         &self,

@@ -168,6 +168,22 @@ impl<'a> Trial<'a> {
             .unwrap_or(&self.own.right[joint])
     }
 
+    /// The square of the first new column at each joint, after the fit's own columns have taken what they can of it.
+    pub fn squares_beside(&self, own: &Factored) -> Option<Vec<f64>> {
+        let mut cross = DVector::zeros(own.right.len());
+        for (j, variance) in self.fit.variance.iter().enumerate() {
+            cross += self.cross[j].column(0) / *variance;
+        }
+        let taken = own.solve(DMatrix::from_column_slice(cross.len(), 1, cross.as_slice()))?;
+        let taken = taken.column(0);
+        let of_joint = |j: usize| {
+            let of_own = (&self.own.gram[j] * taken).dot(&taken);
+            self.gram[j][(0, 0)] - 2.0 * self.cross[j].column(0).dot(&taken) + of_own
+        };
+        let all = (0..self.square.len()).map(of_joint);
+        Some(all.map(|square| square.max(0.0)).collect())
+    }
+
     /// Gain of log-likelihood by the new columns, with factors not below `minimum`. The factors are solved for at the
     /// variances of the fit, which is not the optimum, but shows which of many columns are best.
     pub fn gain(&self, problem: &Problem, own: &Factored, minimum: &[f64]) -> Option<f64> {

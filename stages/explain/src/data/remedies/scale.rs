@@ -8,6 +8,9 @@ use crate::read::input::Input;
 /// Slopes of an arm are the same if each is within this factor of the middle one.
 /// Physical: masses of published URDFs are within a tenth of the real ones, and a gravity torque sums several.
 const SAME: f64 = 1.2;
+/// The same for a factor that a body which the URDF lacks might have.
+/// Physical: a payload weighs on each joint by another share of what the joint bears without it.
+const SAME_NEAR_1: f64 = 1.1;
 /// A common factor further from 1 than this is none of the masses of an arm.
 /// Physical: as [`SAME`]; all bodies of an arm are not wrong by a third in the same direction.
 const OFF: f64 = 1.4;
@@ -30,15 +33,16 @@ pub fn of_scale(input: &Input, slopes: &[(usize, f64)]) -> Option<Slip> {
     sorted.sort_by(f64::total_cmp);
     let middle = *sorted.get(sorted.len() / 2)?;
     let off = |from: f64| move |slope: &f64| (slope / from).ln().abs();
-    let is_same = sorted.iter().map(off(middle)).all(|x| x < SAME.ln());
-    let common = is_same && sorted.len() >= LEAST_JOINTS;
+    let is_same = |within: f64| sorted.iter().map(off(middle)).all(|x| x < within.ln());
+    let common = is_same(SAME) && sorted.len() >= LEAST_JOINTS;
     let scale = EffortScale::of_positive(&sorted);
     let wrong = matches!(
         scale,
         EffortScale::Current { .. } | EffortScale::TooLarge { .. }
     );
     let is_off = off(1.0)(&middle) > OFF.ln();
-    let common_off = common && (wrong || is_off && sorted.len() >= LEAST_JOINTS_NEAR_1);
+    let near_1 = is_off && sorted.len() >= LEAST_JOINTS_NEAR_1 && is_same(SAME_NEAR_1);
+    let common_off = common && (wrong || near_1);
     let in_amperes = input.effort_unit == "A";
     let remedy = match (in_amperes, input.torque_constants_nm_per_a.is_some()) {
         (true, false) => (common && !is_off).then_some(Remedy::IsTorque),
@@ -102,6 +106,15 @@ mod tests {
             None
         );
         assert_eq!(wrong("Nm", false, &[]), None);
+    }
+
+    #[test]
+    fn a_load_that_weighs_more_on_one_joint_than_on_another_is_no_unit() {
+        assert_eq!(wrong("Nm", false, &[1.29, 1.52, 1.81]), None);
+        assert_eq!(
+            wrong("Nm", false, &[1.5, 1.52, 1.56]),
+            Some(Remedy::EffortScaled(1.52))
+        );
     }
 
     #[test]

@@ -12,7 +12,7 @@ use crate::fit::fitted::Fit;
 use crate::fit::interval::{HALF_WIDTH_95, parameter_deviations};
 use crate::fit::urdf_uncertainty::off_with_the_links;
 use crate::physics::active::Hypothesis;
-use crate::physics::parameter_units::{grows_with_effort, is_of_effort};
+use crate::physics::parameter_units::{grows_with_effort, power_of_effort};
 use crate::read::input::Input;
 use crate::read::start::KNOWN;
 
@@ -117,13 +117,15 @@ impl Scales {
         }
         let share = scale.deviation / scale.gain;
         for (name, value) in parameters {
-            let Some(number) = value.as_f64().filter(|_| is_of_effort(name)) else {
+            let power = power_of_effort(name);
+            let Some(number) = value.as_f64().filter(|_| power != 0) else {
                 continue;
             };
-            let known = number / scale.gain;
+            let in_nm = scale.gain.powi(-power);
+            let known = number * in_nm;
             *value = Value::from(known);
             if let Some(interval) = intervals.get_mut(name) {
-                *interval = wider(interval.map(|end| end / scale.gain), known, share);
+                *interval = wider(interval.map(|end| end * in_nm), known, share);
             }
         }
         false
@@ -236,7 +238,7 @@ impl StartScales {
             return;
         }
         for (name, interval) in intervals {
-            let scaled = is_of_effort(name) || grows_with_effort(name);
+            let scaled = power_of_effort(name) != 0 || grows_with_effort(name);
             if let Some(number) = parameters.get(name).and_then(Value::as_f64)
                 && scaled
             {

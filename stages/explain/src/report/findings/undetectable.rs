@@ -4,25 +4,24 @@ use std::collections::BTreeMap;
 
 use tauscope_dynamics::terms::{Layer, PlaceKind};
 
+use crate::context::Context;
 use crate::data::column::Column;
-use crate::fit::fitted::Fit;
-use crate::read::input::Input;
+use crate::physics::active::Hypothesis;
 use crate::report::schema::Undetectable;
 use crate::select::evidence::{LEAST_EVIDENCE, LEAST_SIZE};
 use crate::select::explanation::Explanation;
 use crate::select::grid::shapes;
 use crate::select::propose::Base;
+use crate::select::prune::HIDDEN;
 use crate::select::search::Search;
 
 /// The smallest effects with one factor that would have been found, for each joint and the tool.
 pub fn undetectable(
     search: &Search<'_>,
     found: &Explanation,
-    input: &Input,
+    context: &Context<'_>,
     joints: &[String],
 ) -> Vec<Undetectable> {
-    // Nobody knows what a joint's current is in N m; a body weighs the same in any unit.
-    let in_amperes = input.effort_unit == "A" && input.torque_constants_nm_per_a.is_none();
     let base = Base::new(search.problem, &found.fit, search.hypotheses.len());
     let mut all = Vec::new();
     for hypothesis in search.hypotheses {
@@ -44,12 +43,7 @@ pub fn undetectable(
         let Some(column) = columns.factors.first() else {
             continue;
         };
-        let Some(smallest) = smallest(
-            search,
-            &found.fit,
-            column,
-            base.penalty(1, hypothesis.only_joint()),
-        ) else {
+        let Some(smallest) = smallest(&base, *hypothesis, column) else {
             continue;
         };
         let joint = matches!(hypothesis.effect.place, PlaceKind::Joint)
@@ -60,34 +54,39 @@ pub fn undetectable(
                     .name
                     .clone()
             });
+        // Nobody knows what a joint's current is in N m; a body weighs the same in any unit.
+        let is_unknown = |(joint, _): &(usize, f64)| *joint == hypothesis.place.joint;
+        let in_amperes =
+            hypothesis.effect.layer != Layer::Body && context.unscaled.iter().any(is_unknown);
         all.push(Undetectable {
             effect: hypothesis.effect.name.to_owned(),
             joint,
             link,
             smallest_findable: BTreeMap::from([(told_as.to_owned(), smallest)]),
-            in_amperes: in_amperes && hypothesis.effect.layer != Layer::Body,
+            in_amperes,
         });
     }
     all
 }
 
-/// The smallest factor of a column at which both evidence and size are sufficient.
-fn smallest(search: &Search<'_>, fit: &Fit, column: &Column, penalty: f64) -> Option<f64> {
-    let problem = search.problem;
-    let (mut information, mut share) = (0.0, 0.0_f64);
-    for j in 0..problem.joints {
-        let Some(values) = column.of_joint(j, problem.rows) else {
-            continue;
-        };
-        let weight = &problem.weight[problem.joint_rows(j)];
-        let square: f64 = values.iter().zip(weight).map(|(v, w)| w * v * v).sum();
-        information += square / fit.variance[j];
-        share = share.max(square / fit.variance[j] / fit.count[j].max(1.0));
+/// The smallest factor of a column that would have been found: its evidence and its size beside what the fit left are
+/// sufficient, after the fit's own columns have taken their share of it, and the measurement's noise does not hide it.
+fn smallest(base: &Base<'_>, hypothesis: Hypothesis, column: &Column) -> Option<f64> {
+    let (problem, fit) = (base.problem, base.fit);
+    let lasts = hypothesis.lasts();
+    let (mut information, mut share, mut seen) = (0.0, 0.0_f64, 0.0_f64);
+    for (j, square) in base.squares_beside(column)?.into_iter().enumerate() {
+        let of_row = square / fit.count[j].max(1.0);
+        information += problem.effective_samples[j] * square / fit.variance[j];
+        share = share.max(of_row / fit.variance[j]);
+        seen = seen.max(of_row.sqrt() / problem.unfiltered_noise[j].max(f64::MIN_POSITIVE));
     }
     if information <= 0.0 {
         return None;
     }
+    let penalty = base.penalty(1, hypothesis.only_joint());
     let by_evidence = (2.0 * (LEAST_EVIDENCE + penalty) / information).sqrt();
     let by_size = (LEAST_SIZE / share).sqrt();
-    Some(by_evidence.max(by_size))
+    let by_noise = if lasts { HIDDEN / seen } else { 0.0 };
+    Some(by_evidence.max(by_size).max(by_noise))
 }

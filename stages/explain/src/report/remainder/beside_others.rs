@@ -22,14 +22,17 @@ fn far_more(left: Left<'_>, joint: usize) -> Option<[f64; 2]> {
     let white = &left.problem.white_noise;
     let times = |j: usize| left.rms(j) / white[j];
     let is_told = |j: &usize| white[*j] > 0.0 && left.fit.count[*j] > 0.0;
-    let mut others: Vec<f64> = (0..left.problem.joints)
-        .filter(|j| *j != joint && is_told(j))
-        .map(times)
-        .collect();
-    others.sort_by(f64::total_cmp);
-    let usual = others.get(others.len().saturating_sub(1) / 2)?.max(1.0);
-    // Errors of clocks and derivatives grow with the rate of the effort, which differs from joint to joint.
-    let is_clear = left.rms(joint) > LOUD * white[joint].max(clock_cost(left, joint));
+    let usual_of = |of: &dyn Fn(usize) -> f64| {
+        let others = (0..left.problem.joints).filter(|j| *j != joint && is_told(j));
+        let mut others: Vec<f64> = others.map(of).collect();
+        others.sort_by(f64::total_cmp);
+        others.get(others.len().saturating_sub(1) / 2).copied()
+    };
+    let usual = usual_of(&times)?.max(1.0);
+    // Errors of clocks and derivatives grow with the rate of the effort, which differs from joint to joint. The clock itself
+    // is one for all: it is no worse than what the others leave allows.
+    let clock = usual_of(&|j| left.rms(j) / clock_cost(left, j))?.min(1.0);
+    let is_clear = left.rms(joint) > LOUD * white[joint].max(clock * clock_cost(left, joint));
     (is_told(&joint) && is_clear && times(joint) > FAR_MORE * usual).then(|| [times(joint), usual])
 }
 
