@@ -1,8 +1,11 @@
 //! From what the wall says to what is kept: incidents, contacts, minutes of the residual.
 
+#[cfg(test)]
+mod tests;
+
 use std::collections::BTreeMap;
 
-use tauscope_publish::message::{ContactMessage, Record, StatusMessage};
+use tauscope_publish::message::{ChangeMessage, ContactMessage, Record, StatusMessage};
 
 use crate::store::{JointNormal, Kind, News, Store, StoreError};
 use crate::wall::{Effect, ResidualView, Severity, Snapshot, State, UnknownWhy, Wall};
@@ -68,22 +71,13 @@ impl Keeper {
                 record,
             } => {
                 let status = wall.status_of(cell);
-                match record {
+                // A contact that is kept without its incident would never be told of again.
+                self.store.at_once(|_| match record {
                     Record::Contact(contact) => {
                         self.contact(cell, instance, contact, *told_ns, status)
                     }
-                    Record::Change(change) => {
-                        let unit = status.map_or("", |status| status.effort_unit.as_str());
-                        self.store.raise(&News {
-                            cell: cell.clone(),
-                            kind: Kind::Change,
-                            place: format!("{} {}", change.effect, change.joints.join(" ")),
-                            severity: Severity::Notice,
-                            words: words::change(change, unit),
-                            at_ns: *told_ns,
-                        })
-                    }
-                }
+                    Record::Change(change) => self.change(cell, change, *told_ns, status),
+                })
             }
             Effect::Lost {
                 cell,
@@ -139,6 +133,24 @@ impl Keeper {
                 self.store.close(cell, Kind::Silence, "", now_ns)
             }
         }
+    }
+
+    fn change(
+        &self,
+        cell: &str,
+        change: &ChangeMessage,
+        told_ns: i64,
+        status: Option<&StatusMessage>,
+    ) -> Result<(), StoreError> {
+        let unit = status.map_or("", |status| status.effort_unit.as_str());
+        self.store.raise(&News {
+            cell: cell.to_owned(),
+            kind: Kind::Change,
+            place: format!("{} {}", change.effect, change.joints.join(" ")),
+            severity: Severity::Notice,
+            words: words::change(change, unit),
+            at_ns: told_ns,
+        })
     }
 
     fn contact(

@@ -12,7 +12,7 @@ mod tests;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use rusqlite::{Connection, OptionalExtension as _, params};
+use rusqlite::{Connection, OptionalExtension as _, Transaction, TransactionBehavior, params};
 use serde::Serialize;
 use tauscope_publish::message::ContactMessage;
 
@@ -340,9 +340,9 @@ impl Store {
         &self,
         work: impl FnOnce(&Self) -> Result<(), StoreError>,
     ) -> Result<(), StoreError> {
-        let transaction = self
-            .connection
-            .unchecked_transaction()
+        // One that begins by reading could not wait for somebody else who writes meanwhile.
+        let begin = TransactionBehavior::Immediate;
+        let transaction = Transaction::new_unchecked(&self.connection, begin)
             .map_err(|error| self.failed(error))?;
         work(self)?;
         transaction.commit().map_err(|error| self.failed(error))
