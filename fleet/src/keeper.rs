@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use tauscope_publish::message::{ChangeMessage, ContactMessage, Record, StatusMessage};
 
-use crate::store::{JointNormal, Kind, News, Store, StoreError};
+use crate::store::{JointNormal, Kind, News, Said, Store, StoreError};
 use crate::wall::{Effect, ResidualView, Severity, Snapshot, State, UnknownWhy, Wall};
 use crate::words;
 
@@ -67,16 +67,23 @@ impl Keeper {
             Effect::Recorded {
                 cell,
                 instance,
+                number,
                 told_ns,
                 record,
             } => {
                 let status = wall.status_of(cell);
                 // A contact that is kept without its incident would never be told of again.
-                self.store.at_once(|_| match record {
-                    Record::Contact(contact) => {
-                        self.contact(cell, instance, contact, *told_ns, status)
+                self.store.at_once(|store| {
+                    if !store.hear(cell, instance, *number, now_ns)? {
+                        // A host that was started again asks for all that a cell keeps.
+                        return Ok(());
                     }
-                    Record::Change(change) => self.change(cell, change, *told_ns, status),
+                    match record {
+                        Record::Contact(contact) => {
+                            self.contact(cell, instance, contact, *told_ns, status)
+                        }
+                        Record::Change(change) => self.change(cell, change, *told_ns, status),
+                    }
                 })
             }
             Effect::Lost {
@@ -163,7 +170,12 @@ impl Keeper {
     ) -> Result<(), StoreError> {
         let host = status.map_or("", |status| status.host.as_str());
         let archive = status.and_then(|status| status.archive.as_deref());
-        let is_new = self.store.contact(cell, instance, contact, host, archive)?;
+        let said = self.store.contact(cell, instance, contact, host, archive)?;
+        let is_newest = self.store.is_newest(cell, instance, contact)?;
+        // Of the incident that contacts of a while share, the newest says how it stands.
+        if said == Said::Nothing || (said == Said::More && !is_newest) {
+            return Ok(());
+        }
         let mut text = words::contact(contact);
         if let Some(status) = status
             && let Some(change) = status.changes.first()
@@ -184,10 +196,13 @@ impl Keeper {
             words: text,
             at_ns: told_ns,
         };
-        if is_new {
+        if said == Said::New {
             self.store.raise(&news)?;
         } else {
             self.store.revise(&news)?;
+        }
+        if !is_newest {
+            return Ok(());
         }
         if let (Some(_), Some(by)) = (contact.acknowledged_ns, &contact.acknowledged_by) {
             self.store.acknowledge(cell, by, told_ns)?;

@@ -2,6 +2,7 @@
 //!
 //! All times are ns since the epoch. What is older than [`KEPT_NS`] is removed once an hour.
 
+mod contacts;
 mod history;
 mod incidents;
 mod labels;
@@ -12,10 +13,9 @@ mod tests;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use rusqlite::{Connection, OptionalExtension as _, Transaction, TransactionBehavior, params};
-use serde::Serialize;
-use tauscope_publish::message::ContactMessage;
+use rusqlite::{Connection, Transaction, TransactionBehavior, params};
 
+pub use contacts::{KeptContact, Said};
 pub use history::{Day, JointNormal};
 pub use incidents::{Incident, Kind, News};
 pub use labels::{KeptLabel, Label};
@@ -99,18 +99,6 @@ pub struct Store {
     path: PathBuf,
 }
 
-/// A contact as it is kept.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct KeptContact {
-    /// What the cell told of it.
-    #[serde(flatten)]
-    pub contact: ContactMessage,
-    /// The cell's computer then.
-    pub host: String,
-    /// Where its recorder wrote.
-    pub archive: Option<String>,
-}
-
 impl Store {
     /// Opens the file, or makes it.
     ///
@@ -140,15 +128,14 @@ impl Store {
         connection
             .execute_batch("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;")
             .map_err(failed)?;
-        let has_labels: bool = connection
-            .query_row(
-                "SELECT count(*) FROM sqlite_schema WHERE name = 'labels'",
-                [],
-                |row| row.get(0),
-            )
-            .map_err(failed)?;
-        if !has_labels {
-            connection.execute_batch(labels::TABLE).map_err(failed)?;
+        for (name, tables) in [("labels", labels::TABLE), ("heard", contacts::TABLES)] {
+            let text = "SELECT count(*) FROM sqlite_schema WHERE name = ?1";
+            let has: bool = connection
+                .query_row(text, [name], |row| row.get(0))
+                .map_err(failed)?;
+            if !has {
+                connection.execute_batch(tables).map_err(failed)?;
+            }
         }
         Ok(Self {
             connection,
@@ -234,84 +221,6 @@ impl Store {
         })
     }
 
-    /// Keeps what is known of a contact. Whether it is a new one.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
-    pub fn contact(
-        &self,
-        cell: &str,
-        instance: &str,
-        contact: &ContactMessage,
-        host: &str,
-        archive: Option<&str>,
-    ) -> Result<bool, StoreError> {
-        let number = i64::try_from(contact.number).unwrap_or(i64::MAX);
-        let known = "SELECT 1 FROM contacts WHERE cell = ?1 AND instance = ?2 AND number = ?3";
-        let key = params![cell, instance, number];
-        let known: Option<i64> = self
-            .connection
-            .query_row(known, key, |row| row.get(0))
-            .optional()
-            .map_err(|error| self.failed(error))?;
-        let text =
-            "INSERT INTO contacts VALUES (?1,?2,?3,?4,?5,?6,?7,?8,?9,?10,?11,?12,?13,?14,?15)
-                    ON CONFLICT DO UPDATE SET kind = ?5, link = ?6, end_ns = coalesce(?9, end_ns),
-                    peak_force_n = ?10, latched = max(latched, ?11),
-                    acknowledged_ns = coalesce(?12, acknowledged_ns),
-                    acknowledged_by = coalesce(?13, acknowledged_by)";
-        let values = params![
-            cell,
-            instance,
-            number,
-            contact.detector,
-            contact.kind,
-            contact.link,
-            contact.begin_ns,
-            contact.onset_ns,
-            contact.end_ns,
-            contact.peak_force_n,
-            contact.latched,
-            contact.acknowledged_ns,
-            contact.acknowledged_by,
-            host,
-            archive,
-        ];
-        let done = self.connection.execute(text, values);
-        done.map(|_| known.is_none())
-            .map_err(|error| self.failed(error))
-    }
-
-    /// The newest contacts of a cell.
-    ///
-    /// # Errors
-    /// If the file cannot be read.
-    pub fn contacts(&self, cell: &str, most: u32) -> Result<Vec<KeptContact>, StoreError> {
-        let text = "SELECT number, detector, kind, link, begin_ns, onset_ns, end_ns, peak_force_n, latched,
-                    acknowledged_ns, acknowledged_by, coalesce(host, ''), archive
-                    FROM contacts WHERE cell = ?1 ORDER BY onset_ns DESC LIMIT ?2";
-        self.rows(text, params![cell, most], |row| {
-            let number: i64 = row.get(0)?;
-            Ok(KeptContact {
-                contact: ContactMessage {
-                    number: u64::try_from(number).unwrap_or(0),
-                    detector: row.get(1)?,
-                    kind: row.get(2)?,
-                    link: row.get(3)?,
-                    begin_ns: row.get(4)?,
-                    onset_ns: row.get(5)?,
-                    end_ns: row.get(6)?,
-                    peak_force_n: row.get(7)?,
-                    latched: row.get(8)?,
-                    acknowledged_ns: row.get(9)?,
-                    acknowledged_by: row.get(10)?,
-                },
-                host: row.get(11)?,
-                archive: row.get(12)?,
-            })
-        })
-    }
-
     /// Removes what is older than it is kept.
     ///
     /// # Errors
@@ -320,6 +229,7 @@ impl Store {
         let before = now_ns.saturating_sub(KEPT_NS);
         let texts = [
             "DELETE FROM contacts WHERE onset_ns < ?1",
+            "DELETE FROM heard WHERE at_ns < ?1",
             "DELETE FROM incidents WHERE last_ns < ?1",
             "DELETE FROM history WHERE hour_ns < ?1",
             "DELETE FROM labels WHERE at_ns < ?1",

@@ -114,6 +114,8 @@ pub enum Effect {
         cell: String,
         /// The publisher's life.
         instance: String,
+        /// The record's number in that life.
+        number: u64,
         /// When it was told, by the clock of the cell's computer \[ns since the epoch\].
         told_ns: i64,
         /// The record.

@@ -129,6 +129,7 @@ mod tests {
         let contact = |number| Effect::Recorded {
             cell: "a".to_owned(),
             instance: "x".to_owned(),
+            number,
             told_ns: 6_000_000_000,
             record: Record::Contact(fixture::contact(number, 5)),
         };

@@ -7,6 +7,7 @@ use tauscope_publish::message::{ContactMessage, Record};
 
 use super::*;
 use crate::fixture;
+use crate::store::Incident;
 
 const SECOND: i64 = 1_000_000_000;
 
@@ -32,14 +33,33 @@ impl Story {
         }
     }
 
-    fn try_record(&mut self, record: Record) -> Result<(), StoreError> {
+    /// What a cell told under this number.
+    fn try_record(&mut self, number: u64, record: Record) -> Result<(), StoreError> {
         let effect = Effect::Recorded {
             cell: "a".to_owned(),
             instance: "x".to_owned(),
+            number,
             told_ns: self.now_ns,
             record,
         };
         self.keeper.keep(&self.wall, &effect, self.now_ns)
+    }
+
+    /// Takes records, number by number from 1 on.
+    fn records(&mut self, records: &[Record]) {
+        for (number, record) in (1..).zip(records) {
+            self.try_record(number, record.clone()).unwrap();
+        }
+    }
+
+    /// The fleet host is started again a minute later.
+    fn again(&mut self) {
+        self.now_ns += 60 * SECOND;
+        self.keeper = Keeper::new(Store::open(&self.path).unwrap());
+    }
+
+    fn incidents(&self) -> Vec<Incident> {
+        self.keeper.store().incidents(None, 9).unwrap()
     }
 }
 
@@ -54,16 +74,79 @@ fn a_contact_is_kept_with_its_incident_or_not_at_all() {
         ..fixture::contact(1, 5)
     };
     let record = Record::Contact(contact);
-    story.try_record(record.clone()).unwrap_err();
+    story.try_record(1, record.clone()).unwrap_err();
     let store = story.keeper.store();
     assert_eq!(store.contacts("a", 9).unwrap(), []);
     other.execute_batch("DROP TRIGGER t").unwrap();
     // It is told again once the file can be written.
-    story.try_record(record).unwrap();
+    story.try_record(1, record).unwrap();
     let store = story.keeper.store();
     assert_eq!(store.contacts("a", 9).unwrap().len(), 1);
     assert_eq!(
         store.incidents(None, 9).unwrap()[0].severity,
         Severity::Critical
     );
+}
+
+/// The first contact is over and acknowledged, the second one is latched and nobody has seen it.
+fn two_contacts() -> Vec<Record> {
+    let first = fixture::contact(1, 5);
+    let ended = ContactMessage {
+        end_ns: Some(6 * SECOND),
+        latched: true,
+        ..first.clone()
+    };
+    let seen = ContactMessage {
+        acknowledged_ns: Some(7 * SECOND),
+        acknowledged_by: Some("anna".to_owned()),
+        ..ended.clone()
+    };
+    let second = ContactMessage {
+        latched: true,
+        ..fixture::contact(2, 50)
+    };
+    [first, ended, seen, second].map(Record::Contact).into()
+}
+
+#[test]
+fn what_a_cell_tells_again_after_a_restart_of_the_fleet_host_changes_no_incident() {
+    let mut story = Story::new();
+    let mut records = two_contacts();
+    records.push(Record::Change(fixture::change()));
+    story.records(&records);
+    story.now_ns += 60 * SECOND;
+    let acknowledged_ns = story.now_ns;
+    let store = story.keeper.store();
+    store.acknowledge("a", "anna", acknowledged_ns).unwrap();
+    records.push(Record::Contact(fixture::contact(3, 90)));
+    story.try_record(6, records[5].clone()).unwrap();
+    let before = story.incidents();
+    let open = before.iter().find(|one| one.kind == "contact").unwrap();
+    assert_eq!((open.closed_ns, open.acknowledged_ns), (None, None));
+    let change = before.iter().find(|one| one.kind == "change").unwrap();
+    assert_eq!((change.count, change.closed_ns), (1, Some(acknowledged_ns)));
+    story.again();
+    story.records(&records);
+    assert_eq!(story.incidents(), before);
+}
+
+#[test]
+fn an_old_contact_whose_end_is_heard_late_ends_no_incident_of_a_newer_one() {
+    let mut story = Story::new();
+    let records = two_contacts();
+    story.try_record(1, records[0].clone()).unwrap();
+    story.again();
+    // The newest is heard as it comes, and what was missed behind it.
+    for number in [4, 2, 3] {
+        let record = records[number - 1].clone();
+        story.try_record(number as u64, record).unwrap();
+    }
+    let incidents = story.incidents();
+    let stands: Vec<_> = incidents
+        .iter()
+        .map(|one| (one.count, one.closed_ns, one.acknowledged_ns))
+        .collect();
+    assert_eq!(stands, [(2, None, None)]);
+    let contacts = story.keeper.store().contacts("a", 9).unwrap();
+    assert_eq!(contacts[1].contact.acknowledged_by.as_deref(), Some("anna"));
 }

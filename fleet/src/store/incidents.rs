@@ -108,7 +108,7 @@ impl Store {
         let failed = |error| self.failed(error);
         let text =
             "SELECT id, closed_ns FROM incidents WHERE cell = ?1 AND kind = ?2 AND place = ?3
-                    ORDER BY last_ns DESC, id DESC LIMIT 1";
+                    ORDER BY closed_ns IS NOT NULL, id DESC LIMIT 1";
         let cause = params![news.cell, news.kind.as_str(), news.place];
         let last: Option<(i64, Option<i64>)> = self
             .connection
@@ -116,7 +116,11 @@ impl Store {
             .optional()
             .map_err(failed)?;
         let same = last.filter(|(_, closed_ns)| {
-            closed_ns.is_none_or(|closed_ns| news.at_ns.saturating_sub(closed_ns) < REOPEN_NS)
+            // One that was long over before is another one, too: its stamp is of a clock that was set back.
+            closed_ns.is_none_or(|closed_ns| {
+                let apart_ns = news.at_ns.saturating_sub(closed_ns);
+                apart_ns.saturating_abs() < REOPEN_NS
+            })
         });
         if let Some((id, closed_ns)) = same {
             let text = "UPDATE incidents SET count = count + 1, last_ns = max(last_ns, ?2), words = ?3,

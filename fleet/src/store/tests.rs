@@ -49,6 +49,19 @@ fn a_cause_that_comes_again_within_ten_minutes_is_the_same_incident() {
 }
 
 #[test]
+fn a_cause_that_is_told_with_a_stamp_of_long_before_its_end_is_another_incident() {
+    let (_folder, store) = store();
+    store.raise(&news("link5", 600, Severity::Notice)).unwrap();
+    store.close("a", Kind::Contact, "link5", 601 * MIN).unwrap();
+    store.raise(&news("link5", 60, Severity::Notice)).unwrap();
+    // The open one is gone on with, whatever its stamps.
+    store.raise(&news("link5", 61, Severity::Notice)).unwrap();
+    let all = store.incidents(None, 10).unwrap();
+    let counts: Vec<_> = all.iter().map(|one| (one.count, one.reopened)).collect();
+    assert_eq!(counts, [(2, 0), (1, 0)]);
+}
+
+#[test]
 fn a_contact_that_lasts_when_its_run_ends_is_over_unless_it_is_latched() {
     let (_folder, store) = store();
     store.raise(&news("link5", 0, Severity::Notice)).unwrap();
@@ -69,16 +82,19 @@ fn a_contact_that_lasts_when_its_run_ends_is_over_unless_it_is_latched() {
 fn a_contact_is_kept_once_with_all_that_becomes_known_of_it() {
     let (_folder, store) = store();
     let mut contact = fixture::contact(1, 5);
-    assert!(store.contact("a", "x", &contact, "pc", None).unwrap());
+    let keep = |contact: &_| store.contact("a", "x", contact, "pc", None).unwrap();
+    assert_eq!(keep(&contact), Said::New);
+    let begun = contact.clone();
     contact.end_ns = Some(6_000_000_000);
     contact.acknowledged_by = Some("anna".to_owned());
-    assert!(!store.contact("a", "x", &contact, "pc", None).unwrap());
+    assert_eq!(keep(&contact), Said::More);
+    // What is told again says nothing, and takes nothing back.
+    assert_eq!(keep(&contact), Said::Nothing);
+    assert_eq!(keep(&begun), Said::Nothing);
     // Of another life it is another one.
-    assert!(
-        store
-            .contact("a", "y", &fixture::contact(1, 9), "pc", Some("a.mcap"))
-            .unwrap()
-    );
+    let other = fixture::contact(1, 9);
+    let said = store.contact("a", "y", &other, "pc", Some("a.mcap"));
+    assert_eq!(said.unwrap(), Said::New);
     let kept = store.contacts("a", 10).unwrap();
     assert_eq!(kept.len(), 2);
     assert_eq!(kept[0].archive.as_deref(), Some("a.mcap"));
@@ -186,16 +202,19 @@ fn a_label_is_kept_with_the_contact_and_the_incident_that_it_is_about() {
 }
 
 #[test]
-fn a_file_of_before_gets_a_table_of_labels() {
+fn a_file_of_before_gets_the_tables_that_it_lacks() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("fleet.sqlite");
     let store = Store::open(&path).unwrap();
     store
         .connection
-        .execute_batch("DROP TABLE labels;")
+        .execute_batch("DROP TABLE labels; DROP TABLE heard;")
         .unwrap();
     drop(store);
-    assert_eq!(Store::open(&path).unwrap().labels(None, 1).unwrap(), []);
+    let again = Store::open(&path).unwrap();
+    assert_eq!(again.labels(None, 1).unwrap(), []);
+    assert!(again.hear("a", "x", 1, 0).unwrap());
+    assert!(!again.hear("a", "x", 1, 9).unwrap());
 }
 
 #[test]

@@ -185,6 +185,7 @@ impl Watched {
         effects.push(Effect::Recorded {
             cell: name.to_owned(),
             instance: message.instance,
+            number: message.number,
             told_ns: message.sent_ns,
             record: message.record,
         });
