@@ -343,7 +343,7 @@ impl Worker {
     fn ask(&self, effect: &Effect) {
         let (selector, read): (String, Read) = match effect {
             Effect::AskStatus { cell } => (format!("{cell}/status"), |key, payload, _| {
-                vec![inbox::status(key, payload)]
+                vec![inbox::answer(key, payload)]
             }),
             Effect::AskRecords { cell, after } => (
                 format!("{cell}/records?after={after}"),

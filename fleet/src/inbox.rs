@@ -32,15 +32,21 @@ pub fn token(key: &str) -> Option<(String, String)> {
 
 /// What a status says.
 pub fn status(key: &str, payload: &[u8]) -> Event {
-    let event = |cell: String| {
-        let status: StatusMessage = read(payload, MAX_STATUS_BYTES)?;
-        check_status(&status)?;
-        let status = Box::new(status);
-        Ok(Event::Status { cell, status })
-    };
-    cell_of(key, "/status")
-        .and_then(event)
-        .unwrap_or_else(Event::Refused)
+    let event = |(cell, status)| Event::Status { cell, status };
+    status_of(key, payload).map_or_else(Event::Refused, event)
+}
+
+/// What the answer to a question for the status says.
+pub fn answer(key: &str, payload: &[u8]) -> Event {
+    let event = |(cell, status)| Event::Answer { cell, status };
+    status_of(key, payload).map_or_else(Event::Refused, event)
+}
+
+fn status_of(key: &str, payload: &[u8]) -> Result<(String, Box<StatusMessage>), Refusal> {
+    let cell = cell_of(key, "/status")?;
+    let status: StatusMessage = read(payload, MAX_STATUS_BYTES)?;
+    check_status(&status)?;
+    Ok((cell, Box::new(status)))
 }
 
 /// What an answer to a question for the clock says, which was asked and came back at these times \[ns since the epoch\].

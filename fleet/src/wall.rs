@@ -65,6 +65,13 @@ pub enum Event {
         /// What it says.
         status: Box<StatusMessage>,
     },
+    /// How a cell fares, or fared, when it was asked: the answer may come behind what it has said since.
+    Answer {
+        /// The cell.
+        cell: String,
+        /// What it says.
+        status: Box<StatusMessage>,
+    },
     /// A contact or a change of the arm.
     Record {
         /// The cell.
@@ -221,6 +228,13 @@ impl Wall {
                     return effects;
                 };
                 watched.status(&cell, *status, now, &mut effects);
+                cell
+            }
+            Event::Answer { cell, status } => {
+                let Some(watched) = self.cell(&cell) else {
+                    return effects;
+                };
+                watched.answer(&cell, *status, now, &mut effects);
                 cell
             }
             Event::Record { cell, record } => {

@@ -82,7 +82,21 @@ impl Watched {
         self.status.as_ref().map(|(status, _)| status)
     }
 
-    /// Takes a status. One that answers a question late must not replace a newer one.
+    /// Takes a status that the cell was asked for. What it has said meanwhile by itself is newer.
+    pub fn answer(
+        &mut self,
+        name: &str,
+        status: StatusMessage,
+        now: Now,
+        effects: &mut Vec<Effect>,
+    ) {
+        let known = self.newest().map(|known| known.instance.as_str());
+        if known != Some(status.instance.as_str()) {
+            self.status(name, status, now, effects);
+        }
+    }
+
+    /// Takes a status. They come as they were sent, so its stamp does not matter: the cell's clock may have been set back.
     pub fn status(
         &mut self,
         name: &str,
@@ -90,16 +104,8 @@ impl Watched {
         now: Now,
         effects: &mut Vec<Effect>,
     ) {
-        let known = self
-            .newest()
-            .map(|known| (known.instance.clone(), known.sent_ns));
-        let same_life = known
-            .as_ref()
-            .is_some_and(|(life, _)| *life == status.instance);
-        if same_life && known.is_some_and(|(_, sent_ns)| status.sent_ns <= sent_ns) {
-            return;
-        }
-        if !same_life {
+        let known = self.newest().map(|known| known.instance.as_str());
+        if known != Some(status.instance.as_str()) {
             // Another publisher speaks: the one whose token is there is right.
             let lives = &self.lives;
             let ours = self

@@ -78,9 +78,6 @@ fn a_cell_is_running_only_with_token_status_samples_and_a_detector_that_judges()
     story.is("never seen");
     story.alive("x").is("unknown");
     story.status(|_| {}).is("running");
-    story.status(|status| status.alarm.state = AlarmState::NotReady);
-    // The same instant: an older or equal message replaces nothing.
-    story.is("running").wait(1);
     story
         .status(|status| status.alarm.state = AlarmState::NotReady)
         .is("not ready");
@@ -95,6 +92,36 @@ fn a_cell_is_running_only_with_token_status_samples_and_a_detector_that_judges()
     });
     story.is("not ready");
     story.wait(1).status(|_| {}).is("running");
+}
+
+#[test]
+fn an_answer_that_comes_late_replaces_nothing_that_the_cell_has_said_since() {
+    let mut story = Story::new(&[]);
+    let answer = |state: AlarmState| {
+        let mut status = fixture::status("x", 0);
+        status.alarm.state = state;
+        Event::Answer {
+            cell: "a".to_owned(),
+            status: Box::new(status),
+        }
+    };
+    story.alive("x").tell(answer(AlarmState::NotReady));
+    story.is("not ready").wait(1);
+    story.status(|_| {}).is("running");
+    story.tell(answer(AlarmState::NotReady)).is("running");
+}
+
+#[test]
+fn a_cell_whose_clock_is_set_back_is_heard_on() {
+    let mut story = Story::new(&[]);
+    story.alive("x").status(|_| {}).is("running");
+    for _ in 0..10 {
+        story.wait(1_000).status(|status| {
+            status.sent_ns -= 3_600_000_000_000;
+            status.alarm.state = AlarmState::Collision;
+        });
+        story.is("stopped by latch");
+    }
 }
 
 #[test]

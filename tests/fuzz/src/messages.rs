@@ -37,6 +37,7 @@ pub fn status(bytes: &[u8]) {
     let mut events = inbox::records(&key, payload);
     events.push(inbox::record(&key, payload));
     events.push(inbox::status(&key, payload));
+    events.push(inbox::answer(&key, payload));
     for event in events {
         wall.take(event, now);
     }
