@@ -6,6 +6,7 @@
 
 mod cell;
 mod latch;
+mod life;
 mod snapshot;
 mod state;
 #[cfg(test)]

@@ -2,10 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-use tauscope_bus::clock::{ClockFilter, Offset};
+use tauscope_bus::clock::Offset;
 use tauscope_publish::message::{AlarmState, RecordMessage, StatusMessage};
 
 use super::latch::Latch;
+use super::life::Life;
 use super::snapshot::{CellView, ResidualView};
 use super::state::{Severity, StaleWhy, State, UnknownWhy};
 use super::{CLOCK_LIMIT_NS, Effect, Now, PARTING_MS, STALE_AFTER_MS};
@@ -16,10 +17,6 @@ const MAX_LIVES: usize = 8;
 /// Minutes of the residual that are kept. Resolution: an hour on the small curve of a tile.
 const MINUTES: usize = 60;
 const NS_PER_MS: i64 = 1_000_000;
-/// How often a cell is asked for its clock \[ms\], and how often until it was so many times.
-/// Resolution: traffic, against how soon a clock that was set is told of; a first burst as of NTP.
-const CLOCK_EVERY_MS: u64 = 10_000;
-const CLOCK_BURST: (u64, usize) = (900, 4);
 
 /// A cell.
 #[derive(Debug, Default)]
@@ -28,18 +25,14 @@ pub struct Watched {
     pub expected: bool,
     /// When it was seen last, in an earlier life of the fleet host \[ns since the epoch\].
     remembered_ns: Option<i64>,
+    /// Those whose tokens are there.
     lives: BTreeSet<String>,
+    /// Those that have told a status: one more than [`MAX_LIVES`] at most.
+    heard: BTreeMap<String, Life>,
     /// When its last token went.
     gone: Option<Now>,
     status: Option<(StatusMessage, Now)>,
     latch: Latch,
-    /// The last number of a record, of the life that the status tells of.
-    records: u64,
-    /// Lost samples by stage, as last told.
-    lost: BTreeMap<String, u64>,
-    clock: ClockFilter,
-    /// When it was asked for its clock \[ms\].
-    clock_asked: Option<u64>,
     minutes: VecDeque<f64>,
     minute: Option<i64>,
     /// The state as of the last settling, and since when, if this host saw it begin \[ns since the epoch\].
@@ -104,60 +97,23 @@ impl Watched {
         now: Now,
         effects: &mut Vec<Effect>,
     ) {
-        let known = self.newest().map(|known| known.instance.as_str());
-        if known != Some(status.instance.as_str()) {
-            // Another publisher speaks: the one whose token is there is right.
-            let lives = &self.lives;
-            let ours = self
-                .newest()
-                .is_some_and(|known| lives.contains(&known.instance));
-            if ours && !lives.contains(&status.instance) {
-                return;
-            }
-            self.records = 0;
-            self.lost.clear();
-            self.clock = ClockFilter::default();
-            self.clock_asked = None;
+        let lives = &self.lives;
+        let is_ours = |life: &String| lives.contains(life);
+        let known = self.newest().map(|known| &known.instance);
+        let is_same = known.is_some_and(|known| *known == status.instance);
+        // Another publisher speaks: the one whose token is there is right.
+        if !is_same && known.is_some_and(is_ours) && !is_ours(&status.instance) {
+            return;
         }
-        let every = match CLOCK_BURST {
-            (soon_ms, times) if self.clock.len() < times => soon_ms,
-            _ => CLOCK_EVERY_MS,
-        };
-        let is_due = |asked: u64| now.running_ms.saturating_sub(asked) >= every;
-        if self.clock_asked.is_none_or(is_due) && !status.ended {
-            self.clock_asked = Some(now.running_ms);
-            let cell = name.to_owned();
-            effects.push(Effect::AskClock { cell });
+        if self.heard.len() >= MAX_LIVES && !self.heard.contains_key(&status.instance) {
+            self.heard.retain(|life, _| lives.contains(life));
         }
-        self.count_losses(name, &status, effects);
-        if status.last_record > self.records {
-            effects.push(Effect::AskRecords {
-                cell: name.to_owned(),
-                after: self.records,
-            });
-        }
+        let life = self.heard.entry(status.instance.clone()).or_default();
+        life.take(name, &status, now, effects);
         self.note_residual(&status);
         self.latch
             .take(&status.alarm, &status.instance, now.unix_ns);
         self.status = Some((status, now));
-    }
-
-    fn count_losses(&mut self, name: &str, status: &StatusMessage, effects: &mut Vec<Effect>) {
-        for stage in &status.stages {
-            let known = self.lost.entry(stage.stage.clone()).or_default();
-            // A stage that was started again counts from 0.
-            let more = stage.dropped.saturating_sub(*known);
-            *known = stage.dropped;
-            if more > 0 {
-                effects.push(Effect::Lost {
-                    cell: name.to_owned(),
-                    stage: stage.stage.clone(),
-                    samples: more,
-                });
-            }
-        }
-        let told = |stage: &String| status.stages.iter().any(|told| told.stage == *stage);
-        self.lost.retain(|stage, _| told(stage));
     }
 
     /// One value a minute, for the curve.
@@ -179,14 +135,15 @@ impl Watched {
 
     /// Takes a record.
     pub fn record(&mut self, name: &str, message: RecordMessage, effects: &mut Vec<Effect>) {
-        let known = self.newest().map(|status| status.instance.as_str());
-        if known.is_some_and(|known| known != message.instance) {
+        if self.status.is_some() && !self.speaks(&message.instance) {
             // Of a life that is over, or about to begin: its status comes first.
             return;
         }
         // With a hole before it, the status that follows makes somebody ask.
-        if message.number == self.records + 1 {
-            self.records = message.number;
+        if let Some(life) = self.heard.get_mut(&message.instance)
+            && message.number == life.records.saturating_add(1)
+        {
+            life.records = message.number;
         }
         effects.push(Effect::Recorded {
             cell: name.to_owned(),
@@ -197,21 +154,27 @@ impl Watched {
         });
     }
 
+    /// Whether a life has told a status, and it is the newest or its token is there.
+    fn speaks(&self, instance: &str) -> bool {
+        let known = self.newest();
+        let is_newest = known.is_some_and(|status| status.instance == instance);
+        is_newest || (self.lives.contains(instance) && self.heard.contains_key(instance))
+    }
+
     /// What its clock says.
     pub fn clock(&mut self, instance: &str, offset: Offset, now: Now) {
-        let known = self.newest();
-        if known.is_some_and(|status| status.instance == instance) {
-            self.clock.note(offset, now.running_ms);
+        if let Some(life) = self.heard.get_mut(instance) {
+            life.clock.note(offset, now.running_ms);
         }
     }
 
     /// What is kept of the records has come; what is older is gone.
     pub fn all_records(&mut self, instance: &str, number: u64) {
-        if self
-            .newest()
-            .is_some_and(|status| status.instance == instance)
-        {
-            self.records = self.records.max(number);
+        if !self.speaks(instance) {
+            return;
+        }
+        if let Some(life) = self.heard.get_mut(instance) {
+            life.records = life.records.max(number);
         }
     }
 
@@ -325,7 +288,9 @@ impl Watched {
             _ => self.settled.and_then(|(_, since_ns)| since_ns),
         };
         let age_ms = |at: &Now| now.running_ms.saturating_sub(at.running_ms);
-        let clock = self.clock.best(now.running_ms);
+        let newest = self.newest().map(|status| &status.instance);
+        let life = newest.and_then(|instance| self.heard.get(instance));
+        let clock = life.and_then(|life| life.clock.best(now.running_ms));
         let ms = |ns: i64| ns as f64 / NS_PER_MS as f64;
         let status_age_ms = self.status.as_ref().map(|(_, at)| age_ms(at));
         let sample_age_ms = self
@@ -346,10 +311,7 @@ impl Watched {
             clock_ahead_ms: clock.map(|clock| ms(clock.ahead_ns)),
             clock_uncertainty_ms: clock.map(|clock| ms(clock.uncertainty_ns)),
             clock_is_off: clock.is_some_and(|clock| clock.exceeds(CLOCK_LIMIT_NS)),
-            lost_samples: self
-                .lost
-                .values()
-                .fold(0u64, |sum, lost| sum.saturating_add(*lost)),
+            lost_samples: life.map_or(0, Life::lost_samples),
             residual: self.newest().and_then(ResidualView::of),
             curve: self.minutes.iter().copied().collect(),
             trend: Vec::new(),

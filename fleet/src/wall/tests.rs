@@ -325,8 +325,43 @@ fn samples_that_are_lost_are_counted_over_restarts() {
         Effect::Lost { samples, .. } => Some(*samples),
         _ => None,
     });
-    assert_eq!(samples.collect::<Vec<_>>(), [3, 7]);
+    // The first status of a life says what was lost before anybody listened.
+    assert_eq!(samples.collect::<Vec<_>>(), [7]);
     assert_eq!(story.wall.snapshot().cells[0].lost_samples, 10);
+}
+
+#[test]
+fn two_publishers_of_one_name_tell_their_losses_and_records_once() {
+    let mut story = Story::new(&[]);
+    story.alive("x").alive("y");
+    let number_of_asked = |story: &Story| {
+        let asks = |effect: &&Effect| {
+            matches!(
+                effect,
+                Effect::AskRecords { .. } | Effect::Lost { .. } | Effect::AskClock { .. }
+            )
+        };
+        story.effects.iter().filter(asks).count()
+    };
+    for _ in 0..5 {
+        for life in ["x", "y"] {
+            story.status(|status| {
+                status.instance = life.to_owned();
+                status.stages[0].dropped = 5;
+                status.last_record = 7;
+            });
+            for number in 1..=7 {
+                let record = fixture::record(life, number, fixture::contact(number, 5));
+                story.tell(Event::Record {
+                    cell: "a".to_owned(),
+                    record: Box::new(record),
+                });
+            }
+        }
+    }
+    // Each is asked for its records and its clock.
+    assert_eq!(number_of_asked(&story), 4, "{:?}", story.effects);
+    assert_eq!(story.wall.snapshot().cells[0].lost_samples, 5);
 }
 
 #[test]
