@@ -105,9 +105,13 @@ impl Hub {
         let mut keeper = store.map(Keeper::new);
         if let Some(keeper) = &mut keeper {
             let remembered = keeper.remembered()?;
-            keeper.learn(remembered.iter().map(|(cell, _)| cell.as_str()), unix_ns())?;
-            for (cell, seen_ns) in remembered {
-                wall.remember(&cell, seen_ns, keeper.store().latched(&cell)?);
+            keeper.learn(
+                remembered.iter().map(|known| known.cell.as_str()),
+                unix_ns(),
+            )?;
+            for known in remembered {
+                let latched = keeper.store().latched(&known.cell)?;
+                wall.remember(known, latched);
             }
         }
         let begin = Instant::now();

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use tauscope_publish::message::{ChangeMessage, ContactMessage, Record, StatusMessage};
 
 use crate::store::{JointNormal, Kind, News, Said, Store, StoreError};
-use crate::wall::{Effect, ResidualView, Severity, Snapshot, State, UnknownWhy, Wall};
+use crate::wall::{Effect, Remembered, ResidualView, Severity, Snapshot, State, UnknownWhy, Wall};
 use crate::words;
 
 const MINUTE_NS: i64 = 60_000_000_000;
@@ -53,7 +53,7 @@ impl Keeper {
     ///
     /// # Errors
     /// If the file cannot be read.
-    pub fn remembered(&self) -> Result<Vec<(String, i64)>, StoreError> {
+    pub fn remembered(&self) -> Result<Vec<Remembered>, StoreError> {
         self.store.cells()
     }
 
@@ -64,6 +64,14 @@ impl Keeper {
     pub fn keep(&mut self, wall: &Wall, effect: &Effect, now_ns: i64) -> Result<(), StoreError> {
         match effect {
             Effect::Changed { cell, now, before } => self.changed(cell, *before, *now, now_ns),
+            Effect::Missing { cell, now } => {
+                let mut news = silence(cell, *now, now_ns);
+                news.words += "; it was lost before this fleet host started";
+                if self.store.revise(&news)? {
+                    return Ok(());
+                }
+                self.store.raise(&news)
+            }
             Effect::Recorded {
                 cell,
                 instance,
@@ -116,19 +124,17 @@ impl Keeper {
         now_ns: i64,
     ) -> Result<(), StoreError> {
         match now {
+            State::Ended { .. } => self.store.ended(cell, Some(now_ns))?,
+            State::Unknown { .. } => {}
+            _ => self.store.ended(cell, None)?,
+        }
+        match now {
             // On its way to something else.
             State::Unknown { why } if why != UnknownWhy::TwoPublishers => Ok(()),
             State::Stale { .. } | State::Unknown { .. } => {
-                let news = News {
-                    cell: cell.to_owned(),
-                    kind: Kind::Silence,
-                    place: String::new(),
-                    severity: now.severity(),
-                    words: format!("{}: {}", now.words(), now.reason()),
-                    at_ns: now_ns,
-                };
+                let news = silence(cell, now, now_ns);
                 if matches!(before, State::Stale { .. }) {
-                    self.store.revise(&news)
+                    self.store.revise(&news).map(|_| ())
                 } else {
                     self.store.raise(&news)
                 }
@@ -289,6 +295,17 @@ impl Keeper {
                 view.residual = Some(against);
             }
         }
+    }
+}
+
+fn silence(cell: &str, now: State, now_ns: i64) -> News {
+    News {
+        cell: cell.to_owned(),
+        kind: Kind::Silence,
+        place: String::new(),
+        severity: now.severity(),
+        words: format!("{}: {}", now.words(), now.reason()),
+        at_ns: now_ns,
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! All times are ns since the epoch. What is older than [`KEPT_NS`] is removed once an hour.
 
+mod cells;
 mod contacts;
 mod history;
 mod incidents;
@@ -13,7 +14,7 @@ mod tests;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use rusqlite::{Connection, Transaction, TransactionBehavior, params};
+use rusqlite::{Connection, Transaction, TransactionBehavior};
 
 pub use contacts::{KeptContact, Said};
 pub use history::{Day, JointNormal};
@@ -128,7 +129,12 @@ impl Store {
         connection
             .execute_batch("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;")
             .map_err(failed)?;
-        for (name, tables) in [("labels", labels::TABLE), ("heard", contacts::TABLES)] {
+        let later = [
+            ("labels", labels::TABLE),
+            ("heard", contacts::TABLES),
+            ("ended", cells::TABLE),
+        ];
+        for (name, tables) in later {
             let text = "SELECT count(*) FROM sqlite_schema WHERE name = ?1";
             let has: bool = connection
                 .query_row(text, [name], |row| row.get(0))
@@ -198,29 +204,6 @@ impl Store {
         StoreError::Sqlite { path, source }
     }
 
-    /// A cell was seen.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
-    pub fn seen(&self, cell: &str, at_ns: i64, host: &str, robot: &str) -> Result<(), StoreError> {
-        let text = "INSERT INTO cells VALUES (?1, ?2, ?3, ?4) ON CONFLICT (cell) DO UPDATE
-                    SET seen_ns = ?2, host = ?3, robot = ?4";
-        let done = self
-            .connection
-            .execute(text, params![cell, at_ns, host, robot]);
-        done.map(|_| ()).map_err(|error| self.failed(error))
-    }
-
-    /// The cells that were ever seen, and when last.
-    ///
-    /// # Errors
-    /// If the file cannot be read.
-    pub fn cells(&self) -> Result<Vec<(String, i64)>, StoreError> {
-        self.rows("SELECT cell, seen_ns FROM cells ORDER BY cell", [], |row| {
-            Ok((row.get(0)?, row.get(1)?))
-        })
-    }
-
     /// Removes what is older than it is kept.
     ///
     /// # Errors
@@ -234,6 +217,7 @@ impl Store {
             "DELETE FROM history WHERE hour_ns < ?1",
             "DELETE FROM labels WHERE at_ns < ?1",
             "DELETE FROM cells WHERE seen_ns < ?1",
+            "DELETE FROM ended WHERE at_ns < ?1",
         ];
         for text in texts {
             let done = self.connection.execute(text, [before]);

@@ -17,6 +17,7 @@ use std::collections::BTreeMap;
 use tauscope_bus::clock::Offset;
 use tauscope_publish::message::{Record, RecordMessage, StatusMessage};
 
+pub use cell::Remembered;
 use cell::Watched;
 pub use snapshot::{CellView, ResidualView, Snapshot, Totals};
 pub use state::{Severity, StaleWhy, State, UnknownWhy};
@@ -29,6 +30,9 @@ pub const PARTING_MS: u64 = 200;
 /// A status comes once a second: three that are missing are a silence \[ms\].
 /// Resolution: a pause of a busy host is shorter, and what is cut off is known within 5 s.
 pub const STALE_AFTER_MS: u64 = 3_500;
+/// So long after its start a fleet host calls a cell of an earlier life lost that is not there \[ms\].
+/// Resolution: tokens and statuses are there within seconds of the connection.
+pub const BACK_AFTER_MS: u64 = 10_000;
 /// Clocks that differ by more are told of \[ns\].
 /// Resolution: who lays the records of two cells side by side reads tenths of a second.
 pub const CLOCK_LIMIT_NS: i64 = 100_000_000;
@@ -116,6 +120,13 @@ pub enum Effect {
         /// What it is.
         now: State,
     },
+    /// A cell of an earlier life of the fleet host was lost before this one began.
+    Missing {
+        /// The cell.
+        cell: String,
+        /// What it is.
+        now: State,
+    },
     /// A contact or a change was told, for the first time or with more known of it.
     Recorded {
         /// The cell.
@@ -161,7 +172,10 @@ impl Effect {
     /// Whether a fleet host keeps it.
     pub fn is_kept(&self) -> bool {
         match self {
-            Self::Changed { .. } | Self::Recorded { .. } | Self::Lost { .. } => true,
+            Self::Changed { .. }
+            | Self::Missing { .. }
+            | Self::Recorded { .. }
+            | Self::Lost { .. } => true,
             Self::AskRecords { .. } | Self::AskStatus { .. } | Self::AskClock { .. } => false,
         }
     }
@@ -174,6 +188,8 @@ pub struct Wall {
     refused: BTreeMap<&'static str, u64>,
     reached: usize,
     now: Now,
+    /// It was looked which cells of an earlier life are missing.
+    has_looked: bool,
 }
 
 impl Wall {
@@ -186,11 +202,11 @@ impl Wall {
         wall
     }
 
-    /// A cell that was seen in an earlier life of the fleet host, last at `last_ns`. `latched`: the life of its publisher
-    /// that was latched, and since when \[ns since the epoch\].
-    pub fn remember(&mut self, cell: &str, last_ns: i64, latched: Option<(String, i64)>) {
-        if let Some(cell) = self.cell(cell) {
-            cell.remember(last_ns, latched);
+    /// A cell that was seen in an earlier life of the fleet host. `latched`: the life of its publisher that was
+    /// latched, and since when \[ns since the epoch\].
+    pub fn remember(&mut self, known: Remembered, latched: Option<(String, i64)>) {
+        if let Some(cell) = self.cell(&known.cell) {
+            cell.remember(known, latched);
         }
     }
 
@@ -278,9 +294,13 @@ impl Wall {
         self.now = now;
         let reached = self.reached;
         let cells = self.cells.iter_mut();
-        cells
-            .filter_map(|(name, watched)| watched.settle(name, reached, now))
-            .collect()
+        let settled = cells.filter_map(|(name, watched)| watched.settle(name, reached, now));
+        let mut effects: Vec<Effect> = settled.collect();
+        if now.running_ms >= BACK_AFTER_MS && !std::mem::replace(&mut self.has_looked, true) {
+            let cells = self.cells.iter();
+            effects.extend(cells.filter_map(|(name, watched)| watched.missing(name)));
+        }
+        effects
     }
 
     /// The state of a cell.

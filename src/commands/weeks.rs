@@ -91,7 +91,10 @@ fn notes(args: &Args) -> Result<BTreeMap<String, Vec<Note>>, Failure> {
     let read = || {
         let store = Store::open(path)?;
         let cells = store.cells()?.into_iter();
-        let notes = cells.map(|(cell, _)| Ok((cell.clone(), store.notes(&cell, u32::MAX)?)));
+        let notes = cells.map(|known| {
+            let notes = store.notes(&known.cell, u32::MAX)?;
+            Ok((known.cell, notes))
+        });
         notes.collect::<Result<_, StoreError>>()
     };
     read().map_err(|error: StoreError| Failure::rejected(error.to_string()))

@@ -8,6 +8,7 @@ use tauscope_publish::message::{ContactMessage, Record};
 use super::*;
 use crate::fixture;
 use crate::store::Incident;
+use crate::wall::StaleWhy;
 
 const SECOND: i64 = 1_000_000_000;
 
@@ -50,6 +51,16 @@ impl Story {
         for (number, record) in (1..).zip(records) {
             self.try_record(number, record.clone()).unwrap();
         }
+    }
+
+    fn keep(&mut self, effect: &Effect) {
+        self.keeper.keep(&self.wall, effect, self.now_ns).unwrap();
+    }
+
+    /// The cell's state changes.
+    fn change(&mut self, before: State, now: State) {
+        let cell = "a".to_owned();
+        self.keep(&Effect::Changed { cell, before, now });
     }
 
     /// The fleet host is started again a minute later.
@@ -149,4 +160,40 @@ fn an_old_contact_whose_end_is_heard_late_ends_no_incident_of_a_newer_one() {
     assert_eq!(stands, [(2, None, None)]);
     let contacts = story.keeper.store().contacts("a", 9).unwrap();
     assert_eq!(contacts[1].contact.acknowledged_by.as_deref(), Some("anna"));
+}
+
+#[test]
+fn a_cell_that_was_lost_while_the_fleet_host_was_down_is_one_incident() {
+    let mut story = Story::new();
+    let now = State::Stale {
+        since_ns: 5,
+        why: StaleWhy::Token,
+    };
+    let cell = "a".to_owned();
+    let missing = Effect::Missing { cell, now };
+    for _ in 0..3 {
+        story.keep(&missing);
+        story.again();
+    }
+    let incidents = story.incidents();
+    assert_eq!((incidents.len(), incidents[0].count), (1, 1));
+    assert_eq!(incidents[0].kind, "silence");
+    // It comes back.
+    story.change(now, State::Running);
+    assert!(story.incidents()[0].closed_ns.is_some());
+}
+
+#[test]
+fn a_run_that_ended_in_order_is_known_to_have_ended_until_another_one_begins() {
+    let mut story = Story::new();
+    let seen = |story: &Story| story.keeper.store().seen("a", 1, "pc", "arm");
+    seen(&story).unwrap();
+    let ended = |story: &Story| story.keeper.remembered().unwrap()[0].ended_ns;
+    let is_over = State::Ended { since_ns: 5 };
+    story.change(State::Running, is_over);
+    let ended_ns = story.now_ns;
+    story.again();
+    assert_eq!(ended(&story), Some(ended_ns));
+    story.change(is_over, State::Running);
+    assert_eq!(ended(&story), None);
 }

@@ -146,17 +146,18 @@ impl Store {
         Ok(())
     }
 
-    /// More is known of the open incident of this cause: it did not come again.
+    /// More is known of the open incident of this cause: it did not come again. Whether there is one.
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn revise(&self, news: &News) -> Result<(), StoreError> {
+    pub fn revise(&self, news: &News) -> Result<bool, StoreError> {
         let text = "UPDATE incidents SET words = ?4, severity = max(severity, ?5)
                     WHERE cell = ?1 AND kind = ?2 AND place = ?3 AND closed_ns IS NULL";
         let (kind, severity) = (news.kind.as_str(), number(news.severity));
         let values = params![news.cell, kind, news.place, news.words, severity];
         let done = self.connection.execute(text, values);
-        done.map(|_| ()).map_err(|error| self.failed(error))
+        done.map(|rows| rows > 0)
+            .map_err(|error| self.failed(error))
     }
 
     /// The cause is over.

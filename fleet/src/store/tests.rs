@@ -1,6 +1,6 @@
 use super::*;
 use crate::fixture;
-use crate::wall::Severity;
+use crate::wall::{Remembered, Severity};
 
 const MIN: i64 = 60_000_000_000;
 const DAY: i64 = 1440 * MIN;
@@ -142,7 +142,12 @@ fn what_is_old_goes_and_the_file_is_read_again() {
     store.raise(&news("link5", 0, Severity::Notice)).unwrap();
     store.prune(KEPT_NS + 10).unwrap();
     let again = store.again().unwrap();
-    assert_eq!(again.cells().unwrap(), [("b".to_owned(), KEPT_NS)]);
+    let b = Remembered {
+        cell: "b".to_owned(),
+        seen_ns: KEPT_NS,
+        ended_ns: None,
+    };
+    assert_eq!(again.cells().unwrap(), [b]);
     assert_eq!(again.incidents(None, 5).unwrap(), []);
 }
 
@@ -208,11 +213,12 @@ fn a_file_of_before_gets_the_tables_that_it_lacks() {
     let store = Store::open(&path).unwrap();
     store
         .connection
-        .execute_batch("DROP TABLE labels; DROP TABLE heard;")
+        .execute_batch("DROP TABLE labels; DROP TABLE heard; DROP TABLE ended;")
         .unwrap();
     drop(store);
     let again = Store::open(&path).unwrap();
     assert_eq!(again.labels(None, 1).unwrap(), []);
+    assert_eq!(again.cells().unwrap(), []);
     assert!(again.hear("a", "x", 1, 0).unwrap());
     assert!(!again.hear("a", "x", 1, 9).unwrap());
 }

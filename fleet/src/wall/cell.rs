@@ -18,13 +18,24 @@ const MAX_LIVES: usize = 8;
 const MINUTES: usize = 60;
 const NS_PER_MS: i64 = 1_000_000;
 
+/// A cell of an earlier life of the fleet host.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Remembered {
+    /// Its name.
+    pub cell: String,
+    /// When it was seen last \[ns since the epoch\].
+    pub seen_ns: i64,
+    /// When its run ended in order, if that was the last that was heard of it \[ns since the epoch\].
+    pub ended_ns: Option<i64>,
+}
+
 /// A cell.
 #[derive(Debug, Default)]
 pub struct Watched {
     /// Whether it was named at the start.
     pub expected: bool,
-    /// When it was seen last, in an earlier life of the fleet host \[ns since the epoch\].
-    remembered_ns: Option<i64>,
+    /// What is known of an earlier life of the fleet host.
+    remembered: Option<Remembered>,
     /// Those whose tokens are there.
     lives: BTreeSet<String>,
     /// Those that have told a status: one more than [`MAX_LIVES`] at most.
@@ -40,10 +51,10 @@ pub struct Watched {
 }
 
 impl Watched {
-    /// In an earlier life of the fleet host it was seen last at `last_ns`, and a life of its publisher was latched since
-    /// then \[ns since the epoch\].
-    pub fn remember(&mut self, last_ns: i64, latched: Option<(String, i64)>) {
-        self.remembered_ns = Some(last_ns);
+    /// What is known of an earlier life of the fleet host; a life of its publisher was latched since then
+    /// \[ns since the epoch\].
+    pub fn remember(&mut self, known: Remembered, latched: Option<(String, i64)>) {
+        self.remembered = Some(known);
         self.latch.remember(latched);
     }
 
@@ -89,7 +100,7 @@ impl Watched {
         }
     }
 
-    /// Takes a status. They come as they were sent, so its stamp does not matter: the cell's clock may have been set back.
+    /// Takes a status. They come as they were sent, so stamps do not matter: the cell's clock may have been set back.
     pub fn status(
         &mut self,
         name: &str,
@@ -250,14 +261,27 @@ impl Watched {
                 why: UnknownWhy::NoStatus,
             };
         }
-        let gone_ns = self.gone.map(|gone| gone.unix_ns);
-        match gone_ns.or(self.remembered_ns) {
-            Some(since_ns) => State::Stale {
-                since_ns,
-                why: StaleWhy::Token,
-            },
-            None => State::NeverSeen,
+        let stale = |since_ns| State::Stale {
+            since_ns,
+            why: StaleWhy::Token,
+        };
+        match (self.gone, &self.remembered) {
+            (Some(gone), _) => stale(gone.unix_ns),
+            (None, Some(known)) => known
+                .ended_ns
+                .map_or(stale(known.seen_ns), |since_ns| State::Ended { since_ns }),
+            (None, None) => State::NeverSeen,
         }
+    }
+
+    /// Whether it was lost before this life of the fleet host began.
+    pub fn missing(&self, name: &str) -> Option<Effect> {
+        let (now, _) = self.settled?;
+        let is_missing = self.remembered.is_some() && self.status.is_none();
+        (is_missing && matches!(now, State::Stale { .. })).then(|| Effect::Missing {
+            cell: name.to_owned(),
+            now,
+        })
     }
 
     /// Notes a change of the state.

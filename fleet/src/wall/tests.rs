@@ -394,14 +394,46 @@ fn records_that_were_missed_are_asked_for() {
     assert_eq!(story.effects, []);
 }
 
+fn remembered(seen_ns: i64, ended_ns: Option<i64>) -> Remembered {
+    Remembered {
+        cell: "a".to_owned(),
+        seen_ns,
+        ended_ns,
+    }
+}
+
+#[test]
+fn a_cell_that_was_lost_while_this_host_was_down_is_told_of_once() {
+    let missing = |story: &Story| {
+        let is_missing = |effect: &&Effect| matches!(effect, Effect::Missing { .. });
+        story.effects.iter().filter(is_missing).count()
+    };
+    let mut story = Story::new(&[]);
+    story.wall.remember(remembered(5, None), None);
+    story.wait(1).wait(BACK_AFTER_MS - 2);
+    assert_eq!(missing(&story), 0);
+    story.wait(1).wait(60_000).is("stale");
+    assert_eq!(missing(&story), 1);
+    // One that has come back, and one whose run has ended in order.
+    let mut story = Story::new(&[]);
+    story.wall.remember(remembered(5, None), None);
+    story.wait(1).alive("x").status(|_| {}).wait(BACK_AFTER_MS);
+    assert_eq!(missing(&story), 0);
+    let mut story = Story::new(&[]);
+    story.wall.remember(remembered(5, Some(6)), None);
+    story.wait(1).wait(BACK_AFTER_MS).is("ended");
+    assert_eq!(missing(&story), 0);
+}
+
 #[test]
 fn a_cell_that_was_there_in_an_earlier_life_is_stale_since_then() {
     let mut story = Story::new(&[]);
-    story.wall.remember("a", 5, None);
+    story.wall.remember(remembered(5, None), None);
     story.is("stale");
     assert_eq!(story.wall.snapshot().cells[0].since_ns, Some(5));
     // One of an older version does not tell how old its latch is.
-    story.wall.remember("a", 5, Some(("x".to_owned(), 3)));
+    let latched = Some(("x".to_owned(), 3));
+    story.wall.remember(remembered(5, None), latched);
     assert_eq!(story.wall.snapshot().cells[0].latched_since_ns, Some(3));
     story.alive("x");
     story.status(|status| status.alarm.state = AlarmState::Collision);
