@@ -17,7 +17,7 @@ use zenoh::Wait as _;
 use zenoh::sample::SampleKind;
 
 use crate::inbox;
-use crate::keeper::Keeper;
+use crate::keeper::{Deed, Keeper};
 use crate::mailbox::Mailbox;
 use crate::physics::CellPhysics;
 use crate::store::{Label, Note, Store, StoreError};
@@ -77,9 +77,7 @@ impl FleetError {
 #[derive(Debug)]
 enum Mail {
     Event(Event),
-    Acknowledged { cell: String, by: String },
-    Noted { cell: String, note: Note },
-    Labelled { cell: String, label: Label },
+    Deed(Deed),
 }
 
 /// A fleet host that works until it is dropped.
@@ -192,19 +190,21 @@ impl Hub {
     /// Somebody has seen what is open at a cell.
     pub fn acknowledged(&self, cell: &str, by: &str) {
         let (cell, by) = (cell.to_owned(), by.to_owned());
-        self.mailbox.urgent(Mail::Acknowledged { cell, by });
+        self.mailbox
+            .urgent(Mail::Deed(Deed::Acknowledged { cell, by }));
     }
 
     /// Somebody notes something of a cell.
     pub fn note(&self, cell: &str, note: Note) {
         let cell = cell.to_owned();
-        self.mailbox.urgent(Mail::Noted { cell, note });
+        self.mailbox.urgent(Mail::Deed(Deed::Noted { cell, note }));
     }
 
     /// A cell has taken what somebody writes into its archive.
     pub fn labelled(&self, cell: &str, label: Label) {
         let cell = cell.to_owned();
-        self.mailbox.urgent(Mail::Labelled { cell, label });
+        self.mailbox
+            .urgent(Mail::Deed(Deed::Labelled { cell, label }));
     }
 }
 
@@ -301,20 +301,10 @@ impl Worker {
     }
 
     fn open(&mut self, mail: Mail) {
-        let now_ns = unix_ns();
         match (mail, &mut self.keeper) {
             (Mail::Event(event), _) => self.tell(event),
-            (_, None) => {}
-            (Mail::Acknowledged { cell, by }, Some(keeping)) => {
-                keeping.with(|keeper| keeper.store().acknowledge(&cell, &by, now_ns));
-            }
-            (Mail::Labelled { cell, label }, Some(keeping)) => {
-                keeping.with(|keeper| keeper.store().label(&cell, &label));
-            }
-            (Mail::Noted { cell, note }, Some(keeping)) => keeping.with(|keeper| {
-                let noted = keeper.store().note(&cell, &note);
-                noted.and_then(|()| keeper.learn(std::iter::once(cell.as_str()), now_ns))
-            }),
+            (Mail::Deed(deed), Some(keeping)) => keeping.take(&self.wall, deed, unix_ns()),
+            (Mail::Deed(_), None) => {}
         }
     }
 

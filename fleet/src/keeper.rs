@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use tauscope_publish::message::{ChangeMessage, ContactMessage, Record, StatusMessage};
 
-use crate::store::{JointNormal, Kind, News, Said, Store, StoreError};
+use crate::store::{JointNormal, Kind, Label, News, Note, Said, Store, StoreError};
 use crate::wall::{Effect, Remembered, ResidualView, Severity, Snapshot, State, UnknownWhy, Wall};
 use crate::words;
 
@@ -24,6 +24,32 @@ pub struct Keeper {
     normals: BTreeMap<String, Normal>,
     minute: i64,
     hour: i64,
+}
+
+/// What somebody does on the page.
+#[derive(Debug)]
+pub enum Deed {
+    /// What is open at a cell was seen.
+    Acknowledged {
+        /// The cell.
+        cell: String,
+        /// Who.
+        by: String,
+    },
+    /// Something was noted.
+    Noted {
+        /// The cell.
+        cell: String,
+        /// What, and who.
+        note: Note,
+    },
+    /// A cell has taken a label into its archive.
+    Labelled {
+        /// The cell.
+        cell: String,
+        /// What, and who.
+        label: Label,
+    },
 }
 
 /// What is normal for a cell, and how its residual went by day, as a share of that.
@@ -111,6 +137,23 @@ impl Keeper {
                 self.store.close(cell, Kind::Loss, stage, now_ns)
             }
             Effect::AskRecords { .. } | Effect::AskStatus { .. } | Effect::AskClock { .. } => {
+                Ok(())
+            }
+        }
+    }
+
+    /// Keeps what somebody has done at `at_ns`.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn take(&mut self, deed: &Deed, at_ns: i64) -> Result<(), StoreError> {
+        match deed {
+            Deed::Acknowledged { cell, by } => self.store.acknowledge(cell, by, at_ns),
+            Deed::Labelled { cell, label } => self.store.label(cell, label),
+            Deed::Noted { cell, note } => {
+                self.store.note(cell, note)?;
+                // The note is kept, and what is normal is read again within the hour.
+                let _ = self.learn(std::iter::once(cell.as_str()), at_ns);
                 Ok(())
             }
         }

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use crate::keeper::Keeper;
+use crate::keeper::{Deed, Keeper};
 use crate::store::StoreError;
 use crate::wall::{Effect, Snapshot, Wall};
 
@@ -12,13 +12,29 @@ const MOST: usize = 10_000;
 /// How often it is looked whether the file can be written again. Resolution: a person sees no more.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
+/// What is to be kept.
+#[derive(Debug)]
+enum News {
+    Effect(Effect),
+    Deed(Deed),
+}
+
+impl News {
+    fn keep(&self, keeper: &mut Keeper, wall: &Wall, at_ns: i64) -> Result<(), StoreError> {
+        match self {
+            Self::Effect(effect) => keeper.keep(wall, effect, at_ns),
+            Self::Deed(deed) => keeper.take(deed, at_ns),
+        }
+    }
+}
+
 /// A keeper whose file may fail.
 #[derive(Debug)]
 pub struct Keeping {
     keeper: Keeper,
     failing: Option<Failing>,
     /// What is to be kept, and when it happened \[ns since the epoch\].
-    waiting: VecDeque<(Effect, i64)>,
+    waiting: VecDeque<(News, i64)>,
     /// What had no room among those.
     lost: u64,
 }
@@ -41,35 +57,38 @@ impl Keeping {
 
     /// Keeps it, now or later.
     pub fn keep(&mut self, wall: &Wall, effect: Effect, now_ns: i64) {
+        if self.failing.is_none() || effect.is_kept() {
+            self.keep_news(wall, News::Effect(effect), now_ns);
+        }
+    }
+
+    /// Keeps what somebody has done, now or later.
+    pub fn take(&mut self, wall: &Wall, deed: Deed, now_ns: i64) {
+        self.keep_news(wall, News::Deed(deed), now_ns);
+    }
+
+    fn keep_news(&mut self, wall: &Wall, news: News, now_ns: i64) {
         if self.failing.is_none() {
-            match self.keeper.keep(wall, &effect, now_ns) {
+            match news.keep(&mut self.keeper, wall, now_ns) {
                 Ok(()) => return,
                 Err(error) => self.fails(&error),
             }
-        }
-        if !effect.is_kept() {
-            return;
         }
         if self.waiting.len() == MOST {
             self.waiting.pop_front();
             self.lost += 1;
         }
-        self.waiting.push_back((effect, now_ns));
-    }
-
-    /// Does with the file what cannot wait.
-    pub fn with(&mut self, work: impl FnOnce(&mut Keeper) -> Result<(), StoreError>) {
-        if let Err(error) = work(&mut self.keeper) {
-            self.fails(&error);
-        }
+        self.waiting.push_back((news, now_ns));
     }
 
     /// What is due by the clock; and what waits, where the file can be written again.
     pub fn tick(&mut self, wall: &Wall, snapshot: &mut Snapshot) {
         self.look(wall);
         self.keeper.compare(snapshot);
-        if self.failing.is_none() {
-            self.with(|keeper| keeper.tick(snapshot));
+        if self.failing.is_none()
+            && let Err(error) = self.keeper.tick(snapshot)
+        {
+            self.fails(&error);
         }
         snapshot.unkept = self.failing.as_ref().map(|failing| failing.why.clone());
     }
@@ -86,9 +105,9 @@ impl Keeping {
             return;
         }
         let count = self.waiting.len();
-        while let Some((effect, at_ns)) = self.waiting.pop_front() {
-            if self.keeper.keep(wall, &effect, at_ns).is_err() {
-                self.waiting.push_front((effect, at_ns));
+        while let Some((news, at_ns)) = self.waiting.pop_front() {
+            if news.keep(&mut self.keeper, wall, at_ns).is_err() {
+                self.waiting.push_front((news, at_ns));
                 return;
             }
         }
@@ -117,8 +136,64 @@ impl Keeping {
 mod tests {
     use super::*;
     use crate::fixture;
-    use crate::store::Store;
+    use crate::store::{Label, Note, Store};
     use tauscope_publish::message::Record;
+
+    #[test]
+    fn what_people_do_while_somebody_holds_the_file_is_kept_later() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("fleet.sqlite");
+        let mut keeping = Keeping::new(Keeper::new(Store::open(&path).unwrap()));
+        let (wall, other) = (Wall::new(std::iter::empty()), Store::open(&path).unwrap());
+        let contact = Effect::Recorded {
+            cell: "a".to_owned(),
+            instance: "x".to_owned(),
+            number: 1,
+            told_ns: 6,
+            record: Record::Contact(fixture::contact(1, 5)),
+        };
+        keeping.keep(&wall, contact, 6);
+        other.hold().unwrap();
+        let (cell, by) = ("a".to_owned(), "anna".to_owned());
+        let note = Note {
+            at_ns: 7,
+            by: by.clone(),
+            text: "new gear".to_owned(),
+            baseline: true,
+        };
+        let label = Label {
+            at_ns: 8,
+            stamp_ns: 8,
+            by: by.clone(),
+            text: "hit the fixture".to_owned(),
+        };
+        for deed in [
+            Deed::Noted {
+                cell: cell.clone(),
+                note: note.clone(),
+            },
+            Deed::Labelled {
+                cell: cell.clone(),
+                label: label.clone(),
+            },
+            Deed::Acknowledged { cell, by },
+        ] {
+            keeping.take(&wall, deed, 9);
+        }
+        other.release().unwrap();
+        let begin = Instant::now();
+        let mut snapshot = wall.snapshot();
+        while keeping.failing.is_some() {
+            assert!(begin.elapsed() < Duration::from_mins(1));
+            keeping.tick(&wall, &mut snapshot);
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        assert_eq!(other.notes("a", 9).unwrap(), [note]);
+        assert_eq!(other.labels(Some("a"), 9).unwrap()[0].label, label);
+        let incident = other.incidents(None, 9).unwrap().remove(0);
+        let acknowledged = (incident.acknowledged_ns, incident.acknowledged_by);
+        assert_eq!(acknowledged, (Some(9), Some("anna".to_owned())));
+    }
 
     #[test]
     fn what_happens_while_somebody_holds_the_file_is_kept_later_and_the_wall_goes_on() {

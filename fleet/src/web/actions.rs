@@ -268,6 +268,9 @@ fn back(
     shared.sessions.tell(
         headers,
         match told {
+            Ok(told) if shared.hub.snapshot().unkept.is_some() => {
+                format!("Done: {told}. The fleet host keeps it once its file can be written.")
+            }
             Ok(told) => format!("Done: {told}."),
             Err(why) => format!("Not done: {why}."),
         },
