@@ -23,6 +23,8 @@ use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
 use tokio::sync::{Semaphore, oneshot};
 
+use headers::Door;
+pub use headers::{NoOrigin, Origin};
 pub use users::{NewUser, Users, UsersError};
 
 use crate::hub::Hub;
@@ -59,8 +61,7 @@ struct Shared {
     users: Users,
     sessions: Sessions,
     followers: Arc<Semaphore>,
-    /// Whether only this computer reaches the page.
-    is_loopback: bool,
+    door: Door,
 }
 
 type App = State<Arc<Shared>>;
@@ -73,11 +74,16 @@ pub struct Server {
 }
 
 impl Server {
-    /// Serves the wall of `hub` at `address`; without `users` nobody can act.
+    /// Serves the wall of `hub` at `address`, and through proxies as `origins`; without `users` nobody can act.
     ///
     /// # Errors
     /// If the address cannot be listened at.
-    pub fn start(hub: Arc<Hub>, address: SocketAddr, users: Users) -> Result<Self, ServeError> {
+    pub fn start(
+        hub: Arc<Hub>,
+        address: SocketAddr,
+        users: Users,
+        origins: Vec<Origin>,
+    ) -> Result<Self, ServeError> {
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(2)
             .thread_name("fleet-page")
@@ -92,7 +98,10 @@ impl Server {
             users,
             sessions: Sessions::default(),
             followers: Arc::new(Semaphore::new(MAX_FOLLOWERS)),
-            is_loopback: address.ip().is_loopback(),
+            door: Door {
+                is_loopback: address.ip().is_loopback(),
+                origins,
+            },
         });
         let (stop, stopped) = oneshot::channel::<()>();
         let thread = std::thread::Builder::new().name("fleet-page".to_owned());

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use tauscope_bus::ZenohEndpoints;
 use tauscope_fleet::wall::{Snapshot, State};
-use tauscope_fleet::web::{Server, Users};
+use tauscope_fleet::web::{Origin, Server, Users};
 use tauscope_fleet::{FleetError, Hub, Options, show};
 
 use crate::exit::{Exit, Failure};
@@ -40,6 +40,9 @@ pub struct Args {
     /// Serve the page at this address; without an address, at 127.0.0.1:7460. It is plain HTTP.
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = PAGE)]
     serve: Option<SocketAddr>,
+    /// By which a proxy serves the page, such as `https://fleet.plant`: forms from there are taken. May be repeated.
+    #[arg(long, value_name = "ORIGIN", requires = "serve")]
+    origin: Vec<Origin>,
     /// Print what is known of all cells after 3 s as one JSON document.
     #[arg(long, conflicts_with = "serve")]
     json: bool,
@@ -132,7 +135,8 @@ fn serve(
     if args.users.is_some() && users.is_empty() {
         out.say("note: there are no users yet; `--add-user NAME` makes one");
     }
-    let server = Server::start(hub.clone(), address, users).map_err(anyhow::Error::from)?;
+    let server = Server::start(hub.clone(), address, users, args.origin.clone())
+        .map_err(anyhow::Error::from)?;
     out.say(&format!("the wall is at http://{}/", server.address()));
     if !server.address().ip().is_loopback() {
         out.say(
