@@ -86,18 +86,24 @@ pub struct Ros2Config {
 }
 
 /// A Modbus TCP server.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ModbusConfig {
     /// Address and port that it listens on. Whoever reaches it can read and acknowledge: Modbus has no passwords.
     #[schemars(with = "String")]
     pub listen: SocketAddr,
+    /// A client that asks nothing for so long is disconnected: one whose cable was pulled would keep its place for ever
+    /// \[s\].
+    #[schemars(range(min = 0.1, max = 86_400.0))]
+    pub idle_s: f64,
 }
 
 impl Default for ModbusConfig {
     fn default() -> Self {
         Self {
             listen: SocketAddr::from(([127, 0, 0, 1], 1502)),
+            // Resolution: a PLC asks several times a second; a person who tries it out waits no longer for a place.
+            idle_s: 60.0,
         }
     }
 }

@@ -20,6 +20,7 @@ use tokio_modbus::server::Service;
 use tokio_modbus::server::tcp::Server;
 use tokio_modbus::{ExceptionCode, Request, Response};
 
+use crate::config::ModbusConfig;
 use crate::error::PublishError;
 use crate::status::Status;
 use guard::Guard;
@@ -85,15 +86,18 @@ impl Drop for Modbus {
 }
 
 impl Modbus {
-    /// Listens at `address` and shows what is on `board`. Writes are commands.
+    /// Listens where `config` says and shows what is on `board`. Writes are commands.
     ///
     /// # Errors
     /// If it cannot listen there.
     pub fn serve(
-        address: SocketAddr,
+        config: &ModbusConfig,
         board: &Board,
         commands: Option<Commands>,
     ) -> Result<Self, PublishError> {
+        let address = config.listen;
+        // The schema bounds it; a program that gives nonsense gets a client that may be silent for ever.
+        let idle = Duration::try_from_secs_f64(config.idle_s).unwrap_or(Duration::MAX);
         let failed = |source| PublishError::Modbus { address, source };
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(1)
@@ -123,7 +127,7 @@ impl Modbus {
                 }
                 // Answers are small and must not wait for more; where that cannot be, they do.
                 let _ = stream.set_nodelay(true);
-                async move { Ok(client.map(|client| (client, Guard::new(stream)))) }
+                async move { Ok(client.map(|client| (client, Guard::new(stream, from, idle)))) }
             };
             let server = Server::new(listener);
             loop {

@@ -128,7 +128,7 @@ impl Publisher {
                 cell: setup.cell.clone(),
             });
         let modbus = config.modbus.as_ref();
-        let modbus = modbus.map(|modbus| Modbus::serve(modbus.listen, &board, commands));
+        let modbus = modbus.map(|modbus| Modbus::serve(modbus, &board, commands));
         Ok(Self {
             cell: setup.cell.clone(),
             alarm,

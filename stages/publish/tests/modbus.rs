@@ -81,6 +81,32 @@ async fn a_publisher_that_was_started_again_is_latched_before_anything_is_heard(
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn clients_that_say_nothing_any_more_give_their_places_up() {
+    let publisher = publisher("{modbus: {listen: '127.0.0.1:0', idle_s: 1}}", None);
+    let address = publisher.modbus_address().unwrap();
+    let mut all = Vec::new();
+    for _ in 0..8 {
+        let mut plc = client(address).await;
+        plc.read_coils(0, BITS).await.unwrap().unwrap();
+        all.push(plc);
+    }
+    let mut late = client(address).await;
+    let turned_away = late.read_coils(0, BITS).await;
+    assert!(turned_away.is_err(), "{turned_away:?}");
+    // One goes on asking, seven are gone without a word.
+    for _ in 0..15 {
+        tokio::time::sleep(Duration::from_millis(200)).await;
+        all[0].read_coils(0, BITS).await.unwrap().unwrap();
+    }
+    for _ in 0..7 {
+        let mut plc = client(address).await;
+        plc.read_coils(0, BITS).await.unwrap().unwrap();
+        all.push(plc);
+    }
+    assert!(all[1].read_coils(0, BITS).await.is_err());
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_plc_acknowledges_and_mutes() {
     let endpoint = endpoint();
     let source = Answering::at(&endpoint, &Answer::Taken { stamp_ns: 5 });

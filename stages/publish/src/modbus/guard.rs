@@ -2,12 +2,18 @@
 //!
 //! That (0.17) indexes past the end of a request to write several coils (function 15) which says that it has more of
 //! them than bytes: the panic ends the client's task. Such a request ends the client here, in order.
+//!
+//! A client whose cable was pulled is never heard to leave. One that says nothing for long ends here, too.
 
+use std::future::Future as _;
 use std::io;
+use std::net::SocketAddr;
 use std::pin::Pin;
 use std::task::{Context, Poll, ready};
+use std::time::Duration;
 
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::time::{Instant, Sleep};
 
 /// Bytes before a request: transaction, protocol and length (MODBUS Messaging on TCP/IP 1.0b, section 3.1.3).
 const BEFORE: usize = 6;
@@ -19,9 +25,14 @@ const WRITE_SEVERAL_COILS: u8 = 15;
 pub(super) struct Guard<S> {
     stream: S,
     requests: Requests,
+    from: SocketAddr,
+    /// For so long it may say nothing, and until when.
+    idle: Duration,
+    end: Pin<Box<Sleep>>,
 }
 
 /// How far the requests have come.
+#[derive(Default)]
 struct Requests {
     head: [u8; HEAD],
     /// Bytes of the present one so far.
@@ -55,14 +66,33 @@ impl Requests {
 }
 
 impl<S> Guard<S> {
-    pub(super) fn new(stream: S) -> Self {
+    /// Of the client `from`, which may say nothing for as long as `idle`.
+    pub(super) fn new(stream: S, from: SocketAddr, idle: Duration) -> Self {
         Self {
             stream,
-            requests: Requests {
-                head: [0; HEAD],
-                at: 0,
-            },
+            requests: Requests::default(),
+            from,
+            idle,
+            end: Box::pin(tokio::time::sleep(idle)),
         }
+    }
+
+    /// It has said something, or taken an answer.
+    fn moves(&mut self) {
+        // A time beyond what there is, is none.
+        if let Some(end) = Instant::now().checked_add(self.idle) {
+            self.end.as_mut().reset(end);
+        }
+    }
+
+    /// Ready once it has been silent for too long.
+    fn poll_silence(&mut self, context: &mut Context<'_>) -> Poll<io::Error> {
+        ready!(self.end.as_mut().poll(context));
+        let (from, idle_s) = (self.from, self.idle.as_secs_f64());
+        tracing::warn!(
+            "Modbus client {from} is disconnected: it has said nothing for {idle_s} s (`idle_s`)"
+        );
+        Poll::Ready(io::ErrorKind::TimedOut.into())
     }
 }
 
@@ -73,7 +103,11 @@ impl<S: AsyncRead + Unpin> AsyncRead for Guard<S> {
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
         let before = buffer.filled().len();
-        ready!(Pin::new(&mut self.stream).poll_read(context, buffer))?;
+        let Poll::Ready(read) = Pin::new(&mut self.stream).poll_read(context, buffer) else {
+            return self.poll_silence(context).map(Err);
+        };
+        read?;
+        self.moves();
         Poll::Ready(self.requests.take(&buffer.filled()[before..]))
     }
 }
@@ -84,7 +118,11 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for Guard<S> {
         context: &mut Context<'_>,
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
-        Pin::new(&mut self.stream).poll_write(context, bytes)
+        let Poll::Ready(written) = Pin::new(&mut self.stream).poll_write(context, bytes) else {
+            return self.poll_silence(context).map(Err);
+        };
+        self.moves();
+        Poll::Ready(written)
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
@@ -110,7 +148,7 @@ mod tests {
     #[test]
     fn more_coils_than_there_are_end_a_client_however_its_bytes_come() {
         for pieces in [1, 3, 5, 64] {
-            let mut requests = Guard::new(()).requests;
+            let mut requests = Requests::default();
             let sound = [&SOUND[..], &writes(8), &SOUND].concat();
             for piece in sound.chunks(pieces) {
                 requests.take(piece).unwrap();
