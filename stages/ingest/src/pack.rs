@@ -248,7 +248,9 @@ impl Packer {
             let stamp_ns = front.header.stamp_ns;
             let complete = (!self.settings.expects_command || self.commands.reaches(stamp_ns))
                 && (!self.settings.expects_reference || self.references.reaches(stamp_ns));
-            let waited = now_ns - front.header.received_ns >= self.settings.wait_ns;
+            // A clock of reception that was set back does not make it wait for ever.
+            let waited_ns = now_ns.saturating_sub(front.header.received_ns);
+            let waited = waited_ns.saturating_abs() >= self.settings.wait_ns;
             complete || waited || self.flushed || self.pending.len() >= MAX_PENDING
         })
     }

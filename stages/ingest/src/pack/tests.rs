@@ -363,6 +363,23 @@ fn a_sample_waits_for_the_command_of_its_instant() {
 }
 
 #[test]
+fn a_clock_of_reception_that_is_set_back_holds_no_sample() {
+    let settings = PackSettings {
+        expects_command: true,
+        ..settings()
+    };
+    let mut packer = Packer::new(&setup(), settings).unwrap();
+    let hour_ns = 3_600_000 * MS;
+    packer.state(&message(1000 * MS, "a b c", &[1.0; 3]), hour_ns);
+    assert_eq!(packer.pop(hour_ns - 1), None);
+    assert!(packer.pop(5 * MS).is_some());
+    // The next one waits as long as any other.
+    packer.state(&message(1010 * MS, "a b c", &[1.0; 3]), 10 * MS);
+    assert_eq!(packer.pop(109 * MS), None);
+    assert!(packer.pop(110 * MS).is_some());
+}
+
+#[test]
 fn a_command_of_the_future_is_not_taken() {
     let mut packer = packer();
     packer.command(&message(1020 * MS, "a b c", &[2.0; 3]), 1000 * MS);
