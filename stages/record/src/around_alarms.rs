@@ -2,7 +2,8 @@
 //!
 //! Samples wait in a ring. An alarm opens files, into which the ring is emptied a few samples at a time,
 //! so that no sample has to wait while thousands are written. The files stay open until no alarm could
-//! come any more whose time before it reaches back into them. All times are the samples' own.
+//! come any more whose time before it reaches back into them. All times are the samples' own. Where the
+//! clock of reception is set back, other files begin.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
@@ -19,6 +20,10 @@ use crate::streams::Streams;
 /// Resolution: how long a sample waits, against how long the ring stays full.
 const WRITTEN_PER_SAMPLE: usize = 8;
 
+/// A time of reception that is so far below the one before is of a clock that was set back \[ns\].
+/// Resolution: samples of several stages come in another order by less.
+const SET_BACK_NS: i64 = 1_000_000_000;
+
 /// Files around alarms.
 pub(crate) struct AroundAlarms {
     files: Files,
@@ -30,6 +35,11 @@ pub(crate) struct AroundAlarms {
     after_ns: i64,
     /// Up to which time files are to hold all, while they are open.
     until_ns: Option<i64>,
+    /// When the sample before was received \[ns since the epoch\].
+    received_ns: Option<i64>,
+    /// How often the clock of reception was set back: by now, and before the samples of the open files.
+    set_back: u64,
+    written_set_back: u64,
     /// The ring was too small, and that was said.
     told: bool,
 }
@@ -37,7 +47,10 @@ pub(crate) struct AroundAlarms {
 /// A sample that waits, with its stream's number.
 struct Waiting {
     index: usize,
+    /// By the clock of reception as it stands now \[ns since the epoch\].
     received_ns: i64,
+    /// How often that clock had been set back when the sample was received.
+    set_back: u64,
     sample: Sample,
 }
 
@@ -100,6 +113,9 @@ impl AroundAlarms {
             before_ns: ns(settings.before_s),
             after_ns: ns(settings.after_s),
             until_ns: None,
+            received_ns: None,
+            set_back: 0,
+            written_set_back: 0,
             told: false,
         })
     }
@@ -112,6 +128,11 @@ impl AroundAlarms {
         sample: SampleRef<'_>,
     ) -> Result<(), RecordError> {
         let now_ns = sample.header().received_ns;
+        let before_ns = self.received_ns.replace(now_ns).unwrap_or(now_ns);
+        let back_ns = before_ns.saturating_sub(now_ns);
+        if back_ns > SET_BACK_NS {
+            self.set_back(back_ns);
+        }
         if matches!(sample, SampleRef::Detection(detection) if detection.alarm()) {
             let until_ns = now_ns.saturating_add(self.after_ns);
             self.until_ns = Some(self.until_ns.map_or(until_ns, |ns| ns.max(until_ns)));
@@ -119,6 +140,7 @@ impl AroundAlarms {
         let waiting = Waiting {
             index,
             received_ns: now_ns,
+            set_back: self.set_back,
             sample: Sample::of(sample),
         };
         self.bytes += waiting.bytes();
@@ -133,6 +155,17 @@ impl AroundAlarms {
             self.close(streams)?;
         }
         self.forget(streams, oldest_ns)
+    }
+
+    /// The clock of reception was set back: what waits was received as long ago as before, by the new time.
+    fn set_back(&mut self, by_ns: i64) {
+        self.set_back += 1;
+        for waiting in &mut self.ring {
+            waiting.received_ns = waiting.received_ns.saturating_sub(by_ns);
+        }
+        if let Some(until_ns) = &mut self.until_ns {
+            *until_ns = until_ns.saturating_sub(by_ns);
+        }
     }
 
     /// Gives up what is older than an alarm that comes now would ask for, or what there is no memory for.
@@ -174,6 +207,10 @@ impl AroundAlarms {
         let Some(waiting) = self.pop() else {
             return Ok(false);
         };
+        if std::mem::replace(&mut self.written_set_back, waiting.set_back) != waiting.set_back {
+            // A file is read in the order of reception: what came behind would come first.
+            self.files.finish(streams)?;
+        }
         let sample = waiting.sample.as_ref();
         let told = self.contacts.push(streams, waiting.index, sample);
         self.files.accept(streams, waiting.index, sample, told)?;

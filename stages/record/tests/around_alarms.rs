@@ -7,13 +7,17 @@ mod synthetic;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use synthetic::{START_NS, STEP_NS, arm, cell, motion, streams};
+use synthetic::{Instant, START_NS, STEP_NS, arm, cell, motion, streams};
 use tauscope_archive::Recording;
 use tauscope_bus::Sink;
 use tauscope_record::{AroundAlarms, Config, Recorder};
 
 /// Around the alarms of ten seconds with two pushes: at 3.0 to 4.2 s and at 7.0 to 7.8 s.
 fn record(folder: &Path, around: AroundAlarms) -> Vec<PathBuf> {
+    record_all(folder, around, &motion(12.0))
+}
+
+fn record_all(folder: &Path, around: AroundAlarms, instants: &[Instant]) -> Vec<PathBuf> {
     let config = Config {
         around_alarms: Some(AroundAlarms {
             mcap: Some(folder.join("alarm-{n}.mcap")),
@@ -24,7 +28,7 @@ fn record(folder: &Path, around: AroundAlarms) -> Vec<PathBuf> {
     let cells = [cell("demo", Some(arm(false)))];
     let streams = streams("demo", "");
     let mut recorder = Recorder::new(&config, &cells, &streams, &BTreeMap::new()).unwrap();
-    for instant in &motion(12.0) {
+    for instant in instants {
         instant.feed(&mut recorder, "");
     }
     recorder.finish().unwrap();
@@ -69,6 +73,52 @@ fn each_alarm_has_a_file_from_before_it_to_after_it() {
         let ends = offset_s + 0.2..offset_s + 1.0;
         assert!(begins.contains(&first_s), "begins at {first_s} s");
         assert!(ends.contains(&last_s), "ends at {last_s} s");
+    }
+}
+
+#[test]
+fn a_clock_that_is_set_back_costs_no_file_and_no_sample() {
+    let around = || AroundAlarms {
+        before_s: 1.0,
+        after_s: 0.5,
+        ..AroundAlarms::default()
+    };
+    // Before the first alarm, within the time before it, while it lasts, and behind it.
+    for set_back_s in [1.5, 2.8, 3.5, 4.4] {
+        let mut instants = motion(12.0);
+        let first = (set_back_s * 1e9) as usize / STEP_NS as usize;
+        for instant in &mut instants[first..] {
+            for header in [
+                &mut instant.state.header,
+                &mut instant.twin.header,
+                &mut instant.detection.header,
+            ] {
+                header.received_ns -= 3_600_000_000_000;
+            }
+            if let Some(health) = &mut instant.health {
+                health.header.received_ns -= 3_600_000_000_000;
+            }
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let files = record_all(folder.path(), around(), &instants);
+        let spans: Vec<_> = files.iter().map(|file| span(file)).collect();
+        let folder = tempfile::tempdir().unwrap();
+        let files = record(folder.path(), around());
+        // Where the clock was set back within a file, another one begins.
+        let mut expected = Vec::new();
+        for (begin_s, end_s, _) in files.iter().map(|file| span(file)) {
+            if (begin_s..end_s).contains(&set_back_s) {
+                expected.extend([(begin_s, set_back_s), (set_back_s, end_s)]);
+            } else {
+                expected.push((begin_s, end_s));
+            }
+        }
+        for (got, wanted) in spans.iter().zip(&expected) {
+            let near = |a: f64, b: f64| (a - b).abs() < 0.05;
+            let same = near(got.0, wanted.0) && near(got.1, wanted.1) && got.2;
+            assert!(same, "{set_back_s} s: {got:?} in place of {wanted:?}");
+        }
+        assert_eq!(spans.len(), expected.len(), "{set_back_s} s");
     }
 }
 
