@@ -155,7 +155,7 @@ pub struct Keep {
     #[schemars(range(min = 1.0))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at_most_mb: Option<f64>,
-    /// For so long after a file was completed \[days\].
+    /// For so long after a file was completed, or until the newest one was; the newest stays \[days\].
     #[schemars(range(min = 0.01))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at_most_days: Option<f64>,

@@ -12,7 +12,7 @@ use crate::contacts::Told;
 use crate::error::RecordError;
 use crate::file_name::{FileName, fill_in};
 use crate::rerun::FilePicture;
-use crate::retention;
+use crate::retention::Retention;
 use crate::room::Room;
 use crate::streams::Streams;
 
@@ -25,6 +25,7 @@ pub(crate) struct Files {
     rerun: Option<FileName>,
     open: Option<OpenFiles>,
     room: Room,
+    retention: Retention,
     /// The disk has too little room: what comes is counted and not kept.
     paused: bool,
     /// Samples that were not kept.
@@ -77,6 +78,7 @@ impl Files {
             provenance: provenance.clone(),
             open: None,
             room: Room::new(PathBuf::new(), config.min_free_mb),
+            retention: Retention::new(),
             paused: false,
             dropped: 0,
             dropped_told: 0,
@@ -200,8 +202,8 @@ impl Files {
         let cell = first_cell(streams);
         loop {
             let mut removed = Vec::new();
-            for name in self.names() {
-                match retention::remove_oldest(name, cell) {
+            for name in self.mcap.iter().chain(&self.rerun) {
+                match self.retention.remove_oldest(name, cell) {
                     Ok(mut gone) => removed.append(&mut gone),
                     Err(error) => tracing::warn!("cannot remove an old recording: {error}"),
                 }
@@ -321,17 +323,20 @@ impl Files {
         if completed.is_empty() && outcome.is_err() {
             self.dropped += unwritten;
         }
+        if self.config.keep.is_some() {
+            self.retention.complete(&completed);
+        }
         self.completed = completed;
         self.remove_what_is_beyond(first_cell(streams));
         outcome
     }
 
-    fn remove_what_is_beyond(&self, cell: &str) {
+    fn remove_what_is_beyond(&mut self, cell: &str) {
         let Some(keep) = &self.config.keep else {
             return;
         };
-        for name in self.names() {
-            match retention::remove_what_is_beyond(keep, name, cell) {
+        for name in self.mcap.iter().chain(&self.rerun) {
+            match self.retention.remove_what_is_beyond(keep, name, cell) {
                 Ok(removed) => tell_removed(&removed),
                 Err(error) => tracing::warn!("cannot remove old recordings: {error}"),
             }

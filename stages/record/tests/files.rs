@@ -265,6 +265,44 @@ fn only_so_much_is_kept_the_oldest_goes_first() {
 }
 
 #[test]
+fn recordings_are_not_old_because_nothing_was_recorded_since() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let days = |days: u64| std::time::Duration::from_hours(24 * days);
+    for (name, ago_days) in [
+        ("a-001.mcap", 200),
+        ("a-002.mcap", 110),
+        ("a-003.mcap", 100),
+    ] {
+        let file = std::fs::File::create(at(name)).unwrap();
+        let modified = std::time::SystemTime::now() - days(ago_days);
+        file.set_modified(modified).unwrap();
+    }
+    let config = Config {
+        mcap: Some(at("a-{n}.mcap")),
+        keep: Some(Keep {
+            at_most_mb: None,
+            at_most_days: Some(30.0),
+        }),
+        ..Config::default()
+    };
+    let mut begun = recorder(&config).unwrap();
+    assert!(at("a-002.mcap").exists() && at("a-003.mcap").exists());
+    assert!(!at("a-001.mcap").exists());
+    // Once there is a newer one, they are.
+    for instant in &motion(1.0) {
+        instant.feed(&mut begun, "");
+    }
+    begun.finish().unwrap();
+    let left = files(folder.path());
+    let days_old = |file: &PathBuf| file.metadata().unwrap().modified().unwrap().elapsed();
+    assert!(
+        left.len() == 1 && days_old(&left[0]).unwrap() < days(1),
+        "{left:?}"
+    );
+}
+
+#[test]
 fn a_disk_without_room_pauses_the_recording_and_what_it_loses_is_counted() {
     let folder = tempfile::tempdir().unwrap();
     let config = Config {
