@@ -16,6 +16,9 @@ const HOUR_NS: i64 = 60 * MINUTE_NS;
 const DAY_NS: i64 = 24 * HOUR_NS;
 /// Days of the curve on a tile. Resolution: six weeks, in which a gear wears.
 const TREND_DAYS: i64 = 42;
+/// What a cell tells of a time longer ago, or of one to come, is of a clock that is wrong \[ns\].
+/// Resolution: a fleet host may be away for the longest holidays.
+const LATEST_NS: i64 = 30 * DAY_NS;
 
 /// Keeps what happens to the cells.
 #[derive(Debug)]
@@ -24,6 +27,13 @@ pub struct Keeper {
     normals: BTreeMap<String, Normal>,
     minute: i64,
     hour: i64,
+}
+
+/// When a record was told, and when it came \[ns since the epoch\].
+#[derive(Debug, Clone, Copy)]
+struct Came {
+    told_ns: i64,
+    now_ns: i64,
 }
 
 /// What somebody does on the page.
@@ -106,6 +116,9 @@ impl Keeper {
                 record,
             } => {
                 let status = wall.status_of(cell);
+                let late_ns = now_ns.saturating_sub(*told_ns);
+                let is_right = (0..LATEST_NS).contains(&late_ns);
+                let told_ns = if is_right { *told_ns } else { now_ns };
                 // A contact that is kept without its incident would never be told of again.
                 self.store.at_once(|store| {
                     if !store.hear(cell, instance, *number, now_ns)? {
@@ -114,9 +127,10 @@ impl Keeper {
                     }
                     match record {
                         Record::Contact(contact) => {
-                            self.contact(cell, instance, contact, *told_ns, status)
+                            let came = Came { told_ns, now_ns };
+                            self.contact(cell, instance, contact, came, status)
                         }
-                        Record::Change(change) => self.change(cell, change, *told_ns, status),
+                        Record::Change(change) => self.change(cell, change, told_ns, status),
                     }
                 })
             }
@@ -214,12 +228,12 @@ impl Keeper {
         cell: &str,
         instance: &str,
         contact: &ContactMessage,
-        told_ns: i64,
+        Came { told_ns, now_ns }: Came,
         status: Option<&StatusMessage>,
     ) -> Result<(), StoreError> {
         let host = status.map_or("", |status| status.host.as_str());
         let archive = status.and_then(|status| status.archive.as_deref());
-        let said = self.store.contact(cell, instance, contact, host, archive)?;
+        let said = (self.store).contact(cell, instance, contact, host, archive, now_ns)?;
         let is_newest = self.store.is_newest(cell, instance, contact)?;
         // Of the incident that contacts of a while share, the newest says how it stands.
         if said == Said::Nothing || (said == Said::More && !is_newest) {

@@ -132,6 +132,7 @@ impl Store {
         let later = [
             ("labels", labels::TABLE),
             ("heard", contacts::TABLES),
+            ("arrivals", contacts::ARRIVALS),
             ("ended", cells::TABLE),
         ];
         for (name, tables) in later {
@@ -211,7 +212,9 @@ impl Store {
     pub fn prune(&self, now_ns: i64) -> Result<(), StoreError> {
         let before = now_ns.saturating_sub(KEPT_NS);
         let texts = [
-            "DELETE FROM contacts WHERE onset_ns < ?1",
+            "DELETE FROM contacts WHERE (cell, instance, number) IN
+                (SELECT cell, instance, number FROM arrivals WHERE at_ns < ?1)",
+            "DELETE FROM arrivals WHERE at_ns < ?1",
             "DELETE FROM heard WHERE at_ns < ?1",
             "DELETE FROM incidents WHERE last_ns < ?1",
             "DELETE FROM history WHERE hour_ns < ?1",

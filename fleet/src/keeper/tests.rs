@@ -36,11 +36,15 @@ impl Story {
 
     /// What a cell told under this number.
     fn try_record(&mut self, number: u64, record: Record) -> Result<(), StoreError> {
+        self.tell(number, record, self.now_ns)
+    }
+
+    fn tell(&mut self, number: u64, record: Record, told_ns: i64) -> Result<(), StoreError> {
         let effect = Effect::Recorded {
             cell: "a".to_owned(),
             instance: "x".to_owned(),
             number,
-            told_ns: self.now_ns,
+            told_ns,
             record,
         };
         self.keeper.keep(&self.wall, &effect, self.now_ns)
@@ -196,4 +200,26 @@ fn a_run_that_ended_in_order_is_known_to_have_ended_until_another_one_begins() {
     assert_eq!(ended(&story), Some(ended_ns));
     story.change(is_over, State::Running);
     assert_eq!(ended(&story), None);
+}
+
+#[test]
+fn a_cell_with_a_wrong_clock_has_its_incidents_at_the_time_of_the_fleet_host() {
+    let now_ns = 1_000 * DAY_NS;
+    let yesterday_ns = now_ns - DAY_NS;
+    for (told_ns, opened_ns) in [
+        (now_ns, now_ns),
+        // What is told late was so when it was.
+        (yesterday_ns, yesterday_ns),
+        (5, now_ns),
+        (900 * DAY_NS, now_ns),
+        (now_ns + 1, now_ns),
+        (5_000 * DAY_NS, now_ns),
+    ] {
+        let mut story = Story::new();
+        story.now_ns = now_ns;
+        let record = Record::Change(fixture::change());
+        story.tell(1, record, told_ns).unwrap();
+        story.keeper.store().prune(now_ns).unwrap();
+        assert_eq!(story.incidents()[0].opened_ns, opened_ns, "{told_ns}");
+    }
 }

@@ -12,6 +12,13 @@ pub(super) const TABLES: &str = "
         cell TEXT NOT NULL, instance TEXT NOT NULL, number INTEGER NOT NULL, at_ns INTEGER NOT NULL,
         PRIMARY KEY (cell, instance, number)) WITHOUT ROWID;
 ";
+/// When each contact came, by the clock of the fleet host: its own stamps are of the cell's clock, which may be wrong.
+pub(super) const ARRIVALS: &str = "
+    CREATE TABLE IF NOT EXISTS arrivals (
+        cell TEXT NOT NULL, instance TEXT NOT NULL, number INTEGER NOT NULL, at_ns INTEGER NOT NULL,
+        PRIMARY KEY (cell, instance, number)) WITHOUT ROWID;
+    INSERT INTO arrivals SELECT cell, instance, number, onset_ns FROM contacts;
+";
 
 /// A contact as it is kept.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -59,7 +66,7 @@ impl Store {
             .map_err(|error| self.failed(error))
     }
 
-    /// Keeps what is known of a contact.
+    /// Keeps what is known of a contact, which came at `at_ns`.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -70,6 +77,7 @@ impl Store {
         contact: &ContactMessage,
         host: &str,
         archive: Option<&str>,
+        at_ns: i64,
     ) -> Result<Said, StoreError> {
         let number = signed(contact.number);
         let known = "SELECT 1 FROM contacts WHERE cell = ?1 AND instance = ?2 AND number = ?3";
@@ -109,6 +117,10 @@ impl Store {
         ];
         let done = self.connection.execute(text, values);
         let rows = done.map_err(|error| self.failed(error))?;
+        let text = "INSERT OR IGNORE INTO arrivals VALUES (?1, ?2, ?3, ?4)";
+        let values = params![cell, instance, number, at_ns];
+        let done = self.connection.execute(text, values);
+        done.map_err(|error| self.failed(error))?;
         Ok(match (known, rows) {
             (_, 0) => Said::Nothing,
             (None, _) => Said::New,

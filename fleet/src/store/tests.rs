@@ -82,7 +82,7 @@ fn a_contact_that_lasts_when_its_run_ends_is_over_unless_it_is_latched() {
 fn a_contact_is_kept_once_with_all_that_becomes_known_of_it() {
     let (_folder, store) = store();
     let mut contact = fixture::contact(1, 5);
-    let keep = |contact: &_| store.contact("a", "x", contact, "pc", None).unwrap();
+    let keep = |contact: &_| store.contact("a", "x", contact, "pc", None, 0).unwrap();
     assert_eq!(keep(&contact), Said::New);
     let begun = contact.clone();
     contact.end_ns = Some(6_000_000_000);
@@ -93,7 +93,7 @@ fn a_contact_is_kept_once_with_all_that_becomes_known_of_it() {
     assert_eq!(keep(&begun), Said::Nothing);
     // Of another life it is another one.
     let other = fixture::contact(1, 9);
-    let said = store.contact("a", "y", &other, "pc", Some("a.mcap"));
+    let said = store.contact("a", "y", &other, "pc", Some("a.mcap"), 0);
     assert_eq!(said.unwrap(), Said::New);
     let kept = store.contacts("a", 10).unwrap();
     assert_eq!(kept.len(), 2);
@@ -152,6 +152,22 @@ fn what_is_old_goes_and_the_file_is_read_again() {
 }
 
 #[test]
+fn a_contact_is_as_old_as_it_is_by_the_clock_of_the_fleet_host() {
+    let (_folder, store) = store();
+    let (wrong, old) = (
+        fixture::contact(1, 5),
+        fixture::contact(2, KEPT_NS / 1_000_000_000),
+    );
+    let now_ns = KEPT_NS + 10;
+    store.contact("a", "x", &wrong, "pc", None, now_ns).unwrap();
+    store.contact("a", "x", &old, "pc", None, 9).unwrap();
+    store.prune(now_ns).unwrap();
+    let kept = store.contacts("a", 9).unwrap();
+    assert_eq!(kept.len(), 1);
+    assert_eq!(kept[0].contact, wrong);
+}
+
+#[test]
 fn a_file_that_is_none_of_ours_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("other.db");
@@ -178,7 +194,7 @@ fn a_label_is_kept_with_the_contact_and_the_incident_that_it_is_about() {
     };
     store.label("a", &label(MIN, "before all")).unwrap();
     let contact = fixture::contact(1, 120);
-    store.contact("a", "x", &contact, "pc", None).unwrap();
+    store.contact("a", "x", &contact, "pc", None, 0).unwrap();
     store.raise(&news("tauscope", 2, Severity::Notice)).unwrap();
     store
         .label("a", &label(3 * MIN, "hit the fixture"))
@@ -189,7 +205,7 @@ fn a_label_is_kept_with_the_contact_and_the_incident_that_it_is_about() {
         .unwrap();
     // What comes later takes no label over.
     let later = fixture::contact(2, 600);
-    store.contact("a", "x", &later, "pc", None).unwrap();
+    store.contact("a", "x", &later, "pc", None, 0).unwrap();
     let kept = store.labels(Some("a"), 10).unwrap();
     let about = |text: &str| {
         let one = kept.iter().find(|one| one.label.text == text).unwrap();
@@ -213,7 +229,9 @@ fn a_file_of_before_gets_the_tables_that_it_lacks() {
     let store = Store::open(&path).unwrap();
     store
         .connection
-        .execute_batch("DROP TABLE labels; DROP TABLE heard; DROP TABLE ended;")
+        .execute_batch(
+            "DROP TABLE labels; DROP TABLE heard; DROP TABLE ended; DROP TABLE arrivals;",
+        )
         .unwrap();
     drop(store);
     let again = Store::open(&path).unwrap();
@@ -228,7 +246,7 @@ fn a_latch_is_known_until_it_is_acknowledged() {
     let (_folder, store) = store();
     let mut contact = fixture::contact(1, 60);
     contact.latched = true;
-    store.contact("a", "x", &contact, "pc", None).unwrap();
+    store.contact("a", "x", &contact, "pc", None, 0).unwrap();
     store
         .raise(&news("tauscope", 1, Severity::Critical))
         .unwrap();
@@ -236,11 +254,11 @@ fn a_latch_is_known_until_it_is_acknowledged() {
     assert_eq!(store.latched("a").unwrap(), latched);
     assert_eq!(store.latched("b").unwrap(), None);
     contact.acknowledged_ns = Some(2 * MIN);
-    store.contact("a", "x", &contact, "pc", None).unwrap();
+    store.contact("a", "x", &contact, "pc", None, 0).unwrap();
     assert_eq!(store.latched("a").unwrap(), None);
     // A contact behind it that is not latched.
     store
-        .contact("a", "x", &fixture::contact(2, 120), "pc", None)
+        .contact("a", "x", &fixture::contact(2, 120), "pc", None, 0)
         .unwrap();
     assert_eq!(store.latched("a").unwrap(), None);
 }
