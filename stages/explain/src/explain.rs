@@ -14,6 +14,7 @@ use crate::data::units::scales;
 use crate::data::{other_simulation, remedies};
 use crate::outcome::Outcome;
 use crate::read::audit;
+use crate::read::excerpt::excerpts;
 use crate::read::input::Input;
 use crate::read::start::Start;
 use crate::report::schema::{Report, Verdict};
@@ -39,6 +40,11 @@ pub fn explain(
     if input.holdout.is_empty() && !at_rest {
         hold_out_some(&mut input);
     }
+    let excerpts = if at_rest {
+        None
+    } else {
+        excerpts(&mut input.fit)
+    };
     let n = joints.len();
     let mut slips = if at_rest {
         Slips::default()
@@ -50,7 +56,13 @@ pub fn explain(
     input.mend(&slips.all);
     loop {
         let (stop, errors) = match attempt(&mut input, at_rest, &slips, &joints, progress)? {
-            Attempt::Done(outcome) => return Ok(*outcome),
+            Attempt::Done(mut outcome) => {
+                outcome
+                    .report
+                    .notes
+                    .extend(excerpts.map(notes::in_excerpts));
+                return Ok(*outcome);
+            }
             Attempt::Stopped(stop, errors) => (stop, errors),
         };
         match stop {

@@ -6,6 +6,7 @@
 //! throughout.
 
 pub mod audit;
+pub mod excerpt;
 pub mod input;
 pub mod recording;
 pub mod start;

@@ -411,7 +411,7 @@ impl Reader<'_> {
             && self.measured.contains(&true)
             && self.measured.iter().filter(|is| !**is).count() >= LEAST_ROWS
         {
-            self.recording.keep(&self.measured);
+            self.recording.keep_measured(&self.measured);
         }
         Ok(self.recording)
     }

@@ -3,6 +3,7 @@
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::read::audit::losses;
+use crate::read::excerpt::Excerpts;
 use crate::read::input::Input;
 use crate::report::holdout::Proof;
 use crate::report::schema::Remaining;
@@ -57,6 +58,14 @@ pub fn not_handed_out(proof: &Proof, found: &Fit, names: &[String], unit: &str) 
         }
     }
     notes
+}
+
+/// That a long session was fitted in excerpts.
+pub fn in_excerpts(excerpts: Excerpts) -> String {
+    let Excerpts { whole_s, kept_s } = excerpts;
+    format!(
+        "The fitted recordings last {whole_s:.0} s together. Excerpts of {kept_s:.0} s were fitted, spread evenly over them. What          acted for a moment in between was not looked for: explain fewer recordings to find it."
+    )
 }
 
 /// Notes on the curves over time: another run begins at another time of whatever they follow.

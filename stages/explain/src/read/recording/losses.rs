@@ -34,17 +34,27 @@ impl Losses {
 }
 
 impl Recording {
-    /// Leaves out the samples that are not `measured`: nobody measured their efforts. Their rows are answered by the sample
-    /// before.
-    pub(super) fn keep(&mut self, measured: &[bool]) {
-        let n = self.position.len() / measured.len().max(1);
-        let kept: Vec<usize> = (0..measured.len()).filter(|&k| measured[k]).collect();
-        self.losses.unmeasured += (measured.len() - kept.len()) as u64;
+    /// Leaves out the samples that are not `measured`: nobody measured their efforts.
+    pub(super) fn keep_measured(&mut self, measured: &[bool]) {
+        let unmeasured = measured.iter().filter(|is_measured| !**is_measured);
+        self.losses.unmeasured += unmeasured.count() as u64;
+        self.keep(measured);
+    }
+
+    /// Keeps these samples alone. The rows of the others are answered by the sample before.
+    pub(crate) fn keep(&mut self, is_kept: &[bool]) {
+        let n = self.position.len() / is_kept.len().max(1);
+        let kept: Vec<usize> = (0..is_kept.len()).filter(|&k| is_kept[k]).collect();
         let rows = |all: &[f64]| -> Vec<f64> {
             let row = |&k: &usize| all.get(k * n..(k + 1) * n).unwrap_or_default().iter();
             kept.iter().flat_map(row).copied().collect()
         };
-        for all in [&mut self.position, &mut self.velocity, &mut self.effort] {
+        for all in [
+            &mut self.position,
+            &mut self.velocity,
+            &mut self.effort,
+            &mut self.reference,
+        ] {
             *all = rows(all);
         }
         let start_s = kept.first().map_or(0.0, |&first| self.time_s[first]);
@@ -68,7 +78,7 @@ mod tests {
         let count = whole.len();
         recording.sample_of_row = (0..count).collect();
         let measured: Vec<bool> = (0..count).map(|k| k > 0 && k % 3 != 0).collect();
-        recording.keep(&measured);
+        recording.keep_measured(&measured);
         assert_eq!(recording.losses.unmeasured as usize, count.div_ceil(3));
         assert_eq!(recording.len(), count - count.div_ceil(3));
         assert_eq!(

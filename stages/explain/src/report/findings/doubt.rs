@@ -9,6 +9,7 @@ use crate::data::problem::Problem;
 use crate::physics::active::{Active, Hypothesis, TimeKind};
 use crate::report::schema::Finding;
 use crate::select::evidence::PATCH;
+use crate::select::plausible::at_bound;
 use tauscope_dynamics::kinematic_tree::bearing;
 
 use super::Named;
@@ -48,7 +49,7 @@ pub fn doubt(named: &mut Named, problem: &Problem, actives: &[Active]) {
         if is_shadowed(&problem.model, actives, active.hypothesis) {
             doubt_it(finding);
         }
-        doubt_warming(finding, longest_s);
+        doubt_warming(finding, longest_s, at_bound(active));
         if let Some(says) = far_out(finding, &problem.model) {
             finding.sentence += says;
             doubt_it(finding);
@@ -62,16 +63,16 @@ pub fn doubt(named: &mut Named, problem: &Problem, actives: &[Active]) {
     doubt_patched_pushes(&mut named.findings);
 }
 
-/// Doubts that a joint warms up with a time constant that recordings of at most `longest_s` do not show, and says what
-/// they show.
-fn doubt_warming(finding: &mut Finding, longest_s: f64) {
+/// Doubts that a joint warms up with a time constant that recordings of at most `longest_s` do not show, or that is the least
+/// or the longest of all (`at_bound`), and says what they show.
+fn doubt_warming(finding: &mut Finding, longest_s: f64, at_bound: bool) {
     let time_s = finding.parameters.get("time_constant_s");
     let Some(time_s) = time_s.and_then(serde_json::Value::as_f64) else {
         return;
     };
     let says = if time_s > longest_s {
         " This time is longer than each recording, so the recordings do not show where the friction ends: a drift as well."
-    } else if time_s < LEAST_WARMING_S.min(SOON * longest_s) {
+    } else if at_bound || time_s < LEAST_WARMING_S.min(SOON * longest_s) {
         " No gear warms up so fast: it is something that passes soon after the start of each recording, such as a brake or \
          grease that has set."
     } else {
@@ -283,7 +284,7 @@ mod tests {
             let mut warm = push("a", 2.0);
             let time = serde_json::Value::from(time_s);
             warm.parameters.insert("time_constant_s".to_owned(), time);
-            doubt_warming(&mut warm, 30.0);
+            doubt_warming(&mut warm, 30.0, false);
             (warm.confidence <= DOUBTED, warm.sentence)
         };
         let (doubted, said) = at(3.5);
@@ -299,7 +300,7 @@ mod tests {
         short
             .parameters
             .insert("time_constant_s".to_owned(), serde_json::Value::from(5.0));
-        doubt_warming(&mut short, 10.0);
+        doubt_warming(&mut short, 10.0, false);
         assert!(short.confidence > 0.9);
     }
 
