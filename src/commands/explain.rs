@@ -124,9 +124,6 @@ impl Args {
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let request = args.request()?;
     explain::refuse_to_replace(&args.out, &request, args.force)?;
-    if let Some(note) = &request.note {
-        out.say(&format!("note: {note}"));
-    }
     let progress = Progress::of_work(args.quiet.show(out));
     let input = explain::read(&request, &|share, what| progress.doing(READ * share, what))?;
     explain::make(&args.out)?;
@@ -134,6 +131,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let step = |share: f64, what: &str| progress.doing(READ + (EXPLAINED - READ) * share, what);
     let mut outcome = tauscope_explain::explain(input, &step)
         .map_err(|error| Failure::rejected(error.to_string()))?;
+    outcome.report.notes.splice(0..0, request.note.clone());
     progress.doing(EXPLAINED, "writing");
     let hold = interrupt::hold();
     let made = explain::write(&args.out, &request, &kept, &mut outcome)?;

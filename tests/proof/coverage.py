@@ -1,10 +1,10 @@
 """How often an interval holds the truth: the simulated cell conceals, `explain` tells, and both are compared, parameter by parameter.
 
-    python coverage.py TAUSCOPE OUT [--cases 250] [--count 2] [--first 1] [--scenario FILE] [--slow 0.7] [--bodies-off]
+    python coverage.py TAUSCOPE OUT [--cases 250] [--count 2] [--first 1] [--scenario FILE] [--slow 0.7] [--bodies-off] [--table]
 
 Counted are the numbers of effects that were named at the right place; the rest, and what was missed, is counted apart. --slow makes that share of
 the effort's noise slow (0.3 s), with the same variance. --bodies-off gives `explain` a URDF with every mass 5 % and every centre of mass 5 mm off;
-bodies are then not counted, because what is right for them is not known.
+bodies are then not counted, because what is right for them is not known. --table prints one row of Markdown instead of every number.
 """
 import argparse
 import collections
@@ -33,6 +33,7 @@ def options():
     a.add_argument("--first", type=int, default=1, help="seed of the first case")
     a.add_argument("--slow", type=float, default=0., help="share of the noise that is slow")
     a.add_argument("--bodies-off", action="store_true")
+    a.add_argument("--table", action="store_true")
     a.add_argument("--scenario", type=pathlib.Path, default=HERE.parent / "data/concealed.scenario.yaml")
     return a.parse_args()
 
@@ -105,6 +106,17 @@ def holds(name, truth, interval):
     return low <= truth <= high
 
 
+def worst(hit, of):
+    """The effects that most intervals of miss, with how many of how many hold."""
+    held, every = collections.Counter(), collections.Counter()
+    for (effect, _), count in of.items():
+        every[effect] += count
+    for (effect, _), count in hit.items():
+        held[effect] += count
+    missing = sorted(every, key=lambda effect: held[effect] - every[effect])
+    return ", ".join(f"{effect} {held[effect]} of {every[effect]}" for effect in missing[:3] if held[effect] < every[effect])
+
+
 def main():
     o = options()
     hit, of = collections.Counter(), collections.Counter()
@@ -138,14 +150,20 @@ def main():
                     missed.append((seed, *key, truth, interval))
         names = {named(e) for e in concealed}
         wrong += sum(named(f) not in names for f in said)
+    total, held = sum(of.values()), sum(hit.values())
+    share = held / max(total, 1)
+    half = 1.96 * math.sqrt(share * (1 - share) / max(total, 1))
+    if o.table:
+        print("| cells | effects named | findings of nothing concealed | intervals | hold the truth | share | worst effects |")
+        print("| --- | --- | --- | --- | --- | --- | --- |")
+        print(f"| {cases} | {found} | {wrong} | {total} | {held} | {100 * share:.1f} ± {100 * half:.1f} % | {worst(hit, of)} |")
+        return
     for key in sorted(of):
         print(f"{key[0]:26}{key[1]:34}{hit[key]:5} of {of[key]:4}  {hit[key] / of[key]:.2f}")
     for seed, effect, name, truth, (low, high) in missed:
         print(f"missed by {seed}: {effect} {name} {truth:.5g}, said {low:.5g} to {high:.5g}")
-    total, held = sum(of.values()), sum(hit.values())
-    share = held / max(total, 1)
     print(f"{cases} cases of {o.count} effects: {found} named, {wrong} findings that were not concealed")
-    print(f"{held} of {total} intervals hold the truth: {100 * share:.1f} % (+- {196 * math.sqrt(share * (1 - share) / max(total, 1)):.1f})")
+    print(f"{held} of {total} intervals hold the truth: {100 * share:.1f} % (+- {100 * half:.1f})")
 
 
 if __name__ == "__main__":

@@ -9,13 +9,19 @@ use super::{
 /// Recorded effort: gain times the true one.
 pub static EFFECT: Effect = Effect {
     name: "torque_gain",
-    words: Words::new(
-        "Torque gain",
-        "torque gain",
-        "The torque is reported too large or too small by a factor: sensor gain, torque constant, gear efficiency.",
-        "Joint {place}: torque constant, gear ratio and the scale of its torque sensor.",
-        "The effort of joint {place} is recorded {gain} times as large as it is.",
-    ),
+    words: Words {
+        nothing: Some(
+            "The effort of joint {place} does not follow what the joint bears, {gain} of it: its brake holds it, its drive is off, \
+             or nothing is measured there.",
+        ),
+        ..Words::new(
+            "Torque gain",
+            "torque gain",
+            "The torque is reported too large or too small by a factor: sensor gain, torque constant, gear efficiency.",
+            "Joint {place}: torque constant, gear ratio and the scale of its torque sensor.",
+            "The effort of joint {place} is recorded {gain} times as large as it is.",
+        )
+    },
     family: Family::Recording,
     place: PlaceKind::Joint,
     layer: Layer::Record,

@@ -17,6 +17,8 @@ pub struct Words {
     pub finding: &'static str,
     /// A finding of less of it than a corrected twin says, `{less}` of it; for an effect that may fall below what is known.
     pub less: Option<&'static str>,
+    /// A finding whose first number may be zero; for an effect that takes all away then.
+    pub nothing: Option<&'static str>,
     /// A finding of which the data does not tell the numbers, for an effect that there may be such a finding of.
     pub without_numbers: Option<&'static str>,
 }
@@ -37,6 +39,7 @@ impl Words {
             look_at,
             finding,
             less: None,
+            nothing: None,
             without_numbers: None,
         }
     }

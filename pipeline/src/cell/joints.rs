@@ -84,7 +84,8 @@ impl Fixed {
     pub fn note(&self) -> String {
         let joints: Vec<&str> = self.joints.iter().map(String::as_str).collect();
         format!(
-            "no recording names {} of the robot: fixed at position zero, or the next to it within the limits",
+            "No recording names {} of the robot. Fixed at position zero, or the next to it within the limits: a joint that moves all the \
+             same, such as one that a parallelogram keeps level, bears otherwise than this says.",
             suggest::some(&joints)
         )
     }

@@ -30,17 +30,17 @@ const LARGEST_ERROR: f64 = 2.0;
 /// The sandwich `A⁻¹ B A⁻¹` with A the normal matrix and B the covariance of the scores, but never less than white noise
 /// of the variance that is left gives.
 pub fn covariance(problem: &Problem, fit: &Fit) -> DMatrix<f64> {
-    Normal::of(problem, fit, fit.jacobian(problem)).covariance(fit.parameters().len())
+    Normal::of(problem, fit, &fit.jacobian(problem)).covariance(fit.parameters().len())
 }
 
 /// The same, and from errors of the URDF's bodies: each mass and centre of mass is off by chance, all of them by the same
-/// share of a usual error, a variance component (Searle, Casella and McCulloch, *Variance Components*, 1992, chapter 5)
+/// share of a usual error, a variance component (Searle, Casella and `McCulloch`, *Variance Components*, 1992, chapter 5)
 /// that follows from what the residual has in common with their columns.
 pub fn covariance_beside_bodies(problem: &Problem, fit: &Fit) -> DMatrix<f64> {
     let mut columns = fit.jacobian(problem);
     let own = columns.len();
     columns.extend(usual_errors(problem, fit));
-    let normal = Normal::of(problem, fit, columns);
+    let normal = Normal::of(problem, fit, &columns);
     let mut covariance = normal.covariance(own);
     let bodies = normal.matrix.nrows() - own;
     let Some(inverse) = normal.inverse(own).filter(|_| bodies > 0) else {
@@ -65,7 +65,7 @@ struct Normal {
 }
 
 impl Normal {
-    fn of(problem: &Problem, fit: &Fit, columns: Vec<Arc<Column>>) -> Self {
+    fn of(problem: &Problem, fit: &Fit, columns: &[Arc<Column>]) -> Self {
         let p = columns.len();
         let mut normal = Self {
             matrix: DMatrix::zeros(p, p),
@@ -73,7 +73,7 @@ impl Normal {
             spread: DMatrix::zeros(p, p),
         };
         for joint in 0..problem.joints {
-            normal.add(problem, fit, &columns, joint);
+            normal.add(problem, fit, columns, joint);
         }
         // The prior counts as if it had been measured, too.
         let (known, _) = body_prior::normal(&problem.model, &fit.actives, &fit.parameters());
@@ -297,9 +297,9 @@ mod tests {
         let all = size([0.5, -0.3, 0.6, -0.4, 0.2]);
         assert!((0.4..0.8).contains(&all), "{all}");
         // Noise alone, and something else that is left in one direction.
-        assert_eq!(size([0.1, -0.08, 0.05, -0.1, 0.02]), 0.0);
-        assert_eq!(size([0.05, -0.08, 30.0, -0.1, 0.02]), 0.0);
-        assert_eq!(size([9.0; 5]), LARGEST_ERROR);
+        assert!(size([0.1, -0.08, 0.05, -0.1, 0.02]) <= 0.0);
+        assert!(size([0.05, -0.08, 30.0, -0.1, 0.02]) <= 0.0);
+        assert!(size([9.0; 5]) >= LARGEST_ERROR);
     }
 
     #[test]

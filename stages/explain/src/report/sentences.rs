@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde_json::Value;
+use tauscope_dynamics::terms::Words;
 use tauscope_dynamics::terms::words::{self, Told, number};
 
 use crate::physics::active::Active;
@@ -36,6 +37,10 @@ pub fn in_amperes(sentence: &str) -> String {
     sentence.replace("N m", "A").replace("kg m²", "A s²/rad")
 }
 
+/// A share that may be zero and is surely less than this is none.
+/// Physical: what a torque sensor says of a joint that it does not measure.
+const MOST_OF_NOTHING: f64 = 0.05;
+
 /// A finding as a sentence. `place` is the name of the joint or link.
 pub fn sentence(
     active: &Active,
@@ -56,9 +61,19 @@ pub fn sentence(
         let is_parameter = effect.parameters.iter().any(|p| p.name == name);
         !is_parameter || parameters.contains_key(name)
     };
-    let template = match (effect.words.less, effect.words.without_numbers) {
-        (Some(template), _) if less.is_some() => template,
-        (_, Some(template)) if !words::places(effect.words.finding).all(is_told) => template,
+    let is_nothing = intervals
+        .get(first)
+        .is_some_and(|[low, high]| *low <= 0.0 && *high < MOST_OF_NOTHING);
+    let Words {
+        less: of_less,
+        nothing,
+        without_numbers,
+        ..
+    } = effect.words;
+    let template = match (of_less, nothing, without_numbers) {
+        (Some(template), ..) if less.is_some() => template,
+        (_, Some(template), _) if is_nothing => template,
+        (.., Some(template)) if !words::places(effect.words.finding).all(is_told) => template,
         _ => effect.words.finding,
     };
     words::fill(template, |name, told| match name {
