@@ -88,6 +88,18 @@ fn next(at: &MotionSample<'_>, joint: usize) -> f64 {
     at.velocity.get(joint + 1).copied().unwrap_or(0.0)
 }
 
+impl Against {
+    /// Whether it depends on the effort that a joint's gear transmits.
+    pub fn is_of_load(self) -> bool {
+        matches!(self, Self::Load | Self::DrivenLoad | Self::LoadTurned)
+    }
+
+    /// Whether it is the time since a start that another run does not share.
+    pub fn is_of_start(self) -> bool {
+        matches!(self, Self::RecordingTime | Self::SessionTime)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -84,18 +84,6 @@ pub enum Against {
     SessionTime,
 }
 
-impl Against {
-    /// Whether it depends on the effort that a joint's gear transmits.
-    pub fn is_of_load(self) -> bool {
-        matches!(self, Self::Load | Self::DrivenLoad | Self::LoadTurned)
-    }
-
-    /// Whether it is the time since a start that another run does not share.
-    pub fn is_of_start(self) -> bool {
-        matches!(self, Self::RecordingTime | Self::SessionTime)
-    }
-}
-
 /// A curve through knots, straight between them and held at the ends, or repeated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {

@@ -179,7 +179,6 @@ fn conclude(
     let mut notes = named.notes;
     notes.extend(notes::late_twin(context.twin_late_s));
     notes.extend(notes::not_handed_out(&proof, &found, joints, unit));
-    notes.extend(notes::over_time(&found, joints));
     notes.extend(notes::notes(
         input,
         &problem,

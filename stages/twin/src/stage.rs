@@ -162,6 +162,15 @@ impl Twin {
         Ok(())
     }
 
+    /// Where the recording begins: a short gap makes no motor cold.
+    fn follow_recording(&mut self, stamp_ns: i64) {
+        let since_last = self.last_ns.map(|last| stamp_ns - last);
+        if !since_last.is_some_and(|ns| (0..PAUSE_NS).contains(&ns)) {
+            self.recording_ns = stamp_ns;
+        }
+        self.last_ns = Some(stamp_ns);
+    }
+
     /// Expected effort of the motion as it stands, in the measured effort's unit; not filtered.
     ///
     /// `expected = record(gain * bodies(rigid) + joints) / torque constant + offset`, where bodies, joints
@@ -242,12 +251,7 @@ impl Stage<JointState, TwinState> for Twin {
 
         self.follow_tool(sample)?;
         self.start_ns.get_or_insert(stamp_ns);
-        // A short gap makes no motor cold.
-        let since_last = self.last_ns.map(|last| stamp_ns - last);
-        if !since_last.is_some_and(|ns| (0..PAUSE_NS).contains(&ns)) {
-            self.recording_ns = stamp_ns;
-        }
-        self.last_ns = Some(stamp_ns);
+        self.follow_recording(stamp_ns);
         let dt_s = if go_on { dt_s.unwrap_or(0.0) } else { 0.0 };
         if go_on {
             self.motion.update(dt_s, sample);

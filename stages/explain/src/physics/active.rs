@@ -310,8 +310,7 @@ impl Active {
 
     /// Whether it is a curve over the time since a start that another run does not share.
     pub fn is_curve_over_time(&self) -> bool {
-        let curve = self.curve.as_ref();
-        curve.is_some_and(|curve| curve.against.is_of_start())
+        matches!(&self.curve, Some(curve) if curve.against.is_of_start())
     }
 
     /// Its parameters, as reports hold them.

@@ -1,6 +1,7 @@
 //! A recording as columns: what was measured, sample by sample, in the robot's joint order.
 
 mod losses;
+mod rate;
 
 use std::path::{Path, PathBuf};
 
@@ -8,6 +9,7 @@ use tauscope_archive::{ArchiveError, Recording as Archive, name_of};
 use tauscope_dynamics::Unwrap;
 
 pub use losses::Losses;
+pub use rate::mean_step_s;
 
 /// A longer time between two samples is a gap \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
@@ -42,19 +44,6 @@ pub struct Recording {
     pub sample_of_row: Vec<usize>,
     /// What was dropped on reading.
     pub losses: Losses,
-}
-
-/// Mean time between samples, apart from gaps \[s\]: a pause makes no recording slower. All times count where each is a gap.
-pub fn mean_step_s(time_s: &[f64]) -> f64 {
-    let steps = time_s.windows(2).map(|pair| pair[1] - pair[0]);
-    let (sum, count) = steps
-        .filter(|step| *step <= MAX_GAP_S)
-        .fold((0.0, 0), |(sum, count), step| (sum + step, count + 1));
-    if count > 0 {
-        return sum / f64::from(count);
-    }
-    let whole = time_s.last().unwrap_or(&0.0) - time_s.first().unwrap_or(&0.0);
-    whole / (time_s.len().max(2) - 1) as f64
 }
 
 /// Why a recording cannot be used.
@@ -164,11 +153,6 @@ impl Recording {
             recording.read_reference(&archive, topic, joint_names)?;
         }
         Ok(recording)
-    }
-
-    /// Samples a second, apart from gaps \[Hz\].
-    pub fn rate_hz(&self) -> f64 {
-        1.0 / mean_step_s(&self.time_s).max(1e-6)
     }
 
     /// Number of samples.

@@ -6,7 +6,9 @@ mod contest;
 mod doubt;
 mod far_out;
 mod scales;
+mod sizes;
 mod undetectable;
+mod unsure;
 mod waves;
 
 use std::collections::BTreeMap;
@@ -33,16 +35,14 @@ use contest::{Contest, contest};
 use doubt::DOUBTED;
 pub use doubt::doubt_patches;
 use scales::{Scales, StartScales};
+use sizes::{effort_rms, mismatch};
 pub use undetectable::undetectable;
+use unsure::surest;
 use waves::merge_waves;
 
 /// A time with a larger standard deviation than this has no interval \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const VAGUE_S: f64 = 5.0;
-
-/// Confidence of a body whose mass may be nothing, at most.
-/// Physical: an arm that turns about vertical axes alone hardly shows a mass; one that lifts does.
-const UNSURE_BODY: f64 = 0.85;
 
 /// The findings of an explanation, and what belongs to them.
 #[derive(Debug, Default)]
@@ -102,15 +102,6 @@ fn rival(input: &Input, joints: &[String], hypothesis: &Hypothesis) -> Rival {
     }
 }
 
-/// Whether a body was found whose mass may as well be nothing: another one may cancel it.
-fn may_weigh_nothing(problem: &Problem, active: &Active, deviations: &[f64]) -> bool {
-    let effect = active.hypothesis.effect;
-    let mass = effect.parameters.first();
-    let is_mass = mass.is_some_and(|parameter| parameter.name.ends_with("mass_kg"));
-    let value = active.parameters().first().copied().unwrap_or(0.0);
-    is_mass && value.abs() <= half_width_95(problem) * deviations[0]
-}
-
 /// The findings for every effect in `found`.
 pub fn of(
     search: &Search<'_>,
@@ -122,11 +113,8 @@ pub fn of(
     let (input, fit) = (context.input, &found.fit);
     let effective = &search.problem.effective_samples;
     let by_noise = covariance(search.problem, fit);
-    let spread = if input.bodies {
-        covariance_beside_bodies(search.problem, fit)
-    } else {
-        by_noise.clone()
-    };
+    let beside_bodies = (input.bodies).then(|| covariance_beside_bodies(search.problem, fit));
+    let spread = beside_bodies.as_ref().unwrap_or(&by_noise);
     let total = mismatch(before, fit, before);
     let scales = Scales::of(search.problem, fit, &by_noise);
     let of_start = StartScales::of(input);
@@ -139,13 +127,8 @@ pub fn of(
         if active.hypothesis.is_torque_scale() {
             continue;
         }
-        let deviations = parameter_deviations(search.problem, fit, &spread, index);
+        let deviations = parameter_deviations(search.problem, fit, spread, index);
         let by_noise = parameter_deviations(search.problem, fit, &by_noise, index);
-        let sure = if may_weigh_nothing(search.problem, active, &by_noise) {
-            UNSURE_BODY
-        } else {
-            1.0
-        };
         let less = search.without(found, index);
         let evidence = found.ahead_of(&less, effective);
         let contest = contest(search, found, &less, active);
@@ -177,9 +160,8 @@ pub fn of(
             parameters,
             intervals_95: intervals,
             in_amperes,
-            confidence: or_scale
-                .map_or(1.0, |_| DOUBTED)
-                .min(sure)
+            confidence: (or_scale.map_or(1.0, |_| DOUBTED))
+                .min(surest(search.problem, active, &by_noise))
                 .min(confidence(grounds)),
             recording: when.recording,
             t_start: when.start,
@@ -330,28 +312,6 @@ fn drop_no_force(
 
 fn number(value: f64) -> Value {
     serde_json::Number::from_f64(value).map_or(Value::Null, Value::Number)
-}
-
-/// Squares of the residual of `without` that `with` explains, over the final variance of each joint.
-fn mismatch(without: &Fit, with: &Fit, count: &Fit) -> f64 {
-    (0..with.variance.len())
-        .map(|j| {
-            (without.squares[j] - with.squares[j]).max(0.0)
-                / with.variance[j]
-                / count.count[j].max(1.0)
-        })
-        .sum::<f64>()
-        .max(1e-12)
-}
-
-/// What `without` leaves less what `with` leaves, as root mean square at the joint where that is most \[effort unit\].
-/// `unit_nm` are N m per that unit, by joint.
-fn effort_rms(without: &Fit, with: &Fit, unit_nm: &[f64]) -> f64 {
-    let at = |j: usize| {
-        let square = (without.squares[j] - with.squares[j]).max(0.0) / with.count[j].max(1.0);
-        square.sqrt() / unit_nm[j]
-    };
-    (0..with.squares.len()).map(at).fold(0.0, f64::max)
 }
 
 #[derive(Default)]

@@ -57,6 +57,7 @@ pub fn not_handed_out(proof: &Proof, found: &Fit, names: &[String], unit: &str) 
             ));
         }
     }
+    notes.extend(over_time(found, names));
     notes
 }
 
@@ -69,7 +70,7 @@ pub fn in_excerpts(excerpts: Excerpts) -> String {
 }
 
 /// Notes on the curves over time: another run begins at another time of whatever they follow.
-pub fn over_time(found: &Fit, names: &[String]) -> impl Iterator<Item = String> {
+fn over_time(found: &Fit, names: &[String]) -> impl Iterator<Item = String> {
     let curves = (found.actives.iter()).filter(|active| active.is_curve_over_time());
     curves.map(|active| {
         format!(

@@ -76,7 +76,6 @@ pub struct Base<'a> {
     factored: Factored,
     /// Precision of the shapes' priors, which bounds shapes in the linear step; 0 for factors.
     ridge: Vec<f64>,
-
     /// Logarithm of the number of hypotheses \[nats\].
     pub library: f64,
 }
