@@ -9,11 +9,8 @@ use tauscope_archive::{ArchiveError, Recording as Archive, name_of};
 use tauscope_dynamics::Unwrap;
 
 pub use losses::Losses;
-pub use rate::mean_step_s;
+pub use rate::{MAX_GAP_S, mean_step_s};
 
-/// A longer time between two samples is a gap \[s\].
-/// Tuned: by hand, on no recorded seeds; not swept.
-pub const MAX_GAP_S: f64 = 0.25;
 /// Efforts that are plain zeros at all of so many joints are no measurement. Fewer may be zero by chance, in coarse steps.
 /// Physical: of three joints one bears weight.
 const LEAST_JOINTS: usize = 3;

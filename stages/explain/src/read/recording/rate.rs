@@ -1,6 +1,10 @@
 //! The rate of a recording.
 
-use super::{MAX_GAP_S, Recording};
+use super::Recording;
+
+/// A longer time between two samples is a gap \[s\].
+/// Tuned: by hand, on no recorded seeds; not swept.
+pub const MAX_GAP_S: f64 = 0.25;
 
 /// Mean time between samples, apart from gaps \[s\]: a pause makes no recording slower. All times count where each is a gap.
 pub fn mean_step_s(time_s: &[f64]) -> f64 {
