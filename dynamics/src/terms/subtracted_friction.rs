@@ -16,9 +16,9 @@ pub(super) static EFFECT: Effect = Effect {
         "Joint {place}: does the controller publish its effort less a friction model, or is friction compensated in the driver as well?",
         "The recorded effort of joint {place} has {subtracted_nm} more Coulomb friction subtracted than the joint has.",
     ),
-    family: Family::Friction,
+    family: Family::Recording,
     place: PlaceKind::Joint,
-    layer: Layer::Joint,
+    layer: Layer::Record,
     parameters: &[Parameter::at_least("subtracted_nm", 0.0)],
     coordinates: &[Coordinate::positive_factor("subtracted_nm")],
     to_parameters: <[f64]>::to_vec,
@@ -26,9 +26,10 @@ pub(super) static EFFECT: Effect = Effect {
     simpler: None,
     limit: None,
     excitation: Excitation::Speeds,
-    simulated: Simulated::No("it is no physics of the arm but of what its controller publishes"),
+    simulated: Simulated::Record,
     concealed: Some(|draw| Drawn::new(draw.efforts_nm(), |f| vec![("subtracted_nm", f)])),
     traits: Traits {
+        only_adds: true,
         is_off_list: true,
         ..Traits::NONE
     },
