@@ -382,8 +382,9 @@ fn a_term_that_does_not_fit_the_robot_is_refused() {
     assert!(error.to_string().contains("elbow"), "{error}");
 }
 
-#[test]
-fn a_recording_begins_at_a_reset_and_the_session_does_not() {
+/// Expected efforts of two recordings of 6 s with so many seconds between their first samples are those of a joint that warms
+/// up, whose recording goes on over the gap or begins anew.
+fn warms_up_over(apart_s: i64, goes_on: bool) {
     let terms = r#"[
         {"effect": "friction_step", "joint": "hinge", "parameters":
             {"coulomb_before_nm": 1.0, "coulomb_after_nm": 3.0, "change_time_session_s": 9.995}},
@@ -391,10 +392,9 @@ fn a_recording_begins_at_a_reset_and_the_session_does_not() {
             {"viscous_warm_nms_per_rad": 0.0, "viscous_extra_cold_nms_per_rad": 10.0,
              "time_constant_s": 5.0}}]"#;
     let mut twin = Twin::new(&Config::default(), setup(), corrected(terms)).unwrap();
-    // Two recordings of 6 s each, one right after the other: 1 s is missing between them.
     let both = swing(0.0)
         .chain(swing(0.0).map(|mut sample| {
-            sample.header.stamp_ns += 7_000_000_000;
+            sample.header.stamp_ns += apart_s * 1_000_000_000;
             sample
         }))
         .map(|mut sample| {
@@ -406,14 +406,25 @@ fn a_recording_begins_at_a_reset_and_the_session_does_not() {
         });
     let states = run(&mut twin, both);
     for (i, state) in states.iter().enumerate() {
-        let recording_s = 0.01 * (i % 600) as f64;
-        let session_s = recording_s + if i < 600 { 0.0 } else { 7.0 };
+        let within_s = 0.01 * (i % 600) as f64;
+        let session_s = within_s + if i < 600 { 0.0 } else { apart_s as f64 };
+        let recording_s = if goes_on { session_s } else { within_s };
         let coulomb = if session_s < 9.995 { 1.0 } else { 3.0 };
         // Without friction the still arm at 0 costs what its acceleration seems to be.
         let rigid = 1.5 * MASS_KG * LENGTH_M * LENGTH_M * state.acceleration[0];
         let expected = rigid + coulomb + 10.0 * (-recording_s / 5.0).exp() - 0.25;
         assert!((state.expected_effort[0] - expected).abs() < 1e-9, "{i}");
     }
+}
+
+#[test]
+fn a_gap_of_a_second_makes_no_joint_cold() {
+    warms_up_over(7, true);
+}
+
+#[test]
+fn a_recording_begins_after_a_pause_and_the_session_does_not() {
+    warms_up_over(106, false);
 }
 
 #[test]
