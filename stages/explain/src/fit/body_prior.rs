@@ -17,6 +17,10 @@ const USUAL_SPREAD_M: f64 = 0.05;
 /// Tuned: by hand, on no recorded seeds; not swept.
 const FIRST_SHARE: f64 = 0.1;
 
+/// A centre may always be this far from its link's frame, however short the arm is \[m\].
+/// Physical: tools are shorter.
+const LONG_TOOL_M: f64 = 1.0;
+
 /// A body and the data of its prior.
 #[derive(Debug, Clone, Copy)]
 pub struct Body {
@@ -87,7 +91,8 @@ pub fn make_consistent(model: &Model, actives: &mut [Active]) -> bool {
             let mut nearest = body.nearest_consistent(least_m2);
             // A motion that shows the mass alone may leave the centre anywhere, and no step comes back from there.
             let from_link_m = nearest.com_m().iter().map(|x| x * x).sum::<f64>().sqrt();
-            if of_urdf.is_none() && from_link_m > reach_m(model, active.hypothesis.place.link) {
+            let farthest_m = reach_m(model, active.hypothesis.place.link).max(LONG_TOOL_M);
+            if of_urdf.is_none() && from_link_m > farthest_m {
                 let mass = nearest.mass_kg();
                 let moment = 2.0 * mass * USUAL_SPREAD_M * USUAL_SPREAD_M;
                 nearest = Inertia::new(mass, [0.0; 3], [moment, 0.0, 0.0, moment, 0.0, moment]);
