@@ -1,11 +1,13 @@
 //! Forward dynamics: the motion that efforts and contacts bring about.
 
-use nalgebra::{Matrix6, Vector3, Vector6};
+use nalgebra::{DVector, Matrix6, Vector3, Vector6};
 
+use crate::crba::mass_matrix;
 use crate::data::Data;
 use crate::data::{Articulated, check_lengths};
-use crate::kinematics::forward_kinematics;
+use crate::kinematics::{forward_kinematics, link_jacobian};
 use crate::model::Model;
+use crate::rnea::rnea;
 
 /// What the surroundings do to a link.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,7 +25,8 @@ pub struct Wrench {
 /// (RBDA section 7.3), with classical accelerations. Poses are computed on the way, so [`crate::link_pose`]
 /// and [`crate::link_jacobian`] may be asked afterwards.
 ///
-/// A joint that moves no inertia (a point mass on its axis) has no finite acceleration.
+/// A joint that moves no inertia (a point mass on its axis) has no finite acceleration. With joints that follow others
+/// ([`Model::followers`]) the mass matrix is solved instead, and memory is allocated.
 ///
 /// # Panics
 /// If a slice is not one number per joint, `data` was made for a model with another number of joints,
@@ -37,6 +40,9 @@ pub fn forward_dynamics<'d>(
     wrenches: &[Wrench],
 ) -> &'d [f64] {
     check_lengths(model, data, &[q, qd, effort]);
+    if model.is_coupled() {
+        return coupled(model, data, q, qd, effort, wrenches);
+    }
     forward_kinematics(model, data, q);
     begin(model, data, qd);
     for wrench in wrenches {
@@ -44,6 +50,33 @@ pub fn forward_dynamics<'d>(
     }
     gather(model, data, effort);
     release(model, data)
+}
+
+/// By the mass matrix, as a body there is no joint's alone: M qdd = effort - bias + Jᵀ wrench (RBDA section 6.1).
+fn coupled<'d>(
+    model: &Model,
+    data: &'d mut Data,
+    q: &[f64],
+    qd: &[f64],
+    effort: &[f64],
+    wrenches: &[Wrench],
+) -> &'d [f64] {
+    let n = model.dof();
+    let bias = rnea(model, data, q, qd, &vec![0.0; n]);
+    let mut drive = DVector::from_fn(n, |j, _| effort[j] - bias[j]);
+    let inertia = mass_matrix(model, data, q).clone();
+    for wrench in wrenches {
+        let stacked = stack(&wrench.force_n, &wrench.moment_nm);
+        drive += link_jacobian(model, data, wrench.link).tr_mul(&stacked);
+    }
+    match inertia.cholesky() {
+        Some(factored) => data
+            .acceleration
+            .copy_from_slice(factored.solve(&drive).as_slice()),
+        // As of a joint that moves no inertia.
+        None => data.acceleration.fill(f64::NAN),
+    }
+    &data.acceleration
 }
 
 /// Where a joint's axis, the body's z, stands in a spatial vector.

@@ -62,8 +62,10 @@ pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &[f64]) -> &'d DMat
         while at > 0 {
             let (here, slot) = (&model.bodies[at - 1], &slots[at]);
             let value = slot.angular.dot(&moment) + slot.linear_at_origin.dot(&force);
-            entries[here.joint * n + body.joint] = value;
-            entries[body.joint * n + here.joint] = value;
+            entries[here.joint * n + body.joint] += value;
+            if at != i + 1 {
+                entries[body.joint * n + here.joint] += value;
+            }
             at = here.parent;
         }
         if body.parent > 0 {

@@ -75,6 +75,7 @@ impl Slot {
     /// Poses the body in its parent's frame with its joint at `q` \[rad or m\].
     #[inline]
     pub fn place(&mut self, body: &Body, q: f64) {
+        let q = body.ratio * q + body.offset;
         let r = &body.rotation;
         if body.prismatic {
             self.rotation = *r;
@@ -93,16 +94,16 @@ impl Slot {
 impl Data {
     /// Memory for `model`.
     pub fn new(model: &Model) -> Self {
-        let n = model.dof();
-        let mut slots = vec![Slot::default(); n + 1];
+        let (n, bodies) = (model.dof(), model.bodies.len());
+        let mut slots = vec![Slot::default(); bodies + 1];
         slots[0].world_rotation = Matrix3::identity();
         Self {
             slots,
-            articulated: vec![Articulated::default(); n + 1],
+            articulated: vec![Articulated::default(); bodies + 1],
             effort: vec![0.0; n],
             acceleration: vec![0.0; n],
             mass_matrix: DMatrix::zeros(n, n),
-            regressor: DMatrix::zeros(n, n * PARAMETERS_PER_BODY),
+            regressor: DMatrix::zeros(n, bodies * PARAMETERS_PER_BODY),
             jacobian: Matrix6xX::zeros(n),
         }
     }
@@ -114,9 +115,11 @@ impl Data {
 pub(crate) fn check_lengths(model: &Model, data: &Data, slices: &[&[f64]]) {
     let n = model.dof();
     assert!(
-        data.slots.len() == n + 1,
-        "Data is for {} joints, the model has {n}",
-        data.slots.len() - 1
+        data.effort.len() == n && data.slots.len() == model.bodies.len() + 1,
+        "Data is for {} joints and {} bodies, the model has {n} and {}",
+        data.effort.len(),
+        data.slots.len() - 1,
+        model.bodies.len()
     );
     for slice in slices {
         assert!(

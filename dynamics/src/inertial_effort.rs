@@ -15,6 +15,8 @@ use crate::sines::sines;
 #[derive(Debug, Clone)]
 pub struct InertialEffort {
     bodies: Vec<Body>,
+    /// Position of each body's joint, its sine and its cosine.
+    position: Vec<f64>,
     sin: Vec<f64>,
     cos: Vec<f64>,
     effort: Vec<f64>,
@@ -24,6 +26,9 @@ pub struct InertialEffort {
 #[derive(Debug, Clone)]
 struct Body {
     joint: usize,
+    /// Its joint's position is `ratio` times that of `joint`, and `offset`.
+    ratio: f64,
+    offset: f64,
     /// 0 is the base, i + 1 the body i.
     parent: usize,
     prismatic: bool,
@@ -125,11 +130,13 @@ fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
 impl InertialEffort {
     /// For `model` with the tool it has now; both positions are zero.
     pub fn new(model: &Model) -> Self {
-        let n = model.dof();
+        let (n, bodies) = (model.dof(), model.bodies.len());
         let body = |body: &crate::model::Body| {
             let k = &body.load.pseudo_inertia;
             Body {
                 joint: body.joint,
+                ratio: body.ratio,
+                offset: body.offset,
                 parent: body.parent,
                 prismatic: body.prismatic,
                 home: rows(&body.rotation),
@@ -147,8 +154,9 @@ impl InertialEffort {
         };
         let mut new = Self {
             bodies: model.bodies.iter().map(body).collect(),
-            sin: vec![0.0; n],
-            cos: vec![0.0; n],
+            position: vec![0.0; bodies],
+            sin: vec![0.0; bodies],
+            cos: vec![0.0; bodies],
             effort: vec![0.0; n],
         };
         let zeros = vec![0.0; n];
@@ -162,12 +170,15 @@ impl InertialEffort {
     /// # Panics
     /// If `q` is not one number per joint.
     pub fn place(&mut self, q: &[f64]) {
-        sines(q, &mut self.sin, &mut self.cos);
-        for body in &mut self.bodies {
-            let (sin, cos) = (self.sin[body.joint], self.cos[body.joint]);
+        for (position, body) in self.position.iter_mut().zip(&self.bodies) {
+            *position = body.ratio * q[body.joint] + body.offset;
+        }
+        sines(&self.position, &mut self.sin, &mut self.cos);
+        for (b, body) in self.bodies.iter_mut().enumerate() {
+            let (sin, cos) = (self.sin[b], self.cos[b]);
             for (i, (&[x, y, z], &origin)) in body.home.iter().zip(&body.origin).enumerate() {
                 let (row, translation) = if body.prismatic {
-                    ([x, y, z], origin + z * q[body.joint])
+                    ([x, y, z], origin + z * self.position[b])
                 } else {
                     ([x * cos + y * sin, y * cos - x * sin, z], origin)
                 };
@@ -199,7 +210,7 @@ impl InertialEffort {
                 body.linear = turned_back(&body.rotation, &plus(&parent.linear, &carried));
                 body.alpha = turned_back(&body.rotation, &parent.alpha);
             }
-            let own = Pair([newest[body.joint], previous[body.joint]]);
+            let own = Pair([newest[body.joint], previous[body.joint]]) * body.ratio;
             if body.prismatic {
                 body.linear[2] += own;
             } else {
@@ -216,6 +227,7 @@ impl InertialEffort {
                 alpha[0] * row[0] + alpha[1] * row[1] + alpha[2] * row[2] - pulled[i]
             });
         }
+        effort.fill(0.0);
         for i in (0..bodies.len()).rev() {
             let (done, rest) = bodies.split_at_mut(i);
             let body = &rest[0];
@@ -224,7 +236,7 @@ impl InertialEffort {
             } else {
                 body.moment[2]
             };
-            effort[body.joint] = own.0[0] + own.0[1];
+            effort[body.joint] += body.ratio * (own.0[0] + own.0[1]);
             if body.parent > 0 {
                 let parent = &mut done[body.parent - 1];
                 let force = turned(&body.rotation, &body.force);
@@ -255,7 +267,7 @@ impl InertialEffort {
             slot.world_rotation = parent.world_rotation * slot.rotation;
             slot.world_translation =
                 parent.world_translation + parent.world_rotation * slot.translation;
-            let axis: Vector3<f64> = slot.world_rotation.column(2).into();
+            let axis: Vector3<f64> = slot.world_rotation.column(2) * body.ratio;
             (slot.angular, slot.linear_at_origin) = if body.prismatic {
                 (Vector3::zeros(), axis)
             } else {

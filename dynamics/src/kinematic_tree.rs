@@ -12,8 +12,14 @@ pub fn bearing(model: &Model, link: usize) -> BTreeSet<usize> {
 
 /// The link that the last joint before `link` moves: `link` itself or what it is fixed to.
 pub fn moving_link(model: &Model, link: usize) -> usize {
-    let joint = model.links()[link].joint;
-    joint.map_or(link, |joint| model.joints()[joint].child_link)
+    let slot = model.frames[link].slot;
+    if slot == 0 {
+        return link;
+    }
+    let before = |at: &usize| model.links()[*at].parent;
+    let on_it = |at: &usize| model.frames[*at].slot == slot;
+    let chain = std::iter::successors(Some(link), before).take_while(on_it);
+    chain.last().unwrap_or(link)
 }
 
 /// How far a link's frame can be from the base link's frame \[m\]: the sum of the distances between the frames along the

@@ -20,7 +20,7 @@ pub fn forward_kinematics(model: &Model, data: &mut Data, q: &[f64]) {
         slot.world_rotation = parent.world_rotation * slot.rotation;
         slot.world_translation =
             parent.world_translation + parent.world_rotation * slot.translation;
-        let axis: Vector3<f64> = slot.world_rotation.column(2).into();
+        let axis: Vector3<f64> = slot.world_rotation.column(2) * body.ratio;
         (slot.angular, slot.linear_at_origin) = if body.prismatic {
             (Vector3::zeros(), axis)
         } else {
@@ -104,12 +104,36 @@ fn columns(
     let carrier = &slots[frame.slot];
     let on_carrier = frame.translation + frame.rotation * point_m;
     let point = carrier.world_translation + carrier.world_rotation * on_carrier;
-    let mut at = frame.slot;
-    while at > 0 {
-        let (body, slot) = (&model.bodies[at - 1], &slots[at]);
-        let linear = slot.linear_at_origin + slot.angular.cross(&point);
-        column(body.joint, linear, slot.angular);
-        at = body.parent;
+    let before = |slot: &usize| (*slot > 0).then(|| model.bodies[*slot - 1].parent);
+    let chain = |from| std::iter::successors(Some(from), before).take_while(|slot| *slot > 0);
+    for at in chain(frame.slot) {
+        let joint = model.bodies[at - 1].joint;
+        let (mut linear, mut angular) = velocity(&slots[at], &point);
+        if model.is_coupled() {
+            // A joint that moves several bodies of the chain has one column.
+            let also = |slot: &usize| model.bodies[*slot - 1].joint == joint;
+            if chain(frame.slot)
+                .take_while(|slot| *slot != at)
+                .any(|slot| also(&slot))
+            {
+                continue;
+            }
+            for slot in chain(at).skip(1).filter(also) {
+                let (moved, turned) = velocity(&slots[slot], &point);
+                linear += moved;
+                angular += turned;
+            }
+        }
+        column(joint, linear, angular);
     }
     point
+}
+
+/// What the unit velocity of a body's joint does to a point of the world: its velocity, and the angular one.
+#[inline]
+fn velocity(slot: &Slot, point: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    (
+        slot.linear_at_origin + slot.angular.cross(point),
+        slot.angular,
+    )
 }

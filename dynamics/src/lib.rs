@@ -58,7 +58,9 @@ pub use data::Data;
 pub use inertia::{Inertia, PARAMETERS_PER_BODY};
 pub use inertial_effort::InertialEffort;
 pub use kinematics::{forward_kinematics, link_jacobian, link_pose, point_jacobian};
-pub use model::{Geometry, Joint, JointKind, Limits, Link, Model, ModelError, Shape, fix_joints};
+pub use model::{
+    Follower, Geometry, Joint, JointKind, Limits, Link, Model, ModelError, Shape, fix_joints,
+};
 pub use regressor::regressor;
 pub use rnea::{gravity_effort, rnea};
 pub use unwrap::Unwrap;

@@ -26,6 +26,7 @@ const GRAVITY_M_S2: f64 = 9.81;
 pub struct Model {
     name: String,
     joints: Vec<Joint>,
+    followers: Vec<Follower>,
     links: Vec<Link>,
     /// In traversal order: parents first.
     pub(crate) bodies: Vec<Body>,
@@ -51,9 +52,27 @@ pub struct Joint {
     pub axis: [f64; 3],
     /// Its limits as far as the URDF gives them.
     pub limits: Limits,
-    /// The joint that it is coupled to by its `<mimic>`. To the algorithms it is a joint like any other: what it costs is
-    /// not added to the effort of the joint that it follows.
-    pub follows: Option<String>,
+}
+
+impl Joint {
+    /// Whether it slides: its position is in m and its effort in N.
+    pub fn slides(&self) -> bool {
+        self.kind == JointKind::Prismatic
+    }
+}
+
+/// A joint that has no drive of its own: by its `<mimic>` it is where another joint puts it. It is not among the
+/// [`Model::joints`]; what it carries is part of the effort of the joint that it follows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Follower {
+    /// Its name, unique in the robot.
+    pub name: String,
+    /// The joint that it follows, an index into [`Model::joints`].
+    pub joint: usize,
+    /// Its position is `ratio` times the position of that joint \[rad or m per rad or m\], and `offset` \[rad or m\].
+    pub ratio: f64,
+    /// See `ratio`.
+    pub offset: f64,
 }
 
 /// What a joint lets move.
@@ -117,8 +136,13 @@ impl Link {
 /// z, so that every joint costs as little as an aligned one.
 #[derive(Debug, Clone)]
 pub(crate) struct Body {
-    /// Index in document order.
+    /// The joint that moves it: index in document order.
     pub joint: usize,
+    /// Its own joint's position is `ratio` times that joint's, and `offset`: 1 and 0 but for joints that follow another.
+    pub ratio: f64,
+    pub offset: f64,
+    /// Place of its parameters in the regressor, in bodies.
+    pub block: usize,
     /// Slot of the parent: 0 is the base, i + 1 the body i.
     pub parent: usize,
     pub prismatic: bool,
@@ -185,7 +209,7 @@ impl Model {
         &self.name
     }
 
-    /// Number of movable joints.
+    /// Number of movable joints, without those that follow another.
     pub fn dof(&self) -> usize {
         self.joints.len()
     }
@@ -193,6 +217,17 @@ impl Model {
     /// The movable joints, in the order of the URDF document.
     pub fn joints(&self) -> &[Joint] {
         &self.joints
+    }
+
+    /// The joints that follow one of these, in the order of the URDF document.
+    pub fn followers(&self) -> &[Follower] {
+        &self.followers
+    }
+
+    /// Whether a joint moves more than one body.
+    #[inline]
+    pub(crate) fn is_coupled(&self) -> bool {
+        !self.followers.is_empty()
     }
 
     /// Names of the movable joints, in the order of the URDF document.
@@ -233,6 +268,7 @@ impl Model {
     pub fn shift_zero(&mut self, joint: usize, offset: f64) {
         assert!(joint < self.dof(), "the robot has no joint {joint}");
         for body in self.bodies.iter_mut().filter(|body| body.joint == joint) {
+            let offset = body.ratio * offset;
             if body.prismatic {
                 body.translation += body.rotation.column(2) * offset;
             } else {
@@ -277,14 +313,15 @@ impl Model {
         ghost
     }
 
-    /// The ten inertial parameters of the body that `joint` moves, tool included, in the frame of its
-    /// child link: the factors of the regressor's columns, see [`crate::regressor`].
+    /// The ten inertial parameters of a body, tool included, in the frame of its joint's child link: the factors of the
+    /// regressor's columns, see [`crate::regressor`]. Body j is the one that joint j moves; those of
+    /// [`Model::followers`] come after them.
     ///
     /// # Panics
-    /// If `joint` is not an index into [`Model::joints`].
-    pub fn body_parameters(&self, joint: usize) -> [f64; 10] {
-        assert!(joint < self.dof(), "the robot has no joint {joint}");
-        let body = self.bodies.iter().find(|body| body.joint == joint);
+    /// If there is no such body.
+    pub fn body_parameters(&self, body: usize) -> [f64; 10] {
+        assert!(body < self.bodies.len(), "the robot has no body {body}");
+        let body = self.bodies.iter().find(|other| other.block == body);
         body.map_or([0.0; 10], |body| {
             let to_link = body.alignment.transpose();
             body.inertia()

@@ -7,7 +7,8 @@ use crate::inertia::PARAMETERS_PER_BODY;
 use crate::model::{Body, Model};
 use crate::rnea::accelerate;
 
-/// The joint-torque regressor Y of the motion, with effort = Y θ: n x 10 n. Row i is joint i; columns
+/// The joint-torque regressor Y of the motion, with effort = Y θ: n x 10 b, with n joints and b bodies: one for each
+/// joint, then one for each joint that follows another ([`Model::followers`]). Row i is joint i; columns
 /// 10 j to 10 j + 9 are the parameters of the body that joint j moves, in the frame of its child link:
 /// m, m c (x, y, z), and the inertia about the frame's origin (xx, xy, xz, yy, yz, zz), as
 /// [`Model::body_parameters`] gives them (Atkeson, An and Hollerbach, "Estimation of Inertial
@@ -34,7 +35,7 @@ pub fn regressor<'d>(
     entries.fill(0.0);
     for (i, body) in model.bodies.iter().enumerate() {
         let motion = Motion::of(body, &slots[i + 1]);
-        let first = PARAMETERS_PER_BODY * body.joint * n;
+        let first = PARAMETERS_PER_BODY * body.block * n;
         // From the child link's axes to those of the joint at hand, and where the body's origin is there.
         let (mut rotation, mut origin) = (body.alignment, Vector3::zeros());
         let mut at = i + 1;
@@ -49,9 +50,10 @@ pub fn regressor<'d>(
                     rotation.row(1) * origin.x - rotation.row(0) * origin.y;
                 (axis, lever.transpose())
             };
+            let (angular, linear) = (angular * here.ratio, linear * here.ratio);
             let columns = entries[first..].chunks_exact_mut(n);
             for (column, value) in columns.zip(motion.power(&angular, &linear)) {
-                column[here.joint] = value;
+                column[here.joint] += value;
             }
             if here.parent == 0 {
                 break;

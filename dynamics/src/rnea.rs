@@ -58,14 +58,16 @@ fn recursion<'d>(
         slot.moment = Vector3::new(m.m32 - m.m23, m.m13 - m.m31, m.m21 - m.m12) + h.cross(a);
     }
     let Data { slots, effort, .. } = data;
+    effort.fill(0.0);
     for (i, body) in model.bodies.iter().enumerate().rev() {
         let (done, rest) = slots.split_at_mut(i + 1);
         let (parent, slot) = (&mut done[body.parent], &rest[0]);
-        effort[body.joint] = if body.prismatic {
+        let own = if body.prismatic {
             slot.force.z
         } else {
             slot.moment.z
         };
+        effort[body.joint] += body.ratio * own;
         if body.parent > 0 {
             let force = slot.rotation * slot.force;
             parent.moment += slot.rotation * slot.moment + slot.translation.cross(&force);
@@ -89,6 +91,7 @@ pub(crate) fn accelerate(
         let (parent, slot) = (&done[body.parent], &mut rest[0]);
         let (q, qd, qdd) = motion(body.joint);
         slot.place(body, q);
+        let (qd, qdd) = (body.ratio * qd, body.ratio * qdd);
         follow(parent, slot, body.prismatic, qd, qdd);
     }
 }

@@ -5,7 +5,7 @@
 use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
 use proptest::prelude::*;
 use tauscope_dynamics::{
-    Data, Inertia, Model, Wrench, forward_dynamics, forward_kinematics, gravity_effort,
+    Data, Follower, Inertia, Model, Wrench, forward_dynamics, forward_kinematics, gravity_effort,
     link_jacobian, link_pose, mass_matrix, regressor, rnea,
 };
 
@@ -77,7 +77,7 @@ proptest! {
         let mut data = Data::new(&model);
         let effort = rnea(&model, &mut data, &q, &qd, &qdd).to_vec();
         let parameters: Vec<f64> =
-            (0..model.dof()).flat_map(|joint| model.body_parameters(joint)).collect();
+            (0..model.dof() + model.followers().len()).flat_map(|body| model.body_parameters(body)).collect();
         let product = regressor(&model, &mut data, &q, &qd, &qdd) * DVector::from_vec(parameters);
         prop_assert!(difference(product.as_slice(), &effort) < 1e-12);
     }
@@ -131,6 +131,40 @@ proptest! {
         prop_assert!(difference(rnea(&attached, &mut data, &q, &qd, &qdd), &effort) < 1e-12);
         with.set_tool(link, Inertia::zero());
         prop_assert!(difference(rnea(&with, &mut data, &q, &qd, &qdd), &without) < 1e-12);
+    }
+
+    #[test]
+    fn what_follows_a_joint_costs_that_joint_what_it_would_cost_alone(
+        xml in robot(),
+        seed in -2.0..2.0_f64,
+    ) {
+        let model = Model::from_urdf(&xml).unwrap();
+        let alone = Model::from_urdf(&without_mimics(&xml)).unwrap();
+        let n = model.dof();
+        let motion: Vec<f64> = (0..n).map(|j| (seed + j as f64).sin()).collect();
+        // Of each joint of the robot in which none follows another: the joint that moves it, ratio and offset.
+        let moved: Vec<(usize, f64, f64)> = alone
+            .joint_names()
+            .map(|name| {
+                let follower = model.followers().iter().find(|one| one.name == name);
+                let own = |one: &Follower| (one.joint, one.ratio, one.offset);
+                follower.map_or_else(|| (model.joint_index(name).unwrap(), 1.0, 0.0), own)
+            })
+            .collect();
+        let q: Vec<f64> = moved.iter().map(|(j, ratio, offset)| ratio * motion[*j] + offset).collect();
+        let qd: Vec<f64> = moved.iter().map(|(j, ratio, _)| ratio * motion[*j]).collect();
+        let (mut data, mut other) = (Data::new(&model), Data::new(&alone));
+        let mut wanted = vec![0.0; n];
+        for ((joint, ratio, _), effort) in moved.iter().zip(rnea(&alone, &mut other, &q, &qd, &qd)) {
+            wanted[*joint] += ratio * effort;
+        }
+        let effort = rnea(&model, &mut data, &motion, &motion, &motion);
+        prop_assert!(difference(effort, &wanted) < 1e-12);
+        let link = model.links().len() - 1;
+        forward_kinematics(&model, &mut data, &motion);
+        forward_kinematics(&alone, &mut other, &q);
+        let far = link_pose(&model, &data, link).inverse() * link_pose(&alone, &other, link);
+        prop_assert!(far.translation.vector.norm() < 1e-12);
     }
 
     #[test]
@@ -197,6 +231,16 @@ fn tool_effort(
     let mut linear = rate.fixed_rows_mut::<3>(0);
     linear -= weight;
     jacobian.transpose() * rate
+}
+
+/// The same robot, in which no joint follows another.
+fn without_mimics(xml: &str) -> String {
+    let mut parts = xml.split("<mimic ");
+    let first = parts.next().unwrap().to_owned();
+    first
+        + &parts
+            .map(|part| part.split_once("/>").unwrap().1)
+            .collect::<String>()
 }
 
 /// The same robot with its elements in the opposite order.

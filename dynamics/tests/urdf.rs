@@ -4,7 +4,7 @@
 #![allow(clippy::float_cmp, reason = "numbers are read as they are written")]
 
 use tauscope_dynamics::{
-    Data, Geometry, JointKind, Limits, Model, fix_joints, forward_kinematics, link_pose,
+    Data, Follower, Geometry, JointKind, Limits, Model, fix_joints, forward_kinematics, link_pose,
 };
 
 const INERTIAL: &str = "<inertial><origin xyz='0 0 0.1'/><mass value='2'/>\
@@ -299,13 +299,57 @@ fn masses_must_be_there_and_not_below_zero() {
 }
 
 #[test]
-fn a_joint_that_mimics_another_is_a_joint_and_says_so() {
+fn a_joint_that_mimics_another_is_none_of_its_own_and_goes_where_that_puts_it() {
     let limit = "<limit velocity=\"2\" effort=\"10\"/>";
-    let mimic = robot().replace(limit, "<mimic joint=\"left_arm\"/>");
-    let model = Model::from_urdf(&mimic).unwrap();
-    assert_eq!(model.dof(), 3);
-    assert_eq!(model.joints()[2].follows.as_deref(), Some("left_arm"));
-    assert_eq!(model.joints()[0].follows, None);
+    let with = |mimic: &str| robot().replace(limit, mimic);
+    let mimic = with("<mimic joint=\"left_arm\" multiplier=\"-2\" offset=\"0.1\"/>");
+    let mut model = Model::from_urdf(&mimic).unwrap();
+    let name = Model::from_urdf(&robot()).unwrap().joints()[2].name.clone();
+    let follower = Follower {
+        name,
+        joint: model.joint_index("left_arm").unwrap(),
+        ratio: -2.0,
+        offset: 0.1,
+    };
+    assert_eq!(model.dof(), 2);
+    assert_eq!(model.followers(), [follower]);
+    // Another zero of the joint that it follows moves both.
+    let moved = pose_of(&model, "right", &[0.3, 0.4]);
+    model.shift_zero(0, 0.25);
+    let shifted = pose_of(&model, "right", &[0.05, 0.4]);
+    for (a, b) in moved.iter().zip(&shifted) {
+        assert!((a - b).abs() < 1e-12, "{moved:?} {shifted:?}");
+    }
+    assert_eq!(
+        refusal(&with("<mimic joint=\"nobody\"/>")),
+        "line 19: joint `right_arm` mimics joint `nobody`, which the robot does not have"
+    );
+    assert_eq!(
+        refusal(&with("<mimic joint=\"right_arm\"/>")),
+        "line 19: joint `right_arm` mimics itself, over others or not: no joint moves it"
+    );
+}
+
+#[test]
+fn what_follows_a_fixed_joint_is_fixed_where_that_puts_it() {
+    let limit = "<limit velocity=\"2\" effort=\"10\"/>";
+    let mimic = robot().replace(
+        limit,
+        "<mimic joint=\"left_arm\" multiplier=\"-2\" offset=\"0.1\"/>",
+    );
+    let low = mimic.replace("lower=\"-1\" upper=\"1.5\"", "lower=\"0.4\" upper=\"1.5\"");
+    let whole = Model::from_urdf(&robot()).unwrap();
+    let fixed = Model::from_urdf(&fix_joints(&low, &["left_arm"]).unwrap()).unwrap();
+    assert!(fixed.followers().is_empty());
+    for link in ["left", "hand", "right"] {
+        let stands = pose_of(&fixed, link, &vec![0.0; fixed.dof()]);
+        let mut positions = vec![0.0; whole.dof()];
+        positions[whole.joint_index("left_arm").unwrap()] = 0.4;
+        positions[whole.joint_index("right_arm").unwrap()] = -0.7;
+        for (a, b) in stands.iter().zip(pose_of(&whole, link, &positions)) {
+            assert!((a - b).abs() < 1e-9, "{link}");
+        }
+    }
 }
 
 /// The pose of `link` at these positions of all joints.

@@ -290,14 +290,16 @@ impl Told<'_> {
     }
 }
 
-/// A sentence for each joint that is coupled to another.
+/// A sentence for each joint that follows another.
 fn coupled(cell: &Cell) -> Vec<String> {
-    let joints = cell.model.iter().flat_map(tauscope_dynamics::Model::joints);
-    let coupled = joints.filter_map(|joint| Some((&joint.name, joint.follows.as_ref()?)));
-    let sentence = |(joint, leader)| {
-        format!("Joint {joint} follows {leader}: its load is not counted as effort of {leader}.")
-    };
-    coupled.map(sentence).collect()
+    let model = cell.model.iter();
+    let sentences = model.flat_map(|model| {
+        model.followers().iter().map(|follower| {
+            let (joint, leader) = (&follower.name, &model.joints()[follower.joint].name);
+            format!("Joint {joint} follows {leader}: what it carries is effort of {leader}, and its own effort is not read.")
+        })
+    });
+    sentences.collect()
 }
 
 /// How far the joints move in a recording, and what is odd about its messages.

@@ -197,6 +197,7 @@ const NUMBERS: &[(&str, &[&str], usize)] = &[
     ("axis", &["xyz"], 3),
     ("mass", &["value"], 1),
     ("inertia", &["ixx", "ixy", "ixz", "iyy", "iyz", "izz"], 1),
+    ("mimic", &["multiplier", "offset"], 1),
     ("limit", &["lower", "upper", "velocity", "effort"], 1),
 ];
 

@@ -41,6 +41,24 @@ pub enum ModelError {
         /// The document's outermost element.
         found: String,
     },
+    /// A joint mimics one that is not there.
+    #[error("line {line}: joint `{joint}` mimics joint `{mimics}`, which the robot does not have")]
+    UnknownMimic {
+        /// Line of the joint.
+        line: u32,
+        /// The joint.
+        joint: String,
+        /// The joint in its `<mimic>`.
+        mimics: String,
+    },
+    /// Joints mimic each other in a circle.
+    #[error("line {line}: joint `{joint}` mimics itself, over others or not: no joint moves it")]
+    MimicCircle {
+        /// Line of the joint.
+        line: u32,
+        /// One of the joints.
+        joint: String,
+    },
     /// A number is not one.
     #[error("line {line}: {element} has {attribute}=\"{text}\": not {expected}")]
     Number {

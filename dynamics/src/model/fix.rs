@@ -2,14 +2,13 @@
 
 use std::ops::Range;
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion};
-
+use super::ModelError;
 use super::document::{elements, parse};
 use super::urdf::{Movable, RawJoint, read};
-use super::{JointKind, ModelError};
 
 /// The URDF `xml` with the movable joints of these names made fixed, each where its position is zero, or the next to it
-/// that its limits allow. All else keeps its text. Names that no movable joint has are passed over.
+/// that its limits allow; and those that follow them, where that puts them. All else keeps its text. Names that no movable
+/// joint has are passed over.
 ///
 /// # Errors
 /// What is wrong with the text or its elements.
@@ -23,14 +22,16 @@ pub fn fix_joints(xml: &str, joints: &[&str]) -> Result<String, ModelError> {
             continue;
         };
         let kind = node.attribute_node("type");
-        let (true, Some(kind)) = (joints.contains(&joint.name.as_str()), kind) else {
+        let position = position_at_rest(joint, movable, joints, &robot.joints)?;
+        let (Some(position), Some(kind)) = (position, kind) else {
             continue;
         };
         edits.push((kind.range_value(), "fixed".to_owned()));
         let origin = elements(node).find(|node| node.has_tag_name("origin"));
-        let Some(text) = origin_at_rest(joint, movable) else {
+        if position == 0.0 {
             continue;
-        };
+        }
+        let text = origin_at(joint, movable, position);
         let first = elements(node).next().map(|first| first.range().start);
         let place = origin.map(|origin| origin.range());
         let place = place.or(first.map(|at| at..at));
@@ -43,25 +44,33 @@ pub fn fix_joints(xml: &str, joints: &[&str]) -> Result<String, ModelError> {
     Ok(fixed)
 }
 
-/// The `<origin>` of the joint once it is fixed; none where that is the one it has.
-fn origin_at_rest(joint: &RawJoint, movable: &Movable) -> Option<String> {
-    let position = 0.0_f64
-        .max(movable.limits.lower.unwrap_or(f64::NEG_INFINITY))
-        .min(movable.limits.upper.unwrap_or(f64::INFINITY));
-    if position == 0.0 {
-        return None;
-    }
-    let along = movable.axis * position;
-    let moved = match movable.kind {
-        JointKind::Prismatic => {
-            Isometry3::from_parts(Translation3::from(along), UnitQuaternion::identity())
-        }
-        JointKind::Revolute | JointKind::Continuous => Isometry3::rotation(along),
+/// Where a joint is fixed \[rad or m\], if it is one of `fixed` or follows one.
+fn position_at_rest(
+    joint: &RawJoint,
+    movable: &Movable,
+    fixed: &[&str],
+    all: &[RawJoint],
+) -> Result<Option<f64>, ModelError> {
+    let nearest = |movable: &Movable| {
+        0.0_f64
+            .max(movable.limits.lower.unwrap_or(f64::NEG_INFINITY))
+            .min(movable.limits.upper.unwrap_or(f64::INFINITY))
     };
-    let pose = joint.origin * moved;
+    if fixed.contains(&joint.name.as_str()) {
+        return Ok(Some(nearest(movable)));
+    }
+    let leader = joint.leader(all)?;
+    let leader = leader.filter(|leader| fixed.contains(&all[leader.joint].name.as_str()));
+    Ok(leader.and_then(|leader| {
+        let movable = all[leader.joint].movable.as_ref()?;
+        Some(leader.ratio * nearest(movable) + leader.offset)
+    }))
+}
+
+/// The `<origin>` of the joint once it is fixed at a position.
+fn origin_at(joint: &RawJoint, movable: &Movable, position: f64) -> String {
+    let pose = joint.origin * movable.moved(position);
     let (roll, pitch, yaw) = pose.rotation.euler_angles();
     let [x, y, z] = pose.translation.vector.into();
-    Some(format!(
-        r#"<origin xyz="{x} {y} {z}" rpy="{roll} {pitch} {yaw}"/>"#
-    ))
+    format!(r#"<origin xyz="{x} {y} {z}" rpy="{roll} {pitch} {yaw}"/>"#)
 }

@@ -59,6 +59,7 @@ impl Model {
         let mut model = Self {
             name: String::new(),
             joints: Vec::new(),
+            followers: Vec::new(),
             links: vec![link("base".to_owned(), None)],
             bodies: Vec::new(),
             frames: vec![frame(0)],
@@ -73,13 +74,15 @@ impl Model {
                 child_link: j + 1,
                 axis: [0.0, 0.0, 1.0],
                 limits: Limits::default(),
-                follows: None,
             });
             // Behind link j, moved by joint j.
             model.links.push(link(format!("{name}_link"), Some(j)));
             model.frames.push(frame(j + 1));
             model.bodies.push(Body {
                 joint: j,
+                ratio: 1.0,
+                offset: 0.0,
+                block: j,
                 parent: j,
                 prismatic: false,
                 rotation: Matrix3::identity(),

@@ -1,9 +1,9 @@
 //! From links and joints to the tree the algorithms walk.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Vector3};
 
-use super::urdf::{RawJoint, RawLink, Robot};
-use super::{Body, Frame, GRAVITY_M_S2, Joint, Link, Load, Model, ModelError};
+use super::urdf::{Leader, RawJoint, RawLink, Robot};
+use super::{Body, Follower, Frame, GRAVITY_M_S2, Joint, Link, Load, Model, ModelError};
 use crate::inertia::Inertia;
 
 /// Puts the tree together.
@@ -13,10 +13,12 @@ use crate::inertia::Inertia;
 pub(super) fn build(robot: Robot) -> Result<Model, ModelError> {
     let parents = parent_joints(&robot)?;
     let order = parents_first(&robot, &parents)?;
-    let document_order = number_joints(&robot);
+    let movers = movers(&robot)?;
+    let joints = movable_joints(&robot, &movers);
     let mut builder = Builder {
         links: &robot.links,
-        document_order: &document_order,
+        movers: &movers,
+        joints: joints.len(),
         bodies: Vec::new(),
         frames: vec![None; robot.links.len()],
     };
@@ -26,9 +28,9 @@ pub(super) fn build(robot: Robot) -> Result<Model, ModelError> {
             None => builder.root(link),
             Some((index, joint)) => {
                 builder.hang(index, joint);
-                let carrier = match document_order[index] {
-                    Some(movable) => Some(movable),
-                    None => places[joint.parent].1,
+                let carrier = match movers[index] {
+                    Mover::Own(number) | Mover::Follows { number, .. } => Some(number),
+                    Mover::Fixed { .. } => places[joint.parent].1,
                 };
                 places[link] = (Some(joint.parent), carrier);
             }
@@ -40,7 +42,7 @@ pub(super) fn build(robot: Robot) -> Result<Model, ModelError> {
     for body in &mut bodies {
         body.update_load();
     }
-    let joints = movable_joints(&robot);
+    let followers = followers(&robot, &movers);
     if joints.is_empty() {
         return Err(ModelError::NothingMoves { robot: robot.name });
     }
@@ -60,6 +62,7 @@ pub(super) fn build(robot: Robot) -> Result<Model, ModelError> {
     Ok(Model {
         name: robot.name,
         joints,
+        followers,
         links,
         bodies,
         // Every link is reached: the order holds them all.
@@ -135,32 +138,85 @@ fn cycle(robot: &Robot, parents: &[Option<usize>], link: usize) -> ModelError {
     ModelError::Cycle { joints: Vec::new() }
 }
 
-/// For each joint its number among the movable ones.
-fn number_joints(robot: &Robot) -> Vec<Option<usize>> {
+/// What moves a joint.
+#[derive(Debug, Clone, Copy)]
+enum Mover {
+    /// It itself: its number among such joints.
+    Own(usize),
+    /// The joint of that number, to `ratio` times its position and `offset`.
+    Follows {
+        number: usize,
+        ratio: f64,
+        offset: f64,
+    },
+    /// Nothing: it stays at that position \[rad or m\].
+    Fixed { position: f64 },
+}
+
+fn movers(robot: &Robot) -> Result<Vec<Mover>, ModelError> {
     let mut count = 0;
-    let number = |joint: &RawJoint| {
-        joint.movable.as_ref().map(|_| {
+    let mut number = |joint: &RawJoint| {
+        let is_own = matches!(&joint.movable, Some(movable) if movable.follows.is_none());
+        is_own.then(|| {
             count += 1;
             count - 1
         })
     };
-    robot.joints.iter().map(number).collect()
+    let numbers: Vec<Option<usize>> = robot.joints.iter().map(&mut number).collect();
+    let mover = |index: usize| match robot.joints[index].leader(&robot.joints)? {
+        Some(Leader {
+            joint,
+            ratio,
+            offset,
+        }) => Ok(match numbers[joint] {
+            Some(number) if joint == index => Mover::Own(number),
+            Some(number) => Mover::Follows {
+                number,
+                ratio,
+                offset,
+            },
+            None => Mover::Fixed { position: offset },
+        }),
+        None => Ok(Mover::Fixed { position: 0.0 }),
+    };
+    (0..robot.joints.len()).map(mover).collect()
 }
 
-fn movable_joints(robot: &Robot) -> Vec<Joint> {
-    let joint = |raw: &RawJoint| {
+fn movable_joints(robot: &Robot, movers: &[Mover]) -> Vec<Joint> {
+    let joint = |(raw, mover): (&RawJoint, &Mover)| {
         let movable = raw.movable.as_ref()?;
-        Some(Joint {
+        matches!(mover, Mover::Own(_)).then(|| Joint {
             name: raw.name.clone(),
             kind: movable.kind,
             parent_link: raw.parent,
             child_link: raw.child,
             axis: movable.axis.into(),
             limits: movable.limits,
-            follows: movable.follows.clone(),
         })
     };
-    robot.joints.iter().filter_map(joint).collect()
+    robot.joints.iter().zip(movers).filter_map(joint).collect()
+}
+
+fn followers(robot: &Robot, movers: &[Mover]) -> Vec<Follower> {
+    let follower = |(raw, mover): (&RawJoint, &Mover)| match *mover {
+        Mover::Follows {
+            number,
+            ratio,
+            offset,
+        } => Some(Follower {
+            name: raw.name.clone(),
+            joint: number,
+            ratio,
+            offset,
+        }),
+        Mover::Own(_) | Mover::Fixed { .. } => None,
+    };
+    robot
+        .joints
+        .iter()
+        .zip(movers)
+        .filter_map(follower)
+        .collect()
 }
 
 fn refuse_massless(
@@ -171,7 +227,8 @@ fn refuse_massless(
 ) -> Result<(), ModelError> {
     let mut massless: Vec<usize> = bodies
         .iter()
-        .filter(|body| body.own.mass == 0.0)
+        // What follows a joint may be without a mass: that joint moves others.
+        .filter(|body| body.own.mass == 0.0 && body.block == body.joint)
         .map(|body| body.joint)
         .collect();
     massless.sort_unstable();
@@ -192,7 +249,9 @@ fn refuse_massless(
 
 struct Builder<'a> {
     links: &'a [RawLink],
-    document_order: &'a [Option<usize>],
+    movers: &'a [Mover],
+    /// Number of joints that follow no other.
+    joints: usize,
     bodies: Vec<Body>,
     frames: Vec<Option<Frame>>,
 }
@@ -215,11 +274,29 @@ impl Builder<'_> {
         let origin = joint.origin.rotation.to_rotation_matrix();
         let rotation = parent.rotation * origin.matrix();
         let translation = parent.translation + parent.rotation * joint.origin.translation.vector;
-        let frame = match (&joint.movable, self.document_order[index]) {
-            (Some(movable), Some(number)) => {
+        let moved = match self.movers[index] {
+            Mover::Own(number) => Some((number, 1.0, 0.0, number)),
+            Mover::Follows {
+                number,
+                ratio,
+                offset,
+            } => {
+                let earlier = &self.movers[..index];
+                let followers = earlier
+                    .iter()
+                    .filter(|mover| matches!(mover, Mover::Follows { .. }));
+                Some((number, ratio, offset, self.joints + followers.count()))
+            }
+            Mover::Fixed { .. } => None,
+        };
+        let frame = match (&joint.movable, moved) {
+            (Some(movable), Some((number, ratio, offset, block))) => {
                 let alignment = z_to(&movable.axis);
                 self.bodies.push(Body {
                     joint: number,
+                    ratio,
+                    offset,
+                    block,
                     parent: parent.slot,
                     prismatic: movable.kind == super::JointKind::Prismatic,
                     rotation: rotation * alignment.transpose(),
@@ -235,11 +312,17 @@ impl Builder<'_> {
                     translation: Vector3::zeros(),
                 }
             }
-            _ => Frame {
-                slot: parent.slot,
-                rotation,
-                translation,
-            },
+            (movable, _) => {
+                let stays = match (movable, self.movers[index]) {
+                    (Some(movable), Mover::Fixed { position }) => movable.moved(position),
+                    _ => Isometry3::identity(),
+                };
+                Frame {
+                    slot: parent.slot,
+                    rotation: rotation * stays.rotation.to_rotation_matrix().matrix(),
+                    translation: translation + rotation * stays.translation.vector,
+                }
+            }
         };
         if let Some(body) = frame.slot.checked_sub(1) {
             let inertia = &self.links[joint.child].inertia;

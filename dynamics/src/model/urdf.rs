@@ -43,8 +43,78 @@ pub(super) struct Movable {
     /// Of length 1.
     pub axis: Vector3<f64>,
     pub limits: Limits,
-    /// The joint in its `<mimic>`.
-    pub follows: Option<String>,
+    pub follows: Option<Follows>,
+}
+
+impl Movable {
+    /// What a position \[rad or m\] does to the joint's child.
+    pub fn moved(&self, position: f64) -> Isometry3<f64> {
+        let along = self.axis * position;
+        match self.kind {
+            JointKind::Prismatic => {
+                Isometry3::from_parts(along.into(), nalgebra::UnitQuaternion::identity())
+            }
+            JointKind::Revolute | JointKind::Continuous => Isometry3::rotation(along),
+        }
+    }
+}
+
+/// The joint at whose position another is: `ratio` times it, and `offset`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Leader {
+    /// Its index, of all joints.
+    pub joint: usize,
+    pub ratio: f64,
+    pub offset: f64,
+}
+
+impl RawJoint {
+    /// The joint that this one follows in the end, over any number of others; itself where it follows none, `None` where
+    /// it cannot move.
+    ///
+    /// # Errors
+    /// If a `<mimic>` names no joint, or they go round in a circle.
+    pub fn leader(&self, joints: &[Self]) -> Result<Option<Leader>, ModelError> {
+        let place = |name: &str| joints.iter().position(|joint| joint.name == name);
+        let (mut at, mut ratio, mut offset) = (self, 1.0, 0.0);
+        for _ in 0..=joints.len() {
+            let Some(follows) = at.movable.as_ref().and_then(|m| m.follows.as_ref()) else {
+                let leader = |joint| Leader {
+                    joint,
+                    ratio,
+                    offset,
+                };
+                return Ok(place(&at.name)
+                    .filter(|_| self.movable.is_some())
+                    .map(leader));
+            };
+            offset += ratio * follows.offset;
+            ratio *= follows.ratio;
+            at = match place(&follows.joint) {
+                Some(next) => &joints[next],
+                None => {
+                    return Err(ModelError::UnknownMimic {
+                        line: at.line,
+                        joint: at.name.clone(),
+                        mimics: follows.joint.clone(),
+                    });
+                }
+            };
+        }
+        Err(ModelError::MimicCircle {
+            line: self.line,
+            joint: self.name.clone(),
+        })
+    }
+}
+
+/// A `<mimic>`.
+#[derive(Debug, Clone)]
+pub(super) struct Follows {
+    /// The joint's name.
+    pub joint: String,
+    pub ratio: f64,
+    pub offset: f64,
 }
 
 /// Reads the document.
@@ -155,7 +225,11 @@ fn read_joint(
                 kind,
                 axis,
                 limits: limits(kind, &joint.limit, marks),
-                follows: joint.mimic.map(|mimic| mimic.joint),
+                follows: joint.mimic.map(|mimic| Follows {
+                    joint: mimic.joint,
+                    ratio: mimic.multiplier.unwrap_or(1.0),
+                    offset: mimic.offset.unwrap_or(0.0),
+                }),
             })
         }
     };

@@ -21,6 +21,8 @@ pub struct Segment {
     half_axes_m: [f64; 3],
     /// A second link, fixed to the first.
     flange: bool,
+    /// The joint before it that it follows, with ratio and offset.
+    mimics: Option<(prop::sample::Index, f64, f64)>,
 }
 
 fn vector(size: f64) -> impl Strategy<Value = [f64; 3]> {
@@ -41,6 +43,7 @@ fn axis() -> impl Strategy<Value = [f64; 3]> {
 
 fn segment() -> impl Strategy<Value = Segment> {
     let kind = prop_oneof![Just("revolute"), Just("continuous"), Just("prismatic")];
+    let mimics = (any::<prop::sample::Index>(), -1.5..1.5_f64, -1.0..1.0_f64);
     (
         (
             any::<prop::sample::Index>(),
@@ -56,8 +59,9 @@ fn segment() -> impl Strategy<Value = Segment> {
             prop::array::uniform3(0.05..0.3_f64),
         ),
         any::<bool>(),
+        prop::option::weighted(0.2, mimics),
     )
-        .prop_map(|((parent, kind, axis, xyz, rpy), body, flange)| {
+        .prop_map(|((parent, kind, axis, xyz, rpy), body, flange, mimics)| {
             let (mass_kg, com_m, inertial_rpy, half_axes_m) = body;
             Segment {
                 parent,
@@ -70,6 +74,7 @@ fn segment() -> impl Strategy<Value = Segment> {
                 inertial_rpy,
                 half_axes_m,
                 flange,
+                mimics,
             }
         })
 }
@@ -105,10 +110,17 @@ fn urdf(segments: &[Segment], reversed: bool) -> String {
         } else {
             "<limit lower='-2' upper='2' velocity='1' effort='9'/>"
         };
+        let mimic = match &s.mimics {
+            Some((leader, ratio, offset)) if i > 0 => {
+                let leader = leader.index(i);
+                format!("<mimic joint='joint{leader}' multiplier='{ratio}' offset='{offset}'/>")
+            }
+            _ => String::new(),
+        };
         write!(
             part,
             "<joint name='joint{i}' type='{}'><parent link='{parent}'/><child link='link{i}'/>
-               <origin xyz='{}' rpy='{}'/><axis xyz='{}'/>{limit}</joint>
+               <origin xyz='{}' rpy='{}'/><axis xyz='{}'/>{limit}{mimic}</joint>
              <link name='link{i}'><inertial><origin xyz='{}' rpy='{}'/><mass value='{}'/>
                <inertia ixx='{}' ixy='0' ixz='0' iyy='{}' iyz='0' izz='{}'/></inertial></link>",
             s.kind,

@@ -51,9 +51,10 @@ impl Fixed {
             .joint_names()
             .filter(|name| !is_recorded(name))
             .collect();
+        let follows = |name: &str| model.followers().iter().any(|one| one.name == name);
         let are_known = recorded
             .iter()
-            .all(|name| model.joint_index(name).is_some());
+            .all(|name| model.joint_index(name).is_some() || follows(name));
         if unrecorded.is_empty() || recorded.is_empty() || !are_known {
             return None;
         }
@@ -85,7 +86,8 @@ impl Fixed {
         let joints: Vec<&str> = self.joints.iter().map(String::as_str).collect();
         format!(
             "No recording names {} of the robot. Fixed at position zero, or the next to it within the limits: a joint that moves all the \
-             same, such as one that a parallelogram keeps level, bears otherwise than this says.",
+             same bears otherwise than this says. A joint that others move, such as one that a parallelogram keeps level, \
+             needs a <mimic> in the URDF.",
             suggest::some(&joints)
         )
     }
@@ -144,11 +146,15 @@ mod tests {
     #[test]
     fn a_gripper_that_nobody_records_is_fixed() {
         let fixed = fixed(&["elbow", "shoulder"]).unwrap();
-        assert_eq!(fixed.joints, ["finger", "thumb"]);
+        assert_eq!(fixed.joints, ["finger"]);
+        assert!(
+            fixed.model.followers().is_empty(),
+            "the thumb is fixed, too"
+        );
         assert!(fixed.model.joint_names().eq(["shoulder", "elbow"]));
         // Its mass stays.
         assert!((fixed.model.body_parameters(1)[0] - 3.0).abs() < 1e-12);
-        assert!(fixed.note().contains("finger, thumb"), "{}", fixed.note());
+        assert!(fixed.note().contains("finger"), "{}", fixed.note());
     }
 
     #[test]
