@@ -10,6 +10,7 @@ mod absent_tool;
 mod asymmetric_coulomb;
 mod backlash;
 mod base_tilt;
+mod base_tilt_in_recording;
 mod cable_spring;
 mod concealed;
 mod contact_wall;
@@ -119,6 +120,7 @@ pub static EFFECTS: &[&Effect] = &[
     &link_com::EFFECT,
     &link_inertia::EFFECT,
     &base_tilt::EFFECT,
+    &base_tilt_in_recording::EFFECT,
     &joint_zero_offset::EFFECT,
     &encoder_eccentricity::EFFECT,
     &gain_drift::EFFECT,

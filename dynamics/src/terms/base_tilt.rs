@@ -4,10 +4,11 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Rotation3, Vector3};
 
+use super::ghost::While;
 use super::law::array;
 use super::{
     Coordinate, CoordinateKind, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter,
-    PlaceKind, Simulated, Term, Traits, Words,
+    PlaceKind, Simulated, Site, Term, Traits, Words,
 };
 use crate::{Data, Model, gravity_effort};
 
@@ -43,21 +44,10 @@ pub(super) static EFFECT: Effect = Effect {
         bends: true,
         ..Traits::NONE
     },
-    build: |site, values| {
-        let mut model = site.model.clone();
-        let level = Vector3::from(model.gravity());
-        let tilted = tilted(&level, array(values));
-        // Gravity's effort is linear in gravity: the difference costs the difference.
-        model.set_gravity((tilted - level).into());
-        Box::new(BaseTilt {
-            values: array(values),
-            data: Data::new(&model),
-            model,
-        })
-    },
+    build: |site, values| BaseTilt::boxed(&EFFECT, site, values, While::Always),
 };
 
-const fn angle(name: &'static str) -> Coordinate {
+pub(super) const fn angle(name: &'static str) -> Coordinate {
     let kind = CoordinateKind::Factor {
         step: 1e-3,
         minimum: f64::NEG_INFINITY,
@@ -72,23 +62,51 @@ fn tilted(gravity: &Vector3<f64>, [roll, pitch]: [f64; 2]) -> Vector3<f64> {
     (roll * pitch).inverse_transform_vector(gravity)
 }
 
+/// A tilt by the first two of its coordinates, for good or for a while.
 #[derive(Debug)]
-struct BaseTilt {
-    values: [f64; 2],
+pub(super) struct BaseTilt {
+    effect: &'static Effect,
+    coordinates: Vec<f64>,
+    there: While,
     model: Model,
     data: Data,
 }
 
+impl BaseTilt {
+    pub fn boxed(
+        effect: &'static Effect,
+        site: &Site<'_>,
+        coordinates: &[f64],
+        there: While,
+    ) -> Box<dyn Term> {
+        let mut model = site.model.clone();
+        let level = Vector3::from(model.gravity());
+        let tilted = tilted(&level, array(coordinates));
+        // Gravity's effort is linear in gravity: the difference costs the difference.
+        model.set_gravity((tilted - level).into());
+        Box::new(Self {
+            effect,
+            coordinates: coordinates.to_vec(),
+            there,
+            data: Data::new(&model),
+            model,
+        })
+    }
+}
+
 impl Term for BaseTilt {
     fn effect(&self) -> &'static Effect {
-        &EFFECT
+        self.effect
     }
 
     fn coordinates(&self) -> &[f64] {
-        &self.values
+        &self.coordinates
     }
 
     fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
+        if !self.there.covers(at) {
+            return;
+        }
         let added = gravity_effort(&self.model, &mut self.data, at.position);
         for (effort, added) in effort.iter_mut().zip(added) {
             *effort += added;
@@ -96,7 +114,10 @@ impl Term for BaseTilt {
     }
 
     fn alter(&self, model: &mut Model) -> bool {
-        let gravity = tilted(&model.gravity().into(), self.values);
+        if self.there != While::Always {
+            return false;
+        }
+        let gravity = tilted(&model.gravity().into(), array(&self.coordinates));
         model.set_gravity(gravity.into());
         true
     }

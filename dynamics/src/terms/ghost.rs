@@ -3,7 +3,7 @@
 use super::{Effect, MotionSample, Site, Term};
 use crate::{Data, Inertia, Model, rnea};
 
-/// When a body is there.
+/// When something is there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum While {
     /// For good.
@@ -12,6 +12,18 @@ pub(super) enum While {
     InEachRecording([f64; 2]),
     /// Between two times of the session \[s\].
     InSession([f64; 2]),
+}
+
+impl While {
+    /// Whether it is there now.
+    pub fn covers(self, at: &MotionSample<'_>) -> bool {
+        let (now_s, [start, end]) = match self {
+            Self::Always => return true,
+            Self::InEachRecording(window_s) => (at.recording_s, window_s),
+            Self::InSession(window_s) => (at.session_s, window_s),
+        };
+        start <= now_s && now_s < end
+    }
 }
 
 /// An inertia at a link, for good or for a while. The cost of bodies is linear in their inertias, so a
@@ -58,12 +70,7 @@ impl Term for Ghost {
     }
 
     fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
-        let (now_s, [start, end]) = match self.there {
-            While::Always => (0.0, [0.0, 1.0]),
-            While::InEachRecording(window_s) => (at.recording_s, window_s),
-            While::InSession(window_s) => (at.session_s, window_s),
-        };
-        if !(start <= now_s && now_s < end) {
+        if !self.there.covers(at) {
             return;
         }
         let added = rnea(

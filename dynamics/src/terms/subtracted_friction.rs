@@ -39,3 +39,25 @@ pub(super) static EFFECT: Effect = Effect {
         })
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{TwoJoints, sample};
+    use super::*;
+
+    #[test]
+    fn it_helps_the_motion_where_friction_would_resist_it() {
+        let robot = TwoJoints::new();
+        let mut subtracted = (EFFECT.build)(&robot.site(), &[0.5]);
+        let mut friction = (super::super::coulomb_friction::EFFECT.build)(&robot.site(), &[0.5]);
+        for velocity in [-1.0, 0.0, 0.3] {
+            let at = sample(0.0, 0.0, [0.0; 2], [velocity, 0.0], [0.0; 2]);
+            let mut effort = [3.0, 9.0];
+            subtracted.act(&at.view(), &mut effort);
+            assert!((3.0 - effort[0]) * velocity >= 0.0);
+            // The one is the other's opposite.
+            friction.act(&at.view(), &mut effort);
+            assert!((effort[0] - 3.0).abs() < 1e-12 && effort[1] == 9.0);
+        }
+    }
+}

@@ -7,6 +7,7 @@
 //! section 3.3):
 //!
 //! - `forward` adds the effect with the most evidence;
+//! - `by_recording` adds what differs from one recording to the next in all of them at once;
 //! - `prune` removes effects that are no longer needed;
 //! - `exchange` tries every rival in the place of each effect;
 //! - `one_zero` tries one shifted joint zero in the place of several bodies;
@@ -26,6 +27,7 @@
 //! no seeds are recorded, the sets of docs/proof.md may have been in view; no value was swept. `tests/proof/vary.py`
 //! measures how much the answers depend on those marked `Tuned:`.
 
+pub mod by_recording;
 pub mod candidates;
 pub mod carried;
 pub mod closed_waves;

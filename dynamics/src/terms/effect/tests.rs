@@ -173,7 +173,11 @@ fn what_few_effects_have_fits_them() {
         .filter(|e| e.concealed.is_none() && !e.traits.describes_only);
     assert_eq!(
         plain.map(|e| e.name).collect::<Vec<_>>(),
-        ["absent_tool", "payload_in_recording"]
+        [
+            "absent_tool",
+            "base_tilt_in_recording",
+            "payload_in_recording"
+        ]
     );
 }
 
@@ -186,6 +190,7 @@ fn effects_last_or_come_and_go() {
     assert_eq!(
         all(false),
         [
+            "base_tilt_in_recording",
             "external_push",
             "contact_wall",
             "payload_pickup",

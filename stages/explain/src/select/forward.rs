@@ -81,6 +81,11 @@ impl Search<'_> {
             let is_old = seen.iter().any(|seen| now.repeats(seen));
             if is_old || !evident && (once || !overwhelming(&next, &best)) {
                 barred.extend(new);
+                let fills = new.filter(|new| !is_old && new.effect.traits.fills_recording);
+                if let Some(next) = fills.and_then(|new| self.in_each_recording(&best, new)) {
+                    (self.say)(&describe(&next));
+                    best = next;
+                }
             } else {
                 seen.push(now);
                 best = next;

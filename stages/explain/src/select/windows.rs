@@ -139,7 +139,7 @@ impl Base<'_> {
     }
 
     /// The best factors for the whole of one recording, where there are others.
-    fn propose_recording(&self, hypothesis: Hypothesis, track: usize) -> Option<Proposal> {
+    pub fn propose_recording(&self, hypothesis: Hypothesis, track: usize) -> Option<Proposal> {
         let (first_s, last_s) = (-BESIDE_S, self.longest_s(Some(track)) + BESIDE_S);
         let others = self.problem.tracks.len() > 1;
         others.then(|| self.propose_within(hypothesis, (first_s, last_s), Some(track)))?
