@@ -11,6 +11,7 @@ use crate::data::problem::Problem;
 use crate::fit::body_prior;
 use crate::fit::fitted::{Fit, LEAST_VARIANCE};
 use crate::fit::urdf_uncertainty::usual_errors;
+use crate::physics::active::Hypothesis;
 
 /// Lags over which a prewhitened score is taken to be correlated, in compared samples.
 /// Tuned: by hand, on no recorded seeds; not swept.
@@ -35,7 +36,7 @@ pub fn covariance(problem: &Problem, fit: &Fit) -> DMatrix<f64> {
 
 /// The same, and from errors of the URDF's bodies: each mass and centre of mass is off by chance, all of them by the same
 /// share of a usual error, a variance component (Searle, Casella and `McCulloch`, *Variance Components*, 1992, chapter 5)
-/// that follows from what the residual has in common with their columns.
+/// that follows from what the residual has in common with their columns, and from the bodies that were fitted.
 pub fn covariance_beside_bodies(problem: &Problem, fit: &Fit) -> DMatrix<f64> {
     let mut columns = fit.jacobian(problem);
     let own = columns.len();
@@ -49,9 +50,27 @@ pub fn covariance_beside_bodies(problem: &Problem, fit: &Fit) -> DMatrix<f64> {
     let shared = normal.matrix.view((0, own), (own, bodies));
     // What a usual error of each body does to each number.
     let pull = &inverse * shared;
-    let size = normal.size_of_errors(own, &pull);
+    let size = normal.size_of_errors(own, &pull, fitted_errors(problem, fit, &covariance));
     covariance += &pull * pull.transpose() * (size * size);
     covariance
+}
+
+/// The errors of masses and centres of mass that were fitted, in usual ones, as far as the noise lets them be told.
+fn fitted_errors(problem: &Problem, fit: &Fit, covariance: &DMatrix<f64>) -> Vec<f64> {
+    let of_coordinates = fit.actives.iter().flat_map(|active| {
+        let Hypothesis { effect, place } = active.hypothesis;
+        let off = effect
+            .traits
+            .off_in_urdf
+            .map(|off| off(&problem.model.links()[place.link]));
+        active.coordinates.iter().map(move |value| (value, off))
+    });
+    let told = |(k, (value, off)): (usize, (&f64, Option<f64>))| {
+        let off = off?;
+        (covariance[(k, k)] < off * off)
+            .then(|| (value * value - covariance[(k, k)]).max(0.0).sqrt() / off)
+    };
+    of_coordinates.enumerate().filter_map(told).collect()
 }
 
 /// The normal equations of a fit at its numbers, and how far chance moves their right side.
@@ -169,9 +188,9 @@ impl Normal {
     }
 
     /// The error of bodies, in usual ones, that the residual has in common with their columns: the median over directions
-    /// in which bodies may be off, so that what else is left in some of them counts little. `pull` is what a usual error of
-    /// each does to the first `own` numbers, which were fitted.
-    fn size_of_errors(&self, own: usize, pull: &DMatrix<f64>) -> f64 {
+    /// in which bodies may be off and over the `fitted` errors, so that what else is left in some of them counts little.
+    /// `pull` is what a usual error of each does to the first `own` numbers, which were fitted.
+    fn size_of_errors(&self, own: usize, pull: &DMatrix<f64>, fitted: Vec<f64>) -> f64 {
         let bodies = pull.ncols();
         let shared = self.matrix.view((0, own), (own, bodies));
         // What is left of each column beside those that were fitted. Their right side is zero.
@@ -191,7 +210,7 @@ impl Normal {
             let beyond = (way.dot(&right).powi(2) - by_chance).max(0.0);
             (told > 0.0 && told * told > by_chance).then(|| beyond.sqrt() / told)
         };
-        let mut errors: Vec<f64> = (0..bodies).filter_map(of_direction).collect();
+        let mut errors: Vec<f64> = (0..bodies).filter_map(of_direction).chain(fitted).collect();
         errors.sort_by(f64::total_cmp);
         let median = errors.get(errors.len() / 2).copied().unwrap_or(0.0);
         (median / MEDIAN_OF_ABS_NORMAL).min(LARGEST_ERROR)
@@ -289,7 +308,7 @@ mod tests {
     }
 
     fn size(errors: [f64; 5]) -> f64 {
-        beside(errors).size_of_errors(1, &DMatrix::zeros(1, 5))
+        beside(errors).size_of_errors(1, &DMatrix::zeros(1, 5), Vec::new())
     }
 
     #[test]
@@ -300,6 +319,19 @@ mod tests {
         assert!(size([0.1, -0.08, 0.05, -0.1, 0.02]) <= 0.0);
         assert!(size([0.05, -0.08, 30.0, -0.1, 0.02]) <= 0.0);
         assert!(size([9.0; 5]) >= LARGEST_ERROR);
+    }
+
+    #[test]
+    fn bodies_that_were_fitted_tell_how_far_the_others_are_off() {
+        let size = |fitted: &[f64]| {
+            let unseen = beside([0.0; 5]).size_of_errors(1, &DMatrix::zeros(1, 5), Vec::new());
+            let beside = beside([0.0; 5]).size_of_errors(1, &DMatrix::zeros(1, 5), fitted.to_vec());
+            assert!(unseen <= 0.0);
+            beside
+        };
+        // One link that is another beside five that are right; most of what can be told is off.
+        assert!(size(&[6.0]) <= 0.0);
+        assert!(size(&[0.8, 0.7, 0.9, 1.1, 0.6, 0.9]) > 0.5);
     }
 
     #[test]
