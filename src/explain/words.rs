@@ -146,8 +146,12 @@ fn proof(report: &Report) -> Table {
     };
     let mut table = Table::new();
     table.load_preset(presets::NOTHING);
+    let sliding = match &report.sliding_joints[..] {
+        joints if joints.is_empty() || unit != "N m" => String::new(),
+        joints => format!(", N at {}", joints.join(", ")),
+    };
     table.set_header([
-        format!("RMS on the hold-out [{unit}]"),
+        format!("RMS on the hold-out [{unit}{sliding}]"),
         "before".to_owned(),
         "after".to_owned(),
         "noise".to_owned(),

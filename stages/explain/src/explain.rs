@@ -170,15 +170,14 @@ fn conclude(
     let kept = handed_out::reject(&proof.withheld, &mut named, &problem, &found, joints);
     let noise_floor = noise_floor(input);
     let unit = if input.effort_unit == "A" { "A" } else { "N m" };
-    let of_proof = (&proof.after[..], &named.findings[..]);
-    let remainders =
-        context.remainders((&problem, &kept), &before, &rests_count, unit, of_proof)?;
+    let proved = (&proof.after[..], &named.findings[..]);
+    let remainders = context.remainders((&problem, &kept), &before, &rests_count, unit, proved)?;
     if !remainders.elsewhere.is_empty() {
         findings::doubt_patches(&mut named.findings);
     }
     let mut notes = named.notes;
     notes.extend(notes::late_twin(context.twin_late_s));
-    notes.extend(notes::not_handed_out(&proof, &found, joints, unit));
+    notes.extend(notes::not_handed_out(&proof, &found, &input.model, unit));
     notes.extend(notes::notes(
         input,
         &problem,
@@ -212,6 +211,7 @@ fn conclude(
         remaining: remainders.all,
         notes,
         joints: joints.to_vec(),
+        sliding_joints: sliding_joints(input),
         holdout_rms_before: proof.before,
         holdout_rms_after: proof.after,
         noise_floor,
@@ -228,6 +228,11 @@ fn conclude(
         pictures: proof.pictures,
         trajectories: named.trajectories,
     })
+}
+
+fn sliding_joints(input: &Input) -> Vec<String> {
+    let sliding = input.model.joints().iter().filter(|joint| joint.slides());
+    sliding.map(|joint| joint.name.clone()).collect()
 }
 
 /// White noise of the measured effort, by joint \[effort unit\].
@@ -262,6 +267,7 @@ fn not_evaluated(input: &Input, joints: Vec<String>, reason: String) -> Outcome 
             next_motions: Vec::new(),
             remaining: Vec::new(),
             notes: audit::losses(input),
+            sliding_joints: sliding_joints(input),
             joints,
             holdout_rms_before: nan.clone(),
             holdout_rms_after: nan.clone(),

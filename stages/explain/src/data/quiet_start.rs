@@ -1,14 +1,13 @@
 //! How long a recording of an arm at rest begins quietly: a push that begins in its first second is no usual load.
 
+use crate::data::noise::MEDIAN_OF_ABS_NORMAL;
+
 /// Length of the windows whose means are compared \[s\].
 /// Resolution: a push that begins within the first of them is taken for the load.
 const WINDOW_S: f64 = 0.25;
 /// The load has left the beginning if it is this many times further off than it changes from one window to the next.
 /// Statistical: a normal variable does so in none of 1e22 windows; slow noise of a second in none of 1e6.
 const LEFT: f64 = 10.0;
-/// Median of the absolute value of a normal variable, in standard deviations.
-/// Statistical: the 75 % quantile of the standard normal distribution.
-const MEDIAN_OF_ABS_NORMAL: f64 = 0.6745;
 /// Fewer windows tell nothing of the noise.
 /// Statistical: the median of fewer changes may be that of a push.
 const LEAST_WINDOWS: usize = 12;

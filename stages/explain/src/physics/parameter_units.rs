@@ -1,6 +1,16 @@
 //! Units of parameters, from their canonical names.
 
-use tauscope_dynamics::terms::words;
+use tauscope_dynamics::Model;
+use tauscope_dynamics::terms::{PlaceKind, words};
+
+use crate::physics::active::Hypothesis;
+
+impl Hypothesis {
+    /// Whether it is an effect of a joint that slides, so that its numbers are in N and m.
+    pub fn slides(&self, model: &Model) -> bool {
+        self.effect.place == PlaceKind::Joint && model.joints()[self.place.joint].slides()
+    }
+}
 
 /// Unit of a parameter, from its canonical name; empty for a pure number.
 pub fn unit(parameter: &str) -> &'static str {

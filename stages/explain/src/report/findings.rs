@@ -145,9 +145,8 @@ pub fn of(
         let place = when.whole(active).unwrap_or(&place);
         let mut sentence = sentences::sentence(active, place, &parameters, &intervals, joints);
         sentence += or_scale.unwrap_or_default();
-        if in_amperes {
-            sentence = sentences::in_amperes(&sentence);
-        }
+        let slides = active.hypothesis.slides(&input.model);
+        let sentence = sentences::in_units(&sentence, in_amperes, slides);
         let equivalent_to = named.keep_rivals(active, contest, input, joints);
         let explained = mismatch(&less.fit, fit, before);
         let effort_rms = effort_rms(&less.fit, fit, context.unit_nm);
@@ -160,6 +159,7 @@ pub fn of(
             parameters,
             intervals_95: intervals,
             in_amperes,
+            slides,
             confidence: (or_scale.map_or(1.0, |_| DOUBTED))
                 .min(surest(search.problem, active, &by_noise))
                 .min(confidence(grounds)),

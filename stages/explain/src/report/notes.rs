@@ -7,7 +7,8 @@ use crate::read::excerpt::Excerpts;
 use crate::read::input::Input;
 use crate::report::holdout::Proof;
 use crate::report::schema::Remaining;
-use crate::report::sentences::UNCHANGED;
+use crate::report::sentences::{UNCHANGED, unit_at};
+use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::words::number;
 
 /// A residual above this many times the white noise gets a note.
@@ -30,9 +31,10 @@ pub fn late_twin(late_s: f64) -> Option<String> {
 }
 
 /// Notes on the joints whose correction is not handed out, or makes the error on the held-out recordings larger.
-pub fn not_handed_out(proof: &Proof, found: &Fit, names: &[String], unit: &str) -> Vec<String> {
+pub fn not_handed_out(proof: &Proof, found: &Fit, model: &Model, unit: &str) -> Vec<String> {
     let mut notes = Vec::new();
-    for (joint, name) in names.iter().enumerate() {
+    for (joint, of_joint) in model.joints().iter().enumerate() {
+        let (name, unit) = (&of_joint.name, unit_at(unit, of_joint));
         if proof.kept.contains(&joint) {
             notes.push(format!(
                 "The correction of joint {name} does not predict fitted recordings that were left out. So the predictions of the \
@@ -57,7 +59,7 @@ pub fn not_handed_out(proof: &Proof, found: &Fit, names: &[String], unit: &str) 
             ));
         }
     }
-    notes.extend(over_time(found, names));
+    notes.extend(over_time(found, model));
     notes
 }
 
@@ -65,17 +67,18 @@ pub fn not_handed_out(proof: &Proof, found: &Fit, names: &[String], unit: &str) 
 pub fn in_excerpts(excerpts: Excerpts) -> String {
     let Excerpts { whole_s, kept_s } = excerpts;
     format!(
-        "The fitted recordings last {whole_s:.0} s together. Excerpts of {kept_s:.0} s were fitted, spread evenly over them. What          acted for a moment in between was not looked for: explain fewer recordings to find it."
+        "The fitted recordings last {whole_s:.0} s together. Excerpts of {kept_s:.0} s were fitted, spread evenly over them. What \
+         acted for a moment in between was not looked for: explain fewer recordings to find it."
     )
 }
 
 /// Notes on the curves over time: another run begins at another time of whatever they follow.
-fn over_time(found: &Fit, names: &[String]) -> impl Iterator<Item = String> {
+fn over_time(found: &Fit, model: &Model) -> impl Iterator<Item = String> {
     let curves = (found.actives.iter()).filter(|active| active.is_curve_over_time());
     curves.map(|active| {
         format!(
             "The curve of joint {} over time is not in twin.yaml: how it goes on is not known.",
-            names[active.hypothesis.place.joint]
+            model.joints()[active.hypothesis.place.joint].name
         )
     })
 }

@@ -18,10 +18,11 @@ mod standing;
 mod turns;
 
 use crate::context::Context;
+use crate::data::noise::MEDIAN_OF_ABS_NORMAL;
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::report::schema::{Finding, Remaining};
-use crate::report::sentences::UNCHANGED;
+use crate::report::sentences::{UNCHANGED, unit_at};
 use crate::report::varying_delay::varying_delay;
 use tauscope_dynamics::terms::TermError;
 use tauscope_dynamics::terms::words::number;
@@ -42,9 +43,6 @@ const WORSENED: f64 = 1.1;
 /// A moment stands out if its error is this many standard deviations of the calm half of the time.
 /// Statistical: a normal variable exceeds 10 in none of 1e22 rows; slow noise is as normal as fast.
 const STANDS_OUT: f64 = 10.0;
-/// Median of the absolute value of a normal variable, in standard deviations.
-/// Statistical: the 75 % quantile of the standard normal distribution.
-const MEDIAN_OF_ABS_NORMAL: f64 = 0.6745;
 /// Fewer moments are the edges of an effect that acts once.
 /// Physical: it has two, its beginning and its end.
 const LEAST_MOMENTS: usize = 3;
@@ -233,6 +231,7 @@ fn of(
     let late = varying_delay(problem, found.fit, &rates(problem, found.fit));
     for (j, joint) in joints.iter().enumerate() {
         let (here, noise) = (found.rms(j), problem.white_noise[j]);
+        let unit = unit_at(unit, &problem.model.joints()[j]);
         let told = |nm: f64| format!("{} {unit}", number(nm / unit_nm[j]));
         let there = held.as_ref().map(|held| held.rms(j));
         let mut sentences = Vec::new();

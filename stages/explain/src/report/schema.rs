@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use tauscope_dynamics::terms::{effect, words};
 
-use crate::report::sentences::in_amperes;
+use crate::report::sentences::in_units;
 use crate::report::slip_words;
 
 /// The report.
@@ -40,6 +40,9 @@ pub struct Report {
     pub notes: Vec<String>,
     /// The joints, in URDF order.
     pub joints: Vec<String>,
+    /// Those of them that slide: their efforts are in N where those of the others are in N m.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sliding_joints: Vec<String>,
     /// RMS of measured effort minus the twin's over all hold-out samples, unfiltered, by joint \[effort unit\].
     pub holdout_rms_before: Vec<f64>,
     /// The same of the corrected twin.
@@ -109,6 +112,9 @@ pub struct Finding {
     /// known.
     #[serde(default, skip_serializing_if = "is_false")]
     pub in_amperes: bool,
+    /// Whether its joint slides: its numbers are in N and m, although the names of its parameters say N m and rad.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub slides: bool,
     /// Probability that effect and place are right, up to what no recording can tell apart.
     pub confidence: f64,
     /// The recording that the times refer to. If absent: each recording or, for a lasting change, the session.
@@ -151,11 +157,8 @@ impl Finding {
 
     /// A parameter's name without its unit, and the unit that its number is in.
     pub fn label_and_unit<'n>(&self, name: &'n str) -> (&'n str, String) {
-        match words::unit(name) {
-            Some((stem, unit)) if self.in_amperes => (stem, in_amperes(unit)),
-            Some((stem, unit)) => (stem, unit.to_owned()),
-            None => (name, String::new()),
-        }
+        let (stem, unit) = words::unit(name).unwrap_or((name, ""));
+        (stem, in_units(unit, self.in_amperes, self.slides))
     }
 }
 
@@ -218,6 +221,9 @@ pub struct Undetectable {
     /// Whether its efforts are in A and not in N m, whatever the names of its numbers say.
     #[serde(default, skip_serializing_if = "is_false")]
     pub in_amperes: bool,
+    /// Whether its joint slides: its numbers are in N and m, whatever their names say.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub slides: bool,
 }
 
 /// A motion that would separate rivals that tie.

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde_json::Value;
+use tauscope_dynamics::Joint;
 use tauscope_dynamics::terms::Words;
 use tauscope_dynamics::terms::words::{self, Told, number};
 
@@ -32,9 +33,40 @@ pub fn error_left(before: &[f64], after: &[f64]) -> f64 {
     norm(after) / norm(before)
 }
 
-/// Changes the units of a sentence whose numbers are in A.
-pub fn in_amperes(sentence: &str) -> String {
-    sentence.replace("N m", "A").replace("kg m²", "A s²/rad")
+/// Changes the units of a sentence, or a unit, whose numbers are in A and not in N m, or of a joint that slides.
+pub fn in_units(sentence: &str, amperes: bool, slides: bool) -> String {
+    let mut text = sentence.to_owned();
+    if amperes {
+        text = text.replace("N m", "A").replace("kg m²", "A s²/rad");
+    }
+    if slides { of_a_slide(&text) } else { text }
+}
+
+/// What is N m and rad of other joints is N and m of one that slides.
+fn of_a_slide(sentence: &str) -> String {
+    let forces = sentence.replace("N m", "N").replace("kg m²", "kg");
+    let forces = forces.replace("(N)", "N");
+    // Not within a word.
+    let mut text = String::with_capacity(forces.len());
+    let mut rest = forces.as_str();
+    while let Some(at) = rest.find("rad") {
+        let (before, after) = (&rest[..at], &rest[at + "rad".len()..]);
+        let is_letter = |c: Option<char>| c.is_some_and(char::is_alphabetic);
+        let is_word = is_letter(before.chars().last()) || is_letter(after.chars().next());
+        text += before;
+        text += if is_word { "rad" } else { "m" };
+        rest = after;
+    }
+    text + rest
+}
+
+/// The unit of a joint's effort, where `unit` is that of most joints.
+pub fn unit_at<'u>(unit: &'u str, joint: &Joint) -> &'u str {
+    if unit == "N m" && joint.slides() {
+        "N"
+    } else {
+        unit
+    }
 }
 
 /// A share that may be zero and is surely less than this is none.
@@ -106,6 +138,24 @@ fn with_interval(value: f64, unit: &str, interval: Option<&[f64; 2]>) -> String 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_slides_is_told_in_newtons_and_metres() {
+        for (turning, sliding) in [
+            (
+                "viscous friction of 3.1 N m s/rad (3 to 3.2)",
+                "viscous friction of 3.1 N s/m (3 to 3.2)",
+            ),
+            ("2 1/(N m) at 0.2 rad, 3 rad/s", "2 1/N at 0.2 m, 3 m/s"),
+            (
+                "a rotor of 0.4 kg m², gradually, radial",
+                "a rotor of 0.4 kg, gradually, radial",
+            ),
+            ("7 A s²/rad", "7 A s²/m"),
+        ] {
+            assert_eq!(of_a_slide(turning), sliding);
+        }
+    }
 
     #[test]
     fn odds_are_told_in_powers_of_ten_where_they_are_long() {

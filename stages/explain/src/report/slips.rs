@@ -106,6 +106,7 @@ fn finding(slip: &Slip, joints: &[String], unit: &str) -> Finding {
         parameters,
         intervals_95: BTreeMap::new(),
         in_amperes: false,
+        slides: false,
         confidence: CONFIDENCE,
         recording: None,
         t_start: None,

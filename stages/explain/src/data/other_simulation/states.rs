@@ -1,6 +1,7 @@
 //! Rows at which another simulation's joint moves in one direction and the real joint in another, or not at all.
 
 use crate::data::effective_samples::per_row;
+use crate::data::noise::MEDIAN_OF_ABS_NORMAL;
 use crate::data::problem::Problem;
 use crate::data::track::Track;
 
@@ -21,9 +22,6 @@ const FOLLOWS_S: f64 = 1.0;
 /// A row is left out if its error is this many standard deviations of the calm half of the rows.
 /// Statistical: a normal variable exceeds that once in 16 000 rows.
 const LEFT_OUT: f64 = 4.0;
-/// Median of the absolute value of a normal variable, in standard deviations.
-/// Statistical: the 75 % quantile of the standard normal distribution.
-const MEDIAN_OF_ABS_NORMAL: f64 = 0.6745;
 /// A joint is fast above this share of its 90 % quantile of speed: there its friction and the command's have one sign.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const FAST: f64 = 0.3;

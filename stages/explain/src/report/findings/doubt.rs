@@ -254,6 +254,7 @@ mod tests {
             parameters: BTreeMap::new(),
             intervals_95: BTreeMap::new(),
             in_amperes: false,
+            slides: false,
             confidence: 0.99,
             recording: Some(recording.to_owned()),
             t_start: Some(start_s),

@@ -64,6 +64,7 @@ pub fn undetectable(
             link,
             smallest_findable: BTreeMap::from([(told_as.to_owned(), smallest)]),
             in_amperes,
+            slides: hypothesis.slides(&search.problem.model),
         });
     }
     all

@@ -186,7 +186,7 @@ fn parameters(finding: &Finding) -> Markup {
             thead { tr { th { "Parameter" } th.num { "Value" } th.num { "95 % interval" } th {} } }
             tbody {
                 @for (name, given) in parameters {
-                    @let (label, unit) = parameter_in(name, finding.in_amperes);
+                    @let (label, unit) = parameter_in(name, finding.in_amperes, finding.slides);
                     @let interval = finding.intervals_95.get(name).copied();
                     tr {
                         th scope="row" { (label) }

@@ -3,7 +3,7 @@
 use serde_json::Value;
 use tauscope_dynamics::terms::words::unit;
 
-use crate::report::sentences::in_amperes;
+use crate::report::sentences::in_units;
 
 /// `some_name` as `Some name`.
 pub(super) fn sentence_case(name: &str) -> String {
@@ -50,15 +50,10 @@ pub(super) fn parameter(name: &str) -> (String, &'static str) {
     (parameter_label(&stem), unit)
 }
 
-/// The same, where it is known whether efforts are in A.
-pub(super) fn parameter_in(name: &str, amperes: bool) -> (String, String) {
+/// The same, where it is known whether efforts are in A, and whether the joint slides.
+pub(super) fn parameter_in(name: &str, amperes: bool, slides: bool) -> (String, String) {
     let (label, unit) = parameter(name);
-    let unit = if amperes {
-        in_amperes(unit)
-    } else {
-        unit.to_owned()
-    };
-    (label, unit)
+    (label, in_units(unit, amperes, slides))
 }
 
 fn parameter_label(stem: &str) -> String {

@@ -133,18 +133,22 @@ pub(super) fn undetectable(report: &Report) -> Option<Markup> {
 
 fn matrix(report: &Report, hidden: &[&Undetectable]) -> Markup {
     let mut seen = BTreeSet::new();
-    let rows: Vec<(&str, &str, bool)> = hidden
+    let rows: Vec<(&str, &str, bool, bool)> = hidden
         .iter()
         .flat_map(|hidden| {
             let parameters = hidden.smallest_findable.keys();
-            parameters.map(|name| (hidden.effect.as_str(), name.as_str(), hidden.in_amperes))
+            parameters.map(|name| {
+                let units = (hidden.in_amperes, hidden.slides);
+                (hidden.effect.as_str(), name.as_str(), units.0, units.1)
+            })
         })
         .filter(|row| seen.insert(*row))
         .collect();
-    let cell = |(effect, name, _): (&str, &str, bool), joint: &String| {
+    let cell = |(effect, name, amperes, slides): (&str, &str, bool, bool), joint: &String| {
         hidden
             .iter()
             .filter(|hidden| hidden.effect == effect && hidden.joint.as_ref() == Some(joint))
+            .filter(|hidden| (hidden.in_amperes, hidden.slides) == (amperes, slides))
             .find_map(|hidden| hidden.smallest_findable.get(name).copied())
     };
     html! {
@@ -153,7 +157,7 @@ fn matrix(report: &Report, hidden: &[&Undetectable]) -> Markup {
                 thead { tr { th { "Effect" } th { "Found from" } @for joint in &report.joints { th.num { (joint) } } } }
                 tbody {
                     @for row in rows {
-                        @let (label, unit) = parameter_in(row.1, row.2);
+                        @let (label, unit) = parameter_in(row.1, row.2, row.3);
                         tr {
                             th scope="row" { (effect_title(row.0)) }
                             td { (label) @if !unit.is_empty() { " [" (unit) "]" } }
@@ -179,7 +183,7 @@ fn others_table(hidden: &[&Undetectable]) -> Markup {
                         td { (place_or_all(hidden.joint.as_deref(), hidden.link.as_deref())) }
                         td {
                             @for (index, (name, least)) in hidden.smallest_findable.iter().enumerate() {
-                                @let (label, unit) = parameter_in(name, hidden.in_amperes);
+                                @let (label, unit) = parameter_in(name, hidden.in_amperes, hidden.slides);
                                 @if index > 0 { ", " }
                                 (label) " " (number_text(*least)) " " (unit)
                             }

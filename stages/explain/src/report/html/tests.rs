@@ -19,6 +19,7 @@ fn empty(verdict: Verdict) -> Report {
         next_motions: Vec::new(),
         notes: Vec::new(),
         joints: vec!["joint1".to_owned(), "joint2".to_owned()],
+        sliding_joints: Vec::new(),
         holdout_rms_before: vec![1.0, 0.1],
         holdout_rms_after: vec![0.11, 0.1],
         remaining: Vec::new(),
@@ -35,6 +36,7 @@ fn finding(effect: &str, sentence: &str) -> Finding {
         parameters: [("coulomb_nm".to_owned(), json!(4.1))].into(),
         intervals_95: [("coulomb_nm".to_owned(), [3.9, 4.3])].into(),
         in_amperes: false,
+        slides: false,
         confidence: 0.999,
         recording: None,
         t_start: None,
@@ -79,6 +81,7 @@ fn full() -> Report {
         link: None,
         smallest_findable: [("inertia_kgm2".to_owned(), 0.021)].into(),
         in_amperes: false,
+        slides: false,
     }];
     report.next_motions = vec![NextMotion {
         separates: report.findings[1].equivalent_to.clone(),

@@ -7,6 +7,7 @@ use tauscope_dynamics::terms::words::number;
 
 use crate::data::problem::Problem;
 use crate::report::schema::{Finding, Remaining};
+use crate::report::sentences::unit_at;
 
 use super::{ABOVE_NOISE, Left, Remainders};
 
@@ -35,6 +36,7 @@ impl Remainders {
             let Some([missing, friction]) = unborne(held, j, joint, after_nm, findings) else {
                 continue;
             };
+            let unit = unit_at(unit, &found.problem.model.joints()[j]);
             let told = |nm: f64| format!("{} {unit}", number(nm / unit_nm[j]));
             let said = format!(
                 "While joint {joint} stands on the held-out recordings, {} are missing, more than its friction of {} holds: \
