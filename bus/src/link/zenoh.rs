@@ -101,6 +101,15 @@ impl ZenohEndpoints {
         open_session("router", self, PATIENCE)
     }
 
+    /// The same for what routers and clients alone are to hear, such as a fleet host. Its mode is `peer`: routers tell one
+    /// another who is linked to whom, each time that one comes or goes, and a thousand of them would do little else.
+    ///
+    /// # Errors
+    /// As [`Zenoh::open`].
+    pub fn session_for_routers(&self) -> Result<zenoh::Session, LinkError> {
+        open_session("peer", self, PATIENCE)
+    }
+
     /// Where another session on this host meets one that has these: where it listens, and what it connects to. For a
     /// listener on all interfaces that is the loopback.
     pub fn reached_at(&self) -> impl Iterator<Item = String> + '_ {
@@ -267,6 +276,8 @@ fn config(
         ("scouting/multicast/enabled", "false".to_owned()),
         ("scouting/gossip/enabled", "false".to_owned()),
         ("open/return_conditions/connect_scouted", "false".to_owned()),
+        // A router waits so long for others to be scouted, which nobody does here.
+        ("scouting/delay", "0".to_owned()),
         ("transport/shared_memory/enabled", "false".to_owned()),
         ("transport/link/tx/queue/size/data", QUEUE.to_string()),
         (

@@ -17,6 +17,7 @@ mod presence;
 mod publisher;
 mod report;
 mod ros2;
+mod session;
 mod setup;
 mod status;
 

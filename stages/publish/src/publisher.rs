@@ -9,7 +9,6 @@ use std::time::{Duration, Instant};
 
 use tauscope_bus::{
     Command, Detection, Health, JointState, SampleKind, SampleRef, Sink, StageError, TwinState,
-    ZenohEndpoints,
 };
 use tauscope_dynamics::Model;
 
@@ -22,6 +21,7 @@ use crate::message::{AlarmMessage, AlarmState, CommandMessage};
 use crate::modbus::{Board, Commands, Modbus};
 use crate::outputs::Outputs;
 use crate::poses::Poses;
+use crate::session::session;
 use crate::setup::{Setup, StreamInfo};
 use crate::status::Status;
 
@@ -91,10 +91,7 @@ impl Publisher {
             .and_then(Poses::root)
             .unwrap_or("world")
             .to_owned();
-        let session = match endpoints(config, setup) {
-            Some(endpoints) => Some(endpoints.session()?),
-            None => None,
-        };
+        let session = session(config, setup)?;
         let labels: Vec<&str> = detectors.iter().map(|each| each.label.as_str()).collect();
         let outputs = match (&session, &config.zenoh) {
             (Some(session), Some(zenoh)) => Some(Outputs::open(
@@ -359,24 +356,6 @@ fn of_alarm(alarm: &Alarm) -> AlarmMessage {
         muted_s: alarm.muted_s(),
         ..AlarmMessage::silent()
     }
-}
-
-/// Where its session goes: to the listeners, and to where the source takes commands.
-fn endpoints(config: &Config, setup: &Setup) -> Option<ZenohEndpoints> {
-    let zenoh = config.zenoh.as_ref().map(|zenoh| ZenohEndpoints {
-        listen: zenoh.listen.clone(),
-        connect: zenoh.connect.clone(),
-    });
-    let mut all = match (zenoh, &setup.commands) {
-        (None, None) => return None,
-        (zenoh, _) => zenoh.unwrap_or_default(),
-    };
-    for endpoint in setup.commands.iter().flat_map(ZenohEndpoints::reached_at) {
-        if !all.connect.contains(&endpoint) && !all.listen.contains(&endpoint) {
-            all.connect.push(endpoint);
-        }
-    }
-    Some(all)
 }
 
 fn told(stamp_ns: i64, command: &Command) -> CommandMessage {
