@@ -1,16 +1,18 @@
 """Makes every figure of docs/proof.md, and writes its tables between their marks.
 
-    python3 tests/proof/all.py [--only committed,coverage] [--out out/all] [--docs docs/proof.md]
+    python3 tests/proof/all.py [--only committed,coverage] [--out out/all] [--docs docs/proof.md] [--jobs 2]
 
 Needs requirements.txt. What is in `--out` already is not made again, so a part that was stopped goes on where it was.
-The whole takes some ten hours of one core; `--only committed,first_sight,first_sight_beside,nulls` takes four minutes
-of two.
+The whole takes some HOURS hours of two cores; `--only committed,first_sight,first_sight_beside,nulls` takes four
+minutes. So many parts are made at once as `--jobs` says.
 """
 import argparse
+import concurrent.futures
 import pathlib
 import subprocess
 import sys
 import textwrap
+import threading
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "benches"))
@@ -26,13 +28,13 @@ PARTS = {
                          "--kinds 'gear_hums_at_a_speed, hose_round_the_joint, grease_to_be_parted, dent_in_a_race, "
                          "field_weakening, offset_by_heat, contact_is_lost, rubs_now_and_then'",
     "nulls": "python3 tests/proof/first_sight.py PROGRAM OUT --seed 41 --kinds '' --nulls 6",
-    "named": "python3 tests/proof/named.py PROGRAM OUT --count 5 --beside friction,bodies",
+    "named": "python3 tests/proof/named.py PROGRAM OUT --count 2 --beside friction,bodies",
     "faults": "python3 tests/proof/faults.py PROGRAM OUT --seed 611",
     "slips": "python3 tests/proof/slips.py PROGRAM OUT --seed 501 --count 2",
     "changed": "python3 tests/proof/changed.py PROGRAM OUT --seed 21 --count 8",
-    "coverage": "python3 tests/proof/coverage.py PROGRAM OUT --cases 102 --count 3 --first 7001 --table",
-    "coverage_slow": "python3 tests/proof/coverage.py PROGRAM OUT --cases 102 --count 3 --first 7201 --slow 0.7 --table",
-    "coverage_bodies_off": "python3 tests/proof/coverage.py PROGRAM OUT --cases 102 --count 3 --first 7401 --bodies-off --table",
+    "coverage": "python3 tests/proof/coverage.py PROGRAM OUT --cases 50 --count 3 --first 7001 --table",
+    "coverage_slow": "python3 tests/proof/coverage.py PROGRAM OUT --cases 120 --count 3 --first 7501 --slow 0.7 --table",
+    "coverage_bodies_off": "python3 tests/proof/coverage.py PROGRAM OUT --cases 60 --count 3 --first 7401 --bodies-off --table",
     "reliability": "python3 tests/proof/reliability.py PROGRAM OUT --first 6001 --cases 300 --half odd --svg docs/reliability.svg",
 }
 # What prints lines that are no Markdown.
@@ -44,18 +46,26 @@ def main():
     parser.add_argument("--only", default="", help="of the parts, separated by commas: " + ", ".join(PARTS))
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/all"))
     parser.add_argument("--docs", type=pathlib.Path, default=ROOT / "docs" / "proof.md")
+    parser.add_argument("--jobs", type=int, default=2)
     args = parser.parse_args()
     only = [name for name in args.only.split(",") if name] or list(PARTS)
     if unknown := set(only) - set(PARTS):
         sys.exit(f"no such part: {', '.join(sorted(unknown))}")
     subprocess.run(["cargo", "build", "--release", "--locked", "--quiet"], cwd=ROOT, check=True)
-    for name in only:
+    written = threading.Lock()
+
+    def make(name):
         command = PARTS[name].replace("PROGRAM", PROGRAM).replace("OUT", str(args.out / name))
         print(f"{name}: {command}", file=sys.stderr)
         is_text = name in TEXT
         figures = finished(performance.measured(command, "text" if is_text else "table"))
         figures = figures if is_text else wrapped(figures)
-        args.docs.write_text(performance.put(args.docs.read_text(), name, figures))
+        with written:
+            args.docs.write_text(performance.put(args.docs.read_text(), name, figures))
+
+    with concurrent.futures.ThreadPoolExecutor(args.jobs) as pool:
+        # What a part raises is raised here.
+        list(pool.map(make, only))
 
 
 def finished(markdown):

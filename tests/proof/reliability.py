@@ -43,7 +43,7 @@ def options():
     a.add_argument("--cases", type=int, default=1000)
     a.add_argument("--keep", action="store_true", help="keep the recordings")
     a.add_argument("--table", action="store_true", help="only print the table of what is there")
-    a.add_argument("--half", choices=["even", "odd"], help="tables and fit of these seeds only")
+    a.add_argument("--half", choices=["even", "odd"], help="these seeds only")
     a.add_argument("--fit", action="store_true")
     a.add_argument("--svg", type=pathlib.Path, help="draw the reliability diagram there")
     return a.parse_args()
@@ -184,10 +184,15 @@ def regression(rows, right, spread=2.):
     return b
 
 
+def seeds(o):
+    """Seeds of the cases that are asked for."""
+    return [seed for seed in range(o.first, o.first + o.cases) if o.half is None or seed % 2 == (o.half == "odd")]
+
+
 def show(o):
     pairs, by_kind, neither, cases, rows = [], collections.defaultdict(list), 0, collections.Counter(), []
-    for seed in range(o.first, o.first + o.cases):
-        case = judged(o, seed) if o.half is None or seed % 2 == (o.half == "odd") else None
+    for seed in seeds(o):
+        case = judged(o, seed)
         if case is None:
             continue
         kind, findings, _, _ = case
@@ -216,7 +221,7 @@ def show(o):
 
 def main():
     o = options()
-    for seed in range(o.first, o.first + o.cases) if not o.table else ():
+    for seed in seeds(o) if not o.table else ():
         with contextlib.redirect_stderr(io.StringIO()):
             answer = make_case(o.out, seed)
         if "none" not in answer:
