@@ -139,11 +139,7 @@ fn rival(rival: &Rival) -> String {
 }
 
 fn proof(report: &Report) -> Table {
-    let unit = if report.effort_unit == "Nm" {
-        "N m"
-    } else {
-        &report.effort_unit
-    };
+    let unit = report.effort_unit_at(None);
     let mut table = Table::new();
     table.load_preset(presets::NOTHING);
     let sliding = match &report.sliding_joints[..] {

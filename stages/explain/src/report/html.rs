@@ -24,7 +24,7 @@ use tauscope_dynamics::Model;
 use crate::report::schema::{RecordingPicture, Report, Verdict};
 use crate::report::sentences::error_left;
 
-use self::number_format::{effort_unit, percent};
+use self::number_format::percent;
 use self::tone::Tone;
 
 /// The style sheet of our pages.
@@ -227,7 +227,7 @@ fn facts(report: &Report) -> Vec<Fact> {
 }
 
 fn footer(report: &Report, provenance: &BTreeMap<String, String>) -> Markup {
-    let unit = effort_unit(&report.effort_unit);
+    let unit = report.effort_unit_at(None);
     html! {
         footer {
             details {

@@ -54,6 +54,16 @@ pub struct Report {
 }
 
 impl Report {
+    /// The unit of the recordings' effort in text: at a joint, or at most of them.
+    pub fn effort_unit_at(&self, joint: Option<&str>) -> &str {
+        let slides = |joint| self.sliding_joints.iter().any(|other| other == joint);
+        match (self.effort_unit.as_str(), joint.is_some_and(slides)) {
+            ("Nm", true) => "N",
+            ("Nm", false) => "N m",
+            (unit, _) => unit,
+        }
+    }
+
     /// Whether all but the faults that are listed first is of the recordings without these faults.
     pub fn is_of_mended(&self) -> bool {
         self.findings.iter().any(Finding::is_slip)

@@ -6,9 +6,7 @@ use tauscope_dynamics::terms::UNKNOWN;
 use super::chart::{Axis, r};
 use super::effects::{effect_at, effect_meaning, effect_title, place};
 use super::groups;
-use super::number_format::{
-    almost_all, effort_unit, number_text, parameter_in, percent, value, with_digits_of,
-};
+use super::number_format::{almost_all, number_text, parameter_in, percent, value, with_digits_of};
 use super::proof;
 use crate::report::schema::{Finding, Report, Verdict};
 use crate::report::sentences::error_left;
@@ -19,7 +17,6 @@ pub(super) fn cards(report: &Report) -> Option<Markup> {
         return None;
     }
     let groups = groups::of(report);
-    let unit = effort_unit(&report.effort_unit);
     Some(html! {
         @if report.findings.is_empty() {
             p {
@@ -41,10 +38,10 @@ pub(super) fn cards(report: &Report) -> Option<Markup> {
             @if report.findings.len() > 1 {
                 h3.group {
                     (group.title())
-                    @if group.effort > 0.0 { span.muted { "up to " (number_text(group.effort)) " " (unit) " RMS" } }
+                    @if group.effort > 0.0 { span.muted { "up to " (number_text(group.effort)) " " (report.effort_unit_at(group.joint)) " RMS" } }
                 }
             }
-            @for finding in &group.findings { (card(finding, unit)) }
+            @for finding in &group.findings { (card(finding, report.effort_unit_at(finding.joint.as_deref()))) }
         }
     })
 }
@@ -67,8 +64,7 @@ fn shares(report: &Report) -> Option<Markup> {
     let left = error_left(&report.holdout_rms_before, &report.holdout_rms_after);
     let gone = 1.0 - left * left;
     let alone: f64 = report.findings.iter().map(|finding| finding.explains).sum();
-    let fitted =
-        effort_unit(&report.effort_unit) == "A" && report.findings.iter().any(|f| !f.in_amperes);
+    let fitted = report.effort_unit == "A" && report.findings.iter().any(|f| !f.in_amperes);
     (alone < MOST * gone).then(|| {
         html! {
             "The shares below do not add up to what the correction takes: if one finding is left out, the others are fitted "

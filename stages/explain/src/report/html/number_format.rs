@@ -83,11 +83,6 @@ fn parameter_label(stem: &str) -> String {
     sentence_case(&words.join(" "))
 }
 
-/// A unit of effort as it is written in text.
-pub(super) fn effort_unit(unit: &str) -> &str {
-    if unit == "Nm" { "N m" } else { unit }
-}
-
 /// A parameter's value; numbers with as many digits as their interval warrants.
 pub(super) fn value(value: &Value, interval: Option<[f64; 2]>) -> String {
     match (value, interval) {

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::chart::r;
-use super::number_format::{effort_unit, fixed, number_text, percent};
+use super::number_format::{fixed, number_text, percent};
 use crate::report::schema::{Located, Report, Verdict};
 
 /// How many rows of a table are shown at once.
@@ -188,7 +188,7 @@ pub(super) fn before_and_after(report: &Report) -> Option<Markup> {
     if report.verdict == Verdict::NotEvaluated || !any {
         return None;
     }
-    let unit = effort_unit(&report.effort_unit);
+    let unit = report.effort_unit_at(None);
     let left: Vec<String> = rows
         .iter()
         .filter(|row| row.is_left())
@@ -235,7 +235,8 @@ pub(super) fn before_and_after(report: &Report) -> Option<Markup> {
             tbody {
                 @for row in &rows {
                     tr {
-                        th scope="row" { (row.joint) }
+                        @let own = report.effort_unit_at(Some(row.joint));
+                        th scope="row" { (row.joint) @if own != unit { " [" (own) "]" } }
                         td.num { (number_text(row.before)) }
                         td.num { b { (number_text(row.after)) } }
                         td.num { (change(row)) }

@@ -7,7 +7,7 @@ use tauscope_dynamics::{Data, Model, forward_kinematics, link_pose};
 use super::chart::r;
 use super::effects::effect_title;
 use super::groups::{self, Group};
-use super::number_format::{effort_unit, number_text};
+use super::number_format::number_text;
 use crate::report::schema::{RecordingPicture, Report};
 
 /// The picture's width and height \[px\].
@@ -73,7 +73,7 @@ pub(super) fn picture(
                 @for (index, (at, group)) in labels.iter().enumerate() {
                     @let y = 30.0 + pitch * (index as f64 + 0.5) - 0.25 * pitch;
                     (leader(*at, [ARM[0] + 2.0 * MARGIN + 4.0, y]))
-                    (label(group, y, effort_unit(&report.effort_unit)))
+                    (label(group, y, report.effort_unit_at(group.joint)))
                 }
                 @for (at, group) in labels.iter().filter(|(_, group)| group.joint.is_none()) {
                     rect.found x=(r(at[0] - 7.0)) y=(r(at[1] - 7.0)) width="14" height="14" rx="3"

@@ -4,7 +4,6 @@ use maud::{Markup, html};
 
 use super::chart::{Axis, Panel, bulk, r};
 use super::effects::effect_title;
-use super::number_format::effort_unit;
 use super::proof::{Row, rows};
 use crate::report::schema::{Finding, JointPicture, RecordingPicture, Report};
 
@@ -82,7 +81,7 @@ fn find<'a>(picture: &'a RecordingPicture, joint: &str) -> Option<&'a JointPictu
 }
 
 fn joint(report: &Report, pictures: &[RecordingPicture], row: &Row<'_>, in_full: bool) -> Markup {
-    let unit = effort_unit(&report.effort_unit);
+    let unit = report.effort_unit_at(Some(row.joint));
     let named: Vec<_> = named_at(report, row.joint)
         .map(|finding| effect_title(finding.known_as()))
         .collect();
