@@ -276,8 +276,6 @@ fn config(
         ("scouting/multicast/enabled", "false".to_owned()),
         ("scouting/gossip/enabled", "false".to_owned()),
         ("open/return_conditions/connect_scouted", "false".to_owned()),
-        // A router waits so long for others to be scouted, which nobody does here.
-        ("scouting/delay", "0".to_owned()),
         ("transport/shared_memory/enabled", "false".to_owned()),
         ("transport/link/tx/queue/size/data", QUEUE.to_string()),
         (

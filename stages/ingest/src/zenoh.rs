@@ -350,8 +350,6 @@ fn session_config(zenoh: &ZenohConfig) -> Result<zenoh::Config, ConfigError> {
         ("listen/exit_on_failure", "true".to_owned()),
         ("scouting/multicast/enabled", "false".to_owned()),
         ("scouting/gossip/enabled", "false".to_owned()),
-        // A router waits so long for others to be scouted, which nobody does here.
-        ("scouting/delay", "0".to_owned()),
         ("transport/shared_memory/enabled", "false".to_owned()),
     ];
     for (key, value) in settings {
