@@ -85,6 +85,7 @@ fn a_part_whose_writer_lives_is_not_moved_out_of_the_way() {
 
 #[test]
 fn the_room_of_a_folder_that_is_not_there_yet_is_that_of_the_one_above_it() {
+    let _alone = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
     let folder = tempfile::tempdir().unwrap();
     let below = folder.path().join("not/there/yet");
     assert!(free_bytes(&below).unwrap() > 0);
