@@ -59,7 +59,9 @@ mod tests {
                 let mut leans = level.clone();
                 leans.set_gravity([9.81 * pitch.sin(), 0.0, -9.81 * pitch.cos()]);
                 recording(&leans, seed, |_, _, effort| {
-                    effort.iter_mut().for_each(|x| *x += 0.05 * noise.next());
+                    for effort in effort {
+                        *effort += 0.05 * noise.next();
+                    }
                 })
             })
             .collect();
