@@ -76,6 +76,7 @@ RULE
   listen: { endpoints: ["tls/0.0.0.0:7448"] },
   scouting: { multicast: { enabled: false }, gossip: { enabled: false } },
   transport: {
+    unicast: { max_sessions: 10000, accept_pending: 1000 },
     shared_memory: { enabled: false },
     link: {
       tls: {

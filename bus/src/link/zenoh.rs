@@ -78,6 +78,10 @@ const SPILL: SpillSettings = SpillSettings {
 /// Resolution: memory; the most that Zenoh takes.
 const QUEUE: usize = 16;
 
+/// Sessions that one that listens takes. Zenoh's own limit of 1000 turns the next away without a word.
+/// Resolution: as many cells as a fleet host follows.
+const MOST_SESSIONS: usize = 10_000;
+
 /// Where Zenoh sessions of this host meet others, e.g. `tcp/10.0.0.1:7447`.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -277,6 +281,7 @@ fn config(
         ("scouting/gossip/enabled", "false".to_owned()),
         ("open/return_conditions/connect_scouted", "false".to_owned()),
         ("transport/shared_memory/enabled", "false".to_owned()),
+        ("transport/unicast/max_sessions", MOST_SESSIONS.to_string()),
         ("transport/link/tx/queue/size/data", QUEUE.to_string()),
         (
             "transport/link/tx/queue/congestion_control/block/wait_before_close",
