@@ -3,7 +3,7 @@
     python3 tests/proof/all.py [--only committed,coverage] [--out out/all] [--docs docs/proof.md] [--jobs 2]
 
 Needs requirements.txt. What is in `--out` already is not made again, so a part that was stopped goes on where it was.
-The whole takes some HOURS hours of two cores; `--only committed,first_sight,first_sight_beside,nulls` takes four
+The whole takes some two hours of two cores; `--only committed,first_sight,first_sight_beside,nulls` takes four
 minutes. So many parts are made at once as `--jobs` says.
 """
 import argparse
@@ -37,8 +37,6 @@ PARTS = {
     "coverage_bodies_off": "python3 tests/proof/coverage.py PROGRAM OUT --cases 60 --count 3 --first 7401 --bodies-off --table",
     "reliability": "python3 tests/proof/reliability.py PROGRAM OUT --first 6001 --cases 300 --half odd --svg docs/reliability.svg",
 }
-# What prints lines that are no Markdown.
-TEXT = {"slips"}
 
 
 def main():
@@ -57,9 +55,7 @@ def main():
     def make(name):
         command = PARTS[name].replace("PROGRAM", PROGRAM).replace("OUT", str(args.out / name))
         print(f"{name}: {command}", file=sys.stderr)
-        is_text = name in TEXT
-        figures = finished(performance.measured(command, "text" if is_text else "table"))
-        figures = figures if is_text else wrapped(figures)
+        figures = wrapped(finished(performance.measured(command, "table")))
         with written:
             args.docs.write_text(performance.put(args.docs.read_text(), name, figures))
 

@@ -183,7 +183,9 @@ def main():
             good = is_right(report, words)
             right, alarms, count = right + good, alarms + (bool(said) and not words), count + 1
             other = [f"{f['effect']} {f.get('joint') or f.get('link') or ''} {100 * f['explains']:.0f} %" for f in report["findings"][:3]]
-            print(f"| {arm.name} | {slip} | {report['verdict']} | {said or '; '.join(other)} | {'yes' if good else 'no'} |", flush=True)
+            # The first sentence says what is wrong; the others give evidence and remedy.
+            brief = said.split(". ")[0] if said else "; ".join(other)
+            print(f"| {arm.name} | {slip} | {report['verdict']} | {brief} | {'yes' if good else 'no'} |", flush=True)
     print(f"\nOf {count} explanations, {right} are right. {alarms} without a slip were said to have one.")
 
 
