@@ -3,8 +3,8 @@
     python3 tests/proof/all.py [--only committed,coverage] [--out out/all] [--docs docs/proof.md] [--jobs 2]
 
 Needs requirements.txt. What is in `--out` already is not made again, so a part that was stopped goes on where it was.
-The whole takes some two hours of two cores; `--only committed,first_sight,first_sight_beside,nulls` takes four
-minutes. So many parts are made at once as `--jobs` says.
+The whole takes some two hours of two cores, estimated from its parts;
+`--only committed,first_sight,first_sight_beside,nulls` takes four minutes. `--jobs` parts are made at once.
 """
 import argparse
 import concurrent.futures
