@@ -32,8 +32,10 @@ mod gear_efficiency;
 mod ghost;
 mod joint_elasticity;
 mod joint_zero_offset;
+mod joint_zero_offset_in_recording;
 mod late_brake;
 mod late_effort;
+mod late_position;
 mod law;
 mod link_com;
 mod link_inertia;
@@ -122,10 +124,12 @@ pub static EFFECTS: &[&Effect] = &[
     &base_tilt::EFFECT,
     &base_tilt_in_recording::EFFECT,
     &joint_zero_offset::EFFECT,
+    &joint_zero_offset_in_recording::EFFECT,
     &encoder_eccentricity::EFFECT,
     &gain_drift::EFFECT,
     &gain_ripple::EFFECT,
     &late_effort::EFFECT,
+    &late_position::EFFECT,
     &external_push::EFFECT,
     &contact_wall::EFFECT,
     &payload_pickup::EFFECT,

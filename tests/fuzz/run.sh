@@ -23,14 +23,17 @@ cp target/release/fuzz "$out/bin/program"
 fuzz() {
     ln -sf program "$out/bin/$1"
     mkdir -p "$out/$1"
-    (
+    # The time of computing, which is less than SECONDS on a busy machine.
+    TIMEFORMAT=%U
+    time (
         ulimit -v 4000000
         # Quotes of what a target prints would fill the disk.
         "$out/bin/$1" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=1024 -malloc_limit_mb=1024 \
-            -max_len=65536 -print_final_stats=1 -artifact_prefix="$out/found/$1-" "$out/$1" "tests/fuzz/corpus/$1"
-    ) >"$out/$1.log" 2>&1 && verdict=sound || verdict=FOUND
+            -max_len=65536 -print_final_stats=1 -artifact_prefix="$out/found/$1-" "$out/$1" "tests/fuzz/corpus/$1" \
+            >"$out/$1.log" 2>&1
+    ) 2>"$out/$1.seconds" && verdict=sound || verdict=FOUND
     runs=$(sed -n 's/^stat::number_of_executed_units: *//p' "$out/$1.log")
-    echo "$1: ${runs:-?} inputs, $verdict ($out/$1.log)"
+    echo "$1: ${runs:-?} inputs, $(tail -1 "$out/$1.seconds") s of computing, $verdict ($out/$1.log)"
     [ "$verdict" = sound ]
 }
 export -f fuzz

@@ -1,14 +1,16 @@
-"""Makes every figure of docs/proof.md, and writes its tables between their marks.
+"""Makes every figure of docs/proof.md, and writes it between its marks. Long tables go to docs/proof-cases.md.
 
-    python3 tests/proof/all.py [--only committed,coverage] [--out out/all] [--docs docs/proof.md] [--jobs 2]
+    python3 tests/proof/all.py [--only committed,coverage] [--out out/all] [--docs docs] [--jobs 2]
 
-Needs requirements.txt. What is in `--out` already is not made again, so a part that was stopped goes on where it was.
+Needs requirements.txt. Each figure says of which commit it is. What is in `--out` already is not made again, so a part that was stopped goes on where it was.
 The whole takes some two hours of two cores, estimated from its parts;
 `--only committed,first_sight,first_sight_beside,nulls` takes four minutes. `--jobs` parts are made at once.
 """
 import argparse
 import concurrent.futures
 import pathlib
+import re
+import shutil
 import subprocess
 import sys
 import textwrap
@@ -18,10 +20,9 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "benches"))
 import performance
 
-PROGRAM = "target/release/tauscope"
 # By name: the command, in which OUT is the folder of its results. All print Markdown; --table would make nothing.
 PARTS = {
-    "committed": "tests/proof/prove.sh tests/proof/set OUT",
+    "committed": "tests/proof/prove.sh tests/proof/set OUT PROGRAM",
     "first_sight": "python3 tests/proof/first_sight.py PROGRAM OUT --seed 41",
     "first_sight_beside": "python3 tests/proof/first_sight.py PROGRAM OUT --seed 42 --beside friction,bodies",
     "first_sight_topic": "python3 tests/proof/first_sight.py PROGRAM OUT --seed 43 --twin-topic --nulls 6 "
@@ -38,30 +39,50 @@ PARTS = {
     "reliability": "python3 tests/proof/reliability.py PROGRAM OUT --first 6001 --cases 300 --half odd --svg docs/reliability.svg",
 }
 
+# Their tables have a row for each case, which stand in proof-cases.md; proof.md has the sentence below the table.
+LONG = ("committed", "named", "faults", "slips", "changed")
+
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", default="", help="of the parts, separated by commas: " + ", ".join(PARTS))
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/all"))
-    parser.add_argument("--docs", type=pathlib.Path, default=ROOT / "docs" / "proof.md")
+    parser.add_argument("--docs", type=pathlib.Path, default=ROOT / "docs")
     parser.add_argument("--jobs", type=int, default=2)
     args = parser.parse_args()
     only = [name for name in args.only.split(",") if name] or list(PARTS)
     if unknown := set(only) - set(PARTS):
         sys.exit(f"no such part: {', '.join(sorted(unknown))}")
     subprocess.run(["cargo", "build", "--release", "--locked", "--quiet"], cwd=ROOT, check=True)
+    # A copy, so that the next build may begin before the last part has ended.
+    program = args.out / "tauscope"
+    program.parent.mkdir(parents=True, exist_ok=True)
+    program.unlink(missing_ok=True)
+    shutil.copy2(ROOT / "target/release/tauscope", program)
+    describe = ["git", "describe", "--always", "--dirty"]
+    commit = subprocess.run(describe, cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
     written = threading.Lock()
 
     def make(name):
-        command = PARTS[name].replace("PROGRAM", PROGRAM).replace("OUT", str(args.out / name))
+        command = PARTS[name].replace("PROGRAM", str(program)).replace("OUT", str(args.out / name))
         print(f"{name}: {command}", file=sys.stderr)
-        figures = wrapped(finished(performance.measured(command, "table")))
+        figures = finished(performance.measured(command, "table"))
+        # Anybody's program is where cargo puts it.
+        figures = figures.replace(str(program), "target/release/tauscope").replace(":\n", f", commit {commit}:\n", 1)
+        figures = wrapped(figures)
         with written:
-            args.docs.write_text(performance.put(args.docs.read_text(), name, figures))
+            if name in LONG:
+                put(args.docs / "proof-cases.md", name, figures)
+                figures = "\n\n".join(x for x in re.split(r"\n\n+", figures) if not x.startswith("|"))
+            put(args.docs / "proof.md", name, figures)
 
     with concurrent.futures.ThreadPoolExecutor(args.jobs) as pool:
         # What a part raises is raised here.
         list(pool.map(make, only))
+
+
+def put(document, name, figures):
+    document.write_text(performance.put(document.read_text(), name, figures))
 
 
 def finished(markdown):

@@ -97,14 +97,17 @@ def judged(o, kind, seed):
 
 def show(o):
     print("| fault | cases | named | unknown at the joint | wrong findings | verdicts `unknown_remains` |\n| --- | --- | --- | --- | --- | --- |")
+    every = [0] * 4
     for kind in o.kinds.split(","):
         rows = [(seed, judged(o, kind, seed)) for own, seed in seeds(o) if own == kind]
         rows = [(seed, row) for seed, row in rows if row]
         count = lambda of: sum(of(row) for _, row in rows)
-        print(f"| `{kind}` | {len(rows)} | {count(lambda r: r[0])} | {count(lambda r: r[1])} | {count(lambda r: len(r[2]))} | "
-              f"{count(lambda r: r[3]['verdict'] == 'unknown_remains')} |")
+        own = [len(rows), *(count(of) for of in (lambda r: r[0], lambda r: r[1], lambda r: len(r[2])))]
+        every = [a + b for a, b in zip(every, own)]
+        print(f"| `{kind}` | {' | '.join(map(str, own))} | {count(lambda r: r[3]['verdict'] == 'unknown_remains')} |")
         for seed, row in rows if o.cases else ():
             print("   ", seed, fault_text(row[4]), "SAID", [said(f) for f in row[3]["findings"]], row[3]["verdict"])
+    print(f"\nOf {every[0]} faults, {every[1]} come back by name, {every[2]} more as an `unknown` at their joint. {every[3]} findings are wrong.")
 
 
 def fault_text(fault):

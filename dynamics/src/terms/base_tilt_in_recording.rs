@@ -17,7 +17,7 @@ pub(super) static EFFECT: Effect = Effect {
         "a base that is tilted in one recording",
         "In one recording the base stands otherwise than in the others.",
         "What carries the base: a vehicle that was parked elsewhere, a cart on soft ground, a loose foot?",
-        "In recording {place} the base is tilted otherwise than in the others: roll {roll_rad}, pitch {pitch_rad}.",
+        "In recording {recording} the base is tilted otherwise than in the others: roll {roll_rad}, pitch {pitch_rad}.",
     ),
     family: Family::Mounting,
     place: PlaceKind::Base,

@@ -1,10 +1,10 @@
 //! A joint whose zero is not the model's: B. W. Mooring, Z. S. Roth and M. R. Driels, *Fundamentals of Manipulator
 //! Calibration*, 1991.
 
-use super::law::array;
+use super::ghost::While;
 use super::{
     Coordinate, CoordinateKind, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter,
-    PlaceKind, Simulated, Term, Traits, Words,
+    PlaceKind, Simulated, Site, Term, Traits, Words,
 };
 use crate::{Data, Model, rnea};
 
@@ -32,17 +32,11 @@ pub(super) static EFFECT: Effect = Effect {
     place: PlaceKind::Joint,
     layer: Layer::Body,
     parameters: &[Parameter::any("offset_rad")],
-    coordinates: &[Coordinate {
-        name: "offset_rad",
-        kind: CoordinateKind::Factor {
-            step: 1e-3,
-            minimum: f64::NEG_INFINITY,
-        },
-    }],
+    coordinates: &[offset()],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
-    limit: Some(|_, x| (LEAST..=LARGEST).contains(&x[0].abs())),
+    limit: Some(|_, x| is_told(x[0])),
     excitation: Excitation::Poses,
     simulated: Simulated::Model,
     concealed: Some(|draw| {
@@ -55,24 +49,31 @@ pub(super) static EFFECT: Effect = Effect {
         smallest_told_as: Some("offset_rad"),
         ..Traits::NONE
     },
-    build: |site, values| {
-        let values = array(values);
-        let mut shifted = site.model.clone();
-        shifted.shift_zero(site.joint, values[0]);
-        Box::new(JointZeroOffset {
-            joint: site.joint,
-            values,
-            data: Data::new(site.model),
-            recorded: site.model.clone(),
-            shifted,
-        })
-    },
+    build: |site, values| JointZeroOffset::boxed(&EFFECT, site, values, While::Always),
 };
 
+pub(super) const fn offset() -> Coordinate {
+    Coordinate {
+        name: "offset_rad",
+        kind: CoordinateKind::Factor {
+            step: 1e-3,
+            minimum: f64::NEG_INFINITY,
+        },
+    }
+}
+
+/// Whether an offset is one that is worth telling \[rad or m\].
+pub(super) fn is_told(offset: f64) -> bool {
+    (LEAST..=LARGEST).contains(&offset.abs())
+}
+
+/// An offset by the first of its coordinates, for good or for a while.
 #[derive(Debug)]
-struct JointZeroOffset {
+pub(super) struct JointZeroOffset {
+    effect: &'static Effect,
+    coordinates: Vec<f64>,
+    there: While,
     joint: usize,
-    values: [f64; 1],
     data: Data,
     /// The robot that stands where it is recorded.
     recorded: Model,
@@ -80,17 +81,38 @@ struct JointZeroOffset {
     shifted: Model,
 }
 
+impl JointZeroOffset {
+    pub fn boxed(
+        effect: &'static Effect,
+        site: &Site<'_>,
+        coordinates: &[f64],
+        there: While,
+    ) -> Box<dyn Term> {
+        let mut shifted = site.model.clone();
+        shifted.shift_zero(site.joint, coordinates[0]);
+        Box::new(Self {
+            effect,
+            coordinates: coordinates.to_vec(),
+            there,
+            joint: site.joint,
+            data: Data::new(site.model),
+            recorded: site.model.clone(),
+            shifted,
+        })
+    }
+}
+
 impl Term for JointZeroOffset {
     fn effect(&self) -> &'static Effect {
-        &EFFECT
+        self.effect
     }
 
     fn coordinates(&self) -> &[f64] {
-        &self.values
+        &self.coordinates
     }
 
     fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
-        if self.values[0] == 0.0 {
+        if self.coordinates[0] == 0.0 || !self.there.covers(at) {
             return;
         }
         for (model, share) in [(&self.shifted, 1.0), (&self.recorded, -1.0)] {
@@ -108,7 +130,10 @@ impl Term for JointZeroOffset {
     }
 
     fn alter(&self, model: &mut Model) -> bool {
-        model.shift_zero(self.joint, self.values[0]);
+        if self.there != While::Always {
+            return false;
+        }
+        model.shift_zero(self.joint, self.coordinates[0]);
         true
     }
 }

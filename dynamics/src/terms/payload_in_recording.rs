@@ -18,7 +18,7 @@ pub static EFFECT: Effect = Effect {
         "a payload in one recording",
         "In one recording the arm carries something that it does not carry in the others.",
         "The tool in that recording: what was mounted or held? Explain recordings with it and without it apart.",
-        "In recording {place} the arm carries {mass_kg} more than in the others.",
+        "In recording {recording} the arm carries {mass_kg} more than in the others.",
     ),
     family: Family::Body,
     place: PlaceKind::Tool,

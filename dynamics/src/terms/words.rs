@@ -1,7 +1,7 @@
 //! What a report calls an effect, and what it says of one that was found.
 
 /// The words for an effect. Sentences are templates: in `{}` stands `place`, `source` (the joint that drives it),
-/// or the name of a parameter, for its value with unit and interval; `{name:ratio}` leaves the unit out, and
+/// `recording` (the one that it fills), or the name of a parameter, for its value with unit and interval; `{name:ratio}` leaves the unit out, and
 /// `{name:number}` the interval, too.
 #[derive(Debug, Clone, Copy)]
 pub struct Words {

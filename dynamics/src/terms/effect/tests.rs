@@ -31,6 +31,7 @@ fn every_effect_has_words_of_its_own_about_what_it_has() {
                 let known = match place {
                     "place" | "less" => true,
                     "source" => effect.place == PlaceKind::TwoJoints,
+                    "recording" => effect.traits.fills_recording,
                     name => effect.parameters.iter().any(|p| p.name == name),
                 };
                 assert!(known, "{}: `{place}` in `{sentence}`", effect.name);
@@ -176,6 +177,8 @@ fn what_few_effects_have_fits_them() {
         [
             "absent_tool",
             "base_tilt_in_recording",
+            "joint_zero_offset_in_recording",
+            "late_position",
             "payload_in_recording"
         ]
     );
@@ -191,6 +194,7 @@ fn effects_last_or_come_and_go() {
         all(false),
         [
             "base_tilt_in_recording",
+            "joint_zero_offset_in_recording",
             "external_push",
             "contact_wall",
             "payload_pickup",

@@ -148,9 +148,10 @@ impl Hypothesis {
         self.effect.is_plain_friction()
     }
 
-    /// Whether it shifts the zero of a joint.
+    /// Whether it shifts the zero of a joint, in all recordings.
     pub fn is_zero_offset(&self) -> bool {
-        self.effect.family == Family::Mounting && self.effect.place == PlaceKind::Joint
+        let of_joint = self.effect.place == PlaceKind::Joint;
+        self.effect.family == Family::Mounting && of_joint && self.lasts()
     }
 
     /// Whether it is a function of its joint's position alone.

@@ -142,8 +142,8 @@ pub fn of(
         let in_amperes = scales.to_nm(active.hypothesis, &mut parameters, &mut intervals);
         of_start.widen(active.hypothesis, &parameters, &mut intervals);
         let or_scale = scales.doubt_body(active.hypothesis, &parameters, &mut intervals);
-        let place = when.whole(active).unwrap_or(&place);
-        let mut sentence = sentences::sentence(active, place, &parameters, &intervals, joints);
+        let of = (place.as_str(), when.recording.as_deref());
+        let mut sentence = sentences::sentence(active, of, &parameters, &intervals, joints);
         sentence += or_scale.unwrap_or_default();
         let slides = active.hypothesis.slides(&input.model);
         let sentence = sentences::in_units(&sentence, in_amperes, slides);
@@ -319,14 +319,6 @@ struct When {
     recording: Option<String>,
     start: Option<f64>,
     end: Option<f64>,
-}
-
-impl When {
-    /// Of what fills a recording, the recording: the place that tells something.
-    fn whole(&self, active: &Active) -> Option<&str> {
-        let fills = active.hypothesis.effect.traits.fills_recording;
-        self.recording.as_deref().filter(|_| fills)
-    }
 }
 
 /// The times of a finding. Where they hold for one recording, its parameters are changed to that recording's time.

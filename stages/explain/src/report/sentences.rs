@@ -73,10 +73,10 @@ pub fn unit_at<'u>(unit: &'u str, joint: &Joint) -> &'u str {
 /// Physical: what a torque sensor says of a joint that it does not measure.
 const MOST_OF_NOTHING: f64 = 0.05;
 
-/// A finding as a sentence. `place` is the name of the joint or link.
+/// A finding as a sentence. `place` is the name of the joint or link, `recording` that of the recording it is told in.
 pub fn sentence(
     active: &Active,
-    place: &str,
+    (place, recording): (&str, Option<&str>),
     parameters: &BTreeMap<String, Value>,
     intervals: &BTreeMap<String, [f64; 2]>,
     joints: &[String],
@@ -110,6 +110,7 @@ pub fn sentence(
     };
     words::fill(template, |name, told| match name {
         "place" => place.to_owned(),
+        "recording" => recording.unwrap_or_default().to_owned(),
         "source" => joints[active.hypothesis.place.source].clone(),
         "less" => {
             let interval = intervals.get(first).map(|[low, high]| [-high, -low]);

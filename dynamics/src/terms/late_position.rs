@@ -1,0 +1,176 @@
+//! A joint whose position is reported late: an encoder on a channel of its own, read or sent less often than the others.
+
+use super::law::array;
+use super::{
+    Coordinate, CoordinateKind, Effect, Excitation, Family, Layer, MotionSample, Parameter,
+    PlaceKind, Simulated, Site, Term, Traits, Words,
+};
+use crate::{Data, Model, rnea};
+
+/// Delays that a channel may have beside the others \[s\].
+/// Physical: from one period of a controller to a fifth of a second, after which a joint is elsewhere and not late.
+const DELAYS_S: std::ops::RangeInclusive<f64> = 0.004..=0.2;
+
+/// The joint is where it will be reported a while later. The way there is the Taylor series of the recorded motion up to
+/// the jerk, so motion much faster than the delay is followed less exactly.
+pub(super) static EFFECT: Effect = Effect {
+    name: "late_position",
+    words: Words::new(
+        "Late position channel",
+        "a position channel that is late",
+        "The position of one joint is reported late against the efforts, and against the other joints.",
+        "Joint {place}: how its encoder is read and sent; is its channel slower, filtered or read less often than the others?",
+        "The position of joint {place} is recorded {delay_s} later than those of the other joints.",
+    ),
+    family: Family::Recording,
+    place: PlaceKind::Joint,
+    layer: Layer::Body,
+    parameters: &[Parameter::at_least("delay_s", 0.0)],
+    coordinates: &[Coordinate {
+        name: "delay_s",
+        kind: CoordinateKind::Factor {
+            step: 1e-3,
+            minimum: 0.0,
+        },
+    }],
+    to_parameters: <[f64]>::to_vec,
+    to_coordinates: <[f64]>::to_vec,
+    simpler: None,
+    limit: Some(|_, x| DELAYS_S.contains(&x[0])),
+    excitation: Excitation::Fast,
+    simulated: Simulated::No(
+        "shift the position of that joint in a simulated recording, for example in its CSV table",
+    ),
+    concealed: None,
+    traits: Traits {
+        is_off_list: true,
+        bends: true,
+        smallest_told_as: Some("delay_s"),
+        ..Traits::NONE
+    },
+    build: |site, values| LatePosition::boxed(site, array(values)),
+};
+
+#[derive(Debug)]
+struct LatePosition {
+    joint: usize,
+    values: [f64; 1],
+    model: Model,
+    data: Data,
+    /// Of the sample before \[rad/s² or m/s²\].
+    acceleration_before: Option<f64>,
+    /// The last one \[rad/s³ or m/s³\].
+    jerk: f64,
+    position: Vec<f64>,
+    velocity: Vec<f64>,
+    acceleration: Vec<f64>,
+}
+
+impl LatePosition {
+    fn boxed(site: &Site<'_>, values: [f64; 1]) -> Box<dyn Term> {
+        let zero = vec![0.0; site.model.dof()];
+        Box::new(Self {
+            joint: site.joint,
+            values,
+            model: site.model.clone(),
+            data: Data::new(site.model),
+            acceleration_before: None,
+            jerk: 0.0,
+            position: zero.clone(),
+            velocity: zero.clone(),
+            acceleration: zero,
+        })
+    }
+
+    /// Where the joint truly is, and how it moves there.
+    fn place_truly(&mut self, at: &MotionSample<'_>) {
+        let (j, [late_s]) = (self.joint, self.values);
+        self.position.copy_from_slice(at.position);
+        self.velocity.copy_from_slice(at.velocity);
+        self.acceleration.copy_from_slice(at.acceleration);
+        let (qd, qdd, jerk) = (at.velocity[j], at.acceleration[j], self.jerk);
+        let half = 0.5 * late_s * late_s;
+        self.position[j] += late_s * qd + half * qdd + half * late_s / 3.0 * jerk;
+        self.velocity[j] += late_s * qdd + half * jerk;
+        self.acceleration[j] += late_s * jerk;
+    }
+}
+
+impl Term for LatePosition {
+    fn effect(&self) -> &'static Effect {
+        &EFFECT
+    }
+
+    fn coordinates(&self) -> &[f64] {
+        &self.values
+    }
+
+    fn reset(&mut self) {
+        self.acceleration_before = None;
+        self.jerk = 0.0;
+    }
+
+    fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
+        let now = at.acceleration[self.joint];
+        // A repeated stamp has no change of its own.
+        if at.dt_s > 0.0
+            && let Some(before) = self.acceleration_before
+        {
+            self.jerk = (now - before) / at.dt_s;
+        }
+        self.acceleration_before = Some(now);
+        if self.values[0] == 0.0 {
+            return;
+        }
+        self.place_truly(at);
+        let truly = [&self.position, &self.velocity, &self.acceleration].map(Vec::as_slice);
+        let recorded = [at.position, at.velocity, at.acceleration];
+        for ([q, qd, qdd], share) in [(truly, 1.0), (recorded, -1.0)] {
+            let of_robot = rnea(&self.model, &mut self.data, q, qd, qdd);
+            for (effort, of_robot) in effort.iter_mut().zip(of_robot) {
+                *effort += share * of_robot;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{TwoJoints, sample};
+    use super::*;
+
+    #[test]
+    fn the_robot_is_where_it_will_be_reported() {
+        let robot = TwoJoints::new();
+        let mut data = Data::new(&robot.model);
+        let late_s = 0.03;
+        let mut term = (EFFECT.build)(&robot.site(), &[late_s]);
+        // The first joint swings at half a hertz, the second one stands.
+        let swing = |t: f64| {
+            let (sin, cos) = (3.0 * t).sin_cos();
+            [0.5 * sin, 1.5 * cos, -4.5 * sin]
+        };
+        for k in 0..200 {
+            let t = 0.01 * f64::from(k);
+            let [q, qd, qdd] = swing(t);
+            let dt_s = if k == 0 { 0.0 } else { 0.01 };
+            let at = sample(dt_s, t, [q, 0.3], [qd, 0.0], [qdd, 0.0]);
+            let mut added = [0.0; 2];
+            term.act(&at.view(), &mut added);
+            let of = |data: &mut Data, [q, qd, qdd]: [f64; 3]| {
+                let all = rnea(&robot.model, data, &[q, 0.3], &[qd, 0.0], &[qdd, 0.0]);
+                [all[0], all[1]]
+            };
+            let (true_, recorded) = (
+                of(&mut data, swing(t + late_s)),
+                of(&mut data, [q, qd, qdd]),
+            );
+            let largest = recorded[0].abs().max(1.0);
+            for j in 0..2 {
+                let error = added[j] - (true_[j] - recorded[j]);
+                // The jerk is known from the second sample on, half a step late.
+                assert!(k == 0 || error.abs() < 0.02 * largest, "{k} {j}: {error}");
+            }
+        }
+    }
+}
