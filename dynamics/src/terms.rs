@@ -33,6 +33,7 @@ mod ghost;
 mod joint_elasticity;
 mod joint_zero_offset;
 mod joint_zero_offset_in_recording;
+mod joint_zero_slip;
 mod late_brake;
 mod late_effort;
 mod late_position;
@@ -125,6 +126,7 @@ pub static EFFECTS: &[&Effect] = &[
     &base_tilt_in_recording::EFFECT,
     &joint_zero_offset::EFFECT,
     &joint_zero_offset_in_recording::EFFECT,
+    &joint_zero_slip::EFFECT,
     &encoder_eccentricity::EFFECT,
     &gain_drift::EFFECT,
     &gain_ripple::EFFECT,

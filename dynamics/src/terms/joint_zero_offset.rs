@@ -32,7 +32,7 @@ pub(super) static EFFECT: Effect = Effect {
     place: PlaceKind::Joint,
     layer: Layer::Body,
     parameters: &[Parameter::any("offset_rad")],
-    coordinates: &[offset()],
+    coordinates: &[offset("offset_rad")],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
@@ -52,9 +52,9 @@ pub(super) static EFFECT: Effect = Effect {
     build: |site, values| JointZeroOffset::boxed(&EFFECT, site, values, While::Always),
 };
 
-pub(super) const fn offset() -> Coordinate {
+pub(super) const fn offset(name: &'static str) -> Coordinate {
     Coordinate {
-        name: "offset_rad",
+        name,
         kind: CoordinateKind::Factor {
             step: 1e-3,
             minimum: f64::NEG_INFINITY,
@@ -88,9 +88,18 @@ impl JointZeroOffset {
         coordinates: &[f64],
         there: While,
     ) -> Box<dyn Term> {
+        Box::new(Self::new(effect, site, coordinates, there))
+    }
+
+    pub fn new(
+        effect: &'static Effect,
+        site: &Site<'_>,
+        coordinates: &[f64],
+        there: While,
+    ) -> Self {
         let mut shifted = site.model.clone();
         shifted.shift_zero(site.joint, coordinates[0]);
-        Box::new(Self {
+        Self {
             effect,
             coordinates: coordinates.to_vec(),
             there,
@@ -98,7 +107,7 @@ impl JointZeroOffset {
             data: Data::new(site.model),
             recorded: site.model.clone(),
             shifted,
-        })
+        }
     }
 }
 

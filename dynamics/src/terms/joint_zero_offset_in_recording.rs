@@ -29,7 +29,7 @@ pub(super) static EFFECT: Effect = Effect {
         Parameter::any("t_end_s"),
     ],
     coordinates: &[
-        offset(),
+        offset("offset_rad"),
         time("t_start_s", CoordinateKind::SessionTime),
         time("t_end_s", CoordinateKind::SessionTime),
     ],

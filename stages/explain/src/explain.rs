@@ -189,7 +189,7 @@ fn conclude(
     notes.splice(0..0, slips.note());
     findings.append(&mut named.findings);
     slips.undo(&mut proof);
-    let verdict = verdict::verdict(&findings, &remainders.all, !input.bodies);
+    let verdict = verdict::verdict(&findings, &remainders, !input.bodies);
     let report = Report {
         case: input.case.clone(),
         verdict,

@@ -9,6 +9,7 @@
 pub mod act;
 pub mod active;
 pub mod bodies;
+pub mod carrier;
 pub mod columns;
 pub mod efforts;
 pub mod friction;

@@ -178,6 +178,7 @@ fn what_few_effects_have_fits_them() {
             "absent_tool",
             "base_tilt_in_recording",
             "joint_zero_offset_in_recording",
+            "joint_zero_slip",
             "late_position",
             "payload_in_recording"
         ]

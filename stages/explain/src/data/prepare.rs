@@ -1,6 +1,7 @@
 //! From recordings to the data of a fit.
 
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 use std::sync::{Arc, OnceLock};
 
 use tauscope_dynamics::Model;
@@ -124,6 +125,7 @@ impl Problem {
                 problem.measured.extend(&measured[r * n + j]);
                 problem.weight.extend(&weight[r * n + j]);
             }
+            problem.acceleration_noise[j] = acceleration_noise(recordings, j, n, cutoff_hz);
             variances[j].sort_by(|(a, _), (b, _)| a.total_cmp(b));
             let (filtered, unfiltered) = variances[j][variances[j].len() / 2];
             problem.white_noise[j] = deviation(filtered, problem.largest_effort[j]);
@@ -145,6 +147,7 @@ impl Problem {
             weight: Vec::new(),
             white_noise: vec![0.0; n],
             unfiltered_noise: vec![0.0; n],
+            acceleration_noise: vec![0.0; n],
             largest_effort: vec![0.0; n],
             cutoff_hz,
             effective_samples: Vec::new(),
@@ -164,6 +167,28 @@ fn leave_out_unmeasured(counts: &mut [bool], recording: &Recording, joint: usize
     if is_unmeasured(recording, joint, n) {
         counts.fill(false);
     }
+}
+
+/// Variance that the white noise of a joint's position has as acceleration below a cutoff: its density, twice the variance
+/// over the rate, times (2 pi f)^4, from zero to the cutoff.
+fn acceleration_variance(recording: &Recording, joint: usize, n: usize, cutoff_hz: f64) -> f64 {
+    let position: Vec<f64> = (recording.position.iter().skip(joint).step_by(n).copied()).collect();
+    // A position may come in steps, as an effort may.
+    let (white, new) = of_effort(&position);
+    let rate_hz = new * recording.rate_hz();
+    if rate_hz <= 0.0 {
+        return 0.0;
+    }
+    2.0 * white / rate_hz * TAU.powi(4) * cutoff_hz.powi(5) / 5.0
+}
+
+/// Standard deviation of the same, of the recording in the middle.
+fn acceleration_noise(recordings: &[Recording], joint: usize, n: usize, cutoff_hz: f64) -> f64 {
+    let of = |recording| acceleration_variance(recording, joint, n, cutoff_hz);
+    let mut all: Vec<f64> = recordings.iter().map(of).collect();
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2)
+        .map_or(0.0, |variance| variance.sqrt())
 }
 
 /// Standard deviation of a noise, no less than what the numbers of a driver resolve.

@@ -32,6 +32,9 @@ pub struct Problem {
     pub white_noise: Vec<f64>,
     /// The same before the filter \[N m\].
     pub unfiltered_noise: Vec<f64>,
+    /// What the noise of its recorded position makes of a joint's acceleration below the comparison's cutoff, by joint
+    /// \[rad/s² or m/s²\].
+    pub acceleration_noise: Vec<f64>,
     /// Largest measured effort by joint, unfiltered \[N m\].
     pub largest_effort: Vec<f64>,
     /// Half amplitude of the filter \[Hz\].

@@ -185,7 +185,7 @@ fn pushes(search: &Search<'_>) -> Explanation {
         let base = Base::new(problem, &best.fit, search.hypotheses.len());
         let within = |h: &Hypothesis| base.propose_within(*h, interval, Some(0));
         let proposals = search.hypotheses.iter().filter(near).filter_map(within);
-        let possible = proposals.filter(|p| plausible(&p.active, &problem.model));
+        let possible = proposals.filter(|p| plausible(problem, &p.active));
         let push = possible.max_by(|a, b| a.gain.total_cmp(&b.gain));
         if let Some(push) = push {
             // Its times are those of the interval: a force that grows and fades has no sharper ones.

@@ -117,7 +117,7 @@ impl Fit {
 
     /// The effort that another effect would add.
     pub fn added(&self, problem: &Problem, active: &Active) -> Column {
-        let gains = &self.parts.gains;
+        let on = (&self.parts.gains[..], self.parts.carrier.as_deref());
         let joint = active.hypothesis.only_joint();
         if self.parts.is_plain(&active.hypothesis) && joint.is_some() {
             let efforts = if active.needs_load() {
@@ -125,10 +125,10 @@ impl Fit {
             } else {
                 problem.bare()
             };
-            return problem.column(&change(problem, &[], efforts, active, gains), joint);
+            return problem.column(&change(problem, &[], efforts, active, on), joint);
         }
         let joint = joint.filter(|&joint| !self.parts.feeds(joint));
-        let changed = change(problem, &self.actives, self.efforts(problem), active, gains);
+        let changed = change(problem, &self.actives, self.efforts(problem), active, on);
         problem.column(&changed, joint)
     }
 

@@ -4,9 +4,9 @@ use tauscope_dynamics::terms::{
     Against, Coordinate, CoordinateKind, Effect, Family, Layer, MotionSample, PlaceKind, Site,
     Table, Term, table,
 };
+use tauscope_dynamics::{Inertia, Model};
 
 pub use tauscope_dynamics::terms::Time as TimeKind;
-use tauscope_dynamics::{Inertia, Model};
 
 /// Where an effect acts: indices into the model's joints and links. Indices that its kind of place does not use are 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
@@ -148,10 +148,9 @@ impl Hypothesis {
         self.effect.is_plain_friction()
     }
 
-    /// Whether it shifts the zero of a joint, in all recordings.
+    /// Whether it shifts the zero of a joint.
     pub fn is_zero_offset(&self) -> bool {
-        let of_joint = self.effect.place == PlaceKind::Joint;
-        self.effect.family == Family::Mounting && of_joint && self.lasts()
+        self.effect.family == Family::Mounting && self.effect.place == PlaceKind::Joint
     }
 
     /// Whether it is a function of its joint's position alone.

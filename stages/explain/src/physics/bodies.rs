@@ -12,12 +12,22 @@ use crate::data::problem::Problem;
 use crate::data::track::FitTrack;
 use crate::physics::act::act_over;
 use crate::physics::active::Active;
+use crate::physics::carrier::is_on_carrier;
 
-/// Adds the effort of an effect on bodies to efforts over all tracks. `rigid` is the twin's effort.
-pub fn add(problem: &Problem, active: &Active, rigid: &[Vec<f64>], into: &mut [Vec<f64>]) {
+/// Adds the effort of an effect on bodies to efforts over all tracks. `rigid` is the twin's effort, `carrier` the robot with
+/// the bodies that were found, if there are any.
+pub fn add(
+    problem: &Problem,
+    active: &Active,
+    carrier: Option<&Model>,
+    rigid: &[Vec<f64>],
+    into: &mut [Vec<f64>],
+) {
     let hypothesis = active.hypothesis;
-    let mut term = active.term(&problem.model);
-    if let Some((unit, factors)) = in_units(problem, &*term) {
+    let carrier = carrier.filter(|_| is_on_carrier(active));
+    let mut term = active.term(carrier.unwrap_or(&problem.model));
+    let of_units = (carrier.is_none()).then(|| in_units(problem, &*term));
+    if let Some((unit, factors)) = of_units.flatten() {
         add_units(&units(problem, unit), &factors, into);
     } else {
         if problem.rows <= MOST_ROWS && hypothesis.has_rotor() {

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::{Layer, Term};
 
 use crate::data::efforts::{Efforts, TrackEfforts, scale, subtract, zeros};
@@ -9,6 +10,7 @@ use crate::data::problem::Problem;
 use crate::physics::act::{act_over, run};
 use crate::physics::active::Active;
 use crate::physics::bodies;
+use crate::physics::carrier::{carrier, is_on_carrier};
 use crate::physics::shaped_bodies::add_shaped;
 use crate::physics::torque_scale::gains;
 
@@ -27,9 +29,11 @@ pub fn transmitted(problem: &Problem, actives: &[Active]) -> TrackEfforts {
     let mut body = TrackEfforts::clone(rigid);
     let of_bodies =
         |a: &&Active| a.hypothesis.effect.layer == Layer::Body && !a.hypothesis.is_torque_scale();
+    let carrier = carrier(&problem.model, actives);
     for active in actives.iter().filter(of_bodies) {
-        if !add_shaped(problem, active, &mut body) {
-            bodies::add(problem, active, rigid, &mut body);
+        let alone = carrier.is_none() || !is_on_carrier(active);
+        if !(alone && add_shaped(problem, active, &mut body)) {
+            bodies::add(problem, active, carrier.as_ref(), rigid, &mut body);
         }
     }
     scale(&mut body, &gains(actives, problem.joints));
@@ -57,7 +61,7 @@ pub fn record(problem: &Problem, actives: &[Active], mechanical: &[Vec<f64>]) ->
 }
 
 /// The change of the recorded effort when `active` is added to the effects `others` that made `efforts`. The effort of
-/// bodies is scaled by `gains`.
+/// bodies is scaled by `gains`; what moves or tilts them acts on `carrier`.
 ///
 /// [`Layer::Record`] terms of `others` are passed through; one that is itself of that layer acts after them.
 pub fn change(
@@ -65,7 +69,7 @@ pub fn change(
     others: &[Active],
     efforts: &Efforts,
     active: &Active,
-    gains: &[f64],
+    (gains, carrier): (&[f64], Option<&Model>),
 ) -> TrackEfforts {
     let through = others.iter().any(Active::is_of_record);
     match active.hypothesis.effect.layer {
@@ -86,7 +90,7 @@ pub fn change(
         Layer::Body => {}
     }
     let mut added = zeros(&efforts.body);
-    bodies::add(problem, active, &efforts.body, &mut added);
+    bodies::add(problem, active, carrier, &efforts.body, &mut added);
     scale(&mut added, gains);
     if !through {
         return added;

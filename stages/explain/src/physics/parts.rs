@@ -4,6 +4,7 @@
 
 use std::sync::{Arc, OnceLock};
 
+use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::{Coordinate, CoordinateKind, Layer, PlaceKind};
 
 use crate::data::column::Column;
@@ -12,6 +13,7 @@ use crate::data::memo::MOST_ROWS;
 use crate::data::problem::Problem;
 use crate::physics::active::{Active, Hypothesis, feeds};
 use crate::physics::bodies;
+use crate::physics::carrier::{carrier, is_carried, is_on_carrier};
 use crate::physics::efforts::{change, evaluated, transmitted};
 use crate::physics::torque_scale::gains;
 use crate::physics::unit_columns::units;
@@ -23,6 +25,8 @@ pub struct Parts {
     pub gains: Vec<f64>,
     /// Joints whose recording an effect transforms, so that it is not a sum of parts.
     pub transformed: Vec<bool>,
+    /// The robot with the bodies that were found, if there are any.
+    pub carrier: Option<Arc<Model>>,
     /// By effect, the effort that it adds before torque scales; `None` if it does not only add.
     columns: Vec<Option<Arc<Column>>>,
     /// The effort that the gears transmit, if a part depends on it.
@@ -39,6 +43,7 @@ impl Parts {
         let mut parts = Self {
             gains: gains(actives, problem.joints),
             transformed: transformed(actives, problem.joints),
+            carrier: carrier(&problem.model, actives).map(Arc::new),
             columns: Vec::with_capacity(actives.len()),
             load: None,
             feeds: (0..problem.joints)
@@ -47,7 +52,8 @@ impl Parts {
             efforts: OnceLock::new(),
         };
         if actives.iter().any(Active::needs_load) {
-            let known = before.filter(|(others, _)| same_bodies(actives, others));
+            let of_bodies = |active: &Active| active.hypothesis.effect.layer == Layer::Body;
+            let known = before.filter(|(others, _)| same(actives, others, of_bodies));
             parts.load = known
                 .and_then(|(_, before)| before.load.clone())
                 .or_else(|| Some(Arc::new(transmitted(problem, actives))));
@@ -56,8 +62,9 @@ impl Parts {
             let part = parts.adds(active).then(|| {
                 let known = before.and_then(|(others, before)| {
                     let at = others.iter().position(|other| is_same(active, other))?;
-                    let alike = !active.needs_load()
-                        || matches!((&parts.load, &before.load), (Some(a), Some(b)) if Arc::ptr_eq(a, b));
+                    let alike = (!active.needs_load()
+                        || matches!((&parts.load, &before.load), (Some(a), Some(b)) if Arc::ptr_eq(a, b)))
+                        && (!is_on_carrier(active) || same(actives, others, is_carried));
                     before.columns[at].clone().filter(|_| alike)
                 });
                 known.unwrap_or_else(|| Arc::new(parts.part(problem, active)))
@@ -123,9 +130,12 @@ impl Parts {
         {
             let efforts = Efforts::of_bodies(Arc::clone(load));
             let ones = vec![1.0; problem.joints];
-            return problem.column(&change(problem, &[], &efforts, active, &ones), joint);
+            let on = (&ones[..], None);
+            return problem.column(&change(problem, &[], &efforts, active, on), joint);
         }
+        let alone = self.carrier.is_none() || !is_on_carrier(active);
         if hypothesis.effect.layer == Layer::Body
+            && alone
             && let Some(values) = bodies::signal(problem, active)
         {
             return Column { joint, values };
@@ -149,7 +159,8 @@ impl Parts {
             return Column { joint, values };
         }
         let ones = vec![1.0; problem.joints];
-        let added = change(problem, &[], problem.bare(), active, &ones);
+        let on = (&ones[..], self.carrier.as_deref());
+        let added = change(problem, &[], problem.bare(), active, on);
         problem.column(&added, joint)
     }
 
@@ -242,11 +253,12 @@ fn is_same(a: &Active, b: &Active) -> bool {
     a.hypothesis == b.hypothesis && a.curve == b.curve && bits(a) == bits(b)
 }
 
-fn same_bodies(a: &[Active], b: &[Active]) -> bool {
-    let bodies = |all: &[Active]| -> Vec<Active> {
-        let of_bodies = |a: &&Active| a.hypothesis.effect.layer == Layer::Body;
-        all.iter().filter(of_bodies).cloned().collect()
+/// Whether the effects of a kind are the same in two explanations.
+fn same(a: &[Active], b: &[Active], of_kind: impl Fn(&Active) -> bool) -> bool {
+    let some = |all| -> Vec<&Active> {
+        let all: &[Active] = all;
+        all.iter().filter(|active| of_kind(active)).collect()
     };
-    let (a, b) = (bodies(a), bodies(b));
+    let (a, b) = (some(a), some(b));
     a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| is_same(a, b))
 }

@@ -52,7 +52,7 @@ pub fn bodies_of(problem: &Problem, hypothesis: Hypothesis, shape: &[f64]) -> Ar
         let at = |coordinates: &[f64]| {
             let active = hypothesis.with(coordinates.to_vec());
             let mut added = zeros(rigid);
-            bodies::add(problem, &active, rigid, &mut added);
+            bodies::add(problem, &active, None, rigid, &mut added);
             added
         };
         for (i, _) in steps(hypothesis) {

@@ -52,7 +52,8 @@ pub fn computed(
     }
     let at = |coordinates: &[f64]| {
         let active = hypothesis.with(coordinates.to_vec());
-        problem.column(&change(problem, others, efforts, &active, gains), joint)
+        let on = (gains, None);
+        problem.column(&change(problem, others, efforts, &active, on), joint)
     };
     let alone = at(&coordinates);
     let mut factors = Vec::with_capacity(steps.len());

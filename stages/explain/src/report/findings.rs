@@ -161,7 +161,7 @@ pub fn of(
             in_amperes,
             slides,
             confidence: (or_scale.map_or(1.0, |_| DOUBTED))
-                .min(surest(search.problem, active, &by_noise))
+                .min(surest(search.problem, active, &deviations, &by_noise))
                 .min(confidence(grounds)),
             recording: when.recording,
             t_start: when.start,

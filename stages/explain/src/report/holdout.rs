@@ -6,7 +6,8 @@ use crate::context::Context;
 use crate::data::problem::Problem;
 use crate::data::track::Track;
 use crate::fit::fitted::{Fit, LEAST_VARIANCE};
-use crate::physics::active::in_order;
+use crate::physics::active::{Active, in_order};
+use crate::physics::carrier::is_on_carrier;
 use crate::read::recording::Recording;
 use crate::report::handed_out::{self, HeldOut, Withheld};
 use crate::report::schema::{JointPicture, RecordingPicture};
@@ -61,9 +62,11 @@ enum Velocity {
 impl Context<'_> {
     /// The corrected twin's effort over a track, in the recording's unit.
     pub fn predict(&self, problem: &Problem, fit: &Fit, track: &Track) -> Vec<f64> {
+        let carrier = fit.parts.carrier.as_deref();
+        let robot = |active: &Active| carrier.filter(|_| is_on_carrier(active));
         let terms = in_order(&fit.actives)
             .into_iter()
-            .map(|active| active.term(&problem.model))
+            .map(|active| active.term(robot(active).unwrap_or(&problem.model)))
             .collect();
         let mut physics = Physics::new(terms, self.unit_nm.len());
         let mut effort = track.run(&mut physics, &track.rigid);

@@ -14,6 +14,7 @@
 
 mod beside_others;
 mod follows;
+mod held;
 mod standing;
 mod turns;
 
@@ -22,24 +23,15 @@ use crate::data::noise::MEDIAN_OF_ABS_NORMAL;
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::report::schema::{Finding, Remaining};
-use crate::report::sentences::{UNCHANGED, unit_at};
+use crate::report::sentences::unit_at;
 use crate::report::varying_delay::varying_delay;
 use tauscope_dynamics::terms::TermError;
 use tauscope_dynamics::terms::words::number;
 
 use beside_others::beside_others;
 use follows::follows_motion;
+use held::of_held;
 
-/// An explanation does not carry over at a joint if its error on held-out recordings is this many times that on fitted
-/// ones, where both have the same rate of change of effort.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const WORSE: f64 = 2.0;
-/// The error on held-out recordings must also be this many times the measurement's white noise.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const ABOVE_NOISE: f64 = 3.0;
-/// A correction makes a joint worse if its error on held-out recordings is this many times that of the twin as it was.
-/// Tuned: by hand, with `tests/proof/first_sight.py`, seed 41, in view; not swept.
-const WORSENED: f64 = 1.1;
 /// A moment stands out if its error is this many standard deviations of the calm half of the time.
 /// Statistical: a normal variable exceeds 10 in none of 1e22 rows; slow noise is as normal as fast.
 const STANDS_OUT: f64 = 10.0;
@@ -84,6 +76,8 @@ pub struct Remainders {
     pub all: Vec<Remaining>,
     /// Joints at which the error is much larger on held-out recordings.
     pub elsewhere: Vec<usize>,
+    /// Whether the correction makes a joint's error on held-out recordings larger than the twin as it was leaves.
+    pub is_worsened: bool,
 }
 
 impl Left<'_> {
@@ -251,11 +245,12 @@ fn of(
         }
         if let Some(held) = held {
             let told = (&told as &dyn Fn(f64) -> String, &joint[..]);
-            let (said, is_elsewhere) = of_held(found, before, held, j, told);
-            sentences.extend(said);
-            if is_elsewhere {
+            let said = of_held(found, before, held, j, told);
+            if said.is_elsewhere {
                 remainders.elsewhere.push(j);
             }
+            remainders.is_worsened |= said.is_worsened;
+            sentences.extend(said.sentences);
         }
         if let Some((recording, moment)) = largest_moment([Some(found), held], j) {
             sentences.push(format!(
@@ -284,38 +279,6 @@ fn of(
     remainders
 }
 
-/// What is said of a joint on held-out recordings, and whether the remainder is far larger there. `told` gives efforts in
-/// the recording's unit, and the joint's name.
-fn of_held(
-    found: Left<'_>,
-    before: Before<'_>,
-    held: Left<'_>,
-    j: usize,
-    (told, joint): (&dyn Fn(f64) -> String, &str),
-) -> (Vec<String>, bool) {
-    let (here, there) = (found.rms(j), held.rms(j));
-    let faster = is_elsewhere(found, held, j);
-    let mut sentences = Vec::new();
-    if let Some(faster) = faster {
-        let times = number(there / here);
-        let than = than(faster);
-        sentences.push(format!(
-            "On the held-out recordings {} remain at joint {joint}, {times} times as much as on the fitted ones{than}: either \
-             something acts on the held-out recordings only, or the correction does not carry over to them.",
-            told(there)
-        ));
-    }
-    if let Some(uncorrected) = worsened(found, before, held, j) {
-        sentences.push(format!(
-            "At joint {joint} the correction predicts the held-out recordings worse than the twin as it was: {} remain there, {} did \
-             before. What acts at this joint is something else.",
-            told(there),
-            told(uncorrected)
-        ));
-    }
-    (sentences, faster.is_some())
-}
-
 /// Rate of change of the twin's effort \[N m/s or N/s\], by joint and row.
 pub(super) fn rates(problem: &Problem, fit: &Fit) -> Vec<Vec<f64>> {
     let joints = 0..problem.joints;
@@ -340,15 +303,6 @@ fn rates_of(problem: &Problem, fit: &Fit, joint: usize) -> Vec<f64> {
     rates
 }
 
-/// How many times as fast the effort changes on held-out recordings, in words.
-fn than(faster: f64) -> String {
-    if faster <= 1.0 {
-        return String::new();
-    }
-    let times = number(faster);
-    format!(", although the effort changes only {times} times as fast there")
-}
-
 /// The moment at which the error of a joint stands out most, and its recording.
 fn largest_moment(all: [Option<Left<'_>>; 2], joint: usize) -> Option<(String, Row)> {
     let moments = all.into_iter().flatten().filter_map(|left| {
@@ -357,32 +311,6 @@ fn largest_moment(all: [Option<Left<'_>>; 2], joint: usize) -> Option<(String, R
         Some((name, moment))
     });
     moments.max_by(|(_, a), (_, b)| a.error.abs().total_cmp(&b.error.abs()))
-}
-
-/// The error that the twin as it was leaves at a joint on held-out recordings, if the correction makes it larger.
-fn worsened(found: Left<'_>, before: Before<'_>, held: Left<'_>, joint: usize) -> Option<f64> {
-    let uncorrected = Left {
-        problem: held.problem,
-        fit: before.held?,
-    };
-    let (was, is) = (uncorrected.rms(joint), held.rms(joint));
-    let is_corrected = found.fit.squares[joint] < UNCHANGED * before.fit.squares[joint];
-    let is_seen = is > ABOVE_NOISE * found.problem.white_noise[joint];
-    (is_corrected && is_seen && is > WORSENED * was).then_some(was)
-}
-
-/// Whether the error of a joint is much larger on held-out recordings, and how many times as fast as on the fitted ones the
-/// effort changes there. The errors of clocks, filters and derivatives grow with that rate.
-fn is_elsewhere(found: Left<'_>, held: Left<'_>, joint: usize) -> Option<f64> {
-    let (own, there) = (found.rows(joint), held.rms(joint));
-    // Fitted recordings differ among themselves, too: the worst of them is what the held-out ones are compared with.
-    let each = own
-        .chunk_by(|a, b| a.recording == b.recording)
-        .map(rms_error);
-    let here = each.fold(found.rms(joint), f64::max);
-    let faster = rms_rate(&held.rows(joint)) / rms_rate(&own).max(f64::MIN_POSITIVE);
-    let more = there > WORSE * faster.max(1.0) * here;
-    (more && there > ABOVE_NOISE * found.problem.white_noise[joint]).then_some(faster)
 }
 
 #[cfg(test)]

@@ -2,19 +2,23 @@
 
 use tauscope_dynamics::terms::UNKNOWN;
 
-use crate::report::schema::{Finding, Remaining, Verdict};
+use crate::report::remainder::Remainders;
+use crate::report::schema::{Finding, Verdict};
 
 /// A finding with less confidence names nothing.
 /// Statistical: it is more likely wrong than right.
 const NAMES: f64 = 0.5;
 
 /// The verdict, given what remains beyond the noise. Where the `twin_is_topic`, a remainder beside findings decides
-/// nothing: another simulation has its own delays and friction, and they are no physics of the arm. Where no finding is
-/// more likely right than wrong, something is there that nobody has named.
-pub fn verdict(findings: &[Finding], remaining: &[Remaining], twin_is_topic: bool) -> Verdict {
+/// nothing: another simulation has its own delays and friction, and they are no physics of the arm. Unless `is_worsened`:
+/// a correction that makes a joint worse where it was not fitted explains nothing. Where no finding is more likely right
+/// than wrong, something is there that nobody has named.
+pub fn verdict(findings: &[Finding], remainders: &Remainders, twin_is_topic: bool) -> Verdict {
+    let (remaining, is_worsened) = (&remainders.all, remainders.is_worsened);
     let described = findings.iter().any(|f| f.effect == UNKNOWN.name);
     let named = twin_is_topic || findings.iter().any(|f| f.confidence >= NAMES);
-    let of_the_arm = !remaining.is_empty() && (!twin_is_topic || findings.is_empty());
+    let decides = !twin_is_topic || findings.is_empty() || is_worsened;
+    let of_the_arm = !remaining.is_empty() && decides;
     if described || of_the_arm {
         Verdict::UnknownRemains
     } else if findings.is_empty() {

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use tauscope_dynamics::terms::{Against, CoordinateKind};
 
 use crate::data::column::Column;
+use crate::data::effective_samples;
 use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::fit::least_squares::Products;
@@ -72,6 +73,15 @@ pub const LEAST_VARIANCE: f64 = 1e-16;
 /// Added to the diagonal of the scaled normal equations, which is 1.
 /// Resolution: guards the inverse of dependent columns.
 const RIDGE: f64 = 1e-9;
+
+/// Effective samples per row, by joint, with which the evidence for an effect in `with` is counted. One that begins or ends
+/// within the session makes the noise look more correlated than it is, until it is part of the explanation.
+pub fn independent(problem: &Problem, with: &Fit, hypothesis: Hypothesis) -> Vec<f64> {
+    match hypothesis.time_kind() {
+        TimeKind::Once | TimeKind::Step => effective_samples::at_least(problem, &with.residual),
+        TimeKind::Always | TimeKind::EveryRecording => problem.effective_samples.clone(),
+    }
+}
 
 /// How far a rival may be behind \[nats\] and still not be told from an effect with this evidence.
 pub fn tie(evidence: f64) -> f64 {

@@ -2,7 +2,7 @@
 
 use crate::physics::active::{Hypothesis, TimeKind};
 use crate::select::curve_shapes::repeats;
-use crate::select::evidence::LEAST_GAIN;
+use crate::select::evidence::{LEAST_GAIN, independent};
 use crate::select::explanation::{Explanation, describe};
 use crate::select::explanation::{Piece, pieces, place_of};
 use crate::select::propose::{Base, Proposal};
@@ -112,18 +112,18 @@ impl Search<'_> {
     ) -> Option<Explanation> {
         // What carries over from one recording to the next is no slow noise.
         let removed = &best.fit.actives[index];
-        let white = vec![1.0; self.problem.joints];
-        let effective = if removed.curve.is_some() && repeats(self.problem, &without.fit, removed) {
-            &white
-        } else {
-            &self.problem.effective_samples
-        };
         let proposals = self.rivals(&without.fit, &best.fit, &best.fit.actives[index]);
         let other = self.rival_of(best, without, &proposals)?;
-        if other.ahead_of(best, effective) <= LEAST_GAIN {
+        let new = other.fit.actives.last()?.hypothesis;
+        let effective = if removed.curve.is_some() && repeats(self.problem, &without.fit, removed) {
+            vec![1.0; self.problem.joints]
+        } else {
+            independent(self.problem, &other.fit, new)
+        };
+        if other.ahead_of(best, &effective) <= LEAST_GAIN {
             return None;
         }
         let other = self.pruned(other);
-        (other.ahead_of(best, effective) > LEAST_GAIN).then_some(other)
+        (other.ahead_of(best, &effective) > LEAST_GAIN).then_some(other)
     }
 }

@@ -1,10 +1,11 @@
 //! Forward selection: adds one effect at a time, always the one with the most evidence.
 
-use crate::data::effective_samples;
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Hypothesis, TimeKind};
 use crate::select::cross_validation::carries_over;
-use crate::select::evidence::{LEAST_EVIDENCE, LEAST_GAIN, REFINED, matters, needs, overwhelming};
+use crate::select::evidence::{
+    LEAST_EVIDENCE, LEAST_GAIN, REFINED, independent, matters, needs, overwhelming,
+};
 use crate::select::explanation::{Explanation, describe};
 use crate::select::parallel;
 use crate::select::plausible::{is_timely, plausible};
@@ -70,12 +71,8 @@ impl Search<'_> {
             let new = next.fit.actives.last().map(|active| active.hypothesis);
             let next = self.pruned(next);
             let once = new.is_some_and(|new| new.time_kind() == TimeKind::Once);
-            // An unexplained interval makes the noise look more correlated than it is.
-            let effective = if once {
-                effective_samples::at_least(self.problem, &next.fit.residual)
-            } else {
-                self.problem.effective_samples.clone()
-            };
+            let counted = |new| independent(self.problem, &next.fit, new);
+            let effective = new.map_or_else(|| self.problem.effective_samples.clone(), counted);
             let evident = next.ahead_of(&best, &effective) >= LEAST_EVIDENCE;
             let now = Seen::of(&next);
             let is_old = seen.iter().any(|seen| now.repeats(seen));
@@ -104,8 +101,7 @@ impl Search<'_> {
     ) -> Option<Explanation> {
         let promising = proposals.iter().filter(|p| {
             let (evidence, size) = needs(p.active.hypothesis, &now.fit);
-            let possible =
-                is_timely(self.problem, &p.active) && plausible(&p.active, &self.problem.model);
+            let possible = is_timely(self.problem, &p.active) && plausible(self.problem, &p.active);
             p.evidence() > evidence && p.size > size && possible
         });
         let mut promising: Vec<&Proposal> = promising.collect();

@@ -6,7 +6,7 @@ use crate::fit::covariance::covariance;
 use crate::fit::fitted::Fit;
 use crate::fit::interval::half_width_95;
 use crate::physics::active::{Active, Hypothesis, TimeKind};
-use crate::select::evidence::{LEAST_EVIDENCE, overwhelming, tie, worse_joints};
+use crate::select::evidence::{LEAST_EVIDENCE, independent, overwhelming, tie, worse_joints};
 use crate::select::explanation::{Explanation, describe};
 use crate::select::explanation::{pieces, place_of};
 use crate::select::plausible::at_bound;
@@ -32,7 +32,8 @@ impl Search<'_> {
                 continue;
             };
             let less = self.without(&best, index);
-            let effective = &self.problem.effective_samples;
+            let own = best.fit.actives[index].hypothesis;
+            let effective = &independent(self.problem, &best.fit, own);
             let evidence = best.ahead_of(&less, effective);
             let enough = if at_bound(&best.fit.actives[index]) || self.is_vague(&best.fit, index) {
                 tie(evidence)

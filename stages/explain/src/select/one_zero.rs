@@ -25,7 +25,8 @@ impl Search<'_> {
         }
         let less = |from: Explanation, index: &usize| self.without(&from, *index);
         let without = bodies.iter().rev().fold(best.clone(), less);
-        let proposals = self.proposals_of(&without.fit, Hypothesis::is_zero_offset);
+        let is_lasting = |h: &Hypothesis| h.is_zero_offset() && h.lasts();
+        let proposals = self.proposals_of(&without.fit, is_lasting);
         let with = self.best_of(&without, &proposals, best.fit.likelihood())?;
         let offset = with.fit.actives.last()?.hypothesis;
         let with = self.pruned(self.forward(with));

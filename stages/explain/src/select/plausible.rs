@@ -1,10 +1,10 @@
 //! Which parameters a robot may have, and which times can be told apart from an effect that always acts.
 
-use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::{CoordinateKind, Scale};
 
 use crate::data::problem::Problem;
 use crate::physics::active::{Active, TimeKind};
+use crate::physics::friction::with_known;
 
 /// An interval covers at most this share of its recording: a longer one cannot be told from an offset.
 /// Tuned: by hand, on no recorded seeds; not swept.
@@ -27,7 +27,7 @@ const LEAST_LEFT: f64 = 0.1;
 /// Whether the times of an effect can be told: an effect that acts once begins and ends within one recording, and one that
 /// changes steadily changes enough over the session.
 pub fn is_timely(problem: &Problem, active: &Active) -> bool {
-    let x = &active.coordinates;
+    let x = &with_known(problem, active);
     if let Some(at) = active.hypothesis.effect.traits.drifts {
         let (first_s, last_s) = problem.session_s();
         let (first, last) = (at(x, first_s), at(x, last_s));
@@ -84,10 +84,11 @@ pub fn at_bound(active: &Active) -> bool {
 }
 
 /// Whether a robot may have these parameters, by the effect's own limits.
-pub fn plausible(active: &Active, model: &Model) -> bool {
+pub fn plausible(problem: &Problem, active: &Active) -> bool {
     let hypothesis = active.hypothesis;
-    let site = hypothesis.place.site(model);
-    hypothesis.effect.is_plausible(&site, &active.coordinates)
+    let site = hypothesis.place.site(&problem.model);
+    let coordinates = with_known(problem, active);
+    hypothesis.effect.is_plausible(&site, &coordinates)
 }
 
 #[cfg(test)]
@@ -109,5 +110,18 @@ mod tests {
         };
         assert!(drifts(1.0, 2.0) && drifts(2.0, 1.0));
         assert!(!drifts(1.0, 1.2) && !drifts(1.0, 0.05));
+    }
+
+    #[test]
+    fn friction_that_a_twin_knows_may_grow_from_what_it_was() {
+        let mut problem = problem_with(1, |_, _, _| {});
+        let step = at_joint("friction_step", 0).with(vec![0.0, 2.0, 5.0]);
+        // None comes from nothing.
+        assert!(!plausible(&problem, &step));
+        problem.known_friction[0].insert("coulomb_friction", 3.0);
+        assert!(plausible(&problem, &step));
+        // As much as it does from day to day.
+        let small = at_joint("friction_step", 0).with(vec![0.0, 0.5, 5.0]);
+        assert!(!plausible(&problem, &small));
     }
 }

@@ -63,7 +63,7 @@ impl Search<'_> {
         let ahead = best.ahead_of(less, effective) >= evidence;
         let strong = ahead || repeats || overwhelming(best, less);
         let matters = matters(self.problem, &best.fit, &less.fit, least, least);
-        let possible = is_timely(self.problem, active) && plausible(active, &self.problem.model);
+        let possible = is_timely(self.problem, active) && plausible(self.problem, active);
         possible && strong && matters
     }
 
@@ -79,7 +79,7 @@ impl Search<'_> {
             let effective = joints.iter().map(|&j| effective[j]).fold(1.0, f64::min);
             let (evidence, size) = needs(active.hypothesis, fit);
             is_timely(self.problem, active)
-                && plausible(active, &self.problem.model)
+                && plausible(self.problem, active)
                 && !active.is_unnamed()
                 && 0.5 * effective * chi_square > CERTAIN_TIMES * evidence + CERTAIN_MORE
                 && chi_square > CERTAIN_TIMES * size * rows

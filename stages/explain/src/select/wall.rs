@@ -174,7 +174,7 @@ mod tests {
         let nothing = Fit::new(&data, Vec::new());
         let base = Base::new(&data, &nothing, 40);
         let proposal = base.propose_wall(wall).unwrap();
-        assert!(plausible(&proposal.active, &model));
+        assert!(plausible(&data, &proposal.active));
         let parameters =
             nothing.with(&data, proposal.active).refined(&data).actives[0].parameters();
         (parameters[0], parameters[4])

@@ -77,7 +77,8 @@ impl Base<'_> {
         let all = self.fit.columns(problem, hypothesis, &shape);
         // With the change before everything, the second factor's column is the whole effect.
         let whole = all.factors.last()?;
-        let joint = hypothesis.only_joint()?;
+        // An effect at a joint that all joints feel is told by where it is.
+        let joint = hypothesis.place.joint;
         let split = |first: usize| {
             let (mut before, mut after) = (Column::clone(whole), Column::clone(whole));
             // One block per joint of the column.

@@ -2,7 +2,7 @@
 
 use crate::physics::active::{Active, Hypothesis};
 use crate::report::sentences;
-use crate::select::evidence::tie;
+use crate::select::evidence::{independent, tie};
 use crate::select::explanation::Explanation;
 use crate::select::search::Search;
 
@@ -32,7 +32,7 @@ pub fn contest(
     if active.is_unnamed() {
         return result;
     }
-    let effective = &search.problem.effective_samples;
+    let effective = &independent(search.problem, &found.fit, active.hypothesis);
     let evidence = found.ahead_of(less, effective);
     let proposals = search.rivals(&less.fit, &found.fit, active);
     // A rarer law that contains the effect is no other answer: with the rest of it at nothing it is the effect.

@@ -4,19 +4,30 @@ use crate::data::problem::Problem;
 use crate::fit::interval::half_width_95;
 use crate::physics::active::Active;
 
-/// Confidence of a body whose mass may be nothing, at most.
+/// Confidence of a body whose mass may be nothing by the noise, at most.
 /// Physical: an arm that turns about vertical axes alone hardly shows a mass; one that lifts does.
 const UNSURE_BODY: f64 = 0.85;
+/// Confidence of a body whose mass may be nothing as far as the URDF's bodies are off, at most.
+/// Statistical: it is as likely that nothing is there and the bodies are off.
+const OR_BODIES_OFF: f64 = 0.45;
 
 /// The highest confidence that a finding may have: less where its mass may as well be nothing, given the standard deviations
-/// of its parameters.
-pub fn surest(problem: &Problem, active: &Active, deviations: &[f64]) -> f64 {
+/// of its parameters, of all errors and `by_noise` alone.
+pub fn surest(problem: &Problem, active: &Active, deviations: &[f64], by_noise: &[f64]) -> f64 {
     let effect = active.hypothesis.effect;
     let mass = effect.parameters.first();
     let is_mass = mass.is_some_and(|parameter| parameter.name.ends_with("mass_kg"));
     let value = active.parameters().first().copied().unwrap_or(0.0);
-    if is_mass && value.abs() <= half_width_95(problem) * deviations[0] {
+    let is_nothing = |deviations: &[f64]| {
+        let half = deviations
+            .first()
+            .map(|deviation| half_width_95(problem) * deviation);
+        is_mass && half.is_some_and(|half| value.abs() <= half)
+    };
+    if is_nothing(by_noise) {
         UNSURE_BODY
+    } else if is_nothing(deviations) {
+        OR_BODIES_OFF
     } else {
         1.0
     }
@@ -34,7 +45,10 @@ mod tests {
         let problem = problem_with(1, |_, _, _| {});
         let inertia = [2e-3, 0.0, 0.0, 2e-3, 0.0, 2e-3];
         let payload = &carried(Inertia::new(1.0, [0.0; 3], inertia))[0];
-        assert!(surest(&problem, payload, &[0.1; 10]) >= 1.0);
-        assert!(surest(&problem, payload, &[0.6; 10]) <= UNSURE_BODY);
+        let (sure, vague) = (&[0.1; 10], &[0.6; 10]);
+        assert!(surest(&problem, payload, sure, sure) >= 1.0);
+        assert!(surest(&problem, payload, vague, vague) <= UNSURE_BODY);
+        // The noise says that it is there, and bodies that are off may say the same.
+        assert!(surest(&problem, payload, vague, sure) <= OR_BODIES_OFF);
     }
 }

@@ -9,7 +9,8 @@ use crate::data::problem::Problem;
 use crate::report::schema::{Finding, Remaining};
 use crate::report::sentences::unit_at;
 
-use super::{ABOVE_NOISE, Left, Remainders};
+use super::held::ABOVE_NOISE;
+use super::{Left, Remainders};
 
 /// At standstill more than this many times the friction in motion is missing before something else bears the joint.
 /// Physical: static friction of gears is up to twice that in motion.
