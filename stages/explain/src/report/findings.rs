@@ -5,6 +5,7 @@ mod confidence;
 mod contest;
 mod doubt;
 mod far_out;
+mod odd_robot;
 mod scales;
 mod sizes;
 mod undetectable;

@@ -14,6 +14,7 @@ use tauscope_dynamics::kinematic_tree::bearing;
 
 use super::Named;
 use super::far_out::far_out;
+use super::odd_robot::{imitates, oddities};
 
 /// Highest confidence of a doubted finding.
 /// Statistical: just below even odds.
@@ -45,7 +46,15 @@ pub fn doubt(named: &mut Named, problem: &Problem, actives: &[Active]) {
     let said = actives.iter().filter(|a| !a.hypothesis.is_torque_scale());
     let lengths_s = problem.tracks.iter().map(|track| track.track.time_s.last());
     let longest_s = lengths_s.flatten().copied().fold(0.0, f64::max);
+    let odd = if problem.is_foreign {
+        Vec::new()
+    } else {
+        oddities(&problem.model)
+    };
     for (finding, active) in named.findings.iter_mut().zip(said) {
+        if !odd.is_empty() && imitates(active.hypothesis.effect) {
+            doubt_it(finding);
+        }
         if is_shadowed(&problem.model, actives, active.hypothesis) {
             doubt_it(finding);
         }
@@ -55,6 +64,7 @@ pub fn doubt(named: &mut Named, problem: &Problem, actives: &[Active]) {
             doubt_it(finding);
         }
     }
+    named.notes.extend(odd);
     if problem.is_foreign {
         doubt_below(PATCH_OF_FOREIGN, &mut named.findings);
     }
