@@ -91,11 +91,10 @@ impl Emit<Detection> for Listener<'_> {
 
 /// A contact that begins, and where it seems to be.
 fn first_guess(detection: &Detection) -> String {
-    let link = detection.link.as_str();
-    if link.is_empty() {
+    if detection.link.as_str().is_empty() {
         return detection.state.to_string();
     }
-    format!("{} at {link} (first guess)", detection.state)
+    format!("{} at {} (first guess)", detection.state, detection.links())
 }
 
 impl Told {

@@ -17,6 +17,8 @@ pub struct Contact {
     pub kind: Name,
     /// The touched link; empty where not estimated.
     pub link: Name,
+    /// The other link that it may as well have been; empty where the first is sure.
+    pub other_link: Name,
     /// The joints that detected it: bit j for joint j.
     pub joints: u32,
     /// Estimated beginning \[ns since the epoch\].
@@ -63,6 +65,7 @@ impl Contact {
         let mut contact = Self {
             kind: detection.state,
             link: detection.link,
+            other_link: detection.other_link,
             joints: 0,
             contact_ns: detection.contact_ns,
             onset_ns: detection.header.stamp_ns,
@@ -92,7 +95,7 @@ impl Contact {
         self.kind = detection.state;
         self.joints |= detection.joints;
         if !detection.link.as_str().is_empty() {
-            self.link = detection.link;
+            (self.link, self.other_link) = (detection.link, detection.other_link);
         }
         if detection.header.has(flags::FORCE) {
             self.force = Some(Force {
@@ -126,15 +129,48 @@ impl Contact {
     }
 }
 
-/// Where and how hard, in the words that every output has: `24 N at link5`.
+/// Where and how hard, in the words that every output has: `24 N at link5`, `24 N at link3 or link4`.
 impl fmt::Display for Contact {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.peak(), self.link.as_str()) {
             (Some(peak), "") => write!(f, "{:.0} N", peak.norm_n()),
-            (Some(peak), link) => write!(f, "{:.0} N at {link}", peak.norm_n()),
+            (Some(peak), _) => write!(f, "{:.0} N at {}", peak.norm_n(), self.links()),
             (None, "") => f.write_str("place unknown"),
-            (None, link) => write!(f, "at {link}"),
+            (None, _) => write!(f, "at {}", self.links()),
         }
+    }
+}
+
+/// One link, or two of which either may be meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Links {
+    link: Name,
+    other_link: Name,
+}
+
+/// `link3`, `link3 or link4`.
+impl fmt::Display for Links {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.other_link.as_str() {
+            "" => f.write_str(self.link.as_str()),
+            other => write!(f, "{} or {other}", self.link.as_str()),
+        }
+    }
+}
+
+impl Contact {
+    /// The links that it may have been at, in words.
+    pub fn links(&self) -> Links {
+        let (link, other_link) = (self.link, self.other_link);
+        Links { link, other_link }
+    }
+}
+
+impl Detection {
+    /// The links that the contact may be at, in words; empty where not estimated.
+    pub fn links(&self) -> Links {
+        let (link, other_link) = (self.link, self.other_link);
+        Links { link, other_link }
     }
 }
 
@@ -214,6 +250,21 @@ mod tests {
         assert!((ended.duration_s() - 35e-9).abs() < 1e-15);
         assert!(contacts.open().is_none());
         assert!(contacts.push(&end).is_none());
+    }
+
+    #[test]
+    fn two_links_are_told_where_the_peak_of_the_contact_does_not_part_them() {
+        let mut contacts = ContactFollower::default();
+        contacts.push(&sample(10, Detection::ONSET, 9.0, "link2", 4.0));
+        let mut unsure = sample(20, 0, 80.0, "link3", 24.0);
+        unsure.other_link = "link4".into();
+        contacts.push(&unsure);
+        let words = |contacts: &ContactFollower| contacts.open().unwrap().to_string();
+        assert_eq!(words(&contacts), "24 N at link3 or link4");
+        assert_eq!(unsure.links().to_string(), "link3 or link4");
+        // Later it is sure, and the force is larger.
+        contacts.push(&sample(30, 0, 90.0, "link3", 25.0));
+        assert_eq!(words(&contacts), "25 N at link3");
     }
 
     #[test]

@@ -152,7 +152,7 @@ pub enum EventKind {
 /// A detector's verdict on one sample. One goes out for every sample that came in.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable, ZeroCopySend)]
-#[type_name("tauscope/Detection/3")]
+#[type_name("tauscope/Detection/4")]
 pub struct Detection {
     /// Stamp, sequence, flags; [`flags::READY`] if the detector judged this sample.
     pub header: Header,
@@ -163,6 +163,8 @@ pub struct Detection {
     pub state: Name,
     /// The touched or changed link, empty where not estimated.
     pub link: Name,
+    /// The other link that it may as well have been; empty where the detector is sure of the first, or tells none.
+    pub other_link: Name,
     /// The score; its unit is the detector's.
     pub score: f64,
     /// The score from which on it raises an alarm.
@@ -252,7 +254,7 @@ impl SampleKind {
         match self {
             Self::JointState => "tauscope/JointState/2",
             Self::TwinState => "tauscope/TwinState/1",
-            Self::Detection => "tauscope/Detection/3",
+            Self::Detection => "tauscope/Detection/4",
             Self::Health => "tauscope/Health/1",
         }
     }

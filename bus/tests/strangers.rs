@@ -190,7 +190,7 @@ fn messages_of_a_wrong_type_or_length_end_no_run() {
     scene.send(0..1);
     assert_eq!(scene.take(1), [0]);
     for _ in 0..5 {
-        scene.says("cell/ingest", "tauscope/Detection/3", &[0; 336], None);
+        scene.says("cell/ingest", "tauscope/Detection/4", &[0; 384], None);
         scene.says("cell/ingest", KIND, &[0; 7], None);
         scene.says("cell/ingest", KIND, &[], Some(beside(7)));
     }

@@ -123,6 +123,9 @@ fn numbers(rows: &mut Rows, numbers: &Numbers) {
     rows.count("links", numbers.links);
     rows.count("link_exact", numbers.link_exact);
     rows.count("link_within_one", numbers.link_within_one);
+    rows.count("link_alone", numbers.link_alone);
+    rows.count("link_alone_exact", numbers.link_alone_exact);
+    rows.count("link_told", numbers.link_told);
     rows.number("contact_share", samples.contact_share);
     rows.number("f1", samples.f1);
     rows.number("best_f1", samples.best_f1);
@@ -200,6 +203,8 @@ fn event(
     );
     rows.text("told_kind", said.map(|event| event.kind.as_str()));
     rows.text("told_link", said.and_then(|event| event.link.as_deref()));
+    let other = said.and_then(|event| event.other_link.as_deref());
+    rows.text("told_other_link", other);
     let joints = said.map(|event| event.joints.join(" "));
     rows.text("told_joints", joints.as_deref());
     let length = |force: [f64; 3]| force.iter().map(|f| f * f).sum::<f64>().sqrt();

@@ -81,6 +81,7 @@ pub fn contact(number: u64, begin_s: i64) -> ContactMessage {
         detector: "tauscope".to_owned(),
         kind: "contact".to_owned(),
         link: Some("link5".to_owned()),
+        other_link: None,
         begin_ns: begin_s * 1_000_000_000,
         onset_ns: begin_s * 1_000_000_000 + 20_000_000,
         end_ns: None,

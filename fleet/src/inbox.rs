@@ -177,7 +177,8 @@ fn check_alarm(alarm: &AlarmMessage) -> Result<(), Refusal> {
 
 fn check_contact(contact: &ContactMessage) -> Result<(), Refusal> {
     all_text([&contact.detector, &contact.kind])?;
-    all_text(contact.link.iter().chain(&contact.acknowledged_by))?;
+    let links = contact.link.iter().chain(&contact.other_link);
+    all_text(links.chain(&contact.acknowledged_by))?;
     all_finite(&contact.peak_force_n)
 }
 

@@ -79,6 +79,9 @@ pub fn contact(contact: &ContactMessage) -> String {
     if let Some(link) = &contact.link {
         text += &format!(" at {link}");
     }
+    if let Some(other) = &contact.other_link {
+        text += &format!(" or {other}");
+    }
     if let Some(force_n) = contact.peak_force_n {
         text += &format!(", {force_n:.0} N");
     }

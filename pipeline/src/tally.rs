@@ -1,7 +1,7 @@
 //! What a replay says of a recording: how far the twin was off, and what the detectors found.
 
 use serde::Serialize;
-use tauscope_bus::{Contact, ContactFollower, Detection, EventKind, TwinState, flags};
+use tauscope_bus::{Contact, ContactFollower, Detection, EventKind, Name, TwinState, flags};
 
 /// A joint that is faster than this moves \[rad/s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
@@ -94,6 +94,9 @@ pub struct Event {
     pub kind: String,
     /// The touched or changed link, where estimated.
     pub link: Option<String>,
+    /// The other link that it may as well have been, where the first is not sure.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub other_link: Option<String>,
     /// The joints that detected.
     pub joints: Vec<String>,
     /// Force on the robot in the world frame \[N\], where estimated; that of the sample with the largest score.
@@ -168,7 +171,7 @@ impl DetectionTally {
 
     fn event(&self, contact: &Contact, start_ns: i64) -> Event {
         let seconds = |ns: i64| (ns - start_ns) as f64 * 1e-9;
-        let link = contact.link.as_str();
+        let told = |link: &Name| Some(link.to_string()).filter(|link| !link.is_empty());
         let joints = self.joint_names.iter().enumerate();
         let joints = joints.filter(|(j, _)| *j < 32 && contact.joints & (1 << j) != 0);
         Event {
@@ -176,7 +179,8 @@ impl DetectionTally {
             t_off: seconds(contact.end_ns),
             t_contact: seconds(contact.contact_ns),
             kind: contact.kind.to_string(),
-            link: (!link.is_empty()).then(|| link.to_owned()),
+            link: told(&contact.link),
+            other_link: told(&contact.other_link),
             joints: joints.map(|(_, name)| name.clone()).collect(),
             force: contact.peak().map(|peak| peak.force_n),
             peak_score: contact.peak_score,

@@ -40,22 +40,23 @@
 //! | `filtered_expected_effort` | `[f64; 16]` | 800 |
 //! | `residual` | `[f64; 16]` | 928 |
 //!
-//! | `tauscope/Detection/3`, 336 bytes | type | at |
+//! | `tauscope/Detection/4`, 384 bytes | type | at |
 //! | --- | --- | --- |
 //! | `detector` | name | 32 |
 //! | `state` | name | 80 |
 //! | `link` | name | 128 |
-//! | `score` | `f64` | 176 |
-//! | `threshold` | `f64` | 184 |
-//! | `contact_ns` | `i64` | 192 |
-//! | `force_n` | `[f64; 3]` | 200 |
-//! | `point_m` | `[f64; 3]` | 224 |
-//! | `joints` | `u32` | 248 |
-//! | `event` | `u32` | 252 |
-//! | `size` | `f64` | 256 |
-//! | `content_n` | `[f64; 3]` | 264 |
-//! | `rise_direction` | `[f64; 3]` | 288 |
-//! | `motion_direction` | `[f64; 3]` | 312 |
+//! | `other_link` | name | 176 |
+//! | `score` | `f64` | 224 |
+//! | `threshold` | `f64` | 232 |
+//! | `contact_ns` | `i64` | 240 |
+//! | `force_n` | `[f64; 3]` | 248 |
+//! | `point_m` | `[f64; 3]` | 272 |
+//! | `joints` | `u32` | 296 |
+//! | `event` | `u32` | 300 |
+//! | `size` | `f64` | 304 |
+//! | `content_n` | `[f64; 3]` | 312 |
+//! | `rise_direction` | `[f64; 3]` | 336 |
+//! | `motion_direction` | `[f64; 3]` | 360 |
 //!
 //! | `tauscope/Health/1`, 112 bytes | type | at |
 //! | --- | --- | --- |
@@ -160,11 +161,11 @@ mod tests {
             )
         );
         assert_eq!(
-            tables["tauscope/Detection/3"],
+            tables["tauscope/Detection/4"],
             (
                 Some(size_of::<Detection>()),
                 rows(
-                    layout!(Detection: detector, state, link, score, threshold, contact_ns,
+                    layout!(Detection: detector, state, link, other_link, score, threshold, contact_ns,
                     force_n, point_m, joints, event, size, content_n, rise_direction, motion_direction)
                 )
             )

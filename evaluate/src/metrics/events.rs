@@ -159,6 +159,7 @@ mod tests {
             t_contact: t,
             kind: "contact".to_owned(),
             link: None,
+            other_link: None,
             joints: Vec::new(),
             force: None,
             peak_score: 1.0,

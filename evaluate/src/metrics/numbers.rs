@@ -126,6 +126,12 @@ pub struct Numbers {
     pub link_exact: usize,
     /// Those for which it or a neighbour was named.
     pub link_within_one: usize,
+    /// Those for which one link was told and no other, and those of them where it was right.
+    pub link_alone: usize,
+    /// See above.
+    pub link_alone_exact: usize,
+    /// Those whose link was told, alone or as one of two.
+    pub link_told: usize,
     /// Angle between the true and the estimated force \[deg\].
     pub force_error_deg: Distribution,
 }
@@ -166,6 +172,9 @@ impl Numbers {
         let distances: Vec<Option<usize>> = places
             .map(|(truly, said)| Some(truly.abs_diff(said?)))
             .collect();
+        let told: Vec<ToldLinks> = (matched.iter())
+            .filter_map(|matched| ToldLinks::of(request, matched))
+            .collect();
         let within = |limit: usize| {
             let near = |distance: &&Option<usize>| distance.is_some_and(|d| d <= limit);
             distances.iter().filter(near).count()
@@ -187,8 +196,34 @@ impl Numbers {
             links: distances.len(),
             link_exact: within(0),
             link_within_one: within(1),
+            link_alone: told.iter().filter(|told| told.is_alone).count(),
+            link_alone_exact: (told.iter())
+                .filter(|told| told.is_alone && told.is_right)
+                .count(),
+            link_told: told.iter().filter(|told| told.is_right).count(),
             force_error_deg: Distribution::of(matched.iter().filter_map(force_error_deg)),
         }
+    }
+}
+
+/// The links that were told of a contact whose link is known.
+struct ToldLinks {
+    /// One link was told, and no other.
+    is_alone: bool,
+    /// The touched one is among them.
+    is_right: bool,
+}
+
+impl ToldLinks {
+    fn of(request: &Request, matched: &Matched<'_>) -> Option<Self> {
+        let truly = request.place(matched.event.link.as_deref()?)?;
+        let place = |link: Option<&String>| link.and_then(|link| request.place(link));
+        let first = place(matched.detection.and_then(|said| said.link.as_ref()));
+        let other = place(matched.detection.and_then(|said| said.other_link.as_ref()));
+        Some(Self {
+            is_alone: first.is_some() && other.is_none(),
+            is_right: [first, other].contains(&Some(truly)),
+        })
     }
 }
 

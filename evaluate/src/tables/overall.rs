@@ -202,11 +202,13 @@ pub fn events(judged: &[Judged<'_>], recovery_s: f64) -> Table {
 pub fn places(judged: &[Judged<'_>]) -> Table {
     let mut table = Table::new(
         "Where",
-        "Links over all events: a missed one, or one without a link, is wrong. Force: angle to the true one, of found events.",
+        "Links over all events: a missed one, or one without a link, is wrong. Alone: one link was told and no other, and it is right. One of two: the touched link was told, alone or as one of two. Force: angle to the true one, of found events.",
         &[
             "detector",
             "link exact",
             "within one",
+            "alone, right",
+            "one of two",
             "force [deg]",
             "p50 [deg]",
             "p90 [deg]",
@@ -223,6 +225,8 @@ pub fn places(judged: &[Judged<'_>]) -> Table {
             judged.label.clone(),
             part(first.link_exact, first.links),
             part(first.link_within_one, first.links),
+            part(first.link_alone_exact, first.link_alone),
+            part(first.link_told, first.links),
             mean,
             number(force.p50, 0),
             number(force.p90, 0),

@@ -161,6 +161,8 @@ impl Store {
                     detector: row.get(1)?,
                     kind: row.get(2)?,
                     link: row.get(3)?,
+                    // The newest message tells it; the tables keep the link that is told first.
+                    other_link: None,
                     begin_ns: row.get(4)?,
                     onset_ns: row.get(5)?,
                     end_ns: row.get(6)?,

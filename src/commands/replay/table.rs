@@ -93,6 +93,9 @@ fn event_line(event: &Event, effort_unit: &str) -> String {
     if let Some(link) = &event.link {
         let _ = write!(line, " at {link}");
     }
+    if let Some(other) = &event.other_link {
+        let _ = write!(line, " or {other}");
+    }
     if let Some([x, y, z]) = event.force {
         let _ = write!(line, ", {:.1} N", (x * x + y * y + z * z).sqrt());
     }

@@ -58,11 +58,17 @@ pub fn of_detection(message: &DetectionMessage, label: &str, cell: &str) -> Diag
     if let Some(link) = &message.link {
         values.push(("link", link.clone()));
     }
+    if let Some(other) = &message.other_link {
+        values.push(("other_link", other.clone()));
+    }
     if let Some([x, y, z]) = message.force_n {
         values.push(("force_n", format!("{x} {y} {z}")));
     }
-    let words = match &message.link {
-        Some(link) if message.alarm => format!("{} at {link}", message.state),
+    let words = match (&message.link, &message.other_link) {
+        (Some(link), None) if message.alarm => format!("{} at {link}", message.state),
+        (Some(link), Some(other)) if message.alarm => {
+            format!("{} at {link} or {other}", message.state)
+        }
         _ => message.state.replace('_', " "),
     };
     array(message.stamp_ns, level, label, words, cell, values)

@@ -140,6 +140,9 @@ pub struct DetectionMessage {
     /// The touched link, where it is estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub link: Option<String>,
+    /// The other link that it may as well be, where the first is not sure.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub other_link: Option<String>,
     /// Estimated force on the robot, world frame \[N\].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force_n: Option<[f64; 3]>,

@@ -2,7 +2,7 @@
 //! `docs/publish.md`.
 
 use tauscope_archive::ros::{self, Bool, DiagnosticArray, Float64, Wrench, WrenchStamped};
-use tauscope_bus::{Detection, Health, JointState, TwinState, flags};
+use tauscope_bus::{Detection, Health, JointState, Name, TwinState, flags};
 use zenoh::Session;
 
 use crate::config::ZenohConfig;
@@ -225,7 +225,7 @@ fn score_topic(label: &str) -> String {
 fn detection_message(detection: &Detection, joints: &[String]) -> DetectionMessage {
     let header = &detection.header;
     let has_force = header.has(flags::FORCE);
-    let link = detection.link.to_string();
+    let told = |link: &Name| Some(link.to_string()).filter(|link| !link.is_empty());
     let loaded = |(place, name): (usize, &String)| {
         let is_loaded = detection.joints >> place & 1 == 1;
         is_loaded.then(|| name.clone())
@@ -246,7 +246,8 @@ fn detection_message(detection: &Detection, joints: &[String]) -> DetectionMessa
         threshold: detection.threshold,
         contact_ns: detection.alarm().then_some(detection.contact_ns),
         joints: joints.iter().enumerate().filter_map(loaded).collect(),
-        link: (!link.is_empty()).then_some(link),
+        link: told(&detection.link),
+        other_link: told(&detection.other_link),
         force_n: has_force.then_some(detection.force_n),
         point_m: has_force.then_some(detection.point_m),
     }

@@ -4,7 +4,7 @@ mod residual;
 
 use std::collections::BTreeMap;
 
-use tauscope_bus::{Command, ContactFollower, Detection, EventKind, Verb, flags};
+use tauscope_bus::{Command, ContactFollower, Detection, EventKind, Name, Verb, flags};
 
 use crate::alarm::State;
 use crate::message::{ChangeMessage, ContactMessage, HealthMessage, Record};
@@ -126,6 +126,7 @@ impl Report {
             detector: label.to_owned(),
             kind: String::new(),
             link: None,
+            other_link: None,
             begin_ns: detection.contact_ns,
             onset_ns: detection.header.stamp_ns,
             end_ns: None,
@@ -140,9 +141,10 @@ impl Report {
     /// Brings the newest contact up to date and tells it.
     fn revise(&mut self, contact: &tauscope_bus::Contact, end_ns: Option<i64>) {
         let Some(last) = &mut self.last else { return };
-        let link = contact.link.as_str();
+        let told = |link: &Name| Some(link.to_string()).filter(|link| !link.is_empty());
         last.kind = contact.kind.to_string();
-        last.link = (!link.is_empty()).then(|| link.to_owned());
+        last.link = told(&contact.link);
+        last.other_link = told(&contact.other_link);
         last.peak_force_n = contact.peak().map(tauscope_bus::Force::norm_n);
         last.end_ns = end_ns;
         let told = last.clone();

@@ -325,7 +325,7 @@ mod tests {
         );
         assert_eq!(
             text("ingest", SampleRef::Detection(&Detection::default())),
-            "stage `ingest` sent a tauscope/Detection/3, expected a tauscope/JointState/2"
+            "stage `ingest` sent a tauscope/Detection/4, expected a tauscope/JointState/2"
         );
         sample.header.joint_count = 3;
         assert_eq!(

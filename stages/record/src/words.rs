@@ -48,7 +48,7 @@ pub(crate) fn headline(detection: &Detection) -> String {
         state
     };
     match (detection.alarm(), detection.link.as_str()) {
-        (true, link) if !link.is_empty() => format!("{state} at {link}"),
+        (true, link) if !link.is_empty() => format!("{state} at {}", detection.links()),
         _ => state,
     }
 }
@@ -68,7 +68,7 @@ pub(crate) fn over(ended: &Contact) -> String {
 
 #[cfg(test)]
 mod tests {
-    use tauscope_bus::flags;
+    use tauscope_bus::{Name, flags};
 
     use super::*;
 
@@ -85,6 +85,9 @@ mod tests {
         detection.state = "collision".into();
         detection.link = "link5".into();
         assert_eq!(headline(&detection), "collision at link5");
+        detection.other_link = "link4".into();
+        assert_eq!(headline(&detection), "collision at link5 or link4");
+        detection.other_link = Name::default();
         assert_eq!(Severity::of(&detection), Severity::Collision);
         let joints = ["a", "b", "c"].map(str::to_owned);
         assert_eq!(loaded_joints(detection.joints, &joints), ["a", "c"]);

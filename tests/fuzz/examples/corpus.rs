@@ -65,6 +65,7 @@ fn contact() -> ContactMessage {
         detector: "tauscope".to_owned(),
         kind: "contact".to_owned(),
         link: Some("link5".to_owned()),
+        other_link: Some("link4".to_owned()),
         begin_ns: 1_700_000_000_000_000_000,
         onset_ns: 1_700_000_000_020_000_000,
         end_ns: None,

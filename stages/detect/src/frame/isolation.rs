@@ -25,6 +25,8 @@ const DAMPING: f64 = 1e-2;
 pub struct Contact {
     /// The touched link, as an index into the model's links.
     pub link: usize,
+    /// Another that it may as well have been, where the residual does not part them.
+    pub other_link: Option<usize>,
     /// Force on the robot, world frame \[N\].
     pub force_n: [f64; 3],
     /// Where it is taken to act, world frame \[m\].
@@ -109,6 +111,7 @@ impl Isolation {
             if best.is_none_or(|(most, _)| explained > most) {
                 let contact = Contact {
                     link,
+                    other_link: None,
                     force_n: force.into(),
                     point_m: (pose.translation.vector + arm).into(),
                 };

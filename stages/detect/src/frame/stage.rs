@@ -5,7 +5,7 @@ use tauscope_bus::{Detection, Emit, MAX_JOINTS, Name, Stage, StageError, TwinSta
 use super::detector::{Detector, Judgement, State};
 use super::error::ConfigError;
 use super::events::{Alarm, OwnEvents, Step};
-use super::isolation::Isolation;
+use super::isolation::{Contact, Isolation};
 use super::setup::Setup;
 use super::threshold::Threshold;
 
@@ -116,6 +116,17 @@ impl Detect {
     }
 }
 
+impl Detect {
+    fn tell_place(&self, contact: &Contact, slot: &mut Detection) {
+        let name = |link| Name::new(self.isolation.link_name(link));
+        slot.header.flags |= flags::FORCE;
+        slot.link = name(contact.link);
+        slot.other_link = contact.other_link.map(name).unwrap_or_default();
+        slot.force_n = contact.force_n;
+        slot.point_m = contact.point_m;
+    }
+}
+
 /// Whether every value of every joint is a number.
 fn is_sound(sample: &TwinState) -> bool {
     let joints = (sample.header.joint_count as usize).min(MAX_JOINTS);
@@ -194,10 +205,7 @@ impl Stage<TwinState, Detection> for Detect {
                 slot.contact_ns = contact_ns;
             }
             if let Some(contact) = contact {
-                slot.header.flags |= flags::FORCE;
-                slot.link = Name::new(self.isolation.link_name(contact.link));
-                slot.force_n = contact.force_n;
-                slot.point_m = contact.point_m;
+                self.tell_place(&contact, slot);
             }
             if let Some(details) = details {
                 slot.header.flags |= flags::CONTENT;

@@ -260,6 +260,7 @@ pub(crate) fn judgement(instant: Option<&Instant>, ongoing: Ongoing, link: usize
     };
     let place = Contact {
         link,
+        other_link: None,
         force_n: instant.force_n,
         point_m: instant.point_m,
     };

@@ -89,6 +89,9 @@ pub struct ContactMessage {
     /// The touched link; left out where it is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub link: Option<String>,
+    /// The other link that it may as well have been, where the first is not sure.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub other_link: Option<String>,
     /// Estimated beginning \[ns since the epoch\].
     pub begin_ns: i64,
     /// Stamp of the sample that raised the alarm \[ns since the epoch\].

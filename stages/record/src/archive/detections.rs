@@ -186,6 +186,9 @@ impl Teller<'_> {
         if !contact.link.as_str().is_empty() {
             values.push(("link", contact.link.to_string()));
         }
+        if !contact.other_link.as_str().is_empty() {
+            values.push(("other_link", contact.other_link.to_string()));
+        }
         if let Some(size) = contact.size {
             values.push(("size", size.to_string()));
         }
