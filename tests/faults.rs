@@ -74,6 +74,12 @@ fn a_network_that_was_cut_brings_all_of_it_later() {
 }
 
 #[test]
+fn a_host_that_is_started_again_states_what_is_not_known() {
+    let test = "a_host_that_is_started_again_states_what_is_not_known";
+    fault(test, "a host that");
+}
+
+#[test]
 fn a_fleet_host_knows_soon_of_a_cell_that_is_gone() {
     let test = "a_fleet_host_knows_soon_of_a_cell_that_is_gone";
     fault(test, "fleet: a cell");

@@ -448,6 +448,43 @@ def poor_network(program, folder, seconds):
         hosts.close()
 
 
+def restarted(program, folder, place, seconds):
+    """All processes of one host die at once, as in a power cut, and its run is started again 3 s later."""
+    hosts = Hosts()
+    router = f"{hosts.addresses[0]}:7447"
+    listed = f'hosts: {{a: {{listen: "tcp/{router}"}}, b: {{connect: "tcp/{router}"}}}}\n'
+    make(folder, seconds, listed, "host: a, ", "host: b, ", source=RECORDED)
+    record(program, folder)
+    start = lambda at: Run(program, folder, ["--host", "ab"[at]], hosts.enter(at))
+    runs, dead = [start(0), start(1)], None
+    try:
+        runs[1].wait_for("stage `record` runs")
+        time.sleep(8.0)
+        dead = runs[place]
+        hosts.kill(place)
+        dead.process.wait()
+        time.sleep(3.0)
+        runs[place] = start(place)
+        (near, sent), (far, got) = [run.end(seconds + 180) for run in runs]
+    finally:
+        for run in [*runs, *([dead] if dead else [])]:
+            run.process.kill()
+        hosts.close()
+    balance(sent)
+    stated = balance(got)
+    whole, there = emitted(sent, "ingest"), archived(program, folder)[TOPICS["ingest"]]
+    taken = link(got, "ingest", "record")
+    # What a sender of before had sent and nobody has heard is known to nobody: it is said that its stream did not end.
+    missing = whole - there
+    check(missing <= taken["dropped"] + UNKEPT_S * 1000, missing, "are missing, stated are", taken, there, got)
+    check(far == 3, "exit code", far, "with", missing, "missing and", stated, "stated:", got)
+    if place == 0:
+        said = runs[1].text()
+        check("nobody knows what was on its way" in said, "nobody says that a sender was cut off:", said)
+    return (f"{whole} emitted by the last life, {there} in the archives, {taken['dropped']} stated as lost; "
+            f"exits {near} and {far}")
+
+
 FLEET_CELL = """version: 1
 cells: {{demo: {{robot: {data}/demo_arm.urdf}}}}
 stages:
@@ -528,6 +565,9 @@ def scenarios(short, kills):
         program, folder, pause, pause + 15)
     yield "kill -9 of a source with listeners on another host", lambda program, folder: far_kill(
         program, folder, min(times, 10), 20 if short else 60)
+    for place, name in enumerate(("sends", "listens")):
+        yield f"a host that {name} is started again", lambda program, folder, place=place: restarted(
+            program, folder, place, 20 if short else 40)
     for fault in ("killed", "cut off"):
         yield f"fleet: a cell {fault}", lambda program, folder, fault=fault: fleet(program, folder, fault)
     yield "poor network", lambda program, folder: poor_network(program, folder, 10 if short else 60)
