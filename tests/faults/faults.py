@@ -368,6 +368,35 @@ def full_disk(program, folder, seconds):
         subprocess.run(["umount", "-l", disk], check=False)
 
 
+def full_shared_memory(program, folder, seconds):
+    """A small /dev/shm of its own that fills up while a stage lags, so that its sender needs more of it."""
+    small = "mount -t tmpfs -o size=12m tmpfs /dev/shm && exec \"$@\""
+    own = ["unshare", "-m", "sh", "-c", small, "sh"]
+    tried = subprocess.run([*own, "true"], capture_output=True, text=True, check=False)
+    if tried.returncode:
+        raise Skipped(f"no /dev/shm of its own: {tried.stderr.strip()}")
+    make(folder, seconds, source=RECORDED)
+    record(program, folder)
+    run = Run(program, folder, prefix=own)
+    run.begun()
+    fill = "head -c 1G /dev/zero > /dev/shm/full"
+    subprocess.run(["nsenter", "-t", str(run.process.pid), "-m", "sh", "-c", fill], capture_output=True, check=False)
+    lags = run.ids["detect"]
+    os.kill(lags, signal.SIGSTOP)
+    time.sleep(6.0)
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(lags, signal.SIGCONT)
+    code, summary = run.end()
+    lost = balance(summary)
+    check("bus error, as 0 MB are free in /dev/shm; make it larger" in run.text(), "nobody says why:", run.text())
+    # Whether it dies often enough to be given up depends on how busy the machine is.
+    check(code in (1, 3), "exit code", code, "with", lost, "lost")
+    there = archived(program, folder)[TOPICS["ingest"]]
+    taken = link(summary, "ingest", "record")["received"]
+    check(there == taken, there, "in the archive of", taken)
+    return f"told, with the remedy; {lost} lost and counted, {there} of {taken} in the archive, exit {code}"
+
+
 def across(program, folder, hosts, seconds, fault, connect=None):
     """Source and twin on one host, detector and recorder on the other; what both say, and what is in the archive."""
     router = f"{hosts.addresses[0]}:7447"
@@ -559,6 +588,7 @@ def scenarios(short, kills):
             program, folder, victim, pause, pause + 8)
     yield "a thread that hangs", lambda program, folder: hang(program, folder, max(pause, 7), 25)
     yield "full disk", lambda program, folder: full_disk(program, folder, 15)
+    yield "full shared memory", lambda program, folder: full_shared_memory(program, folder, 15)
     for gap in (12,) if short else (12, 30):
         yield f"network cut for {gap} s", lambda program, folder, gap=gap: cut(program, folder, gap, gap + 15)
     yield "SIGSTOP of a recorder on another host", lambda program, folder: far_freeze(
