@@ -11,6 +11,7 @@
 //! Whoever gets nothing it can use is named within seconds, with what is there instead ([`watchman`]).
 
 mod crew;
+mod exit_words;
 mod flow;
 mod ledger;
 mod liveness;

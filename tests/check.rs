@@ -38,6 +38,21 @@ const GOOD: &str = "
 ";
 
 #[test]
+fn limits_of_a_robot_that_leave_no_room_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let urdf = std::fs::read_to_string(bundled().join("demo_arm.urdf")).unwrap();
+    let begin = urdf.find("lower=").unwrap();
+    let end = begin + urdf[begin..].find("upper=").unwrap();
+    let reversed = format!("{}lower=\"9\" {}", &urdf[..begin], &urdf[end..]);
+    write(&folder.path().join("reversed.urdf"), &reversed);
+    let text = stages(GOOD).replace("arm.urdf", "reversed.urdf");
+    let out = check(folder.path(), &text, &[]);
+    assert_eq!(out.code, 0, "{}", out.stderr);
+    let told = "warning: cell `demo`: joint `joint1` counts as unlimited";
+    assert!(out.stderr.starts_with(told), "{}", out.stderr);
+}
+
+#[test]
 fn a_good_file_is_shown_as_tables_pictures_and_json() {
     let folder = tempfile::tempdir().unwrap();
     let out = check(folder.path(), &stages(GOOD), &[]);

@@ -68,9 +68,21 @@ fn a_full_disk_is_told() {
 }
 
 #[test]
+fn a_full_shared_memory_is_told_with_its_remedy() {
+    let test = "a_full_shared_memory_is_told_with_its_remedy";
+    fault(test, "full shared memory");
+}
+
+#[test]
 fn a_network_that_was_cut_brings_all_of_it_later() {
     let test = "a_network_that_was_cut_brings_all_of_it_later";
     fault(test, "network cut");
+}
+
+#[test]
+fn a_host_that_is_started_again_states_what_is_not_known() {
+    let test = "a_host_that_is_started_again_states_what_is_not_known";
+    fault(test, "a host that");
 }
 
 #[test]

@@ -50,7 +50,8 @@ fn cell(folder: &Path, name: &str, router: &str) -> Live {
              commands: {{connect: [{router}]}}}}}}\n\
              - {{name: twin, input: ingest, twin: {{model: {data}/demo.twin.yaml}}}}\n\
              - {{name: detect, input: twin, detect: {{twin_regression: {{}}}}}}\n\
-             - {{name: record, inputs: [ingest, twin, detect], record: {{mcap: x.mcap}}}}\n\
+             - {{name: record, inputs: [ingest, twin, detect], record: {{mcap: x.mcap, \
+             around_alarms: {{rerun: \"alarm-{{n}}.rrd\"}}}}}}\n\
              - {{name: publish, inputs: [ingest, twin, detect], publish: {{latch: contact, stop_after_s: 5, \
              zenoh: {{connect: [{router}], json: false}}}}}}\n"
         ),
@@ -242,6 +243,7 @@ fn cells_that_run_are_seen_acknowledged_from_the_page_and_missed_when_they_are_k
     for part in [
         "Contacts",
         "x.mcap",
+        "alarm-*.rrd",
         "joint7",
         "Acknowledge</button>",
         "acknowledged by anna",

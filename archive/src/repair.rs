@@ -42,6 +42,8 @@ pub struct Repaired {
     pub from: Vec<PathBuf>,
     /// What of the old ones could not be taken over. Empty if they were whole.
     pub damage: Vec<Damage>,
+    /// Where [`repair_in_place`] has put a damaged file, of which more than the torn end could not be taken over.
+    pub set_aside: Option<PathBuf>,
 }
 
 /// Where [`repair`] puts its file: `a.repaired.mcap` beside `a.mcap` or `a.mcap.part`.
@@ -71,7 +73,8 @@ pub fn repair(pieces: &[impl AsRef<Path>], to: &Path) -> Result<Repaired, Repair
 
 /// Repairs `part`, what a dead writer of `a.mcap` left as `a.mcap.part`, to `a.mcap`, or to the first
 /// of `a.1.mcap`, `a.2.mcap`, ... that is free. `part` is removed once the new file is on the disk, and
-/// only if nothing but its torn end is missing from that.
+/// only if nothing but its torn end is missing from that; else it becomes `a.mcap.damaged`, so that nobody takes it for
+/// one that waits to be repaired.
 ///
 /// # Errors
 /// As [`repair`]; `part` stays then.
@@ -85,13 +88,14 @@ pub fn repair_in_place(part: &Path) -> Result<Repaired, RepairError> {
     let name = part.with_extension("");
     let to = whole_file::unused_name(&name).map_err(ArchiveError::io(&name))?;
     let work = part.with_file_name(format!("{}.repairing.mcap.part", stem(part)));
-    let repaired = write_held(&[part], &to, &work)?;
+    let mut repaired = write_held(&[part], &to, &work)?;
     let torn = |damage: &Damage| damage.kind == DamageKind::TornTail || !damage.loses_data();
-    if repaired.damage.iter().all(torn) {
-        fs::remove_file(part)
-            .and_then(|()| whole_file::sync_folder_of(part))
-            .map_err(ArchiveError::io(part))?;
-    }
+    let settled = if repaired.damage.iter().all(torn) {
+        fs::remove_file(part).and_then(|()| whole_file::sync_folder_of(part))
+    } else {
+        whole_file::set_damaged_aside(part).map(|aside| repaired.set_aside = Some(aside))
+    };
+    settled.map_err(ArchiveError::io(part))?;
     Ok(repaired)
 }
 
@@ -160,6 +164,7 @@ fn write_held(
         },
         from: layouts.iter().map(|layout| layout.path.clone()).collect(),
         damage: copy.damage,
+        set_aside: None,
     })
 }
 

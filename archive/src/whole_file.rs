@@ -306,6 +306,28 @@ pub fn set_part_aside(path: &Path) -> io::Result<Option<PathBuf>> {
     }
 }
 
+/// Renames `a.mcap.part`, all of which that can be read is in another file, to `a.mcap.damaged`, or to the first of
+/// `a.1.mcap.damaged`, ... that is free; gives its new name.
+///
+/// # Errors
+/// If the folder cannot be read or synced, or the file not be renamed.
+pub fn set_damaged_aside(part: &Path) -> io::Result<PathBuf> {
+    let whole = part.with_extension("");
+    let named = |name: &Path| {
+        let mut damaged = name.as_os_str().to_owned();
+        damaged.push(".damaged");
+        PathBuf::from(damaged)
+    };
+    let (mut damaged, mut n) = (named(&whole), 0);
+    while damaged.try_exists()? {
+        n += 1;
+        damaged = named(&numbered(&whole, n));
+    }
+    rename_to_new(part, &damaged)?;
+    sync_folder_of(&damaged)?;
+    Ok(damaged)
+}
+
 /// `a.3.mcap` for `a.mcap` and 3.
 fn numbered(path: &Path, n: u32) -> PathBuf {
     let mut name = path.file_stem().unwrap_or_default().to_owned();

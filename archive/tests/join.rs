@@ -141,11 +141,11 @@ fn a_torn_file_is_replaced_by_its_repaired_one_only_if_all_of_it_was_read() {
     bytes[middle] ^= 0xff;
     fs::write(&part, bytes).unwrap();
     let repaired = repair_in_place(&part).unwrap();
-    assert!(
-        part.exists() && repaired.written.path.exists(),
-        "{:?}",
-        repaired.damage
-    );
+    assert!(repaired.written.path.exists(), "{:?}", repaired.damage);
+    // It stays by another name: the next start would repair it once more, into one more file.
+    let aside = folder.path().join("b.mcap.damaged");
+    assert_eq!(repaired.set_aside.as_ref(), Some(&aside));
+    assert!(aside.exists() && !part.exists());
 }
 
 #[test]

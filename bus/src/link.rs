@@ -171,6 +171,10 @@ pub struct ReceiverCounts {
     /// Messages of somebody who is not the stream's sender, or that are no samples of it: not part of the books.
     #[serde(default)]
     pub foreign: u64,
+    /// Lives of the sender that ended without an end of the stream, and of which no later life knows: nobody knows how
+    /// many samples they had sent.
+    #[serde(default)]
+    pub broken_off: u64,
 }
 
 impl ReceiverCounts {

@@ -59,6 +59,16 @@ impl Joint {
     pub fn slides(&self) -> bool {
         self.kind == JointKind::Prismatic
     }
+
+    /// A sentence on limits that count as none.
+    pub fn remark(&self) -> Option<String> {
+        let [lower, upper] = self.limits.ignored?;
+        let name = &self.name;
+        Some(format!(
+            "joint `{name}` counts as unlimited: in the URDF its lower limit, {lower}, is not below its upper one, \
+             {upper}"
+        ))
+    }
 }
 
 /// A joint that has no drive of its own: by its `<mimic>` it is where another joint puts it. It is not among the
@@ -97,6 +107,8 @@ pub struct Limits {
     pub velocity: Option<f64>,
     /// Highest effort \[N m or N\].
     pub effort: Option<f64>,
+    /// Lowest and highest position as the URDF has them, where they leave no room and count as none \[rad or m\].
+    pub ignored: Option<[f64; 2]>,
 }
 
 /// A link; also those behind fixed joints.

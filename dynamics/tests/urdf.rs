@@ -56,6 +56,33 @@ fn refusal(xml: &str) -> String {
 }
 
 #[test]
+fn limits_that_leave_no_room_count_as_none_and_are_told() {
+    let with = |limit: &str| {
+        Model::from_urdf(&format!(
+            "<robot name='a'><link name='base'/><link name='tip'><inertial><mass value='1'/>\
+             <inertia ixx='1' ixy='0' ixz='0' iyy='1' iyz='0' izz='1'/></inertial></link>\
+             <joint name='j' type='revolute'><parent link='base'/><child link='tip'/>\
+             <limit effort='1' velocity='1' {limit}/></joint></robot>"
+        ))
+        .unwrap()
+        .joints()[0]
+            .clone()
+    };
+    for limit in [
+        "lower='1.5' upper='-1.5'",
+        "lower='0' upper='0'",
+        "lower='1'",
+    ] {
+        let joint = with(limit);
+        assert_eq!((joint.limits.lower, joint.limits.upper), (None, None));
+        let remark = joint.remark().unwrap();
+        assert!(remark.contains("`j` counts as unlimited"), "{remark}");
+    }
+    assert_eq!(with("").remark(), None, "none are given");
+    assert_eq!(with("lower='-1' upper='1'").remark(), None);
+}
+
+#[test]
 fn joints_links_limits_and_shapes_are_as_written() {
     let model = Model::from_urdf(&robot()).unwrap();
     assert_eq!(model.name(), "two_arms");
@@ -76,7 +103,8 @@ fn joints_links_limits_and_shapes_are_as_written() {
             lower: Some(-1.0),
             upper: Some(1.5),
             velocity: Some(3.0),
-            effort: Some(40.0)
+            effort: Some(40.0),
+            ignored: None,
         }
     );
     assert_eq!(hoist.limits.effort, None, "infinite is none");

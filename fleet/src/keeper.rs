@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use tauscope_publish::message::{ChangeMessage, ContactMessage, Record, StatusMessage};
 
-use crate::store::{JointNormal, Kind, Label, News, Note, Said, Store, StoreError};
+use crate::store::{Aging, JointNormal, Kind, Label, News, Note, Said, Store, StoreError};
 use crate::wall::{Effect, Remembered, ResidualView, Severity, Snapshot, State, UnknownWhy, Wall};
 use crate::words;
 
@@ -27,6 +27,7 @@ pub struct Keeper {
     normals: BTreeMap<String, Normal>,
     minute: i64,
     hour: i64,
+    aging: Aging,
 }
 
 /// When a record was told, and when it came \[ns since the epoch\].
@@ -77,6 +78,7 @@ impl Keeper {
             normals: BTreeMap::new(),
             minute: 0,
             hour: 0,
+            aging: Aging::default(),
         }
     }
 
@@ -295,7 +297,7 @@ impl Keeper {
         }
         if hour != self.hour {
             self.hour = hour;
-            self.store.prune(now_ns)?;
+            self.aging.prune(&self.store, now_ns)?;
             self.learn(snapshot.cells.iter().map(|cell| cell.cell.as_str()), now_ns)?;
         }
         Ok(())

@@ -3,6 +3,7 @@
 //! All times are ns since the epoch. What is older than [`KEPT_NS`] is removed once an hour.
 
 mod cells;
+mod clock;
 mod contacts;
 mod history;
 mod incidents;
@@ -16,6 +17,7 @@ use std::time::Duration;
 
 use rusqlite::{Connection, Transaction, TransactionBehavior};
 
+pub use clock::Aging;
 pub use contacts::{KeptContact, Said};
 pub use history::{Day, JointNormal};
 pub use incidents::{Incident, Kind, News};
@@ -134,6 +136,7 @@ impl Store {
             ("heard", contacts::TABLES),
             ("arrivals", contacts::ARRIVALS),
             ("ended", cells::TABLE),
+            ("believed", clock::TABLE),
         ];
         for (name, tables) in later {
             let text = "SELECT count(*) FROM sqlite_schema WHERE name = ?1";

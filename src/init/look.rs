@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use tauscope_archive::ros::JointStateType;
 use tauscope_archive::{Info, Recording};
 use tauscope_dynamics::effort_scale::EffortScale;
+use tauscope_dynamics::{Joint, Model};
 use tauscope_ingest::Topics;
 use tauscope_pipeline::calibrate::Job;
 use tauscope_pipeline::cell::{Cell, ConstantSpot, EffortUnit, first_joint_names};
@@ -98,6 +99,7 @@ impl Told<'_> {
         )];
         sentences.extend(fixed.map(|note| format!("{note}.")));
         sentences.extend(coupled(&cell));
+        sentences.extend(unlimited(&cell));
         let mut travel = Vec::new();
         for path in self.recordings {
             let (far, remarks) = oddities(path, &state_topic)?;
@@ -300,6 +302,15 @@ fn coupled(cell: &Cell) -> Vec<String> {
         })
     });
     sentences.collect()
+}
+
+/// A sentence for each joint whose limits count as none.
+fn unlimited(cell: &Cell) -> Vec<String> {
+    let joints = cell.model.iter().flat_map(Model::joints);
+    let remarks = joints.filter_map(Joint::remark);
+    remarks
+        .map(|remark| format!("{}.", remark.replacen("joint", "Joint", 1)))
+        .collect()
 }
 
 /// How far the joints move in a recording, and what is odd about its messages.

@@ -3,8 +3,10 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use tauscope_dynamics::Model;
 use tauscope_explain::html;
 use tauscope_explain::report::{Report, Verdict};
+use tauscope_pipeline::cell::{Cell, EffortUnit};
 
 use super::folder::Folder;
 use super::learn::Learnt;
@@ -34,7 +36,7 @@ pub fn page(
 
     let mut twin = vec![report.summary.clone()];
     if report.verdict != Verdict::NotEvaluated {
-        twin.push(proof(report));
+        twin.push(proof(report, &looked.cell));
     }
     section(&mut text, "Twin", &twin);
     let findings = html::largest_first(report);
@@ -126,22 +128,59 @@ fn motions(report: &Report) -> Vec<String> {
     .collect()
 }
 
+/// The error of the held-out recordings at a joint, before and after, and its unit.
+struct JointError<'a> {
+    joint: &'a str,
+    unit: &'a str,
+    before: f64,
+    after: f64,
+}
+
 /// How much smaller the error of the held-out recordings got, joint by joint.
-fn proof(report: &Report) -> String {
-    let joints = report.joints.iter();
-    let errors = report
-        .holdout_rms_before
-        .iter()
-        .zip(&report.holdout_rms_after);
-    let parts = joints
-        .zip(errors)
-        .map(|(joint, (before, after))| format!("{joint} {before:.3} to {after:.3}"));
+fn proof(report: &Report, cell: &Cell) -> String {
+    let slides = |joint: &String| {
+        let mut joints = cell.model.iter().flat_map(Model::joints);
+        joints.any(|known| known.name == *joint && known.slides())
+    };
+    let (before, after) = (&report.holdout_rms_before, &report.holdout_rms_after);
+    let joints = report.joints.iter().zip(before.iter().zip(after));
+    let errors = joints.map(|(joint, (&before, &after))| JointError {
+        joint,
+        unit: match cell.facts.effort_unit {
+            EffortUnit::Nm if slides(joint) => "N",
+            unit => super::look::words(unit),
+        },
+        before,
+        after,
+    });
+    told(&errors.collect::<Vec<_>>())
+}
+
+/// The unit stands once where all joints have the same.
+fn told(errors: &[JointError<'_>]) -> String {
+    let of_first = errors.first().map_or("", |first| first.unit);
+    let is_one = errors.iter().all(|error| error.unit == of_first);
+    let parts = errors.iter().map(|error| {
+        let JointError {
+            joint,
+            unit,
+            before,
+            after,
+        } = error;
+        let part = format!("{joint} {before:.3} to {after:.3}");
+        if is_one {
+            part
+        } else {
+            format!("{part} {unit}")
+        }
+    });
     let parts: Vec<String> = parts.collect();
-    format!(
-        "RMS error on recordings that were held out, in {}: {}.",
-        report.effort_unit,
-        parts.join(", ")
-    )
+    let parts = parts.join(", ");
+    if is_one {
+        format!("RMS error on recordings that were held out, in {of_first}: {parts}.")
+    } else {
+        format!("RMS error on recordings that were held out: {parts}.")
+    }
 }
 
 /// The first few of many sentences, and where the others are.
@@ -171,5 +210,29 @@ fn list(text: &mut String, sentences: &[String]) {
     }
     for sentence in sentences {
         let _ = writeln!(text, "- {sentence}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_joint_that_slides_has_its_error_in_newtons() {
+        let error = |joint, unit, before, after| JointError {
+            joint,
+            unit,
+            before,
+            after,
+        };
+        let turns = || error("shoulder", "N m", 1.0, 0.5);
+        assert_eq!(
+            told(&[turns(), error("lift", "N", 20.0, 3.25)]),
+            "RMS error on recordings that were held out: shoulder 1.000 to 0.500 N m, lift 20.000 to 3.250 N."
+        );
+        assert_eq!(
+            told(&[turns()]),
+            "RMS error on recordings that were held out, in N m: shoulder 1.000 to 0.500."
+        );
     }
 }

@@ -8,6 +8,7 @@ use tauscope_bus::{SampleKind, Seat, Trouble};
 use tauscope_pipeline::pipeline::{Restart, When};
 use tokio::time::Instant;
 
+use super::exit_words;
 use super::flow::Flow;
 use super::ledger::Kept;
 use super::patience::{Overdue, Patience};
@@ -228,7 +229,7 @@ impl Local {
         match (failed, exit) {
             (Some(why), _) => Some(format!("{FAILED}: {why}")),
             (None, None) => None,
-            (None, Some(Ok(status))) => Some(words_for(*status)),
+            (None, Some(Ok(status))) => Some(exit_words::of(*status)),
             (None, Some(Err(error))) => Some(format!("cannot be waited for: {error}")),
         }
     }
@@ -383,12 +384,3 @@ impl Local {
 
 /// How [`Local::death`] begins where a stage says itself why.
 pub const FAILED: &str = "failed";
-
-fn words_for(status: ExitStatus) -> String {
-    use std::os::unix::process::ExitStatusExt;
-    match (status.signal(), status.code()) {
-        (Some(signal), _) => format!("was killed by signal {signal}"),
-        (None, Some(code)) => format!("ended with exit code {code}"),
-        (None, None) => "ended".to_owned(),
-    }
-}

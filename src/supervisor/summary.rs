@@ -300,7 +300,7 @@ impl Books<'_> {
         })
     }
 
-    /// What the receiver has counted, and whether the stream has ended.
+    /// What the receiver has counted, and whether the stream has ended, in all lives of its sender.
     fn heard(&self, receiver: &Local) -> (ReceiverCounts, bool) {
         let is_it = |input: &tauscope_bus::seat::Input| input.stream == self.link.stream;
         let Some(place) = receiver.seat.inputs.iter().position(is_it) else {
@@ -309,7 +309,8 @@ impl Books<'_> {
         let counts = receiver.tally.sums().inputs;
         let newest = receiver.tally.newest().inputs.get(place);
         let counts = counts.get(place).copied().unwrap_or_default();
-        (counts, newest.is_some_and(|input| input.ended))
+        let ended = newest.is_some_and(|input| input.ended) && counts.broken_off == 0;
+        (counts, ended)
     }
 }
 

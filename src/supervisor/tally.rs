@@ -94,6 +94,7 @@ impl Tally {
             sum.refused += counts.refused;
             sum.before += counts.before;
             sum.foreign += counts.foreign;
+            sum.broken_off += counts.broken_off;
         }
         sums
     }

@@ -368,6 +368,35 @@ def full_disk(program, folder, seconds):
         subprocess.run(["umount", "-l", disk], check=False)
 
 
+def full_shared_memory(program, folder, seconds):
+    """A small /dev/shm of its own that fills up while a stage lags, so that its sender needs more of it."""
+    small = "mount -t tmpfs -o size=12m tmpfs /dev/shm && exec \"$@\""
+    own = ["unshare", "-m", "sh", "-c", small, "sh"]
+    tried = subprocess.run([*own, "true"], capture_output=True, text=True, check=False)
+    if tried.returncode:
+        raise Skipped(f"no /dev/shm of its own: {tried.stderr.strip()}")
+    make(folder, seconds, source=RECORDED)
+    record(program, folder)
+    run = Run(program, folder, prefix=own)
+    run.begun()
+    fill = "head -c 1G /dev/zero > /dev/shm/full"
+    subprocess.run(["nsenter", "-t", str(run.process.pid), "-m", "sh", "-c", fill], capture_output=True, check=False)
+    lags = run.ids["detect"]
+    os.kill(lags, signal.SIGSTOP)
+    time.sleep(6.0)
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(lags, signal.SIGCONT)
+    code, summary = run.end()
+    lost = balance(summary)
+    check("bus error, as 0 MB are free in /dev/shm; make it larger" in run.text(), "nobody says why:", run.text())
+    # Whether it dies often enough to be given up depends on how busy the machine is.
+    check(code in (1, 3), "exit code", code, "with", lost, "lost")
+    there = archived(program, folder)[TOPICS["ingest"]]
+    taken = link(summary, "ingest", "record")["received"]
+    check(there == taken, there, "in the archive of", taken)
+    return f"told, with the remedy; {lost} lost and counted, {there} of {taken} in the archive, exit {code}"
+
+
 def across(program, folder, hosts, seconds, fault, connect=None):
     """Source and twin on one host, detector and recorder on the other; what both say, and what is in the archive."""
     router = f"{hosts.addresses[0]}:7447"
@@ -448,6 +477,43 @@ def poor_network(program, folder, seconds):
         hosts.close()
 
 
+def restarted(program, folder, place, seconds):
+    """All processes of one host die at once, as in a power cut, and its run is started again 3 s later."""
+    hosts = Hosts()
+    router = f"{hosts.addresses[0]}:7447"
+    listed = f'hosts: {{a: {{listen: "tcp/{router}"}}, b: {{connect: "tcp/{router}"}}}}\n'
+    make(folder, seconds, listed, "host: a, ", "host: b, ", source=RECORDED)
+    record(program, folder)
+    start = lambda at: Run(program, folder, ["--host", "ab"[at]], hosts.enter(at))
+    runs, dead = [start(0), start(1)], None
+    try:
+        runs[1].wait_for("stage `record` runs")
+        time.sleep(8.0)
+        dead = runs[place]
+        hosts.kill(place)
+        dead.process.wait()
+        time.sleep(3.0)
+        runs[place] = start(place)
+        (near, sent), (far, got) = [run.end(seconds + 180) for run in runs]
+    finally:
+        for run in [*runs, *([dead] if dead else [])]:
+            run.process.kill()
+        hosts.close()
+    balance(sent)
+    stated = balance(got)
+    whole, there = emitted(sent, "ingest"), archived(program, folder)[TOPICS["ingest"]]
+    taken = link(got, "ingest", "record")
+    # What a sender of before had sent and nobody has heard is known to nobody: it is said that its stream did not end.
+    missing = whole - there
+    check(missing <= taken["dropped"] + UNKEPT_S * 1000, missing, "are missing, stated are", taken, there, got)
+    check(far == 3, "exit code", far, "with", missing, "missing and", stated, "stated:", got)
+    if place == 0:
+        said = runs[1].text()
+        check("nobody knows what was on its way" in said, "nobody says that a sender was cut off:", said)
+    return (f"{whole} emitted by the last life, {there} in the archives, {taken['dropped']} stated as lost; "
+            f"exits {near} and {far}")
+
+
 FLEET_CELL = """version: 1
 cells: {{demo: {{robot: {data}/demo_arm.urdf}}}}
 stages:
@@ -522,12 +588,16 @@ def scenarios(short, kills):
             program, folder, victim, pause, pause + 8)
     yield "a thread that hangs", lambda program, folder: hang(program, folder, max(pause, 7), 25)
     yield "full disk", lambda program, folder: full_disk(program, folder, 15)
+    yield "full shared memory", lambda program, folder: full_shared_memory(program, folder, 15)
     for gap in (12,) if short else (12, 30):
         yield f"network cut for {gap} s", lambda program, folder, gap=gap: cut(program, folder, gap, gap + 15)
     yield "SIGSTOP of a recorder on another host", lambda program, folder: far_freeze(
         program, folder, pause, pause + 15)
     yield "kill -9 of a source with listeners on another host", lambda program, folder: far_kill(
         program, folder, min(times, 10), 20 if short else 60)
+    for place, name in enumerate(("sends", "listens")):
+        yield f"a host that {name} is started again", lambda program, folder, place=place: restarted(
+            program, folder, place, 20 if short else 40)
     for fault in ("killed", "cut off"):
         yield f"fleet: a cell {fault}", lambda program, folder, fault=fault: fleet(program, folder, fault)
     yield "poor network", lambda program, folder: poor_network(program, folder, 10 if short else 60)

@@ -194,6 +194,7 @@ fn place(chain: &[Piece], folder: &Path) -> Result<Repaired, RepairError> {
         },
         from: vec![path.clone()],
         damage: Vec::new(),
+        set_aside: None,
     })
 }
 

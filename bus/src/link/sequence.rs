@@ -15,6 +15,8 @@ pub(crate) struct Tracker {
     counts: ReceiverCounts,
     /// An earlier life of this receiver has counted, too.
     resumed: bool,
+    /// The sender's present life has ended the stream.
+    ended: bool,
 }
 
 impl Tracker {
@@ -49,6 +51,7 @@ impl Tracker {
             self.counts.lost = self.counts.lost.saturating_add(sequence);
         }
         self.former = self.present.replace(Position { instance, next });
+        self.ended = false;
         true
     }
 
@@ -85,6 +88,7 @@ impl Tracker {
             return None;
         }
         if header.has(flags::END) {
+            self.ended = true;
             return Some(Received::End);
         }
         self.counts.received += 1;
@@ -115,6 +119,18 @@ impl Tracker {
     /// was not heard is lost, or, if nothing was heard yet, was sent before this receiver came in.
     pub(crate) fn hears_of_former_lives(&mut self, samples: u64) {
         let samples = samples.min(MOST_SAMPLES);
+        // A life that follows another one of its run has heard of at least what is known here.
+        if let Some(position) = self.present
+            && samples < position.next
+            && !self.ended
+        {
+            self.counts.broken_off += 1;
+            let stream = &self.stream;
+            tracing::warn!(
+                "stream `{stream}`: its sender was started anew before it had ended the stream: nobody knows what was on \
+                 its way"
+            );
+        }
         let counts = &mut self.counts;
         let known = counts.received.saturating_add(counts.dropped());
         let missing = samples.saturating_sub(known);
@@ -217,6 +233,28 @@ mod tests {
         assert_eq!((counts.before, counts.received, counts.lost), (10, 3, 4));
         tracker.hears_of_former_lives(u64::MAX);
         tracker.hears_of_former_lives(u64::MAX);
+    }
+
+    #[test]
+    fn a_sender_that_another_run_has_started_anew_leaves_an_open_end() {
+        let hear = |tracker: &mut Tracker, instance, sequence, flags| {
+            let mut sample = crate::JointState::default();
+            sample.header.sequence = sequence;
+            sample.header.flags = flags;
+            tracker.take(None, instance, &sample, &mut |_| {});
+        };
+        for (last, former, broken_off) in [(0, 0, 1), (flags::END, 0, 0), (0, 9, 0)] {
+            let mut tracker = Tracker::of("c/s");
+            tracker.hears_of_former_lives(0);
+            for sequence in 0..7 {
+                hear(&mut tracker, 1, sequence, 0);
+            }
+            hear(&mut tracker, 1, 7, last);
+            tracker.hears_of_former_lives(former);
+            hear(&mut tracker, 2, 0, 0);
+            let told = tracker.counts().broken_off;
+            assert_eq!(told, broken_off, "{last} {former}");
+        }
     }
 
     #[test]

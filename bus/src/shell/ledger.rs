@@ -18,8 +18,10 @@ use crate::seat::Seat;
 
 /// Numbers of the stage itself: emitted, stamp of the newest sample.
 const OWN: usize = 2;
-/// Numbers of an input: received, lost, refused, before, foreign, whether it was heard, instance, next.
-const EACH: usize = 8;
+/// Numbers of an input: received, lost, refused, before, foreign, whether it was heard, instance, next, broken off.
+const EACH: usize = 9;
+/// Place of the last of these.
+const BROKEN_OFF: usize = 8;
 
 /// Where a stage keeps its counts; nowhere by default. Clones are one.
 #[derive(Debug, Clone, Default)]
@@ -67,11 +69,13 @@ impl Ledger {
             refused,
             before,
             foreign,
+            broken_off,
         } = *counts;
         let numbers = [received, lost, refused, before, foreign];
         for (place, number) in (at..).zip(numbers) {
             self.put(place, number);
         }
+        self.put(at + BROKEN_OFF, broken_off);
         if let Some(Position { instance, next }) = position {
             self.put(at + 6, instance);
             self.put(at + 7, next);
@@ -131,6 +135,7 @@ impl Account {
                 heard,
                 instance,
                 next,
+                broken_off,
             ] = *words;
             let counts = ReceiverCounts {
                 received,
@@ -138,6 +143,7 @@ impl Account {
                 refused,
                 before,
                 foreign,
+                broken_off,
             };
             (counts, (heard != 0).then_some(Position { instance, next }))
         });
@@ -167,6 +173,7 @@ mod tests {
         let counts = ReceiverCounts {
             received: 7,
             lost: 2,
+            broken_off: 1,
             ..ReceiverCounts::default()
         };
         let position = Position {

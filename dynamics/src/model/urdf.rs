@@ -247,8 +247,10 @@ fn limits(kind: JointKind, limit: &urdf_rs::JointLimit, marks: &JointMarks) -> L
     let known = |given: bool, value: f64| (given && value.is_finite()).then_some(value);
     let bounded = kind != JointKind::Continuous;
     // Limits that leave no room are a slip of the pen: nobody knows what was meant.
+    let leave_none = bounded && limit.lower >= limit.upper && (marks.lower || marks.upper);
     let bounded = bounded && limit.lower < limit.upper;
     Limits {
+        ignored: leave_none.then_some([limit.lower, limit.upper]),
         lower: known(bounded && marks.lower, limit.lower),
         upper: known(bounded && marks.upper, limit.upper),
         velocity: known(marks.velocity, limit.velocity),

@@ -223,3 +223,22 @@ fn a_cell_with_a_wrong_clock_has_its_incidents_at_the_time_of_the_fleet_host() {
         assert_eq!(story.incidents()[0].opened_ns, opened_ns, "{told_ns}");
     }
 }
+
+#[test]
+fn a_clock_that_is_years_ahead_removes_nothing_also_after_a_restart() {
+    let mut story = Story::new();
+    let snapshot = |story: &Story, now_ns: i64| Snapshot {
+        now_ns,
+        ..story.wall.snapshot()
+    };
+    let record = Record::Change(fixture::change());
+    story.tell(1, record, story.now_ns).unwrap();
+    let right = snapshot(&story, story.now_ns);
+    story.keeper.tick(&right).unwrap();
+    let wrong = snapshot(&story, story.now_ns + 3_000 * DAY_NS);
+    for _ in 0..2 {
+        story.keeper.tick(&wrong).unwrap();
+        assert_eq!(story.incidents().len(), 1);
+        story.again();
+    }
+}

@@ -230,13 +230,14 @@ fn a_file_of_before_gets_the_tables_that_it_lacks() {
     store
         .connection
         .execute_batch(
-            "DROP TABLE labels; DROP TABLE heard; DROP TABLE ended; DROP TABLE arrivals;",
+            "DROP TABLE labels; DROP TABLE heard; DROP TABLE ended; DROP TABLE arrivals; DROP TABLE believed;",
         )
         .unwrap();
     drop(store);
     let again = Store::open(&path).unwrap();
     assert_eq!(again.labels(None, 1).unwrap(), []);
     assert_eq!(again.cells().unwrap(), []);
+    assert_eq!(again.believed_ns().unwrap(), None);
     assert!(again.hear("a", "x", 1, 0).unwrap());
     assert!(!again.hear("a", "x", 1, 9).unwrap());
 }

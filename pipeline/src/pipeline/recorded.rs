@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use tauscope_archive::Recording;
+use tauscope_dynamics::{Joint, Model};
 use tauscope_record::{RecordError, Recorder};
 use tauscope_watch as watch;
 
@@ -14,10 +15,16 @@ use crate::provenance::sha256;
 use crate::settings::Settings;
 
 impl Pipeline {
-    /// What speaks against running its detectors (on `host`, if one is given) as they are set, though they can be run.
+    /// What speaks against running its detectors (on `host`, if one is given) as they are set, though they can be run,
+    /// and what of its robots was not believed.
     pub fn warnings(&self, host: Option<&str>) -> Vec<String> {
         let here = |stage: &&Stage| host.is_none() || stage.host.as_deref() == host;
         let mut warnings = Vec::new();
+        for (name, cell) in &self.cells {
+            let joints = cell.model.iter().flat_map(Model::joints);
+            let remarks = joints.filter_map(Joint::remark);
+            warnings.extend(remarks.map(|remark| format!("cell `{name}`: {remark}")));
+        }
         for stage in self.stages.iter().filter(here) {
             let Settings::Detect { config, model } = &stage.settings else {
                 continue;

@@ -131,6 +131,27 @@ fn receive(source: &mut ZenohSource, count: usize) -> Vec<JointState> {
 }
 
 #[test]
+fn a_measurement_that_is_repeated_for_two_seconds_is_none_until_it_changes() {
+    let endpoint = endpoint();
+    let session = publisher(&endpoint);
+    let mut source = source(&endpoint, Keys::Tauscope, Topics::default());
+    let key = "demo/joint_states";
+    meet(&session, key, &mut source);
+    let mut put = |ms: i64, effort: f64| {
+        let mut message = state(ms * MS, "a b", &[0.1, 0.2], &[effort, 1.0]);
+        message.velocity = vec![0.0, 0.3];
+        session.put(key, body(&message)).wait().unwrap();
+        let sample = receive(&mut source, 1).remove(0);
+        (sample.header.has(flags::EFFORT_MEASURED), sample.effort[0])
+    };
+    for ms in [1000, 2000, 2900] {
+        assert_eq!(put(ms, 3.0), (true, 3.0), "{ms} ms");
+    }
+    assert_eq!(put(3000, 3.0), (false, 0.0));
+    assert_eq!(put(3100, 3.5), (true, 3.5));
+}
+
+#[test]
 fn rmw_zenoh_with_commands_and_lost_messages() {
     let endpoint = endpoint();
     let session = publisher(&endpoint);

@@ -26,7 +26,7 @@ pub struct Facts {
     pub twin_sha256: Option<String>,
     /// By joint, the residual's standard deviation when the twin was calibrated \[effort unit\].
     pub calibrated: Vec<Option<f64>>,
-    /// Where the cell's recorder writes, `*` for numbers and times in the name.
+    /// Where the cell's recorder writes, `*` for numbers and times in a name and `, ` between names.
     pub archive: Option<String>,
 }
 

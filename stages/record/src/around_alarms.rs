@@ -14,15 +14,12 @@ use crate::config::{AroundAlarms as Settings, Config};
 use crate::contacts::Contacts;
 use crate::error::RecordError;
 use crate::files::Files;
+use crate::set_back::SetBack;
 use crate::streams::Streams;
 
 /// Samples that are written for each that comes, while there are any to be.
 /// Resolution: how long a sample waits, against how long the ring stays full.
 const WRITTEN_PER_SAMPLE: usize = 8;
-
-/// A time of reception that is so far below the one before is of a clock that was set back \[ns\].
-/// Resolution: samples of several stages come in another order by less.
-const SET_BACK_NS: i64 = 1_000_000_000;
 
 /// Files around alarms.
 pub(crate) struct AroundAlarms {
@@ -35,8 +32,7 @@ pub(crate) struct AroundAlarms {
     after_ns: i64,
     /// Up to which time files are to hold all, while they are open.
     until_ns: Option<i64>,
-    /// When the sample before was received \[ns since the epoch\].
-    received_ns: Option<i64>,
+    clock: SetBack,
     /// How often the clock of reception was set back: by now, and before the samples of the open files.
     set_back: u64,
     written_set_back: u64,
@@ -113,7 +109,7 @@ impl AroundAlarms {
             before_ns: ns(settings.before_s),
             after_ns: ns(settings.after_s),
             until_ns: None,
-            received_ns: None,
+            clock: SetBack::new(streams),
             set_back: 0,
             written_set_back: 0,
             told: false,
@@ -128,9 +124,7 @@ impl AroundAlarms {
         sample: SampleRef<'_>,
     ) -> Result<(), RecordError> {
         let now_ns = sample.header().received_ns;
-        let before_ns = self.received_ns.replace(now_ns).unwrap_or(now_ns);
-        let back_ns = before_ns.saturating_sub(now_ns);
-        if back_ns > SET_BACK_NS {
+        if let Some(back_ns) = self.clock.note(index, now_ns) {
             self.set_back(back_ns);
         }
         if matches!(sample, SampleRef::Detection(detection) if detection.alarm()) {

@@ -77,6 +77,29 @@ impl Config {
         self.mcap.iter().chain(picture)
     }
 
+    /// The names of all files that it asks for, those around alarms, too: of archives, and of pictures.
+    pub(crate) fn all_names(&self) -> [Vec<&PathBuf>; 2] {
+        let around = self.around_alarms.as_ref();
+        let picture = self.rerun.as_ref().and_then(|rerun| rerun.file.as_ref());
+        let archives = self
+            .mcap
+            .iter()
+            .chain(around.and_then(|it| it.mcap.as_ref()));
+        let pictures = picture
+            .into_iter()
+            .chain(around.and_then(|it| it.rerun.as_ref()));
+        [archives.collect(), pictures.collect()]
+    }
+
+    /// The names of the files in which an alarm can be looked at: archives, and the picture that shows least beside it.
+    pub fn names_of_alarms(&self) -> Vec<&PathBuf> {
+        let [archives, pictures] = self.all_names();
+        archives
+            .into_iter()
+            .chain(pictures.last().copied())
+            .collect()
+    }
+
     /// The names of all files that it asks for, those around alarms, too.
     pub fn all_names_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
         let picture = self.rerun.as_mut().and_then(|rerun| rerun.file.as_mut());

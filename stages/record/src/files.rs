@@ -14,6 +14,7 @@ use crate::file_name::{FileName, fill_in};
 use crate::rerun::FilePicture;
 use crate::retention::Retention;
 use crate::room::Room;
+use crate::set_back::SetBack;
 use crate::streams::Streams;
 
 /// Where files go and when new ones begin.
@@ -24,6 +25,7 @@ pub(crate) struct Files {
     mcap: Option<FileName>,
     rerun: Option<FileName>,
     open: Option<OpenFiles>,
+    clock: SetBack,
     room: Room,
     retention: Retention,
     /// The disk has too little room: what comes is counted and not kept.
@@ -77,6 +79,7 @@ impl Files {
             config: config.clone(),
             provenance: provenance.clone(),
             open: None,
+            clock: SetBack::new(streams),
             room: Room::new(PathBuf::new(), config.min_free_mb),
             retention: Retention::new(),
             paused: false,
@@ -141,11 +144,10 @@ impl Files {
         let now_ns = sample.header().received_ns;
         // Of what a stage has done is told ahead of its samples, which may wait in a queue.
         let is_of_time = !matches!(sample, SampleRef::Health(_));
-        if is_of_time
-            && self
-                .open
-                .as_ref()
-                .is_some_and(|open| self.is_full(open, now_ns))
+        // A file is read in the order of reception: what came behind a clock that was set back would come first.
+        let is_set_back = is_of_time && self.clock.note(index, now_ns).is_some();
+        let ends = is_set_back && self.names().all(FileName::can_differ);
+        if is_of_time && (self.open.as_ref()).is_some_and(|open| ends || self.is_full(open, now_ns))
         {
             self.complete(streams)?;
         }

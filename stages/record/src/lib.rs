@@ -13,6 +13,7 @@ mod recorder;
 mod rerun;
 mod retention;
 mod room;
+mod set_back;
 mod streams;
 mod words;
 

@@ -11,7 +11,9 @@ use synthetic::{arm, cell, motion, streams};
 use tauscope_archive::Recording;
 use tauscope_archive::ros::{Float64, JointState, Message};
 use tauscope_bus::{SampleRef, Sink};
-use tauscope_record::{Config, Existing, Keep, RecordError, Recorder, RerunConfig, Split};
+use tauscope_record::{
+    AroundAlarms, Config, Existing, Keep, RecordError, Recorder, RerunConfig, Split,
+};
 
 fn recorder(config: &Config) -> Result<Recorder, RecordError> {
     let cells = [cell("demo", Some(arm(false)))];
@@ -189,6 +191,51 @@ fn names_that_cannot_be_are_refused() {
     ));
 }
 
+#[test]
+fn a_clock_that_is_set_back_begins_another_file_and_a_stream_that_is_late_does_not() {
+    const HOUR_NS: i64 = 3_600_000_000_000;
+    let record = |late: bool| {
+        let folder = tempfile::tempdir().unwrap();
+        let config = Config {
+            mcap: Some(folder.path().join("a-{n}.mcap")),
+            ..Config::default()
+        };
+        let mut recorder = recorder(&config).unwrap();
+        for (at, mut instant) in motion(2.0).into_iter().enumerate() {
+            let headers = [
+                &mut instant.state.header,
+                &mut instant.twin.header,
+                &mut instant.detection.header,
+            ];
+            let is_back = at >= 250;
+            for header in headers.into_iter().skip(if late { 2 } else { 0 }) {
+                header.received_ns -= if is_back || late { HOUR_NS } else { 0 };
+            }
+            if let Some(health) = instant.health.as_mut().filter(|_| is_back && !late) {
+                health.header.received_ns -= HOUR_NS;
+            }
+            instant.feed(&mut recorder, "");
+        }
+        recorder.finish().unwrap();
+        let spans = files(folder.path()).into_iter().map(|file| {
+            let recording = Recording::open(&file).unwrap();
+            let times = recording.start_ns().zip(recording.end_ns());
+            let span_ns = times.map(|(start, end)| end - start);
+            (
+                span_ns.unwrap(),
+                count::<JointState>(&file, "/joint_states"),
+            )
+        });
+        spans.collect::<Vec<_>>()
+    };
+    let spans = record(false);
+    let counts: Vec<usize> = spans.iter().map(|(_, count)| *count).collect();
+    assert_eq!(counts, [250, 250]);
+    assert!(spans.iter().all(|(ns, _)| *ns < 2_000_000_000), "{spans:?}");
+    // Behind a network that was cut, what another host tells is of long ago.
+    assert_eq!(record(true).len(), 1);
+}
+
 /// What a recorder leaves that is killed: the file as it is in the middle of writing.
 fn torn_copy(path: &Path, seconds: f64) {
     let folder = tempfile::tempdir().unwrap();
@@ -232,6 +279,51 @@ fn what_earlier_recorders_left_is_repaired_by_the_next_and_what_lives_is_left_al
         assert!((300..750).contains(&states), "{repaired}: {states}");
     }
     assert_eq!(count::<JointState>(&at("a.mcap"), "/joint_states"), 250);
+}
+
+#[test]
+fn what_was_left_around_alarms_and_of_pictures_is_repaired_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |file: &str| folder.path().join(file);
+    let pictured = |name: &str| {
+        Some(RerunConfig {
+            file: Some(at(name)),
+            connect: None,
+        })
+    };
+    let whole = Config {
+        rerun: pictured("whole.rrd"),
+        ..Config::default()
+    };
+    record(&whole, 6.0);
+    let bytes = std::fs::read(at("whole.rrd")).unwrap();
+    std::fs::write(at("a.rrd.part"), &bytes[..bytes.len() * 2 / 3]).unwrap();
+    std::fs::write(at("alarm-001.rrd.part"), &bytes[..bytes.len() / 2]).unwrap();
+    std::fs::write(at("alarm-002.rrd.part"), "").unwrap();
+    torn_copy(&at("alarm-001.mcap.part"), 3.0);
+    std::fs::remove_file(at("whole.rrd")).unwrap();
+    let config = Config {
+        rerun: pictured("a.rrd"),
+        around_alarms: Some(AroundAlarms {
+            mcap: Some(at("alarm-{n}.mcap")),
+            rerun: Some(at("alarm-{n}.rrd")),
+            ..AroundAlarms::default()
+        }),
+        ..Config::default()
+    };
+    let mut recorder = recorder(&config).unwrap();
+    recorder.repair_leftovers(&config);
+    recorder.finish().unwrap();
+    let expected = ["a.1.rrd", "a.rrd", "alarm-001.mcap", "alarm-001.rrd"];
+    assert_eq!(files(folder.path()), expected.map(at));
+    assert!(count::<JointState>(&at("alarm-001.mcap"), "/joint_states") > 300);
+    for (name, share) in [("a.1.rrd", 0.6), ("alarm-001.rrd", 0.4)] {
+        let repaired = at(name).metadata().unwrap().len() as f64;
+        assert!(repaired > share * bytes.len() as f64, "{name}: {repaired}");
+        let reader = std::io::BufReader::new(std::fs::File::open(at(name)).unwrap());
+        let messages = rerun::external::re_log_encoding::DecoderApp::decode_eager(reader).unwrap();
+        assert!(messages.map(Result::unwrap).count() > 10, "{name}");
+    }
 }
 
 #[test]

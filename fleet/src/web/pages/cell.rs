@@ -199,7 +199,7 @@ fn contacts_table(kept: &Kept, now_ns: i64) -> Markup {
                     } }
                     td.full data-label="In the archive" { @match archive {
                         Some(archive) => {
-                            code { @if !host.is_empty() { (host) ":" } (archive) } br;
+                            @for name in archive.split(", ") { code { @if !host.is_empty() { (host) ":" } (name) } br; }
                             span.muted { (words::time_of_day(contact.begin_ns - AROUND_NS)) " to "
                                 (words::time_of_day(contact.end_ns.unwrap_or(contact.onset_ns) + AROUND_NS)) }
                         }

@@ -178,8 +178,33 @@ fn residual(view: &CellView) -> Markup {
                 (format!("{:.2}", residual.ratio)) " × normal "
                 span.muted { "(" (residual.normal) ")" }
             }
-            None => span.muted { "no normal to compare with" },
+            // Not muted: on a dense wall that would leave the name of the value alone.
+            None => "no normal yet",
         }
         @if curve.len() > 2 { (chart::spark("residual", curve, span)) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture;
+    use crate::wall::{Event, Now, Wall};
+
+    #[test]
+    fn a_small_tile_says_that_there_is_no_normal_to_compare_with() {
+        let mut wall = Wall::new(["a".to_owned()]);
+        let mut status = fixture::status("x", 5);
+        for joint in status.residual.iter_mut().flat_map(|it| &mut it.joints) {
+            joint.calibrated = None;
+        }
+        let (cell, status) = ("a".to_owned(), Box::new(status));
+        wall.take(Event::Status { cell, status }, Now::default());
+        let shown = tile(&wall.snapshot().cells[0], 0).into_string();
+        // What is muted is not shown there.
+        assert!(
+            shown.contains("<dd class=\"brief\">no normal yet</dd>"),
+            "{shown}"
+        );
     }
 }

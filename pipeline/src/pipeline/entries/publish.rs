@@ -1,5 +1,7 @@
 //! A publisher must serve one cell, and know where the cell's source takes commands.
 
+use std::path::PathBuf;
+
 use tauscope_bus::{SampleKind, ZenohEndpoints};
 use tauscope_publish::{Config, ConfigError};
 use tauscope_record::FileName;
@@ -65,10 +67,14 @@ impl Resolver<'_> {
         let noise = model.iter().flat_map(|model| &model.joints);
         let writes = |at: usize| {
             let cell = (cells.iter()).find(|cell| wiring.cells[at].contains(*cell))?;
-            let path = self.entry(at).record.as_ref()?.mcap.as_ref()?;
-            let path = self.file.resolve(path);
-            let path = std::path::absolute(&path).unwrap_or(path);
-            Some(FileName::parse(&path).ok()?.pattern(cell))
+            let pattern = |path: &PathBuf| {
+                let path = self.file.resolve(path);
+                let path = std::path::absolute(&path).unwrap_or(path);
+                Some(FileName::parse(&path).ok()?.pattern(cell))
+            };
+            let names = self.entry(at).record.as_ref()?.names_of_alarms();
+            let patterns: Vec<String> = names.into_iter().filter_map(pattern).collect();
+            (!patterns.is_empty()).then(|| patterns.join(", "))
         };
         BesidePublisher {
             twin_sha256: twin

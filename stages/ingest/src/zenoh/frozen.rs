@@ -29,14 +29,19 @@ impl Frozen {
         self.newest_ns = now_ns;
     }
 
+    /// Whether nothing changes.
+    pub fn is_frozen(&self) -> bool {
+        self.newest_ns.saturating_sub(self.since_ns) >= FROZEN_NS
+    }
+
     /// What to say, if nothing changes.
     pub fn trouble(&self) -> Option<Trouble> {
-        if self.newest_ns.saturating_sub(self.since_ns) < FROZEN_NS {
+        if !self.is_frozen() {
             return None;
         }
         let trouble = Trouble::new(
             "position, velocity and effort of all joints have been the same to the last bit for more than 2 s: \
-             nothing that happens to the arm would show",
+             nothing that happens to the arm would show, so they count as not measured",
         );
         Some(trouble.likely(Some(
             "the driver has lost the robot and repeats its last measurement, the drives are off, or a simulation stands still"

@@ -52,7 +52,12 @@ impl Watch {
         }
     }
 
-    /// A sample went out.
+    /// Whether the driver repeats its last measurement.
+    pub fn is_frozen(&self) -> bool {
+        self.frozen.is_frozen()
+    }
+
+    /// A sample goes out.
     pub fn sample(&mut self, sample: &JointState, packed: PackCounts) {
         let now = Instant::now();
         if sample.header.has(flags::EFFORT_MEASURED) {

@@ -31,7 +31,8 @@ pub struct StatusMessage {
     /// SHA-256 of the twin's file; left out where the twin is the URDF alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub twin_sha256: Option<String>,
-    /// Where the cell's recorder writes, on its host, `*` for numbers and times in the name; left out without a recorder.
+    /// Where the cell's recorder writes archives and pictures, on its host, `*` for numbers and times in a name and `, `
+    /// between names; left out without a recorder.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub archive: Option<String>,
     /// Whether the cell's source takes commands.

@@ -22,9 +22,9 @@ pub(super) struct PictureFile {
     file: File,
 }
 
-type Cause = dyn std::error::Error + 'static;
+pub(super) type Cause = dyn std::error::Error + 'static;
 
-fn failed(part: &Path, error: &Cause) -> RecordError {
+pub(super) fn failed(part: &Path, error: &Cause) -> RecordError {
     RecordError::RerunFile {
         path: part.to_owned(),
         reason: error.to_string(),
@@ -43,7 +43,18 @@ impl PictureFile {
         }
         whole_file::set_part_aside(path).map_err(|error| failed(&error))?;
         let new = OpenOptions::new().write(true).create_new(true).clone();
-        let file = whole_file::create(&part, &new).map_err(|error| failed(&error))?;
+        Self::begin(path, part, existing, &new)
+    }
+
+    /// Makes the unfinished file `part` of what is to be `path`.
+    pub fn begin(
+        path: &Path,
+        part: PathBuf,
+        existing: Existing,
+        options: &OpenOptions,
+    ) -> Result<Self, RecordError> {
+        let failed = |error: &Cause| failed(&part, error);
+        let file = whole_file::create(&part, options).map_err(|error| failed(&error))?;
         whole_file::hold(&file).map_err(|error| failed(&error))?;
         whole_file::sync_folder_of(&part).map_err(|error| failed(&error))?;
         let twin = file.try_clone().map_err(|error| failed(&error))?;
