@@ -89,7 +89,8 @@ pub fn with_known(problem: &Problem, active: &Active) -> Vec<f64> {
     let effect = active.hypothesis.effect;
     let known = &problem.known_friction[active.hypothesis.place.joint];
     let changes = effect.time() == TimeKind::Step || effect.traits.drifts.is_some();
-    let contained = contained(effect).filter(|_| changes);
+    // Another simulation has any friction: how much, nobody knows.
+    let contained = contained(effect).filter(|_| changes && !problem.is_foreign);
     let known = contained.and_then(|(plain, numbers)| Some((known.get(plain.name)?, numbers)));
     let Some((known, numbers)) = known else {
         return active.coordinates.clone();
