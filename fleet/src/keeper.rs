@@ -127,7 +127,7 @@ impl Keeper {
                         // A host that was started again asks for all that a cell keeps.
                         return Ok(());
                     }
-                    match record {
+                    match &**record {
                         Record::Contact(contact) => {
                             let came = Came { told_ns, now_ns };
                             self.contact(cell, instance, contact, came, status)

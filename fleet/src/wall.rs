@@ -138,7 +138,7 @@ pub enum Effect {
         /// When it was told, by the clock of the cell's computer \[ns since the epoch\].
         told_ns: i64,
         /// The record.
-        record: Record,
+        record: Box<Record>,
     },
     /// A cell has lost samples.
     Lost {

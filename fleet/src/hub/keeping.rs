@@ -150,7 +150,7 @@ mod tests {
             instance: "x".to_owned(),
             number: 1,
             told_ns: 6,
-            record: Record::Contact(fixture::contact(1, 5)),
+            record: Box::new(Record::Contact(fixture::contact(1, 5))),
         };
         keeping.keep(&wall, contact, 6);
         other.hold().unwrap();
@@ -206,7 +206,7 @@ mod tests {
             instance: "x".to_owned(),
             number,
             told_ns: 6_000_000_000,
-            record: Record::Contact(fixture::contact(number, 5)),
+            record: Box::new(Record::Contact(fixture::contact(number, 5))),
         };
         keeping.keep(&wall, contact(1), 0);
         other.hold().unwrap();

@@ -45,7 +45,7 @@ impl Story {
             instance: "x".to_owned(),
             number,
             told_ns,
-            record,
+            record: Box::new(record),
         };
         self.keeper.keep(&self.wall, &effect, self.now_ns)
     }

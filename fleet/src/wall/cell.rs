@@ -161,7 +161,7 @@ impl Watched {
             instance: message.instance,
             number: message.number,
             told_ns: message.sent_ns,
-            record: message.record,
+            record: Box::new(message.record),
         });
     }
 

@@ -129,7 +129,7 @@ impl Archive {
         streams: &Streams,
         index: usize,
         sample: SampleRef<'_>,
-        told: Told<'_>,
+        told: &Told<'_>,
     ) -> Result<(), RecordError> {
         let stream = &streams.all[index];
         match (sample, &mut self.topics[index]) {

@@ -207,7 +207,7 @@ impl AroundAlarms {
         }
         let sample = waiting.sample.as_ref();
         let told = self.contacts.push(streams, waiting.index, sample);
-        self.files.accept(streams, waiting.index, sample, told)?;
+        self.files.accept(streams, waiting.index, sample, &told)?;
         Ok(true)
     }
 

@@ -13,7 +13,7 @@ pub(crate) struct Contacts {
 }
 
 /// What is known of a detector's contact at a sample.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Default)]
 pub(crate) struct Told<'a> {
     /// The contact that lasts, as far as it is known by now.
     pub open: Option<&'a Contact>,

@@ -116,7 +116,7 @@ impl Files {
         streams: &Streams,
         index: usize,
         sample: SampleRef<'_>,
-        told: Told<'_>,
+        told: &Told<'_>,
     ) -> Result<(), RecordError> {
         if self.names().next().is_none() {
             return Ok(());
@@ -139,7 +139,7 @@ impl Files {
         streams: &Streams,
         index: usize,
         sample: SampleRef<'_>,
-        told: Told<'_>,
+        told: &Told<'_>,
     ) -> Result<(), RecordError> {
         let now_ns = sample.header().received_ns;
         // Of what a stage has done is told ahead of its samples, which may wait in a queue.
@@ -357,7 +357,7 @@ impl OpenFiles {
         streams: &Streams,
         index: usize,
         sample: SampleRef<'_>,
-        told: Told<'_>,
+        told: &Told<'_>,
     ) -> Result<(), RecordError> {
         if let Some(archive) = &mut self.archive {
             self.unwritten += 1;

@@ -87,12 +87,12 @@ impl Recorder {
     fn keep(&mut self, from: &str, sample: SampleRef<'_>) -> Result<(), RecordError> {
         let index = self.streams.find(from, &sample)?;
         let told = self.contacts.push(&self.streams, index, sample);
-        self.files.accept(&self.streams, index, sample, told)?;
+        self.files.accept(&self.streams, index, sample, &told)?;
         if let Some(around) = &mut self.around_alarms {
             around.accept(&self.streams, index, sample)?;
         }
         if let Some(live) = &mut self.live {
-            live.accept(&self.streams, index, sample, told)?;
+            live.accept(&self.streams, index, sample, &told)?;
         }
         self.note_completed();
         Ok(())

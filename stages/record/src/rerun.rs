@@ -57,7 +57,7 @@ impl FilePicture {
         streams: &Streams,
         index: usize,
         sample: SampleRef<'_>,
-        told: Told<'_>,
+        told: &Told<'_>,
     ) -> Result<(), RecordError> {
         let Self { painter, file } = self;
         painter.accept(streams, (index, sample, told), &mut |message| {
@@ -106,7 +106,7 @@ impl LivePicture {
         streams: &Streams,
         index: usize,
         sample: SampleRef<'_>,
-        told: Told<'_>,
+        told: &Told<'_>,
     ) -> Result<(), RecordError> {
         let Self { painter, live } = self;
         painter.accept(streams, (index, sample, told), &mut push_to(live))

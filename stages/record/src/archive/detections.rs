@@ -48,7 +48,7 @@ impl DetectionTopics {
         file: &mut File,
         streams: &Streams,
         stream: &Stream,
-        (detection, told): (&Detection, Told<'_>),
+        (detection, told): (&Detection, &Told<'_>),
     ) -> Result<(), WriteError> {
         let header = &detection.header;
         if header.has(flags::READY) {

@@ -157,7 +157,7 @@ impl DetectionTracks {
     /// Takes a detection of the stream number `index`; the recording began at `start_ns`.
     pub fn accept(
         &mut self,
-        (detection, told): (&Detection, Told<'_>),
+        (detection, told): (&Detection, &Told<'_>),
         (index, stream): (usize, &Stream),
         start_ns: i64,
         joints: &[String],

@@ -155,7 +155,7 @@ impl Painter {
     pub fn accept(
         &mut self,
         streams: &Streams,
-        (index, sample, told): (usize, SampleRef<'_>, Told<'_>),
+        (index, sample, told): (usize, SampleRef<'_>, &Told<'_>),
         out: &mut Out<'_>,
     ) -> Result<(), RecordError> {
         let cell = streams.all[index].cell;
