@@ -83,6 +83,7 @@ pub use effect::{
 };
 pub use expansion::Expansion;
 pub use gauge::Gauge;
+pub use link_com::EFFECT as LINK_COM;
 pub use payload::EFFECT as PAYLOAD;
 pub use payload_pickup::EFFECT as PAYLOAD_PICKUP;
 pub use physics::Physics;

@@ -21,7 +21,7 @@ const MOST_DRAWN_M: f64 = 0.06;
 
 /// A shift of a link's centre of mass, in the link's frame; its mass and the inertia about the centre
 /// stay. To first order linear in the shift.
-pub(super) static EFFECT: Effect = Effect {
+pub static EFFECT: Effect = Effect {
     name: "link_com",
     words: Words::new(
         "Link centre of mass",

@@ -55,6 +55,12 @@ pub struct Problem {
 }
 
 impl Problem {
+    /// Whether the twin was fitted to this arm before: it has the arm's friction.
+    pub fn is_beside_fitted_twin(&self) -> bool {
+        let has_friction = self.known_friction.iter().any(|known| !known.is_empty());
+        has_friction && !self.is_foreign
+    }
+
     /// The same where one recording does not count.
     #[must_use]
     pub fn without(&self, track: usize) -> Self {

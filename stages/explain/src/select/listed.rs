@@ -32,7 +32,8 @@ impl Search<'_> {
                 let hypothesis = p.active.hypothesis;
                 let same = hypothesis.place.link == own.place.link
                     && hypothesis.effect.family == Family::Body;
-                !is_unlisted(&hypothesis) && (!body || same)
+                let is_worse_name = own.is_zero_offset() && self.is_moved_centre(hypothesis);
+                !is_unlisted(&hypothesis) && !is_worse_name && (!body || same)
             });
             let Some(listed) = self.best_of(&less, &proposals, best.fit.likelihood()) else {
                 continue;
