@@ -151,7 +151,10 @@ fn tell_the_same(detector: (&str, &str, &str)) {
         Told {
             duration_s: format!("{:.2}", number(values, "duration_s")),
             force_n: format!("{:.0}", number(values, "peak_force_n")),
-            link: values["link"].clone(),
+            link: match values.get("other_link") {
+                Some(other) => format!("{} or {other}", values["link"]),
+                None => values["link"].clone(),
+            },
         }
     });
     let archived: Vec<Told> = archived.collect();
