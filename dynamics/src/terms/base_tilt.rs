@@ -7,8 +7,8 @@ use nalgebra::{Rotation3, Vector3};
 use super::ghost::While;
 use super::law::array;
 use super::{
-    Coordinate, CoordinateKind, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter,
-    PlaceKind, Simulated, Site, Term, Traits, Words,
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind,
+    Simulated, Site, Term, Traits, Words,
 };
 use crate::{Data, Model, gravity_effort};
 
@@ -27,7 +27,10 @@ pub(super) static EFFECT: Effect = Effect {
     place: PlaceKind::Base,
     layer: Layer::Body,
     parameters: &[Parameter::any("roll_rad"), Parameter::any("pitch_rad")],
-    coordinates: &[angle("roll_rad"), angle("pitch_rad")],
+    coordinates: &[
+        Coordinate::bending_factor("roll_rad"),
+        Coordinate::bending_factor("pitch_rad"),
+    ],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
@@ -46,14 +49,6 @@ pub(super) static EFFECT: Effect = Effect {
     },
     build: |site, values| BaseTilt::boxed(&EFFECT, site, values, While::Always),
 };
-
-pub(super) const fn angle(name: &'static str) -> Coordinate {
-    let kind = CoordinateKind::Factor {
-        step: 1e-3,
-        minimum: f64::NEG_INFINITY,
-    };
-    Coordinate { name, kind }
-}
 
 /// Gravity as the tilted base sees it.
 fn tilted(gravity: &Vector3<f64>, [roll, pitch]: [f64; 2]) -> Vector3<f64> {

@@ -1,12 +1,12 @@
 //! A base that stands otherwise in one recording than in the others.
 
-use super::base_tilt::{BaseTilt, angle};
+use super::base_tilt::BaseTilt;
 use super::ghost::While;
 use super::law::array;
 use super::payload_pickup::time;
 use super::{
-    CoordinateKind, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated, Traits,
-    Words,
+    Coordinate, CoordinateKind, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated,
+    Traits, Words,
 };
 
 /// As `base_tilt`, between two times of the session that enclose a recording.
@@ -29,8 +29,8 @@ pub(super) static EFFECT: Effect = Effect {
         Parameter::any("t_end_s"),
     ],
     coordinates: &[
-        angle("roll_rad"),
-        angle("pitch_rad"),
+        Coordinate::bending_factor("roll_rad"),
+        Coordinate::bending_factor("pitch_rad"),
         time("t_start_s", CoordinateKind::SessionTime),
         time("t_end_s", CoordinateKind::SessionTime),
     ],

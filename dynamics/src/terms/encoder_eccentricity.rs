@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 
 use super::law::array;
 use super::{
-    Coordinate, CoordinateKind, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter,
-    PlaceKind, Scale, Simulated, Term, Traits, Words, wave,
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind,
+    Scale, Simulated, Term, Traits, Words, wave,
 };
 use crate::{Data, JointKind, Model, rnea};
 
@@ -38,8 +38,8 @@ pub(super) static EFFECT: Effect = Effect {
         Parameter::any("phase_rad"),
     ],
     coordinates: &[
-        factor("sine_rad"),
-        factor("cosine_rad"),
+        Coordinate::bending_factor("sine_rad"),
+        Coordinate::bending_factor("cosine_rad"),
         Coordinate::shape("cycles_per_rev", 1.0, 2.0, 2, Scale::Linear),
     ],
     to_parameters: wave::to_parameters,
@@ -80,17 +80,6 @@ pub(super) static EFFECT: Effect = Effect {
         })
     },
 };
-
-/// A factor whose effect is linear for small values only \[rad\].
-const fn factor(name: &'static str) -> Coordinate {
-    Coordinate {
-        name,
-        kind: CoordinateKind::Factor {
-            step: 1e-3,
-            minimum: f64::NEG_INFINITY,
-        },
-    }
-}
 
 #[derive(Debug)]
 struct EncoderEccentricity {

@@ -3,8 +3,8 @@
 
 use super::ghost::While;
 use super::{
-    Coordinate, CoordinateKind, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter,
-    PlaceKind, Simulated, Site, Term, Traits, Words,
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind,
+    Simulated, Site, Term, Traits, Words,
 };
 use crate::{Data, Model, rnea};
 
@@ -32,7 +32,7 @@ pub(super) static EFFECT: Effect = Effect {
     place: PlaceKind::Joint,
     layer: Layer::Body,
     parameters: &[Parameter::any("offset_rad")],
-    coordinates: &[offset("offset_rad")],
+    coordinates: &[Coordinate::bending_factor("offset_rad")],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
     simpler: None,
@@ -51,16 +51,6 @@ pub(super) static EFFECT: Effect = Effect {
     },
     build: |site, values| JointZeroOffset::boxed(&EFFECT, site, values, While::Always),
 };
-
-pub(super) const fn offset(name: &'static str) -> Coordinate {
-    Coordinate {
-        name,
-        kind: CoordinateKind::Factor {
-            step: 1e-3,
-            minimum: f64::NEG_INFINITY,
-        },
-    }
-}
 
 /// Whether an offset is one that is worth telling \[rad or m\].
 pub(super) fn is_told(offset: f64) -> bool {

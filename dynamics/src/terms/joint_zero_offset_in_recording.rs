@@ -1,12 +1,12 @@
 //! A joint whose zero is another one in one recording than in the others.
 
 use super::ghost::While;
-use super::joint_zero_offset::{JointZeroOffset, is_told, offset};
+use super::joint_zero_offset::{JointZeroOffset, is_told};
 use super::law::array;
 use super::payload_pickup::time;
 use super::{
-    CoordinateKind, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated, Traits,
-    Words,
+    Coordinate, CoordinateKind, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated,
+    Traits, Words,
 };
 
 /// As `joint_zero_offset`, between two times of the session that enclose a recording.
@@ -29,7 +29,7 @@ pub(super) static EFFECT: Effect = Effect {
         Parameter::any("t_end_s"),
     ],
     coordinates: &[
-        offset("offset_rad"),
+        Coordinate::bending_factor("offset_rad"),
         time("t_start_s", CoordinateKind::SessionTime),
         time("t_end_s", CoordinateKind::SessionTime),
     ],

@@ -1,7 +1,8 @@
 //! A joint whose zero jumps once: an encoder that slips on its shaft, a belt that jumps a tooth.
 
 use super::ghost::While;
-use super::joint_zero_offset::{JointZeroOffset, is_told, offset};
+use super::joint_zero_offset::{JointZeroOffset, is_told};
+use super::payload_pickup::time;
 use super::{
     Coordinate, CoordinateKind, Effect, Excitation, Family, Layer, MotionSample, Parameter,
     PlaceKind, Simpler, Simulated, Term, Traits, Words,
@@ -16,7 +17,7 @@ pub(super) static EFFECT: Effect = Effect {
         "From some time on the joint stands elsewhere than its recorded position says, or elsewhere than before.",
         "Joint {place}: does its encoder, coupling or clamp slip on the shaft, did a belt jump a tooth?",
         "The zero of joint {place} jumped, {change_time_session_s} into the session: the joint stood at its recorded position \
-         plus {offset_before_rad} before, and stands at {offset_after_rad} more than recorded since.",
+         plus {offset_before_rad} before, and stands at its recorded position plus {offset_after_rad} since.",
     ),
     family: Family::Mounting,
     place: PlaceKind::Joint,
@@ -27,12 +28,9 @@ pub(super) static EFFECT: Effect = Effect {
         Parameter::any("change_time_session_s"),
     ],
     coordinates: &[
-        offset("offset_before_rad"),
-        offset("offset_after_rad"),
-        Coordinate {
-            name: "change_time_session_s",
-            kind: CoordinateKind::SessionTime,
-        },
+        Coordinate::bending_factor("offset_before_rad"),
+        Coordinate::bending_factor("offset_after_rad"),
+        time("change_time_session_s", CoordinateKind::SessionTime),
     ],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,

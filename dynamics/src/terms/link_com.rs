@@ -2,8 +2,8 @@
 
 use super::ghost::{Ghost, While};
 use super::{
-    Coordinate, CoordinateKind, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind,
-    Simulated, Traits, Words,
+    Coordinate, Drawn, Effect, Excitation, Family, Layer, Parameter, PlaceKind, Simulated, Traits,
+    Words,
 };
 use crate::Inertia;
 use crate::kinematic_tree::length_m;
@@ -39,9 +39,9 @@ pub static EFFECT: Effect = Effect {
         Parameter::any("delta_com_z_m"),
     ],
     coordinates: &[
-        shift("delta_com_x_m"),
-        shift("delta_com_y_m"),
-        shift("delta_com_z_m"),
+        Coordinate::bending_factor("delta_com_x_m"),
+        Coordinate::bending_factor("delta_com_y_m"),
+        Coordinate::bending_factor("delta_com_z_m"),
     ],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
@@ -75,11 +75,3 @@ pub static EFFECT: Effect = Effect {
         )
     },
 };
-
-const fn shift(name: &'static str) -> Coordinate {
-    let kind = CoordinateKind::Factor {
-        step: 1e-3,
-        minimum: f64::NEG_INFINITY,
-    };
-    Coordinate { name, kind }
-}

@@ -6,6 +6,7 @@ use crate::data::problem::Problem;
 use crate::data::track::Track;
 use crate::physics::active::{Hypothesis, Whereabouts};
 use crate::read::recording::{Losses, Recording};
+use crate::report::schema::Finding;
 
 /// Two joints under gravity.
 pub const URDF: &str = r#"<robot name="two">
@@ -128,4 +129,27 @@ pub fn problem_with(seed: u64, mut add: impl FnMut(&[f64], &[f64], &mut [f64])) 
         recording(&model, 2 * seed + 1, &mut noisy),
     ];
     problem(&model, &recordings)
+}
+
+/// A finding of that effect at the first joint, without words.
+pub fn finding(effect: &str) -> Finding {
+    Finding {
+        effect: effect.to_owned(),
+        joint: Some("joint1".to_owned()),
+        link: None,
+        parameters: [("coulomb_nm".to_owned(), 4.1.into())].into(),
+        intervals_95: [("coulomb_nm".to_owned(), [3.9, 4.3])].into(),
+        in_amperes: false,
+        slides: false,
+        confidence: 0.999,
+        recording: None,
+        t_start: None,
+        t_end: None,
+        explains: 0.63,
+        over_rest: 9.0,
+        evidence_nats: 40.0,
+        effort_rms: 2.0,
+        equivalent_to: Vec::new(),
+        sentence: String::new(),
+    }
 }

@@ -89,6 +89,17 @@ impl Coordinate {
         }
     }
 
+    /// A factor of any sign whose effort is linear for small values only: an angle or a length \[rad or m\].
+    pub const fn bending_factor(name: &'static str) -> Self {
+        Self {
+            name,
+            kind: CoordinateKind::Factor {
+                step: 1e-3,
+                minimum: f64::NEG_INFINITY,
+            },
+        }
+    }
+
     /// A shape that is first tried at `steps` values.
     pub const fn shape(
         name: &'static str,

@@ -195,3 +195,31 @@ fn acceleration_noise(recordings: &[Recording], joint: usize, n: usize, cutoff_h
 fn deviation(variance: f64, largest_effort: f64) -> f64 {
     variance.sqrt().max(RESOLUTION * largest_effort)
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::fixture::{Noise, model, problem, recording};
+
+    /// The density says what the smoother and the filter of the comparison make of the noise of a joint that stands.
+    #[test]
+    fn the_noise_of_a_position_is_so_much_acceleration() {
+        let model = model();
+        let mut noise = Noise(5);
+        let recordings = [1, 2, 3].map(|seed| {
+            let mut recording = recording(&model, seed, |_, _, _| {});
+            for position in &mut recording.position {
+                *position = 1e-3 * noise.next();
+            }
+            recording
+        });
+        let problem = problem(&model, &recordings);
+        let accelerations: Vec<Vec<f64>> = (problem.tracks.iter())
+            .map(|track| track.track.acceleration.clone())
+            .collect();
+        let mut seen = vec![0.0; problem.rows];
+        problem.joint_signal(&accelerations, 1, &mut seen);
+        let rms = (seen.iter().map(|x| x * x).sum::<f64>() / seen.len() as f64).sqrt();
+        let ratio = problem.acceleration_noise[1] / rms;
+        assert!((0.7..1.4).contains(&ratio), "{ratio}");
+    }
+}

@@ -29,3 +29,34 @@ pub fn verdict(findings: &[Finding], remainders: &Remainders, twin_is_topic: boo
         Verdict::Explained
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::finding;
+    use crate::report::schema::Remaining;
+
+    #[test]
+    fn beside_another_simulation_only_a_joint_that_got_worse_decides() {
+        let findings = [finding("coulomb_friction")];
+        let remaining = Remaining {
+            joint: "elbow".to_owned(),
+            rms: 2.0,
+            holdout_rms: Some(3.0),
+            noise: 0.1,
+            sentence: String::new(),
+        };
+        for (is_worsened, twin_is_topic, said) in [
+            (false, true, Verdict::Explained),
+            (true, true, Verdict::UnknownRemains),
+            (false, false, Verdict::UnknownRemains),
+        ] {
+            let remainders = Remainders {
+                all: vec![remaining.clone()],
+                is_worsened,
+                ..Remainders::default()
+            };
+            assert_eq!(verdict(&findings, &remainders, twin_is_topic), said);
+        }
+    }
+}

@@ -4,12 +4,11 @@ use crate::data::problem::Problem;
 use crate::fit::interval::half_width_95;
 use crate::physics::active::Active;
 
+use super::doubt::DOUBTED;
+
 /// Confidence of a body whose mass may be nothing by the noise, at most.
 /// Physical: an arm that turns about vertical axes alone hardly shows a mass; one that lifts does.
 const UNSURE_BODY: f64 = 0.85;
-/// Confidence of a body whose mass may be nothing as far as the URDF's bodies are off, at most.
-/// Statistical: it is as likely that nothing is there and the bodies are off.
-const OR_BODIES_OFF: f64 = 0.45;
 
 /// The highest confidence that a finding may have: less where its mass may as well be nothing, given the standard deviations
 /// of its parameters, of all errors and `by_noise` alone.
@@ -26,8 +25,9 @@ pub fn surest(problem: &Problem, active: &Active, deviations: &[f64], by_noise: 
     };
     if is_nothing(by_noise) {
         UNSURE_BODY
+    // It is as likely that nothing is there and the URDF's bodies are off.
     } else if is_nothing(deviations) {
-        OR_BODIES_OFF
+        DOUBTED
     } else {
         1.0
     }
@@ -49,6 +49,6 @@ mod tests {
         assert!(surest(&problem, payload, sure, sure) >= 1.0);
         assert!(surest(&problem, payload, vague, vague) <= UNSURE_BODY);
         // The noise says that it is there, and bodies that are off may say the same.
-        assert!(surest(&problem, payload, vague, sure) <= OR_BODIES_OFF);
+        assert!(surest(&problem, payload, vague, sure) <= DOUBTED);
     }
 }

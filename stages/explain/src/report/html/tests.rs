@@ -1,6 +1,7 @@
 use serde_json::json;
 
 use super::*;
+use crate::fixture;
 use crate::report::schema::{
     Finding, JointPicture, Located, NextMotion, Rejected, Rival, Undetectable,
 };
@@ -30,23 +31,8 @@ fn empty(verdict: Verdict) -> Report {
 
 fn finding(effect: &str, sentence: &str) -> Finding {
     Finding {
-        effect: effect.to_owned(),
-        joint: Some("joint1".to_owned()),
-        link: None,
-        parameters: [("coulomb_nm".to_owned(), json!(4.1))].into(),
-        intervals_95: [("coulomb_nm".to_owned(), [3.9, 4.3])].into(),
-        in_amperes: false,
-        slides: false,
-        confidence: 0.999,
-        recording: None,
-        t_start: None,
-        t_end: None,
-        explains: 0.63,
-        over_rest: 9.0,
-        evidence_nats: 40.0,
-        effort_rms: 2.0,
-        equivalent_to: Vec::new(),
         sentence: sentence.to_owned(),
+        ..fixture::finding(effect)
     }
 }
 
