@@ -220,9 +220,8 @@ mod tests {
         let mut seen = vec![0.0; problem.rows];
         problem.joint_signal(&accelerations, 1, &mut seen);
         // Accelerations at the ends of a recording are far less certain: of all rows the one in the middle.
-        seen.iter_mut().for_each(|x| *x = x.abs());
-        seen.sort_by(f64::total_cmp);
-        let deviation = seen[seen.len() / 2] / MEDIAN_OF_ABS_NORMAL;
+        seen.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
+        let deviation = seen[seen.len() / 2].abs() / MEDIAN_OF_ABS_NORMAL;
         let ratio = problem.acceleration_noise[1] / deviation;
         assert!((0.7..1.4).contains(&ratio), "{ratio}");
     }
