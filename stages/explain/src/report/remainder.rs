@@ -9,12 +9,14 @@
 //! - it is far larger on held-out recordings than on fitted ones, although their efforts change no faster, or larger there
 //!   than what the twin left before it was corrected;
 //! - it stands out for moments;
+//! - one recording does not go with the others (`remainder/odd_recording.rs`);
 //! - one joint leaves far more than the others (`remainder/beside_others.rs`);
 //! - more is missing while a joint stands than its friction holds (`remainder/standing.rs`).
 
 mod beside_others;
 mod follows;
 mod held;
+mod odd_recording;
 mod standing;
 mod turns;
 
@@ -31,6 +33,7 @@ use tauscope_dynamics::terms::words::number;
 use beside_others::beside_others;
 use follows::follows_motion;
 use held::of_held;
+use odd_recording::odd_recording;
 
 /// A moment stands out if its error is this many standard deviations of the calm half of the time.
 /// Statistical: a normal variable exceeds 10 in none of 1e22 rows; slow noise is as normal as fast.
@@ -223,13 +226,27 @@ fn of(
     let problem = found.problem;
     let mut remainders = Remainders::default();
     let late = varying_delay(problem, found.fit, &rates(problem, found.fit));
+    let odd = odd_recording(found);
     for (j, joint) in joints.iter().enumerate() {
         let (here, noise) = (found.rms(j), problem.white_noise[j]);
         let unit = unit_at(unit, &problem.model.joints()[j]);
         let told = |nm: f64| format!("{} {unit}", number(nm / unit_nm[j]));
         let there = held.as_ref().map(|held| held.rms(j));
         let mut sentences = Vec::new();
-        if let Some(with) = follows_motion(found, before.fit, j) {
+        if let Some(odd) = &odd
+            && let Some([own, others]) = odd.left[j]
+        {
+            sentences.push(format!(
+                "Recording {} does not go with the others: fitted without it they leave {} at joint {joint}, and it then leaves {}. \
+                 Is it of another robot, with another tool or load, or did something change in it?",
+                odd.name,
+                told(others),
+                told(own)
+            ));
+        }
+        if sentences.is_empty()
+            && let Some(with) = follows_motion(found, before.fit, j)
+        {
             sentences.push(format!(
                 "{} remain at joint {joint}, and not as noise: {with}",
                 told(here)
@@ -255,7 +272,7 @@ fn of(
         if let Some((recording, moment)) = largest_moment([Some(found), held], j) {
             sentences.push(format!(
                 "At joint {joint} the error stands out for moments: {} in {recording} at {:.1} s, beside {} all the time. Look for a \
-                 contact or a disturbance there.",
+                 contact, a brake or a disturbance there.",
                 told(moment.error.abs()),
                 moment.time_s,
                 told(here)

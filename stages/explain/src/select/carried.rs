@@ -18,8 +18,8 @@ const DAMPING: f64 = 0.01;
 /// Statistical: mean and standard deviation of 39 are known to 16 % of the deviation.
 const SURROGATES: usize = 39;
 /// What surrogates predict at most, in standard deviations above their mean.
-/// Statistical: a Gumbel variable, as the largest of many is, exceeds this once in 300.
-const BEYOND_CHANCE: f64 = 4.0;
+/// Statistical: a Gumbel variable, as the largest of many is, exceeds this once in 1000: once in 150 arms of six joints.
+const BEYOND_CHANCE: f64 = 5.0;
 /// Surrogates are turned by at least this share of a recording, either way.
 /// Statistical: noise that is slower than that is not slow noise but an offset.
 const LEAST_TURN: f64 = 1.0 / 6.0;

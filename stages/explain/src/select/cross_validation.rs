@@ -52,9 +52,38 @@ pub fn left_elsewhere(problem: &Problem, fit: &Fit, joint: usize) -> f64 {
 
 /// By joint, the sum of squared residuals over all recordings, each with the factors fitted on the others.
 fn left_where_not_fitted(problem: &Problem, fit: &Fit, joints: &[usize]) -> Vec<f64> {
-    let jacobian = fit.jacobian_at(problem, Some(joints));
-    // Shapes keep their values: a first-order step of a shape may be far too long.
-    let factors = fit.parameters_at(Some(joints)).into_iter();
+    let mut left = vec![0.0; problem.joints];
+    for out in left_out(problem, fit, Some(joints)) {
+        for (sum, own) in left.iter_mut().zip(out.own) {
+            *sum += own;
+        }
+    }
+    left
+}
+
+/// A recording, and the factors fitted on the others. All by joint.
+#[derive(Debug)]
+pub struct LeftOut {
+    /// Sum of squared residuals on the recording itself.
+    pub own: Vec<f64>,
+    /// Rows of it that count.
+    pub own_count: Vec<f64>,
+    /// Sum of squared residuals on the others, with the factors fitted on all.
+    pub others_with: Vec<f64>,
+    /// The same with the factors fitted on the others.
+    pub others_without: Vec<f64>,
+    /// Rows of the others that count.
+    pub others_count: Vec<f64>,
+}
+
+/// Each recording left out in turn. Shapes keep their values: a first-order step of a shape may be far too long.
+pub fn each_left_out(problem: &Problem, fit: &Fit) -> Vec<LeftOut> {
+    left_out(problem, fit, None)
+}
+
+fn left_out(problem: &Problem, fit: &Fit, joints: Option<&[usize]>) -> Vec<LeftOut> {
+    let jacobian = fit.jacobian_at(problem, joints);
+    let factors = fit.parameters_at(joints).into_iter();
     let factors = factors.map(|(index, c)| fit.is_factor(index, c));
     let columns = jacobian.iter().zip(factors).filter(|(_, factor)| *factor);
     let columns: Vec<&Column> = columns.map(|(column, _)| column.as_ref()).collect();
@@ -62,17 +91,21 @@ fn left_where_not_fitted(problem: &Problem, fit: &Fit, joints: &[usize]) -> Vec<
     let (normal, _) = all.normal(&fit.variance, &vec![0.0; columns.len()]);
     let ridge: Vec<f64> = normal.diagonal().iter().map(|d| DAMPING * d).collect();
     let used = vec![true; columns.len()];
-    let mut left = vec![0.0; problem.joints];
-    for track in 0..problem.tracks.len() {
+    let of_track = |track: usize| {
         let own = Products::new(problem, &columns, &fit.residual, Some(track));
         let others = all.without(&own);
-        let own_left = match others.solve(&fit.variance, &ridge, &used) {
-            Some(step) => own.all_left(&step),
-            None => own.square,
+        let step = others.solve(&fit.variance, &ridge, &used);
+        let left = |of: &Products| match &step {
+            Some(step) => of.all_left(step),
+            None => of.square.clone(),
         };
-        for (sum, own) in left.iter_mut().zip(own_left) {
-            *sum += own;
+        LeftOut {
+            own: left(&own),
+            others_without: left(&others),
+            own_count: own.count,
+            others_with: others.square,
+            others_count: others.count,
         }
-    }
-    left
+    };
+    (0..problem.tracks.len()).map(of_track).collect()
 }

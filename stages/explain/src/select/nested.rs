@@ -24,8 +24,9 @@ fn is_slight(best: &Explanation, simple: &Explanation, index: usize) -> bool {
 
 impl Search<'_> {
     /// Replaces an effect by the simpler one that it contains, unless it is ahead by `enough` \[nats\], a function of
-    /// the evidence for the effect, and leaves less at some joint. An effect with a shape at the end of its range, or that nothing determines, must be
-    /// ahead by [`tie`].
+    /// the evidence for the effect, and leaves less at some joint. An effect with a shape at the end of its range, or that
+    /// nothing determines, must be ahead by [`tie`]. Where both hold, the effect is the simpler one: a gear that is as stiff
+    /// as a gear can be, and perhaps infinitely so, is a rotor.
     pub fn simplified(&self, mut best: Explanation, enough: impl Fn(f64) -> f64) -> Explanation {
         for piece in pieces(&best) {
             let Some(index) = place_of(&best, piece) else {
@@ -35,10 +36,11 @@ impl Search<'_> {
             let own = best.fit.actives[index].hypothesis;
             let effective = &independent(self.problem, &best.fit, own);
             let evidence = best.ahead_of(&less, effective);
-            let enough = if at_bound(&best.fit.actives[index]) || self.is_vague(&best.fit, index) {
-                tie(evidence)
-            } else {
-                enough(evidence)
+            let at_end = at_bound(&best.fit.actives[index]);
+            let enough = match (at_end, self.is_vague(&best.fit, index)) {
+                (true, true) => f64::INFINITY,
+                (false, false) => enough(evidence),
+                _ => tie(evidence),
             };
             if let Some(simple) = self.simpler(&best, &less, index)
                 && (best.ahead_of(&simple, effective) < enough || is_slight(&best, &simple, index))

@@ -74,7 +74,7 @@ pub(super) fn follows_motion(found: Left<'_>, before: &Fit, joint: usize) -> Opt
         let is_told = share > LEAST_OF_TURNS && is_worth_telling(share);
         is_told.then(|| {
             format!(
-                "{}: friction that comes and goes, or between two joints.",
+                "{}: friction that comes and goes, play in the gear, or friction between two joints.",
                 turns.at
             )
         })
