@@ -262,11 +262,10 @@ fn each_fate_is_told_as_what_it_is_and_nothing_is_told_of_the_others() {
         };
         let wear = one(0, Cause::Wear, Some("joint3"));
         let night = |day: f64| day - FIRST_DAY;
-        assert!(
-            night(wear.told) < 200.0,
-            "told in night {}",
-            night(wear.told)
-        );
+        // Of friction that is 15 % higher the detector makes no contact yet (tests/year/first_alarm.py).
+        let grown = 0.4 * (night(wear.told) - 90.0) / (NIGHTS as f64 - 90.0);
+        println!("seed {seed}: wear told at {:.1} %", 100.0 * grown);
+        assert!(grown < 0.15, "told in night {}", night(wear.told));
         assert!(wear.forecast.is_some(), "{wear:?}");
         let crash = one(1, Cause::FrictionStep, Some("joint5"));
         assert!((night(crash.from) - 200.0).abs() <= 2.0, "{crash:?}");

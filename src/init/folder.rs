@@ -251,8 +251,13 @@ SOURCE
     # What of the residual is usual was learnt from the recordings. Fewer false alarms need larger forces.
     detect: {tauscope: {learnt: learnt.yaml, false_alarms_per_hour: 5}}
 
+  - name: watch
+    input: twin
+    # Says what has changed where no contact explains an alarm: a payload, friction, a scale or an offset.
+    explain: {}
+
   - name: record
-    inputs: [ingest, twin, detect]
+    inputs: [ingest, twin, detect, watch]
     record:
       # {n} is the first number that is free: nothing is replaced.
       mcap: "out/CELL-{n}.mcap"

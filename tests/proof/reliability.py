@@ -29,6 +29,9 @@ import small_arm
 from robot import Robot
 
 EDGES = [0., 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0001]
+WORDS = {"single": "one effect of the library", "combo": "two to four effects of the library",
+         "null": "nothing hidden, white or partly slow noise", "unknown": "an effect that the library lacks",
+         "arm": "a whole arm: friction on every joint, bodies that differ from the URDF"}
 KINDS = {"single": 0.34, "combo": 0.24, "null": 0.1, "unknown": 0.2, "arm": 0.12}
 OF_POSITION = {"cable_spring", "counterbalance_spring", "torque_ripple"}
 IMITATED = OF_POSITION | {"torque_gain"}
@@ -211,7 +214,7 @@ def show(o):
     for kind in KINDS:
         own, sure = by_kind[kind], [r for c, r in by_kind[kind] if c >= 0.9]
         mean = lambda x: f"{sum(x) / len(x):.3f}" if x else ""
-        print(f"| {kind} | {len(own)} | {mean([c for c, _ in own])} | {mean([r for _, r in own])} | {len(sure)} | {mean(sure)} |")
+        print(f"| {WORDS[kind]} | {len(own)} | {mean([c for c, _ in own])} | {mean([r for _, r in own])} | {len(sure)} | {mean(sure)} |")
     if o.fit:
         names = ["BASE", "PER_LOG_OVER_REST", "PER_NAT_BELOW", "IMITATED", "BESIDE_ANOTHER"]
         print("\n" + ", ".join(f"{n} {x:.3f}" for n, x in zip(names, regression(rows, [r for _, r in pairs]))))
