@@ -286,6 +286,33 @@ def freeze(program, folder, victim, pause, seconds):
     return f"stopped for {pause} s, {lost} samples lost and counted, exit {code}"
 
 
+def clock_set(program, folder, seconds):
+    """The host's clock is set an hour forward, then two hours back, while the pipeline runs."""
+    places = [*Path("/usr/lib").glob("*/faketime/libfaketimeMT.so.1"), *Path("/usr/lib/faketime").glob("libfaketimeMT.so.1")]
+    if not places:
+        raise Skipped("no libfaketime: apt-get install faketime")
+    make(folder, seconds)
+    clock = folder / "clock"
+    clock.write_text("+0s")
+    settings = [f"LD_PRELOAD={places[0]}", f"FAKETIME_TIMESTAMP_FILE={clock}", "FAKETIME_NO_CACHE=1",
+                "DONT_FAKE_MONOTONIC=1", "NO_FAKE_STAT=1"]
+    told = subprocess.run(["env", *settings, "date", "+%s"], capture_output=True, text=True, check=True)
+    check(abs(int(told.stdout) - time.time()) < 5, "the clock is not the host's:", told.stdout)
+    run = Run(program, folder, prefix=("env", *settings))
+    run.begun()
+    for offset in ("+3600s", "-3600s"):
+        clock.write_text(offset)
+        time.sleep(3)
+    told = subprocess.run(["env", *settings, "date", "+%s"], capture_output=True, text=True, check=True)
+    check(abs(int(told.stdout) - time.time() + 3600) < 5, "the clock was not set:", told.stdout)
+    code, summary = run.end()
+    lost = balance(summary)
+    check((code, lost) == (0, 0), "exit code", code, "with", lost, "lost:", run.text())
+    held = archived(program, folder)[TOPICS["ingest"]]
+    check(held == emitted(summary, "ingest"), "the archive holds", held, "of", emitted(summary, "ingest"))
+    return f"an hour forward, two hours back: {held} samples, none lost, exit {code}"
+
+
 SHARED = """version: 1
 process: cells
 cells: {{a: {{robot: {data}/demo_arm.urdf}}, b: {{robot: {data}/demo_arm.urdf}}}}
@@ -586,6 +613,7 @@ def scenarios(short, kills):
     for victim in ("record", "twin"):
         yield f"SIGSTOP of {victim}", lambda program, folder, victim=victim: freeze(
             program, folder, victim, pause, pause + 8)
+    yield "a clock that is set forward and back", lambda program, folder: clock_set(program, folder, 15)
     yield "a thread that hangs", lambda program, folder: hang(program, folder, max(pause, 7), 25)
     yield "full disk", lambda program, folder: full_disk(program, folder, 15)
     yield "full shared memory", lambda program, folder: full_shared_memory(program, folder, 15)

@@ -188,7 +188,11 @@ impl SharedMemory {
                             }
                             SystemInFlux
                             | Opening(
-                                E::IsMarkedForDestruction | E::HangsInCreation | E::DoesNotExist,
+                                // The last one is what a service that another process is making looks like at times.
+                                E::IsMarkedForDestruction
+                                | E::HangsInCreation
+                                | E::DoesNotExist
+                                | E::InternalFailure,
                             ) => Failure::Passing(open_error(stream, &error)),
                             _ => Failure::Final(open_error(stream, &error)),
                         }
@@ -215,7 +219,11 @@ impl SharedMemory {
                         match error {
                             SystemInFlux
                             | Opening(
-                                E::IsMarkedForDestruction | E::HangsInCreation | E::DoesNotExist,
+                                // The last one is what a service that another process is making looks like at times.
+                                E::IsMarkedForDestruction
+                                | E::HangsInCreation
+                                | E::DoesNotExist
+                                | E::InternalFailure,
                             ) => Failure::Passing(link_error),
                             _ => Failure::Final(link_error),
                         }
