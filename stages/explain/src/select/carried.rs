@@ -18,8 +18,8 @@ const DAMPING: f64 = 0.01;
 /// Statistical: mean and standard deviation of 39 are known to 16 % of the deviation.
 const SURROGATES: usize = 39;
 /// What surrogates predict at most, in standard deviations above their mean.
-/// Statistical: a Gumbel variable, as the largest of many is, exceeds this once in 1000: once in 150 arms of six joints.
-const BEYOND_CHANCE: f64 = 5.0;
+/// Statistical: a Gumbel variable, as the largest of many is, exceeds this once in 300.
+pub const BEYOND_CHANCE: f64 = 4.0;
 /// Surrogates are turned by at least this share of a recording, either way.
 /// Statistical: noise that is slower than that is not slow noise but an offset.
 const LEAST_TURN: f64 = 1.0 / 6.0;
@@ -139,8 +139,9 @@ impl Carried {
         })
     }
 
-    /// What the best of some functions predicts at most where the residual has nothing to do with the motion.
-    pub fn largest_by_chance<'a>(all: impl Iterator<Item = &'a Self>) -> f64 {
+    /// What the best of some functions predicts at most where the residual has nothing to do with the motion: so many standard
+    /// deviations above the mean of surrogates.
+    pub fn largest_by_chance<'a>(all: impl Iterator<Item = &'a Self>, deviations: f64) -> f64 {
         let mut best = vec![f64::NEG_INFINITY; SURROGATES];
         for one in all {
             for (best, share) in best.iter_mut().zip(&one.surrogates) {
@@ -150,7 +151,7 @@ impl Carried {
         let count = best.len() as f64;
         let mean = best.iter().sum::<f64>() / count;
         let variance = best.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / count;
-        mean + BEYOND_CHANCE * variance.sqrt()
+        mean + deviations * variance.sqrt()
     }
 }
 
@@ -172,7 +173,7 @@ mod tests {
         let carried = Carried::of(&data, &nothing.residual, 0, &columns).unwrap();
         (
             carried.share,
-            Carried::largest_by_chance(std::iter::once(&carried)),
+            Carried::largest_by_chance(std::iter::once(&carried), BEYOND_CHANCE),
         )
     }
 

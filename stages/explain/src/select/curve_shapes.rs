@@ -8,7 +8,7 @@ use crate::data::track::FitTrack;
 use crate::fit::fitted::Fit;
 use crate::fit::least_squares::weighted_dot;
 use crate::physics::active::{Active, Hypothesis, Whereabouts, held_knots};
-use crate::select::carried::Carried;
+use crate::select::carried::{BEYOND_CHANCE, Carried};
 use crate::select::curve_axes::curves;
 use crate::select::evidence::{FAIR_SHARE_OF_CURVE, LEAST_SIZE};
 use crate::select::propose::Base;
@@ -87,7 +87,8 @@ impl Base<'_> {
             .iter()
             .filter_map(|curve| self.try_curve(joint, curve))
             .collect();
-        let by_chance = Carried::largest_by_chance(tried.iter().filter_map(|(_, c)| c.as_ref()));
+        let by_chance =
+            Carried::largest_by_chance(tried.iter().filter_map(|(_, c)| c.as_ref()), BEYOND_CHANCE);
         let judged = tried.into_iter().map(|(mut proposal, carried)| {
             proposal.penalty += count.ln();
             let share = carried.map(|carried| carried.share);
@@ -223,7 +224,7 @@ pub fn repeats(problem: &Problem, without: &Fit, curve: &Active) -> bool {
     };
     let carried = carried(problem, without, table, joint, &columns);
     carried.is_some_and(|carried| {
-        let by_chance = Carried::largest_by_chance(std::iter::once(&carried));
+        let by_chance = Carried::largest_by_chance(std::iter::once(&carried), BEYOND_CHANCE);
         carried.share > by_chance.max(LEAST_CARRIED)
     })
 }
