@@ -77,7 +77,7 @@ def sudden(what, size, seed, motion):
 
 
 def events(program, pipeline, recordings):
-    """By recording: times of the detector's alarms; times and words of the watch."""
+    """By recording: the events of the detector, and those of the watch."""
     for one in json.loads(run(program, "replay", *recordings, "--pipeline", pipeline, "--json")):
         alarms = [e for d in one["detectors"] for e in d["events"] if d["stage"] == "detect"]
         told = [e for d in one["detectors"] for e in d["events"] if d["stage"] == "watch"]
@@ -103,11 +103,8 @@ def main():
             usual += record(program, os.path.join(work, f"usual{seed}"), seed, text, 40)
         cell = os.path.join(work, "cell")
         run(program, "init", *usual, "--robot", f"{ROOT}/tests/data/demo_arm.urdf", "--out", cell)
-        pipeline = os.path.join(cell, "watched.yaml")
-        with open(os.path.join(cell, "pipeline.yaml"), encoding="utf-8") as file:
-            text = file.read().split("\n  - name: record")[0]
-        with open(pipeline, "w", encoding="utf-8") as file:
-            file.write(text + "\n  - name: watch\n    input: twin\n    explain: {}\n")
+        # With the detector and the watch that init writes.
+        pipeline = os.path.join(cell, "pipeline.yaml")
         print("| from one day to the next | contacts in 2 min, by size |\n| --- | --- |", flush=True)
         for what, sizes in CHANGES.items():
             counts = []
