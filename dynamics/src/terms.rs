@@ -234,6 +234,11 @@ pub trait Term: std::fmt::Debug + Send {
         None
     }
 
+    /// The inertia that it adds at a link's frame at this instant, for good or for a while, if that is what it is.
+    fn inertia_at(&self, _at: &MotionSample<'_>) -> Option<(usize, Inertia)> {
+        self.inertia()
+    }
+
     /// The curve of an `unknown` effect: all there is to it.
     fn table(&self) -> Option<&Table> {
         None

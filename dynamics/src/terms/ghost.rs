@@ -96,4 +96,8 @@ impl Term for Ghost {
     fn inertia(&self) -> Option<(usize, Inertia)> {
         (self.there == While::Always).then_some((self.link, self.inertia))
     }
+
+    fn inertia_at(&self, at: &MotionSample<'_>) -> Option<(usize, Inertia)> {
+        self.there.covers(at).then_some((self.link, self.inertia))
+    }
 }

@@ -370,6 +370,35 @@ fn what_alters_the_model_costs_the_same_either_way() {
 }
 
 #[test]
+fn a_body_costs_what_its_inertia_of_the_instant_costs() {
+    let robot = TwoJoints::new();
+    let motion = motion(&robot.model, 50);
+    let mut bodies = 0;
+    for effect in EFFECTS {
+        let site = robot.site_for(effect.place);
+        let mut term = (effect.build)(&site, &plausible(effect));
+        let added = run(&mut *term, &motion);
+        let is_body = motion
+            .iter()
+            .any(|at| term.inertia_at(&at.view()).is_some());
+        bodies += usize::from(is_body);
+        for (at, added) in motion.iter().zip(added).filter(|_| is_body) {
+            let mut expected = [0.0; 2];
+            if let Some((link, inertia)) = term.inertia_at(&at.view()) {
+                let ghost = robot.model.ghost(link, inertia);
+                let mut data = Data::new(&ghost);
+                let (q, qd, qdd) = (&at.position, &at.velocity, &at.acceleration);
+                expected.copy_from_slice(rnea(&ghost, &mut data, q, qd, qdd));
+            }
+            for j in 0..2 {
+                assert!((added[j] - expected[j]).abs() < 1e-9, "{}", effect.name);
+            }
+        }
+    }
+    assert!(bodies > 5, "{bodies}");
+}
+
+#[test]
 fn a_sign_is_full_at_a_few_hundredths_and_smooth_through_zero() {
     assert!((sign(0.02) - 1.0).abs() < 1e-7);
     assert!((sign(-0.02) + 1.0).abs() < 1e-7);

@@ -1,5 +1,7 @@
 //! How the effort of an explanation changes with each of its numbers.
 
+use std::borrow::Cow;
+use std::cell::OnceCell;
 use std::sync::Arc;
 
 use tauscope_dynamics::terms::{CoordinateKind, Layer, PlaceKind, Scale};
@@ -92,24 +94,31 @@ impl Fit {
         let alike = is_kept(problem, active) && !active.is_of_record();
         let known = alike.then(|| self.columns(problem, hypothesis, &active.shape()));
         let factors = hypothesis.factors();
+        let here = OnceCell::new();
         let one = |&c: &usize| {
             let at = factors.iter().position(|&factor| factor == c);
             match (&known, at) {
                 (Some(known), Some(at)) => Arc::clone(&known.factors[at]),
-                _ => Arc::new(self.sensitivity(problem, index, c)),
+                _ => Arc::new(self.sensitivity(problem, index, c, &here)),
             }
         };
         of.iter().map(one).collect()
     }
 
-    /// The difference quotient of one coordinate.
-    fn sensitivity(&self, problem: &Problem, index: usize, c: usize) -> Column {
+    /// The difference quotient of one coordinate. `here` keeps what the effect adds where it is, for its other coordinates.
+    fn sensitivity(
+        &self,
+        problem: &Problem,
+        index: usize,
+        c: usize,
+        here: &OnceCell<Column>,
+    ) -> Column {
         let active = &self.actives[index];
         let hypothesis = active.hypothesis;
         let step = step_of(problem, active, c);
         let mut there = active.clone();
         there.coordinates[c] += step;
-        let (mut values, base, joint);
+        let (mut values, base, joint): (_, Cow<'_, Vec<f64>>, _);
         if let Some(here) = self.parts.of(index)
             && self.parts.is_plain(&hypothesis)
         {
@@ -122,7 +131,7 @@ impl Fit {
                         .for_each(|(there, here)| *there = here + gain * (*there - here));
                 }
             }
-            (values, base, joint) = (column.values, here.values.clone(), column.joint);
+            (values, base, joint) = (column.values, Cow::Borrowed(&here.values), column.joint);
         } else if active.is_of_record() {
             let mut all = self.actives.clone();
             all[index] = there;
@@ -133,13 +142,14 @@ impl Fit {
             let explained = problem.measured[rows.clone()]
                 .iter()
                 .zip(&self.residual[rows]);
-            base = explained.map(|(m, r)| m - r).collect();
+            base = Cow::Owned(explained.map(|(m, r)| m - r).collect());
         } else {
             let there = self.added(problem, &there);
+            let here = here.get_or_init(|| self.added(problem, active));
             joint = there.joint;
-            (values, base) = (there.values, self.added(problem, active).values);
+            (values, base) = (there.values, Cow::Borrowed(&here.values));
         }
-        for (value, base) in values.iter_mut().zip(&base) {
+        for (value, base) in values.iter_mut().zip(base.iter()) {
             *value = (*value - base) / step;
         }
         Column { joint, values }

@@ -29,6 +29,8 @@ pub fn add(
     let of_units = (carrier.is_none()).then(|| in_units(problem, &*term));
     if let Some((unit, factors)) = of_units.flatten() {
         add_units(&units(problem, unit), &factors, into);
+    } else if hypothesis.is_body() && !hypothesis.lasts() && problem.rows <= MOST_ROWS {
+        add_for_a_while(problem, &*term, hypothesis.place.link, into);
     } else {
         if problem.rows <= MOST_ROWS && hypothesis.has_rotor() {
             term.expand(problem.expansion(hypothesis.place.joint));
@@ -81,6 +83,24 @@ fn in_units(problem: &Problem, term: &dyn Term) -> Option<(Unit, Vec<f64>)> {
     // What alters the robot but not gravity is no combination of units.
     let is_of_gravity = is_altered && change.iter().any(|change| *change != 0.0);
     is_of_gravity.then_some((Unit::Gravity, change))
+}
+
+/// Adds the effort of an inertia that a term adds at a link for a while.
+fn add_for_a_while(problem: &Problem, term: &dyn Term, link: usize, into: &mut [Vec<f64>]) {
+    let units = units(problem, Unit::Inertia(link));
+    for (r, (track, into)) in problem.tracks.iter().zip(into).enumerate() {
+        track.track.each(|k, at| {
+            let Some((_, inertia)) = term.inertia_at(at) else {
+                return;
+            };
+            let row = k * problem.joints..(k + 1) * problem.joints;
+            for (unit, factor) in units.iter().zip(inertia.parameters()) {
+                for (into, unit) in into[row.clone()].iter_mut().zip(&unit[r][row.clone()]) {
+                    *into += factor * unit;
+                }
+            }
+        });
+    }
 }
 
 fn add_units(units: &[TrackEfforts], factors: &[f64], into: &mut [Vec<f64>]) {
