@@ -1,10 +1,13 @@
 //! The context that every step of an explanation shares.
 
+use std::sync::Arc;
+
 use tauscope_dynamics::terms::{TermError, TermSpec};
 
 use crate::data::other_simulation::leave_out_other_states;
 use crate::data::problem::Problem;
 use crate::data::track::Track;
+use crate::data::work::Work;
 use crate::fit::fitted::Fit;
 use crate::physics::active::Hypothesis;
 use crate::physics::library;
@@ -29,6 +32,8 @@ pub struct Context<'a> {
     pub at_rest: bool,
     /// By how much another simulation's effort was late before it was put on the recordings' clock \[s\].
     pub twin_late_s: f64,
+    /// What was computed so far.
+    pub work: Arc<Work>,
 }
 
 impl Context<'_> {
@@ -100,6 +105,7 @@ impl Context<'_> {
             self.unit_nm,
             rests_count,
         );
+        problem.work = Arc::clone(&self.work);
         if !self.input.bodies && !self.at_rest {
             problem.is_foreign = true;
             leave_out_other_states(&mut problem);

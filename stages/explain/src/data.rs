@@ -23,3 +23,4 @@ pub mod smoother;
 pub mod standstill;
 pub mod track;
 pub mod units;
+pub mod work;

@@ -5,12 +5,14 @@ mod in_motion;
 mod judged;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use tauscope_dynamics::terms::TermError;
 
 use crate::context::Context;
 use crate::data::noise::white_noise;
 use crate::data::units::scales;
+use crate::data::work::Work;
 use crate::data::{other_simulation, remedies};
 use crate::outcome::Outcome;
 use crate::read::audit;
@@ -84,6 +86,10 @@ pub fn explain(
 /// Resolution: each joint may be in another's place, turned, and have another unit.
 const MOST_SLIPS_PER_JOINT: usize = 3;
 
+/// Once it has computed so much, a search names what it has and tries no more \[ns of one core\].
+/// Resolution: with what is not counted, about a minute.
+const MOST_WORK_NS: u64 = 40_000_000_000;
+
 /// What came of an attempt to explain.
 enum Attempt {
     Done(Box<Outcome>),
@@ -125,6 +131,7 @@ fn attempt(
         session_start_ns,
         at_rest,
         twin_late_s,
+        work: Arc::new(Work::bounded(MOST_WORK_NS)),
     };
     let mut judged = if at_rest {
         context.at_rest(progress)?
@@ -176,7 +183,7 @@ fn conclude(
         findings::doubt_patches(&mut named.findings);
     }
     let mut notes = named.notes;
-    notes.extend(notes::late_twin(context.twin_late_s));
+    notes.extend(context.notes());
     notes.extend(notes::not_handed_out(&proof, &found, &input.model, unit));
     notes.extend(notes::notes(
         input,
@@ -228,6 +235,16 @@ fn conclude(
         pictures: proof.pictures,
         trajectories: named.trajectories,
     })
+}
+
+impl Context<'_> {
+    /// Notes on how the twin was compared and what was not tried.
+    fn notes(&self) -> impl Iterator<Item = String> {
+        let untried = notes::untried(&self.work.untried());
+        untried
+            .into_iter()
+            .chain(notes::late_twin(self.twin_late_s))
+    }
 }
 
 fn sliding_joints(input: &Input) -> Vec<String> {

@@ -82,6 +82,7 @@ pub fn measure(input: &Input) -> Result<Result<Measured, String>, TermError> {
         session_start_ns: begins.min().unwrap_or(0),
         at_rest: false,
         twin_late_s: 0.0,
+        work: std::sync::Arc::default(),
     };
     let problem = context.problem(&input.fit, &vec![false; n])?;
     let count = |joint: usize| {

@@ -42,6 +42,7 @@ pub mod explanation;
 pub mod forward;
 pub mod free_body;
 pub mod grid;
+pub mod intervals;
 pub mod listed;
 pub mod nested;
 pub mod one_zero;

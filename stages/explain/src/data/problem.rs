@@ -10,6 +10,7 @@ use crate::data::column::Column;
 use crate::data::efforts::Efforts;
 use crate::data::memo::{ColumnCache, UnitEfforts};
 use crate::data::track::FitTrack;
+use crate::data::work::Work;
 
 /// Everything that a fit works on. A *signal* is joint-major: `rows` numbers for joint 0, then for joint 1,
 /// and so on; the rows of each joint are those of the tracks, one after the other.
@@ -47,6 +48,8 @@ pub struct Problem {
     pub is_foreign: bool,
     /// Columns that were computed before.
     pub cache: Arc<ColumnCache>,
+    /// What was computed so far, of all problems of an explanation.
+    pub work: Arc<Work>,
     /// What unit bodies cost.
     pub units: Arc<UnitEfforts>,
     pub(super) bare: OnceLock<Efforts>,

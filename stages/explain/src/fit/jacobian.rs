@@ -21,6 +21,12 @@ const SHAPE_STEP: f64 = 1e-5;
 /// Tuned: by hand, one sample at 100 Hz, on no recorded seeds; not swept.
 const TIME_STEP_S: f64 = 0.01;
 
+/// What a difference quotient costs for each joint and sample \[ns of one core\]: of a term with its filter, and of inverse
+/// dynamics.
+/// Resolution: by `perf record` of three recordings of real arms.
+const OF_TERM_NS: usize = 30;
+const OF_ROBOT_NS: usize = 330;
+
 impl Fit {
     /// The coordinates that are free, as (index of the active, index of the coordinate).
     pub fn parameters(&self) -> Vec<(usize, usize)> {
@@ -80,6 +86,24 @@ impl Fit {
         })
     }
 
+    /// What the derivatives by some coordinates cost \[ns of one core\], roughly.
+    pub fn cost(&self, problem: &Problem, free: &[(usize, usize)]) -> usize {
+        let samples: usize = problem.tracks.iter().map(|track| track.track.len()).sum();
+        let one = |&(i, c): &(usize, usize)| {
+            let active = &self.actives[i];
+            let joints = active.hypothesis.only_joint().map_or(problem.joints, |_| 1);
+            let alike = is_kept(problem, active) && !active.is_of_record();
+            if active.hypothesis.is_torque_scale() || alike && self.is_factor(i, c) {
+                joints * problem.rows
+            } else if active.hypothesis.effect.traits.bends {
+                OF_ROBOT_NS * joints * samples
+            } else {
+                OF_TERM_NS * joints * samples
+            }
+        };
+        free.iter().map(one).sum()
+    }
+
     /// How the explained effort changes with some coordinates of an active.
     fn sensitivities(&self, problem: &Problem, index: usize, of: &[usize]) -> Vec<Arc<Column>> {
         let active = &self.actives[index];
@@ -118,7 +142,7 @@ impl Fit {
         let step = step_of(problem, active, c);
         let mut there = active.clone();
         there.coordinates[c] += step;
-        let (mut values, base, joint): (_, Cow<'_, Vec<f64>>, _);
+        let (mut values, base, joint): (_, Cow<'_, [f64]>, _);
         if let Some(here) = self.parts.of(index)
             && self.parts.is_plain(&hypothesis)
         {
@@ -131,7 +155,7 @@ impl Fit {
                         .for_each(|(there, here)| *there = here + gain * (*there - here));
                 }
             }
-            (values, base, joint) = (column.values, Cow::Borrowed(&here.values), column.joint);
+            (values, base, joint) = (column.values, Cow::Borrowed(&here.values[..]), column.joint);
         } else if active.is_of_record() {
             let mut all = self.actives.clone();
             all[index] = there;
@@ -147,7 +171,7 @@ impl Fit {
             let there = self.added(problem, &there);
             let here = here.get_or_init(|| self.added(problem, active));
             joint = there.joint;
-            (values, base) = (there.values, Cow::Borrowed(&here.values));
+            (values, base) = (there.values, Cow::Borrowed(&here.values[..]));
         }
         for (value, base) in values.iter_mut().zip(base.iter()) {
             *value = (*value - base) / step;

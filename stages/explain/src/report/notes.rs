@@ -1,6 +1,9 @@
 //! Notes of the report beside the findings.
 
+use std::collections::BTreeSet;
+
 use crate::data::problem::Problem;
+use crate::data::work::Untried;
 use crate::fit::fitted::Fit;
 use crate::read::audit::losses;
 use crate::read::excerpt::Excerpts;
@@ -26,6 +29,21 @@ pub fn late_twin(late_s: f64) -> Option<String> {
         format!(
             "The effort of the twin's topic is {late_ms} ms late. So it was compared with the effort that was measured {late_ms} ms \
              before its stamp. Detectors that use the topic as it is see the lateness."
+        )
+    })
+}
+
+/// That the search ended at its bound, and what it left out.
+pub fn untried(untried: &BTreeSet<Untried>) -> Option<String> {
+    let each = untried.iter().map(|one| match one {
+        Untried::FurtherEffects => "effects beside those that were found",
+        Untried::OtherNames => "other names in the place of some that were found",
+    });
+    let each: Vec<&str> = each.collect();
+    (!each.is_empty()).then(|| {
+        format!(
+            "The search ended at its bound of computing. It did not try {}. To go on from here, explain the same recordings              beside the twin.yaml of this report, as `twin: {{model: twin.yaml}}` of the case.",
+            each.join(" and ")
         )
     })
 }

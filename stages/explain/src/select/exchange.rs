@@ -1,5 +1,6 @@
 //! Removes each effect in turn and tries every rival in its place.
 
+use crate::data::work::Untried;
 use crate::physics::active::{Hypothesis, TimeKind};
 use crate::select::curve_shapes::repeats;
 use crate::select::evidence::{LEAST_GAIN, independent};
@@ -37,6 +38,9 @@ impl Search<'_> {
     /// place. One pass.
     pub fn exchange(&self, mut best: Explanation) -> Explanation {
         for piece in pieces(&best) {
+            if self.problem.work.is_spent(Untried::OtherNames) {
+                return best;
+            }
             let Some(index) = place_of(&best, piece) else {
                 continue;
             };
@@ -64,6 +68,9 @@ impl Search<'_> {
         }
         for (i, a) in all.iter().enumerate() {
             for b in &all[..i] {
+                if self.problem.work.is_spent(Untried::OtherNames) {
+                    return best;
+                }
                 let joint = |piece: &Piece| piece.0.only_joint();
                 let (Some(first), Some(second)) = (place_of(&best, *a), place_of(&best, *b)) else {
                     continue;

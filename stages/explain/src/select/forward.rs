@@ -1,5 +1,6 @@
 //! Forward selection: adds one effect at a time, always the one with the most evidence.
 
+use crate::data::work::Untried;
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Hypothesis, TimeKind};
 use crate::select::cross_validation::carries_over;
@@ -67,6 +68,9 @@ impl Search<'_> {
             let Some(next) = self.best_of(&best, &proposals, best.fit.likelihood()) else {
                 break;
             };
+            if self.problem.work.is_spent(Untried::FurtherEffects) {
+                break;
+            }
             (self.say)(&describe(&next));
             let new = next.fit.actives.last().map(|active| active.hypothesis);
             let next = self.pruned(next);
@@ -183,7 +187,8 @@ fn to_refine<'a>(promising: &[&'a Proposal]) -> Vec<&'a Proposal> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixture::at_joint;
+    use crate::data::work::Work;
+    use crate::fixture::{at_joint, problem_with};
 
     #[test]
     fn the_same_effects_that_explain_no_more_are_a_circle_in_any_order() {
@@ -196,6 +201,27 @@ mod tests {
         assert!(!seen(&["torque_bias", "coulomb_friction"], 120.0).repeats(&earlier));
         assert!(!seen(&["torque_bias"], 90.0).repeats(&earlier));
         assert!(!seen(&["torque_bias", "torque_bias"], 90.0).repeats(&earlier));
+    }
+
+    #[test]
+    fn a_search_at_its_bound_says_that_it_left_out_an_effect_for_which_there_was_evidence() {
+        let found = |most: u64, friction_nm: f64| {
+            let mut problem = problem_with(3, |_, qd, effort| effort[1] += friction_nm * qd[1]);
+            problem.work = Work::bounded(most).into();
+            let search = Search {
+                problem: &problem,
+                hypotheses: &[at_joint("viscous_friction", 1)],
+                unnamed_bodies: &[],
+                say: &|_| {},
+            };
+            // What a step costs before the search.
+            problem.work.add(1);
+            let found = search.first_guess(Vec::new(), Vec::new());
+            (found.fit.actives.len(), problem.work.untried())
+        };
+        assert_eq!(found(u64::MAX, 2.0), (1, [].into()));
+        assert_eq!(found(0, 2.0), (0, [Untried::FurtherEffects].into()));
+        assert_eq!(found(0, 0.0), (0, [].into()), "nothing was left out");
     }
 
     #[test]

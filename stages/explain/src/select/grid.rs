@@ -55,3 +55,17 @@ pub fn shapes(problem: &Problem, hypothesis: Hypothesis) -> Vec<Vec<f64>> {
     }
     grid
 }
+
+/// Index of a hypothesis' shape, if it has exactly one.
+pub fn shape_index(hypothesis: Hypothesis) -> Option<usize> {
+    let coordinates = hypothesis.effect.coordinates.iter().enumerate();
+    let mut shapes = coordinates.filter(|(_, c)| matches!(c.kind, CoordinateKind::Shape { .. }));
+    let (first, _) = shapes.next()?;
+    shapes.next().is_none().then_some(first)
+}
+
+/// Index and value of the largest gain.
+pub fn best_of(gains: impl Iterator<Item = Option<f64>>) -> Option<(usize, f64)> {
+    let known = gains.enumerate().filter_map(|(i, gain)| Some((i, gain?)));
+    known.max_by(|(_, a), (_, b)| a.total_cmp(b))
+}

@@ -12,7 +12,7 @@ use crate::fit::fitted::{Fit, likelihood, variances};
 use crate::fit::least_squares::Products;
 use crate::physics::active::{Active, Hypothesis};
 use crate::physics::friction::least;
-use crate::select::grid::shapes;
+use crate::select::grid::{best_of, shape_index, shapes};
 use crate::select::trial::{Factored, Trial};
 
 /// How often the grid step is halved around its best value.
@@ -150,6 +150,20 @@ impl<'a> Base<'a> {
             &self.factored,
             &minimum(self.problem, hypothesis),
         )
+    }
+
+    /// The same with one factor before a row and another from then on, for each of these rows, which ascend.
+    pub fn first_order_scores_of_split(
+        &self,
+        hypothesis: Hypothesis,
+        column: &Column,
+        firsts: &[usize],
+    ) -> Vec<Option<f64>> {
+        let own = (&self.jacobian[..], &self.products);
+        let minimum = minimum(self.problem, hypothesis);
+        let trials = Trial::split(self.problem, self.fit, own, column, firsts).into_iter();
+        let gain = |trial: Trial<'_>| trial.gain(self.problem, &self.factored, &minimum);
+        trials.map(gain).collect()
     }
 
     /// First-order score of a hypothesis at one shape.
@@ -305,20 +319,6 @@ fn minimum(problem: &Problem, hypothesis: Hypothesis) -> Vec<f64> {
             _ => f64::NEG_INFINITY,
         });
     of.collect()
-}
-
-/// Index of a hypothesis' shape, if it has exactly one.
-fn shape_index(hypothesis: Hypothesis) -> Option<usize> {
-    let coordinates = hypothesis.effect.coordinates.iter().enumerate();
-    let mut shapes = coordinates.filter(|(_, c)| matches!(c.kind, CoordinateKind::Shape { .. }));
-    let (first, _) = shapes.next()?;
-    shapes.next().is_none().then_some(first)
-}
-
-/// Index and value of the largest gain.
-pub fn best_of(gains: impl Iterator<Item = Option<f64>>) -> Option<(usize, f64)> {
-    let known = gains.enumerate().filter_map(|(i, gain)| Some((i, gain?)));
-    known.max_by(|(_, a), (_, b)| a.total_cmp(b))
 }
 
 #[cfg(test)]

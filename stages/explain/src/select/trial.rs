@@ -58,7 +58,7 @@ impl Factored {
 }
 
 /// New columns: their products with those of a fit and with its residual.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Trial<'a> {
     fit: &'a Fit,
     own: &'a Products,
@@ -85,6 +85,9 @@ impl<'a> Trial<'a> {
         columns: &[C],
     ) -> Self {
         let (p, q) = (jacobian.len(), columns.len());
+        problem
+            .work
+            .add_products((p + q) * q * problem.rows * problem.joints);
         let mut trial = Self {
             fit,
             own,
@@ -133,6 +136,52 @@ impl<'a> Trial<'a> {
             trial.right.push(right);
         }
         trial
+    }
+
+    /// A trial of two columns for each of the rows `firsts`, in ascending order: what `column` has before that row, and
+    /// what it has from then on. Running sums serve all of them.
+    pub fn split<J: AsRef<Column>>(
+        problem: &Problem,
+        fit: &'a Fit,
+        (jacobian, own): (&[J], &'a Products),
+        column: &Column,
+        firsts: &[usize],
+    ) -> Vec<Self> {
+        let (p, joints) = (jacobian.len(), problem.joints);
+        problem.work.add_products((p + 2) * problem.rows * joints);
+        let blank = Self {
+            fit,
+            own,
+            cross: vec![DMatrix::zeros(p, 2); joints],
+            gram: vec![DMatrix::zeros(2, 2); joints],
+            right: vec![DVector::zeros(2); joints],
+            own_right: vec![None; joints],
+            square: own.square.clone(),
+        };
+        let mut trials = vec![blank; firsts.len()];
+        for j in 0..joints {
+            let rows = problem.joint_rows(j);
+            let (weight, e) = (&problem.weight[rows.clone()], &fit.residual[rows]);
+            let Some(column) = column.of_joint(j, problem.rows) else {
+                continue;
+            };
+            let parts = |other: &[f64]| split_dots(weight, column, other, firsts);
+            for (trial, [before, after]) in trials.iter_mut().zip(parts(column)) {
+                (trial.gram[j][(0, 0)], trial.gram[j][(1, 1)]) = (before, after);
+            }
+            for (trial, [before, after]) in trials.iter_mut().zip(parts(e)) {
+                (trial.right[j][0], trial.right[j][1]) = (before, after);
+            }
+            for (a, own) in jacobian.iter().enumerate() {
+                let Some(own) = own.as_ref().of_joint(j, problem.rows) else {
+                    continue;
+                };
+                for (trial, [before, after]) in trials.iter_mut().zip(parts(own)) {
+                    (trial.cross[j][(a, 0)], trial.cross[j][(a, 1)]) = (before, after);
+                }
+            }
+        }
+        trials
     }
 
     /// Products of all columns, the fit's own first.
@@ -235,6 +284,23 @@ impl<'a> Trial<'a> {
         let variance = variances(problem, &squares, &self.own.count);
         Some(likelihood(&variance, &self.own.count) - self.fit.likelihood())
     }
+}
+
+/// The weighted products of two columns before each of the rows `firsts`, in ascending order, and from then on.
+fn split_dots(weight: &[f64], a: &[f64], b: &[f64], firsts: &[usize]) -> Vec<[f64; 2]> {
+    let between =
+        |from: usize, to: usize| weighted_dot(&weight[from..to], &a[from..to], &b[from..to]);
+    let (mut before, mut from) = (0.0, 0);
+    let mut sums: Vec<f64> = Vec::with_capacity(firsts.len());
+    for &first in firsts {
+        before += between(from, first);
+        from = first;
+        sums.push(before);
+    }
+    let all = before + between(from, weight.len());
+    sums.into_iter()
+        .map(|before| [before, all - before])
+        .collect()
 }
 
 /// Factors of the columns in `used`, 0 for the others; `None` if the columns are dependent.

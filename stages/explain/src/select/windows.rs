@@ -9,7 +9,9 @@ use tauscope_dynamics::terms::CoordinateKind;
 use crate::data::column::Column;
 use crate::physics::active::Hypothesis;
 use crate::physics::active::TimeKind;
-use crate::select::propose::{Base, Proposal, best_of};
+use crate::select::grid::best_of;
+use crate::select::intervals::{STEPS, Steps, intervals};
+use crate::select::propose::{Base, Proposal};
 
 /// Shortest interval that is searched \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
@@ -20,21 +22,10 @@ const TRIED: usize = 4;
 /// Rows that a change point needs on either side.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_ROWS: usize = 8;
-/// Steps per recording on which change points are searched, and intervals at least. Their number's logarithm is the
-/// penalty for the choice of one time.
-/// Tuned: by hand, for what it costs in time; not swept.
-const STEPS: usize = 100;
 /// Shortest and longest step on which the ends of short intervals are searched \[s\].
 /// Resolution: half the step costs four times the time; the fit refines the times afterwards.
 const LEAST_STEP_S: f64 = 0.05;
 const MOST_STEP_S: f64 = 0.1;
-/// Of a recording with more than [`STEPS`] steps, intervals of more than this many steps are searched on twice the step,
-/// so that the shortest are found in a log of any length and the work grows no faster than the log.
-/// Resolution: the ends of an interval are searched to within a twentieth of its length.
-const FINE_STEPS: usize = 40;
-/// Intervals whose two ends differ by at most this many steps in sum count as the same.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const SAME_STEPS: usize = 4;
 /// Factors that are scanned. The inertias of a payload come after them and hardly change the effort.
 /// Physical: a payload's mass and first moments of mass.
 const SCANNED_FACTORS: usize = 4;
@@ -108,10 +99,9 @@ impl Base<'_> {
                 }
             }
         }
-        let scores = times
-            .iter()
-            .map(|&(first, _)| self.first_order_score(hypothesis, None, &split(first)));
-        let (best, _) = best_of(scores)?;
+        let firsts: Vec<usize> = times.iter().map(|(first, _)| *first).collect();
+        let scores = self.first_order_scores_of_split(hypothesis, whole, &firsts);
+        let (best, _) = best_of(scores.into_iter())?;
         let (first, time_s) = times[best];
         shape[time] = time_s;
         let mut proposal = self.propose_columns(hypothesis, &shape, None, &split(first))?;
@@ -279,43 +269,6 @@ impl Base<'_> {
     }
 }
 
-/// An interval in steps, and on how many of them at once its ends were searched.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Steps {
-    from: usize,
-    to: usize,
-    stride: usize,
-}
-
-impl Steps {
-    fn is_near(&self, other: &Self) -> bool {
-        let apart = self.from.abs_diff(other.from) + self.to.abs_diff(other.to);
-        apart <= SAME_STEPS * self.stride.max(other.stride)
-    }
-}
-
-/// The intervals of at least `shortest` steps that are searched among so many: all of few; of many, the longer the
-/// coarser.
-fn intervals(steps: usize, shortest: usize) -> Vec<Steps> {
-    let mut all = Vec::new();
-    let mut stride = 1;
-    let mut lengths = shortest..=if steps <= STEPS + 2 {
-        steps
-    } else {
-        FINE_STEPS
-    };
-    while lengths.start() * stride <= steps {
-        for from in (0..steps).step_by(stride) {
-            let ends = lengths.clone().map(|length| from + length * stride);
-            let ends = ends.take_while(|to| *to <= steps);
-            all.extend(ends.map(|to| Steps { from, to, stride }));
-        }
-        stride *= 2;
-        lengths = lengths.end() / 2 + 1..=*lengths.end();
-    }
-    all
-}
-
 fn time_indices(hypothesis: Hypothesis) -> Vec<usize> {
     let is_time = |kind| {
         matches!(
@@ -337,45 +290,37 @@ fn time_index(hypothesis: Hypothesis) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// How much of both together the best of the searched intervals shares with this one.
-    fn overlap(all: &[Steps], from: usize, to: usize) -> f64 {
-        let share = |other: &Steps| {
-            let common = other.to.min(to).saturating_sub(other.from.max(from));
-            common as f64 / (other.to.max(to) - other.from.min(from)) as f64
-        };
-        all.iter().map(share).fold(0.0, f64::max)
-    }
+    use crate::fit::fitted::Fit;
+    use crate::fixture::{at_joint, problem_with};
 
     #[test]
-    fn an_interval_of_any_length_is_found_in_a_log_of_any_length() {
-        for steps in [100, 820, 6000] {
-            let all = intervals(steps, 4);
-            for length in [4, 7, 33, 41, 79] {
-                // All of it lies within the log.
-                let from = (steps / 3 + 1).min(steps - length);
-                let share = overlap(&all, from, from + length);
-                assert!(share > 0.9, "{length} of {steps}: {share}");
-            }
-            let share = overlap(&all, 0, steps);
-            assert!(share > 0.9, "all of {steps}: {share}");
-        }
-    }
-
-    #[test]
-    fn the_work_grows_no_faster_than_the_log() {
-        let [short, long] = [1000, 10_000].map(|steps| intervals(steps, 4).len());
-        assert!(long < 11 * short, "{short} {long}");
-    }
-
-    #[test]
-    fn every_interval_lies_within_the_log() {
-        for steps in [3, 4, 5, 101, 103, 500] {
-            let all = intervals(steps, 4);
-            assert!(
-                all.iter()
-                    .all(|one| one.from + 4 <= one.to && one.to <= steps)
-            );
+    fn a_change_is_found_at_the_time_at_which_each_by_itself_would_score_best() {
+        let (mut samples, friction_nm) = (0, [0.5, 1.5]);
+        let problem = problem_with(6, |_, qd, effort| {
+            samples += 1;
+            effort[1] += friction_nm[usize::from(samples > 1200)] * qd[1].signum();
+        });
+        let hypothesis = at_joint("friction_step", 1);
+        let fit = Fit::new(
+            &problem,
+            vec![at_joint("viscous_friction", 0).with(vec![0.2])],
+        );
+        let base = Base::new(&problem, &fit, 40);
+        let shape = [0.0, 0.0, f64::NEG_INFINITY];
+        let whole = Column::clone(
+            fit.columns(&problem, hypothesis, &shape)
+                .factors
+                .last()
+                .unwrap(),
+        );
+        let firsts: Vec<usize> = (10..problem.rows - 10).step_by(7).collect();
+        let together = base.first_order_scores_of_split(hypothesis, &whole, &firsts);
+        for (&first, together) in firsts.iter().zip(together) {
+            let (mut before, mut after) = (whole.clone(), whole.clone());
+            before.values[first..].fill(0.0);
+            after.values[..first].fill(0.0);
+            let alone = base.first_order_score(hypothesis, None, &[before, after]);
+            assert!((together.unwrap() - alone.unwrap()).abs() < 1e-6, "{first}");
         }
     }
 }

@@ -1,0 +1,99 @@
+//! Intervals of a log that are searched for an effect that acts for a while.
+
+/// Steps per recording on which change points are searched, and intervals at least. Their number's logarithm is the
+/// penalty for the choice of one time.
+/// Tuned: by hand, for what it costs in time; not swept.
+pub const STEPS: usize = 100;
+/// Of a recording with more than [`STEPS`] steps, intervals of more than this many steps are searched on twice the step,
+/// so that the shortest are found in a log of any length and the work grows no faster than the log.
+/// Resolution: the ends of an interval are searched to within a twentieth of its length.
+const FINE_STEPS: usize = 40;
+/// Intervals whose two ends differ by at most this many steps in sum count as the same.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const SAME_STEPS: usize = 4;
+
+/// An interval in steps, and on how many of them at once its ends were searched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Steps {
+    /// First step.
+    pub from: usize,
+    /// The step after the last one.
+    pub to: usize,
+    stride: usize,
+}
+
+impl Steps {
+    /// Whether their ends are about the same.
+    pub fn is_near(&self, other: &Self) -> bool {
+        let apart = self.from.abs_diff(other.from) + self.to.abs_diff(other.to);
+        apart <= SAME_STEPS * self.stride.max(other.stride)
+    }
+}
+
+/// The intervals of at least `shortest` steps that are searched among so many: all of few; of many, the longer the
+/// coarser.
+pub fn intervals(steps: usize, shortest: usize) -> Vec<Steps> {
+    let mut all = Vec::new();
+    let mut stride = 1;
+    let mut lengths = shortest..=if steps <= STEPS + 2 {
+        steps
+    } else {
+        FINE_STEPS
+    };
+    while lengths.start() * stride <= steps {
+        for from in (0..steps).step_by(stride) {
+            let ends = lengths.clone().map(|length| from + length * stride);
+            let ends = ends.take_while(|to| *to <= steps);
+            all.extend(ends.map(|to| Steps { from, to, stride }));
+        }
+        stride *= 2;
+        lengths = lengths.end() / 2 + 1..=*lengths.end();
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// How much of both together the best of the searched intervals shares with this one.
+    fn overlap(all: &[Steps], from: usize, to: usize) -> f64 {
+        let share = |other: &Steps| {
+            let common = other.to.min(to).saturating_sub(other.from.max(from));
+            common as f64 / (other.to.max(to) - other.from.min(from)) as f64
+        };
+        all.iter().map(share).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn an_interval_of_any_length_is_found_in_a_log_of_any_length() {
+        for steps in [100, 820, 6000] {
+            let all = intervals(steps, 4);
+            for length in [4, 7, 33, 41, 79] {
+                // All of it lies within the log.
+                let from = (steps / 3 + 1).min(steps - length);
+                let share = overlap(&all, from, from + length);
+                assert!(share > 0.9, "{length} of {steps}: {share}");
+            }
+            let share = overlap(&all, 0, steps);
+            assert!(share > 0.9, "all of {steps}: {share}");
+        }
+    }
+
+    #[test]
+    fn the_work_grows_no_faster_than_the_log() {
+        let [short, long] = [1000, 10_000].map(|steps| intervals(steps, 4).len());
+        assert!(long < 11 * short, "{short} {long}");
+    }
+
+    #[test]
+    fn every_interval_lies_within_the_log() {
+        for steps in [3, 4, 5, 101, 103, 500] {
+            let all = intervals(steps, 4);
+            assert!(
+                all.iter()
+                    .all(|one| one.from + 4 <= one.to && one.to <= steps)
+            );
+        }
+    }
+}
