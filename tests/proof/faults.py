@@ -30,6 +30,7 @@ from robot import Robot
 
 RATE, WHITE_SHARE, PAUSE_S = 100., 0.5, 20.
 SOUND, FAULTY = (3, 1), (2, 1)                # recordings to fit and held out
+SHIFT_SHOWS = 3.                              # in standard deviations of the noise
 SURE = 0.5                                    # findings with less confidence are not counted as said
 SHORT = ["brake_drags", "encoder_remounted", "connectors_swapped"]
 
@@ -208,6 +209,9 @@ class Arm:
         target = float(np.exp(rng.uniform(*np.log(fault.size))))
         if fault.changes or fault.effect == "late_brake":
             loud = [j for j in range(robot.n) if c.swing[j] > 20. * c.sigma[j] and c.range[j] > 0.3]
+            if fault.changes in (zero_offset, eccentric_encoder):
+                shows = {j: shift_shows(fault, c, j) for j in loud}
+                loud = [j for j in loud if shows[j] > SHIFT_SHOWS] or sorted(loud, key=shows.get)[-1:]
             j = int(rng.choice(loud or [1]))
             if fault.changes:
                 return [], j
@@ -233,6 +237,13 @@ class Arm:
             if self.record(names, commands, starts, self.own + new, change):
                 return *self.explain(fault.name, fit, [x for x in names if x not in fit], "sound"), new, joint
         return None
+
+
+def shift_shows(fault, c, j):
+    """By how much a joint that stands elsewhere than recorded changes the efforts, in standard deviations of the noise at the joint that shows most."""
+    change = lambda m: fault.changes(m.q, m.v, np.zeros_like(m.q), j, np.random.default_rng(0))[0]
+    less = np.concatenate([c.robot.nominal.rnea(change(m), m.v, m.a) - c.rigid[m.recording] for m in c.fit_motions])
+    return float(np.max(np.sqrt(np.mean(less**2, 0)) / c.sigma))
 
 
 def late_brake(robot, j, size, commands, starts):

@@ -9,7 +9,7 @@
 //! is followed while nothing touches the robot.
 //!
 //! The threshold is set by a wish: so many false alarms an hour. How often the score exceeds what by chance is
-//! extrapolated from its peaks in contact-free data ([`Tail`]).
+//! extrapolated from its peaks in contact-free data ([`Tail`]), and known better the longer it runs (`going_on`).
 //!
 //! Where labels tell collisions from cooperations, what parts them is learnt, too ([`Kinds`]).
 //!
@@ -25,6 +25,7 @@
 //! 508, by `tauscope evaluate set.yaml --out results --detectors tauscope`. How flat their optimum is was not measured then.
 
 mod alarm;
+mod going_on;
 mod kinds;
 mod late;
 mod learning;
@@ -45,9 +46,9 @@ mod tail;
 mod usual;
 mod windows;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 use tauscope_bus::{TwinState, flags};
 
@@ -57,6 +58,7 @@ use crate::frame::{
     Setup, State, Task, Trained, Training, Verdict,
 };
 use alarm::Watch;
+use going_on::GoingOn;
 use late::{Late, LateIn};
 use learnt::ENOUGH_S;
 pub use learnt::{KindContacts, Kinds, Learnt, LearntJoint, LearntRest, LearntWindow, Smallest};
@@ -104,6 +106,12 @@ pub struct Settings {
     /// `tauscope evaluate` write it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub learnt: Option<HereOrFile<Learnt>>,
+    /// Whether it goes on learning while it runs: the more contact-free time it has seen, the lower its threshold may be.
+    pub keep_learning: bool,
+    /// A file that keeps what it learns while it runs from one run to the next; it need not exist yet, and goes before
+    /// `learnt`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub state: Option<PathBuf>,
 }
 
 impl Default for Settings {
@@ -113,6 +121,8 @@ impl Default for Settings {
             drift_s: 20.0,
             offset_from_first_s: 0.0,
             learnt: None,
+            keep_learning: true,
+            state: None,
         }
     }
 }
@@ -158,7 +168,16 @@ impl DetectorSettings for Settings {
     }
 
     fn found_by_evaluation(&self) -> Vec<&'static str> {
-        self.learnt.iter().map(|_| "learnt").collect()
+        let state = self.state.iter().map(|_| "state");
+        state.chain(self.learnt.iter().map(|_| "learnt")).collect()
+    }
+
+    fn state_file(&mut self) -> Option<&mut Option<PathBuf>> {
+        Some(&mut self.state)
+    }
+
+    fn state_schema(generator: &mut SchemaGenerator) -> Option<Schema> {
+        Some(generator.subschema_for::<Learnt>())
     }
 
     fn learnt_file(&self) -> Option<&Path> {
@@ -226,6 +245,8 @@ struct Tauscope {
     moved: Ring<MOVED>,
     place: Place,
     watch: Watch,
+    /// What further contact-free time tells of the threshold; nothing where it is not to go on.
+    going_on: Option<GoingOn>,
     kinds: Option<Kinds>,
     /// Of the newest alarm, what kinds are told by, and what was told.
     measurements: Option<Vector6<f64>>,
@@ -243,6 +264,13 @@ impl Detector for Tauscope {
 
     fn fault(&self) -> Option<String> {
         self.rate.fault()
+    }
+
+    fn learnt(&self) -> Option<State> {
+        let going_on = self.going_on.as_ref()?;
+        let mut learnt = self.windows.learnt();
+        learnt.peaks_since = going_on.peaks();
+        serde_json::to_value(learnt).ok()
     }
 
     fn judge(&mut self, sample: &TwinState) -> Judgement {
@@ -273,6 +301,7 @@ impl Detector for Tauscope {
         } else if let Some(since_ns) = self.watch.step(now_ns, score, &mut self.windows) {
             self.tell(sample, since_ns);
         }
+        self.go_on(sample, score);
         let contact = self.watch.contact_ns().map(|contact_ns| Seen {
             contact_ns,
             joints: Some(Place::loaded(&self.windows, contact_ns)),
@@ -293,7 +322,9 @@ impl Tauscope {
     /// One that takes its time to tell the kinds if `tells_kinds`.
     fn new(learnt: &Learnt, settings: &Settings, setup: &Setup, tells_kinds: bool) -> Self {
         let per_hour = settings.false_alarms_per_hour;
-        let threshold = learnt.tail.threshold(per_hour);
+        let mut going_on = (settings.keep_learning).then(|| GoingOn::new(learnt, per_hour));
+        let threshold =
+            (going_on.as_mut()).map_or_else(|| learnt.tail.threshold(per_hour), GoingOn::threshold);
         let mut windows = Windows::new(learnt, settings.follow());
         windows.seek(threshold, per_hour);
         Self {
@@ -303,9 +334,24 @@ impl Tauscope {
             moved: Ring::new(),
             place: Place::new(setup),
             watch: Watch::new(threshold, tells_kinds),
+            going_on,
             kinds: learnt.kinds,
             measurements: None,
             state: UNTOLD,
+        }
+    }
+
+    /// Goes on learning from a score.
+    fn go_on(&mut self, sample: &TwinState, score: f64) {
+        let Some(going_on) = &mut self.going_on else {
+            return;
+        };
+        let alarm = (self.watch.contact_ns()).map(|_| self.watch.threshold());
+        going_on.add(sample, self.windows.joints(), score, alarm);
+        if alarm.is_none() && going_on.is_due() {
+            let threshold = going_on.threshold();
+            self.watch.retune(threshold);
+            self.windows.retune(threshold);
         }
     }
 

@@ -95,6 +95,11 @@ impl Watch {
         self.threshold
     }
 
+    /// From now on the threshold is another one.
+    pub fn retune(&mut self, threshold: f64) {
+        self.threshold = threshold;
+    }
+
     pub fn reset(&mut self) {
         self.end();
         self.newest_low_ns = None;

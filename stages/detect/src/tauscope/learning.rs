@@ -81,6 +81,7 @@ impl Learnt {
                 scale: 1.0,
                 shape: 0.0,
             },
+            peaks_since: Vec::new(),
             free_s: Some(free_s(pieces)),
             smallest: Vec::new(),
             kinds: None,

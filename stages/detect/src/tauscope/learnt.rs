@@ -36,6 +36,10 @@ pub struct Learnt {
     pub rest: Option<LearntRest>,
     /// How often the score exceeds what by chance.
     pub tail: Tail,
+    /// Roots of the largest scores of the newest seconds in which the arm moved while the detector ran, at most an hour of
+    /// them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub peaks_since: Vec<f32>,
     /// How much of contact-free time all of it is from \[s\].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub free_s: Option<f64>,

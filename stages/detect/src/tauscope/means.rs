@@ -5,7 +5,7 @@ use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 use super::learnt::LearntJoint;
 use super::spans::{Follow, LONG, MIDDLE, SHORTEST, WINDOWS_S};
 use super::sums::Sums;
-use super::usual::{Step, Usual};
+use super::usual::{FEATURES, Step, Usual};
 
 /// So much of the usual noise of the next shorter window's mean a longer one's may be away from it: what has gone is not told any longer.
 /// Statistical: two standard deviations hold 95 % of Gaussian noise.
@@ -203,6 +203,11 @@ impl Means {
     /// The same, whatever the change of velocity tells.
     pub fn whole(&self, window: usize, joint: usize) -> f64 {
         self.sums.means[window][joint]
+    }
+
+    /// By joint, what each feature of what is usual weighs now.
+    pub fn usual_weights(&self) -> impl Iterator<Item = [f64; FEATURES]> + '_ {
+        self.usual.iter().map(Usual::weights)
     }
 
     /// How far the usual residual of a joint may be wrong \[effort unit\].

@@ -272,6 +272,12 @@ impl Rest {
         }
     }
 
+    /// From now on the threshold is another one.
+    pub fn retune(&mut self, threshold: f64) {
+        self.scale *= threshold / self.threshold;
+        self.threshold = threshold;
+    }
+
     pub fn reset(&mut self) {
         self.base.reset();
         self.end.forget();

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// Length of the blocks whose largest score counts \[s\].
 /// Statistical: twice the 0.5 s for which what is left of a residual stays, so that blocks are nearly independent.
-const BLOCK_S: f64 = 1.0;
+pub(super) const BLOCK_S: f64 = 1.0;
 /// Share of the blocks above the level from which the tail is told.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const ABOVE: f64 = 0.15;
@@ -72,20 +72,26 @@ impl Tail {
         for score in &mut blocks {
             *score = score.max(0.0).sqrt();
         }
+        Self::of_roots(&blocks, &mut Vec::with_capacity(blocks.len()))
+    }
+
+    /// The same from the roots of these scores, without an allocation where `scratch` has room for them.
+    pub(super) fn of_roots(blocks: &[f64], scratch: &mut Vec<f64>) -> Self {
         let count = blocks.len().max(1);
-        let mut sorted = blocks.clone();
-        sorted.sort_by(f64::total_cmp);
+        scratch.clear();
+        scratch.extend_from_slice(blocks);
+        scratch.sort_unstable_by(f64::total_cmp);
         let above = ((count as f64 * ABOVE) as usize).max(1);
-        let level = sorted
+        let level = scratch
             .len()
             .checked_sub(above + 1)
-            .map_or(0.0, |at| sorted[at]);
+            .map_or(0.0, |at| scratch[at]);
         let of_run = |run: &[f64]| run.iter().fold(0.0, |a, b| f64::max(a, b - level));
-        let mut excess: Vec<f64> = (blocks.split(|score| *score <= level))
-            .filter(|run| !run.is_empty())
-            .map(of_run)
-            .collect();
-        excess.sort_by(f64::total_cmp);
+        let runs = blocks.split(|score| *score <= level);
+        scratch.clear();
+        scratch.extend(runs.filter(|run| !run.is_empty()).map(of_run));
+        scratch.sort_unstable_by(f64::total_cmp);
+        let excess = scratch;
         // Probability-weighted moments (Hosking and Wallis 1987): a0 = E X, a1 = E X (1 - F).
         let n = excess.len().max(1) as f64;
         let a0 = excess.iter().sum::<f64>() / n;

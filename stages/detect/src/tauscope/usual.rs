@@ -13,7 +13,7 @@ use super::pieces::{FOLDS, Piece, marked, quantile};
 
 /// The features: a constant, viscous friction, Coulomb friction that sets in over these shares of the usual highest speed, and how much the
 /// expected effort has changed.
-const FEATURES: usize = 5;
+pub(super) const FEATURES: usize = 5;
 /// Coulomb friction sets in over these shares of the usual highest speed.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const SETS_IN: [f64; 2] = [0.1, 0.02];
@@ -155,6 +155,12 @@ impl LearntUsual {
         })
     }
 
+    /// Goes on from these weights. The constant is that of contact-free recordings: what lies below a residual is another
+    /// one after each start.
+    pub(super) fn go_on(&mut self, weights: [f64; FEATURES]) {
+        self.weights[1..].copy_from_slice(&weights[1..]);
+    }
+
     /// Whether it holds what it needs.
     pub(super) fn is_whole(&self) -> bool {
         let products = self.inverse_products.len() == FEATURES * FEATURES;
@@ -251,6 +257,11 @@ impl Usual {
             measured: Changes::default(),
             smooth: 0.0,
         }
+    }
+
+    /// What each feature weighs now.
+    pub fn weights(&self) -> [f64; FEATURES] {
+        self.weights.into()
     }
 
     /// A recording begins: what lay below the residual is not known any longer; how the joint rubs is.

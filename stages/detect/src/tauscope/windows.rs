@@ -94,6 +94,24 @@ impl Windows {
         self.recovery = Some(Recovery::default());
     }
 
+    /// From now on the threshold is another one.
+    pub fn retune(&mut self, threshold: f64) {
+        if let Some(rest) = &mut self.at_rest {
+            rest.retune(threshold);
+        }
+    }
+
+    /// What was learnt, with what has become usual since.
+    pub fn learnt(&self) -> Learnt {
+        let mut learnt = self.learnt.clone();
+        for (joint, weights) in learnt.joints.iter_mut().zip(self.means.usual_weights()) {
+            if let Some(usual) = &mut joint.usual {
+                usual.go_on(weights);
+            }
+        }
+        learnt
+    }
+
     pub fn reset(&mut self) {
         self.means.reset();
         if let Some(rest) = &mut self.at_rest {
