@@ -112,3 +112,39 @@ impl Search<'_> {
         evident.then_some(with)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{at_joint, problem_with};
+
+    /// What is left of Stribeck's friction with so little more at rest than in motion, which falls off at this speed, however
+    /// far ahead it seems to be.
+    fn simplified(speed_rad_s: f64) -> &'static str {
+        let problem = problem_with(7, |_, qd, effort| effort[1] += 1.5 * qd[1].signum());
+        let hypotheses = ["stribeck_friction", "coulomb_friction"].map(|name| at_joint(name, 1));
+        let search = Search {
+            problem: &problem,
+            hypotheses: &hypotheses,
+            unnamed_bodies: &[],
+            say: &|_| {},
+        };
+        let stribeck = hypotheses[0].with(vec![1.5, 1e-3, speed_rad_s]);
+        let best = Explanation {
+            fit: Fit::new(&problem, vec![stribeck]),
+            penalties: vec![-1e6],
+        };
+        let left = search.simplified(best, |_| 0.0);
+        left.fit.actives[0].hypothesis.effect.name
+    }
+
+    #[test]
+    fn a_shape_at_its_end_that_nothing_determines_is_the_simpler_effect() {
+        assert_eq!(simplified(0.02), "coulomb_friction");
+    }
+
+    #[test]
+    fn a_shape_within_its_range_stands_where_it_is_far_ahead() {
+        assert_eq!(simplified(0.3), "stribeck_friction");
+    }
+}

@@ -48,9 +48,7 @@ pub(super) fn odd_recording(found: Left<'_>) -> Option<OddRecording> {
         let joints: Vec<Option<Joint>> = (0..problem.joints)
             .map(|joint| odd_joint(problem, out, track, joint))
             .collect();
-        let count = joints.iter().flatten().count();
-        let falls = joints.iter().flatten().any(|joint| joint.falls);
-        (falls || count >= LEAST_JOINTS).then(|| OddRecording {
+        is_odd(&joints).then(|| OddRecording {
             name: problem.tracks[track].track.name.clone(),
             left: (joints.into_iter())
                 .map(|joint| joint.map(|joint| joint.left))
@@ -59,6 +57,12 @@ pub(super) fn odd_recording(found: Left<'_>) -> Option<OddRecording> {
     });
     let mut odd: Vec<OddRecording> = odd.collect();
     (odd.len() == 1).then(|| odd.remove(0))
+}
+
+/// Whether what the joints say of a recording makes it odd.
+fn is_odd(joints: &[Option<Joint>]) -> bool {
+    let odd = joints.iter().flatten();
+    odd.clone().any(|joint| joint.falls) || odd.count() >= LEAST_JOINTS
 }
 
 /// What a joint says of a recording that was left out, if it is odd there.
@@ -128,6 +132,18 @@ mod tests {
         let odd = said([1.0, 1.0, 2.0, 1.0]).expect("the third");
         assert_eq!(odd.name, "r3", "{odd:?}");
         assert!(odd.left[0].is_some() && odd.left[1].is_none(), "{odd:?}");
+    }
+
+    #[test]
+    fn three_joints_tell_where_none_of_them_is_clear_by_itself() {
+        let joint = || {
+            Some(Joint {
+                left: [3.0, 0.5],
+                falls: false,
+            })
+        };
+        assert!(is_odd(&[joint(), None, joint(), joint()]));
+        assert!(!is_odd(&[joint(), None, joint(), None]));
     }
 
     #[test]
