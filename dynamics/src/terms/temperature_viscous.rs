@@ -9,12 +9,16 @@ use super::{
 /// Friction leaves at least this share of what it was when cold: none goes for good.
 /// Tuned: not swept.
 const LEAST_LEFT: f64 = 0.1;
+/// Shortest time constant that is searched, and that is told \[s\]: what wants a shorter one is no warmth.
+/// Physical: no gearbox warms up at once.
+const SEARCHED_FROM_S: f64 = 3.0;
+const TOLD_FROM_S: f64 = 3.05;
 /// No joint warms up faster where one is drawn \[s\].
 /// Tuned: for simulated cells only, whose recordings are short; not swept.
 const FASTEST_DRAWN_S: f64 = 3.2;
 
 /// Effort (Fw + Fx exp(-t/T)) qd, t since the start of the recording: the joint is cold then. No gearbox warms up at
-/// once: T is searched from 3 s on.
+/// once: T is searched from 3 s on, and one that would be shorter is not told.
 pub(super) static EFFECT: Effect = Effect {
     name: "temperature_viscous",
     words: Words::new(
@@ -35,7 +39,7 @@ pub(super) static EFFECT: Effect = Effect {
     coordinates: &[
         Coordinate::positive_factor("viscous_warm_nms_per_rad"),
         Coordinate::positive_factor("viscous_extra_cold_nms_per_rad"),
-        Coordinate::shape("time_constant_s", 3.0, 900.0, 18, Scale::Log),
+        Coordinate::shape("time_constant_s", SEARCHED_FROM_S, 900.0, 18, Scale::Log),
     ],
     to_parameters: <[f64]>::to_vec,
     to_coordinates: <[f64]>::to_vec,
@@ -43,7 +47,7 @@ pub(super) static EFFECT: Effect = Effect {
         effect: &super::viscous_friction::EFFECT,
         numbers: &["viscous_warm_nms_per_rad"],
     }),
-    limit: Some(|_, x| x[0] >= LEAST_LEFT * (x[0] + x[1])),
+    limit: Some(|_, x| x[0] >= LEAST_LEFT * (x[0] + x[1]) && x[2] >= TOLD_FROM_S),
     excitation: Excitation::Speeds,
     simulated: Simulated::Joint,
     concealed: Some(|draw| {
