@@ -204,7 +204,18 @@ fn sentence(slip: &Slip, joints: &[String], unit: &str) -> String {
                 joint.map_or("all joints", name),
                 number(factor)
             ),
-            format!("Divide it by {} in the driver.", number(factor)),
+            match joint {
+                Some(_) => format!("Divide it by {} in the driver.", number(factor)),
+                None => format!(
+                    "Divide it by {} in the driver; or the clock of the stamps runs {}.",
+                    number(factor),
+                    if factor > 1.0 {
+                        format!("{} times too fast", number(factor))
+                    } else {
+                        format!("{} times too slowly", number(1.0 / factor))
+                    }
+                ),
+            },
         ),
         Remedy::Unmeasured(joint, effort) => (
             format!(
