@@ -152,9 +152,9 @@ mod tests {
         let all = told([57.3, 57.3]);
         assert!(all.len() == 1 && near(&all[0].0, None, 57.3), "{all:?}");
         // As a filter leaves them, or a clock that is wrong.
-        assert!(told([0.8, 0.95]).is_empty());
-        let slow = told([0.8, 0.81]);
-        assert!(slow.len() == 1 && near(&slow[0].0, None, 0.805), "{slow:?}");
+        assert!(told([0.85, 0.95]).is_empty());
+        let slow = told([0.85, 0.86]);
+        assert!(slow.len() == 1 && near(&slow[0].0, None, 0.855), "{slow:?}");
         let turned = told([-1.0, 1.0]);
         assert!(near(&turned[0].0, Some(0), -1.0), "{turned:?}");
     }
