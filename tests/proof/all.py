@@ -53,6 +53,10 @@ def main():
     only = [name for name in args.only.split(",") if name] or list(PARTS)
     if unknown := set(only) - set(PARTS):
         sys.exit(f"no such part: {', '.join(sorted(unknown))}")
+    # What was measured for an hour must not be lost for want of a page.
+    for page in ("proof.md", "proof-cases.md"):
+        if not (args.docs / page).is_file():
+            sys.exit(f"no such page: {args.docs / page}")
     subprocess.run(["cargo", "build", "--release", "--locked", "--quiet"], cwd=ROOT, check=True)
     # A copy, so that the next build may begin before the last part has ended.
     program = args.out / "tauscope"

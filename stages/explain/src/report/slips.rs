@@ -204,18 +204,7 @@ fn sentence(slip: &Slip, joints: &[String], unit: &str) -> String {
                 joint.map_or("all joints", name),
                 number(factor)
             ),
-            match joint {
-                Some(_) => format!("Divide it by {} in the driver.", number(factor)),
-                None => format!(
-                    "Divide it by {} in the driver; or the clock of the stamps runs {}.",
-                    number(factor),
-                    if factor > 1.0 {
-                        format!("{} times too fast", number(factor))
-                    } else {
-                        format!("{} times too slowly", number(1.0 / factor))
-                    }
-                ),
-            },
+            cure_of_velocity(joint, factor),
         ),
         Remedy::Unmeasured(joint, effort) => (
             format!(
@@ -230,6 +219,20 @@ fn sentence(slip: &Slip, joints: &[String], unit: &str) -> String {
     };
     let evidence = evidence(slip, joints, unit);
     format!("{wrong} {evidence}{cure}")
+}
+
+/// What mends velocities that are `factor` times what they should be, at a joint or at all.
+fn cure_of_velocity(joint: Option<usize>, factor: f64) -> String {
+    let mut text = format!("Divide it by {} in the driver", number(factor));
+    if joint.is_none() {
+        let runs = if factor > 1.0 {
+            format!("{} times too fast", number(factor))
+        } else {
+            format!("{} times too slowly", number(1.0 / factor))
+        };
+        text += &format!("; or the clock of the stamps runs {runs}");
+    }
+    text + "."
 }
 
 /// How far off torque constants are that must be multiplied by `factor`.
