@@ -42,7 +42,8 @@ pub fn untried(untried: &BTreeSet<Untried>) -> Option<String> {
     let each: Vec<&str> = each.collect();
     (!each.is_empty()).then(|| {
         format!(
-            "The search ended at its bound of computing. It did not try {}. To go on from here, explain the same recordings              beside the twin.yaml of this report, as `twin: {{model: twin.yaml}}` of the case.",
+            "The search ended at its bound of computing. It did not try {}. To go on from here, explain the same recordings \
+             beside the twin.yaml of this report, as `twin: {{model: twin.yaml}}` of the case.",
             each.join(" and ")
         )
     })
