@@ -25,7 +25,7 @@ const TIME_STEP_S: f64 = 0.01;
 /// dynamics.
 /// Resolution: by `perf record` of three recordings of real arms.
 const OF_TERM_NS: usize = 30;
-const OF_ROBOT_NS: usize = 330;
+const OF_ROBOT_NS: usize = 660;
 
 impl Fit {
     /// The coordinates that are free, as (index of the active, index of the coordinate).
