@@ -166,6 +166,13 @@ pub fn audit(problem: &Problem, is_scaled: bool) -> Audit {
         .collect();
     let mut reading = Reading::as_recorded(n);
     let mut model = problem.rigid().to_vec();
+    // What a corrected twin has beside its URDF. It stays, so that a position turned twice is the position as it was.
+    let urdf = trial.model(&reading);
+    let beside: Vec<f64> = model
+        .iter()
+        .zip(urdf)
+        .map(|(twin, urdf)| twin - urdf)
+        .collect();
     let mut found = Audit::default();
     // Each joint may be turned and be in another's place; more is another robot.
     while found.slips.len() < 2 * n {
@@ -189,7 +196,8 @@ pub fn audit(problem: &Problem, is_scaled: bool) -> Audit {
             let moved = (&new.position, &new.place, new.weighs)
                 != (&reading.position, &reading.place, reading.weighs);
             let model = if moved {
-                trial.model(&new)
+                let urdf = trial.model(&new).into_iter().zip(&beside);
+                urdf.map(|(urdf, beside)| urdf + beside).collect()
             } else {
                 model.clone()
             };
