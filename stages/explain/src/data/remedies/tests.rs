@@ -56,7 +56,9 @@ fn what_a_twin_has_beside_its_urdf_stays_while_remedies_are_tried() {
         let mut twin = Vec::new();
         let mut recording = fixture::recording(&model, seed, |q, _, effort| {
             twin.extend([effort[0] + 9.0 * (3.0 * q[0]).sin(), effort[1]]);
-            effort.iter_mut().for_each(|x| *x += 0.05 * noise.next());
+            for x in effort {
+                *x += 0.05 * noise.next();
+            }
         });
         recording.reference = twin;
         recording
