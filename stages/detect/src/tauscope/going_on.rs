@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn two_minutes_of_motion_and_a_standing_arm_tell_nothing() {
+    fn less_than_two_minutes_of_motion_and_a_standing_arm_tell_nothing() {
         for (blocks, velocity) in [(100, 0.5), (3700, 0.0)] {
             let found = after(blocks, velocity, usual, |_| None);
             assert!((found - MOST).abs() < 1e-9, "{found}");

@@ -14,10 +14,11 @@ pub enum Untried {
 }
 
 /// Multiplications of two columns in a nanosecond.
-/// Resolution: by `perf record` of three recordings of real arms.
+/// Resolution: by `perf record` of `explain` on one real arm and two simulated ones.
 const PRODUCTS_PER_NS: usize = 4;
 
-/// How much was computed, in nanoseconds of one core, roughly. It is counted and not timed, so that the same input gives the same report on every machine.
+/// How much was computed, in nanoseconds of one core, roughly. It is counted and not timed: the same input gives the same
+/// report on every machine.
 #[derive(Debug)]
 pub struct Work {
     most: u64,

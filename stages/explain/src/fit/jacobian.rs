@@ -23,7 +23,7 @@ const TIME_STEP_S: f64 = 0.01;
 
 /// What a difference quotient costs for each joint and sample \[ns of one core\]: of a term with its filter, and of inverse
 /// dynamics.
-/// Resolution: by `perf record` of three recordings of real arms.
+/// Resolution: by `perf record` of `explain` on one real arm and two simulated ones.
 const OF_TERM_NS: usize = 30;
 const OF_ROBOT_NS: usize = 660;
 

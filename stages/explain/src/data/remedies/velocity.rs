@@ -18,7 +18,7 @@ const EXPLAINS: f64 = 0.9;
 const SAME: f64 = 1.1;
 /// One factor of all joints is wrong from here on, if they are this near to each other: no filter slows all motions alike,
 /// but a wrong unit does, or a wrong clock.
-/// Tuned: by hand, on no recorded seeds; not swept. Real arms have 0.98 to 1.02.
+/// Tuned: by hand, on no recorded seeds; not swept.
 const OFF_TOGETHER: f64 = 1.1;
 const SAME_TOGETHER: f64 = 1.03;
 /// A joint tells if it is this fast, RMS \[rad/s or m/s\].
@@ -56,8 +56,8 @@ pub fn of_velocity(recordings: &[Recording], n: usize) -> Vec<Slip> {
         slopes,
     };
     let all_off = (off.len() == told.len()).then(|| together(SAME)).flatten();
-    let is_slight = |factor: &f64| !(1.0 / OFF_TOGETHER..=OFF_TOGETHER).contains(factor);
-    if let Some(factor) = all_off.or_else(|| together(SAME_TOGETHER).filter(is_slight)) {
+    let is_off_together = |factor: &f64| !(1.0 / OFF_TOGETHER..=OFF_TOGETHER).contains(factor);
+    if let Some(factor) = all_off.or_else(|| together(SAME_TOGETHER).filter(is_off_together)) {
         return vec![slip(None, factor, told)];
     }
     (off.iter().copied())
