@@ -17,8 +17,8 @@ pub enum Untried {
 /// Resolution: by `perf record` of `explain` on one real arm and two simulated ones.
 const PRODUCTS_PER_NS: usize = 4;
 
-/// How much was computed, in nanoseconds of one core, roughly. It is counted and not timed: the same input gives the same
-/// report on every machine.
+/// How much was computed, in nanoseconds of one core, roughly. It is counted and not timed: the same input gives the
+/// same report on every machine.
 #[derive(Debug)]
 pub struct Work {
     most: u64,
