@@ -6,6 +6,7 @@ mod output;
 mod picture;
 mod read;
 mod robot;
+mod served;
 mod twin;
 mod words;
 

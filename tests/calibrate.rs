@@ -43,3 +43,34 @@ fn a_detector_begins_anew_with_each_recording_whichever_was_recorded_first() {
         );
     }
 }
+
+#[test]
+fn a_joints_low_pass_is_chosen_unless_one_is_given() {
+    let folder = tempfile::tempdir().unwrap();
+    let cutoffs = |given: &[&str]| {
+        let twin = folder.path().join("twin.yaml");
+        let mut calibrate = tauscope();
+        calibrate
+            .args(["calibrate", "--force", "--robot"])
+            .arg(bundled().join("demo_arm.urdf"))
+            .arg(bundled().join("demo_train_sweep.mcap"))
+            .args(given)
+            .arg("--out")
+            .arg(&twin);
+        let out = Out::of(calibrate);
+        assert_eq!(out.code, 0, "{}", out.stderr);
+        let text = std::fs::read_to_string(twin).unwrap();
+        let file: TwinFile = serde_saphyr::from_str(&text).unwrap();
+        let own: Vec<f64> = (file.joints.values())
+            .filter_map(|joint| joint.effort_cutoff_hz)
+            .collect();
+        (file.filters.effort_cutoff_hz, own)
+    };
+    let (usual, chosen) = cutoffs(&[]);
+    assert!((usual - 4.5).abs() < 1e-9 && !chosen.is_empty());
+    assert!(
+        chosen.iter().all(|hz| (6.0..51.0).contains(hz)),
+        "{chosen:?}"
+    );
+    assert_eq!(cutoffs(&["--effort-cutoff-hz", "8"]), (8.0, Vec::new()));
+}

@@ -367,6 +367,26 @@ stages:
 }
 
 #[test]
+fn one_low_pass_for_a_twin_that_has_them_by_joint_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = std::fs::read_to_string(bundled().join("demo.twin.yaml")).unwrap();
+    let model = model.replacen("    gain:", "    effort_cutoff_hz: 9.0\n    gain:", 1);
+    write(&folder.path().join("twin.yaml"), &model);
+    let twin = |cutoff: &str| {
+        stages(&format!(
+            "- {{name: ingest, ingest: {{zenoh: {{connect: [tcp/127.0.0.1:7447]}}}}}}
+- {{name: twin, input: ingest, twin: {{model: twin.yaml{cutoff}}}}}
+"
+        ))
+    };
+    let out = check(folder.path(), &twin(", effort_cutoff_hz: 4.5"), &[]);
+    let said = "the twin's model has low-passes by joint";
+    assert!(out.code == 2 && out.stderr.contains(said), "{}", out.stderr);
+    let out = check(folder.path(), &twin(""), &[]);
+    assert_eq!(out.code, 0, "{}", out.stderr);
+}
+
+#[test]
 fn a_twin_made_for_another_robot_or_other_filters_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let model = std::fs::read_to_string(bundled().join("demo.twin.yaml")).unwrap();

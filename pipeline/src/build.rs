@@ -184,10 +184,17 @@ pub fn twin(
         torque_constants_nm_per_a: cell.facts.torque_constants_nm_per_a.clone(),
         tool_link: cell.tool_link(),
     };
+    let mut correction = correction(model, cell)?;
+    if config.effort_cutoff_hz.is_some() {
+        // One for all joints.
+        for joint in &mut correction.joints {
+            joint.effort_cutoff_hz = None;
+        }
+    }
     let config = config
         .clone()
         .with(config.filters(model.map(|model| model.filters)));
-    Ok(Twin::new(&config, setup, correction(model, cell)?)?)
+    Ok(Twin::new(&config, setup, correction)?)
 }
 
 /// A detector behind a twin of `cell` with this `model`, and what it shares with others.
@@ -255,7 +262,7 @@ pub fn detect_setup(
     })
 }
 
-/// A watch over a twin of `cell` with this `model` and low-pass on efforts.
+/// A watch over a twin of `cell` with this `model` and low-pass on efforts of joints that have none of their own there.
 ///
 /// # Errors
 /// If the model does not fit the cell.
@@ -266,10 +273,12 @@ pub fn watch(
     cell: &Cell,
 ) -> Result<Watch, BuildError> {
     let joints = detect_setup(model, cell)?.joints;
+    let own = correction(model, cell)?.joints;
+    let cutoffs = own.iter().map(|joint| joint.effort_cutoff_hz);
     let setup = watch::Setup {
         model: cell.model.clone(),
         effort_per_nm: joints.iter().map(|joint| joint.effort_per_nm).collect(),
-        effort_cutoff_hz,
+        effort_cutoff_hz: cutoffs.map(|own| own.unwrap_or(effort_cutoff_hz)).collect(),
     };
     Ok(Watch::new(config, &setup))
 }

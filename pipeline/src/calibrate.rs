@@ -1,12 +1,13 @@
 //! Calibration: what a twin's gain, offset and noise per joint are, and what the detectors' scores do
 //! while nothing touches the robot. The stages are the pipeline's own, so that the numbers hold there.
 
+mod cutoff;
+mod measured;
 mod spread;
 
 use std::path::{Path, PathBuf};
 
 use tauscope_bus::{JointState, SampleRef, Sink, StageError, TwinState, flags};
-use tauscope_detect::Detector;
 use tauscope_dynamics::effort_scale::{EffortScale, ScaleFault};
 use tauscope_ingest::{FileConfig, RecordedSource, Topics};
 use tauscope_twin::{
@@ -20,8 +21,6 @@ use crate::plausible::{Oddity, Plausible};
 use crate::provenance;
 use crate::replay::ReplayError;
 use crate::report::without_path;
-
-use spread::Spread;
 
 /// What to calibrate, and on what.
 #[derive(Debug)]
@@ -109,8 +108,14 @@ impl Job<'_> {
         if let Some(doubt) = calibrated.doubt.take() {
             return Err(doubt);
         }
-        let lost = self.measure(&mut calibrated.file, self.measured(), &|index, fraction| {
-            progress(self.fit.len() + index, fraction);
+        let measured = self.measured();
+        if self.twin.effort_cutoff_hz.is_none() {
+            self.choose_cutoffs(&mut calibrated.file, measured, &|index, fraction| {
+                progress(self.fit.len() + index, fraction);
+            })?;
+        }
+        let lost = self.measure(&mut calibrated.file, measured, &|index, fraction| {
+            progress(self.recordings() - measured.len() + index, fraction);
         })?;
         calibrated.lost += if self.validation.is_empty() { 0 } else { lost };
         Ok(calibrated)
@@ -167,8 +172,8 @@ impl Job<'_> {
                 gain_deviation: (from_topic && !in_nm)
                     .then_some(fit.gain.abs().max(f64::MIN_POSITIVE)),
                 offset: fit.offset,
-                noise: None,
                 explained: Some(fit.explained),
+                ..JointCorrection::default()
             };
             file.joints.insert(name.clone(), joint);
         }
@@ -179,54 +184,6 @@ impl Job<'_> {
             notes,
             doubt: stands.or(doubt.map(CalibrateError::from)),
         })
-    }
-
-    /// Measures the noise of the residual and the detectors' scores with the corrected twin `file` on
-    /// `recordings`, in which nothing may touch the robot, and writes them into it. Returns what was lost.
-    ///
-    /// # Errors
-    /// If a recording cannot be read, or the twin does not fit the cell.
-    pub fn measure(
-        &self,
-        file: &mut TwinFile,
-        recordings: &[PathBuf],
-        progress: &dyn Fn(usize, f64),
-    ) -> Result<u64, CalibrateError> {
-        let names = &self.cell.facts.joint_names;
-        let mut noise = vec![Spread::default(); names.len()];
-        let mut detectors = self
-            .detectors(file)
-            .map_err(|source| CalibrateError::Recording {
-                recording: recordings.first().cloned().unwrap_or_default(),
-                source,
-            })?;
-        let mut lost = 0;
-        for (index, recording) in recordings.iter().enumerate() {
-            let step = &mut |fraction| progress(index, fraction);
-            let mut plausible = Plausible::new(self.cell);
-            lost += self.each(recording, Some(file), &mut plausible, step, &mut |sample| {
-                for (spread, residual) in noise.iter_mut().zip(sample.residual) {
-                    spread.add(residual);
-                }
-                for (detector, spread) in &mut detectors {
-                    let judgement = detector.judge(sample);
-                    if judgement.ready {
-                        spread.add(judgement.score);
-                    }
-                }
-            })?;
-        }
-        for (name, spread) in names.iter().zip(&noise) {
-            if let Some(joint) = file.joints.get_mut(name) {
-                // About zero: a standing error of the twin is noise to a detector, too.
-                joint.noise = (spread.count > 0).then(|| spread.root_mean_square());
-            }
-        }
-        file.scores = (detectors.iter())
-            .filter(|(_, spread)| spread.count > 0)
-            .map(|(detector, spread)| (detector.name().to_owned(), spread.statistics()))
-            .collect();
-        Ok(lost)
     }
 
     /// What noise and scores are measured on.
@@ -240,7 +197,9 @@ impl Job<'_> {
 
     /// How many recordings are read, for a progress bar.
     pub fn recordings(&self) -> usize {
-        self.fit.len() + self.measured().len()
+        let measured = self.measured().len();
+        let chosen = usize::from(self.twin.effort_cutoff_hz.is_none()) * measured;
+        self.fit.len() + chosen + measured
     }
 
     /// Runs a recording through source and twin and hands over every sample whose filters have
@@ -312,16 +271,6 @@ impl Job<'_> {
             provenance: std::collections::BTreeMap::new(),
         }
     }
-
-    /// Every detector behind this twin, its score not yet measured.
-    fn detectors(&self, file: &TwinFile) -> Result<Vec<Scored>, ReplayError> {
-        let setup = build::detect_setup(Some(file), self.cell)?;
-        let all = tauscope_detect::Config::calibrated(&setup).map_err(build::BuildError::from)?;
-        Ok(all
-            .into_iter()
-            .map(|detector| (detector, Spread::default()))
-            .collect())
-    }
 }
 
 /// What is odd in a recording.
@@ -374,6 +323,3 @@ impl Sink for Settled<'_> {
         Ok(())
     }
 }
-
-/// A detector and what its score has done.
-type Scored = (Box<dyn Detector>, Spread);

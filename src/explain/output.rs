@@ -209,11 +209,8 @@ fn twin_text(
     provenance: &BTreeMap<String, String>,
     made: &mut Made,
 ) -> Result<String, Failure> {
-    let (file, unmeasured) = twin::file(request, kept, outcome, provenance);
-    if let Some(error) = unmeasured {
-        let note = format!("{TWIN} holds no noise and no scores: {error}.");
-        made.notes.push(note);
-    }
+    let (file, notes) = twin::file(request, kept, outcome, provenance);
+    made.notes.extend(notes);
     Ok(serde_saphyr::to_string(&file).context("the twin")?)
 }
 

@@ -12,16 +12,17 @@ use tauscope_twin::{Expected, JointCorrection, TwinFile};
 
 use super::input::Request;
 use super::read::Kept;
+use super::served::keep_what_serves;
 
 /// The corrected twin. Its noise, and the scores that thresholds rest on, are measured with the pipeline's
 /// own twin on the fitted recordings in which nothing came and went; where there is none they are left out,
-/// as they are where that twin fails, which is said.
+/// as they are where that twin fails. Returns with it what is to be said of it.
 pub fn file(
     request: &Request,
     kept: &Kept,
     outcome: &Outcome,
     provenance: &BTreeMap<String, String>,
-) -> (TwinFile, Option<CalibrateError>) {
+) -> (TwinFile, Vec<String>) {
     let topics = Topics {
         state: request.state_topic.clone(),
         command: None,
@@ -64,13 +65,35 @@ pub fn file(
     }
     let quiet = quiet(request, kept, &outcome.report);
     if quiet.is_empty() {
-        return (file, None);
+        return (file, Vec::new());
     }
     let mut measured = file.clone();
-    match job.measure(&mut measured, &quiet, &|_, _| {}) {
-        Ok(_) => (measured, None),
-        Err(error) => (file, Some(error)),
+    let before = before(request, &job);
+    let mut measure = || {
+        let notes = keep_what_serves(&job, &mut measured, &before, &quiet)?;
+        job.choose_cutoffs(&mut measured, &quiet, &|_, _| {})?;
+        job.measure(&mut measured, &quiet, &|_, _| {})?;
+        Ok::<_, CalibrateError>(notes)
+    };
+    match measure() {
+        Ok(notes) => (measured, notes),
+        Err(error) => {
+            let note = format!("twin.yaml holds no noise and no scores: {error}.");
+            (file, vec![note])
+        }
     }
+}
+
+/// The twin that the explanation started from.
+fn before(request: &Request, job: &Job<'_>) -> TwinFile {
+    if let Some(start) = &request.start {
+        return start.file.clone();
+    }
+    let mut file = job.file();
+    for name in &request.cell.facts.joint_names {
+        file.joints.insert(name.clone(), JointCorrection::default());
+    }
+    file
 }
 
 /// The fitted recordings that the corrected twin holds for from end to end.

@@ -96,7 +96,12 @@ impl Twin {
         }
         let filters = config.filters(None);
         let motion = MotionTracker::new(config.motion, joint_count, filters.velocity_cutoff_hz);
-        let effort_filter = Butterworth2::new(filters.effort_cutoff_hz);
+        let effort_filters: Vec<Butterworth2> = (correction.joints.iter())
+            .map(|joint| joint.effort_cutoff_hz.unwrap_or(filters.effort_cutoff_hz))
+            .map(Butterworth2::new)
+            .collect();
+        let settles_s = effort_filters.iter().map(Butterworth2::settling_time_s);
+        let efforts_settle_s = settles_s.fold(0.0, f64::max);
         let nm_per_unit = setup
             .torque_constants_nm_per_a
             .unwrap_or_else(|| vec![1.0; joint_count]);
@@ -104,7 +109,7 @@ impl Twin {
         Ok(Self {
             expected: config.expected,
             max_gap_s: config.max_gap_s,
-            settling_time_s: motion.settling_time_s() + effort_filter.settling_time_s(),
+            settling_time_s: motion.settling_time_s() + efforts_settle_s,
             model: setup.model.map(|model| {
                 let data = Data::new(&model);
                 (model, data)
@@ -116,8 +121,8 @@ impl Twin {
             nm_per_unit,
             motion,
             plain_zeros: PlainZeros::default(),
-            measured_filters: vec![effort_filter.clone(); joint_count],
-            expected_filters: vec![effort_filter; joint_count],
+            measured_filters: effort_filters.clone(),
+            expected_filters: effort_filters,
             previous_ns: None,
             reset_ns: 0,
             last_ns: None,

@@ -53,8 +53,10 @@ pub struct Robot {
 #[serde(deny_unknown_fields)]
 pub struct Filters {
     /// Low-pass on the velocity before it is differentiated \[Hz\].
+    #[schemars(range(min = 0.01, max = 10_000.0))]
     pub velocity_cutoff_hz: f64,
-    /// Low-pass on measured and expected effort \[Hz\].
+    /// Low-pass on measured and expected effort of joints that have none of their own \[Hz\].
+    #[schemars(range(min = 0.01, max = 10_000.0))]
     pub effort_cutoff_hz: f64,
 }
 
@@ -90,6 +92,10 @@ pub struct JointCorrection {
     /// small, the gain is not identifiable from these motions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub explained: Option<f64>,
+    /// Low-pass on this joint's measured and expected effort \[Hz\]; that of the `filters` where none is given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.01, max = 10_000.0))]
+    pub effort_cutoff_hz: Option<f64>,
 }
 
 /// A line's slope is a drive's gain where the line explains more than this share of the effort's variance,
@@ -118,6 +124,7 @@ impl Default for JointCorrection {
             offset: 0.0,
             noise: None,
             explained: None,
+            effort_cutoff_hz: None,
         }
     }
 }

@@ -222,6 +222,26 @@ fn somebody_elses_twin_is_corrected_like_our_own() {
 }
 
 #[test]
+fn a_joint_has_the_low_pass_that_its_correction_gives() {
+    let after_a_step = |own: Option<f64>, config: &Config| {
+        let mut correction = Correction::none(1);
+        correction.joints[0].effort_cutoff_hz = own;
+        let mut twin = Twin::new(config, setup(), correction).unwrap();
+        let samples =
+            (0..110).map(|i| sample(0.01 * f64::from(i), 0.0, 0.0, f64::from(u8::from(i > 99))));
+        run(&mut twin, samples).last().unwrap().residual[0]
+    };
+    let usual = Config::default();
+    let fast = Config {
+        effort_cutoff_hz: Some(9.0),
+        ..Config::default()
+    };
+    assert!(after_a_step(Some(9.0), &usual) > 1.2 * after_a_step(None, &usual));
+    let difference = after_a_step(Some(9.0), &usual) - after_a_step(None, &fast);
+    assert!(difference.abs() < 1e-12);
+}
+
+#[test]
 fn without_a_model_or_a_topic_there_is_no_twin() {
     let setup = Setup {
         model: None,

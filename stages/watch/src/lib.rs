@@ -38,8 +38,8 @@ pub struct Setup {
     /// Measured effort per torque at the joint, by joint in URDF order \[effort unit per N m\]. NaN where it is not
     /// known: such a joint is not used for payloads and forces.
     pub effort_per_nm: Vec<f64>,
-    /// Cutoff of the twin's low-pass on efforts \[Hz\].
-    pub effort_cutoff_hz: f64,
+    /// Cutoff of the twin's low-pass on efforts, by joint in URDF order \[Hz\].
+    pub effort_cutoff_hz: Vec<f64>,
 }
 
 /// The stage: takes twin states and emits one detection for each.

@@ -87,8 +87,13 @@ pub(super) struct Rows {
 
 impl Rows {
     pub fn new(setup: &Setup) -> Self {
-        let filter = Butterworth2::new(setup.effort_cutoff_hz);
-        let joints = setup.effort_per_nm.len().min(MAX_JOINTS);
+        let cutoffs = setup.effort_per_nm.iter().zip(&setup.effort_cutoff_hz);
+        let filters: Vec<_> = cutoffs
+            .take(MAX_JOINTS)
+            .map(|(_, &cutoff_hz)| Butterworth2::new(cutoff_hz))
+            .collect();
+        let joints = filters.len();
+        let settle_s = filters.iter().map(Butterworth2::settling_time_s);
         let prismatic = |j: usize| {
             let model = setup.model.as_ref();
             model.is_some_and(|model| model.joints()[j].kind == JointKind::Prismatic)
@@ -112,10 +117,10 @@ impl Rows {
             sums: Sums::default(),
             previous_s: None,
             start_ns: 0,
-            settling_s: filter.settling_time_s(),
+            settling_s: settle_s.fold(0.0, f64::max),
             reset_s: 0.0,
-            filters: (0..joints)
-                .map(|_| std::array::from_fn(|_| filter.clone()))
+            filters: (filters.iter())
+                .map(|filter| std::array::from_fn(|_| filter.clone()))
                 .collect(),
             row: Row {
                 stamp_ns: 0,

@@ -64,7 +64,7 @@ fn watch_since(stream: &mut Stream, duration_s: f64, since_s: f64) -> Vec<(Said,
     let setup = Setup {
         model: Some(stream.nominal.clone()),
         effort_per_nm: vec![1.0; 7],
-        effort_cutoff_hz: 4.0,
+        effort_cutoff_hz: vec![4.0; 7],
     };
     let mut stage = Watch::new(&Config::default(), &setup);
     let mut said = Vec::new();
@@ -137,7 +137,7 @@ fn a_watch_that_is_started_again_goes_on_watching() {
     let setup = |stream: &Stream| Setup {
         model: Some(stream.nominal.clone()),
         effort_per_nm: vec![1.0; 7],
-        effort_cutoff_hz: 4.0,
+        effort_cutoff_hz: vec![4.0; 7],
     };
     let mut stream = Stream::new(3).with(Act::Coulomb(1, 1.0), 110.0, FOR_GOOD);
     let mut said = Vec::new();
@@ -250,7 +250,7 @@ fn standstill_and_nonsense_say_nothing() {
     let setup = Setup {
         model: None,
         effort_per_nm: vec![f64::NAN; 7],
-        effort_cutoff_hz: 4.0,
+        effort_cutoff_hz: vec![4.0; 7],
     };
     let mut stage = Watch::new(&Config::default(), &setup);
     let mut said = Vec::new();
@@ -326,7 +326,7 @@ fn figures() {
     let setup = Setup {
         model: Some(stream.nominal.clone()),
         effort_per_nm: vec![1.0; 7],
-        effort_cutoff_hz: 4.0,
+        effort_cutoff_hz: vec![4.0; 7],
     };
     let mut stage = Watch::new(&Config::default(), &setup);
     let start = std::time::Instant::now();

@@ -23,6 +23,17 @@ impl Resolver<'_> {
             self.report
                 .push(problem.help("calibrate one for this robot: `tauscope calibrate`"));
         }
+        if model.scores.is_empty() {
+            return;
+        }
+        let mut own = model.joints.values().filter_map(|j| j.effort_cutoff_hz);
+        if config.effort_cutoff_hz.is_some() && own.next().is_some() {
+            let title = "`effort_cutoff_hz` is given, but the twin's model has low-passes by joint";
+            let problem = self.file.at(&place.key("effort_cutoff_hz"), title);
+            let help = "leave it out, or calibrate anew with --effort-cutoff-hz: its thresholds hold for no other";
+            self.report.push(problem.help(help));
+            return;
+        }
         let cutoffs = [
             (
                 "velocity_cutoff_hz",
@@ -41,9 +52,7 @@ impl Resolver<'_> {
                 reason = "both were written by people, not computed"
             )]
             let other = here.filter(|here| *here != there);
-            if let Some(here) = other
-                && !model.scores.is_empty()
-            {
+            if let Some(here) = other {
                 let title =
                     format!("`{key}` is {here}, but the twin's model was made with {there}");
                 let problem = self.file.at(&place.key(key), title);
