@@ -45,6 +45,7 @@ mod load_dependent_friction;
 mod load_squared_friction;
 mod payload;
 mod payload_in_recording;
+mod payload_in_session;
 mod payload_pickup;
 mod physics;
 mod presliding_hysteresis;
@@ -137,6 +138,7 @@ pub static EFFECTS: &[&Effect] = &[
     &contact_wall::EFFECT,
     &payload_pickup::EFFECT,
     &payload_in_recording::EFFECT,
+    &payload_in_session::EFFECT,
     &torque_delay::EFFECT,
     &torque_lowpass::EFFECT,
     &torque_saturation::EFFECT,

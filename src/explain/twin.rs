@@ -99,13 +99,19 @@ fn before(request: &Request, job: &Job<'_>) -> TwinFile {
 /// The fitted recordings that the corrected twin holds for from end to end.
 fn quiet(request: &Request, kept: &Kept, report: &Report) -> Vec<PathBuf> {
     let disturbs = |finding: &Finding, name: &str| {
-        let effect = terms::effect(&finding.effect);
+        let effect = terms::effect(finding.known_as());
         if effect.is_some_and(Effect::is_surface) {
             return true;
         }
+        let begins_s = kept.begins_s.get(name).copied();
+        let begins_s = begins_s.unwrap_or(f64::NEG_INFINITY);
+        if effect.is_some_and(|effect| effect.traits.in_session) {
+            // The end that is none has no interval.
+            let is_kept = finding.intervals_95.contains_key("t_start_s");
+            let changed_s = if is_kept { finding.t_start } else { finding.t_end };
+            return changed_s.is_some_and(|changed_s| begins_s < changed_s);
+        }
         if effect.is_some_and(|effect| effect.time() == Time::Step) {
-            let begins_s = kept.begins_s.get(name).copied();
-            let begins_s = begins_s.unwrap_or(f64::NEG_INFINITY);
             return finding
                 .t_start
                 .is_some_and(|changed_s| begins_s < changed_s);

@@ -248,6 +248,8 @@ pub struct Traits {
     pub off_in_urdf: Option<fn(&Link) -> f64>,
     /// It acts through the whole of one recording: its two times are those of a recording's ends.
     pub fills_recording: bool,
+    /// It acts from the start of the session to some time, or from some time to its end, in several recordings perhaps.
+    pub in_session: bool,
     /// It is estimated every night, whether it is there or not, and followed over weeks.
     pub is_followed: bool,
     /// What the smallest size that would have been found is told as: its first factor. `None` if that does not make it.
@@ -273,6 +275,7 @@ impl Traits {
         is_made_by_gears: |_| true,
         off_in_urdf: None,
         fills_recording: false,
+        in_session: false,
         is_followed: false,
         smallest_told_as: None,
     };

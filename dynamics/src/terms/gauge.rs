@@ -12,6 +12,9 @@ const LEAST_REST_S: f64 = 0.1;
 /// A joint of which nothing is known yet has moved for so long \[s\].
 /// Physical: longer than any recording.
 const LONG_S: f64 = 1e7;
+/// And so far \[rad or m\].
+/// Physical: farther than any joint moves in one direction.
+const FAR: f64 = 1e7;
 
 /// Reads what a curve is drawn against, sample by sample.
 #[derive(Debug, Clone)]
@@ -22,6 +25,9 @@ pub struct Gauge {
     band: f64,
     rested_s: f64,
     moved_s: f64,
+    /// Direction of the newest motion, and how far it has led \[rad or m\].
+    direction: f64,
+    travel: f64,
     turned: f64,
     load: Option<f64>,
 }
@@ -36,6 +42,8 @@ impl Gauge {
             band,
             rested_s: 0.0,
             moved_s: LONG_S,
+            direction: 0.0,
+            travel: FAR,
             turned: 0.0,
             load: None,
         }
@@ -76,6 +84,17 @@ impl Gauge {
                     self.moved_s += at.dt_s;
                 }
                 self.moved_s
+            }
+            Against::SinceTurn => {
+                let velocity = at.velocity[joint];
+                if velocity.abs() >= REST_RAD_S {
+                    let before = std::mem::replace(&mut self.direction, sign(velocity));
+                    if before * self.direction < 0.0 {
+                        self.travel = 0.0;
+                    }
+                    self.travel = FAR.min(self.travel + velocity.abs() * at.dt_s);
+                }
+                self.travel
             }
             Against::RecordingTime => at.recording_s,
             Against::SessionTime => at.session_s,
@@ -140,6 +159,18 @@ mod tests {
         };
         assert!(since(1) > LONG_S);
         assert!((since(4) - 0.1).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_way_since_a_joint_turned_round_counts_motion_alone() {
+        let ways = readings(
+            Against::SinceTurn,
+            &[(1.0, 0.0), (-1.0, 0.0), (0.0, 0.0), (-2.0, 0.0), (0.5, 0.0)],
+        );
+        assert!(ways[0] >= FAR);
+        for (way, wanted) in ways[1..].iter().zip([0.05, 0.05, 0.15, 0.025]) {
+            assert!((way - wanted).abs() < 1e-12, "{ways:?}");
+        }
     }
 
     #[test]

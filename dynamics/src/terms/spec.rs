@@ -118,9 +118,30 @@ impl TermSpec {
         afterwards.unwrap_or_else(|| self.clone())
     }
 
-    /// What it is at a time of its session: of what changes steadily, the simpler effect with the number that it has then.
+    /// A payload that is there for a part of the session as one that stays, if it is there at this time.
+    fn without_times(self, session_s: f64) -> Self {
+        let time = |name: &str| self.parameters.get(name).copied();
+        let is_there = time("t_start_s").is_some_and(|start_s| start_s <= session_s)
+            && time("t_end_s").is_some_and(|end_s| session_s < end_s);
+        if !is_there {
+            return self;
+        }
+        let mut parameters = self.parameters;
+        parameters.retain(|name, _| !name.starts_with("t_"));
+        Self {
+            effect: super::payload::EFFECT.name.to_owned(),
+            parameters,
+            ..self
+        }
+    }
+
+    /// What it is at a time of its session: of what changes steadily, the simpler effect with the number that it has then;
+    /// of what is there for a part of the session, that part aside, if it is there then.
     #[must_use]
     pub fn at_session(self, session_s: f64) -> Self {
+        if self.effect().is_ok_and(|e| e.traits.in_session) {
+            return self.without_times(session_s);
+        }
         let settled = self.effect().ok().and_then(|effect| {
             let (at, simpler) = (effect.traits.drifts?, effect.simpler?.effect);
             let value = |p: &super::Parameter| self.parameters.get(p.name).copied();

@@ -78,6 +78,8 @@ pub enum Against {
     LoadTurned,
     /// Time since a joint last stood still \[s\].
     SinceRest,
+    /// How far a joint has moved since it last turned round \[rad or m\].
+    SinceTurn,
     /// Time since the start of the recording \[s\].
     RecordingTime,
     /// Time since the start of the session \[s\].
@@ -176,6 +178,9 @@ impl Table {
                 "the time since the joint last stood still".to_owned()
             }
             Against::SinceRest => format!("the time since joint {} last stood still", joints[self.of_joint]),
+            Against::SinceTurn => {
+                format!("how far joint {} has moved since it last turned round", joints[self.of_joint])
+            }
             Against::RecordingTime => "the time since the start of the recording".to_owned(),
             Against::SessionTime => "the time since the start of the session".to_owned(),
         };

@@ -44,6 +44,7 @@ pub mod free_body;
 pub mod grid;
 pub mod intervals;
 pub mod listed;
+pub mod moments;
 pub mod nested;
 pub mod one_zero;
 pub mod parallel;

@@ -228,7 +228,7 @@ fn a_joint_has_the_low_pass_that_its_correction_gives() {
         correction.joints[0].effort_cutoff_hz = own;
         let mut twin = Twin::new(config, setup(), correction).unwrap();
         let samples =
-            (0..110).map(|i| sample(0.01 * f64::from(i), 0.0, 0.0, f64::from(u8::from(i > 99))));
+            (0..105).map(|i| sample(0.01 * f64::from(i), 0.0, 0.0, f64::from(u8::from(i > 99))));
         run(&mut twin, samples).last().unwrap().residual[0]
     };
     let usual = Config::default();

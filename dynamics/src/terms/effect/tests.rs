@@ -180,7 +180,8 @@ fn what_few_effects_have_fits_them() {
             "joint_zero_offset_in_recording",
             "joint_zero_slip",
             "late_position",
-            "payload_in_recording"
+            "payload_in_recording",
+            "payload_in_session"
         ]
     );
 }
@@ -199,7 +200,8 @@ fn effects_last_or_come_and_go() {
             "external_push",
             "contact_wall",
             "payload_pickup",
-            "payload_in_recording"
+            "payload_in_recording",
+            "payload_in_session"
         ]
     );
     let surfaces = EFFECTS.iter().filter(|e| e.is_surface());

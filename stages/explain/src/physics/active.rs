@@ -337,7 +337,7 @@ pub fn in_order(actives: &[Active]) -> Vec<&Active> {
 /// The knots of a joint's curve that are held at zero. A curve over the joint's own velocity is what remains beside Coulomb
 /// and viscous friction. These two make a straight line in each direction, so the slowest and the fastest knot of each
 /// direction are held at zero. So are those of the others where friction or an offset stands beside them: no load, the
-/// middle of a hysteresis, and long after a standstill.
+/// middle of a hysteresis, long after a standstill, and far from a turn.
 pub fn held_knots(curve: &Table, joint: usize) -> Vec<usize> {
     let last = curve.knots.len() - 1;
     match curve.against {
@@ -346,7 +346,7 @@ pub fn held_knots(curve: &Table, joint: usize) -> Vec<usize> {
             return zero.into_iter().collect();
         }
         Against::LoadTurned => return vec![last / 2],
-        Against::SinceRest => return vec![last],
+        Against::SinceRest | Against::SinceTurn => return vec![last],
         _ => {}
     }
     if !curve.is_friction_of(joint) {

@@ -68,7 +68,9 @@ impl Context<'_> {
             .map_or_else(Vec::new, |start| start.terms.clone());
         for (index, active) in found.actives.iter().enumerate() {
             let is_withheld = withheld.iter().any(|withheld| withheld.effect == index);
-            let lasts = active.hypothesis.lasts() && !active.is_curve_over_time();
+            let is_kept = active.hypothesis.effect.traits.in_session
+                && self.spec(active).effect != active.hypothesis.effect.name;
+            let lasts = is_kept || active.hypothesis.lasts() && !active.is_curve_over_time();
             if active.hypothesis.is_torque_scale() || !lasts || is_withheld {
                 continue;
             }

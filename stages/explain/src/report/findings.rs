@@ -346,6 +346,22 @@ fn when(
             let (Some(start), Some(end)) = (get("t_start_s"), get("t_end_s")) else {
                 return none;
             };
+            if active.hypothesis.effect.traits.in_session {
+                // An end that is none has no interval.
+                let (first_s, last_s) = search.problem.session_s();
+                let within = |t: f64| t.clamp(first_s, last_s);
+                for (name, t) in [("t_start_s", start), ("t_end_s", end)] {
+                    if within(t) != t {
+                        parameters.insert(name.to_owned(), number(within(t)));
+                        intervals.remove(name);
+                    }
+                }
+                return When {
+                    recording: None,
+                    start: Some(within(start)),
+                    end: Some(within(end)),
+                };
+            }
             let middle = 0.5 * (start + end);
             let track = search
                 .problem

@@ -60,6 +60,9 @@ fn of_curve(finding: &Finding) -> Option<&'static str> {
         (Against::SinceRest, _) => {
             "Joint {place}: its brake, for it may let go late; and lubricant that sets at rest."
         }
+        (Against::SinceTurn, _) => {
+            "Joint {place}: belt, coupling, gear and its screws; does something give or wind up each time it turns round?"
+        }
         (Against::RecordingTime | Against::SessionTime, _) => {
             "Joint {place}: what changed then? Heat, a brake that drags, a bearing, a loose connector, a sensor that drifts."
         }

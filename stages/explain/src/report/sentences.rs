@@ -130,8 +130,11 @@ fn with_interval(value: f64, unit: &str, interval: Option<&[f64; 2]>) -> String 
     if !unit.is_empty() {
         text += &format!(" {unit}");
     }
-    if let Some([low, high]) = interval {
-        text += &format!(" ({} to {})", number(*low), number(*high));
+    if let Some([low, high]) = interval.map(|ends| ends.map(number)) {
+        // A time may be known better than it is written.
+        if low != high {
+            text += &format!(" ({low} to {high})");
+        }
     }
     text
 }

@@ -33,6 +33,10 @@ const FIRST_S: f64 = 0.1;
 /// Physical: brakes, lubricants and springs settle within seconds; what takes longer is seen over the session.
 const SETTLED_S: f64 = 10.0;
 
+/// Knots of a curve over the way since the last turn: the first lies at 1/64 of the joint's range.
+/// Resolution: a thirtieth of a radian on a range of two; what winds up by less is friction at rest.
+const OCTAVES: u32 = 7;
+
 /// Curves to try in a joint.
 pub fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
     let mut all = Vec::new();
@@ -103,6 +107,13 @@ pub fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
     }
     let rested = since_rest_knots(problem, joint);
     add(Against::SinceRest, joint, rested, &[false, true]);
+    // What winds up at each turn acts against the motion.
+    add(
+        Against::SinceTurn,
+        joint,
+        since_turn_knots(problem, joint),
+        &[true],
+    );
     // A straight line: what bends over the session cannot be told from slow noise.
     if let Some(ends) = session_ends(problem, joint) {
         add(Against::SessionTime, joint, ends.to_vec(), &[false, true]);
@@ -118,6 +129,15 @@ fn since_rest_knots(problem: &Problem, joint: usize) -> Vec<f64> {
     let times = (0..).map(|k| FIRST_S * f64::from(1 << k));
     let times = times.take_while(|t| *t <= longest);
     std::iter::once(0.0).chain(times).collect()
+}
+
+/// Ways since the last turn \[rad or m\], each twice the one before, as far as the joint moves in one direction.
+fn since_turn_knots(problem: &Problem, joint: usize) -> Vec<f64> {
+    let position = readings(problem, Against::Position, joint);
+    let least = position.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = position.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let ways = (0..OCTAVES).map(|k| (most - least) / f64::from(1 << k));
+    std::iter::once(0.0).chain(ways.rev()).collect()
 }
 
 /// The first and the last time of the session \[s\], where it lasts.

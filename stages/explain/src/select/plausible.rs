@@ -24,8 +24,8 @@ const LEAST_GAIN_DRIFT: f64 = 0.01;
 /// Tuned: as the least that a step of friction leaves; not swept.
 const LEAST_LEFT: f64 = 0.1;
 
-/// Whether the times of an effect can be told: an effect that acts once begins and ends within one recording, and one that
-/// changes steadily changes enough over the session.
+/// Whether the times of an effect can be told: an effect that acts once begins and ends within one recording, unless it
+/// spans them, and one that changes steadily changes enough over the session.
 pub fn is_timely(problem: &Problem, active: &Active) -> bool {
     let x = &with_known(problem, active);
     if let Some(at) = active.hypothesis.effect.traits.drifts {
@@ -40,6 +40,7 @@ pub fn is_timely(problem: &Problem, active: &Active) -> bool {
         return more - less > least * more && less >= LEAST_LEFT * more;
     }
     match active.hypothesis.time_kind() {
+        TimeKind::Once if active.hypothesis.effect.traits.in_session => true,
         TimeKind::Once => {
             let [.., start_s, end_s] = x[..] else {
                 return true;

@@ -28,10 +28,10 @@ const LEAST_STEP_S: f64 = 0.05;
 const MOST_STEP_S: f64 = 0.1;
 /// Factors that are scanned. The inertias of a payload come after them and hardly change the effort.
 /// Physical: a payload's mass and first moments of mass.
-const SCANNED_FACTORS: usize = 4;
+pub(super) const SCANNED_FACTORS: usize = 4;
 /// An effect of a whole recording begins so long before it and ends so long after it \[s\].
 /// Resolution: the ends lie where no row is, so that the fit leaves them there.
-const BESIDE_S: f64 = 0.02;
+pub(super) const BESIDE_S: f64 = 0.02;
 /// Added to the diagonal of an interval's normal equations, as a share of their trace.
 /// Resolution: guards the factorisation of dependent columns.
 const RIDGE: f64 = 1e-9;
@@ -47,6 +47,9 @@ impl Base<'_> {
             TimeKind::Always => self.propose(hypothesis),
             TimeKind::Step => self.propose_step(hypothesis),
             TimeKind::EveryRecording => self.propose_interval(hypothesis, None),
+            TimeKind::Once if hypothesis.effect.traits.in_session => {
+                self.propose_moment(hypothesis)
+            }
             TimeKind::Once => (0..self.problem.tracks.len())
                 .filter_map(|track| {
                     if hypothesis.effect.traits.fills_recording {
@@ -190,23 +193,22 @@ impl Base<'_> {
         masked
     }
 
-    /// The most promising intervals \[s of recording time\]. The fit's own parameters stay fixed.
-    fn scan(&self, columns: &[Arc<Column>], only: Option<usize>) -> Vec<(f64, f64)> {
+    /// Normal equations of columns, summed over the rows of all bins before each.
+    pub(super) fn running_sums(
+        &self,
+        columns: &[Arc<Column>],
+        tracks: &[usize],
+        bins: usize,
+        bin_of: impl Fn(usize, usize) -> usize,
+    ) -> (Vec<DMatrix<f64>>, Vec<DVector<f64>>) {
         let problem = self.problem;
         let q = columns.len();
-        let tracks: Vec<usize> = match only {
-            Some(track) => vec![track],
-            None => (0..problem.tracks.len()).collect(),
-        };
-        let duration_s = self.longest_s(only);
-        let bin_s = (duration_s / STEPS as f64).clamp(LEAST_STEP_S, MOST_STEP_S);
-        let bins = (duration_s / bin_s).ceil() as usize + 1;
         let mut gram = vec![DMatrix::<f64>::zeros(q, q); bins + 1];
         let mut right = vec![DVector::<f64>::zeros(q); bins + 1];
-        for &r in &tracks {
+        for &r in tracks {
             let track = &problem.tracks[r];
             for (row, &k) in track.rows().zip(&track.compared) {
-                let bin = (track.track.time_s[k] / bin_s) as usize + 1;
+                let bin = bin_of(r, k) + 1;
                 for j in 0..problem.joints {
                     let at = j * problem.rows + row;
                     let weight = problem.weight[at] / self.fit.variance[j];
@@ -229,17 +231,31 @@ impl Base<'_> {
             let (before, here) = right.split_at_mut(bin);
             here[0] += &before[bin - 1];
         }
+        (gram, right)
+    }
+
+    /// The most promising intervals \[s of recording time\]. The fit's own parameters stay fixed.
+    fn scan(&self, columns: &[Arc<Column>], only: Option<usize>) -> Vec<(f64, f64)> {
+        let problem = self.problem;
+        let tracks: Vec<usize> = match only {
+            Some(track) => vec![track],
+            None => (0..problem.tracks.len()).collect(),
+        };
+        let duration_s = self.longest_s(only);
+        let bin_s = (duration_s / STEPS as f64).clamp(LEAST_STEP_S, MOST_STEP_S);
+        let bins = (duration_s / bin_s).ceil() as usize + 1;
+        let bin_of = |track: usize, k: usize| {
+            let time_s = problem.tracks[track].track.time_s[k];
+            (time_s / bin_s) as usize
+        };
+        let (gram, right) = self.running_sums(columns, &tracks, bins, bin_of);
         let shortest = ((SHORTEST_S / bin_s).ceil() as usize).max(1);
         let mut found: Vec<(f64, Steps)> = Vec::new();
         for interval in intervals(bins, shortest) {
-            let mut normal = &gram[interval.to] - &gram[interval.from];
+            let normal = &gram[interval.to] - &gram[interval.from];
             let rhs = &right[interval.to] - &right[interval.from];
-            let trace = normal.trace();
-            for a in 0..q {
-                normal[(a, a)] += RIDGE * trace + LEAST_RIDGE;
-            }
-            if let Some(factor) = normal.cholesky() {
-                found.push((rhs.dot(&factor.solve(&rhs)), interval));
+            if let Some(score) = gain(normal, &rhs) {
+                found.push((score, interval));
             }
         }
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -260,7 +276,7 @@ impl Base<'_> {
     }
 
     /// How long the recording lasts, or the longest of all \[s\].
-    fn longest_s(&self, only: Option<usize>) -> f64 {
+    pub(super) fn longest_s(&self, only: Option<usize>) -> f64 {
         let tracks = self.problem.tracks.iter().enumerate();
         tracks
             .filter(|(r, _)| only.is_none_or(|only| only == *r))
@@ -269,7 +285,7 @@ impl Base<'_> {
     }
 }
 
-fn time_indices(hypothesis: Hypothesis) -> Vec<usize> {
+pub(super) fn time_indices(hypothesis: Hypothesis) -> Vec<usize> {
     let is_time = |kind| {
         matches!(
             kind,
@@ -281,6 +297,16 @@ fn time_indices(hypothesis: Hypothesis) -> Vec<usize> {
         .filter(|(_, c)| is_time(c.kind))
         .map(|(i, _)| i)
         .collect()
+}
+
+/// By how much the best factors reduce the squares, from normal equations.
+pub(super) fn gain(mut normal: DMatrix<f64>, right: &DVector<f64>) -> Option<f64> {
+    let ridge = RIDGE * normal.trace() + LEAST_RIDGE;
+    for a in 0..right.len() {
+        normal[(a, a)] += ridge;
+    }
+    let factor = normal.cholesky()?;
+    Some(right.dot(&factor.solve(right)))
 }
 
 fn time_index(hypothesis: Hypothesis) -> Option<usize> {
