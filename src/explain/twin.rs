@@ -108,7 +108,11 @@ fn quiet(request: &Request, kept: &Kept, report: &Report) -> Vec<PathBuf> {
         if effect.is_some_and(|effect| effect.traits.in_session) {
             // The end that is none has no interval.
             let is_kept = finding.intervals_95.contains_key("t_start_s");
-            let changed_s = if is_kept { finding.t_start } else { finding.t_end };
+            let changed_s = if is_kept {
+                finding.t_start
+            } else {
+                finding.t_end
+            };
             return changed_s.is_some_and(|changed_s| begins_s < changed_s);
         }
         if effect.is_some_and(|effect| effect.time() == Time::Step) {

@@ -323,6 +323,20 @@ mod tests {
     }
 
     #[test]
+    fn what_was_picked_up_and_kept_is_a_payload_from_then_on() {
+        let carried = |from_s: f64, to_s: f64| {
+            let text = format!(
+                r#"{{"effect": "payload_in_session", "link": "tool", "parameters":
+                {{"mass_kg": 2.0, "t_start_s": {from_s:?}, "t_end_s": {to_s:?}}}}}"#
+            );
+            spec(&text)
+        };
+        let payload = r#"{"effect": "payload", "link": "tool", "parameters": {"mass_kg": 2.0}}"#;
+        assert_eq!(carried(50.0, 1e6).at_session(100.0), spec(payload));
+        assert_eq!(carried(-1e6, 50.0).at_session(100.0), carried(-1e6, 50.0));
+    }
+
+    #[test]
     fn less_friction_than_the_twin_has_is_a_term() {
         let less = spec(&VISCOUS.replace("3.0", "-3.0"));
         assert_eq!(less.build(&joints()).unwrap().coordinates(), [-3.0]);

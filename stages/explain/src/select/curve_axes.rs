@@ -250,4 +250,20 @@ mod tests {
             );
         }
     }
+
+    #[test]
+    fn what_winds_up_at_each_turn_is_drawn_over_the_way_since_then() {
+        let (mut turned_rad, mut before) = (0.0_f64, None);
+        let problem = problem_with(4, |q, qd, effort| {
+            // The spring of a drive whose friction lies behind it.
+            let by = q[1] - before.replace(q[1]).unwrap_or(q[1]);
+            turned_rad = (turned_rad + by).clamp(-0.1, 0.1);
+            effort[1] += 2.0 * (turned_rad / 0.1 - qd[1].signum());
+        });
+        let nothing = Fit::new(&problem, Vec::new());
+        let base = Base::new(&problem, &nothing, 40);
+        let curve = base.propose_curve(1).unwrap();
+        let drawn = curve.active.curve.as_ref().unwrap();
+        assert_eq!((drawn.against, drawn.of_joint), (Against::SinceTurn, 1));
+    }
 }
