@@ -11,6 +11,7 @@ mod asymmetric_coulomb;
 mod backlash;
 mod base_tilt;
 mod base_tilt_in_recording;
+mod bias_step;
 mod cable_spring;
 mod concealed;
 mod contact_wall;
@@ -27,6 +28,7 @@ mod friction_drift;
 mod friction_step;
 mod gain_drift;
 mod gain_ripple;
+mod gain_step;
 mod gauge;
 mod gear_efficiency;
 mod ghost;
@@ -69,6 +71,7 @@ mod torque_saturation;
 mod transmission_coupling;
 mod two_masses;
 mod viscous_friction;
+mod viscous_step;
 mod wave;
 pub mod words;
 
@@ -109,12 +112,14 @@ pub static EFFECTS: &[&Effect] = &[
     &quadratic_drag::EFFECT,
     &temperature_viscous::EFFECT,
     &friction_step::EFFECT,
+    &viscous_step::EFFECT,
     &friction_drift::EFFECT,
     &late_brake::EFFECT,
     &subtracted_friction::EFFECT,
     &rotor_inertia::EFFECT,
     &torque_gain::EFFECT,
     &torque_bias::EFFECT,
+    &bias_step::EFFECT,
     &transmission_coupling::EFFECT,
     &counterbalance_spring::EFFECT,
     &cable_spring::EFFECT,
@@ -131,6 +136,7 @@ pub static EFFECTS: &[&Effect] = &[
     &joint_zero_slip::EFFECT,
     &encoder_eccentricity::EFFECT,
     &gain_drift::EFFECT,
+    &gain_step::EFFECT,
     &gain_ripple::EFFECT,
     &late_effort::EFFECT,
     &late_position::EFFECT,

@@ -176,9 +176,12 @@ fn what_few_effects_have_fits_them() {
         plain.map(|e| e.name).collect::<Vec<_>>(),
         [
             "absent_tool",
+            "viscous_step",
+            "bias_step",
             "base_tilt_in_recording",
             "joint_zero_offset_in_recording",
             "joint_zero_slip",
+            "gain_step",
             "late_position",
             "payload_in_recording",
             "payload_in_session"

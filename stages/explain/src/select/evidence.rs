@@ -1,7 +1,7 @@
 //! How much evidence an effect needs, and how much of the residual it must explain.
 
 use nalgebra::{DMatrix, DVector};
-use tauscope_dynamics::terms::{Against, CoordinateKind};
+use tauscope_dynamics::terms::{Against, CoordinateKind, Layer};
 
 use crate::data::column::Column;
 use crate::data::effective_samples;
@@ -164,8 +164,13 @@ pub fn needs(hypothesis: Hypothesis, fit: &Fit) -> (f64, f64) {
         a.curve.is_some() && (once || a.hypothesis.only_joint() == joint) && !goes_with(a)
     };
     let beside_curve = (once || joint.is_some()) && fit.actives.iter().any(curve);
+    // An offset that jumps follows slow noise as well as what acts once does.
+    let follows_noise =
+        hypothesis.time_kind() == TimeKind::Step && hypothesis.effect.layer == Layer::Record;
     let (evidence, size) = if once {
         (INTERVAL_EVIDENCE, LEAST_SIZE_OF_INTERVAL)
+    } else if follows_noise {
+        (INTERVAL_EVIDENCE, LEAST_SIZE)
     } else {
         (LEAST_EVIDENCE, LEAST_SIZE)
     };

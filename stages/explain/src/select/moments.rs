@@ -95,7 +95,7 @@ mod tests {
 
     use super::*;
     use crate::fit::fitted::Fit;
-    use crate::fixture::{Noise, model, problem, recording};
+    use crate::fixture::{Noise, at_joint, model, problem, problem_with, recording};
     use crate::physics::active::Whereabouts;
 
     /// What is said of three recordings in the first `with` of which the small arm carries 2 kg: from when to when, and
@@ -144,6 +144,37 @@ mod tests {
         for with in [1, 2] {
             let [from_s, _, mass_kg] = said(with);
             assert!(from_s < -1.0 && (mass_kg - 2.0).abs() < 0.1, "{mass_kg}");
+        }
+    }
+
+    #[test]
+    fn what_changes_once_is_told_with_what_it_was_before_and_is_since() {
+        for (effect, sizes) in [
+            ("viscous_step", [1.5, 0.5]),
+            ("bias_step", [-0.5, 1.0]),
+            ("gain_step", [0.0, 0.4]),
+        ] {
+            let mut samples = 0;
+            let problem = problem_with(6, |_, qd, effort| {
+                samples += 1;
+                let size = sizes[usize::from(samples > 1200)];
+                effort[1] += match effect {
+                    "viscous_step" => size * qd[1],
+                    "bias_step" => size,
+                    _ => size * effort[1],
+                };
+            });
+            let nothing = Fit::new(&problem, Vec::new());
+            let base = Base::new(&problem, &nothing, 40);
+            let proposal = base.propose_in_time(at_joint(effect, 1)).unwrap();
+            let [before, after, _] = proposal.active.coordinates[..] else {
+                panic!("three numbers");
+            };
+            let near = |is: f64, wanted: f64| (is - wanted).abs() < 0.1;
+            assert!(
+                near(before, sizes[0]) && near(after, sizes[1]),
+                "{effect}: {before} {after}"
+            );
         }
     }
 }
