@@ -208,8 +208,8 @@ fn sentence(slip: &Slip, joints: &[String], unit: &str) -> String {
         ),
         Remedy::Unmeasured(joint, effort) => (
             format!(
-                "The effort of {} is {} {unit} in every sample, while the joint moves: nothing measures it, and nothing is \
-                 said of the joint.",
+                "The effort of {} stays the same through each recording, such as {} {unit}, while the joint moves: nothing \
+                 measures it, and nothing is said of the joint.",
                 name(joint),
                 number(effort)
             ),

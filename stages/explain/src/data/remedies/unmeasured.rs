@@ -4,7 +4,8 @@ use super::{Remedy, Slip};
 use crate::read::audit::is_unmeasured;
 use crate::read::recording::Recording;
 
-/// The joints, of `n`, whose effort is one number while they move, in every recording in which they do.
+/// The joints, of `n`, whose effort stays one number through every recording, and that move in some: a channel that
+/// stands still holds another number each time it is started.
 pub fn of_unmeasured(recordings: &[Recording], n: usize) -> Vec<Slip> {
     let with_effort = || recordings.iter().filter(|one| !one.effort.is_empty());
     let number = |joint: usize| {
@@ -12,11 +13,9 @@ pub fn of_unmeasured(recordings: &[Recording], n: usize) -> Vec<Slip> {
         let silent = with_effort().filter(|one| is_unmeasured(one, joint, n));
         let first = silent.clone().next().and_then(of)?;
         let same = |one: &Recording| {
-            one.effort
-                .iter()
-                .skip(joint)
-                .step_by(n)
-                .all(|x| x.to_bits() == first.to_bits())
+            let mut efforts = one.effort.iter().skip(joint).step_by(n);
+            let held = efforts.next().map(|x| x.to_bits());
+            efforts.all(|x| Some(x.to_bits()) == held)
         };
         with_effort().all(same).then_some(first)
     };
@@ -52,6 +51,10 @@ mod tests {
         let told = of_unmeasured(&recordings, 2);
         assert_eq!(told.len(), 1);
         assert_eq!(told[0].remedy, Remedy::Unmeasured(1, 0.37));
+        // Another number in another recording is none the less one number there.
+        let other = recordings[1].effort.iter_mut().skip(1).step_by(2);
+        other.for_each(|x| *x = -0.51);
+        assert_eq!(of_unmeasured(&recordings, 2).len(), 1);
         // In one recording it does change.
         recordings[1].effort[21] += 0.01;
         assert!(of_unmeasured(&recordings, 2).is_empty());
