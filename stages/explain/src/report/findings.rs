@@ -351,7 +351,7 @@ fn when(
                 let (first_s, last_s) = search.problem.session_s();
                 let within = |t: f64| t.clamp(first_s, last_s);
                 for (name, t) in [("t_start_s", start), ("t_end_s", end)] {
-                    if within(t) != t {
+                    if t < first_s || t > last_s {
                         parameters.insert(name.to_owned(), number(within(t)));
                         intervals.remove(name);
                     }

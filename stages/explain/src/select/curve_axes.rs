@@ -97,13 +97,8 @@ pub fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
     }
     let driven = with_zero(even(Against::DrivenLoad, joint, KNOTS));
     add(Against::DrivenLoad, joint, driven, &[true]);
-    let load = readings(problem, Against::Load, joint);
-    for share in HYSTERESIS {
-        let band = share * deviation(&load);
-        let knots = (0..=2 * KNOTS_OF_SIDE).map(|k| band * (k as f64 / KNOTS_OF_SIDE as f64 - 1.0));
-        if band > 0.0 {
-            add(Against::LoadTurned, joint, knots.collect(), &[false]);
-        }
+    for knots in hysteresis_knots(problem, joint) {
+        add(Against::LoadTurned, joint, knots, &[false]);
     }
     let rested = since_rest_knots(problem, joint);
     add(Against::SinceRest, joint, rested, &[false, true]);
@@ -119,6 +114,18 @@ pub fn curves(problem: &Problem, joint: usize) -> Vec<Table> {
         add(Against::SessionTime, joint, ends.to_vec(), &[false, true]);
     }
     all
+}
+
+/// Knots of hystereses of several bands \[N m or N\], where the joint bears a load that changes.
+fn hysteresis_knots(problem: &Problem, joint: usize) -> Vec<Vec<f64>> {
+    let spread = deviation(&readings(problem, Against::Load, joint));
+    let sides = 0..=2 * KNOTS_OF_SIDE;
+    let of_band = |band: f64| {
+        let at = |k: usize| band * (k as f64 / KNOTS_OF_SIDE as f64 - 1.0);
+        sides.clone().map(at).collect()
+    };
+    let bands = HYSTERESIS.iter().map(|share| share * spread);
+    bands.filter(|band| *band > 0.0).map(of_band).collect()
 }
 
 /// Times since the last rest \[s\], each twice the one before, as far as the joint moves.
