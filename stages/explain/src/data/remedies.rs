@@ -168,7 +168,7 @@ pub fn audit(problem: &Problem, is_scaled: bool) -> Audit {
     let mut model = problem.rigid().to_vec();
     // What a corrected twin has beside its URDF. It stays, so that a position turned twice is the position as it was.
     let urdf = trial.model(&reading);
-    let beside: Vec<f64> = model
+    let mut beside: Vec<f64> = model
         .iter()
         .zip(urdf)
         .map(|(twin, urdf)| twin - urdf)
@@ -195,7 +195,10 @@ pub fn audit(problem: &Problem, is_scaled: bool) -> Audit {
             let new = reading.with(&remedy, &turns);
             let moved = (&new.position, &new.place, new.weighs)
                 != (&reading.position, &reading.place, reading.weighs);
-            let model = if moved {
+            let model = if remedy == Remedy::Degrees {
+                // What it has beside it was computed from degrees, too.
+                trial.model(&new)
+            } else if moved {
                 let urdf = trial.model(&new).into_iter().zip(&beside);
                 urdf.map(|(urdf, beside)| urdf + beside).collect()
             } else {
@@ -221,6 +224,9 @@ pub fn audit(problem: &Problem, is_scaled: bool) -> Audit {
         let Some((slip, new, moved, _)) = best.filter(|_| most > LEAST_GAIN.ln()) else {
             break;
         };
+        if slip.remedy == Remedy::Degrees {
+            beside.fill(0.0);
+        }
         found.slips.push(slip);
         (reading, model) = (new, moved);
     }

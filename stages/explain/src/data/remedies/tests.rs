@@ -68,6 +68,27 @@ fn what_a_twin_has_beside_its_urdf_stays_while_remedies_are_tried() {
 }
 
 #[test]
+fn degrees_are_told_beside_a_twin_whose_friction_they_make_huge() {
+    let model = fixture::model();
+    let recordings = [4, 5].map(|seed| {
+        let mut twin = Vec::new();
+        let mut recording = fixture::recording(&model, seed, |_, qd, effort| {
+            twin.extend([0, 1].map(|j| 2.0 * qd[j].to_degrees() + 30.0));
+            for (x, qd) in effort.iter_mut().zip(qd) {
+                *x += 2.0 * qd;
+            }
+        });
+        let angles = recording.position.iter_mut().chain(&mut recording.velocity);
+        angles.for_each(|x| *x = x.to_degrees());
+        recording.reference = twin;
+        recording
+    });
+    let found = audit(&fixture::problem(&model, &recordings), true);
+    let told: Vec<Remedy> = found.slips.into_iter().map(|slip| slip.remedy).collect();
+    assert_eq!(told, [Remedy::Degrees]);
+}
+
+#[test]
 fn swapped_efforts_turned_signs_and_degrees_are_told() {
     let swap = |r: &mut Recording| r.effort.chunks_mut(2).for_each(|row| row.swap(0, 1));
     assert_eq!(remedies(found(swap)), [Remedy::Swapped(0, 1)]);
