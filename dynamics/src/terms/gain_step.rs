@@ -21,15 +21,15 @@ pub(super) static EFFECT: Effect = Effect {
         "From some time on the torque is reported larger or smaller by a factor: a motor that lost a part of its magnets or \
          windings, a drive or a sensor that was set up anew.",
         "Joint {place}: what was set in its drive or sensor then? Was its motor too hot?",
-        "The effort of joint {place} is recorded {gain_before} times as large as it is up to {change_time_session_s} of the \
-         session, and {gain_after} times since.",
+        "The effort of joint {place} is recorded too large by a share of {gain_excess_before} up to {change_time_session_s} of \
+         the session, and by {gain_excess_after} since.",
     ),
     family: Family::Recording,
     place: PlaceKind::Joint,
     layer: Layer::Record,
     parameters: &[
-        Parameter::ratio("gain_before", f64::NEG_INFINITY),
-        Parameter::ratio("gain_after", f64::NEG_INFINITY),
+        Parameter::ratio("gain_excess_before", f64::NEG_INFINITY),
+        Parameter::ratio("gain_excess_after", f64::NEG_INFINITY),
         Parameter::any("change_time_session_s"),
     ],
     coordinates: &[
@@ -37,11 +37,11 @@ pub(super) static EFFECT: Effect = Effect {
         Coordinate::factor("gain_excess_after"),
         time("change_time_session_s", CoordinateKind::SessionTime),
     ],
-    to_parameters: |c| vec![1.0 + c[0], 1.0 + c[1], c[2]],
-    to_coordinates: |p| vec![p[0] - 1.0, p[1] - 1.0, p[2]],
+    to_parameters: <[f64]>::to_vec,
+    to_coordinates: <[f64]>::to_vec,
     simpler: Some(Simpler {
         effect: &super::torque_gain::EFFECT,
-        numbers: &["gain_after", "gain_before"],
+        numbers: &["gain_excess_after", "gain_excess_before"],
     }),
     limit: Some(|_, x| (x[1] - x[0]).abs() > LEAST_STEP),
     excitation: Excitation::Poses,

@@ -108,6 +108,7 @@ impl TermSpec {
         let afterwards = known.and_then(|effect| {
             let simpler = effect.simpler?;
             let value = *self.parameters.get(*simpler.numbers.first()?)?;
+            let value = *(simpler.effect.to_parameters)(&[value]).first()?;
             let number = simpler.effect.parameters.first()?.name;
             Some(Self {
                 effect: simpler.effect.name.to_owned(),

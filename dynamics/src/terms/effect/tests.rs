@@ -175,9 +175,9 @@ fn what_few_effects_have_fits_them() {
     assert_eq!(
         plain.map(|e| e.name).collect::<Vec<_>>(),
         [
-            "absent_tool",
             "viscous_step",
             "bias_step",
+            "absent_tool",
             "base_tilt_in_recording",
             "joint_zero_offset_in_recording",
             "joint_zero_slip",

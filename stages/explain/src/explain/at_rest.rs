@@ -206,9 +206,11 @@ impl Context<'_> {
         let joints: Vec<String> = input.model.joint_names().map(str::to_owned).collect();
         let rests_count = vec![true; joints.len()];
         let mut hypotheses = self.hypotheses();
-        // What is there through a whole recording is part of its load.
-        let passes =
-            |h: &Hypothesis| h.time_kind() == TimeKind::Once && !h.effect.traits.fills_recording;
+        // What is there through a whole recording, or longer, is part of its load.
+        let passes = |h: &Hypothesis| {
+            let stays = h.effect.traits.fills_recording || h.effect.traits.in_session;
+            h.time_kind() == TimeKind::Once && !stays
+        };
         hypotheses.retain(passes);
         let say = |text: &str| progress(0.1, text);
         let (mut actives, mut undetectable) = (Vec::new(), Vec::new());
