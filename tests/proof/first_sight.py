@@ -295,7 +295,7 @@ def show(o):
         if o.cases:
             text = [f"{f['parameters'].get('kind') or f['effect']}{'/' + f['parameters']['against'] if 'against' in f['parameters'] else ''}"
                     f"@{f.get('joint') or f.get('link') or ''} {f['confidence']:.2f}{' WRONG' if f in wrong else ''}" for f in report["findings"]]
-            ratio = lambda k: [round(a / b, 1) for a, b in zip(report[k], report["noise_floor"])] if None not in report[k] else None
+            ratio = lambda k: [round(a / max(b, 1e-9), 1) for a, b in zip(report[k], report["noise_floor"])] if None not in report[k] else None
             print(f"{name} [{answer['joint']}, size {answer['size']:.0f}, {answer['clock']}, {'slow' if answer['slow'] else 'white'}, {answer['rate']} Hz, "
                   f"{answer['robot']}] {best.upper()} {report['verdict']} {took['cpu_s']:.0f} s\n    {text}\n    remaining "
                   f"{[(r['joint'], round(r['rms'] / r['noise'], 1)) for r in report.get('remaining', [])]}, hold-out over noise {ratio('holdout_rms_before')} to {ratio('holdout_rms_after')}")

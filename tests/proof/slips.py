@@ -167,7 +167,7 @@ def is_right(report, words):
 
 
 # Kinds of `unknown` that are no physics, but a fault of the recording or of what is said of it.
-FAULTS = {"efforts_swapped", "names_swapped", "effort_constant", "effort_sign", "position_sign", "joint_sign", "degrees", "gravity_subtracted", "effort_unit", "torque_constant", "velocity_scale"}
+FAULTS = {"efforts_swapped", "names_swapped", "effort_constant", "effort_sign", "effort_without_sign", "position_sign", "joint_sign", "degrees", "gravity_subtracted", "effort_unit", "torque_constant", "velocity_scale"}
 
 
 def main():

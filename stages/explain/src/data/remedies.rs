@@ -41,6 +41,8 @@ pub enum Remedy {
     NamesSwapped(usize, usize),
     /// The effort of a joint has the other sign.
     EffortTurned(usize),
+    /// The effort of a joint is told without its sign: it is left out.
+    EffortWithoutSign(usize),
     /// The position of a joint has the other sign.
     PositionTurned(usize),
     /// The position of a joint counts the other way, and its effort with it.
@@ -106,6 +108,8 @@ struct Reading {
     position: Vec<f64>,
     /// Whether gravity is part of the effort.
     weighs: bool,
+    /// By joint, whether its effort has no sign.
+    without_sign: Vec<bool>,
 }
 
 impl Reading {
@@ -116,6 +120,7 @@ impl Reading {
             effort: vec![1.0; joints],
             position: vec![1.0; joints],
             weighs: true,
+            without_sign: vec![false; joints],
         }
     }
 
@@ -129,6 +134,7 @@ impl Reading {
                 new.place.swap(a, b);
             }
             Remedy::EffortTurned(j) => new.effort[j] *= -1.0,
+            Remedy::EffortWithoutSign(j) => new.without_sign[j] = true,
             Remedy::PositionTurned(j) => new.position[j] *= -1.0,
             Remedy::JointTurned(j) => {
                 new.effort[j] *= -1.0;
@@ -191,7 +197,9 @@ pub fn audit(problem: &Problem, is_scaled: bool) -> Audit {
         });
         let physics = physics.max_by(|(_, a), (_, b)| a.total_cmp(b));
         let mut best: Option<(Slip, Reading, Vec<f64>, f64)> = None;
-        for remedy in candidates(n, &turns, &reading) {
+        let mut tried = candidates(n, &turns, &reading);
+        tried.extend(trial.without_sign(&model, &reading));
+        for remedy in tried {
             let new = reading.with(&remedy, &turns);
             let moved = (&new.position, &new.place, new.weighs)
                 != (&reading.position, &reading.place, reading.weighs);
@@ -221,7 +229,12 @@ pub fn audit(problem: &Problem, is_scaled: bool) -> Audit {
             found.physics = Some(remedy);
             break;
         }
-        let Some((slip, new, moved, _)) = best.filter(|_| most > LEAST_GAIN.ln()) else {
+        // An effort that is never below zero says so itself.
+        let needed = |slip: &Slip| match slip.remedy {
+            Remedy::EffortWithoutSign(_) => MENDED,
+            _ => LEAST_GAIN,
+        };
+        let Some((slip, new, moved, _)) = best.filter(|(slip, ..)| most > needed(slip).ln()) else {
             break;
         };
         if slip.remedy == Remedy::Degrees {

@@ -12,7 +12,7 @@ pub struct SlipWords {
 }
 
 /// All kinds of faults, by the `kind` of their findings.
-static KINDS: [(&str, SlipWords); 11] = [
+static KINDS: [(&str, SlipWords); 12] = [
     (
         "efforts_swapped",
         SlipWords {
@@ -43,6 +43,14 @@ static KINDS: [(&str, SlipWords); 11] = [
             title: "Effort of the other sign",
             meaning: "The effort falls where the motion needs more of it.",
             look_at: "Joint {place}: turn the sign of its effort in the driver.",
+        },
+    ),
+    (
+        "effort_without_sign",
+        SlipWords {
+            title: "Effort without its sign",
+            meaning: "The effort is a magnitude: it is never below zero, though the motion requires torques of both signs.",
+            look_at: "Joint {place}: let its driver publish the effort, or the current, with its sign.",
         },
     ),
     (

@@ -77,6 +77,12 @@ impl Slips {
         if let Some(errors) = &self.as_recorded {
             proof.before.clone_from(errors);
         }
+        // Nothing is corrected at a joint that was left out.
+        for slip in &self.all {
+            if let Remedy::Unmeasured(j, _) | Remedy::EffortWithoutSign(j) = slip.remedy {
+                proof.after[j] = proof.before[j];
+            }
+        }
     }
 }
 
@@ -126,6 +132,7 @@ fn named(remedy: &Remedy) -> (&'static str, Option<usize>, Option<usize>) {
         Remedy::Swapped(a, b) => ("efforts_swapped", Some(a), Some(b)),
         Remedy::NamesSwapped(a, b) => ("names_swapped", Some(a), Some(b)),
         Remedy::EffortTurned(j) => ("effort_sign", Some(j), None),
+        Remedy::EffortWithoutSign(j) => ("effort_without_sign", Some(j), None),
         Remedy::PositionTurned(j) => ("position_sign", Some(j), None),
         Remedy::JointTurned(j) => ("joint_sign", Some(j), None),
         Remedy::Degrees => ("degrees", None, None),
@@ -156,6 +163,14 @@ fn sentence(slip: &Slip, joints: &[String], unit: &str) -> String {
         Remedy::EffortTurned(j) => (
             format!("The effort of {} has the other sign.", name(j)),
             "Turn it in the driver.".to_owned(),
+        ),
+        Remedy::EffortWithoutSign(j) => (
+            format!(
+                "The effort of {} has no sign: it is never below zero, though the motion requires torques of both signs. Nothing \
+                 else is said of the joint.",
+                name(j)
+            ),
+            "Let the driver publish the effort with its sign.".to_owned(),
         ),
         Remedy::PositionTurned(j) => (
             format!("The position of {} has the other sign.", name(j)),

@@ -73,6 +73,8 @@ impl Remedy {
                 }
             }
             Self::EffortTurned(j) => scale(&mut recording.effort, j, n, -1.0),
+            // One number throughout is no measurement, and is left out.
+            Self::EffortWithoutSign(j) => scale(&mut recording.effort, j, n, 0.0),
             Self::PositionTurned(j) | Self::JointTurned(j) => {
                 scale(&mut recording.position, j, n, -1.0);
                 scale(&mut recording.velocity, j, n, -1.0);

@@ -126,6 +126,26 @@ fn swapped_efforts_turned_signs_and_degrees_are_told() {
 }
 
 #[test]
+fn an_effort_without_its_sign_is_told_and_one_of_one_sign_is_not() {
+    let magnitude = |r: &mut Recording| {
+        r.effort
+            .iter_mut()
+            .skip(1)
+            .step_by(2)
+            .for_each(|x| *x = x.abs());
+    };
+    assert_eq!(remedies(found(magnitude)), [Remedy::EffortWithoutSign(1)]);
+    let lifted = |r: &mut Recording| {
+        r.effort
+            .iter_mut()
+            .skip(1)
+            .step_by(2)
+            .for_each(|x| *x += 60.0);
+    };
+    assert_eq!(remedies(found(lifted)), []);
+}
+
+#[test]
 fn a_mended_recording_is_as_it_was_and_a_prediction_for_it_finds_back() {
     let model = fixture::model();
     let whole = fixture::recording(&model, 4, |_, _, _| {});

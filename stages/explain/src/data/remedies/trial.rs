@@ -1,7 +1,10 @@
 //! The fit of a robot to the data after a change, beside offset, gain, Coulomb and viscous friction in each joint.
 
-use nalgebra::{DMatrix, DVector, Vector3};
-use tauscope_dynamics::{Data, Inertia, Link, Model, gravity_effort, rnea};
+mod base_turned;
+mod without_sign;
+
+use nalgebra::{DMatrix, DVector};
+use tauscope_dynamics::{Data, Inertia, Link, Model, rnea};
 
 use super::{Reading, Remedy, SUSPECT};
 use crate::data::efforts::TrackEfforts;
@@ -9,12 +12,6 @@ use crate::data::problem::Problem;
 use crate::data::track::Track;
 use crate::read::audit::MOVES;
 
-/// Gravity after a turn of the base is as strong as before, up to this share: bodies in the URDF may be wrong by so much.
-/// Physical: masses of published URDFs are within a tenth of the real ones.
-const SAME_GRAVITY: f64 = 0.1;
-/// A base that is turned by less is found by the search as a tilt \[rad\].
-/// Physical: beyond it a sine is no longer near its angle.
-const TURNED_RAD: f64 = 0.5;
 /// A joint tells if its effort varies by at least this many times the noise, and is compared with this many rows.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const STRONG: f64 = 5.0;
@@ -138,6 +135,11 @@ impl<'a> Trial<'a> {
         let measured = DVector::from_iterator(rows.len(), measured);
         let required = rows.iter().map(|r| model[own + r.row]);
         let required = DVector::from_iterator(rows.len(), required);
+        let measured = if reading.without_sign[joint] {
+            measured.zip_map(&required, f64::copysign)
+        } else {
+            measured
+        };
         let friction = friction(rows, reading.position[joint]);
         let (_, beside) = least_squares(&friction, &measured);
         let noise = self.problem.white_noise[reading.column[joint]].max(f64::MIN_POSITIVE);
@@ -239,45 +241,6 @@ impl<'a> Trial<'a> {
         Some((factors, model))
     }
 
-    /// Roll and pitch of the base that fit best, if gravity is then as strong as before.
-    fn base_turned(&self) -> Option<(Remedy, Vec<f64>)> {
-        let model = &self.problem.model;
-        let along = |axis: usize| {
-            let mut gravity = [0.0; 3];
-            gravity[axis] = 1.0;
-            self.against_gravity(gravity)
-        };
-        let columns: Vec<Vec<f64>> = (0..3).map(along).collect();
-        let mut weightless = self.problem.rigid().to_vec();
-        for (weightless, weight) in weightless
-            .iter_mut()
-            .zip(self.against_gravity(model.gravity()))
-        {
-            *weightless -= weight;
-        }
-        let (found, model_turned) = self.fitted(&weightless, &columns)?;
-        let found = Vector3::new(found[0], found[1], found[2]);
-        let was = Vector3::from(model.gravity());
-        let same = (found.norm() / was.norm() - 1.0).abs() < SAME_GRAVITY;
-        let upright = was.x == 0.0 && was.y == 0.0;
-        let turned = found.angle(&was) > TURNED_RAD;
-        let remedy = Remedy::BaseTurned(turn_to(&found));
-        (same && upright && turned).then_some((remedy, model_turned))
-    }
-
-    fn against_gravity(&self, gravity: [f64; 3]) -> Vec<f64> {
-        let mut model = self.problem.model.clone();
-        model.set_gravity(gravity);
-        let mut data = Data::new(&model);
-        self.efforts(|track| {
-            let mut effort = Vec::with_capacity(track.position.len());
-            track.each(|_, at| {
-                effort.extend_from_slice(gravity_effort(&model, &mut data, at.position));
-            });
-            effort
-        })
-    }
-
     /// Mass of the body on the tool that fits best.
     fn payload(&self) -> Option<(Remedy, Vec<f64>)> {
         let (found, loaded) = self.with_body(self.problem.model.tool_link())?;
@@ -369,32 +332,4 @@ fn least_squares(columns: &DMatrix<f64>, values: &DVector<f64>) -> (DVector<f64>
     let solution = solution.unwrap_or_else(|| DVector::zeros(columns.ncols()));
     let left = values - columns * &solution;
     (solution, left)
-}
-
-/// Roll and pitch of a base that sees gravity so, with a pitch of a quarter turn at most.
-fn turn_to(gravity: &Vector3<f64>) -> [f64; 2] {
-    let down = gravity.normalize();
-    let sin_roll = (-down.y).clamp(-1.0, 1.0);
-    let upside_down = if down.z > 0.0 { -1.0 } else { 1.0 };
-    let cos_roll = upside_down * (1.0 - sin_roll * sin_roll).sqrt();
-    let pitch = (upside_down * down.x).atan2((upside_down * -down.z).max(0.0));
-    [sin_roll.atan2(cos_roll), pitch]
-}
-
-#[cfg(test)]
-mod tests {
-    use nalgebra::Rotation3;
-
-    use super::*;
-
-    #[test]
-    fn a_turn_is_told_by_the_gravity_that_the_base_sees() {
-        for (roll, pitch) in [(0.7, 0.2), (-1.2, -0.9), (2.5, 0.4), (3.1, -1.0)] {
-            let turn = Rotation3::from_axis_angle(&Vector3::x_axis(), roll)
-                * Rotation3::from_axis_angle(&Vector3::y_axis(), pitch);
-            let seen = turn.inverse_transform_vector(&Vector3::new(0.0, 0.0, -9.81));
-            let [told_roll, told_pitch] = turn_to(&seen);
-            assert!((told_roll - roll).abs() < 1e-9 && (told_pitch - pitch).abs() < 1e-9);
-        }
-    }
 }

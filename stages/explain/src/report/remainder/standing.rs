@@ -33,6 +33,13 @@ impl Remainders {
         unit: &str,
     ) {
         for (j, joint) in found.problem.model.joint_names().enumerate() {
+            // Of a joint whose effort nobody measures nothing is said.
+            if found.problem.weight[found.problem.joint_rows(j)]
+                .iter()
+                .all(|weight| *weight == 0.0)
+            {
+                continue;
+            }
             let after_nm = after[j] * unit_nm[j];
             let Some([missing, friction]) = unborne(held, j, joint, after_nm, findings) else {
                 continue;
