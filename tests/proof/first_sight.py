@@ -3,9 +3,9 @@
     python first_sight.py TAUSCOPE OUT --seed 1 [--kinds a,b] [--beside friction,bodies] [--twin-topic] [--nulls 6] [--table] [--cases]
 
 Each fault is on an arm that is otherwise exact or, with `--beside friction,bodies`, as real ones are. Clocks are even, jittered, or uneven with
-gaps; noise is white or partly slow. `found`: an `unknown`, or the nearest name of the list, at the joint; `near`: at a neighbour; `told`: only
-`remaining` names the joint; `silent`: none of it. A case that is there already is not made again. Standard arms are those of `robots/`, and
-small_arm.py's.
+gaps; noise is white or partly slow. `found`: an `unknown`, or the nearest name of the list, at the joint; `place`: the same, but the `unknown` has
+neither law nor curve (`without_law`); `near`: at a neighbour; `told`: only `remaining` names the joint; `silent`: none of it. A case that is there
+already is not made again. Standard arms are those of `robots/`, and small_arm.py's.
 """
 import argparse
 import json
@@ -238,7 +238,7 @@ def explain(o, name):
 
 
 def judged(o, answer, report):
-    """(found, near, told or silent; wrong findings) of a case."""
+    """(found, place, near, told or silent; wrong findings) of a case."""
     joint, kind = answer["joint"], answer["fault"]
     robot = Robot(str(o.out / "cases" / report["case"] / "arm.urdf"))
     where = judge.places(robot)
@@ -251,9 +251,11 @@ def judged(o, answer, report):
             continue
         right = kind and (f["effect"] == "unknown" or name_of(f) in unforeseen.NEAREST.get(kind, ()))
         apart = 0 if joint is None or place(f) is None else abs(place(f) - where[joint])
-        if right and apart == 0:
+        if right and apart == 0 and f["parameters"].get("kind") == "without_law":
+            best = "place" if best != "found" else best
+        elif right and apart == 0:
             best = "found"
-        elif right and apart == 1 and best != "found":
+        elif right and apart == 1 and best not in ("found", "place"):
             best = "near"
         elif kind and joint and apart == 0 and f["effect"] in FRICTION and kind in {x.__name__ for x in unforeseen.TORQUE}:
             continue                                # its share that plain friction is
@@ -285,7 +287,7 @@ def show(o):
         confident = [f for f in wrong if f["confidence"] > 0.9]
         sure, said_count = sure + len(confident), said_count + len([f for f in report["findings"] if f["confidence"] >= 0.5])
         key = "fault" if kind else "null"
-        row = counts.setdefault(key, {"n": 0, "found": 0, "near": 0, "told": 0, "silent": 0, "wrong": 0, "verdict": 0})
+        row = counts.setdefault(key, {"n": 0, "found": 0, "place": 0, "near": 0, "told": 0, "silent": 0, "wrong": 0, "verdict": 0})
         row["n"] += 1
         row[best] += 1
         row["wrong"] += len(wrong)
@@ -299,9 +301,9 @@ def show(o):
             print(f"{name} [{answer['joint']}, size {answer['size']:.0f}, {answer['clock']}, {'slow' if answer['slow'] else 'white'}, {answer['rate']} Hz, "
                   f"{answer['robot']}] {best.upper()} {report['verdict']} {took['cpu_s']:.0f} s\n    {text}\n    remaining "
                   f"{[(r['joint'], round(r['rms'] / r['noise'], 1)) for r in report.get('remaining', [])]}, hold-out over noise {ratio('holdout_rms_before')} to {ratio('holdout_rms_after')}")
-    print("| | cases | found | near | told | silent | wrong findings | verdict as it should be |\n| --- | --- | --- | --- | --- | --- | --- | --- |")
+    print("| | cases | found | place | near | told | silent | wrong findings | verdict as it should be |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     for key, r in counts.items():
-        print(f"| {key} | {r['n']} | {r['found']} | {r['near']} | {r['told']} | {r['silent']} | {r['wrong']} | {r['verdict']} |")
+        print(f"| {key} | {r['n']} | {r['found']} | {r['place']} | {r['near']} | {r['told']} | {r['silent']} | {r['wrong']} | {r['verdict']} |")
     print(f"\nWrong with a confidence above 0.9: {sure} of {said_count} findings. Longest: {max(seconds)[0]:.0f} s of CPU ({max(seconds)[1]}); "
           f"most memory: {max(peaks)[0]:.0f} MB ({max(peaks)[1]}).")
 

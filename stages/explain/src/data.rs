@@ -9,6 +9,7 @@
 //! fourth differences, its correlation as an effective sample size.
 
 pub mod column;
+mod compared;
 pub mod effective_samples;
 pub mod efforts;
 pub mod memo;

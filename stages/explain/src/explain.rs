@@ -21,7 +21,7 @@ use crate::read::input::Input;
 use crate::read::start::Start;
 use crate::report::schema::{Report, Verdict};
 use crate::report::slips::Slips;
-use crate::report::{findings, handed_out, locate, notes, summary, verdict};
+use crate::report::{findings, handed_out, locate, notes, summary, verdict, without_law};
 
 use judged::{Judged, Stop};
 
@@ -197,18 +197,29 @@ fn conclude(
     findings.append(&mut named.findings);
     slips.undo(&mut proof);
     let verdict = verdict::verdict(&findings, &remainders, !input.bodies);
+    let summary = summary::summary(
+        verdict,
+        &findings,
+        &remainders.all,
+        joints,
+        [&proof.before, &proof.after],
+        input.start.is_some(),
+    );
+    // What another simulation leaves at a joint may be its own.
+    if input.bodies {
+        let sliding = sliding_joints(input);
+        findings.extend(without_law::findings(
+            &remainders,
+            &findings,
+            &sliding,
+            unit == "A",
+        ));
+    }
     let report = Report {
         case: input.case.clone(),
         verdict,
         reason: None,
-        summary: summary::summary(
-            verdict,
-            &findings,
-            &remainders.all,
-            joints,
-            [&proof.before, &proof.after],
-            input.start.is_some(),
-        ),
+        summary,
         effort_unit: input.effort_unit.clone(),
         located: locate::located(&problem, &before, joints),
         undetectable,

@@ -23,6 +23,7 @@ pub(crate) mod slips;
 pub(crate) mod summary;
 pub(crate) mod varying_delay;
 pub(crate) mod verdict;
+pub(crate) mod without_law;
 
 pub use next_motion::MOTION_PREFIX;
 pub use schema::*;

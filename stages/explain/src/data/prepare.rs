@@ -80,8 +80,9 @@ impl Problem {
         for (recording, (track, full, kept)) in recordings.iter().zip(tracks) {
             let compared = spaced(&track.time_s, 0.5 / cutoff_hz);
             let mut filters = Vec::with_capacity(n);
+            let gaps = full.gaps(cutoff_hz);
             for j in 0..n {
-                let mut counts = track.counts(j, moves[j] && !rests_count[j], cutoff_hz);
+                let mut counts = track.counts(j, moves[j] && !rests_count[j], &gaps, cutoff_hz);
                 leave_out_unmeasured(&mut counts, recording, j, n);
                 let filter = LowPass::weighted(&track.time_s, cutoff_hz, |k| counts[k]);
                 let of_joint = (0..full.len()).map(|k| k * n + j);

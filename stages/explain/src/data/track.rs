@@ -7,18 +7,11 @@ use tauscope_dynamics::{Data, Model, rnea};
 use crate::data::quiet_start::quiet_s;
 use crate::data::smoother::{LowPass, MotionSmoother};
 use crate::data::standstill;
-use crate::read::recording::{MAX_GAP_S, Recording};
+use crate::read::recording::Recording;
 
 /// A joint slower than this is at rest: its friction takes any value up to breakaway \[rad/s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 pub const STANDSTILL_RAD_S: f64 = 0.01;
-/// Samples nearer than this to an end of the recording or to a gap are left out, in periods of the cutoff.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const END_PERIODS: f64 = 0.8;
-/// Samples nearer than this to a standstill or reversal of the joint are left out, in periods of the cutoff. The
-/// motion does not determine the friction there.
-/// Tuned: by hand, on no recorded seeds; not swept.
-const REVERSAL_PERIODS: f64 = 0.4;
 /// A joint that moves in less than this share of the time is compared at rest, too.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LEAST_MOVING_SHARE: f64 = 0.2;
@@ -212,41 +205,6 @@ impl Track {
             };
             visit(k, &at);
         }
-    }
-}
-
-impl Track {
-    /// Which samples of a joint are compared. Left out are the ends, the neighbourhood of gaps and, if the joint `moves`,
-    /// its standstills and reversals.
-    pub(crate) fn counts(&self, joint: usize, moves: bool, cutoff_hz: f64) -> Vec<bool> {
-        let n = self.position.len() / self.len();
-        let time = &self.time_s;
-        let mut counts = vec![true; time.len()];
-        let mut spoil = |from: f64, to: f64| {
-            let first = time.partition_point(|t| *t < from);
-            let last = time.partition_point(|t| *t <= to);
-            counts[first..last].fill(false);
-        };
-        let margin = END_PERIODS / cutoff_hz;
-        let (start, end) = (time[0], time[time.len() - 1]);
-        spoil(start, start + margin);
-        spoil(end - margin, end);
-        for pair in time.windows(2) {
-            if pair[1] - pair[0] > MAX_GAP_S {
-                spoil(pair[0] - margin, pair[1] + margin);
-            }
-        }
-        if moves {
-            let margin = REVERSAL_PERIODS / cutoff_hz;
-            let velocity = |k: usize| self.velocity[k * n + joint];
-            for (k, &t) in time.iter().enumerate() {
-                let reverses = k > 0 && velocity(k) * velocity(k - 1) < 0.0;
-                if reverses || velocity(k).abs() < STANDSTILL_RAD_S {
-                    spoil(t - margin, t + margin);
-                }
-            }
-        }
-        counts
     }
 }
 

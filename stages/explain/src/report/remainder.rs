@@ -30,7 +30,7 @@ use crate::report::varying_delay::varying_delay;
 use tauscope_dynamics::terms::TermError;
 use tauscope_dynamics::terms::words::number;
 
-use beside_others::beside_others;
+use beside_others::{beside_others, is_alone};
 use follows::follows_motion;
 use held::of_held;
 use odd_recording::odd_recording;
@@ -79,6 +79,8 @@ pub struct Remainders {
     pub all: Vec<Remaining>,
     /// Joints at which the error is much larger on held-out recordings.
     pub elsewhere: Vec<usize>,
+    /// Names of the joints that leave several times what the others do, each in units of its noise.
+    pub alone: Vec<String>,
     /// Whether the correction makes a joint's error on held-out recordings larger than the twin as it was leaves.
     pub is_worsened: bool,
 }
@@ -282,6 +284,10 @@ fn of(
             && let Some(said) = beside_others(found, j, &told)
         {
             sentences.push(format!("{} remain at joint {joint}. {said}", told(here)));
+        }
+        let lefts = [Some(found), held];
+        if lefts.into_iter().flatten().any(|left| is_alone(left, j)) {
+            remainders.alone.push(joint.clone());
         }
         if !sentences.is_empty() {
             remainders.all.push(Remaining {

@@ -7,7 +7,7 @@ use serde_json::Value;
 use tauscope_dynamics::terms::{effect, words};
 
 use crate::report::sentences::in_units;
-use crate::report::slip_words;
+use crate::report::{slip_words, without_law};
 
 /// The report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -105,6 +105,18 @@ pub struct Remaining {
     pub sentence: String,
 }
 
+impl Remaining {
+    /// RMS on the fitted or the held-out recordings, where it is larger \[effort unit\].
+    pub fn largest_rms(&self) -> f64 {
+        self.rms.max(self.holdout_rms.unwrap_or(0.0))
+    }
+
+    /// The same in units of the measurement's white noise.
+    pub fn over_noise(&self) -> f64 {
+        self.largest_rms() / self.noise.max(f64::MIN_POSITIVE)
+    }
+}
+
 /// An effect that the twin leaves out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
@@ -158,6 +170,11 @@ impl Finding {
         let is_law = |kind: &str| effect(kind).is_some_and(|e| e.said() == self.effect);
         kind.filter(|kind| is_law(kind) || slip_words::words(kind).is_some())
             .unwrap_or(&self.effect)
+    }
+
+    /// Whether it says only that something remains at its joint: the correction has nothing for it.
+    pub fn is_without_law(&self) -> bool {
+        self.parameters.get("kind").and_then(Value::as_str) == Some(without_law::KIND)
     }
 
     /// Whether it is a fault of the recordings, or of what is said of them, and no physics.

@@ -15,10 +15,8 @@ pub fn summary(
     has_changed: bool,
 ) -> String {
     let proof = proof(joints, errors);
-    let remains = remaining.iter().max_by(|a, b| {
-        let loud = |r: &Remaining| r.rms.max(r.holdout_rms.unwrap_or(0.0)) / r.noise.max(1e-12);
-        loud(a).total_cmp(&loud(b))
-    });
+    let louder = |a: &&Remaining, b: &&Remaining| a.over_noise().total_cmp(&b.over_noise());
+    let remains = remaining.iter().max_by(louder);
     let remains = remains.map_or("", |remaining| remaining.sentence.as_str());
     match verdict {
         Verdict::NothingMissing => {

@@ -93,14 +93,20 @@ fn card(finding: &Finding, effort_unit: &str) -> Markup {
             }
             div.halves { div {
             p.sentence { (finding.sentence) }
-            @if let Some(meaning) = effect_meaning(finding.known_as()) { p.meaning { (meaning) } }
+            @if finding.is_without_law() {
+                p.meaning { "Nothing that was tried describes it, so the correction has nothing for it." }
+            } @else if let Some(meaning) = effect_meaning(finding.known_as()) {
+                p.meaning { (meaning) }
+            }
             p.figures {
                 @if finding.effort_rms > 0.0 {
                     span { "Effort " b { (number_text(finding.effort_rms)) " " (effort_unit) } " RMS" }
                 }
-                span {
-                    "Without it " b { (percent(finding.explains)) } " of the mismatch (squared, in units of noise) would return "
-                    (meter(finding.explains))
+                @if !finding.is_without_law() {
+                    span {
+                        "Without it " b { (percent(finding.explains)) } " of the mismatch (squared, in units of noise) would return "
+                        (meter(finding.explains))
+                    }
                 }
                 span { "Confidence " b { (almost_all(finding.confidence)) } }
                 @if let Some(when) = when { span { (when) } }
