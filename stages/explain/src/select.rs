@@ -53,6 +53,7 @@ pub mod propose;
 pub mod prune;
 pub mod search;
 pub mod split_push;
+pub mod spots;
 pub mod trial;
 pub mod wall;
 pub mod windows;

@@ -6,6 +6,7 @@ mod contest;
 mod doubt;
 mod far_out;
 mod odd_robot;
+mod rivals;
 mod scales;
 mod sizes;
 mod undetectable;
@@ -26,13 +27,13 @@ use crate::physics::active::{Active, Hypothesis, TimeKind};
 use crate::physics::friction::least;
 use crate::read::input::Input;
 use crate::report::schema::{Finding, NextMotion, Rejected, Rival};
-use crate::report::{next_motion, sentences};
+use crate::report::sentences;
 use crate::select::explanation::Explanation;
 use crate::select::search::Search;
 
 use clipping::is_clipped;
 use confidence::{Grounds, confidence};
-use contest::{Contest, contest};
+use contest::contest;
 use doubt::DOUBTED;
 pub use doubt::doubt_patches;
 use scales::{Scales, StartScales};
@@ -201,37 +202,6 @@ fn without_twin(
     let bare = search.without(&less, twin);
     let of_both = found.ahead_of(&bare, &search.problem.effective_samples);
     (bare, of_both)
-}
-
-impl Named {
-    /// Keeps the rejected rivals of a finding, and the motion that would separate those that tie with it. Returns those
-    /// that tie.
-    fn keep_rivals(
-        &mut self,
-        active: &Active,
-        contest: Contest,
-        input: &Input,
-        joints: &[String],
-    ) -> Vec<Rival> {
-        for (hypothesis, reason) in contest.rejected {
-            let (joint, link) = place_of(input, joints, &hypothesis);
-            self.rejected.push(Rejected {
-                effect: hypothesis.effect.name.to_owned(),
-                joint,
-                link,
-                reason,
-            });
-        }
-        let next = next_motion::of(&active.hypothesis, &contest.ties, input, joints);
-        if let Some((next, trajectory)) = next {
-            if let Some(file) = &next.trajectory {
-                self.trajectories.push((file.clone(), trajectory));
-            }
-            self.next_motions.push(next);
-        }
-        let ties = contest.ties.iter();
-        ties.map(|tie| rival(input, joints, tie)).collect()
-    }
 }
 
 /// The numbers of an effect by name, and their 95 % intervals.

@@ -79,7 +79,7 @@ pub struct Remainders {
     pub all: Vec<Remaining>,
     /// Joints at which the error is much larger on held-out recordings.
     pub elsewhere: Vec<usize>,
-    /// Names of the joints that leave several times what the others do, each in units of its noise.
+    /// Names of the joints that leave several times what the others do on the fitted recordings, each in units of its noise.
     pub alone: Vec<String>,
     /// Whether the correction makes a joint's error on held-out recordings larger than the twin as it was leaves.
     pub is_worsened: bool,
@@ -285,8 +285,7 @@ fn of(
         {
             sentences.push(format!("{} remain at joint {joint}. {said}", told(here)));
         }
-        let lefts = [Some(found), held];
-        if lefts.into_iter().flatten().any(|left| is_alone(left, j)) {
+        if is_alone(found, j) {
             remainders.alone.push(joint.clone());
         }
         if !sentences.is_empty() {

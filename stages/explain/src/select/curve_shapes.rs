@@ -12,6 +12,7 @@ use crate::select::carried::{BEYOND_CHANCE, Carried};
 use crate::select::curve_axes::curves;
 use crate::select::evidence::{FAIR_SHARE_OF_CURVE, LEAST_SIZE};
 use crate::select::propose::Base;
+use crate::select::spots::spots;
 
 /// Knots of a periodic curve, per period.
 /// Tuned: by hand, on no recorded seeds; not swept.
@@ -82,6 +83,7 @@ impl Base<'_> {
     pub fn propose_curve(&self, joint: usize) -> Option<CurveProposal> {
         let mut candidates = curves(self.problem, joint);
         candidates.extend(self.repeated(joint));
+        candidates.extend(spots(self.problem, &self.fit.residual, joint));
         let count = candidates.len() as f64;
         let tried: Vec<(CurveProposal, Option<Carried>)> = candidates
             .iter()
