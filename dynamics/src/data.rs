@@ -26,6 +26,8 @@ pub(crate) struct Slot {
     /// Pose in the parent's frame.
     pub rotation: Matrix3<f64>,
     pub translation: Vector3<f64>,
+    /// The last angle of the joint, with its sine and cosine: derivatives move one joint at a time.
+    angle: Option<[f64; 3]>,
     /// Angular velocity and acceleration.
     pub omega: Vector3<f64>,
     pub alpha: Vector3<f64>,
@@ -81,12 +83,26 @@ impl Slot {
             self.rotation = *r;
             self.translation = body.translation + r.column(2) * q;
         } else {
-            let (sin, cos) = q.sin_cos();
+            let (sin, cos) = self.sin_cos(q);
             let (x, y) = (r.column(0), r.column(1));
             self.rotation.set_column(0, &(x * cos + y * sin));
             self.rotation.set_column(1, &(y * cos - x * sin));
             self.rotation.set_column(2, &r.column(2));
             self.translation = body.translation;
+        }
+    }
+}
+
+impl Slot {
+    #[inline]
+    fn sin_cos(&mut self, angle: f64) -> (f64, f64) {
+        match self.angle {
+            Some([last, sin, cos]) if last.to_bits() == angle.to_bits() => (sin, cos),
+            _ => {
+                let (sin, cos) = angle.sin_cos();
+                self.angle = Some([angle, sin, cos]);
+                (sin, cos)
+            }
         }
     }
 }
