@@ -6,6 +6,7 @@ use serde_json::Value;
 use tauscope_dynamics::terms::words::number;
 
 use crate::data::problem::Problem;
+use crate::data::track::{FitTrack, STANDSTILL_RAD_S};
 use crate::report::schema::{Finding, Remaining};
 use crate::report::sentences::unit_at;
 
@@ -18,6 +19,9 @@ const STICKS: f64 = 2.0;
 /// The joint must stand for at least this share of the held-out time: fewer rows are the edges of standstills.
 /// Tuned: by hand, with practice sets in view; not swept.
 const LEAST_SHARE: f64 = 0.05;
+/// And for at least this share of the time that does not count: the rest are ends, gaps and reversals.
+/// Tuned: as [`LEAST_SHARE`].
+const LEAST_OF_LEFT_OUT: f64 = 0.5;
 /// And this share of the largest effort must be missing.
 /// Tuned: as [`LEAST_SHARE`].
 const LEAST_OF_LARGEST: f64 = 0.1;
@@ -82,14 +86,29 @@ fn unborne(
         .filter(|weight| **weight > 0.0)
         .count() as f64;
     let moves = moving / problem.rows.max(1) as f64;
+    // What is left out beside a gap or an end does not stand.
+    let stands = standing(problem, joint) / problem.rows.max(1) as f64;
+    if stands < LEAST_SHARE.max(LEAST_OF_LEFT_OUT * (1.0 - moves)) {
+        return None;
+    }
     let noise = problem.unfiltered_noise[joint];
     let while_moving = held.rms(joint).powi(2) + noise * noise;
     let square = (after * after - moves * while_moving) / (1.0 - moves).max(LEAST_SHARE);
     let missing = square.max(0.0).sqrt();
     let friction = friction(problem, joint, name, findings);
-    let is_seen =
-        1.0 - moves >= LEAST_SHARE && missing > LEAST_OF_LARGEST * problem.largest_effort[joint];
+    let is_seen = missing > LEAST_OF_LARGEST * problem.largest_effort[joint];
     (is_seen && missing > STICKS * friction + ABOVE_NOISE * noise).then_some([missing, friction])
+}
+
+/// The number of rows in which a joint stands.
+fn standing(problem: &Problem, joint: usize) -> f64 {
+    let stands = |velocity: f64| velocity.abs() < STANDSTILL_RAD_S;
+    let of = |track: &FitTrack| {
+        let velocities =
+            (track.compared.iter()).map(|k| track.track.velocity[k * problem.joints + joint]);
+        velocities.filter(|velocity| stands(*velocity)).count()
+    };
+    problem.tracks.iter().map(of).sum::<usize>() as f64
 }
 
 /// The most that the friction of a joint holds, as far as it is known \[N m or N\].
@@ -121,6 +140,20 @@ fn largest(parameters: &BTreeMap<String, Value>, largest_effort: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixture;
+
+    #[test]
+    fn an_arm_in_motion_stands_in_hardly_any_row_and_one_at_rest_in_all() {
+        let model = fixture::model();
+        let mut recording = fixture::recording(&model, 4, |_, _, _| {});
+        let moving = fixture::problem(&model, std::slice::from_ref(&recording));
+        assert!(standing(&moving, 0) < 0.05 * moving.rows as f64);
+        for rows in [&mut recording.position, &mut recording.velocity] {
+            rows.fill(0.0);
+        }
+        let resting = fixture::problem(&model, &[recording]);
+        assert!(standing(&resting, 0) > 0.99 * resting.rows as f64);
+    }
 
     #[test]
     fn the_most_that_an_effect_holds_is_its_largest_dry_friction() {
