@@ -51,6 +51,7 @@ pub mod parallel;
 pub mod plausible;
 pub mod propose;
 pub mod prune;
+mod restart;
 pub mod search;
 pub mod split_push;
 pub mod spots;

@@ -181,7 +181,12 @@ impl Search<'_> {
     }
 
     /// The explanation without some of its effects, refined at the joint that they act in.
-    fn stripped(&self, best: &Explanation, pieces: &[usize], joint: usize) -> Explanation {
+    pub(super) fn stripped(
+        &self,
+        best: &Explanation,
+        pieces: &[usize],
+        joint: usize,
+    ) -> Explanation {
         let mut bare = best.clone();
         for &i in pieces.iter().rev() {
             bare.fit.actives.remove(i);

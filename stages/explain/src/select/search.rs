@@ -69,7 +69,7 @@ impl Search<'_> {
         for _ in 0..MOST_ROUNDS {
             best = self.forward(best);
             let effective = &self.problem.effective_samples;
-            let mut exchanged = self.exchange(best.clone());
+            let mut exchanged = self.restarted(self.exchange(best.clone()));
             if let Some(better) = self.with_one_zero(&exchanged) {
                 (self.say)(&describe(&better));
                 exchanged = better;
