@@ -86,14 +86,15 @@ fn unborne(
         .filter(|weight| **weight > 0.0)
         .count() as f64;
     let moves = moving / problem.rows.max(1) as f64;
-    // What is left out beside a gap or an end does not stand.
+    let left_out = 1.0 - moves;
+    // What is left out beside a gap or an end does not stand; a standstill that counts is compared like motion.
     let stands = standing(problem, joint) / problem.rows.max(1) as f64;
-    if stands < LEAST_SHARE.max(LEAST_OF_LEFT_OUT * (1.0 - moves)) {
+    if left_out < LEAST_SHARE || stands < LEAST_OF_LEFT_OUT * left_out {
         return None;
     }
     let noise = problem.unfiltered_noise[joint];
     let while_moving = held.rms(joint).powi(2) + noise * noise;
-    let square = (after * after - moves * while_moving) / (1.0 - moves).max(LEAST_SHARE);
+    let square = (after * after - moves * while_moving) / left_out;
     let missing = square.max(0.0).sqrt();
     let friction = friction(problem, joint, name, findings);
     let is_seen = missing > LEAST_OF_LARGEST * problem.largest_effort[joint];
