@@ -19,7 +19,8 @@ use crate::read::audit;
 use crate::read::excerpt::excerpts;
 use crate::read::input::Input;
 use crate::read::start::Start;
-use crate::report::schema::{Report, Verdict};
+use crate::report::remainder::Remainders;
+use crate::report::schema::{Finding, Report, Verdict};
 use crate::report::slips::Slips;
 use crate::report::{findings, handed_out, locate, notes, summary, verdict, without_law};
 
@@ -185,36 +186,23 @@ fn conclude(
     let mut notes = named.notes;
     notes.extend(context.notes());
     notes.extend(notes::not_handed_out(&proof, &found, &input.model, unit));
+    let remaining = &remainders.all;
     notes.extend(notes::notes(
         input,
         &problem,
         &found,
         &rests_count,
-        &remainders.all,
+        remaining,
     ));
     let mut findings = slips.findings(joints, unit, context.unit_nm);
     notes.splice(0..0, slips.note());
     findings.append(&mut named.findings);
     slips.undo(&mut proof);
     let verdict = verdict::verdict(&findings, &remainders, !input.bodies);
-    let summary = summary::summary(
-        verdict,
-        &findings,
-        &remainders.all,
-        joints,
-        [&proof.before, &proof.after],
-        input.start.is_some(),
-    );
-    // What another simulation leaves at a joint may be its own.
-    if input.bodies {
-        let sliding = sliding_joints(input);
-        findings.extend(without_law::findings(
-            &remainders,
-            &findings,
-            &sliding,
-            unit == "A",
-        ));
-    }
+    let errors = [&proof.before[..], &proof.after[..]];
+    let has_changed = input.start.is_some();
+    let summary = summary::summary(verdict, &findings, remaining, joints, errors, has_changed);
+    findings.extend(without_law(input, &remainders, &findings));
     let report = Report {
         case: input.case.clone(),
         verdict,
@@ -246,6 +234,15 @@ fn conclude(
         pictures: proof.pictures,
         trajectories: named.trajectories,
     })
+}
+
+/// Findings for what remains at a joint. What another simulation leaves there may be its own.
+fn without_law(input: &Input, remainders: &Remainders, said: &[Finding]) -> Vec<Finding> {
+    if !input.bodies {
+        return Vec::new();
+    }
+    let in_amperes = input.effort_unit == "A";
+    without_law::findings(remainders, said, &sliding_joints(input), in_amperes)
 }
 
 impl Context<'_> {

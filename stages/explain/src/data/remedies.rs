@@ -75,6 +75,14 @@ impl Remedy {
         matches!(self, Self::IsCurrent | Self::IsOfRating)
     }
 
+    /// By how much it must divide the error. An effort that is never below zero says so itself.
+    fn least_gain(&self) -> f64 {
+        match self {
+            Self::EffortWithoutSign(_) => MENDED,
+            _ => LEAST_GAIN,
+        }
+    }
+
     /// Whether it is physics that the search can name, and no fault of the recording.
     pub fn is_physics(&self) -> bool {
         matches!(self, Self::BaseTurned(_) | Self::Payload(_))
@@ -229,12 +237,9 @@ pub fn audit(problem: &Problem, is_scaled: bool) -> Audit {
             found.physics = Some(remedy);
             break;
         }
-        // An effort that is never below zero says so itself.
-        let needed = |slip: &Slip| match slip.remedy {
-            Remedy::EffortWithoutSign(_) => MENDED,
-            _ => LEAST_GAIN,
-        };
-        let Some((slip, new, moved, _)) = best.filter(|(slip, ..)| most > needed(slip).ln()) else {
+        let Some((slip, new, moved, _)) =
+            best.filter(|(slip, ..)| most > slip.remedy.least_gain().ln())
+        else {
             break;
         };
         if slip.remedy == Remedy::Degrees {

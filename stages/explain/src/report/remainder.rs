@@ -207,6 +207,8 @@ impl Context<'_> {
             held: uncorrected.as_ref(),
         };
         let mut remainders = of(found, before, held, self.unit_nm, &joints, unit);
+        let alone = (0..joints.len()).filter(|&j| is_alone(found, j));
+        remainders.alone = alone.map(|j| joints[j].clone()).collect();
         // Where nobody knows an effort's scale, friction in N m is no measure for it.
         if let Some(held) = held.filter(|_| self.input.bodies && self.unscaled.is_empty()) {
             remainders.add_standing(found, held, self.unit_nm, (after, findings), unit);
@@ -284,9 +286,6 @@ fn of(
             && let Some(said) = beside_others(found, j, &told)
         {
             sentences.push(format!("{} remain at joint {joint}. {said}", told(here)));
-        }
-        if is_alone(found, j) {
-            remainders.alone.push(joint.clone());
         }
         if !sentences.is_empty() {
             remainders.all.push(Remaining {

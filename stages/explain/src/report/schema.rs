@@ -7,7 +7,7 @@ use serde_json::Value;
 use tauscope_dynamics::terms::{effect, words};
 
 use crate::report::sentences::in_units;
-use crate::report::{slip_words, without_law};
+use crate::report::slip_words;
 
 /// The report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -117,6 +117,9 @@ impl Remaining {
     }
 }
 
+/// The `kind` of an `unknown` that says only where something remains.
+pub const WITHOUT_LAW: &str = "without_law";
+
 /// An effect that the twin leaves out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
@@ -174,7 +177,7 @@ impl Finding {
 
     /// Whether it says only that something remains at its joint: the correction has nothing for it.
     pub fn is_without_law(&self) -> bool {
-        self.parameters.get("kind").and_then(Value::as_str) == Some(without_law::KIND)
+        self.parameters.get("kind").and_then(Value::as_str) == Some(WITHOUT_LAW)
     }
 
     /// Whether it is a fault of the recordings, or of what is said of them, and no physics.

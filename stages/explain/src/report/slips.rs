@@ -164,14 +164,7 @@ fn sentence(slip: &Slip, joints: &[String], unit: &str) -> String {
             format!("The effort of {} has the other sign.", name(j)),
             "Turn it in the driver.".to_owned(),
         ),
-        Remedy::EffortWithoutSign(j) => (
-            format!(
-                "The effort of {} has no sign: it is never below zero, though the motion requires torques of both signs. Nothing \
-                 else is said of the joint.",
-                name(j)
-            ),
-            "Let the driver publish the effort with its sign.".to_owned(),
-        ),
+        Remedy::EffortWithoutSign(j) => without_sign(name(j)),
         Remedy::PositionTurned(j) => (
             format!("The position of {} has the other sign.", name(j)),
             "Turn it in the driver.".to_owned(),
@@ -234,6 +227,16 @@ fn sentence(slip: &Slip, joints: &[String], unit: &str) -> String {
     };
     let evidence = evidence(slip, joints, unit);
     format!("{wrong} {evidence}{cure}")
+}
+
+/// What is wrong with an effort that is told as a magnitude, and what to do.
+fn without_sign(joint: &str) -> (String, String) {
+    let wrong = format!(
+        "The effort of {joint} has no sign: it is never below zero, though the motion requires torques of both signs. Nothing else \
+         is said of the joint."
+    );
+    let cure = "Let the driver publish the effort with its sign.".to_owned();
+    (wrong, cure)
 }
 
 /// What mends velocities that are `factor` times what they should be, at a joint or at all.

@@ -9,10 +9,7 @@ use serde_json::Value;
 use tauscope_dynamics::terms::UNKNOWN;
 
 use crate::report::remainder::Remainders;
-use crate::report::schema::{Finding, Remaining};
-
-/// The `kind` of such a finding.
-pub const KIND: &str = "without_law";
+use crate::report::schema::{Finding, Remaining, WITHOUT_LAW};
 
 /// A joint is told if it leaves at least this share of what the joint leaves that leaves most, each in units of its noise: what
 /// happens at one joint is felt at its neighbours, too.
@@ -63,7 +60,7 @@ pub fn findings(
 
 fn finding(remaining: &Remaining, confidence: f64) -> Finding {
     let parameters = [
-        ("kind", Value::from(KIND)),
+        ("kind", Value::from(WITHOUT_LAW)),
         ("remaining_nm", Value::from(remaining.largest_rms())),
         ("over_noise", Value::from(remaining.over_noise())),
     ];
