@@ -26,7 +26,7 @@ pub(crate) struct Slot {
     /// Pose in the parent's frame.
     pub rotation: Matrix3<f64>,
     pub translation: Vector3<f64>,
-    /// The last angle of the joint, with its sine and cosine: derivatives move one joint at a time.
+    /// The last angle of the joint \[rad\], with its sine and cosine: derivatives move one joint at a time.
     angle: Option<[f64; 3]>,
     /// Angular velocity and acceleration.
     pub omega: Vector3<f64>,
@@ -91,9 +91,8 @@ impl Slot {
             self.translation = body.translation;
         }
     }
-}
 
-impl Slot {
+    /// Sine and cosine of an angle \[rad\].
     #[inline]
     fn sin_cos(&mut self, angle: f64) -> (f64, f64) {
         match self.angle {

@@ -119,6 +119,17 @@ impl Problem {
         joint * self.rows..(joint + 1) * self.rows
     }
 
+    /// The rows of a joint that count, as recording, row of the joint, and sample of the recording's track.
+    pub fn counted(&self, joint: usize) -> impl Iterator<Item = (usize, usize, usize)> + '_ {
+        let weight = &self.weight[self.joint_rows(joint)];
+        let of = |(recording, track): (usize, &'_ FitTrack)| {
+            let rows = track.rows().zip(track.compared.iter().copied());
+            rows.map(|(row, k)| (recording, row, k)).collect::<Vec<_>>()
+        };
+        let all = self.tracks.iter().enumerate().flat_map(of);
+        all.filter(|(_, row, _)| weight[*row] > 0.0)
+    }
+
     /// Filters efforts over all tracks (row-major, one `Vec` per track) into a signal.
     pub fn signal(&self, efforts: &[Vec<f64>]) -> Vec<f64> {
         let mut signal = vec![0.0; self.joints * self.rows];

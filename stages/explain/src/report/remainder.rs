@@ -96,21 +96,13 @@ impl Left<'_> {
         let problem = self.problem;
         let first = problem.joint_rows(joint).start;
         let rates = rates_of(problem, self.fit, joint);
-        let mut rows = Vec::new();
-        for (recording, track) in problem.tracks.iter().enumerate() {
-            for (row, &k) in track.rows().zip(&track.compared) {
-                let at = first + row;
-                if problem.weight[at] > 0.0 {
-                    rows.push(Row {
-                        recording,
-                        time_s: track.track.time_s[k],
-                        error: self.fit.residual[at],
-                        rate: rates[row],
-                    });
-                }
-            }
-        }
-        rows
+        let row = |(recording, row, k): (usize, usize, usize)| Row {
+            recording,
+            time_s: problem.tracks[recording].track.time_s[k],
+            error: self.fit.residual[first + row],
+            rate: rates[row],
+        };
+        problem.counted(joint).map(row).collect()
     }
 
     /// The moment at which the error of a joint stands out most, if the error is one of moments.

@@ -16,7 +16,7 @@ use crate::report::schema::{Finding, Remaining, WITHOUT_LAW};
 /// Tuned: by hand, with `tests/proof/first_sight.py` in view, seeds 41 and 42 beside friction and bodies; not swept.
 const LEAST_SHARE: f64 = 0.5;
 /// A fault lies at the only joint that leaves something, and at one of several that leave as much.
-/// Tuned: as [`LEAST_SHARE`]: of 11 joints that were told 11 were right.
+/// Tuned: as [`LEAST_SHARE`]: all of the 13 joints that were told were right.
 const CONFIDENCE_ALONE: f64 = 0.85;
 const CONFIDENCE_AMONG: f64 = 0.6;
 /// What is more likely right than wrong tells of the joint already.

@@ -59,20 +59,12 @@ pub fn spots(problem: &Problem, residual: &[f64], joint: usize) -> Vec<Table> {
 
 fn rows(problem: &Problem, residual: &[f64], joint: usize) -> Vec<Row> {
     let first = problem.joint_rows(joint).start;
-    let mut rows = Vec::new();
-    for (recording, track) in problem.tracks.iter().enumerate() {
-        for (row, &k) in track.rows().zip(&track.compared) {
-            let at = first + row;
-            if problem.weight[at] > 0.0 {
-                rows.push(Row {
-                    position: track.track.position[k * problem.joints + joint],
-                    square: residual[at] * residual[at],
-                    recording,
-                });
-            }
-        }
-    }
-    rows
+    let row = |(recording, row, k): (usize, usize, usize)| Row {
+        position: problem.tracks[recording].track.position[k * problem.joints + joint],
+        square: residual[first + row] * residual[first + row],
+        recording,
+    };
+    problem.counted(joint).map(row).collect()
 }
 
 /// The middle of the piece with the largest sum of squares, if it is dense enough there.

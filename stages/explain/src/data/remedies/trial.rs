@@ -290,21 +290,12 @@ impl<'a> Trial<'a> {
 
 /// The rows of a joint that count.
 fn counted(problem: &Problem, joint: usize) -> Vec<Counted> {
-    let first = problem.joint_rows(joint).start;
-    let mut rows = Vec::new();
-    for (recording, track) in problem.tracks.iter().enumerate() {
-        for (row, &k) in track.rows().zip(&track.compared) {
-            if problem.weight[first + row] > 0.0 {
-                let velocity = track.track.velocity[k * problem.joints + joint];
-                rows.push(Counted {
-                    row,
-                    recording,
-                    velocity,
-                });
-            }
-        }
-    }
-    rows
+    let counted = |(recording, row, k): (usize, usize, usize)| Counted {
+        row,
+        recording,
+        velocity: problem.tracks[recording].track.velocity[k * problem.joints + joint],
+    };
+    problem.counted(joint).map(counted).collect()
 }
 
 /// Columns of an offset, the direction and the speed, where positions are multiplied by `factor`.
