@@ -9,20 +9,24 @@ mod common;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::{bundled, root, write};
+use common::{bundled, hide_own_package, root, write};
 use live::{Live, signal, stage};
 
 /// Builds the example next to the program under test, and returns where it is.
 fn outside_stage() -> PathBuf {
     let program = Path::new(env!("CARGO_BIN_EXE_tauscope"));
     let target = program.ancestors().nth(2).unwrap();
-    let status = Command::new(env!("CARGO"))
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo
         .args(["build", "--quiet", "--locked", "--manifest-path"])
         .arg(root().join("examples/outside-stage/Cargo.toml"))
         .arg("--target-dir")
-        .arg(target)
-        .status();
-    assert!(status.unwrap().success(), "the example cannot be built");
+        .arg(target);
+    hide_own_package(&mut cargo);
+    assert!(
+        cargo.status().unwrap().success(),
+        "the example cannot be built"
+    );
     target.join("debug/outside-stage")
 }
 

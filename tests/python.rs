@@ -10,7 +10,7 @@ mod python;
 use std::path::Path;
 use std::process::Command;
 
-use common::{Out, root, skipped};
+use common::{Out, hide_own_package, root, skipped};
 
 const PACKAGES: [&str; 6] = [
     "maturin>=1.9,<2",
@@ -36,6 +36,7 @@ fn install(python: &Path, folder: &Path) {
             .arg(target.unwrap())
             .arg("--out")
             .arg(folder);
+        hide_own_package(&mut maturin);
         maturin
     });
     assert_eq!(build.code, 0, "{}{}", build.stdout, build.stderr);

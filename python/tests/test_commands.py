@@ -85,7 +85,9 @@ def test_other_threads_run_while_a_recording_is_read(data: Path) -> None:
 def test_ctrl_c_ends_the_work_and_not_the_interpreter(concealed: tauscope.Simulation, tmp_path: Path) -> None:
     program = textwrap.dedent(
         """
-        import itertools, sys, tauscope
+        import itertools, signal, sys, tauscope
+        # A shell that runs the tests in the background has made Python ignore Ctrl-C.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         print("begun", flush=True)
         try:
             # One may end before it is interrupted.

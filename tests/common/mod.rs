@@ -12,6 +12,20 @@ pub fn tauscope() -> Command {
     Command::new(env!("CARGO_BIN_EXE_tauscope"))
 }
 
+/// Hides from a cargo that is called by a test what this one says of the test's own package. The build script of ring
+/// asks for it: ring would be built again, and with it nearly all else.
+pub fn hide_own_package(command: &mut Command) {
+    for (name, _) in std::env::vars_os() {
+        let of_package = |name: &str| {
+            let own = ["CARGO_PKG_", "CARGO_MANIFEST_", "CARGO_BIN_EXE_"];
+            own.iter().any(|own| name.starts_with(own))
+        };
+        if name.to_str().is_some_and(of_package) {
+            command.env_remove(name);
+        }
+    }
+}
+
 /// The root of the project.
 pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
