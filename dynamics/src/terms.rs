@@ -18,6 +18,7 @@ mod contact_wall;
 mod coulomb_friction;
 mod counterbalance_spring;
 mod delay_line;
+mod displaced;
 mod drive_deadband;
 mod eccentric_gear;
 mod effect;
@@ -230,6 +231,11 @@ pub trait Term: std::fmt::Debug + Send {
     /// Takes what bodies cost along the motion that the following calls of [`Term::act`] go through, sample by sample
     /// and over any [`Term::reset`]: for terms that move a link by a little, which need not ask for it then.
     fn expand(&mut self, _along: &Arc<Expansion>) {}
+
+    /// Takes what the robot that the term was built for costs along the motion that the following calls of
+    /// [`Term::act`] go through, over any [`Term::reset`]: one effort per joint \[N m or N\] and sample, sample by sample.
+    /// For terms that compare with it, which need not compute it then.
+    fn know_recorded(&mut self, _efforts: &Arc<Vec<f64>>) {}
 
     /// Makes the change part of the model where it is one of rigid bodies or of gravity; `false` if it
     /// is not.

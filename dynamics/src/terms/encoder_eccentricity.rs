@@ -2,13 +2,15 @@
 //! *Fundamentals of Manipulator Calibration*, 1991, count it among the non-geometric errors of a joint.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
+use super::displaced::Displaced;
 use super::law::array;
 use super::{
     Coordinate, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind,
     Scale, Simulated, Term, Traits, Words, wave,
 };
-use crate::{Data, JointKind, Model, rnea};
+use crate::JointKind;
 
 /// A larger error is none of an encoder \[rad\].
 /// Physical: at arm's length the arm would miss by a hand's width, which nobody overlooks.
@@ -72,11 +74,7 @@ pub(super) static EFFECT: Effect = Effect {
         Box::new(EncoderEccentricity {
             joint: site.joint,
             values: array(values),
-            model: site.model.clone(),
-            data: Data::new(site.model),
-            position: vec![0.0; site.model.dof()],
-            velocity: vec![0.0; site.model.dof()],
-            acceleration: vec![0.0; site.model.dof()],
+            robot: Displaced::new(site.model, site.joint),
         })
     },
 };
@@ -86,29 +84,24 @@ struct EncoderEccentricity {
     joint: usize,
     /// Factors of sine and cosine \[rad\], and cycles per revolution.
     values: [f64; 3],
-    model: Model,
-    data: Data,
-    position: Vec<f64>,
-    velocity: Vec<f64>,
-    acceleration: Vec<f64>,
+    robot: Displaced,
 }
 
 impl EncoderEccentricity {
-    /// Where the joint truly is, and how it moves there.
-    fn place_truly(&mut self, at: &MotionSample<'_>) {
+    /// Position, velocity and acceleration of the joint as it truly moves.
+    fn truly(&self, at: &MotionSample<'_>) -> [f64; 3] {
         let j = self.joint;
-        self.position.copy_from_slice(at.position);
-        self.velocity.copy_from_slice(at.velocity);
-        self.acceleration.copy_from_slice(at.acceleration);
         let [sine, cosine, n] = self.values;
         let (q, qd, qdd) = (at.position[j], at.velocity[j], at.acceleration[j]);
         let (sin, cos) = (n * q).sin_cos();
         let error = sine * sin + cosine * cos;
         let slope = n * (sine * cos - cosine * sin);
         let bend = -n * n * error;
-        self.position[j] = q + error;
-        self.velocity[j] = qd * (1.0 + slope);
-        self.acceleration[j] = qdd * (1.0 + slope) + bend * qd * qd;
+        [
+            q + error,
+            qd * (1.0 + slope),
+            qdd * (1.0 + slope) + bend * qd * qd,
+        ]
     }
 }
 
@@ -125,27 +118,11 @@ impl Term for EncoderEccentricity {
         if self.values[0] == 0.0 && self.values[1] == 0.0 {
             return;
         }
-        self.place_truly(at);
-        let there = rnea(
-            &self.model,
-            &mut self.data,
-            &self.position,
-            &self.velocity,
-            &self.acceleration,
-        );
-        for (effort, there) in effort.iter_mut().zip(there) {
-            *effort += there;
-        }
-        let recorded = rnea(
-            &self.model,
-            &mut self.data,
-            at.position,
-            at.velocity,
-            at.acceleration,
-        );
-        for (effort, recorded) in effort.iter_mut().zip(recorded) {
-            *effort -= recorded;
-        }
+        self.robot.act(at, self.truly(at), effort);
+    }
+
+    fn know_recorded(&mut self, efforts: &Arc<Vec<f64>>) {
+        self.robot.know_recorded(efforts);
     }
 }
 
@@ -153,6 +130,7 @@ impl Term for EncoderEccentricity {
 mod tests {
     use super::super::tests::{TwoJoints, motion, run};
     use super::*;
+    use crate::{Data, rnea};
 
     #[test]
     fn the_robot_is_where_the_encoder_does_not_say() {

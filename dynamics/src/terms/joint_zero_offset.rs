@@ -1,12 +1,15 @@
 //! A joint whose zero is not the model's: B. W. Mooring, Z. S. Roth and M. R. Driels, *Fundamentals of Manipulator
 //! Calibration*, 1991.
 
+use std::sync::Arc;
+
+use super::displaced::Displaced;
 use super::ghost::While;
 use super::{
     Coordinate, Drawn, Effect, Excitation, Family, Layer, MotionSample, Parameter, PlaceKind,
     Simulated, Site, Term, Traits, Words,
 };
-use crate::{Data, Model, rnea};
+use crate::Model;
 
 /// A larger offset is no slip of a zero \[rad or m\].
 /// Physical: at arm's length such a joint misses by a hand's width, which nobody overlooks.
@@ -64,11 +67,7 @@ pub(super) struct JointZeroOffset {
     coordinates: Vec<f64>,
     there: While,
     joint: usize,
-    data: Data,
-    /// The robot that stands where it is recorded.
-    recorded: Model,
-    /// The robot that stands where it is.
-    shifted: Model,
+    robot: Displaced,
 }
 
 impl JointZeroOffset {
@@ -87,16 +86,12 @@ impl JointZeroOffset {
         coordinates: &[f64],
         there: While,
     ) -> Self {
-        let mut shifted = site.model.clone();
-        shifted.shift_zero(site.joint, coordinates[0]);
         Self {
             effect,
             coordinates: coordinates.to_vec(),
             there,
             joint: site.joint,
-            data: Data::new(site.model),
-            recorded: site.model.clone(),
-            shifted,
+            robot: Displaced::new(site.model, site.joint),
         }
     }
 }
@@ -112,20 +107,20 @@ impl Term for JointZeroOffset {
 
     fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
         if self.coordinates[0] == 0.0 || !self.there.covers(at) {
+            self.robot.skip();
             return;
         }
-        for (model, share) in [(&self.shifted, 1.0), (&self.recorded, -1.0)] {
-            let of_robot = rnea(
-                model,
-                &mut self.data,
-                at.position,
-                at.velocity,
-                at.acceleration,
-            );
-            for (effort, of_robot) in effort.iter_mut().zip(of_robot) {
-                *effort += share * of_robot;
-            }
-        }
+        let j = self.joint;
+        let truly = [
+            at.position[j] + self.coordinates[0],
+            at.velocity[j],
+            at.acceleration[j],
+        ];
+        self.robot.act(at, truly, effort);
+    }
+
+    fn know_recorded(&mut self, efforts: &Arc<Vec<f64>>) {
+        self.robot.know_recorded(efforts);
     }
 
     fn alter(&self, model: &mut Model) -> bool {
@@ -142,6 +137,7 @@ mod tests {
     use super::super::Site;
     use super::super::tests::{TwoJoints, motion, run};
     use super::*;
+    use crate::{Data, rnea};
 
     #[test]
     fn it_costs_what_the_robot_costs_where_the_joint_truly_is() {

@@ -1,5 +1,7 @@
 //! A joint whose zero jumps once: an encoder that slips on its shaft, a belt that jumps a tooth.
 
+use std::sync::Arc;
+
 use super::ghost::While;
 use super::joint_zero_offset::{JointZeroOffset, is_told};
 use super::payload_pickup::time;
@@ -82,6 +84,12 @@ impl Term for JointZeroSlip {
     fn act(&mut self, at: &MotionSample<'_>, effort: &mut [f64]) {
         for part in &mut self.parts {
             part.act(at, effort);
+        }
+    }
+
+    fn know_recorded(&mut self, efforts: &Arc<Vec<f64>>) {
+        for part in &mut self.parts {
+            part.know_recorded(efforts);
         }
     }
 }

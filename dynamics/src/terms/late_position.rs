@@ -1,11 +1,13 @@
 //! A joint whose position is reported late: an encoder on a channel of its own, read or sent less often than the others.
 
+use std::sync::Arc;
+
+use super::displaced::Displaced;
 use super::law::array;
 use super::{
     Coordinate, CoordinateKind, Effect, Excitation, Family, Layer, MotionSample, Parameter,
     PlaceKind, Simulated, Site, Term, Traits, Words,
 };
-use crate::{Data, Model, rnea};
 
 /// Delays that a channel may have beside the others \[s\].
 /// Physical: from one period of a controller to a fifth of a second, after which a joint is elsewhere and not late.
@@ -55,44 +57,34 @@ pub(super) static EFFECT: Effect = Effect {
 struct LatePosition {
     joint: usize,
     values: [f64; 1],
-    model: Model,
-    data: Data,
+    robot: Displaced,
     /// Of the sample before \[rad/s² or m/s²\].
     acceleration_before: Option<f64>,
     /// The last one \[rad/s³ or m/s³\].
     jerk: f64,
-    position: Vec<f64>,
-    velocity: Vec<f64>,
-    acceleration: Vec<f64>,
 }
 
 impl LatePosition {
     fn boxed(site: &Site<'_>, values: [f64; 1]) -> Box<dyn Term> {
-        let zero = vec![0.0; site.model.dof()];
         Box::new(Self {
             joint: site.joint,
             values,
-            model: site.model.clone(),
-            data: Data::new(site.model),
+            robot: Displaced::new(site.model, site.joint),
             acceleration_before: None,
             jerk: 0.0,
-            position: zero.clone(),
-            velocity: zero.clone(),
-            acceleration: zero,
         })
     }
 
-    /// Where the joint truly is, and how it moves there.
-    fn place_truly(&mut self, at: &MotionSample<'_>) {
+    /// Position, velocity and acceleration of the joint as it truly moves.
+    fn truly(&self, at: &MotionSample<'_>) -> [f64; 3] {
         let (j, [late_s]) = (self.joint, self.values);
-        self.position.copy_from_slice(at.position);
-        self.velocity.copy_from_slice(at.velocity);
-        self.acceleration.copy_from_slice(at.acceleration);
-        let (qd, qdd, jerk) = (at.velocity[j], at.acceleration[j], self.jerk);
+        let (q, qd, qdd) = (at.position[j], at.velocity[j], at.acceleration[j]);
         let half = 0.5 * late_s * late_s;
-        self.position[j] += late_s * qd + half * qdd + half * late_s / 3.0 * jerk;
-        self.velocity[j] += late_s * qdd + half * jerk;
-        self.acceleration[j] += late_s * jerk;
+        [
+            q + late_s * qd + half * qdd + half * late_s / 3.0 * self.jerk,
+            qd + late_s * qdd + half * self.jerk,
+            qdd + late_s * self.jerk,
+        ]
     }
 }
 
@@ -122,15 +114,11 @@ impl Term for LatePosition {
         if self.values[0] == 0.0 {
             return;
         }
-        self.place_truly(at);
-        let truly = [&self.position, &self.velocity, &self.acceleration].map(Vec::as_slice);
-        let recorded = [at.position, at.velocity, at.acceleration];
-        for ([q, qd, qdd], share) in [(truly, 1.0), (recorded, -1.0)] {
-            let of_robot = rnea(&self.model, &mut self.data, q, qd, qdd);
-            for (effort, of_robot) in effort.iter_mut().zip(of_robot) {
-                *effort += share * of_robot;
-            }
-        }
+        self.robot.act(at, self.truly(at), effort);
+    }
+
+    fn know_recorded(&mut self, efforts: &Arc<Vec<f64>>) {
+        self.robot.know_recorded(efforts);
     }
 }
 
@@ -138,6 +126,7 @@ impl Term for LatePosition {
 mod tests {
     use super::super::tests::{TwoJoints, sample};
     use super::*;
+    use crate::{Data, rnea};
 
     #[test]
     fn the_robot_is_where_it_will_be_reported() {

@@ -159,6 +159,7 @@ impl Problem {
             units: Arc::default(),
             bare: OnceLock::new(),
             rigid: OnceLock::new(),
+            recorded: OnceLock::new(),
             expansions: vec![OnceLock::new(); n],
         }
     }

@@ -52,6 +52,8 @@ pub struct Problem {
     pub work: Arc<Work>,
     /// What unit bodies cost.
     pub units: Arc<UnitEfforts>,
+    /// What the robot costs along the recorded motion, once that was asked for: by joint and sample of all tracks.
+    pub recorded: OnceLock<Arc<Vec<f64>>>,
     pub(super) bare: OnceLock<Efforts>,
     pub(super) rigid: OnceLock<Vec<f64>>,
     pub(super) expansions: Vec<OnceLock<Arc<Expansion>>>,

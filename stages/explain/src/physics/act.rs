@@ -1,9 +1,13 @@
-//! Runs terms over the recordings.
+//! Runs terms and robots over the recordings.
+
+use std::sync::Arc;
 
 use tauscope_dynamics::terms::{MotionSample, Physics, Term};
+use tauscope_dynamics::{Data, Model, gravity_effort, rnea};
 
 use crate::data::efforts::TrackEfforts;
 use crate::data::problem::Problem;
+use crate::data::track::FitTrack;
 
 /// The efforts `start` after `terms` have acted on them.
 pub fn run(problem: &Problem, terms: Vec<Box<dyn Term>>, start: &[Vec<f64>]) -> TrackEfforts {
@@ -38,4 +42,26 @@ pub fn act_over(
         });
     }
     out
+}
+
+/// Effort of a model over the motion of all tracks or, if not `moving`, the effort against gravity alone.
+pub fn over_tracks(problem: &Problem, model: &Model, moving: bool) -> TrackEfforts {
+    let mut data = Data::new(model);
+    let mut of = |track: &FitTrack| {
+        let mut effort = Vec::with_capacity(track.track.position.len());
+        track.track.each(|_, at| {
+            effort.extend_from_slice(if moving {
+                rnea(model, &mut data, at.position, at.velocity, at.acceleration)
+            } else {
+                gravity_effort(model, &mut data, at.position)
+            });
+        });
+        effort
+    };
+    problem.tracks.iter().map(&mut of).collect()
+}
+
+/// What a robot costs along the recorded motion, for [`Term::know_recorded`].
+pub fn recorded(problem: &Problem, model: &Model) -> Arc<Vec<f64>> {
+    Arc::new(over_tracks(problem, model, true).concat())
 }

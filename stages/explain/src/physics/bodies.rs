@@ -3,29 +3,28 @@
 
 use std::sync::Arc;
 
+use tauscope_dynamics::Inertia;
 use tauscope_dynamics::terms::Term;
-use tauscope_dynamics::{Data, Inertia, Model, gravity_effort, rnea};
 
 use crate::data::efforts::{TrackEfforts, zeros};
 use crate::data::memo::{MOST_ROWS, Unit};
 use crate::data::problem::Problem;
-use crate::data::track::FitTrack;
-use crate::physics::act::act_over;
+use crate::physics::act::{act_over, over_tracks, recorded};
 use crate::physics::active::Active;
-use crate::physics::carrier::is_on_carrier;
+use crate::physics::carrier::{Carrier, is_on_carrier};
 
 /// Adds the effort of an effect on bodies to efforts over all tracks. `rigid` is the twin's effort, `carrier` the robot with
 /// the bodies that were found, if there are any.
 pub fn add(
     problem: &Problem,
     active: &Active,
-    carrier: Option<&Model>,
+    carrier: Option<&Carrier>,
     rigid: &[Vec<f64>],
     into: &mut [Vec<f64>],
 ) {
     let hypothesis = active.hypothesis;
     let carrier = carrier.filter(|_| is_on_carrier(active));
-    let mut term = active.term(carrier.unwrap_or(&problem.model));
+    let mut term = active.term(carrier.map_or(&problem.model, |carrier| &carrier.model));
     let of_units = (carrier.is_none()).then(|| in_units(problem, &*term));
     if let Some((unit, factors)) = of_units.flatten() {
         add_units(&units(problem, unit), &factors, into);
@@ -34,6 +33,14 @@ pub fn add(
     } else {
         if problem.rows <= MOST_ROWS && hypothesis.has_rotor() {
             term.expand(problem.expansion(hypothesis.place.joint));
+        }
+        if problem.rows <= MOST_ROWS && is_on_carrier(active) {
+            term.know_recorded(match carrier {
+                Some(carrier) => carrier.recorded(problem),
+                None => problem
+                    .recorded
+                    .get_or_init(|| recorded(problem, &problem.model)),
+            });
         }
         let added = act_over(problem, &mut *term, &zeros(rigid), rigid);
         add_units(&[added], &[1.0], into);
@@ -139,21 +146,4 @@ fn units(problem: &Problem, unit: Unit) -> Arc<Vec<TrackEfforts>> {
         .units
         .efforts
         .get_or(unit, || (0..count).map(one).collect())
-}
-
-/// Effort of a model over the motion of all tracks or, if not `moving`, the effort against gravity alone.
-fn over_tracks(problem: &Problem, model: &Model, moving: bool) -> TrackEfforts {
-    let mut data = Data::new(model);
-    let mut of = |track: &FitTrack| {
-        let mut effort = Vec::with_capacity(track.track.position.len());
-        track.track.each(|_, at| {
-            effort.extend_from_slice(if moving {
-                rnea(model, &mut data, at.position, at.velocity, at.acceleration)
-            } else {
-                gravity_effort(model, &mut data, at.position)
-            });
-        });
-        effort
-    };
-    problem.tracks.iter().map(&mut of).collect()
 }

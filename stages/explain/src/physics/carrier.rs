@@ -3,19 +3,43 @@
 //! A base that leans, a joint that stands elsewhere and a position that comes late act on a payload as on the arm itself.
 //! The product of both, a payload's weight on a base that leans, is in neither of the two efforts by itself.
 
+use std::sync::{Arc, OnceLock};
+
 use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::Layer;
 
+use crate::data::problem::Problem;
+use crate::physics::act::recorded;
 use crate::physics::active::Active;
 
+/// A robot with bodies on it.
+#[derive(Debug)]
+pub struct Carrier {
+    /// The robot.
+    pub model: Model,
+    /// What it costs along the recorded motion, once that was asked for.
+    recorded: OnceLock<Arc<Vec<f64>>>,
+}
+
+impl Carrier {
+    /// What it costs along the motion of all tracks, for `Term::know_recorded`.
+    pub fn recorded(&self, problem: &Problem) -> &Arc<Vec<f64>> {
+        self.recorded.get_or_init(|| recorded(problem, &self.model))
+    }
+}
+
 /// The robot with the bodies of `actives` that are there for good; `None` without any.
-pub fn carrier(model: &Model, actives: &[Active]) -> Option<Model> {
+pub fn carrier(model: &Model, actives: &[Active]) -> Option<Carrier> {
     let bodies = actives.iter().filter(|active| is_carried(active));
     let inertias = bodies.filter_map(|active| active.term(model).inertia());
-    inertias.fold(None, |carrier, (link, inertia)| {
+    let model = inertias.fold(None, |carrier, (link, inertia)| {
         let mut carrier = carrier.unwrap_or_else(|| model.clone());
         carrier.attach(link, inertia);
         Some(carrier)
+    })?;
+    Some(Carrier {
+        model,
+        recorded: OnceLock::new(),
     })
 }
 

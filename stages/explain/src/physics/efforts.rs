@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::{Layer, Term};
 
 use crate::data::efforts::{Efforts, TrackEfforts, scale, subtract, zeros};
@@ -10,7 +9,7 @@ use crate::data::problem::Problem;
 use crate::physics::act::{act_over, run};
 use crate::physics::active::Active;
 use crate::physics::bodies;
-use crate::physics::carrier::{carrier, is_on_carrier};
+use crate::physics::carrier::{Carrier, carrier, is_on_carrier};
 use crate::physics::shaped_bodies::add_shaped;
 use crate::physics::torque_scale::gains;
 
@@ -69,7 +68,7 @@ pub fn change(
     others: &[Active],
     efforts: &Efforts,
     active: &Active,
-    (gains, carrier): (&[f64], Option<&Model>),
+    (gains, carrier): (&[f64], Option<&Carrier>),
 ) -> TrackEfforts {
     let through = others.iter().any(Active::is_of_record);
     match active.hypothesis.effect.layer {

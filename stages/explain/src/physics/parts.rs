@@ -4,7 +4,6 @@
 
 use std::sync::{Arc, OnceLock};
 
-use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::{Coordinate, CoordinateKind, Layer, PlaceKind};
 
 use crate::data::column::Column;
@@ -13,7 +12,7 @@ use crate::data::memo::MOST_ROWS;
 use crate::data::problem::Problem;
 use crate::physics::active::{Active, Hypothesis, feeds};
 use crate::physics::bodies;
-use crate::physics::carrier::{carrier, is_carried, is_on_carrier};
+use crate::physics::carrier::{Carrier, carrier, is_carried, is_on_carrier};
 use crate::physics::efforts::{change, evaluated, transmitted};
 use crate::physics::torque_scale::gains;
 use crate::physics::unit_columns::units;
@@ -26,7 +25,7 @@ pub struct Parts {
     /// Joints whose recording an effect transforms, so that it is not a sum of parts.
     pub transformed: Vec<bool>,
     /// The robot with the bodies that were found, if there are any.
-    pub carrier: Option<Arc<Model>>,
+    pub carrier: Option<Arc<Carrier>>,
     /// By effect, the effort that it adds before torque scales; `None` if it does not only add.
     columns: Vec<Option<Arc<Column>>>,
     /// The effort that the gears transmit, if a part depends on it.
@@ -43,7 +42,12 @@ impl Parts {
         let mut parts = Self {
             gains: gains(actives, problem.joints),
             transformed: transformed(actives, problem.joints),
-            carrier: carrier(&problem.model, actives).map(Arc::new),
+            carrier: match before {
+                Some((others, before)) if same(actives, others, is_carried) => {
+                    before.carrier.clone()
+                }
+                _ => carrier(&problem.model, actives).map(Arc::new),
+            },
             columns: Vec::with_capacity(actives.len()),
             load: None,
             feeds: (0..problem.joints)
