@@ -99,17 +99,20 @@ def test_ctrl_c_ends_the_work_and_not_the_interpreter(concealed: tauscope.Simula
     )
     out = tmp_path / "report"
     arguments = [concealed.case, out, concealed.recordings[0]]
-    process = subprocess.Popen(
+    with subprocess.Popen(
         [sys.executable, "-c", program, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    assert process.stdout is not None and process.stdout.readline() == "begun\n"
-    # The folder is made once the recordings are read.
-    deadline = time.monotonic() + 60
-    while not out.exists() and time.monotonic() < deadline:
-        time.sleep(0.01)
-    started = time.monotonic()
-    os.kill(process.pid, signal.SIGINT)
-    said, warned = process.communicate(timeout=60)
+    ) as process:
+        try:
+            assert process.stdout is not None and process.stdout.readline() == "begun\n"
+            # The folder is made once the recordings are read.
+            deadline = time.monotonic() + 60
+            while not out.exists() and time.monotonic() < deadline:
+                time.sleep(0.01)
+            started = time.monotonic()
+            os.kill(process.pid, signal.SIGINT)
+            said, warned = process.communicate(timeout=60)
+        finally:
+            process.kill()
     number, _, could_read = said.partition(" ")
     assert (process.returncode, could_read, warned) == (0, "True\n", "")
     assert time.monotonic() - started < 10

@@ -10,6 +10,10 @@ use crate::Inertia;
 /// Physical: the mass of the URDF and the estimate may both be off by a tenth.
 const MOST_ABSENT: f64 = 1.2;
 
+/// And no less than this share: by so much the masses of a URDF are off, and `link_mass` and `link_com` tell of it.
+/// Physical: a fifth; drawings and weighed arms differ by a twentieth to a tenth.
+const LEAST_ABSENT: f64 = 0.2;
+
 /// Mass of all that the last joint before the tool carries \[kg\].
 fn carried_kg(site: &Site<'_>) -> f64 {
     let links = site.model.links();
@@ -38,7 +42,7 @@ pub static EFFECT: Effect = Effect {
     to_coordinates: |p| inertia(&array(p)).parameters().to_vec(),
     simpler: None,
     // More than there is cannot be absent.
-    limit: Some(|site, x| x[0] <= MOST_ABSENT * carried_kg(site)),
+    limit: Some(|site, x| (LEAST_ABSENT..=MOST_ABSENT).contains(&(x[0] / carried_kg(site)))),
     excitation: Excitation::Poses,
     simulated: Simulated::Model,
     // What can be taken off depends on the URDF.

@@ -7,7 +7,7 @@ use std::sync::{Arc, OnceLock};
 use tauscope_dynamics::Model;
 
 use crate::data::effective_samples::per_row;
-use crate::data::noise::of_effort;
+use crate::data::noise::{of_effort, step};
 use crate::data::problem::Problem;
 use crate::data::smoother::LowPass;
 use crate::data::track::{FitTrack, Track, moving_joints, spaced, thinned};
@@ -90,6 +90,9 @@ impl Problem {
                     most.max((recording.effort[at] * unit_nm[j]).abs())
                 });
                 problem.largest_effort[j] = problem.largest_effort[j].max(largest);
+                let told: Vec<f64> = of_joint.clone().map(|at| recording.effort[at]).collect();
+                let step = step(&told).unwrap_or(0.0) * unit_nm[j];
+                problem.effort_step[j] = problem.effort_step[j].max(step);
                 let mut signal: Vec<f64> = of_joint
                     .map(|at| (recording.effort[at] - full.beside[at]) * unit_nm[j])
                     .collect();
@@ -148,6 +151,7 @@ impl Problem {
             weight: Vec::new(),
             white_noise: vec![0.0; n],
             unfiltered_noise: vec![0.0; n],
+            effort_step: vec![0.0; n],
             acceleration_noise: vec![0.0; n],
             largest_effort: vec![0.0; n],
             cutoff_hz,

@@ -7,7 +7,8 @@ use crate::data::problem::Problem;
 use crate::fit::fitted::Fit;
 use crate::physics::active::{Active, Hypothesis};
 use crate::select::evidence::{LEAST_GAIN, MORE_THAN_SIMPLE, tie};
-use crate::select::explanation::{Explanation, describe};
+use crate::select::explanation::{Explanation, describe, left_out};
+use crate::select::plausible::plausible;
 
 /// Rounds of adding effects and exchanging all of them.
 /// Tuned: by hand, for what it costs in time; not swept.
@@ -54,9 +55,21 @@ impl Search<'_> {
             }
         }
         best = self.with_listed_names(self.with_drifts_named(best));
-        // So far it was refined only as far as comparisons needed. Now its parameters are refined fully.
-        best.fit = best.fit.refined(self.problem);
+        best = self.fully_refined(best);
         self.without_hidden(self.with_split_pushes(self.with_names_that_hold(best)))
+    }
+
+    /// So far it was refined only as far as comparisons needed. Now its parameters are refined fully. What that carries to
+    /// where no robot has it is removed.
+    fn fully_refined(&self, mut best: Explanation) -> Explanation {
+        best.fit = best.fit.refined(self.problem);
+        let beyond = |active: &Active| !plausible(self.problem, active);
+        while let Some(index) = best.fit.actives.iter().position(beyond) {
+            (self.say)(&left_out(&best, index));
+            best = self.without(&best, index);
+            best.fit = best.fit.refined(self.problem);
+        }
+        best
     }
 
     fn started(&self, start: Vec<Active>, penalties: Vec<f64>) -> Explanation {
