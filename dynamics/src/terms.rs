@@ -80,6 +80,7 @@ use std::sync::Arc;
 
 use crate::{Inertia, Model};
 
+pub use absent_tool::{EFFECT as ABSENT_TOOL, LEAST_ABSENT, share_of_carried};
 pub use concealed::{Chance, Draw, Drawn, Parameters};
 pub use coulomb_friction::EFFECT as COULOMB_FRICTION;
 pub use effect::{

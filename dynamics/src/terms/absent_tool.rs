@@ -3,24 +3,22 @@
 use super::ghost::{Ghost, While};
 use super::law::array;
 use super::payload::{BODY_COORDINATES, BODY_PARAMETERS, inertia, parameters};
-use super::{Effect, Excitation, Family, Layer, PlaceKind, Simulated, Site, Traits, Words};
-use crate::Inertia;
+use super::{Effect, Excitation, Family, Layer, PlaceKind, Simulated, Traits, Words};
+use crate::{Inertia, Model};
 
 /// No more than this share of what the last joint carries is absent.
 /// Physical: the mass of the URDF and the estimate may both be off by a tenth.
 const MOST_ABSENT: f64 = 1.2;
 
-/// And no less than this share: by so much the masses of a URDF are off, and `link_mass` and `link_com` tell of it.
+/// Of less than this share no tool is missing: the bodies of a URDF are off by as much.
 /// Physical: a fifth; drawings and weighed arms differ by a twentieth to a tenth.
-const LEAST_ABSENT: f64 = 0.2;
+pub const LEAST_ABSENT: f64 = 0.2;
 
-/// Mass of all that the last joint before the tool carries \[kg\].
-fn carried_kg(site: &Site<'_>) -> f64 {
-    let links = site.model.links();
-    let same = links
-        .iter()
-        .filter(|link| link.joint == links[site.link].joint);
-    same.map(|link| link.inertia.mass_kg()).sum()
+/// A mass \[kg\] as a share of all that the joint of a link carries in the model, up to the next joint.
+pub fn share_of_carried(model: &Model, link: usize, mass_kg: f64) -> f64 {
+    let links = model.links();
+    let same = links.iter().filter(|one| one.joint == links[link].joint);
+    mass_kg / same.map(|one| one.inertia.mass_kg()).sum::<f64>()
 }
 
 /// A payload that is taken off: the URDF has a gripper that is not mounted, or one that is heavier than the real one.
@@ -42,7 +40,7 @@ pub static EFFECT: Effect = Effect {
     to_coordinates: |p| inertia(&array(p)).parameters().to_vec(),
     simpler: None,
     // More than there is cannot be absent.
-    limit: Some(|site, x| (LEAST_ABSENT..=MOST_ABSENT).contains(&(x[0] / carried_kg(site)))),
+    limit: Some(|site, x| share_of_carried(site.model, site.link, x[0]) <= MOST_ABSENT),
     excitation: Excitation::Poses,
     simulated: Simulated::Model,
     // What can be taken off depends on the URDF.

@@ -5,6 +5,7 @@ mod confidence;
 mod contest;
 mod doubt;
 mod far_out;
+mod lighter_body;
 mod odd_robot;
 mod rivals;
 mod scales;
@@ -175,6 +176,9 @@ pub fn of(
             equivalent_to,
             sentence,
         });
+    }
+    for finding in &mut named.findings {
+        lighter_body::tell_share(finding, &input.model);
     }
     doubt::doubt(&mut named, search.problem, &fit.actives);
     merge_waves(&mut named.findings);

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use tauscope_dynamics::terms::{effect, words};
+use tauscope_dynamics::terms::{LEAST_ABSENT, effect, words};
 
 use crate::report::sentences::in_units;
 use crate::report::slip_words;
@@ -119,6 +119,8 @@ impl Remaining {
 
 /// The `kind` of an `unknown` that says only where something remains.
 pub const WITHOUT_LAW: &str = "without_law";
+/// The parameter of an absent tool that is its share of what the twin has there.
+pub const SHARE_OF_CARRIED: &str = "share_of_carried";
 
 /// An effect that the twin leaves out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -178,6 +180,15 @@ impl Finding {
     /// Whether it says only that something remains at its joint: the correction has nothing for it.
     pub fn is_without_law(&self) -> bool {
         self.parameters.get("kind").and_then(Value::as_str) == Some(WITHOUT_LAW)
+    }
+
+    /// Whether it is a body that is off by as much as those of a URDF are.
+    pub fn is_body_off(&self) -> bool {
+        let share = self
+            .parameters
+            .get(SHARE_OF_CARRIED)
+            .and_then(Value::as_f64);
+        share.is_some_and(|share| share < LEAST_ABSENT)
     }
 
     /// Whether it is a fault of the recordings, or of what is said of them, and no physics.

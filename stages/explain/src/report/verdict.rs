@@ -15,7 +15,8 @@ const NAMES: f64 = 0.5;
 /// than wrong, something is there that nobody has named.
 pub fn verdict(findings: &[Finding], remainders: &Remainders, twin_is_topic: bool) -> Verdict {
     let (remaining, is_worsened) = (&remainders.all, remainders.is_worsened);
-    let described = findings.iter().any(|f| f.effect == UNKNOWN.name);
+    let is_described = |f: &Finding| f.effect == UNKNOWN.name && !f.is_body_off();
+    let described = findings.iter().any(is_described);
     let named = twin_is_topic || findings.iter().any(|f| f.confidence >= NAMES);
     let decides = !twin_is_topic || findings.is_empty() || is_worsened;
     let of_the_arm = !remaining.is_empty() && decides;
@@ -34,7 +35,19 @@ pub fn verdict(findings: &[Finding], remainders: &Remainders, twin_is_topic: boo
 mod tests {
     use super::*;
     use crate::fixture::finding;
-    use crate::report::schema::Remaining;
+    use crate::report::schema::{Remaining, SHARE_OF_CARRIED};
+    use serde_json::Value;
+
+    #[test]
+    fn a_body_that_is_a_little_lighter_than_the_twins_is_no_unknown() {
+        for (share, said) in [(0.05, Verdict::Explained), (0.9, Verdict::UnknownRemains)] {
+            let mut lighter = finding(UNKNOWN.name);
+            let share = (SHARE_OF_CARRIED.to_owned(), Value::from(share));
+            lighter.parameters.extend([share]);
+            let found = verdict(&[lighter], &Remainders::default(), false);
+            assert_eq!(found, said);
+        }
+    }
 
     #[test]
     fn beside_another_simulation_only_a_joint_that_got_worse_decides() {
