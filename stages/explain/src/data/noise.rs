@@ -50,8 +50,8 @@ pub fn of_effort(signal: &[f64]) -> (f64, f64) {
 
 /// The step in which a signal is told: the smallest difference of two of its values, if any two values differ. Of a signal
 /// that is told finely it is next to nothing.
-pub fn step(signal: &[f64]) -> Option<f64> {
-    let mut values: Vec<f64> = signal.iter().copied().filter(|x| x.is_finite()).collect();
+pub fn step(signal: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = signal.filter(|x| x.is_finite()).collect();
     values.sort_by(f64::total_cmp);
     let largest = values.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     let steps = values.windows(2).map(|pair| pair[1] - pair[0]);
@@ -104,10 +104,10 @@ mod tests {
     #[test]
     fn an_effort_is_told_in_steps_or_finely() {
         let fine = told(2);
-        let coarse: Vec<f64> = fine.iter().map(|x| (8.0 * x).round() / 8.0).collect();
-        assert_eq!(step(&coarse), Some(0.125));
-        assert!(step(&fine).is_some_and(|step| step < 1e-4));
-        assert_eq!(step(&[3.0; 9]), None);
+        let coarse = fine.iter().map(|x| (8.0 * x).round() / 8.0);
+        assert_eq!(step(coarse), Some(0.125));
+        assert!(step(fine.into_iter()).is_some_and(|step| step < 1e-4));
+        assert_eq!(step([3.0; 9].into_iter()), None);
     }
 
     #[test]

@@ -86,13 +86,8 @@ impl Problem {
                 leave_out_unmeasured(&mut counts, recording, j, n);
                 let filter = LowPass::weighted(&track.time_s, cutoff_hz, |k| counts[k]);
                 let of_joint = (0..full.len()).map(|k| k * n + j);
-                let largest = of_joint.clone().fold(0.0_f64, |most, at| {
-                    most.max((recording.effort[at] * unit_nm[j]).abs())
-                });
-                problem.largest_effort[j] = problem.largest_effort[j].max(largest);
-                let told: Vec<f64> = of_joint.clone().map(|at| recording.effort[at]).collect();
-                let step = step(&told).unwrap_or(0.0) * unit_nm[j];
-                problem.effort_step[j] = problem.effort_step[j].max(step);
+                let own = recording.effort[j..].iter().step_by(n).take(full.len());
+                problem.note_efforts(j, &own.map(|x| x * unit_nm[j]).collect::<Vec<_>>());
                 let mut signal: Vec<f64> = of_joint
                     .map(|at| (recording.effort[at] - full.beside[at]) * unit_nm[j])
                     .collect();
@@ -107,12 +102,8 @@ impl Problem {
                 let mut signal: Vec<f64> = kept.iter().map(|&k| signal[k]).collect();
                 filter.apply(&mut signal);
                 measured.push(compared.iter().map(|&k| signal[k]).collect::<Vec<_>>());
-                weight.push(
-                    compared
-                        .iter()
-                        .map(|&k| f64::from(counts[k]))
-                        .collect::<Vec<_>>(),
-                );
+                let counted = compared.iter().map(|&k| f64::from(counts[k]));
+                weight.push(counted.collect::<Vec<_>>());
                 filters.push(filter);
             }
             let first_row = problem.rows;
@@ -137,6 +128,16 @@ impl Problem {
         }
         problem.effective_samples = per_row(&problem);
         problem
+    }
+
+    /// Takes note of the largest of some efforts of a joint \[N m or N\], and of their step.
+    fn note_efforts(&mut self, joint: usize, efforts: &[f64]) {
+        let (most, least) = (
+            &mut self.largest_effort[joint],
+            &mut self.effort_step[joint],
+        );
+        *most = efforts.iter().fold(*most, |most, x| most.max(x.abs()));
+        *least = least.max(step(efforts.iter().copied()).unwrap_or(0.0));
     }
 
     /// No recordings of a robot.

@@ -65,6 +65,17 @@ pub struct Named {
 }
 
 impl Named {
+    /// Says of each finding, of the effects `actives`, what the others make of it, and puts the largest first.
+    fn judge(&mut self, problem: &Problem, actives: &[Active]) {
+        for finding in &mut self.findings {
+            lighter_body::tell_share(finding, &problem.model);
+        }
+        doubt::doubt(self, problem, actives);
+        merge_waves(&mut self.findings);
+        self.findings
+            .sort_by(|a, b| b.explains.total_cmp(&a.explains));
+    }
+
     /// Adds the findings of another explanation.
     pub fn extend(&mut self, other: Self) {
         self.findings.extend(other.findings);
@@ -177,14 +188,7 @@ pub fn of(
             sentence,
         });
     }
-    for finding in &mut named.findings {
-        lighter_body::tell_share(finding, &input.model);
-    }
-    doubt::doubt(&mut named, search.problem, &fit.actives);
-    merge_waves(&mut named.findings);
-    named
-        .findings
-        .sort_by(|a, b| b.explains.total_cmp(&a.explains));
+    named.judge(search.problem, &fit.actives);
     named
 }
 

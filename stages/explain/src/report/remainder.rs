@@ -239,18 +239,8 @@ fn of(
         let unit = unit_at(unit, &problem.model.joints()[j]);
         let told = |nm: f64| format!("{} {unit}", number(nm / unit_nm[j]));
         let there = held.as_ref().map(|held| held.rms(j));
-        let mut sentences = Vec::new();
-        if let Some(odd) = &odd
-            && let Some([own, others]) = odd.left[j]
-        {
-            sentences.push(format!(
-                "Recording {} does not go with the others: fitted without it they leave {} at joint {joint}, and it then leaves {}. \
-                 Is it of another robot, with another tool or load, or did something change in it?",
-                odd.name,
-                told(others),
-                told(own)
-            ));
-        }
+        let odd = odd.as_ref().and_then(|odd| odd.says(j, joint, &told));
+        let mut sentences: Vec<String> = odd.into_iter().collect();
         if sentences.is_empty()
             && is_fine(&found)
             && let Some(with) = follows_motion(found, before.fit, j)

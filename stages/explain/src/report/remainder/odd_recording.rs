@@ -37,6 +37,20 @@ struct Joint {
     falls: bool,
 }
 
+impl OddRecording {
+    /// What is said of a joint. `told` gives efforts in the recording's unit.
+    pub fn says(&self, j: usize, joint: &str, told: &dyn Fn(f64) -> String) -> Option<String> {
+        let [own, others] = self.left[j]?;
+        Some(format!(
+            "Recording {} does not go with the others: fitted without it they leave {} at joint {joint}, and it then leaves {}. \
+             Is it of another robot, with another tool or load, or did something change in it?",
+            self.name,
+            told(others),
+            told(own)
+        ))
+    }
+}
+
 /// The recording that does not go with the others, if there is one and no second one.
 pub(super) fn odd_recording(found: Left<'_>) -> Option<OddRecording> {
     let problem = found.problem;
