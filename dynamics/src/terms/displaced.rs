@@ -48,6 +48,9 @@ impl Displaced {
 
     /// Adds to `effort` what the next sample costs more with the joint at this position, velocity and acceleration
     /// \[rad, rad/s, rad/s² or m\]. Does not allocate.
+    ///
+    /// # Panics
+    /// If the efforts that are known end before this sample.
     pub fn act(&mut self, at: &MotionSample<'_>, [q, qd, qdd]: [f64; 3], effort: &mut [f64]) {
         self.position.copy_from_slice(at.position);
         self.velocity.copy_from_slice(at.velocity);

@@ -132,12 +132,11 @@ impl Problem {
 
     /// Takes note of the largest of some efforts of a joint \[N m or N\], and of their step.
     fn note_efforts(&mut self, joint: usize, efforts: &[f64]) {
-        let (most, least) = (
-            &mut self.largest_effort[joint],
-            &mut self.effort_step[joint],
-        );
-        *most = efforts.iter().fold(*most, |most, x| most.max(x.abs()));
-        *least = least.max(step(efforts.iter().copied()).unwrap_or(0.0));
+        let largest = &mut self.largest_effort[joint];
+        *largest = efforts.iter().fold(*largest, |most, x| most.max(x.abs()));
+        if let Some(step) = step(efforts.iter().copied()) {
+            self.effort_step[joint] = self.effort_step[joint].min(step);
+        }
     }
 
     /// No recordings of a robot.
@@ -152,7 +151,7 @@ impl Problem {
             weight: Vec::new(),
             white_noise: vec![0.0; n],
             unfiltered_noise: vec![0.0; n],
-            effort_step: vec![0.0; n],
+            effort_step: vec![f64::INFINITY; n],
             acceleration_noise: vec![0.0; n],
             largest_effort: vec![0.0; n],
             cutoff_hz,

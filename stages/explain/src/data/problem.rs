@@ -33,7 +33,8 @@ pub struct Problem {
     pub white_noise: Vec<f64>,
     /// The same before the filter \[N m\].
     pub unfiltered_noise: Vec<f64>,
-    /// The step in which the measured effort is told, by joint \[N m or N\].
+    /// The step in which the measured effort is told, by joint \[N m or N\]: the smallest that any recording shows; infinite
+    /// if the effort never changes.
     pub effort_step: Vec<f64>,
     /// What the noise of its recorded position makes of a joint's acceleration below the comparison's cutoff, by joint
     /// \[rad/s² or m/s²\].

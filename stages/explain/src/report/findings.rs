@@ -65,7 +65,8 @@ pub struct Named {
 }
 
 impl Named {
-    /// Says of each finding, of the effects `actives`, what the others make of it, and puts the largest first.
+    /// Adds to each finding what its size and the other findings say of it, and puts the largest first. `actives` are the
+    /// effects of the findings, in their order.
     fn judge(&mut self, problem: &Problem, actives: &[Active]) {
         for finding in &mut self.findings {
             lighter_body::tell_share(finding, &problem.model);

@@ -98,7 +98,8 @@ impl Left<'_> {
 
     /// Whether a joint's error is one of few steps of its effort.
     fn is_within_steps(&self, joint: usize) -> bool {
-        self.rms(joint) < LEAST_STEPS * self.problem.effort_step[joint]
+        let step = self.problem.effort_step[joint];
+        step.is_finite() && self.rms(joint) < LEAST_STEPS * step
     }
 
     /// Rows of a joint that count, with the rate at which the twin's effort changes there \[N m/s\].
