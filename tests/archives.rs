@@ -2,14 +2,12 @@
 //! results are compared.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
-mod common;
-
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use common::{Out, bundled, root, tauscope, write};
+use crate::common::{Out, bundled, root, tauscope, write};
 use tauscope_pipeline::results::{COLUMNS, parquet_files, read_results};
 
 const RECORDINGS: [&str; 4] = [
@@ -311,7 +309,7 @@ fn the_command_line_of_the_cluster_jobs_is_one_that_the_program_takes() {
 fn an_archive_whose_runners_are_killed_and_meet_ends_with_the_same_files() {
     let test = "an_archive_whose_runners_are_killed_and_meet_ends_with_the_same_files";
     if Command::new("python3").arg("--version").output().is_err() {
-        return common::skipped(test, "python3 is absent");
+        return crate::common::skipped(test, "python3 is absent");
     }
     let folder = tempfile::tempdir().unwrap();
     let mut command = Command::new("python3");

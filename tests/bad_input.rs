@@ -3,19 +3,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
-#[path = "common/labelled_set.rs"]
-mod labelled_set;
-
-#[path = "common/learnt_pipeline.rs"]
-mod learnt_pipeline;
-
 use std::path::Path;
 
-use common::{Out, bundled, tauscope, write};
-use labelled_set::{Set, changed, evaluate};
-use learnt_pipeline::{LEARNT, arm, pipeline, refused, replay, run};
+use crate::common::labelled_set::{Set, changed, evaluate};
+use crate::common::learnt_pipeline::{LEARNT, arm, pipeline, refused, replay, run};
+use crate::common::{Out, bundled, tauscope, write};
 use serde_json::Value;
 use tauscope_archive::ros::JointState;
 

@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
 use std::collections::BTreeMap;
 
-use common::{Out, bundled, tauscope};
+use crate::common::{Out, bundled, tauscope};
 use tauscope_twin::TwinFile;
 
 /// By detector, samples and mean of its score on bundled recordings, in this order.

@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
 use std::path::Path;
 
-use common::{Out, bundled, tauscope, write};
+use crate::common::{Out, bundled, tauscope, write};
 
 fn check(folder: &Path, text: &str, more: &[&str]) -> Out {
     std::fs::copy(bundled().join("demo_arm.urdf"), folder.join("arm.urdf")).unwrap();

@@ -1,13 +1,11 @@
 //! An hour of clean cycles with friction that warms up (`tests/data/clean_hour.scenario.yaml`): no alarm is right. Every
-//! time in short; the whole hour with `cargo test --release --test clean_hour -- --ignored`.
+//! time in short; the whole hour with `cargo test --release --test program clean_hour -- --ignored`.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
 use std::path::Path;
 
-use common::{Out, bundled, tauscope, write};
+use crate::common::{Out, bundled, tauscope, write};
 use serde_json::Value;
 
 const DETECTORS: &str = "virtual_collision_sensor_basic,virtual_collision_sensor,tauscope";

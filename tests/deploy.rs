@@ -2,13 +2,11 @@
 //! container engine or a cluster.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
-mod common;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::{Out, bundled, root, skipped, write};
+use crate::common::{Out, bundled, root, skipped, write};
 use serde_json::Value;
 
 fn deploy(name: &str) -> PathBuf {

@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
-use common::{Out, bundled, root, tauscope, write};
+use crate::common::{Out, bundled, root, tauscope, write};
 
 /// The first block of `document` that begins with this line.
 fn block(document: &str, fence: &str) -> String {

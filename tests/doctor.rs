@@ -1,12 +1,10 @@
 //! `tauscope doctor` says what would keep a pipeline from running.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
-mod common;
-
 use std::net::TcpListener;
 use std::path::Path;
 
-use common::{Out, bundled, write};
+use crate::common::{Out, bundled, write};
 use serde_json::Value;
 
 #[test]

@@ -1,19 +1,12 @@
 //! What outlasts a killed recorder, a power cut and a full disk.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
-#[path = "common/live.rs"]
-mod live;
-
-mod common;
-
-#[path = "common/python.rs"]
-mod python;
-
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::{Out, bundled, root, skipped, write};
-use live::{Live, signal, stage, wait_until};
+use crate::common::live::{Live, signal, stage, wait_until};
+use crate::common::python;
+use crate::common::{Out, bundled, root, skipped, write};
 use tauscope_archive::Recording;
 
 /// The bundled recording at `rate`, recorded as `record` says.

@@ -3,15 +3,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
-#[path = "common/labelled_set.rs"]
-mod labelled_set;
-
 use std::path::{Path, PathBuf};
 
-use common::{bundled, shared, skipped, write};
-use labelled_set::{Set, changed, evaluate};
+use crate::common::labelled_set::{Set, changed, evaluate};
+use crate::common::{bundled, shared, skipped, write};
 use serde_json::Value;
 
 const LIGHT: [&str; 2] = ["--detectors", "naive_difference,twin_regression"];
@@ -68,7 +63,7 @@ fn every_contact_of_the_bundled_set_is_found_and_scored() {
         "--out",
         out.to_str().unwrap(),
     ];
-    let again = common::Out::answer(again.iter().chain(&LIGHT));
+    let again = crate::common::Out::answer(again.iter().chain(&LIGHT));
     assert_eq!(again.code, 2, "{again:?}");
     assert!(again.stderr.contains("--force"), "{again:?}");
     assert_eq!(

@@ -2,19 +2,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
-#[path = "common/live.rs"]
-mod live;
-
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use common::{Out, bundled, tauscope, write};
-use live::{Live, signal};
+use crate::common::live::{Live, signal};
+use crate::common::{Out, bundled, tauscope, write};
 use serde_json::Value;
 use tauscope_bus::{ZenohEndpoints, ZenohRouter};
 
@@ -309,7 +304,7 @@ fn the_clock_of_a_cell_is_measured_and_told_of_where_it_is_off() {
     drop(fleet);
 
     let Some(library) = shifts else {
-        return common::skipped(test, "a clock is shifted by libfaketime, which is absent");
+        return crate::common::skipped(test, "a clock is shifted by libfaketime, which is absent");
     };
     let mut command = tauscope();
     command

@@ -2,20 +2,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
-#[path = "common/formats.rs"]
-mod formats;
-
-#[path = "common/labelled_set.rs"]
-mod labelled_set;
-
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-use common::{Out, bundled, write};
-use formats::Format;
-use labelled_set::{Set, evaluate};
+use crate::common::formats;
+use crate::common::formats::Format;
+use crate::common::labelled_set::{Set, evaluate};
+use crate::common::{Out, bundled, write};
 use serde_json::Value;
 use tauscope_twin::TwinFile;
 

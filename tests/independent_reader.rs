@@ -2,16 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
-#[path = "common/python.rs"]
-mod python;
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::{Out, bundled, root, skipped, tauscope, write};
+use crate::common::python;
+use crate::common::{Out, bundled, root, skipped, tauscope, write};
 use tauscope_archive::{Recording, ros};
 
 const PACKAGES: [&str; 2] = ["mcap==1.6.0", "mcap-ros2-support==0.6.0"];

@@ -2,12 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
 use std::ffi::OsStr;
 use std::path::Path;
 
-use common::{Out, bundled, root};
+use crate::common::{Out, bundled, root};
 use serde_json::Value;
 
 const FREE: [&str; 3] = [

@@ -1,17 +1,12 @@
 //! `tauscope init --live`: from a robot that moves to a pipeline that listens to it.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
-#[path = "common/robot.rs"]
-mod robot;
-
-mod common;
-
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use common::{Out, bundled, tauscope};
-use robot::{endpoint, rmw_key, router};
+use crate::common::robot::{endpoint, rmw_key, router};
+use crate::common::{Out, bundled, tauscope};
 use tauscope_archive::{Recording, ros};
 use zenoh::Wait as _;
 

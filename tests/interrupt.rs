@@ -2,17 +2,12 @@
 //! does not end is named and killed.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
-#[path = "common/live.rs"]
-mod live;
-
-mod common;
-
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use common::{Out, bundled, tauscope, write};
-use live::{Live, signal, stage, wait_until};
+use crate::common::live::{Live, signal, stage, wait_until};
+use crate::common::{Out, bundled, tauscope, write};
 
 /// Runs `command`, sends it a signal when `ripe`, and gives what it said.
 fn interrupted(mut command: Command, name: &str, ripe: impl Fn() -> bool) -> Out {

@@ -2,16 +2,11 @@
 //! others go on.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
-#[path = "common/live.rs"]
-mod live;
-
-mod common;
-
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use common::{bundled, write};
-use live::{Live, is_alive, signal, stage, wait_until};
+use crate::common::live::{Live, is_alive, signal, stage, wait_until};
+use crate::common::{bundled, write};
 
 const STAGES: [&str; 4] = ["record", "detect", "twin", "ingest"];
 

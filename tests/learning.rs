@@ -3,11 +3,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
 use std::path::{Path, PathBuf};
 
-use common::{Out, bundled, tauscope, write};
+use crate::common::{Out, bundled, tauscope, write};
 
 /// An arm at its cycle: somebody asks for learning in the first recording; in the second it is touched, less than the
 /// first bias tells.

@@ -3,11 +3,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
 use std::path::Path;
 
-use common::{Out, bundled, tauscope, write};
+use crate::common::{Out, bundled, tauscope, write};
 use serde_json::{Value, json};
 
 /// Simulates recordings of the bundled arm with this physics.

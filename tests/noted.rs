@@ -2,15 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
-#[path = "common/labelled_set.rs"]
-mod labelled_set;
-
 use std::path::Path;
 
-use common::{Out, bundled, shared, skipped, tauscope, write};
-use labelled_set::{Set, changed, evaluate};
+use crate::common::labelled_set::{Set, changed, evaluate};
+use crate::common::{Out, bundled, shared, skipped, tauscope, write};
 use serde_json::Value;
 
 const LIGHT: [&str; 2] = ["--detectors", "naive_difference,twin_regression"];

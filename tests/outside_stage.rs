@@ -1,16 +1,11 @@
 //! A stage from another crate takes a place in a pipeline by name.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
-#[path = "common/live.rs"]
-mod live;
-
-mod common;
-
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::{bundled, hide_own_package, root, write};
-use live::{Live, signal, stage};
+use crate::common::live::{Live, signal, stage};
+use crate::common::{bundled, hide_own_package, root, write};
 
 /// Builds the example next to the program under test, and returns where it is.
 fn outside_stage() -> PathBuf {

@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
 use std::path::Path;
 
-use common::{Out, bundled, shared, tauscope};
+use crate::common::{Out, bundled, shared, tauscope};
 use serde_json::Value;
 
 /// `tauscope physics --json` of these recordings into `history`.

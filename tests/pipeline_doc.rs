@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
-use common::{Out, bundled, root, write};
+use crate::common::{Out, bundled, root, write};
 
 #[test]
 fn every_pipeline_in_the_documentation_passes_the_check() {

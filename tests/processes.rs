@@ -2,17 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-#[path = "common/live.rs"]
-mod live;
-
-mod common;
-
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
-use common::{bundled, write};
-use live::{Live, is_alive, signal, stage, wait_until};
+use crate::common::live::{Live, is_alive, signal, stage, wait_until};
+use crate::common::{bundled, write};
 
 /// The bundled recording at this rate, with `more` at the top level, through two detectors into a recorder.
 fn pipeline(folder: &Path, rate: &str, more: &str) {

@@ -2,22 +2,16 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
-#[path = "common/live.rs"]
-mod live;
-
-#[path = "common/python.rs"]
-mod python;
-
 use std::io::{BufRead as _, BufReader};
 use std::net::TcpListener;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use common::{Out, bundled, root, skipped, tauscope, write};
-use live::Live;
+use crate::common::live;
+use crate::common::live::Live;
+use crate::common::python;
+use crate::common::{Out, bundled, root, skipped, tauscope, write};
 use serde_json::Value;
 use tauscope_archive::{Recording, ros};
 

@@ -2,15 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
-#[path = "common/python.rs"]
-mod python;
-
 use std::path::Path;
 use std::process::Command;
 
-use common::{Out, hide_own_package, root, skipped};
+use crate::common::python;
+use crate::common::{Out, hide_own_package, root, skipped};
 
 const PACKAGES: [&str; 6] = [
     "maturin>=1.9,<2",

@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
 use std::path::Path;
 
-use common::{Out, shared, tauscope, write};
+use crate::common::{Out, shared, tauscope, write};
 
 /// `tauscope replay --json` of one recording; the residual's RMS by joint, all and moving samples.
 fn rms(out: &Out) -> (Vec<f64>, Vec<f64>) {

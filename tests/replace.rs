@@ -1,12 +1,10 @@
 //! No command takes the place of a file that it did not make in this run, unless it is told to.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
-mod common;
-
 use std::ffi::OsString;
 use std::path::Path;
 
-use common::{Out, bundled, write};
+use crate::common::{Out, bundled, write};
 
 /// Runs a command twice, then with `--force`; `named` is in what the second one says.
 fn twice(arguments: &[&str], out: &Path, named: &[&str]) {
@@ -69,7 +67,10 @@ fn a_second_run_into_one_place_is_refused() {
         &at("twin.yaml"),
         &["twin.yaml is there already"],
     );
-    let pipeline = common::root().join("pipeline.yaml").display().to_string();
+    let pipeline = crate::common::root()
+        .join("pipeline.yaml")
+        .display()
+        .to_string();
     twice(
         &["replay", "--pipeline", &pipeline, &recording],
         &at("replayed"),

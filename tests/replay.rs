@@ -3,12 +3,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-use common::{Out, bundled, tauscope, write};
+use crate::common::{Out, bundled, tauscope, write};
 
 /// A pipeline over the bundled recording with these detectors, its results in `folder`.
 fn pipeline(folder: &Path, detectors: &[&str]) -> PathBuf {

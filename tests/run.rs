@@ -1,15 +1,10 @@
 //! `tauscope run`: stages as processes, their end in order, and what is said of it.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
-#[path = "common/live.rs"]
-mod live;
-
-mod common;
-
 use std::path::Path;
 
-use common::{Out, bundled, tauscope, write};
-use live::{Live, is_alive, signal, stage, wait_until};
+use crate::common::live::{Live, is_alive, signal, stage, wait_until};
+use crate::common::{Out, bundled, tauscope, write};
 
 /// The bundled recording at this rate through everything, into `out.mcap`.
 fn pipeline(folder: &Path, rate: &str) {

@@ -2,14 +2,12 @@
 //! label.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
-mod common;
-
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-use common::{Out, bundled, tauscope, write};
+use crate::common::{Out, bundled, tauscope, write};
 use rerun::external::arrow::array::{Array, AsArray};
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::log::{Chunk, LogMsg};

@@ -2,12 +2,7 @@
 //! certificate decides who is heard.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
-mod common;
-#[path = "common/live.rs"]
-mod live;
-#[path = "common/robot.rs"]
-mod robot;
-
+use crate::common::{live, robot};
 use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
@@ -22,7 +17,7 @@ const SOON: Duration = Duration::from_secs(10);
 /// Certificates for two cells, and the router that they meet at. Where there is no `openssl`, none.
 fn router(folder: &Path, test: &str) -> Option<(Session, String)> {
     if Command::new("openssl").arg("version").output().is_err() {
-        common::skipped(test, "openssl is absent");
+        crate::common::skipped(test, "openssl is absent");
         return None;
     }
     secure(folder);
@@ -47,7 +42,7 @@ fn router(folder: &Path, test: &str) -> Option<(Session, String)> {
 }
 
 fn secure(folder: &Path) {
-    let script = common::root().join("deploy/zenoh/secure.sh");
+    let script = crate::common::root().join("deploy/zenoh/secure.sh");
     let made = Command::new(script)
         .arg(folder)
         .args(["127.0.0.1", "press-1", "press-2"])
@@ -198,7 +193,7 @@ fn who_has_no_certificate_of_the_plant_does_not_get_in() {
 
 /// A cell that publishes at that endpoint; what it says of it.
 fn said_of(endpoint: &str, folder: &Path) -> String {
-    let data = common::bundled();
+    let data = crate::common::bundled();
     let data = data.display();
     let text = format!(
         "version: 1
@@ -210,7 +205,7 @@ stages:
 - {{name: publish, inputs: [ingest, twin, detect], publish: {{zenoh: {{connect: [\"{endpoint}\"]}}}}}}
 "
     );
-    common::write(&folder.join("pipeline.yaml"), &text);
+    crate::common::write(&folder.join("pipeline.yaml"), &text);
     live::Live::start(folder, &[]).wait_for_part("no session with ")
 }
 
@@ -241,7 +236,7 @@ fn a_session_that_cannot_open_is_told_with_its_reason() {
 
 /// A cell on two hosts that meet at that router; the second one shows the certificate `desk`.
 fn two_hosts(endpoint: &str, folder: &Path, desk: &str) -> (live::Live, live::Live) {
-    let data = common::bundled();
+    let data = crate::common::bundled();
     let data = data.display();
     let robot = with_certificate(endpoint, folder, "press-1");
     let desk = with_certificate(endpoint, folder, desk);
@@ -256,7 +251,7 @@ stages:
 - {{name: record, host: desk, inputs: [ingest, twin, detect], record: {{mcap: out.mcap}}}}
 "
     );
-    common::write(&folder.join("pipeline.yaml"), &text);
+    crate::common::write(&folder.join("pipeline.yaml"), &text);
     let robot = live::Live::start(folder, &["--host", "robot"]);
     (robot, live::Live::start(folder, &["--host", "desk"]))
 }

@@ -1,11 +1,9 @@
 //! What a shell and `man` are given.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
-mod common;
-
 use std::process::Command;
 
-use common::Out;
+use crate::common::Out;
 
 /// The commands that `tauscope --help` lists.
 fn commands() -> Vec<String> {
@@ -69,10 +67,10 @@ fn every_command_has_a_manual_page() {
 fn a_program_that_is_built_apart_and_is_not_there_is_told_with_what_builds_it() {
     let empty = tempfile::tempdir().unwrap();
     for (command, program) in [("query", "tauscope-query"), ("cluster", "tauscope-cluster")] {
-        let mut asked = common::tauscope();
+        let mut asked = crate::common::tauscope();
         let beside = std::path::Path::new(asked.get_program()).with_file_name(program);
         if beside.exists() {
-            common::skipped(
+            crate::common::skipped(
                 "a missing program",
                 &format!("{} is there", beside.display()),
             );
@@ -85,7 +83,7 @@ fn a_program_that_is_built_apart_and_is_not_there_is_told_with_what_builds_it() 
         assert_eq!(out.code, 2, "{out:?}");
         assert!(out.stderr.contains(&format!("-p {program}")), "{out:?}");
         // What it is for is told without it.
-        let mut asked = common::tauscope();
+        let mut asked = crate::common::tauscope();
         asked.arg(command).arg("--help").env("PATH", empty.path());
         let help = Out::of(asked);
         assert_eq!(help.code, 0, "{help:?}");

@@ -1,19 +1,12 @@
 //! A live pipeline that gets nothing says so within seconds, with what is there instead and the likeliest slip.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
-#[path = "common/live.rs"]
-mod live;
-#[path = "common/robot.rs"]
-mod robot;
-
-mod common;
-
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use common::{bundled, write};
-use live::{Live, signal, stage};
-use robot::{JOINTS, Publisher, endpoint, rmw_key, rmw_token, router};
+use crate::common::live::{Live, signal, stage};
+use crate::common::robot::{JOINTS, Publisher, endpoint, rmw_key, rmw_token, router};
+use crate::common::{bundled, write};
 use zenoh::Wait as _;
 
 /// Within this time of the start something must be said. The program promises 5 s of its own; the tests run side by

@@ -3,19 +3,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
-#[path = "common/labelled_set.rs"]
-mod labelled_set;
-
-#[path = "common/learnt_pipeline.rs"]
-mod learnt_pipeline;
-
 use std::path::Path;
 
-use common::{Out, bundled, tauscope, write};
-use labelled_set::{Set, evaluate};
-use learnt_pipeline::{LearntPipeline, replay};
+use crate::common::labelled_set::{Set, evaluate};
+use crate::common::learnt_pipeline::{LearntPipeline, replay};
+use crate::common::{Out, bundled, tauscope, write};
 use serde_json::Value;
 
 /// The events of a replay, by detector, and those that `evaluate` wrote.

@@ -1,17 +1,12 @@
 //! How a run is looked after: who hangs is named, who may come back is said in the file, and a service manager is told.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
-#[path = "common/live.rs"]
-mod live;
-
-mod common;
-
 use std::os::unix::net::UnixDatagram;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use common::{bundled, tauscope, write};
-use live::{Live, is_alive, signal, stage};
+use crate::common::live::{Live, is_alive, signal, stage};
+use crate::common::{bundled, tauscope, write};
 
 /// Slow machines run the tests, too; nothing waits this long where all is well.
 const PATIENCE: Duration = Duration::from_mins(1);

@@ -2,16 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-#[path = "common/live.rs"]
-mod live;
-
-mod common;
-
 use std::net::TcpListener;
 use std::process::Command;
 
-use common::{Out, bundled, root, skipped, write};
-use live::{Live, stage};
+use crate::common::live::{Live, stage};
+use crate::common::{Out, bundled, root, skipped, write};
 
 #[test]
 fn two_hosts_share_a_pipeline_and_nothing_is_lost_between_them() {

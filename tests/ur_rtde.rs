@@ -1,20 +1,14 @@
 //! The contacts of a recording are found when a controller of Universal Robots tells of them, as they are in the file.
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
-#[path = "common/live.rs"]
-mod live;
-#[path = "common/ur_controller.rs"]
-mod ur_controller;
-
-mod common;
-
 use std::path::Path;
 use std::time::Duration;
 
-use common::{bundled, write};
-use live::{Live, signal, stage};
+use crate::common::live;
+use crate::common::live::{Live, signal, stage};
+use crate::common::ur_controller::{Behaviour, Controller, Instant};
+use crate::common::{bundled, write};
 use tauscope_archive::Recording;
-use ur_controller::{Behaviour, Controller, Instant};
 
 /// Contacts of the bundled recording.
 const CONTACTS: usize = 6;

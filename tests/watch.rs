@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
 use std::path::Path;
 
-use common::{Out, bundled, tauscope, write};
+use crate::common::{Out, bundled, tauscope, write};
 
 /// When the friction steps in the recording \[s\].
 const STEP_S: f64 = 42.0;

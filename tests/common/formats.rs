@@ -1,6 +1,4 @@
 //! A bundled recording's joint states, written again in other formats.
-#![allow(dead_code, reason = "each test file uses its own part")]
-#![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::collections::BTreeMap;
 use std::fs::File;

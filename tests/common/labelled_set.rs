@@ -1,6 +1,4 @@
 //! The bundled recordings as a labelled set, and damaged copies of them.
-#![allow(dead_code, reason = "each test file uses its own part")]
-#![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::collections::BTreeMap;
 use std::ffi::OsStr;

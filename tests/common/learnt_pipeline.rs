@@ -1,13 +1,11 @@
 //! A pipeline out of what `tauscope evaluate` has left behind: its `twin.yaml`, and each part of its `learnt.yaml` as
 //! a stage.
-#![allow(dead_code, reason = "each test file uses its own part")]
-#![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use crate::common::labelled_set::{Set, evaluate};
 use crate::common::{Out, bundled, tauscope, write};
-use crate::labelled_set::{Set, evaluate};
 
 /// What a pipeline over the results of an evaluation is made of.
 pub struct LearntPipeline<'a> {

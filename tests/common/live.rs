@@ -1,6 +1,4 @@
 //! A pipeline that is running.
-#![allow(dead_code, reason = "each test file uses its own part")]
-#![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;

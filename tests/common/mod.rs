@@ -1,6 +1,14 @@
 //! What the tests of the whole program share.
-#![allow(dead_code, reason = "each test file uses its own part")]
+#![allow(dead_code, reason = "hostile.rs, a program of its own, uses a part")]
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
+
+pub mod formats;
+pub mod labelled_set;
+pub mod learnt_pipeline;
+pub mod live;
+pub mod python;
+pub mod robot;
+pub mod ur_controller;
 
 use std::ffi::OsString;
 use std::io::Write as _;

@@ -1,5 +1,4 @@
 //! A Python with packages from PyPI, in a venv under `target/`.
-#![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::path::PathBuf;
 use std::process::Command;

@@ -1,6 +1,4 @@
 //! A robot on Zenoh: a router in this process, and publishers as ROS 2 would have them.
-#![allow(dead_code, reason = "each test file uses its own part")]
-#![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::net::TcpListener;
 use std::sync::Arc;

@@ -5,8 +5,8 @@ use std::path::Path;
 use serde_json::Value;
 use tauscope_archive::ros::JointState;
 
-use super::common::{Out, root, write};
 use super::{case, changed, explain, explain_case, named, pair, report, robot, states};
+use crate::common::{Out, root, write};
 
 /// What data that allows no verdict gets: a reason, and exit code 0.
 fn not_evaluated(out: &Path, done: &Out, reason: &str) {

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use serde_json::Value;
 
-use super::common::bundled;
 use super::simulated::simulate;
 use super::{explain, report};
+use crate::common::bundled;
 
 /// An arm whose joints rub, and the twin of it as it was.
 struct Arm {

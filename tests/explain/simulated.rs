@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::common::{Out, bundled, tauscope, write};
 use super::{explain, named, pair, report};
+use crate::common::{Out, bundled, tauscope, write};
 
 const WALL: [(&str, f64); 5] = [
     ("stiffness_n_per_m", 37.2),

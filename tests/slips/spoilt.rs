@@ -275,13 +275,13 @@ fn a_run_warns_once_of_what_cannot_be() {
     ] {
         let file = desk.path("spoilt.yaml");
         std::fs::write(&file, text.replace("demo.mcap", name)).unwrap();
-        let mut run = super::common::tauscope();
+        let mut run = crate::common::tauscope();
         run.args(["run", "-q"]).arg(&file);
         let out = super::Out::of(run);
         let told = out.stderr.matches(wanted).count();
         assert_eq!((out.code, told), (code, 1), "{name}: {out:?}");
     }
-    let mut run = super::common::tauscope();
+    let mut run = crate::common::tauscope();
     run.args(["run", "-q"]).arg(desk.path("pipeline.yaml"));
     let sound = super::Out::of(run);
     assert!(!sound.stderr.contains("WARN"), "{sound:?}");

@@ -4,9 +4,6 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-#[path = "../common/mod.rs"]
-mod common;
-
 mod arguments;
 mod data_sets;
 mod files;
@@ -15,7 +12,7 @@ mod spoilt;
 
 use std::path::{Path, PathBuf};
 
-use common::{Out, bundled};
+use crate::common::{Out, bundled};
 
 /// What somebody types, and what the answer must have. `@name` is a file of the [`Desk`].
 struct Slip {

@@ -6,15 +6,13 @@
 mod at_rest;
 mod bad_input;
 mod changed;
-#[path = "../common/mod.rs"]
-mod common;
 mod simulated;
 
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-use common::{Out, root, tauscope, write};
+use crate::common::{Out, root, tauscope, write};
 use serde_json::Value;
 use tauscope_archive::ros::JointState;
 use tauscope_archive::{Compression, McapWriter, Recording};

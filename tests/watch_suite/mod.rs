@@ -5,22 +5,22 @@
 //! All of it, in release and over seeds of one's choice, with a table at the end:
 //!
 //! ```sh
-//! WATCH_SEEDS=1..100 cargo test --release --test watch_suite -- --ignored --nocapture changes
-//! WATCH_SEEDS=1..9 WATCH_HOURS=1 cargo test --release --test watch_suite -- --ignored --nocapture hours
+//! WATCH_SEEDS=1..100 cargo test --release --test program watch_suite::changes \
+//!     -- --ignored --nocapture
+//! WATCH_SEEDS=1..9 WATCH_HOURS=1 cargo test --release --test program watch_suite::clean \
+//!     -- --ignored --nocapture
 //! ```
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod cell;
-#[path = "../common/mod.rs"]
-mod common;
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
+use crate::common::{tauscope, write};
 use cell::{Cell, Change, MOVES_RAD_S, done, rows};
-use common::{tauscope, write};
 use rand::Rng;
 use serde_json::{Value, json};
 

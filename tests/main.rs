@@ -1,0 +1,51 @@
+//! Tests of the whole program, a file for each subject.
+//!
+//! They are one test program: each test program is linked with all of tauscope, which takes seconds, and in one the
+//! tests that wait run beside those that compute.
+
+mod archives;
+mod bad_input;
+mod bad_learnt;
+mod calibrate;
+mod check;
+mod clean_hour;
+mod common;
+mod deploy;
+mod docs;
+mod doctor;
+mod durable;
+mod evaluate;
+mod explain;
+mod faults;
+mod fleet;
+mod formats;
+mod independent_reader;
+mod init;
+mod init_live;
+mod interrupt;
+mod kill_stage;
+mod learning;
+mod next_motion;
+mod noted;
+mod outside_stage;
+mod physics;
+mod pipeline_doc;
+mod processes;
+mod prose;
+mod publish;
+mod python;
+mod real_recordings;
+mod replace;
+mod replay;
+mod run;
+mod same_contact;
+mod secure_router;
+mod shell;
+mod silence;
+mod slips;
+mod streaming;
+mod supervision;
+mod two_hosts;
+mod ur_rtde;
+mod watch;
+mod watch_suite;
