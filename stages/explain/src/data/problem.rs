@@ -7,7 +7,7 @@ use tauscope_dynamics::terms::Expansion;
 use tauscope_dynamics::{Data, Model};
 
 use crate::data::column::Column;
-use crate::data::efforts::Efforts;
+use crate::data::efforts::{Efforts, TrackEfforts};
 use crate::data::memo::{ColumnCache, UnitEfforts};
 use crate::data::track::FitTrack;
 use crate::data::work::Work;
@@ -155,6 +155,19 @@ impl Problem {
                 .collect();
             track.compare(joint, one, &mut into[track.rows()]);
         }
+    }
+
+    /// One joint's effort over all tracks, one number a sample, as a column.
+    pub fn column_at(&self, joint: usize, effort: TrackEfforts) -> Column {
+        let mut values = vec![0.0; self.rows];
+        for (track, effort) in self.tracks.iter().zip(effort) {
+            // Silence stays silence behind a filter.
+            if effort.iter().any(|x| *x != 0.0) {
+                track.compare(joint, effort, &mut values[track.rows()]);
+            }
+        }
+        let joint = Some(joint);
+        Column { joint, values }
     }
 
     /// An effort over all tracks as a column: of one joint, or of all.

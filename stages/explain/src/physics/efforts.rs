@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use tauscope_dynamics::terms::{Layer, Term};
+use tauscope_dynamics::terms::{Layer, MotionSample, Physics, Term};
 
 use crate::data::efforts::{Efforts, TrackEfforts, scale, subtract, zeros};
 use crate::data::problem::Problem;
+use crate::data::track::FitTrack;
 use crate::physics::act::{act_over, run};
 use crate::physics::active::Active;
 use crate::physics::bodies;
@@ -95,6 +96,71 @@ pub fn change(
         return added;
     }
     recorded_on_top(problem, others, efforts, &added, 1.0)
+}
+
+/// The same for an effect of a joint's effort or of its recording, at the only joint that it changes: one number a sample.
+pub fn change_at(
+    problem: &Problem,
+    others: &[Active],
+    efforts: &Efforts,
+    active: &Active,
+    joint: usize,
+) -> TrackEfforts {
+    let n = problem.joints;
+    let of_record = active.hypothesis.effect.layer == Layer::Record;
+    let mut term = active.term(&problem.model);
+    let through = if of_record {
+        Vec::new()
+    } else {
+        record_terms_at(problem, others, joint)
+    };
+    let mut through = (!through.is_empty()).then(|| Physics::new(through, n));
+    let from = match (of_record, &through) {
+        (true, _) => Some(&efforts.recorded),
+        (false, Some(_)) => Some(&efforts.mechanical),
+        (false, None) => None,
+    };
+    let mut row = vec![0.0; n];
+    let mut of_track = |(i, track): (usize, &FitTrack)| {
+        let mut changes = Vec::with_capacity(track.track.len());
+        let (recorded, body) = (&efforts.recorded[i], &efforts.body[i]);
+        term.reset();
+        through.iter_mut().for_each(Physics::reset);
+        track.track.each(|k, at| {
+            let at_k = k * n..(k + 1) * n;
+            match from {
+                Some(from) => row.copy_from_slice(&from[i][at_k.clone()]),
+                None => row.fill(0.0),
+            }
+            let transmitted = &body[at_k];
+            term.act(&MotionSample { transmitted, ..*at }, &mut row);
+            if let Some(through) = &mut through {
+                through.act(at, &mut row);
+            }
+            let before = from.map_or(0.0, |_| recorded[k * n + joint]);
+            changes.push(row[joint] - before);
+        });
+        changes
+    };
+    problem
+        .tracks
+        .iter()
+        .enumerate()
+        .map(&mut of_track)
+        .collect()
+}
+
+/// The terms of `actives` that transform what is recorded at a joint.
+fn record_terms_at(problem: &Problem, actives: &[Active], joint: usize) -> Vec<Box<dyn Term>> {
+    let of_record = actives.iter().filter(|active| active.is_of_record());
+    // A coupling reads another joint's effort as it is recorded there.
+    let coupled = of_record.clone().any(|active| active.is_coupling());
+    let is_elsewhere = |active: &Active| {
+        let own = active.hypothesis.only_joint();
+        own.is_some_and(|own| own != joint)
+    };
+    let of_joint = of_record.filter(|active| coupled || !is_elsewhere(active));
+    of_joint.map(|active| active.term(&problem.model)).collect()
 }
 
 /// The change of the recorded effort when `share` times `added` is added to the mechanical efforts.

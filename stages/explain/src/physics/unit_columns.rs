@@ -10,7 +10,7 @@ use crate::data::memo::MOST_ROWS;
 use crate::data::problem::Problem;
 use crate::physics::active::{Active, Hypothesis, feeds};
 use crate::physics::bodies;
-use crate::physics::efforts::change;
+use crate::physics::efforts::{change, change_at};
 use crate::physics::shaped_bodies::{key, steps};
 
 /// The columns of a hypothesis that depends on the motion alone, before torque scales and where no effect transforms the
@@ -52,6 +52,10 @@ pub fn computed(
     }
     let at = |coordinates: &[f64]| {
         let active = hypothesis.with(coordinates.to_vec());
+        if let Some(joint) = joint.filter(|_| hypothesis.effect.layer != Layer::Body) {
+            let changes = change_at(problem, others, efforts, &active, joint);
+            return problem.column_at(joint, changes);
+        }
         let on = (gains, None);
         problem.column(&change(problem, others, efforts, &active, on), joint)
     };

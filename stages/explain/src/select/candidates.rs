@@ -22,6 +22,11 @@ impl Search<'_> {
         })
     }
 
+    /// Proposals of every hypothesis that changes the effort of this joint alone, as [`Search::proposals`].
+    pub fn proposals_at(&self, fit: &Fit, joint: usize) -> Vec<Proposal> {
+        self.proposals_for(fit, |h| h.only_joint() == Some(joint))
+    }
+
     /// Rivals of `active`, an effect of `best` that `without` lacks. Rivals of friction act in its joint alone.
     pub fn rivals(&self, without: &Fit, best: &Fit, active: &Active) -> Vec<Proposal> {
         let worse = worse_joints(without, best);

@@ -53,8 +53,8 @@ impl Search<'_> {
             own.iter()
                 .all(|&i| actives[i].hypothesis != p.active.hypothesis)
         };
-        let mut beginnings = self.proposals(&bare.fit, &[joint]);
-        beginnings.retain(|p| p.active.hypothesis.only_joint() == Some(joint) && is_new(p));
+        let mut beginnings = self.proposals_at(&bare.fit, joint);
+        beginnings.retain(is_new);
         beginnings.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         let effective = &self.problem.effective_samples;
         let tried = beginnings.iter().take(BEGINNINGS).map(|beginning| {
@@ -69,8 +69,7 @@ impl Search<'_> {
     /// Adds up to `most` effects of a joint, each that with the most evidence.
     fn filled(&self, mut best: Explanation, joint: usize, most: usize) -> Explanation {
         for _ in 0..most {
-            let mut proposals = self.proposals(&best.fit, &[joint]);
-            proposals.retain(|p| p.active.hypothesis.only_joint() == Some(joint));
+            let proposals = self.proposals_at(&best.fit, joint);
             match self.best_of(&best, &proposals, best.fit.likelihood()) {
                 Some(next) => best = next,
                 None => break,
