@@ -157,6 +157,11 @@ impl Problem {
         }
     }
 
+    /// Samples of all tracks.
+    pub fn samples(&self) -> usize {
+        self.tracks.iter().map(|track| track.track.len()).sum()
+    }
+
     /// One joint's effort over all tracks, one number a sample, as a column.
     pub fn column_at(&self, joint: usize, effort: TrackEfforts) -> Column {
         let mut values = vec![0.0; self.rows];

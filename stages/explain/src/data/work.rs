@@ -17,6 +17,10 @@ pub enum Untried {
 /// Resolution: by `perf record` of `explain` on one real arm and two simulated ones.
 const PRODUCTS_PER_NS: usize = 4;
 
+/// What a term with its filter costs for each joint and sample \[ns of one core\].
+/// Resolution: by `perf record` of `explain` on one real arm and two simulated ones.
+pub const OF_TERM_NS: usize = 30;
+
 /// How much was computed, in nanoseconds of one core, roughly. It is counted and not timed: the same input gives the
 /// same report on every machine.
 #[derive(Debug)]
@@ -50,6 +54,11 @@ impl Work {
     /// Adds so many multiplications of columns with each other.
     pub fn add_products(&self, count: usize) {
         self.add(count / PRODUCTS_PER_NS);
+    }
+
+    /// Adds so many evaluations of a term, each of one joint at one sample.
+    pub fn add_terms(&self, count: usize) {
+        self.add(count * OF_TERM_NS);
     }
 
     /// Whether the bound is reached. Then `left_out` is noted. To be asked only where no other thread adds, so that the

@@ -8,6 +8,7 @@ use tauscope_dynamics::terms::{CoordinateKind, Layer, PlaceKind, Scale};
 
 use crate::data::column::Column;
 use crate::data::problem::Problem;
+use crate::data::work::OF_TERM_NS;
 use crate::fit::fitted::Fit;
 use crate::physics::active::Active;
 use crate::physics::efforts::record;
@@ -21,10 +22,8 @@ const SHAPE_STEP: f64 = 1e-5;
 /// Tuned: by hand, one sample at 100 Hz, on no recorded seeds; not swept.
 const TIME_STEP_S: f64 = 0.01;
 
-/// What a difference quotient costs for each joint and sample \[ns of one core\]: of a term with its filter, and of inverse
-/// dynamics.
+/// What inverse dynamics cost for each joint and sample \[ns of one core\].
 /// Resolution: by `perf record` of `explain` on one real arm and two simulated ones.
-const OF_TERM_NS: usize = 30;
 const OF_ROBOT_NS: usize = 660;
 
 impl Fit {
@@ -88,7 +87,7 @@ impl Fit {
 
     /// What the derivatives by some coordinates cost \[ns of one core\], roughly.
     pub fn cost(&self, problem: &Problem, free: &[(usize, usize)]) -> usize {
-        let samples: usize = problem.tracks.iter().map(|track| track.track.len()).sum();
+        let samples = problem.samples();
         let one = |&(i, c): &(usize, usize)| {
             let active = &self.actives[i];
             let joints = active.hypothesis.only_joint().map_or(problem.joints, |_| 1);

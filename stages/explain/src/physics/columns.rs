@@ -23,11 +23,14 @@ pub fn columns(
 ) -> Arc<Columns> {
     let gains = &parts.gains;
     let body = hypothesis.effect.layer == Layer::Body;
-    if hypothesis.needs_load() && parts.is_plain(&hypothesis) {
+    let plain = parts.is_plain(&hypothesis);
+    if !plain || hypothesis.needs_load() || problem.rows > MOST_ROWS {
+        count(problem, actives, hypothesis);
+    }
+    if hypothesis.needs_load() && plain {
         let efforts = Efforts::of_bodies(parts.load(problem, actives));
         return Arc::new(computed(problem, &[], &efforts, hypothesis, shape, gains));
     }
-    let plain = parts.is_plain(&hypothesis);
     if !plain && body && !in_time(hypothesis, shape) && problem.rows <= MOST_ROWS {
         return Arc::new(recorded(problem, (actives, parts), hypothesis, shape));
     }
@@ -52,6 +55,21 @@ pub fn columns(
         alone: units.alone.as_ref().map(scale),
         factors: units.factors.iter().map(|c| Arc::new(scale(c))).collect(),
     })
+}
+
+/// Counts what it takes to compute a hypothesis' columns: once without its factors and once with each of them, through
+/// what transforms the recording.
+fn count(problem: &Problem, actives: &[Active], hypothesis: Hypothesis) {
+    let own = hypothesis.only_joint();
+    let is_passed = |active: &&Active| {
+        let other = active.hypothesis.only_joint();
+        active.is_of_record() && (own.is_none() || other.is_none() || own == other)
+    };
+    let terms = 1 + actives.iter().filter(is_passed).count();
+    let passes = 1 + hypothesis.factors().len();
+    let joints = own.map_or(problem.joints, |_| 1);
+    let evaluations = passes * terms * joints * problem.samples();
+    problem.work.add_terms(evaluations);
 }
 
 /// The columns of an effect on bodies where effects of the recording transform some joints' efforts.
