@@ -93,10 +93,11 @@ def decode(body):
     return names, numbers(), numbers(), numbers()
 
 
-def read(path):
-    """(names, stamps [ns], position, velocity or None, effort) of the /joint_states that `write` wrote. Rows are samples."""
+def read(path, topic="/joint_states"):
+    """(names, stamps [ns], position, velocity, effort) of a topic of sensor_msgs/msg/JointState. Rows are samples; what is
+    absent is None."""
     with open(path, "rb") as file:
-        rows = [(m.log_time, *decode(m.data)) for _, _, m in make_reader(file).iter_messages(topics=["/joint_states"])]
+        rows = [(m.log_time, *decode(m.data)) for _, _, m in make_reader(file).iter_messages(topics=[topic])]
     stack = lambda k: np.stack([row[k] for row in rows])
-    velocity = stack(3)
-    return rows[0][1], stack(0).astype(np.int64), stack(2), velocity if velocity.shape[1] else None, stack(4)
+    given = [column if column.shape[1] else None for column in map(stack, (2, 3, 4))]
+    return rows[0][1], stack(0).astype(np.int64), *given
