@@ -96,6 +96,7 @@ pub fn recording(
         effort,
         reference: Vec::new(),
         sample_of_row: (0..count).collect(),
+        clock: None,
         losses: Losses::default(),
     }
 }

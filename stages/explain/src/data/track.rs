@@ -308,6 +308,7 @@ mod tests {
             effort: Vec::new(),
             reference: Vec::new(),
             sample_of_row: (0..100).collect(),
+            clock: None,
             losses: Losses::default(),
         };
         let mut track = Track {

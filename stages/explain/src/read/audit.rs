@@ -101,7 +101,7 @@ fn moving_s(recordings: &[Recording], joint: usize, n: usize) -> f64 {
     sum
 }
 
-/// One sentence per recording that lost rows or messages on reading.
+/// One sentence per recording that lost rows or messages on reading, and one where its stamps were put on an even clock.
 pub fn losses(input: &Input) -> Vec<String> {
     let mut notes = Vec::new();
     for recording in input.fit.iter().chain(&input.holdout) {
@@ -128,6 +128,9 @@ pub fn losses(input: &Input) -> Vec<String> {
             losses.damaged,
             "parts of the file cannot be read, e.g. a torn tail",
         );
+        if let Some(clock) = &recording.clock {
+            notes.push(clock.note(&recording.name));
+        }
         if !parts.is_empty() {
             notes.push(format!("{}: {}.", recording.name, parts.join(", ")));
         }

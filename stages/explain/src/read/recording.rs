@@ -1,13 +1,16 @@
 //! A recording as columns: what was measured, sample by sample, in the robot's joint order.
 
+mod even_clock;
 mod losses;
 mod rate;
+mod reference;
 
 use std::path::{Path, PathBuf};
 
 use tauscope_archive::{ArchiveError, Recording as Archive, name_of};
 use tauscope_dynamics::Unwrap;
 
+pub use even_clock::EvenClock;
 pub use losses::Losses;
 pub use rate::{MAX_GAP_S, mean_step_s};
 
@@ -27,7 +30,7 @@ pub struct Recording {
     pub path: PathBuf,
     /// Stamp of its first sample \[ns since the epoch\].
     pub start_ns: i64,
-    /// Time of each sample since the first \[s\], strictly increasing.
+    /// Time of each sample since the first \[s\], strictly increasing; on the drive's clock where that is known.
     pub time_s: Vec<f64>,
     /// Position \[rad or m\].
     pub position: Vec<f64>,
@@ -39,6 +42,8 @@ pub struct Recording {
     pub reference: Vec<f64>,
     /// For each recorded row, the sample that stands for it: repeated rows share one.
     pub sample_of_row: Vec<usize>,
+    /// The drive's clock, where the stamps were put back on it.
+    pub clock: Option<EvenClock>,
     /// What was dropped on reading.
     pub losses: Losses,
 }
@@ -113,6 +118,7 @@ impl Recording {
                 effort: Vec::new(),
                 reference: Vec::new(),
                 sample_of_row: Vec::new(),
+                clock: None,
                 losses: Losses::default(),
             },
             joint_names,
@@ -146,8 +152,9 @@ impl Recording {
         let lost = damage.iter().filter(|part| part.loses_data());
         reader.recording.losses.damaged = lost.count() as u64;
         let mut recording = reader.finish(&topics.state)?;
-        if let Some(topic) = &topics.reference {
-            recording.read_reference(&archive, topic, joint_names)?;
+        match &topics.reference {
+            Some(topic) => recording.read_reference(&archive, topic, joint_names)?,
+            None => recording.put_on_even_clock(),
         }
         Ok(recording)
     }
@@ -165,69 +172,6 @@ impl Recording {
     /// From the first sample to the last \[s\].
     pub fn duration_s(&self) -> f64 {
         self.time_s.last().copied().unwrap_or(0.0)
-    }
-
-    /// Another twin's effort, interpolated to this recording's instants.
-    fn read_reference(
-        &mut self,
-        archive: &Archive,
-        topic: &str,
-        joint_names: &[String],
-    ) -> Result<(), RecordingError> {
-        let mut times = Vec::new();
-        let mut rows: Vec<f64> = Vec::new();
-        let mut states = archive.joint_states(topic)?;
-        let mut order = Vec::new();
-        while let Some(state) = states.next_state() {
-            let Ok(stamped) = state else {
-                self.losses.unreadable += 1;
-                continue;
-            };
-            let message = stamped.message;
-            if order.is_empty() {
-                order = indices(&message.name, joint_names).map_err(|joint| {
-                    RecordingError::MissingJoint {
-                        path: self.path.clone(),
-                        joint,
-                        known: message.name.join(", "),
-                    }
-                })?;
-            }
-            let time_s = (message.header.stamp.ns() - self.start_ns) as f64 * 1e-9;
-            let efforts = order.iter().map_while(|&at| message.effort.get(at));
-            let row: Vec<f64> = efforts.copied().collect();
-            let later = times.last().is_none_or(|last| time_s > *last);
-            if row.len() == order.len() && row.iter().all(|x| x.is_finite()) && later {
-                times.push(time_s);
-                rows.extend(row);
-            }
-        }
-        if times.is_empty() {
-            return Err(RecordingError::Empty {
-                path: self.path.clone(),
-                topic: topic.to_owned(),
-            });
-        }
-        let n = joint_names.len();
-        self.reference = Vec::with_capacity(self.len() * n);
-        let mut at = 0;
-        for &time_s in &self.time_s {
-            while at + 2 < times.len() && times[at + 1] <= time_s {
-                at += 1;
-            }
-            let next = (at + 1).min(times.len() - 1);
-            let span = times[next] - times[at];
-            let share = if span > 0.0 {
-                ((time_s - times[at]) / span).clamp(0.0, 1.0)
-            } else {
-                0.0
-            };
-            for j in 0..n {
-                let (a, b) = (rows[at * n + j], rows[next * n + j]);
-                self.reference.push(a + share * (b - a));
-            }
-        }
-        Ok(())
     }
 }
 
