@@ -1,9 +1,11 @@
 //! The short form of `tests/faults/faults.py`: faults done to running pipelines, and books that balance.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+mod common;
+
 use std::process::Command;
 
-use crate::common::{Out, root, skipped};
+use common::{Out, root, skipped};
 
 fn fault(test: &str, only: &str) {
     script(test, "faults.py", &["--only", only], only);

@@ -16,7 +16,6 @@ mod doctor;
 mod durable;
 mod evaluate;
 mod explain;
-mod faults;
 mod fleet;
 mod formats;
 mod independent_reader;

@@ -2,13 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
-mod common;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::{Copied, PERIOD_NS, START_NS, read_all, shared, state, write};
+use crate::common::{Copied, PERIOD_NS, START_NS, read_all, shared, state, write};
 use rusqlite::Connection;
 use tauscope_archive::ros::{self, JointState, Message};
 use tauscope_archive::{
@@ -239,7 +237,7 @@ fn files_of_a_bag_are_read_as_one() {
     };
     assert_eq!(times(&read), times(&all));
     // One topic only.
-    let contacts = common::drain(recording.messages(&["/contact"]).unwrap()).0;
+    let contacts = crate::common::drain(recording.messages(&["/contact"]).unwrap()).0;
     assert!(contacts.iter().all(|message| message.topic == "/contact"));
     assert_eq!(contacts.len(), 2 + 3 + 4);
 }

@@ -2,12 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 
-use common::shared;
+use crate::common::shared;
 use tauscope_archive::{
     ArchiveError, Column, Columns, CsvMapping, CsvProblem, DamageKind, Recording, RecordingKind,
 };
@@ -215,7 +213,7 @@ fn a_last_line_without_an_end_is_a_torn_tail() {
     };
     assert_eq!((damage.at, &damage.kind), (3, &DamageKind::TornTail));
     assert_eq!(damage.readable_until_ns, Some(100_000_000));
-    assert_eq!(common::read_all(&recording).0.len(), 2);
+    assert_eq!(crate::common::read_all(&recording).0.len(), 2);
 }
 
 #[test]

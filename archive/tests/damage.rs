@@ -2,14 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
-mod common;
-
 use std::fs::{self, OpenOptions};
 use std::io::{Cursor, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use common::{Copied, read_all, state, write};
+use crate::common::{Copied, read_all, state, write};
 use mcap::records::{MessageHeader, Metadata};
 use proptest::prelude::*;
 use tauscope_archive::ros::{self, JointState, Message};

@@ -2,12 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
-mod common;
-
 use std::collections::BTreeMap;
 use std::fs;
 
-use common::{PERIOD_NS, START_NS, state, write};
+use crate::common::{PERIOD_NS, START_NS, state, write};
 use tauscope_archive::ros::JointState;
 use tauscope_archive::{Compression, Info, McapWriter, Recording};
 

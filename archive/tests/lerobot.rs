@@ -3,13 +3,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-#[path = "common/lerobot.rs"]
-mod sets;
-
 use std::fs;
 use std::path::Path;
 
-use sets::{copy, data, refusal, states};
+use crate::sets::{copy, data, refusal, states};
 use tauscope_archive::{Info, Recording, is_there, name_of, recordings_at, sources};
 
 /// Replaces text in `meta/info.json`.

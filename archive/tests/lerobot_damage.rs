@@ -2,12 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-#[path = "common/lerobot.rs"]
-mod sets;
-
 use std::fs;
 
-use sets::{copy, data, refusal, states};
+use crate::sets::{copy, data, refusal, states};
 use tauscope_archive::{ArchiveError, Info, Recording};
 
 #[test]

@@ -1,11 +1,9 @@
 //! What `McapWriter` writes.
 
-mod common;
-
 use std::collections::BTreeMap;
 use std::fs;
 
-use common::{PERIOD_NS, START_NS, read_all, state, write};
+use crate::common::{PERIOD_NS, START_NS, read_all, state, write};
 use tauscope_archive::ros::{self, JointState, Message};
 use tauscope_archive::{CHUNK_SPAN_NS, Compression, McapWriter, Recording};
 

@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
-mod common;
-
 use std::path::{Path, PathBuf};
 
-use common::shared;
+use crate::common::shared;
 use tauscope_archive::ros::{self, Bool, JointState, Message};
 use tauscope_archive::{Info, Recording};
 

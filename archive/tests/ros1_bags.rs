@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
-mod common;
-
 use std::path::{Path, PathBuf};
 
-use common::{PERIOD_NS, START_NS, read_all, state};
+use crate::common::{PERIOD_NS, START_NS, read_all, state};
 use tauscope_archive::ros::{Bool, JointState};
 use tauscope_archive::{ArchiveError, DamageKind, Info, Recording, RecordingKind};
 

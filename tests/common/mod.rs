@@ -1,5 +1,8 @@
 //! What the tests of the whole program share.
-#![allow(dead_code, reason = "hostile.rs, a program of its own, uses a part")]
+#![allow(
+    dead_code,
+    reason = "hostile.rs and faults.rs, programs of their own, use a part"
+)]
 #![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 pub mod formats;

@@ -1,4 +1,9 @@
 //! A controller of Universal Robots, as far as RTDE goes: it speaks the protocol's version 2 over a real socket.
+#![allow(
+    dead_code,
+    clippy::unwrap_used,
+    reason = "each test program uses its own part, and a test may fail here"
+)]
 
 use std::io::{Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};

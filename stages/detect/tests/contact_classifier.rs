@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
 use std::sync::LazyLock;
 
-use common::Out;
+use crate::common::Out;
 use tauscope_bus::{Detection, EventKind, Header, Stage, TwinState, flags};
 use tauscope_detect::salt_ducaju::contact_signals::SignalSettings;
 use tauscope_detect::salt_ducaju::{contact_classifier, fisher_discriminant, frequency_classifier};

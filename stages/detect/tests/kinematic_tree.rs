@@ -3,9 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
-use common::Out;
+use crate::common::Out;
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};

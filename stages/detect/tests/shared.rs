@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
-use common::Out;
+use crate::common::Out;
 use tauscope_bus::{Detection, Stage, TwinState, flags};
 use tauscope_detect::frame::Discriminant;
 use tauscope_detect::indri::{virtual_collision_sensor, virtual_collision_sensor_basic};

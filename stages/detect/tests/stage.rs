@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
 use std::collections::BTreeMap;
 
-use common::Out;
+use crate::common::Out;
 use tauscope_bus::{Detection, EventKind, Header, Stage, TwinState, flags};
 use tauscope_detect::tajiri::{naive_difference, twin_regression};
 use tauscope_detect::{Config, ConfigError, Detect, JointSetup, ScoreStatistics, Setup, Threshold};

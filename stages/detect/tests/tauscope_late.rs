@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
-use common::Out;
+use crate::common::Out;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tauscope_bus::{EventKind, Stage, TwinState, flags};
@@ -24,7 +22,7 @@ const STEPS: usize = 10;
 fn setup(knows_arm: bool) -> Setup {
     Setup {
         model: knows_arm.then(|| Model::from_urdf(ARM).unwrap()),
-        ..common::setup(1)
+        ..crate::common::setup(1)
     }
 }
 

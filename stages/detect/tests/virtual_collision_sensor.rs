@@ -3,9 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
-use common::Out;
+use crate::common::Out;
 use tauscope_bus::{Detection, EventKind, Header, Stage, TwinState, flags};
 use tauscope_detect::indri::virtual_collision_sensor::{FirstBias, Learn, Learnt};
 use tauscope_detect::indri::{

@@ -5,9 +5,7 @@
     reason = "what is copied comes out as it went in"
 )]
 
-mod common;
-
-use common::{cell, drain, state, write_bag};
+use crate::common::{cell, drain, state, write_bag};
 use tauscope_bus::{Source, flags};
 use tauscope_ingest::{ArchivedTwin, ArchivedTwinTopics, Config};
 

@@ -1,12 +1,10 @@
 //! Commands over Zenoh, into the samples of any source.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
 use std::net::TcpListener;
 use std::time::{Duration, Instant};
 
-use common::{Collect, cell};
+use crate::common::{Collect, cell};
 use tauscope_bus::command::{Answer, Request, ask, key};
 use tauscope_bus::{Emit, JointState, Progress, Source, StageError, Verb, ZenohEndpoints, flags};
 use tauscope_ingest::{Commanded, Setup, Takes};

@@ -1,12 +1,10 @@
 //! What every source of the table promises, whichever it is.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod common;
-
 use std::fmt::Write as _;
 use std::path::Path;
 
-use common::{Collect, cell, drain, state, write_bag};
+use crate::common::{Collect, cell, drain, state, write_bag};
 use tauscope_bus::{JointState, Progress, Source};
 use tauscope_dynamics::Model;
 use tauscope_ingest::simulated::Scenario;

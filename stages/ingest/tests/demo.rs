@@ -5,11 +5,9 @@
     reason = "what is copied comes out as it went in"
 )]
 
-mod common;
-
 use std::path::{Path, PathBuf};
 
-use common::{cell, drain, file};
+use crate::common::{cell, drain, file};
 use tauscope_bus::{JointState, flags};
 use tauscope_dynamics::Model;
 use tauscope_ingest::simulated::{Scenario, SimulatedCell};

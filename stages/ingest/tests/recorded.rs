@@ -5,11 +5,9 @@
     reason = "what is copied comes out as it went in"
 )]
 
-mod common;
-
 use std::path::Path;
 
-use common::{Collect, cell, drain, file, shared, state, write_bag};
+use crate::common::{Collect, cell, drain, file, shared, state, write_bag};
 use tauscope_bus::{JointState, Progress, Source, flags};
 use tauscope_ingest::{Config, CsvConfig, FileConfig, Rate, RecordedSource, Setup, Topics, open};
 

@@ -5,17 +5,13 @@
     reason = "what is copied comes out as it went in"
 )]
 
-mod common;
-#[path = "../../../tests/common/ur_controller.rs"]
-mod ur_controller;
-
 use std::net::TcpListener;
 use std::time::{Duration, Instant};
 
-use common::{Collect, cell};
+use crate::common::{Collect, cell};
+use crate::ur_controller::{Behaviour, Controller, Instant as Measured};
 use tauscope_bus::{JointState, Source, Trouble, flags};
 use tauscope_ingest::{Config, Setup, UrEffort, UrRtdeConfig, UrRtdeSource};
-use ur_controller::{Behaviour, Controller, Instant as Measured};
 
 const PATIENCE: Duration = Duration::from_secs(20);
 /// Within this time a live source says what is wrong.

@@ -5,12 +5,10 @@
     reason = "what is copied comes out as it went in"
 )]
 
-mod common;
-
 use std::net::TcpListener;
 use std::time::{Duration, Instant};
 
-use common::{Collect, cell, state};
+use crate::common::{Collect, cell, state};
 use tauscope_archive::ros::{self, Message};
 use tauscope_bus::{JointState, Source, flags};
 use tauscope_ingest::{Config, Keys, Topics, ZenohConfig, ZenohSource};

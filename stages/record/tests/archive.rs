@@ -3,12 +3,10 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 #![allow(clippy::float_cmp, reason = "the archive keeps every bit")]
 
-mod synthetic;
-
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use synthetic::{Instant, START_NS, STEP_NS, THRESHOLD, arm, cell, motion, streams};
+use crate::synthetic::{Instant, START_NS, STEP_NS, THRESHOLD, arm, cell, motion, streams};
 use tauscope_archive::Recording;
 use tauscope_archive::ros::{
     DiagnosticArray, Float64, InertiaStamped, JointState, Level, Message, WrenchStamped,

@@ -2,12 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
-mod synthetic;
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use synthetic::{Instant, START_NS, STEP_NS, arm, cell, motion, streams};
+use crate::synthetic::{Instant, START_NS, STEP_NS, arm, cell, motion, streams};
 use tauscope_archive::Recording;
 use tauscope_bus::Sink;
 use tauscope_record::{AroundAlarms, Config, Recorder};

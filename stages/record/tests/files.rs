@@ -2,12 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
-mod synthetic;
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use synthetic::{arm, cell, motion, streams};
+use crate::synthetic::{arm, cell, motion, streams};
 use tauscope_archive::Recording;
 use tauscope_archive::ros::{Float64, JointState, Message};
 use tauscope_bus::{SampleRef, Sink};

@@ -2,17 +2,15 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
-mod synthetic;
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use crate::synthetic::{arm, cell, motion, streams};
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::log::{Chunk, LogMsg};
-use synthetic::{arm, cell, motion, streams};
 use tauscope_bus::{Sink, flags};
 use tauscope_record::{CellInfo, Config, RecordError, Recorder, RerunConfig, StreamInfo};
 
@@ -80,7 +78,10 @@ fn the_plot_of_a_score_names_its_unit_and_the_value_of_its_threshold() {
     recorder.finish().unwrap();
     let text = blueprint_text(&path);
     assert!(text.contains("Score of twin_regression [(N m)²]"), "{text}");
-    let threshold = format!("threshold {} (alarm from here on)", synthetic::THRESHOLD);
+    let threshold = format!(
+        "threshold {} (alarm from here on)",
+        crate::synthetic::THRESHOLD
+    );
     assert!(text.contains(&threshold), "{text}");
 }
 
@@ -168,7 +169,7 @@ fn the_forces_content_its_states_and_both_directions_are_drawn() {
     let cells = [cell("demo", Some(arm(false)))];
     let mut recorder = recorder(to_file(&path), &cells, &streams("demo", "")).unwrap();
     let mut instants = motion(5.0);
-    let ready = |instant: &synthetic::Instant| instant.detection.header.has(flags::READY);
+    let ready = |instant: &crate::synthetic::Instant| instant.detection.header.has(flags::READY);
     for instant in instants.iter_mut().filter(|instant| ready(instant)) {
         let detection = &mut instant.detection;
         detection.header.flags |= flags::CONTENT;

@@ -1,0 +1,18 @@
+//! One program of the tests through the public face: linking one is what takes long.
+
+mod bags;
+mod cdr;
+mod common;
+mod csv;
+mod damage;
+mod hostile_tables;
+mod info;
+mod join;
+mod lerobot;
+mod lerobot_damage;
+mod limits;
+mod mcap_write;
+mod real_files;
+mod ros1_bags;
+#[path = "common/lerobot.rs"]
+mod sets;

@@ -1,0 +1,16 @@
+//! One program of the tests through the public face: linking one is what takes long.
+
+mod common;
+mod contact_classifier;
+mod contact_machine;
+mod kinematic_tree;
+mod learned;
+mod momentum;
+mod momentum_observer;
+mod shared;
+mod stage;
+mod tauscope;
+mod tauscope_late;
+mod tauscope_standing;
+mod tauscope_usual;
+mod virtual_collision_sensor;
