@@ -89,7 +89,7 @@ const MOST_SLIPS_PER_JOINT: usize = 3;
 
 /// Once it has computed so much, a search names what it has and tries no more \[ns of one core\].
 /// Resolution: with what is not counted, about one minute.
-const MOST_WORK_NS: u64 = 40_000_000_000;
+const MOST_WORK_NS: u64 = 30_000_000_000;
 
 /// What came of an attempt to explain.
 enum Attempt {

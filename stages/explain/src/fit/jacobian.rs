@@ -24,7 +24,7 @@ const TIME_STEP_S: f64 = 0.01;
 
 /// What inverse dynamics cost for each joint and sample \[ns of one core\].
 /// Resolution: by `perf record` of `explain` on one real arm and two simulated ones.
-const OF_ROBOT_NS: usize = 660;
+const OF_ROBOT_NS: usize = 400;
 
 impl Fit {
     /// The coordinates that are free, as (index of the active, index of the coordinate).

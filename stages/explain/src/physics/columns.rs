@@ -57,18 +57,18 @@ pub fn columns(
     })
 }
 
-/// Counts what it takes to compute a hypothesis' columns: once without its factors and once with each of them, through
-/// what transforms the recording.
+/// Counts what it takes to compute a hypothesis' columns: once without its factors and once with each of them, at each joint,
+/// and through what transforms the recording of one.
 fn count(problem: &Problem, actives: &[Active], hypothesis: Hypothesis) {
     let own = hypothesis.only_joint();
     let is_passed = |active: &&Active| {
         let other = active.hypothesis.only_joint();
         active.is_of_record() && (own.is_none() || other.is_none() || own == other)
     };
-    let terms = 1 + actives.iter().filter(is_passed).count();
-    let passes = 1 + hypothesis.factors().len();
+    let passed = actives.iter().filter(is_passed).count();
     let joints = own.map_or(problem.joints, |_| 1);
-    let evaluations = passes * terms * joints * problem.samples();
+    let passes = 1 + hypothesis.factors().len();
+    let evaluations = passes * (joints + passed) * problem.samples();
     problem.work.add_terms(evaluations);
 }
 

@@ -154,7 +154,7 @@ pub fn change_at(
 fn record_terms_at(problem: &Problem, actives: &[Active], joint: usize) -> Vec<Box<dyn Term>> {
     let of_record = actives.iter().filter(|active| active.is_of_record());
     // A coupling reads another joint's effort as it is recorded there.
-    let coupled = of_record.clone().any(|active| active.is_coupling());
+    let coupled = of_record.clone().any(Active::is_coupling);
     let is_elsewhere = |active: &Active| {
         let own = active.hypothesis.only_joint();
         own.is_some_and(|own| own != joint)

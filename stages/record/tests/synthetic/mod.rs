@@ -1,4 +1,5 @@
 //! A made-up cell: a seven-joint arm that swings, and is pushed twice.
+#![allow(clippy::unwrap_used, reason = "only tests are in here")]
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;

@@ -6,6 +6,7 @@ use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::{Against, PAYLOAD_PICKUP, PlaceKind, UNKNOWN};
 
 use crate::data::problem::Problem;
+use crate::data::work::Untried;
 use crate::physics::active::{Active, Hypothesis, TimeKind};
 use crate::report::schema::Finding;
 use crate::select::evidence::PATCH;
@@ -23,6 +24,9 @@ pub(super) const DOUBTED: f64 = 0.45;
 /// larger than those of smoothing.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const PATCH_OF_FOREIGN: f64 = 0.05;
+/// Highest confidence of what no other name was tried in the place of, because the search had reached its bound.
+/// Tuned: by hand, below what is sure; not swept.
+const UNRIVALLED: f64 = 0.85;
 /// Pushes in different recordings come at the same time if their times differ by less than this \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const SAME_TIME_S: f64 = 0.3;
@@ -51,7 +55,11 @@ pub fn doubt(named: &mut Named, problem: &Problem, actives: &[Active]) {
     } else {
         oddities(&problem.model)
     };
+    let unrivalled = problem.work.untried().contains(&Untried::OtherNames);
     for (finding, active) in named.findings.iter_mut().zip(said) {
+        if unrivalled && !active.hypothesis.is_plain_friction() {
+            finding.confidence = finding.confidence.min(UNRIVALLED);
+        }
         if !odd.is_empty() && imitates(active.hypothesis.effect) {
             doubt_it(finding);
         }
