@@ -23,7 +23,7 @@ const SHAPE_STEP: f64 = 1e-5;
 const TIME_STEP_S: f64 = 0.01;
 
 /// What inverse dynamics cost for each joint and sample \[ns of one core\].
-/// Resolution: by `perf record` of `explain` on one real arm and two simulated ones.
+/// Resolution: by the processor time of `explain` on one real arm and four simulated ones.
 const OF_ROBOT_NS: usize = 400;
 
 impl Fit {

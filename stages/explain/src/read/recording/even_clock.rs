@@ -143,7 +143,7 @@ mod tests {
     use super::*;
     use crate::fixture::{Noise, model, recording};
 
-    /// A recording at 500 Hz whose samples are taken, and stamped, off the even clock by these parts of a step.
+    /// A recording of 3 ms a sample, whose samples are taken, and stamped, off the even clock by these parts of a step.
     fn sampled(taken: impl Fn(usize) -> f64, stamped: impl Fn(usize) -> f64) -> Recording {
         let mut it = recording(&model(), 3, |_, _, _| {});
         let n = it.position.len() / it.len();
