@@ -14,17 +14,14 @@ use crate::select::search::Search;
 const QUIET: f64 = 1.15;
 
 impl Search<'_> {
-    /// Proposals of every hypothesis that could change the effort of one of `joints`, beside the effects of `fit`. Most
-    /// evidence first.
-    pub fn proposals(&self, fit: &Fit, joints: &[usize]) -> Vec<Proposal> {
-        self.proposals_for(fit, |h| {
-            h.only_joint().is_none_or(|joint| joints.contains(&joint))
-        })
+    /// Proposals of every hypothesis, beside the effects of `fit`. Most evidence first.
+    pub fn proposals(&self, fit: &Fit) -> Vec<Proposal> {
+        self.proposals_of(fit, |_| true)
     }
 
     /// Proposals of every hypothesis that changes the effort of this joint alone, as [`Search::proposals`].
     pub fn proposals_at(&self, fit: &Fit, joint: usize) -> Vec<Proposal> {
-        self.proposals_for(fit, |h| h.only_joint() == Some(joint))
+        self.proposals_of(fit, |h| h.only_joint() == Some(joint))
     }
 
     /// Rivals of `active`, an effect of `best` that `without` lacks. Rivals of friction act in its joint alone.
@@ -33,23 +30,19 @@ impl Search<'_> {
         let own = active.hypothesis.only_joint();
         let friction =
             active.is_set_valued(&self.problem.model) || active.hypothesis.is_plain_friction();
-        self.proposals_for(without, |h| match h.only_joint() {
+        self.proposals_of(without, |h| match h.only_joint() {
             Some(joint) => worse.contains(&joint),
             None => !(friction && own.is_some()),
         })
     }
 
-    /// Proposals of the hypotheses of one kind.
+    /// Proposals of the hypotheses of one kind, as [`Search::proposals`].
     pub fn proposals_of(&self, fit: &Fit, is: impl Fn(&Hypothesis) -> bool) -> Vec<Proposal> {
-        self.proposals_for(fit, is)
-    }
-
-    fn proposals_for(&self, fit: &Fit, touches: impl Fn(&Hypothesis) -> bool) -> Vec<Proposal> {
         let base = Base::new(self.problem, fit, self.hypotheses.len());
         let wanted: Vec<Hypothesis> = self
             .hypotheses
             .iter()
-            .filter(|h| touches(h) && self.is_candidate(fit, **h))
+            .filter(|h| is(h) && self.is_candidate(fit, **h))
             .copied()
             .collect();
         // An effect that splits a joint in rotor and link is costly to try. It is tried only where the rotor alone
@@ -58,11 +51,11 @@ impl Search<'_> {
             let Some(simpler) = split.effect.simpler else {
                 return true;
             };
-            let is =
+            let is_simpler =
                 |h: &&Hypothesis| h.effect == simpler.effect && h.place.joint == split.place.joint;
-            let hypothesis = self.hypotheses.iter().find(is);
+            let hypothesis = self.hypotheses.iter().find(is_simpler);
             hypothesis.is_none_or(|h| base.propose(*h).is_some_and(|p| p.gain > LEAST_EVIDENCE))
-                || fit.actives.iter().any(|a| is(&&a.hypothesis))
+                || fit.actives.iter().any(|a| is_simpler(&&a.hypothesis))
         };
         let wanted: Vec<Hypothesis> = wanted
             .into_iter()

@@ -58,12 +58,11 @@ impl Search<'_> {
                 .filter(|a| !a.hypothesis.is_torque_scale())
                 .count()
         };
-        let all: Vec<usize> = (0..self.problem.joints).collect();
         // An effect that was added and removed again would be added without end, and so would several in turn.
         let mut barred: Vec<Hypothesis> = Vec::new();
         let mut seen = vec![Seen::of(&best)];
         while pieces(&best) < MOST_PIECES {
-            let mut proposals = self.proposals(&best.fit, &all);
+            let mut proposals = self.proposals(&best.fit);
             proposals.retain(|p| !barred.contains(&p.active.hypothesis));
             let Some(next) = self.best_of(&best, &proposals, best.fit.likelihood()) else {
                 break;

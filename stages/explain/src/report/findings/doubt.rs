@@ -57,8 +57,8 @@ pub fn doubt(named: &mut Named, problem: &Problem, actives: &[Active]) {
     };
     let unrivalled = problem.work.untried().contains(&Untried::OtherNames);
     for (finding, active) in named.findings.iter_mut().zip(said) {
-        if unrivalled && !active.hypothesis.is_plain_friction() {
-            finding.confidence = finding.confidence.min(UNRIVALLED);
+        if unrivalled {
+            doubt_unrivalled(finding, active.hypothesis);
         }
         if !odd.is_empty() && imitates(active.hypothesis.effect) {
             doubt_it(finding);
@@ -79,6 +79,13 @@ pub fn doubt(named: &mut Named, problem: &Problem, actives: &[Active]) {
     let pushed = doubt_pushes(&mut named.findings, problem.tracks.len());
     named.notes.extend(pushed);
     doubt_patched_pushes(&mut named.findings);
+}
+
+/// Lowers the confidence of a finding that no other name was tried in the place of. Plain friction has few rivals.
+fn doubt_unrivalled(finding: &mut Finding, hypothesis: Hypothesis) {
+    if !hypothesis.is_plain_friction() {
+        finding.confidence = finding.confidence.min(UNRIVALLED);
+    }
 }
 
 /// Doubts that a joint warms up with a time constant that recordings of at most `longest_s` do not show, or that is the least
@@ -284,6 +291,20 @@ mod tests {
             equivalent_to: Vec::new(),
             sentence: String::new(),
         }
+    }
+
+    #[test]
+    fn what_no_other_name_was_tried_in_the_place_of_is_not_sure_unless_it_is_plain_friction() {
+        let said = |name: &str, confidence: f64| {
+            let mut finding = push("a", 2.0);
+            finding.confidence = confidence;
+            doubt_unrivalled(&mut finding, hypothesis(name, 1, 0));
+            finding.confidence
+        };
+        assert!(said("joint_zero_offset", 0.99) <= UNRIVALLED);
+        assert!(said("coulomb_friction", 0.99) > UNRIVALLED);
+        // What was doubted before is not believed more.
+        assert!(said("joint_zero_offset", 0.3) < 0.31);
     }
 
     #[test]
