@@ -11,6 +11,7 @@
 pub mod body_prior;
 pub mod body_step;
 pub mod covariance;
+mod disagreement;
 pub mod fitted;
 pub mod interval;
 pub mod jacobian;

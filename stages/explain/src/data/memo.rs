@@ -9,9 +9,9 @@ use crate::data::efforts::TrackEfforts;
 /// Problems with more rows than this do without the memo.
 /// Resolution: larger problems compute the same numbers again, which takes time instead of memory.
 pub const MOST_ROWS: usize = 12_000;
-/// At most this many numbers are kept of each kind: 400 MB.
+/// At most this many numbers are kept of each kind: 160 MB.
 /// Resolution: memory against computing time.
-const KEPT_NUMBERS: usize = 50_000_000;
+const KEPT_NUMBERS: usize = 20_000_000;
 
 /// An effect, its place (joint, source joint, link), and the bits of its shape parameters.
 pub type Key = (&'static str, [usize; 3], Vec<u64>);

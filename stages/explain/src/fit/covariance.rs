@@ -9,6 +9,7 @@ use crate::data::column::Column;
 use crate::data::noise::MEDIAN_OF_ABS_NORMAL;
 use crate::data::problem::Problem;
 use crate::fit::body_prior;
+use crate::fit::disagreement::Disagreement;
 use crate::fit::fitted::{Fit, LEAST_VARIANCE};
 use crate::fit::urdf_uncertainty::usual_errors;
 use crate::physics::active::Hypothesis;
@@ -29,7 +30,7 @@ const LARGEST_ERROR: f64 = 2.0;
 /// Covariance of all free coordinates of a fit, in the order of [`Fit::parameters`], from the noise.
 ///
 /// The sandwich `A⁻¹ B A⁻¹` with A the normal matrix and B the covariance of the scores, but never less than white noise
-/// of the variance that is left gives.
+/// of the variance that is left gives, and for each number no less than recordings disagree by, if that is more than chance.
 pub fn covariance(problem: &Problem, fit: &Fit) -> DMatrix<f64> {
     Normal::of(problem, fit, &fit.jacobian(problem)).covariance(fit.parameters().len())
 }
@@ -81,6 +82,8 @@ struct Normal {
     right: DVector<f64>,
     /// Covariance of `right`.
     spread: DMatrix<f64>,
+    /// What each recording adds to `right`, one column each.
+    by_recording: DMatrix<f64>,
 }
 
 impl Normal {
@@ -90,6 +93,7 @@ impl Normal {
             matrix: DMatrix::zeros(p, p),
             right: DVector::zeros(p),
             spread: DMatrix::zeros(p, p),
+            by_recording: DMatrix::zeros(p, problem.tracks.len()),
         };
         for joint in 0..problem.joints {
             normal.add(problem, fit, columns, joint);
@@ -140,7 +144,11 @@ impl Normal {
         }
         let spread = long_run(&scores, k);
         for (i, (a, _)) in touching.iter().enumerate() {
-            self.right[*a] += scores.iter().flatten().map(|s| s[i]).sum::<f64>();
+            for (r, of_track) in scores.iter().enumerate() {
+                let score: f64 = of_track.iter().map(|s| s[i]).sum();
+                self.by_recording[(*a, r)] += score;
+                self.right[*a] += score;
+            }
             for (j, (b, _)) in touching.iter().enumerate() {
                 self.matrix[(*a, *b)] += matrix[(i, j)];
                 self.spread[(*a, *b)] += spread[(i, j)];
@@ -173,11 +181,14 @@ impl Normal {
             return DMatrix::from_diagonal_element(own, own, f64::INFINITY);
         };
         let mut covariance = &inverse * self.spread.view((0, 0), (own, own)) * &inverse;
+        let disagree = Disagreement::of(&inverse * self.by_recording.rows(0, own));
         for a in 0..own {
-            let (robust, white) = (covariance[(a, a)], inverse[(a, a)]);
+            let robust = covariance[(a, a)];
+            let white = robust.max(inverse[(a, a)]);
+            let wide = white.max(disagree.beyond_chance(a, white));
             // Zero is what no row depends on: it stays so.
-            if robust > 0.0 && robust < white {
-                let grow = (white / robust).sqrt();
+            if robust > 0.0 && robust < wide {
+                let grow = (wide / robust).sqrt();
                 for b in 0..own {
                     covariance[(a, b)] *= grow;
                     covariance[(b, a)] *= grow;
@@ -293,6 +304,23 @@ mod tests {
         assert!(held.count() >= 35, "{all:?}");
     }
 
+    #[test]
+    fn a_number_on_which_recordings_disagree_is_known_no_better_than_they_agree() {
+        let deviation = |second: f64| {
+            let mut sample = 0;
+            let data = problem_with(3, |_, qd, effort| {
+                effort[0] += if sample < 2000 { 0.6 } else { second } * qd[0];
+                sample += 1;
+            });
+            let active = at_joint("viscous_friction", 0).with(vec![0.0]);
+            let fit = Fit::new(&data, vec![active]).refined(&data);
+            parameter_deviations(&data, &fit, &covariance(&data, &fit), 0)[0]
+        };
+        assert!(deviation(0.6) < 0.02, "{}", deviation(0.6));
+        // The mean of two numbers that are 0.4 apart.
+        assert!((0.1..0.3).contains(&deviation(1.0)), "{}", deviation(1.0));
+    }
+
     /// The normal equations of one number and five bodies, each direction of which tells a usual error of itself tenfold
     /// its noise; `errors` is what the residual has of each.
     fn beside(errors: [f64; 5]) -> Normal {
@@ -304,6 +332,7 @@ mod tests {
             matrix: DMatrix::from_diagonal_element(6, 6, 100.0),
             right,
             spread: DMatrix::from_diagonal_element(6, 6, 100.0),
+            by_recording: DMatrix::zeros(6, 1),
         }
     }
 

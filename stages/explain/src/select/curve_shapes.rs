@@ -1,10 +1,12 @@
 //! Curves over motion or time, for a residual that no effect of the library fits.
 
+use nalgebra::Complex;
 use tauscope_dynamics::terms::{Against, Table, UNKNOWN};
 
 use crate::data::column::Column;
 use crate::data::problem::Problem;
 use crate::data::track::FitTrack;
+use crate::data::work::Work;
 use crate::fit::fitted::Fit;
 use crate::fit::least_squares::weighted_dot;
 use crate::physics::active::{Active, Hypothesis, Whereabouts, held_knots};
@@ -27,6 +29,9 @@ const LEAST_IN_RECORDING: f64 = 1.5;
 /// Resolution: a finer grid costs time in proportion; a peak half a step away keeps 95 % of its power and is
 /// interpolated.
 const STEPS_OF_FREQUENCY: f64 = 4.0;
+/// Products in turning a value by an angle and adding it.
+/// Resolution: four multiplications, and as many additions.
+const OF_TURN: usize = 4;
 /// A periodic effect is not looked for over a longer time span, over which it would lose phase \[s\].
 /// Tuned: by hand, on no recorded seeds; not swept.
 const LONGEST_IN_STEP_S: f64 = 1200.0;
@@ -274,7 +279,11 @@ impl Base<'_> {
             let length_s = |track: &FitTrack| track.track.time_s.last().copied().unwrap_or(0.0);
             let longest_s = self.problem.tracks.iter().map(length_s).fold(0.0, f64::max);
             let least_hz = (LEAST_PERIODS / span_s).max(LEAST_IN_RECORDING / longest_s);
-            let frequency_hz = loudest(&rows, [least_hz, self.problem.cutoff_hz])?;
+            let frequency_hz = loudest(
+                &rows,
+                [least_hz, self.problem.cutoff_hz],
+                &self.problem.work,
+            )?;
             let period = 1.0 / frequency_hz;
             let knot = |k: usize| start_s + period * k as f64 / KNOTS_OF_PERIOD as f64;
             Some(Table {
@@ -293,7 +302,7 @@ impl Base<'_> {
 
 /// Frequency at which values at uneven times have the most power \[Hz\]: the Lomb-Scargle periodogram without its time
 /// shift, which hardly matters with many periods.
-fn loudest(rows: &[(f64, f64)], [lowest_hz, highest_hz]: [f64; 2]) -> Option<f64> {
+fn loudest(rows: &[(f64, f64)], [lowest_hz, highest_hz]: [f64; 2], work: &Work) -> Option<f64> {
     let last_s = rows
         .iter()
         .map(|(t, _)| *t)
@@ -303,20 +312,32 @@ fn loudest(rows: &[(f64, f64)], [lowest_hz, highest_hz]: [f64; 2]) -> Option<f64
         return None;
     }
     let step_hz = 1.0 / (STEPS_OF_FREQUENCY * (last_s - first_s));
-    let power = |hz: f64| {
-        let turn = std::f64::consts::TAU * hz;
-        let (mut cosine, mut sine) = (0.0, 0.0);
-        for (t, x) in rows {
-            let (s, c) = (turn * t).sin_cos();
-            cosine += c * x;
-            sine += s * x;
-        }
-        cosine * cosine + sine * sine
+    let turned = move |hz: f64| {
+        let turn = move |t: f64| Complex::from_polar(1.0, std::f64::consts::TAU * hz * t);
+        rows.iter().map(move |&(t, x)| (turn(t), x))
     };
+    // From one frequency of the grid to the next each value turns by the same angle.
+    let mut values: Vec<Complex<f64>> = turned(lowest_hz).map(|(at, x)| at * x).collect();
+    let steps_of_values: Vec<Complex<f64>> = turned(step_hz).map(|(step, _)| step).collect();
     let steps = ((highest_hz - lowest_hz) / step_hz).max(0.0) as usize;
-    let grid = (0..=steps).map(|k| lowest_hz + step_hz * k as f64);
-    let powers = grid.map(|hz| (hz, power(hz)));
-    let (best, _) = powers.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    work.add_products(OF_TURN * steps * rows.len());
+    let mut best = (lowest_hz, f64::NEG_INFINITY);
+    for k in 0..=steps {
+        let power = values.iter().sum::<Complex<f64>>().norm_sqr();
+        if power >= best.1 {
+            best = (lowest_hz + step_hz * k as f64, power);
+        }
+        for (value, step) in values.iter_mut().zip(&steps_of_values) {
+            *value *= step;
+        }
+    }
+    let (best, _) = best;
+    let power = |hz: f64| {
+        turned(hz)
+            .map(|(at, x)| at * x)
+            .sum::<Complex<f64>>()
+            .norm_sqr()
+    };
     // Between the grid steps the peak is interpolated by a parabola.
     let [before, at, after] = [best - step_hz, best, best + step_hz].map(power);
     let bend = before - 2.0 * at + after;
@@ -345,9 +366,9 @@ mod tests {
                     (t, (std::f64::consts::TAU * hz * t + 0.4).sin() + slow)
                 })
                 .collect();
-            let found = loudest(&rows, [0.1, 8.0]).unwrap();
+            let found = loudest(&rows, [0.1, 8.0], &Work::default()).unwrap();
             assert!((found - hz).abs() < 2e-4, "{found} Hz for {hz}");
         }
-        assert!(loudest(&[(1.0, 2.0)], [0.1, 8.0]).is_none());
+        assert!(loudest(&[(1.0, 2.0)], [0.1, 8.0], &Work::default()).is_none());
     }
 }
