@@ -17,4 +17,5 @@ pub mod interval;
 pub mod jacobian;
 pub mod least_squares;
 pub mod refine;
+pub mod untold;
 pub mod urdf_uncertainty;

@@ -24,6 +24,7 @@ use crate::data::problem::Problem;
 use crate::fit::covariance::{covariance, covariance_beside_bodies};
 use crate::fit::fitted::Fit;
 use crate::fit::interval::{half_width_95, parameter_deviations};
+use crate::fit::untold::untold;
 use crate::physics::active::{Active, Hypothesis, TimeKind};
 use crate::physics::friction::least;
 use crate::read::input::Input;
@@ -130,6 +131,7 @@ pub fn of(
     let by_noise = covariance(search.problem, fit);
     let beside_bodies = (input.bodies).then(|| covariance_beside_bodies(search.problem, fit));
     let spread = beside_bodies.as_ref().unwrap_or(&by_noise);
+    let untold = untold(search.problem, fit);
     let total = mismatch(before, fit, before);
     let scales = Scales::of(search.problem, fit, &by_noise);
     let of_start = StartScales::of(input);
@@ -147,8 +149,13 @@ pub fn of(
         let less = search.without(found, index);
         let evidence = found.ahead_of(&less, effective);
         let contest = contest(search, found, &less, active);
-        let (mut parameters, mut intervals) =
-            numbers(search.problem, fit, active, &deviations, joints);
+        let (mut parameters, mut intervals) = numbers(
+            search.problem,
+            fit,
+            active,
+            (&deviations, &untold[index]),
+            joints,
+        );
         let (joint, link) = place_of(input, joints, &active.hypothesis);
         let place = link.clone().or_else(|| joint.clone()).unwrap_or_default();
         let when = when(search, active, &mut parameters, &mut intervals);
@@ -218,13 +225,15 @@ fn numbers(
     problem: &Problem,
     fit: &Fit,
     active: &Active,
-    deviations: &[f64],
+    (deviations, untold): (&[f64], &[bool]),
     joints: &[String],
 ) -> (BTreeMap<String, Value>, BTreeMap<String, [f64; 2]>) {
     let (mut parameters, mut intervals) = (BTreeMap::new(), BTreeMap::new());
     let effect = active.hypothesis.effect;
     let values = active.parameters();
-    for ((parameter, value), deviation) in effect.parameters.iter().zip(&values).zip(deviations) {
+    let all = effect.parameters.iter().zip(&values);
+    let all = all.zip(deviations).zip(untold);
+    for ((parameter, value), deviation) in all.filter(|(_, untold)| !**untold).map(|(one, _)| one) {
         parameters.insert(parameter.name.to_owned(), number(*value));
         // The time of a change between two recordings is not known any better.
         let vague = parameter.name.starts_with("change_time") && *deviation > VAGUE_S;

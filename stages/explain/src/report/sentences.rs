@@ -73,6 +73,9 @@ pub fn unit_at<'u>(unit: &'u str, joint: &Joint) -> &'u str {
 /// Physical: what a torque sensor says of a joint that it does not measure.
 const MOST_OF_NOTHING: f64 = 0.05;
 
+/// In the place of a number of which the recordings tell nothing.
+const NOT_TOLD: &str = "not told by these recordings";
+
 /// A finding as a sentence. `place` is the name of the joint or link, `recording` that of the recording it is told in.
 pub fn sentence(
     active: &Active,
@@ -116,6 +119,7 @@ pub fn sentence(
             let interval = intervals.get(first).map(|[low, high]| [-high, -low]);
             with_interval(-less.unwrap_or(f64::NAN), unit(first), interval.as_ref())
         }
+        name if told == Told::Whole && value(name).is_none() => NOT_TOLD.to_owned(),
         name => {
             let unit = if told == Told::Whole { unit(name) } else { "" };
             let interval = intervals.get(name).filter(|_| told != Told::Number);

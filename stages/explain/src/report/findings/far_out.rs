@@ -69,7 +69,10 @@ fn vector(
         let value = finding.parameters.get(&name).and_then(Value::as_f64)?;
         Some(of(value, finding.intervals_95.get(&name)))
     };
-    Some(Vector3::new(axis("x")?, axis("y")?, axis("z")?))
+    // What the recordings tell nothing of is left out.
+    let axes = ["x", "y", "z"].map(axis);
+    let any = axes.iter().any(Option::is_some);
+    any.then(|| axes.map(Option::unwrap_or_default).into())
 }
 
 /// The value in an interval that is nearest to zero; zero where the motion does not determine it.
