@@ -352,6 +352,7 @@ fn loudest(rows: &[(f64, f64)], [lowest_hz, highest_hz]: [f64; 2], work: &Work) 
 #[cfg(test)]
 mod tests {
     use super::loudest;
+    use crate::data::work::Work;
 
     #[test]
     fn the_loudest_frequency_is_found_on_an_uneven_clock_with_gaps() {
