@@ -7,8 +7,13 @@ use std::process::Command;
 
 use common::{Out, root, skipped};
 
-fn fault(test: &str, only: &str) {
-    script(test, "faults.py", &["--only", only], only);
+/// The short forms of some faults at once: they wait more than they compute.
+fn faults(test: &str, all: &[&str]) {
+    std::thread::scope(|scope| {
+        for only in all {
+            scope.spawn(move || script(test, "faults.py", &["--only", only], only));
+        }
+    });
 }
 
 /// The short form of a script, whose output has to begin so.
@@ -34,26 +39,15 @@ fn script(test: &str, name: &str, more: &[&str], begins: &str) {
 }
 
 #[test]
-fn a_killed_twin_costs_what_is_said() {
-    fault("a_killed_twin_costs_what_is_said", "kill -9 of twin");
-}
-
-#[test]
-fn a_killed_source_goes_on_and_costs_what_is_said() {
-    let test = "a_killed_source_goes_on_and_costs_what_is_said";
-    fault(test, "kill -9 of ingest");
-}
-
-#[test]
-fn a_stopped_recorder_holds_up_no_detector() {
-    let test = "a_stopped_recorder_holds_up_no_detector";
-    fault(test, "SIGSTOP of record");
+fn what_is_killed_or_stopped_costs_what_is_said() {
+    let all = ["kill -9 of twin", "kill -9 of ingest", "SIGSTOP of record"];
+    faults("what_is_killed_or_stopped_costs_what_is_said", &all);
 }
 
 #[test]
 fn a_thread_that_hangs_is_named_and_the_other_cell_of_its_process_goes_on() {
     let test = "a_thread_that_hangs_is_named_and_the_other_cell_of_its_process_goes_on";
-    fault(test, "a thread that hangs");
+    faults(test, &["a thread that hangs"]);
 }
 
 #[test]
@@ -63,30 +57,13 @@ fn a_fleet_host_bears_ten_cells_and_misses_who_goes() {
 }
 
 #[test]
-fn a_full_disk_is_told() {
-    fault("a_full_disk_is_told", "full disk");
+fn what_is_full_is_told_with_its_remedy() {
+    let all = ["full disk", "full shared memory"];
+    faults("what_is_full_is_told_with_its_remedy", &all);
 }
 
 #[test]
-fn a_full_shared_memory_is_told_with_its_remedy() {
-    let test = "a_full_shared_memory_is_told_with_its_remedy";
-    fault(test, "full shared memory");
-}
-
-#[test]
-fn a_network_that_was_cut_brings_all_of_it_later() {
-    let test = "a_network_that_was_cut_brings_all_of_it_later";
-    fault(test, "network cut");
-}
-
-#[test]
-fn a_host_that_is_started_again_states_what_is_not_known() {
-    let test = "a_host_that_is_started_again_states_what_is_not_known";
-    fault(test, "a host that");
-}
-
-#[test]
-fn a_fleet_host_knows_soon_of_a_cell_that_is_gone() {
-    let test = "a_fleet_host_knows_soon_of_a_cell_that_is_gone";
-    fault(test, "fleet: a cell");
+fn a_cell_that_was_cut_off_is_known_soon_and_told_of_later() {
+    let all = ["network cut", "a host that", "fleet: a cell"];
+    faults("a_cell_that_was_cut_off_is_known_soon_and_told_of_later", &all);
 }

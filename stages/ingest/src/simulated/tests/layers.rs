@@ -105,36 +105,44 @@ fn describing(effect: &Effect) -> Scenario {
 
 #[test]
 fn every_effect_is_suffered_as_its_term_says_or_says_why_it_cannot_be() {
-    for effect in EFFECTS {
-        if let Simulated::No(reason) = effect.simulated {
-            assert!(!reason.is_empty(), "{}", effect.name);
-            continue;
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| {
+        for first in 0..threads {
+            let own = EFFECTS.iter().skip(first).step_by(threads);
+            scope.spawn(|| own.for_each(|effect| suffers(effect)));
         }
-        // Not every one that is drawn is felt in this motion: a limit may not be reached. The draws are judged
-        // together, for a joint whose two sides chatter is described worse than the next.
-        let draws: Vec<(f64, f64)> = if effect.concealed.is_some() {
-            (0..DRAWS)
-                .map(|seed| suffered(&drawn(effect, seed)))
-                .collect()
-        } else {
-            vec![suffered(&describing(effect))]
-        };
-        let pooled = |of: fn(&(f64, f64)) -> f64| {
-            (draws.iter().map(|draw| of(draw).powi(2)).sum::<f64>() / draws.len() as f64).sqrt()
-        };
-        let (changed, wrong) = (pooled(|draw| draw.0), pooled(|draw| draw.1));
-        assert!(changed > 0.0, "{} is not felt", effect.name);
-        let share = if effect.splits_joint() {
-            SHARE_SPLIT
-        } else {
-            SHARE
-        };
-        assert!(
-            wrong < share * changed + DISCRETE_NM,
-            "{}: {wrong} of {changed}, by draw {draws:?}",
-            effect.name
-        );
+    });
+}
+
+fn suffers(effect: &'static Effect) {
+    if let Simulated::No(reason) = effect.simulated {
+        assert!(!reason.is_empty(), "{}", effect.name);
+        return;
     }
+    // Not every one that is drawn is felt in this motion: a limit may not be reached. The draws are judged
+    // together, for a joint whose two sides chatter is described worse than the next.
+    let draws: Vec<(f64, f64)> = if effect.concealed.is_some() {
+        (0..DRAWS)
+            .map(|seed| suffered(&drawn(effect, seed)))
+            .collect()
+    } else {
+        vec![suffered(&describing(effect))]
+    };
+    let pooled = |of: fn(&(f64, f64)) -> f64| {
+        (draws.iter().map(|draw| of(draw).powi(2)).sum::<f64>() / draws.len() as f64).sqrt()
+    };
+    let (changed, wrong) = (pooled(|draw| draw.0), pooled(|draw| draw.1));
+    assert!(changed > 0.0, "{} is not felt", effect.name);
+    let share = if effect.splits_joint() {
+        SHARE_SPLIT
+    } else {
+        SHARE
+    };
+    assert!(
+        wrong < share * changed + DISCRETE_NM,
+        "{}: {wrong} of {changed}, by draw {draws:?}",
+        effect.name
+    );
 }
 
 #[test]
