@@ -34,7 +34,7 @@ PARTS = {
     "slips": "python3 tests/proof/slips.py PROGRAM OUT --seed 501 --count 2",
     "changed": "python3 tests/proof/changed.py PROGRAM OUT --seed 21 --count 8",
     "coverage": "python3 tests/proof/coverage.py PROGRAM OUT --cases 50 --count 3 --first 7001 --table",
-    "coverage_slow": "python3 tests/proof/coverage.py PROGRAM OUT --cases 120 --count 3 --first 7501 --slow 0.7 --table",
+    "coverage_slow": "python3 tests/proof/coverage.py PROGRAM OUT --cases 180 --count 3 --first 7501 --slow 0.7 --table",
     "coverage_bodies_off": "python3 tests/proof/coverage.py PROGRAM OUT --cases 60 --count 3 --first 7401 --bodies-off --table",
     "reliability": "python3 tests/proof/reliability.py PROGRAM OUT --first 6001 --cases 300 --half odd --svg docs/reliability.svg",
 }
