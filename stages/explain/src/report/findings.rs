@@ -41,7 +41,7 @@ pub use doubt::doubt_patches;
 use scales::{Scales, StartScales};
 use sizes::{effort_rms, mismatch};
 pub use undetectable::undetectable;
-use unsure::surest;
+use unsure::{UNSURE_SIDES, alike, surest};
 use waves::merge_waves;
 
 /// A time with a larger standard deviation than this has no interval \[s\].
@@ -148,7 +148,11 @@ pub fn of(
         let by_noise = parameter_deviations(search.problem, fit, &by_noise, index);
         let less = search.without(found, index);
         let evidence = found.ahead_of(&less, effective);
-        let contest = contest(search, found, &less, active);
+        let mut contest = contest(search, found, &less, active);
+        let alike = alike(search.problem, active, &deviations);
+        if let Some(simple) = alike {
+            contest.tie(simple);
+        }
         let (mut parameters, mut intervals) = numbers(
             search.problem,
             fit,
@@ -183,6 +187,7 @@ pub fn of(
             in_amperes,
             slides,
             confidence: (or_scale.map_or(1.0, |_| DOUBTED))
+                .min(alike.map_or(1.0, |_| UNSURE_SIDES))
                 .min(surest(search.problem, active, &deviations, &by_noise))
                 .min(confidence(grounds)),
             recording: when.recording,

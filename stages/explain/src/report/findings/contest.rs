@@ -18,6 +18,16 @@ pub struct Contest {
     pub rejected: Vec<(Hypothesis, String)>,
 }
 
+impl Contest {
+    /// Notes a rival that may as well be it.
+    pub fn tie(&mut self, rival: Hypothesis) {
+        self.rejected.retain(|(rejected, _)| *rejected != rival);
+        if !self.ties.contains(&rival) {
+            self.ties.push(rival);
+        }
+    }
+}
+
 /// Compares one effect with its rivals.
 pub fn contest(
     search: &Search<'_>,
