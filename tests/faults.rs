@@ -65,5 +65,8 @@ fn what_is_full_is_told_with_its_remedy() {
 #[test]
 fn a_cell_that_was_cut_off_is_known_soon_and_told_of_later() {
     let all = ["network cut", "a host that", "fleet: a cell"];
-    faults("a_cell_that_was_cut_off_is_known_soon_and_told_of_later", &all);
+    faults(
+        "a_cell_that_was_cut_off_is_known_soon_and_told_of_later",
+        &all,
+    );
 }

@@ -41,7 +41,7 @@ pub use doubt::doubt_patches;
 use scales::{Scales, StartScales};
 use sizes::{effort_rms, mismatch};
 pub use undetectable::undetectable;
-use unsure::{UNSURE_SIDES, alike, surest};
+use unsure::{alike, surest};
 use waves::merge_waves;
 
 /// A time with a larger standard deviation than this has no interval \[s\].
@@ -133,6 +133,7 @@ pub fn of(
     let spread = beside_bodies.as_ref().unwrap_or(&by_noise);
     let untold = untold(search.problem, fit);
     let total = mismatch(before, fit, before);
+    let share = |less: &Fit| (mismatch(less, fit, before) / total).clamp(0.0, 1.0);
     let scales = Scales::of(search.problem, fit, &by_noise);
     let of_start = StartScales::of(input);
     let mut named = Named {
@@ -148,18 +149,10 @@ pub fn of(
         let by_noise = parameter_deviations(search.problem, fit, &by_noise, index);
         let less = search.without(found, index);
         let evidence = found.ahead_of(&less, effective);
-        let mut contest = contest(search, found, &less, active);
         let alike = alike(search.problem, active, &deviations);
-        if let Some(simple) = alike {
-            contest.tie(simple);
-        }
-        let (mut parameters, mut intervals) = numbers(
-            search.problem,
-            fit,
-            active,
-            (&deviations, &untold[index]),
-            joints,
-        );
+        let contest = contest(search, found, &less, active).beside(alike);
+        let known = (&deviations[..], &untold[index][..]);
+        let (mut parameters, mut intervals) = numbers(search.problem, fit, active, known, joints);
         let (joint, link) = place_of(input, joints, &active.hypothesis);
         let place = link.clone().or_else(|| joint.clone()).unwrap_or_default();
         let when = when(search, active, &mut parameters, &mut intervals);
@@ -172,10 +165,12 @@ pub fn of(
         let mut sentence = sentences::sentence(active, of, &parameters, &intervals, joints);
         sentence += or_scale.unwrap_or_default();
         let slides = active.hypothesis.slides(&input.model);
-        let sentence = sentences::in_units(&sentence, in_amperes, slides);
+        sentence = sentences::in_units(&sentence, in_amperes, slides);
         let equivalent_to = named.keep_rivals(active, contest, input, joints);
-        let explained = mismatch(&less.fit, fit, before);
-        let effort_rms = effort_rms(&less.fit, fit, context.unit_nm);
+        let (explains, effort_rms) = (
+            share(&less.fit),
+            effort_rms(&less.fit, fit, context.unit_nm),
+        );
         let (bare, of_both) = without_twin(search, found, less, index, evidence);
         let grounds = Grounds::of(fit, &bare.fit, active, of_both);
         named.findings.push(Finding {
@@ -187,13 +182,12 @@ pub fn of(
             in_amperes,
             slides,
             confidence: (or_scale.map_or(1.0, |_| DOUBTED))
-                .min(alike.map_or(1.0, |_| UNSURE_SIDES))
                 .min(surest(search.problem, active, &deviations, &by_noise))
                 .min(confidence(grounds)),
             recording: when.recording,
             t_start: when.start,
             t_end: when.end,
-            explains: (explained / total).clamp(0.0, 1.0),
+            explains,
             over_rest: grounds.over_rest,
             evidence_nats: evidence,
             effort_rms,

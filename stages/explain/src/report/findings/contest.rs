@@ -19,12 +19,13 @@ pub struct Contest {
 }
 
 impl Contest {
-    /// Notes a rival that may as well be it.
-    pub fn tie(&mut self, rival: Hypothesis) {
-        self.rejected.retain(|(rejected, _)| *rejected != rival);
-        if !self.ties.contains(&rival) {
-            self.ties.push(rival);
-        }
+    /// The same, with a rival that may as well be it.
+    pub fn beside(mut self, rival: Option<Hypothesis>) -> Self {
+        self.rejected
+            .retain(|(rejected, _)| Some(*rejected) != rival);
+        let new = rival.filter(|rival| !self.ties.contains(rival));
+        self.ties.extend(new);
+        self
     }
 }
 

@@ -13,7 +13,7 @@ const UNSURE_BODY: f64 = 0.85;
 /// Confidence of what may be the same both ways, at most. The simpler effect is told beside it.
 /// Tuned: one of six was right in `tests/proof/reliability.py`, seeds 6001 to 6300, and all of them with the simpler one;
 /// above, all 20 were right.
-pub const UNSURE_SIDES: f64 = 0.6;
+const UNSURE_SIDES: f64 = 0.6;
 
 /// The simpler effect that an effect of two directions would be if both were alike, where their intervals overlap. Weight
 /// that is not told pulls the one up and the other down, so their errors add up.
@@ -28,8 +28,8 @@ pub fn alike(problem: &Problem, active: &Active, deviations: &[f64]) -> Option<H
     (is_of_directions && overlap).then_some(Hypothesis { effect, place })
 }
 
-/// The highest confidence that a finding may have: less where its mass may as well be nothing, given the standard deviations
-/// of its parameters, of all errors and `by_noise` alone.
+/// The highest confidence that a finding may have: less where its mass may as well be nothing, or its directions alike, given
+/// the standard deviations of its parameters, of all errors and `by_noise` alone.
 pub fn surest(problem: &Problem, active: &Active, deviations: &[f64], by_noise: &[f64]) -> f64 {
     let effect = active.hypothesis.effect;
     let mass = effect.parameters.first();
@@ -46,6 +46,8 @@ pub fn surest(problem: &Problem, active: &Active, deviations: &[f64], by_noise: 
     // It is as likely that nothing is there and the URDF's bodies are off.
     } else if is_nothing(deviations) {
         DOUBTED
+    } else if alike(problem, active, deviations).is_some() {
+        UNSURE_SIDES
     } else {
         1.0
     }
@@ -69,6 +71,7 @@ mod tests {
         // The noise says that it is there, and bodies that are off may say the same.
         assert!(surest(&problem, payload, vague, sure) <= DOUBTED);
     }
+
     #[test]
     fn friction_that_may_be_the_same_both_ways_is_told_beside_plain_friction() {
         let problem = problem_with(1, |_, _, _| {});
