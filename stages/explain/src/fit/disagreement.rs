@@ -2,9 +2,8 @@
 
 use nalgebra::DMatrix;
 
-/// Recordings disagree on a number if by chance they would disagree less, with this quantile of the standard normal
-/// distribution.
-/// Statistical: the 99 % quantile.
+/// Recordings disagree on a number if they differ by more than chance makes 99 times of 100.
+/// Statistical: the 99 % quantile of the standard normal distribution, which gives that of the chi-square distribution.
 const SELDOM: f64 = 2.326;
 
 /// By how much each recording pulls each number, in first order: what the number would change by without it, less what all
