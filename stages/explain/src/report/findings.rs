@@ -41,7 +41,7 @@ pub use doubt::doubt_patches;
 use scales::{Scales, StartScales};
 use sizes::{effort_rms, mismatch};
 pub use undetectable::undetectable;
-use unsure::{alike, surest};
+use unsure::{ALIKE, alike, surest};
 use waves::merge_waves;
 
 /// A time with a larger standard deviation than this has no interval \[s\].
@@ -126,7 +126,7 @@ pub fn of(
     context: &Context<'_>,
     joints: &[String],
 ) -> Named {
-    let (input, fit) = (context.input, &found.fit);
+    let (input, fit, unit_nm) = (context.input, &found.fit, context.unit_nm);
     let effective = &search.problem.effective_samples;
     let by_noise = covariance(search.problem, fit);
     let beside_bodies = (input.bodies).then(|| covariance_beside_bodies(search.problem, fit));
@@ -149,8 +149,13 @@ pub fn of(
         let by_noise = parameter_deviations(search.problem, fit, &by_noise, index);
         let less = search.without(found, index);
         let evidence = found.ahead_of(&less, effective);
+        let contest = contest(search, found, &less, active);
+        let most = surest(search.problem, active, &deviations, &by_noise);
         let alike = alike(search.problem, active, &deviations);
-        let contest = contest(search, found, &less, active).beside(alike);
+        let (active, deviations, contest, most) = match &alike {
+            Some((plain, both)) => (plain, both, contest.told_as(plain, active), most.min(ALIKE)),
+            None => (active, &deviations, contest, most),
+        };
         let known = (&deviations[..], &untold[index][..]);
         let (mut parameters, mut intervals) = numbers(search.problem, fit, active, known, joints);
         let (joint, link) = place_of(input, joints, &active.hypothesis);
@@ -167,10 +172,7 @@ pub fn of(
         let slides = active.hypothesis.slides(&input.model);
         sentence = sentences::in_units(&sentence, in_amperes, slides);
         let equivalent_to = named.keep_rivals(active, contest, input, joints);
-        let (explains, effort_rms) = (
-            share(&less.fit),
-            effort_rms(&less.fit, fit, context.unit_nm),
-        );
+        let (explains, effort_rms) = (share(&less.fit), effort_rms(&less.fit, fit, unit_nm));
         let (bare, of_both) = without_twin(search, found, less, index, evidence);
         let grounds = Grounds::of(fit, &bare.fit, active, of_both);
         named.findings.push(Finding {
@@ -181,9 +183,7 @@ pub fn of(
             intervals_95: intervals,
             in_amperes,
             slides,
-            confidence: (or_scale.map_or(1.0, |_| DOUBTED))
-                .min(surest(search.problem, active, &deviations, &by_noise))
-                .min(confidence(grounds)),
+            confidence: confidence(grounds).min(or_scale.map_or(most, |_| DOUBTED)),
             recording: when.recording,
             t_start: when.start,
             t_end: when.end,

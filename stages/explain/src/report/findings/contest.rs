@@ -19,12 +19,12 @@ pub struct Contest {
 }
 
 impl Contest {
-    /// The same, with a rival that may as well be it.
-    pub fn beside(mut self, rival: Option<Hypothesis>) -> Self {
-        self.rejected
-            .retain(|(rejected, _)| Some(*rejected) != rival);
-        let new = rival.filter(|rival| !self.ties.contains(rival));
-        self.ties.extend(new);
+    /// The same where an effect is told as `plain`, and is a rival itself.
+    pub fn told_as(mut self, plain: &Active, active: &Active) -> Self {
+        let is_other = |h: &Hypothesis| *h != plain.hypothesis;
+        self.rejected.retain(|(rejected, _)| is_other(rejected));
+        self.ties.retain(is_other);
+        self.ties.insert(0, active.hypothesis);
         self
     }
 }
