@@ -4,7 +4,7 @@
 
 Needs requirements.txt. Each figure says of which commit it is. What is in `--out` already is not made again, so a part that was stopped goes on where it was.
 The whole takes some two hours of two cores, estimated from its parts;
-`--only committed,first_sight,first_sight_beside,nulls` takes four minutes. `--jobs` parts are made at once.
+`--only committed,first_sight,first_sight_beside,nulls` took nine minutes beside other work. `--jobs` parts are made at once.
 """
 import argparse
 import concurrent.futures
