@@ -19,7 +19,7 @@ use tauscope_pipeline::report::Problem;
 
 use crate::exit::Failure;
 
-pub use input::{Arguments, Request, from_arguments, from_case, without};
+pub use input::{Arguments, Named, Request, from_arguments, from_case, without};
 pub use output::{json, make, refuse_to_replace, write};
 pub use read::{Kept, read};
 pub use words::text;

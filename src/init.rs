@@ -1,8 +1,8 @@
 //! `tauscope init`: from contact-free recordings to a folder with a running pipeline.
 //!
 //! 0. [`live`]: with `--live`, the recordings are made first.
-//! 1. [`look`]: the topic, the joints and the unit of the effort.
-//! 2. `explain` makes the twin, and holds some recordings out.
+//! 1. [`look`]: the recordings are read as `explain` reads them, and some are held out.
+//! 2. `explain` makes the twin.
 //! 3. [`learn`]: the detector learns behind it, judged on the recordings held out.
 //! 4. [`folder`]: what is written.
 
@@ -23,7 +23,7 @@ pub use folder::Folder;
 pub use learn::learn;
 pub use live::Live;
 pub use look::{Looked, Told};
-pub use page::page;
+pub use page::{Seen, page};
 
 /// Writes a file of the folder, whole or not at all. What must not be replaced was found before anything began.
 pub fn write(path: &Path, content: &[u8]) -> Result<(), Failure> {

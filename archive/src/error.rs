@@ -163,6 +163,14 @@ impl ArchiveError {
         move |source| Self::Io { path, source }
     }
 
+    /// What is wrong, without the place in the file where it is known.
+    pub fn reason(&self) -> String {
+        match self {
+            Self::Decode { source, .. } => source.to_string(),
+            other => other.to_string(),
+        }
+    }
+
     /// The damage, if it is that and reading can go on behind it.
     pub fn damage(&self) -> Option<&Damage> {
         match self {

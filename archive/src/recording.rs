@@ -143,6 +143,11 @@ impl Recording {
         &self.damage
     }
 
+    /// Remarks on how it was read, a sentence each.
+    pub fn remarks(&self) -> &[String] {
+        &[]
+    }
+
     /// Whether its joint states can be compared with expected efforts of `joints`, as far as its format tells: a LeRobot
     /// data set may have no efforts, positions in degrees without saying so, or names of its own for the joints.
     ///

@@ -188,20 +188,18 @@ fn recordings(
     all
 }
 
-/// The stamp of a recording's first joint state, and what its topic of contacts says.
+/// The time of a recording's first joint state, and the content of its topic of contacts.
 fn open(path: &Path, state: &str, contact: Option<&str>) -> Result<(i64, Option<Truth>), String> {
-    let wrong = |error: tauscope_archive::ArchiveError| error.to_string();
-    let recording = Recording::open_comparable(path, &[]).map_err(wrong)?;
-    let mut states = recording.joint_states(state).map_err(wrong)?;
-    let (start_ns, start_log_ns) = loop {
-        match states.next_state() {
-            Some(Ok(first)) => break (first.message.header.stamp.ns(), first.log_time_ns),
-            Some(Err(_)) => {}
-            None => return Err(format!("{}: nothing on `{state}`", path.display())),
-        }
-    };
+    let wrong = |error: SessionError| error.to_string();
+    let recording = tauscope_session::open(path).map_err(|error| wrong(error.into()))?;
+    let look = Look::at(&recording, Some(state), Joints::default()).map_err(wrong)?;
+    let (start_ns, start_log_ns) = look
+        .start_ns(&recording)
+        .map_err(wrong)?
+        .ok_or_else(|| format!("{}: no joint state on `{state}`", path.display()))?;
     let truth = match contact {
-        Some(topic) => labels::from_topic(&recording, topic, start_log_ns).map_err(wrong)?,
+        Some(topic) => labels::from_topic(&recording, topic, start_log_ns)
+            .map_err(|error| wrong(error.into()))?,
         None => None,
     };
     Ok((start_ns, truth))

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use tauscope_archive::Recording;
 use tauscope_bus::flags;
 use tauscope_detect::{Impedance, Lesson, Setup};
 use tauscope_pipeline::build;
@@ -167,7 +166,7 @@ impl Prepared {
         let topics = request.topics(false);
         request.recordings.iter().find_map(|named| {
             // One that cannot be read has been told.
-            let recording = Recording::open(&named.path).ok()?;
+            let recording = tauscope_session::open(&named.path).ok()?;
             let rate_hz = recorded_rate_hz(&recording, &topics.state).ok()??;
             let fault = cutoffs_above_half(filters, rate_hz).next()?;
             Some(format!("{}: {fault}", named.name))

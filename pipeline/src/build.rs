@@ -43,6 +43,7 @@ pub fn ingest_setup(cell: &Cell) -> tauscope_ingest::Setup {
     tauscope_ingest::Setup {
         cell: cell.facts.name.clone(),
         joint_names: cell.facts.joint_names.clone(),
+        effort_limits: cell.effort_limits(),
         tool: cell
             .facts
             .tool

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use tauscope_bus::{JointState, SampleRef, Sink, StageError, TwinState, flags};
 use tauscope_dynamics::effort_scale::{EffortScale, ScaleFault};
 use tauscope_ingest::{FileConfig, RecordedSource, Topics};
+use tauscope_session::{Effect, Finding, Plausible};
 use tauscope_twin::{
     Calibration, Expected, JointCorrection, Robot, TwinFile, spread_scale, telling_slopes,
 };
@@ -17,7 +18,7 @@ use tauscope_twin::{
 use crate::build;
 use crate::cell::{Cell, EffortUnit};
 use crate::graph::Graph;
-use crate::plausible::{Oddity, Plausible};
+use crate::plausible;
 use crate::provenance;
 use crate::replay::ReplayError;
 use crate::report::without_path;
@@ -48,18 +49,36 @@ pub enum CalibrateError {
         /// Why.
         source: ReplayError,
     },
-    /// The recordings are over before the filters have settled, or hold no effort.
+    /// No sample of the recordings measures an effort.
     #[error(
-        "no sample to calibrate on: the recordings hold no effort, or end before the twin's filters have settled"
+        "no sample to calibrate on: none of {samples} joint states measures an effort; record the topic that has efforts, \
+         with the drives on"
     )]
-    TooShort,
+    NoEffort {
+        /// Joint states that were read.
+        samples: u64,
+    },
+    /// The recordings are over before the filters have settled.
+    #[error(
+        "no sample to calibrate on: the twin's filters need {settling_s:.1} s without a gap, and the {samples} joint states \
+         with efforts end before; record longer pieces"
+    )]
+    TooShort {
+        /// Joint states with efforts that were read.
+        samples: u64,
+        /// Time that the filters need \[s\].
+        settling_s: f64,
+    },
+    /// All samples are labelled as touched.
+    #[error("no sample to calibrate on: the labels leave no time in which nothing touches the robot")]
+    AllTouched,
     /// Nothing that is learnt from this recording can be right.
     #[error("{}: {oddity}", recording.display())]
     Implausible {
         /// The recording.
         recording: PathBuf,
         /// Why.
-        oddity: Oddity,
+        oddity: Finding,
     },
     /// The arm stands, and how many N m an ampere gives is not known.
     #[error(
@@ -77,7 +96,12 @@ impl CalibrateError {
     pub fn is_input(&self) -> bool {
         match self {
             Self::Recording { source, .. } => source.is_input(),
-            Self::TooShort | Self::Implausible { .. } | Self::Stands | Self::WrongScale(_) => true,
+            Self::NoEffort { .. }
+            | Self::TooShort { .. }
+            | Self::AllTouched
+            | Self::Implausible { .. }
+            | Self::Stands
+            | Self::WrongScale(_) => true,
         }
     }
 }
@@ -132,7 +156,7 @@ impl Job<'_> {
         progress: &dyn Fn(usize, f64),
     ) -> Result<Calibrated, CalibrateError> {
         let joint_count = self.cell.facts.joint_names.len();
-        let mut lost = 0;
+        let mut all = Read::default();
         let facts = &self.cell.facts;
         let in_nm =
             facts.effort_unit == EffortUnit::Nm || facts.torque_constants_nm_per_a.is_some();
@@ -142,17 +166,20 @@ impl Job<'_> {
         let mut all_stand = true;
         for (index, recording) in self.fit.iter().enumerate() {
             let step = &mut |fraction| progress(index, fraction);
-            let mut plausible = Plausible::new(self.cell);
-            lost += self.each(recording, None, &mut plausible, step, &mut |sample| {
+            let read = self.each(recording, None, step, &mut |sample| {
                 if is_free(recording, sample.header.stamp_ns) {
                     calibration.add(sample);
                 }
             })?;
-            all_stand &= plausible.stands();
-            notes.extend(odd_in(recording, &plausible)?);
+            all_stand &= read.stands;
+            notes.extend(odd_in(recording, &read.findings)?);
+            all.add(&read);
         }
+        let lost = all.lost;
         let Some(fits) = calibration.fit() else {
-            return Err(CalibrateError::TooShort);
+            let twin = build::twin(self.twin, None, self.cell);
+            let settling_s = twin.map_or(0.0, |twin| twin.settling_time_s());
+            return Err(all.why_nothing(settling_s));
         };
         let scale = EffortScale::of(&telling_slopes(&facts.joint_names, &fits));
         if let Some(fault) = scale.fault_in_nm().filter(|_| in_nm && !from_topic) {
@@ -203,27 +230,29 @@ impl Job<'_> {
     }
 
     /// Runs a recording through source and twin and hands over every sample whose filters have
-    /// settled; returns what was lost.
+    /// settled.
     fn each(
         &self,
         recording: &Path,
         model: Option<&TwinFile>,
-        plausible: &mut Plausible,
         progress: &mut dyn FnMut(f64),
         take: &mut (dyn FnMut(&TwinState) + Send),
-    ) -> Result<u64, CalibrateError> {
+    ) -> Result<Read, CalibrateError> {
         let failed = |source: ReplayError| CalibrateError::Recording {
             recording: recording.to_owned(),
             source,
         };
-        let mut run = || -> Result<u64, ReplayError> {
+        let mut plausible = plausible::of_cell(self.cell);
+        let (mut measured, mut settled) = (0, 0);
+        let mut run = || -> Result<(u64, Vec<Finding>), ReplayError> {
             let config = tauscope_ingest::Config::default();
             let file = FileConfig {
                 path: recording.to_owned(),
                 topics: self.topics.clone(),
             };
             let setup = build::ingest_setup(self.cell);
-            let source = RecordedSource::open_file(&file, &config, &setup)?;
+            let mut source = RecordedSource::open_file(&file, &config, &setup)?;
+            let findings = source.findings();
             let twin = build::twin(self.twin, model, self.cell)?;
             let mut graph = Graph::default();
             let states = graph.source("ingest", Box::new(source));
@@ -232,19 +261,31 @@ impl Job<'_> {
                 graph.listen::<JointState>(&states)?,
                 graph.listen::<TwinState>(&twins)?,
             ];
-            let settled = Settled {
-                plausible: &mut *plausible,
+            let sink = Settled {
+                plausible: &mut plausible,
+                measured: &mut measured,
+                settled: &mut settled,
                 take: &mut *take,
                 reset: true,
             };
-            graph.sink("calibration", Box::new(settled), inputs);
+            graph.sink("calibration", Box::new(sink), inputs);
             let counts = graph.run(&mut |fraction| {
                 progress(fraction);
                 true
             })?;
-            Ok(counts.iter().flatten().map(|stage| stage.dropped).sum())
+            let lost = counts.iter().flatten().map(|stage| stage.dropped).sum();
+            Ok((lost, findings.get()))
         };
-        run().map_err(failed)
+        let (lost, mut findings) = run().map_err(failed)?;
+        findings.extend(plausible.findings());
+        Ok(Read {
+            lost,
+            measured,
+            settled,
+            samples: plausible.samples(),
+            stands: plausible.stands(),
+            findings,
+        })
     }
 
     /// The twin as far as it is known before the fit.
@@ -277,21 +318,59 @@ impl Job<'_> {
 ///
 /// # Errors
 /// If nothing that is learnt from it can be right.
-fn odd_in(recording: &Path, plausible: &Plausible) -> Result<Vec<String>, CalibrateError> {
-    let mut notes = Vec::new();
-    for oddity in plausible.oddities() {
-        if oddity.is_fault() {
-            let recording = recording.to_owned();
-            return Err(CalibrateError::Implausible { recording, oddity });
-        }
-        notes.push(format!("{}: {oddity}", recording.display()));
+fn odd_in(recording: &Path, findings: &[Finding]) -> Result<Vec<String>, CalibrateError> {
+    if let Some(fault) = findings.iter().find(|it| it.effect() == Effect::Fault) {
+        let (recording, oddity) = (recording.to_owned(), fault.clone());
+        return Err(CalibrateError::Implausible { recording, oddity });
     }
-    Ok(notes)
+    let name = recording.display();
+    Ok(findings.iter().map(|finding| format!("{name}: {finding}")).collect())
+}
+
+/// What was read of a recording, or of all.
+#[derive(Debug, Default)]
+struct Read {
+    /// Samples that were lost or refused.
+    lost: u64,
+    /// Joint states.
+    samples: u64,
+    /// Joint states with measured efforts.
+    measured: u64,
+    /// Samples behind settled filters.
+    settled: u64,
+    /// Whether no joint has moved.
+    stands: bool,
+    findings: Vec<Finding>,
+}
+
+impl Read {
+    fn add(&mut self, other: &Self) {
+        self.lost += other.lost;
+        self.samples += other.samples;
+        self.measured += other.measured;
+        self.settled += other.settled;
+    }
+
+    /// Why there is no sample to calibrate on.
+    fn why_nothing(&self, settling_s: f64) -> CalibrateError {
+        match (self.measured, self.settled) {
+            (0, _) => CalibrateError::NoEffort {
+                samples: self.samples,
+            },
+            (samples, 0..2) => CalibrateError::TooShort {
+                samples,
+                settling_s,
+            },
+            _ => CalibrateError::AllTouched,
+        }
+    }
 }
 
 /// Hands every sample whose filters have settled to a closure; the first one after a reset says so.
 struct Settled<'a> {
     plausible: &'a mut Plausible,
+    measured: &'a mut u64,
+    settled: &'a mut u64,
     take: &'a mut (dyn FnMut(&TwinState) + Send),
     reset: bool,
 }
@@ -302,12 +381,14 @@ impl Sink for Settled<'_> {
             SampleRef::TwinState(sample) => sample,
             SampleRef::JointState(sample) => {
                 self.plausible.add(sample);
+                *self.measured += u64::from(sample.header.has(flags::EFFORT_MEASURED));
                 return Ok(());
             }
             _ => return Ok(()),
         };
         self.reset |= sample.header.has(flags::RESET);
         if sample.header.has(flags::READY) {
+            *self.settled += 1;
             if std::mem::take(&mut self.reset) {
                 let mut first = *sample;
                 first.header.flags |= flags::RESET;

@@ -13,7 +13,7 @@ use tauscope_bus::MAX_JOINTS;
 use tauscope_dynamics::Model;
 
 pub use constants::{ConstantSpot, torque_constants};
-pub use joints::{Fixed, first_joint_names};
+pub use joints::{Fixed, recorded_joint_names};
 
 use crate::report::{Problem, Report};
 use crate::urdf;
@@ -121,6 +121,12 @@ impl Cell {
         self.facts.urdf = Some(fixed.urdf);
         self.model = Some(fixed.model);
         (self, Some(note))
+    }
+
+    /// By joint, the effort limit of the robot file \[N m or N\]; empty without a robot.
+    pub fn effort_limits(&self) -> Vec<Option<f64>> {
+        let joints = self.model.iter().flat_map(Model::joints);
+        joints.map(|joint| joint.limits.effort).collect()
     }
 
     /// The link the tool is attached to.

@@ -20,9 +20,9 @@ pub mod report;
 pub mod results;
 pub mod scenario;
 pub mod settings;
-pub mod suggest;
 pub mod tables;
 pub mod tally;
 pub mod trained;
-pub mod urdf;
 pub mod yaml;
+
+pub use tauscope_session::{robot as urdf, suggest};

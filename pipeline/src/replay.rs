@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use tauscope_bus::{Detection, JointState, SampleKind, Sink, TwinState};
-use tauscope_ingest::{ArchivedTwin, Commanded};
+use tauscope_ingest::{ArchivedTwin, Commanded, Findings};
 use tauscope_twin::TwinFile;
 
 use crate::build;
@@ -176,6 +176,7 @@ impl<'a> Replay<'a> {
         let stem = stem(recording);
         let mut observer = Observer::new(cell, self.plausible_twins());
         let mut files = Vec::new();
+        let mut findings = Findings::default();
         let mut graph = Graph::default();
         let mut streams: BTreeMap<usize, Stream> = BTreeMap::new();
         // Detectors behind one twin are given the same samples, one after the other.
@@ -189,7 +190,9 @@ impl<'a> Replay<'a> {
                 .cloned();
             let stream = match (&stage.settings, input) {
                 (Settings::Ingest(config), _) => {
-                    let source = open::recording(config, recording, cell, self.reads_ahead)?;
+                    let (source, of_source) =
+                        open::recording(config, recording, cell, self.reads_ahead)?;
+                    findings = of_source;
                     Some(graph.source(&stage.name, Box::new(Commanded::archived(source))))
                 }
                 (Settings::Twin { config, model }, Some(input)) => {
@@ -243,6 +246,9 @@ impl<'a> Replay<'a> {
         let mut stages = graph.run(progress)?.ok_or(ReplayError::Interrupted)?;
         stages.truncate(stage_count);
         drop(graph);
+        let of_source = findings.get().into_iter();
+        let of_source = of_source.map(|finding| finding.to_string());
+        observer.observed.notes.splice(0..0, of_source);
         Ok(observer.observed.into_outcome(cell, stem, stages, files))
     }
 

@@ -142,7 +142,7 @@ pub fn read(
     topic: Option<&str>,
     may_go_on: &dyn Fn() -> Result<(), PyErr>,
 ) -> Result<Read, ReadError> {
-    let recording = Recording::open(path)?;
+    let recording = tauscope_session::open(path)?;
     let topic = match topic {
         Some(topic) => topic.to_owned(),
         None => only_topic(&recording)?,

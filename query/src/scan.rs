@@ -84,7 +84,7 @@ pub(crate) struct Counts {
 /// # Errors
 /// If it cannot be opened, or has another size by now.
 pub(crate) fn open(listed: &Listed, counts: &Counts) -> Result<Recording> {
-    let recording = Recording::open(&listed.path).map_err(external)?;
+    let recording = tauscope_session::open(&listed.path).map_err(external)?;
     if listed.bytes != 0 && recording.bytes() != listed.bytes {
         let path = listed.path.display();
         return Err(external(format!(

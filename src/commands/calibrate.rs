@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use comfy_table::{CellAlignment, Table, presets};
 use tauscope_archive::whole_file::{self, Existing};
-use tauscope_archive::{ArchiveError, Recording};
+use tauscope_archive::ArchiveError;
 use tauscope_ingest::Topics;
 use tauscope_pipeline::calibrate::{Calibrated, Job};
 use tauscope_pipeline::cell::{Cell, ConstantSpot, EffortUnit};
@@ -173,7 +173,7 @@ fn check_cutoffs(args: &Args) -> Result<(), Failure> {
     ];
     for path in args.recordings.iter().chain(&args.validation) {
         let rejected = |error: ArchiveError| Failure::rejected(error.to_string());
-        let recording = Recording::open(path).map_err(rejected)?;
+        let recording = tauscope_session::open(path).map_err(rejected)?;
         let Some(rate_hz) = recorded_rate_hz(&recording, &args.state_topic).map_err(rejected)?
         else {
             continue;

@@ -49,7 +49,7 @@ pub struct Args {
     /// Topic of another twin's effort, which takes the place of the URDF's.
     #[arg(long, value_name = "TOPIC")]
     twin_topic: Option<String>,
-    /// Topic of the measured joint states; `/joint_states` without it.
+    /// Topic of the measured joint states; without it the one that gives efforts of most of the robot's joints.
     #[arg(long, value_name = "TOPIC")]
     state_topic: Option<String>,
     /// An effect that is left out of the library; may be given several times.
@@ -112,7 +112,7 @@ impl Args {
             torque_constants_nm_per_a: self.torque_constant.iter().cloned().collect(),
             twin: self.twin.as_deref(),
             twin_topic: self.twin_topic.as_deref(),
-            state_topic: self.state_topic.as_deref().unwrap_or("/joint_states"),
+            state_topic: self.state_topic.as_deref(),
             fit: &fit,
             holdout: &self.holdout,
         };

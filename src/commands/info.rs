@@ -2,12 +2,14 @@
 
 use std::path::PathBuf;
 
+use serde::Serialize;
 use tauscope_archive::{Info, Recording};
+use tauscope_session::{Finding, Publisher, SessionError, Survey};
 
 use crate::exit::{Exit, Failure};
 use crate::output::Output;
 
-/// Say what is in a recording: its topics and rates, gaps, whose joints move and what is odd about them, damage.
+/// Say what is in a recording: its topics and rates, publishers, gaps, whose joints move and what is odd about them, damage.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// An MCAP file, a rosbag2 folder, a `.db3`, a `.bag` of ROS 1, a table (`.csv`), or an episode of a LeRobot data set
@@ -18,16 +20,74 @@ pub struct Args {
     json: bool,
 }
 
+/// What is printed of a recording.
+#[derive(Debug, Serialize)]
+struct Printed {
+    #[serde(flatten)]
+    info: Info,
+    /// By topic of joint states.
+    joint_states: Vec<Topic>,
+}
+
+/// Publishers and findings of a topic of joint states.
+#[derive(Debug, Serialize)]
+struct Topic {
+    topic: String,
+    publishers: Vec<Publisher>,
+    findings: Vec<Finding>,
+    /// Each finding as a sentence.
+    sentences: Vec<String>,
+}
+
 /// Prints it.
 pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
-    let rejected = |error: tauscope_archive::ArchiveError| Failure::rejected(error.to_string());
-    let recording = Recording::open(&args.recording).map_err(rejected)?;
-    let info = Info::read(&recording).map_err(rejected)?;
+    let rejected = |error: SessionError| Failure::rejected(error.to_string());
+    let recording = tauscope_session::open(&args.recording).map_err(|it| rejected(it.into()))?;
+    let info = Info::read(&recording).map_err(|error| rejected(error.into()))?;
+    let joint_states = joint_states(&recording).map_err(rejected)?;
+    let lost = info.has_lost_data();
+    let printed = Printed { info, joint_states };
     let text = if args.json {
-        serde_json::to_string_pretty(&info).map_err(anyhow::Error::from)?
+        serde_json::to_string_pretty(&printed).map_err(anyhow::Error::from)?
     } else {
-        info.to_string()
+        text(&printed)
     };
     out.print(&text)?;
-    Ok(Exit::from_loss(info.has_lost_data()))
+    Ok(Exit::from_loss(lost))
+}
+
+fn joint_states(recording: &Recording) -> Result<Vec<Topic>, SessionError> {
+    let topics = recording.topics().iter();
+    let topics = topics.filter(|it| it.joint_state_type().is_some() && it.message_count > 0);
+    let each = topics.map(|topic| {
+        let survey = Survey::of(recording, &topic.name)?;
+        let sentences = survey.findings.iter().map(ToString::to_string);
+        Ok(Topic {
+            topic: topic.name.clone(),
+            sentences: sentences.collect(),
+            publishers: survey.publishers,
+            findings: survey.findings,
+        })
+    });
+    each.collect()
+}
+
+/// The recording, then publishers and findings of each topic of joint states.
+fn text(printed: &Printed) -> String {
+    let mut text = printed.info.to_string();
+    for topic in &printed.joint_states {
+        if topic.publishers.len() > 1 {
+            text += &format!("publishers on {}:\n", topic.topic);
+            for publisher in &topic.publishers {
+                text += &format!("  {publisher}\n");
+            }
+        }
+        if !topic.sentences.is_empty() {
+            text += &format!("findings on {}:\n", topic.topic);
+            for sentence in &topic.sentences {
+                text += &format!("  {sentence}\n");
+            }
+        }
+    }
+    text
 }

@@ -3,13 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use tauscope_pipeline::cell::EffortUnit;
+use tauscope_explain::report::Report;
 use tauscope_pipeline::recordings;
+use tauscope_pipeline::report::Problem;
 
 use super::effort_unit;
 use crate::existing::Force;
 use crate::exit::{Exit, Failure};
-use crate::explain::{self, Arguments, Kept};
-use crate::init::{self, Folder, Live, Looked, Told};
+use crate::explain::{self, Named};
+use crate::init::{self, Folder, Live, Looked, Seen, Told};
 use crate::interrupt;
 use crate::output::Output;
 use crate::progress::{Progress, Quiet};
@@ -84,8 +86,9 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         state_topic: args.state_topic.as_deref(),
         effort_unit: args.effort_unit,
     };
-    let looked = told.look()?;
-    match set_up(args, &folder, &looked, progress) {
+    let looked = told.look(&|share, what| progress.doing(LOOKED * share, what))?;
+    let sentences = looked.sentences.clone();
+    match set_up(args, &folder, looked, progress) {
         Ok((page, exit)) => {
             folder.keep();
             out.print(&page)?;
@@ -94,7 +97,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         }
         Err(failure) => {
             // They stand on the page, which there is none of.
-            for sentence in &looked.sentences {
+            for sentence in &sentences {
                 out.say(sentence);
             }
             Err(failure)
@@ -106,36 +109,34 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
 fn set_up(
     args: &Args,
     folder: &Folder,
-    looked: &Looked,
+    looked: Looked,
     progress: Progress,
 ) -> Result<(String, Exit), Failure> {
-    let (fit, holdout) = looked.parted();
-    let arguments = Arguments {
-        robot: Some(&args.robot),
-        effort_unit: looked.cell.facts.effort_unit,
-        torque_constants_nm_per_a: std::collections::BTreeMap::new(),
-        twin: None,
-        twin_topic: None,
-        state_topic: &looked.state_topic,
-        fit: &fit,
-        holdout: &holdout,
-    };
-    let request = explain::from_arguments(&arguments, std::collections::BTreeSet::new())?;
+    let Looked {
+        mut request,
+        input,
+        kept,
+        sentences,
+    } = looked;
     explain::refuse_to_replace(&folder.explained(), &request, args.force)?;
-    let input = explain::read(&request, &|share, what| {
-        progress.doing(LOOKED * share, what);
-    })?;
     explain::make(&folder.explained())?;
-    let kept = Kept::of(&input);
     let step = |share: f64, what: &str| progress.doing(LOOKED + (EXPLAINED - LOOKED) * share, what);
     let mut outcome = tauscope_explain::explain(input, &step)
         .map_err(|error| Failure::rejected(error.to_string()))?;
+    if let Some(reason) = &outcome.report.reason {
+        let problem = Problem::new(format!("the recordings cannot be explained: {reason}"));
+        return Err(Failure::Rejected(problem.into()));
+    }
+    request.cell.facts.effort_unit = unit_of(&outcome.report);
     let hold = interrupt::hold();
     explain::write(&folder.explained(), &request, &kept, &mut outcome)?;
 
-    let urdf = looked.cell.facts.urdf.as_deref().unwrap_or_default();
+    let cell = &request.cell;
+    let urdf = cell.facts.urdf.as_deref().unwrap_or_default();
     init::write(&folder.robot(), urdf.as_bytes())?;
-    folder.write_set(&looked.cell, &looked.state_topic, &fit, &holdout)?;
+    let paths = |of: &[Named]| -> Vec<PathBuf> { of.iter().map(|it| it.path.clone()).collect() };
+    let (fit, holdout) = (paths(&request.fit), paths(&request.holdout));
+    folder.write_set(cell, &request.state_topic, &fit, &holdout)?;
     if interrupt::is_asked() {
         let far = "before the detector learnt; what was written is removed";
         return Err(Failure::Interrupted(far.to_owned()));
@@ -159,17 +160,25 @@ fn set_up(
         .map_or(Path::new(""), PathBuf::as_path);
     let live = args.live.is_some().then_some(&*args.source);
     let is_explained = learnt.is_explained;
-    folder.write_pipeline(&looked.cell, &looked.state_topic, shown, live, is_explained)?;
-    let page = init::page(
-        folder,
-        looked,
-        &outcome.report,
-        &learnt,
-        live.is_some(),
-        kept.lost,
-    );
+    folder.write_pipeline(cell, &request.state_topic, shown, live, is_explained)?;
+    let seen = Seen {
+        cell,
+        sentences: &sentences,
+        lost: kept.lost,
+        is_live: live.is_some(),
+    };
+    let page = init::page(folder, &seen, &outcome.report, &learnt);
     init::write(&folder.page(), page.as_bytes())?;
     drop(hold);
     drop(progress);
     Ok((page, Exit::from_loss(kept.lost > 0)))
+}
+
+/// The unit that the explanation settled on.
+fn unit_of(report: &Report) -> EffortUnit {
+    if report.effort_unit == EffortUnit::A.as_str() {
+        EffortUnit::A
+    } else {
+        EffortUnit::Nm
+    }
 }

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use serde::Serialize;
-use tauscope_archive::{Recording, whole_file};
+use tauscope_archive::whole_file;
 use tauscope_pipeline::parallel;
 use tauscope_pipeline::pipeline::Pipeline;
 use tauscope_pipeline::recordings;
@@ -75,7 +75,8 @@ fn check_recordings(args: &Args) -> Result<(), Report> {
     let mut said = BTreeSet::new();
     let is_table = |path: &&PathBuf| path.extension().is_some_and(|ending| ending == "csv");
     for path in args.recordings.iter().filter(|path| !is_table(path)) {
-        if let Err(error) = Recording::open_comparable(path, &[]) {
+        let comparable = tauscope_session::open(path).and_then(|it| it.check_comparable(&[]));
+        if let Err(error) = comparable {
             let title = error.to_string();
             // What a data set lacks, all of its episodes lack.
             if said.insert(title.clone()) {

@@ -12,7 +12,7 @@ use tauscope_ingest::SimulatedRobot;
 use tauscope_pipeline::build::{self, BuildError};
 use tauscope_pipeline::cell::Cell;
 use tauscope_pipeline::learnt_state::{self, Kept};
-use tauscope_pipeline::plausible::{Plausible, PlausibleTwin, Watched, WatchedTwin};
+use tauscope_pipeline::plausible::{self, PlausibleTwin, Watched, WatchedTwin};
 use tauscope_pipeline::report::Report;
 use tauscope_pipeline::scenario::ScenarioFacts;
 use tauscope_pipeline::settings::Settings;
@@ -116,7 +116,7 @@ fn member(seat: &Seat, shared: &tauscope_detect::Shared) -> Result<Member, SeatE
             let robot: Option<SimulatedRobot> = scenario.map(ScenarioFacts::robot).transpose()?;
             let source = build::ingest(config, robot.as_ref(), cell()?, told.after_ns)?;
             let source = build::commanded(source, config, cell()?, told.somebody_learns)?;
-            let source = Watched::new(&seat.stage, source, Plausible::new(cell()?));
+            let source = Watched::new(&seat.stage, source, plausible::of_cell(cell()?));
             Member::Source(Box::new(announce::commands::Announced::new(
                 &seat.stage,
                 source,

@@ -7,7 +7,7 @@ use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use rustix::process::{Resource, getrlimit};
-use tauscope_archive::{Recording, whole_file};
+use tauscope_archive::whole_file;
 use tauscope_pipeline::pipeline::{Pipeline, Stage};
 use tauscope_pipeline::settings::Settings;
 
@@ -221,7 +221,7 @@ fn bytes_a_day(folder: &Path) -> Option<f64> {
     let files = fs::read_dir(here).ok()?.filter_map(Result::ok);
     let archives = files.filter(|file| file.path().extension().is_some_and(|kind| kind == "mcap"));
     let newest = archives.max_by_key(|file| file.metadata().and_then(|of| of.modified()).ok())?;
-    let recording = Recording::open(newest.path()).ok()?;
+    let recording = tauscope_session::open(&newest.path()).ok()?;
     let seconds = recording.end_ns()?.checked_sub(recording.start_ns()?)? as f64 * 1e-9;
     (seconds > 1.0).then(|| recording.bytes() as f64 / seconds * 86_400.0)
 }

@@ -61,7 +61,7 @@ impl Request {
             model: cell.model.clone(),
             twin,
             twin_topic: None,
-            state_topic: state_topic.to_owned(),
+            state_topic: Some(state_topic.to_owned()),
             fit: recordings.to_vec(),
             holdout: Vec::new(),
             problem: &|_, title| Problem::new(title),
@@ -103,8 +103,8 @@ pub struct Arguments<'a> {
     pub twin: Option<&'a Path>,
     /// Topic of somebody else's twin.
     pub twin_topic: Option<&'a str>,
-    /// Topic of the measured joint states.
-    pub state_topic: &'a str,
+    /// Topic of the measured joint states; without it the one that gives efforts of most joints.
+    pub state_topic: Option<&'a str>,
     /// Recordings that may be fitted.
     pub fit: &'a [PathBuf],
     /// Recordings that nothing is fitted on.
@@ -169,7 +169,7 @@ pub fn from_case(path: &Path, without: BTreeSet<String>) -> Result<Request, Repo
         model: None,
         twin: model.map(|model| file.resolve(model)),
         twin_topic,
-        state_topic: case.topics.state.clone(),
+        state_topic: Some(case.topics.state.clone()),
         fit: case.fit.iter().map(|path| file.resolve(path)).collect(),
         holdout: case.holdout.iter().map(|path| file.resolve(path)).collect(),
         problem: &|spot, title| match spot {
@@ -206,7 +206,7 @@ pub fn from_arguments(
         model: None,
         twin: arguments.twin.map(Path::to_owned),
         twin_topic: arguments.twin_topic.map(str::to_owned),
-        state_topic: arguments.state_topic.to_owned(),
+        state_topic: arguments.state_topic.map(str::to_owned),
         fit: arguments.fit.to_vec(),
         holdout: arguments.holdout.to_vec(),
         problem: &|_, title| Problem::new(title),

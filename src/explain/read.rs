@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use tauscope_dynamics::Model;
 use tauscope_explain::{Input, Recording, RecordingTopics, Start};
 use tauscope_pipeline::report::{Problem, Report};
+use tauscope_session::Joints;
 use tauscope_twin::JointCorrection;
 
 use super::input::{Named, Request};
@@ -57,6 +58,11 @@ pub fn read(request: &Request, progress: &dyn Fn(f64, &str)) -> Result<Input, Re
         reference: request.twin_topic.clone(),
         longest_s: request.longest_s,
     };
+    let limits = request.cell.effort_limits();
+    let joints = Joints {
+        names: &facts.joint_names,
+        effort_limits: &limits,
+    };
     let count = (request.fit.len() + request.holdout.len()) as f64;
     let mut report = Report::default();
     let mut done = 0.0;
@@ -65,7 +71,7 @@ pub fn read(request: &Request, progress: &dyn Fn(f64, &str)) -> Result<Input, Re
         for Named { name, path } in recordings {
             progress(done / count, &format!("reading {name}"));
             done += 1.0;
-            match Recording::read(path, &topics, &facts.joint_names) {
+            match Recording::read(path, &topics, joints) {
                 Ok(mut recording) => {
                     recording.name.clone_from(name);
                     all.push(recording);

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use tauscope_archive::Recording;
 use tauscope_pipeline::pipeline::Pipeline;
 use tauscope_pipeline::report::Problem;
 
@@ -101,7 +100,7 @@ impl Live<'_> {
         let least_s = LEAST_SHARE * self.seconds / RECORDINGS;
         let mut kept = Vec::new();
         for path in all {
-            let recording = Recording::open(&path);
+            let recording = tauscope_session::open(&path);
             let recording = recording.map_err(|error| Failure::rejected(error.to_string()))?;
             let span = recording.start_ns().zip(recording.end_ns());
             let lasts_s = span.map_or(0.0, |(start, end)| (end - start) as f64 * 1e-9);

@@ -1,81 +1,63 @@
-//! What the recordings are: which topic holds the joint states, whose joints they are, in which unit the effort is.
+//! The recordings before anything is fitted: read as `explain` reads them, parted into those to fit and those held out.
 
-mod slopes;
-
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use tauscope_archive::ros::JointStateType;
-use tauscope_archive::{Info, Recording};
 use tauscope_dynamics::effort_scale::EffortScale;
 use tauscope_dynamics::{Joint, Model};
+use tauscope_explain::{Input, Recording};
 use tauscope_ingest::Topics;
 use tauscope_pipeline::calibrate::Job;
-use tauscope_pipeline::cell::{Cell, ConstantSpot, EffortUnit, first_joint_names};
+use tauscope_pipeline::cell::{Cell, EffortUnit};
 use tauscope_pipeline::report::{Problem, Report};
-use tauscope_pipeline::suggest;
+use tauscope_session::Effect;
+use tauscope_twin::telling_slopes_of;
 
-use self::slopes::{Slopes, signs, telling, turned_in_some};
 use crate::exit::Failure;
+use crate::explain::{self, Arguments, Kept, Request};
 
-/// A joint's torque constant is below this \[N m/A\].
+/// Largest torque constant of a joint \[N m/A\].
 /// Physical: 1 N m/A of a large motor behind a gear of 300.
 const MOST_NM_PER_A: f64 = 300.0;
 
 /// The arm and its recordings, before anything is fitted.
 #[derive(Debug)]
 pub struct Looked {
-    /// The arm, with the unit that its effort is in.
-    pub cell: Cell,
-    /// Where the joint states are.
-    pub state_topic: String,
+    /// What `explain` is asked, with the unit of the effort.
+    pub request: Request,
+    /// What `explain` takes.
+    pub input: Input,
+    /// What is known of the input once the engine has taken it.
+    pub kept: Kept,
     /// What was found, a sentence each.
     pub sentences: Vec<String>,
-    /// By recording, how far its joints move in all \[rad or m\].
-    travel: Vec<(PathBuf, f64)>,
 }
 
 impl Looked {
-    /// The recordings to fit, and those that nothing is fitted on: of every four or less one, those in the middle by how
-    /// far the joints move, so that neither a standing arm nor the liveliest motion is kept from the fit.
-    pub fn parted(&self) -> (Vec<PathBuf>, Vec<PathBuf>) {
-        const FOR_ONE_HELD_OUT: usize = 4;
-        let mut sorted: Vec<_> = self.travel.iter().collect();
-        sorted.sort_by(|a, b| a.1.total_cmp(&b.1));
-        let count = sorted.len();
-        let held = if count < 2 {
-            0
-        } else {
-            count.div_ceil(FOR_ONE_HELD_OUT).min(count / 2)
-        };
-        let from = (count - held) / 2;
-        let is_held = |path: &&PathBuf| sorted[from..from + held].iter().any(|one| one.0 == **path);
-        let all = || self.travel.iter().map(|one| &one.0);
-        let fit = all().filter(|path| !is_held(path)).cloned().collect();
-        (fit, all().filter(is_held).cloned().collect())
+    /// The arm.
+    pub fn cell(&self) -> &Cell {
+        &self.request.cell
     }
 }
 
-/// What is told on the command line.
+/// What is given on the command line.
 #[derive(Debug)]
 pub struct Told<'a> {
     /// The URDF.
     pub robot: &'a Path,
     /// The recordings.
     pub recordings: &'a [PathBuf],
-    /// The topic of the joint states, where it is told.
+    /// The topic of the joint states, where it is given.
     pub state_topic: Option<&'a str>,
-    /// The unit of the effort, where it is told.
+    /// The unit of the effort, where it is given.
     pub effort_unit: Option<EffortUnit>,
 }
 
 impl Told<'_> {
-    /// Looks at the recordings.
+    /// Reads the recordings, holds some of them out and chooses the unit that the explanation begins with.
     ///
     /// # Errors
-    /// If they are not those of the robot, or nobody can tell the unit.
-    pub fn look(&self) -> Result<Looked, Failure> {
+    /// If they are not those of the robot, or nothing that is learnt from one of them can be right.
+    pub fn look(&self, progress: &dyn Fn(f64, &str)) -> Result<Looked, Failure> {
         let [_, _, ..] = self.recordings else {
             let problem = Problem::new(
                 "one recording is too few: one is fitted and another shows whether the fit holds",
@@ -83,213 +65,165 @@ impl Told<'_> {
             let help = "record the arm at least twice, better five times, with different motions and nothing touching it";
             return Err(Failure::Rejected(problem.help(help).into()));
         };
-        let cell = self.cell()?;
-        let state_topic = match self.state_topic {
-            Some(topic) => topic.to_owned(),
-            None => self.find_topic(&cell)?,
-        };
-        let recorded = first_joint_names(&self.recordings[0], &state_topic);
-        let (mut cell, fixed) = cell.without_unrecorded(&recorded.unwrap_or_default());
-        self.check_joints(&cell, &state_topic)?;
+        let mut request = self.request()?;
+        let mut input = explain::read(&request, progress)?;
+        refuse_faults(&input)?;
+        let cell = &request.cell;
         let mut sentences = vec![format!(
-            "{} joints of {} on {state_topic} in {} recording(s).",
+            "{} joints of {} on {} in {} recordings.",
             cell.facts.joint_names.len(),
             cell.facts.name,
+            request.state_topic,
             self.recordings.len()
         )];
-        sentences.extend(fixed.map(|note| format!("{note}.")));
-        sentences.extend(coupled(&cell));
-        sentences.extend(unlimited(&cell));
-        let mut travel = Vec::new();
-        for path in self.recordings {
-            let (far, remarks) = oddities(path, &state_topic)?;
-            travel.push((path.clone(), far));
-            let name = path.display();
-            sentences.extend(
-                remarks
-                    .into_iter()
-                    .map(|remark| format!("{name}: {remark}.")),
-            );
+        sentences.extend(request.note.clone());
+        sentences.extend(request.robot_findings.iter().cloned());
+        sentences.extend(coupled(cell));
+        sentences.extend(unlimited(cell));
+        for recording in &input.fit {
+            let name = recording.path.display();
+            let findings = recording.findings.iter();
+            sentences.extend(findings.map(|finding| format!("{name}: {finding}.")));
         }
-        let slopes = self.slopes(&cell, &state_topic)?;
-        sentences.extend(slopes.notes.iter().map(|note| format!("{note}.")));
-        let (unit, sentence) = self.unit(&EffortScale::of(&slopes.all))?;
+        let (unit, sentence) = self.unit(&request);
         sentences.push(sentence);
-        sentences.extend(signs(&slopes.all));
-        cell.facts.effort_unit = unit;
+        request.cell.facts.effort_unit = unit;
+        unit.as_str().clone_into(&mut input.effort_unit);
+        let kept = Kept::of(&input);
+        hold_out(&mut request, &mut input);
         Ok(Looked {
-            cell,
-            state_topic,
+            request,
+            input,
+            kept,
             sentences,
-            travel,
         })
     }
 
-    /// The robot. Its effort is taken for a current until the unit is known: that needs no torque constants.
-    fn cell(&self) -> Result<Cell, Report> {
-        let problem = |_: ConstantSpot<'_>, title| Problem::new(title);
-        Cell::from_urdf(self.robot, EffortUnit::A, &BTreeMap::new(), &problem)
-    }
-
-    /// The topic of joint states with positions whose messages name most of the robot's joints.
-    fn find_topic(&self, cell: &Cell) -> Result<String, Report> {
-        let first = &self.recordings[0];
-        let recording = Recording::open(first).map_err(|error| Problem::new(error.to_string()))?;
-        let topics = recording.topics().iter();
-        let topics = topics.filter(|topic| topic.joint_state_type().is_some());
-        let named = topics.filter_map(|topic| {
-            let names = first_joint_names(first, &topic.name).ok()?;
-            let wanted = &cell.facts.joint_names;
-            let known = wanted.iter().filter(|name| names.contains(name)).count();
-            let (position, effort) = given(&recording, &topic.name);
-            let name = Reverse(topic.name.clone());
-            Some((position, effort, known, topic.message_count, name))
-        });
-        match named.max() {
-            Some((true, .., name)) => Ok(name.0),
-            Some((false, .., name)) => {
-                let title = format!(
-                    "{}: no joint states with positions; {} has none",
-                    first.display(),
-                    name.0
-                );
-                let help = "record the topic that holds the joints' positions and efforts";
-                Err(Problem::new(title).help(help).into())
-            }
-            None => {
-                let title = format!("{} holds no {}", first.display(), JointStateType::names());
-                let topics = recording.topics().iter().map(|topic| topic.name.as_str());
-                let help = format!("its topics are {}", suggest::list(topics));
-                Err(Problem::new(title).help(help).into())
-            }
-        }
-    }
-
-    /// Every recording must have every joint of the robot.
-    fn check_joints(&self, cell: &Cell, topic: &str) -> Result<(), Report> {
-        let mut report = Report::default();
-        let mut said = BTreeSet::new();
-        for recording in self.recordings {
-            let comparable = Recording::open_comparable(recording, &cell.facts.joint_names);
-            if let Err(error) = comparable {
-                let title = error.to_string();
-                // What a data set lacks, all of its episodes lack.
-                if said.insert(title.clone()) {
-                    report.push(Problem::new(title));
-                }
-                continue;
-            }
-            let names = match first_joint_names(recording, topic) {
-                Ok(names) => names,
-                Err(problems) => {
-                    report.append(problems);
-                    continue;
-                }
-            };
-            let joints = cell.facts.joint_names.iter();
-            let missing: Vec<&str> = joints
-                .filter(|joint| !names.contains(joint))
-                .map(String::as_str)
-                .collect();
-            if missing.is_empty() {
-                continue;
-            }
-            let title = format!(
-                "{}: {topic} does not name {} of the robot {}",
-                recording.display(),
-                suggest::some(&missing),
-                cell.facts.name
-            );
-            let recorded: Vec<&str> = names.iter().map(String::as_str).collect();
-            let help = format!(
-                "it names {}; give the URDF of the arm that was recorded, or --state-topic",
-                suggest::some(&recorded)
-            );
-            report.push(Problem::new(title).help(help));
-        }
-        report.into_result(())
-    }
-
-    /// The slopes of measured over expected effort, and what is odd in the recordings.
-    fn slopes(&self, cell: &Cell, state_topic: &str) -> Result<Slopes, Failure> {
-        let topics = Topics {
-            state: state_topic.to_owned(),
-            command: None,
+    /// All recordings to be fitted, efforts in N m as long as the unit is not known.
+    fn request(&self) -> Result<Request, Report> {
+        let arguments = Arguments {
+            robot: Some(self.robot),
+            effort_unit: self.effort_unit.unwrap_or_default(),
+            torque_constants_nm_per_a: std::collections::BTreeMap::new(),
             twin: None,
-            tool: None,
-            learn: None,
-            commands: None,
+            twin_topic: None,
+            state_topic: self.state_topic,
+            fit: self.recordings,
+            holdout: &[],
         };
-        let twin = tauscope_twin::Config::default();
-        let fit = |recordings: &[PathBuf]| {
-            let job = Job {
-                cell,
-                topics: &topics,
-                twin: &twin,
-                fit: recordings,
-                validation: &[],
-            };
-            job.fit(&|_, _| true, &|_, _| {})
-        };
-        // Signs first: a joint that is turned in some recordings only has no slope over all of them.
-        let each = self.recordings.iter().filter_map(|recording| {
-            // What is wrong with one that cannot be fitted is found with all of them.
-            let fitted = fit(std::slice::from_ref(recording)).ok()?;
-            Some((recording.as_path(), telling(&fitted.file)))
-        });
-        if let Some(problem) = turned_in_some(&each.collect::<Vec<_>>()) {
-            return Err(Failure::Rejected(problem.into()));
-        }
-        let fitted = fit(self.recordings);
-        let fitted = fitted.map_err(|error| Failure::rejected(error.to_string()))?;
-        Ok(Slopes {
-            all: telling(&fitted.file),
-            notes: fitted.notes,
-        })
+        explain::from_arguments(&arguments, std::collections::BTreeSet::new())
     }
 
-    /// The unit and how it is known.
-    fn unit(&self, scale: &EffortScale) -> Result<(EffortUnit, String), Failure> {
+    /// The unit that the explanation begins with, and how it was chosen: motor current where joints that bear weight
+    /// measure far less than the weight requires, else N m. The explanation revises it.
+    fn unit(&self, request: &Request) -> (EffortUnit, String) {
         if let Some(unit) = self.effort_unit {
-            let fault = match unit {
-                EffortUnit::Nm => scale.fault_in_nm(),
-                EffortUnit::A => scale.fault_in_a(),
-            };
-            if let Some(fault) = fault {
-                return Err(Failure::rejected(fault.to_string()));
-            }
-            return Ok((unit, format!("Effort is in {}, as told.", words(unit))));
+            return (unit, format!("Effort is in {}, as given.", words(unit)));
         }
+        let in_nm = || {
+            let sentence = "Effort is taken to be in N m; the explanation below says if it is not.";
+            (EffortUnit::Nm, sentence.to_owned())
+        };
+        let Some(scale) = scale(request) else {
+            return in_nm();
+        };
         match scale {
-            EffortScale::Torque { slope, sure: true } => {
-                let sentence = format!(
+            EffortScale::Torque { slope, sure: true } => (
+                EffortUnit::Nm,
+                format!(
                     "Effort is in N m: the joints that bear weight measure {slope:.2} times what the robot's weight requires."
-                );
-                Ok((EffortUnit::Nm, sentence))
-            }
-            EffortScale::Current { nm_per_unit, .. } if *nm_per_unit > MOST_NM_PER_A => {
-                let problem = Problem::new(format!(
-                    "the unit of the effort cannot be told: the robot's weight requires {nm_per_unit:.0} N m for each unit, \
-                     more than any motor gives for an ampere"
-                ));
-                let help = "the masses of a URDF are in kg, not in g; efforts are in N m or A, not in kN m. Or give --effort-unit";
-                Err(Failure::Rejected(problem.help(help).into()))
-            }
+                ),
+            ),
             EffortScale::Current {
                 nm_per_unit,
                 joints,
-            } => {
+            } if nm_per_unit <= MOST_NM_PER_A => {
+                let plural = if joints == 1 { "" } else { "s" };
                 let sentence = format!(
-                    "Effort is in A, motor current: {joints} joint(s) that bear weight measure {:.3} per N m that the \
+                    "Effort is in A, motor current: {joints} joint{plural} that bear weight measure {:.3} per N m that the \
                      robot's weight requires, which is a torque constant of {nm_per_unit:.1} N m/A. If that is \
                      wrong, give --effort-unit Nm.",
                     1.0 / nm_per_unit
                 );
-                Ok((EffortUnit::A, sentence))
+                (EffortUnit::A, sentence)
             }
-            other => Err(Failure::Rejected(undecided(other).into())),
+            _ => in_nm(),
         }
     }
+}
+
+/// The slopes of measured over expected effort, of the joints whose motion explains most of their effort.
+fn scale(request: &Request) -> Option<EffortScale> {
+    let topics = Topics {
+        state: request.state_topic.clone(),
+        ..Topics::default()
+    };
+    let mut cell = request.cell.clone();
+    // A fit in A needs no torque constants, and refuses no slope.
+    cell.facts.effort_unit = EffortUnit::A;
+    let fit: Vec<PathBuf> = request.fit.iter().map(|named| named.path.clone()).collect();
+    let job = Job {
+        cell: &cell,
+        topics: &topics,
+        twin: &tauscope_twin::Config::default(),
+        fit: &fit,
+        validation: &[],
+    };
+    // Where no line can be fitted, the explanation finds out why.
+    let fitted = job.fit(&|_, _| true, &|_, _| {}).ok()?;
+    Some(EffortScale::of(&telling_slopes_of(&fitted.file)))
+}
+
+/// Holds out one of every four or less recordings, those in the middle by how far the joints move, so that neither a
+/// standing arm nor the liveliest motion is kept from the fit.
+fn hold_out(request: &mut Request, input: &mut Input) {
+    const FOR_ONE_HELD_OUT: usize = 4;
+    let joints = input.model.dof();
+    let mut sorted: Vec<(f64, String)> = input
+        .fit
+        .iter()
+        .map(|recording| (travel(recording, joints), recording.name.clone()))
+        .collect();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let count = sorted.len();
+    let held = count.div_ceil(FOR_ONE_HELD_OUT).min(count / 2);
+    let from = (count - held) / 2;
+    let is_held = |name: &str| sorted[from..from + held].iter().any(|(_, of)| of == name);
+    let (held, kept) = std::mem::take(&mut input.fit)
+        .into_iter()
+        .partition(|recording| is_held(&recording.name));
+    (input.holdout, input.fit) = (held, kept);
+    let (held, kept) = std::mem::take(&mut request.fit)
+        .into_iter()
+        .partition(|named| is_held(&named.name));
+    (request.holdout, request.fit) = (held, kept);
+}
+
+/// How far the joints move in all \[rad or m\].
+fn travel(recording: &Recording, joints: usize) -> f64 {
+    let rows: Vec<&[f64]> = recording.position.chunks_exact(joints).collect();
+    let steps = rows.windows(2).map(|pair| {
+        let joints = pair[0].iter().zip(pair[1]);
+        joints.map(|(before, after)| (after - before).abs()).sum::<f64>()
+    });
+    steps.sum()
+}
+
+/// Nothing begins on recordings from which nothing right can be learnt.
+fn refuse_faults(input: &Input) -> Result<(), Report> {
+    let mut report = Report::default();
+    for recording in &input.fit {
+        let faults = recording.findings.iter();
+        for fault in faults.filter(|finding| finding.effect() == Effect::Fault) {
+            report.push(Problem::of_file(&recording.path, fault.to_string()));
+        }
+        if recording.effort.is_empty() {
+            let title = "no joint state has an effort";
+            let help = "record the topic that has efforts, with the drives on";
+            report.push(Problem::of_file(&recording.path, title.to_owned()).help(help));
+        }
+    }
+    report.into_result(())
 }
 
 /// A sentence for each joint that follows another.
@@ -311,57 +245,6 @@ fn unlimited(cell: &Cell) -> Vec<String> {
     remarks
         .map(|remark| format!("{}.", remark.replacen("joint", "Joint", 1)))
         .collect()
-}
-
-/// How far the joints move in a recording, and what is odd about its messages.
-fn oddities(path: &Path, topic: &str) -> Result<(f64, Vec<String>), Report> {
-    let failed =
-        |error: tauscope_archive::ArchiveError| Report::from(Problem::new(error.to_string()));
-    let info = Info::read(&Recording::open(path).map_err(failed)?).map_err(failed)?;
-    let mut topics = info.topics.into_iter();
-    let joints = topics
-        .find(|info| info.topic.name == topic)
-        .and_then(|info| info.joints);
-    let joints = joints.unwrap_or_default();
-    Ok((
-        joints.joints.iter().map(|joint| joint.travel).sum(),
-        joints.row_remarks(),
-    ))
-}
-
-/// Why the recordings do not tell the unit, and what to do.
-fn undecided(scale: &EffortScale) -> Problem {
-    let give = "give --effort-unit Nm or --effort-unit A";
-    match scale {
-        EffortScale::Torque { slope, .. } => Problem::new(format!(
-            "the unit of the effort is in doubt: the joints that bear weight measure {slope:.2} times what the robot's \
-             weight requires"
-        ))
-        .help(format!(
-            "a payload, or a URDF with other masses, would do that to N m; {give}"
-        )),
-        EffortScale::TooLarge { .. } | EffortScale::Turned { .. } => {
-            let fault = scale.fault_in_nm();
-            Problem::new(fault.map_or_else(String::new, |fault| fault.to_string()))
-        }
-        EffortScale::Untold | EffortScale::Current { .. } => {
-            Problem::new("the unit of the effort cannot be told: no joint bears weight in these recordings").help(format!(
-                "{give}, or add a recording in which the arm moves through poses that its weight loads"
-            ))
-        }
-    }
-}
-
-/// Whether the first message on a topic has positions, and efforts.
-fn given(recording: &Recording, topic: &str) -> (bool, bool) {
-    let states = recording.joint_states(topic).ok();
-    let first = states.and_then(|mut states| {
-        states.next_state()?.ok().map(|state| {
-            let message = &state.message;
-            (!message.position.is_empty(), !message.effort.is_empty())
-        })
-    });
-    first.unwrap_or_default()
 }
 
 /// The unit in words.

@@ -10,21 +10,26 @@ use tauscope_pipeline::cell::{Cell, EffortUnit};
 
 use super::folder::Folder;
 use super::learn::Learnt;
-use super::look::Looked;
+
+/// The arm and its recordings as the page shows them.
+#[derive(Debug)]
+pub struct Seen<'a> {
+    /// The arm.
+    pub cell: &'a Cell,
+    /// Findings about the recordings and the robot, a sentence each.
+    pub sentences: &'a [String],
+    /// Rows and parts of recordings that could not be used.
+    pub lost: u64,
+    /// Whether the pipeline listens to the robot.
+    pub is_live: bool,
+}
 
 /// The page as Markdown: what the recordings are, what the twin leaves out, what the detector has learnt, what to
-/// record next, and how to go on. `is_live` tells that the pipeline listens to the robot, `lost` how many rows could not
-/// be used.
-pub fn page(
-    folder: &Folder,
-    looked: &Looked,
-    report: &Report,
-    learnt: &Learnt,
-    is_live: bool,
-    lost: u64,
-) -> String {
-    let mut text = format!("# {}\n", looked.cell.facts.name);
-    section(&mut text, "Recordings", &looked.sentences);
+/// record next, and how to go on.
+pub fn page(folder: &Folder, seen: &Seen<'_>, report: &Report, learnt: &Learnt) -> String {
+    let (lost, is_live) = (seen.lost, seen.is_live);
+    let mut text = format!("# {}\n", seen.cell.facts.name);
+    section(&mut text, "Recordings", seen.sentences);
     if lost > 0 {
         let page = folder.explained().join("report.html");
         let say = format!(
@@ -36,7 +41,7 @@ pub fn page(
 
     let mut twin = vec![report.summary.clone()];
     if report.verdict != Verdict::NotEvaluated {
-        twin.push(proof(report, &looked.cell));
+        twin.push(proof(report, seen.cell));
     }
     section(&mut text, "Twin", &twin);
     let findings = html::largest_first(report);

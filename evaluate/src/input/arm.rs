@@ -1,6 +1,6 @@
 //! The arm of a set: its robot, its joints, its tool.
 
-use tauscope_pipeline::cell::{Cell, ConstantSpot, ToolEntry, first_joint_names};
+use tauscope_pipeline::cell::{Cell, ConstantSpot, ToolEntry, recorded_joint_names};
 use tauscope_pipeline::files::SetFile;
 use tauscope_pipeline::report::{Problem, Report};
 use tauscope_pipeline::suggest;
@@ -54,5 +54,5 @@ fn joint_names(file: &Located<SetFile>) -> Result<Vec<String>, Report> {
         let problem = Problem::new("the set names neither a `robot` nor a recording");
         return Err(problem.into());
     };
-    first_joint_names(&file.resolve(first), &set.topics.state)
+    recorded_joint_names(&file.resolve(first), &set.topics.state)
 }

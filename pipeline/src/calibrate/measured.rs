@@ -11,7 +11,6 @@ use super::cutoff::Cutoffs;
 use super::spread::Spread;
 use super::{CalibrateError, Job};
 use crate::build;
-use crate::plausible::Plausible;
 use crate::replay::ReplayError;
 
 impl Job<'_> {
@@ -26,14 +25,9 @@ impl Job<'_> {
     ) -> Result<Vec<f64>, CalibrateError> {
         let mut noise = vec![Spread::default(); self.cell.facts.joint_names.len()];
         for recording in recordings {
-            let mut plausible = Plausible::new(self.cell);
-            self.each(
-                recording,
-                Some(file),
-                &mut plausible,
-                &mut |_| {},
-                &mut |sample| add(&mut noise, sample),
-            )?;
+            self.each(recording, Some(file), &mut |_| {}, &mut |sample| {
+                add(&mut noise, sample);
+            })?;
         }
         Ok(noise.iter().map(Spread::root_mean_square).collect())
     }
@@ -53,8 +47,7 @@ impl Job<'_> {
         let mut cutoffs = Cutoffs::new(file.filters.effort_cutoff_hz, names.len());
         for (index, recording) in recordings.iter().enumerate() {
             let step = &mut |fraction| progress(index, fraction);
-            let mut plausible = Plausible::new(self.cell);
-            self.each(recording, Some(file), &mut plausible, step, &mut |sample| {
+            self.each(recording, Some(file), step, &mut |sample| {
                 cutoffs.take(sample);
             })?;
         }
@@ -88,8 +81,7 @@ impl Job<'_> {
         let mut lost = 0;
         for (index, recording) in recordings.iter().enumerate() {
             let step = &mut |fraction| progress(index, fraction);
-            let mut plausible = Plausible::new(self.cell);
-            lost += self.each(recording, Some(file), &mut plausible, step, &mut |sample| {
+            let read = self.each(recording, Some(file), step, &mut |sample| {
                 add(&mut noise, sample);
                 for (detector, spread) in &mut detectors {
                     let judgement = detector.judge(sample);
@@ -98,6 +90,7 @@ impl Job<'_> {
                     }
                 }
             })?;
+            lost += read.lost;
         }
         for (name, spread) in names.iter().zip(&noise) {
             if let Some(joint) = file.joints.get_mut(name) {

@@ -2,33 +2,21 @@
 
 use std::path::Path;
 
-use tauscope_archive::Recording;
 use tauscope_dynamics::{Model, fix_joints};
+use tauscope_session::{Joints, Look, SessionError};
 
 use crate::report::{Problem, Report};
 use crate::suggest;
 
-/// The joints of the first message that can be read, in its order.
+/// The joints that the publishers on the topic name, in the order of their messages.
 ///
 /// # Errors
 /// If the recording cannot be read or has no joint states on the topic.
-pub fn first_joint_names(path: &Path, topic: &str) -> Result<Vec<String>, Report> {
-    let wrong = |title: String| Report::from(Problem::new(title));
-    let archive = Recording::open(path).map_err(|error| wrong(error.to_string()))?;
-    let mut states = archive
-        .joint_states(topic)
-        .map_err(|error| wrong(error.to_string()))?;
-    while let Some(state) = states.next_state() {
-        if let Ok(state) = state
-            && !state.message.name.is_empty()
-        {
-            return Ok(state.message.name.clone());
-        }
-    }
-    let path = path.display();
-    Err(wrong(format!(
-        "{path}: no message on `{topic}` names its joints"
-    )))
+pub fn recorded_joint_names(path: &Path, topic: &str) -> Result<Vec<String>, Report> {
+    let wrong = |error: SessionError| Report::from(Problem::new(error.to_string()));
+    let archive = tauscope_session::open(path).map_err(|error| wrong(error.into()))?;
+    let look = Look::at(&archive, Some(topic), Joints::default()).map_err(wrong)?;
+    Ok(look.recorded())
 }
 
 /// A robot with joints fixed that nobody records.

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use tauscope_archive::Recording;
 use tauscope_dynamics::{Joint, Model};
 use tauscope_record::{RecordError, Recorder};
 use tauscope_watch as watch;
@@ -126,6 +125,6 @@ fn rate_hz(source: &Stage) -> Option<f64> {
         return Some(controller.rate_hz);
     }
     let file = config.file.as_ref()?;
-    let recording = Recording::open(&file.path).ok()?;
+    let recording = tauscope_session::open(&file.path).ok()?;
     plausible::recorded_rate_hz(&recording, &file.topics.state).ok()?
 }

@@ -7,7 +7,9 @@ use tauscope_bus::{
     Emit, JointState, LinkError, Progress, Source, Stage, StageError, Trouble, TwinState,
 };
 
-use super::{Oddity, Plausible, PlausibleTwin};
+use tauscope_session::{Finding, Plausible};
+
+use super::PlausibleTwin;
 
 /// When the first look is taken \[ns of stream time\]; each next one after twice the time.
 /// Physical: a person who watches the start still sits there after three seconds.
@@ -86,10 +88,10 @@ impl<S: Source<JointState>> Source<JointState> for Watched<S> {
         let see = &mut |sample: &JointState| {
             plausible.add(sample);
             if told.is_time(sample.header.stamp_ns) {
-                let oddities = plausible.oddities().into_iter();
-                // A pause is told where it is noticed.
-                for oddity in oddities.filter(|it| !matches!(it, Oddity::Pause { .. })) {
-                    told.warn(stage, oddity.key(), &oddity.to_string());
+                let findings = plausible.findings().into_iter();
+                // A pause is reported where it is noticed.
+                for finding in findings.filter(|it| !matches!(it, Finding::Pause { .. })) {
+                    told.warn(stage, finding.subject(), &finding.to_string());
                 }
             }
         };

@@ -8,7 +8,9 @@ use tauscope_bus::{SampleRef, Sink, StageError};
 use super::Outcome;
 use crate::cell::Cell;
 use crate::graph::StageCounts;
-use crate::plausible::{Plausible, PlausibleTwin};
+use tauscope_session::Plausible;
+
+use crate::plausible::{self, PlausibleTwin};
 use crate::tally::{DetectionTally, TwinTally};
 
 /// What was observed.
@@ -67,7 +69,7 @@ impl Observer {
     pub fn new(cell: &Cell, plausible_twins: BTreeMap<String, PlausibleTwin>) -> Self {
         Self {
             joint_names: cell.facts.joint_names.clone(),
-            plausible: Plausible::new(cell),
+            plausible: plausible::of_cell(cell),
             plausible_twins,
             observed: Observed::default(),
         }
@@ -113,8 +115,8 @@ impl Sink for &mut Observer {
     }
 
     fn finish(&mut self) -> Result<(), StageError> {
-        let oddities = self.plausible.oddities().into_iter();
-        let mut notes: Vec<String> = oddities.map(|oddity| oddity.to_string()).collect();
+        let findings = self.plausible.findings().into_iter();
+        let mut notes: Vec<String> = findings.map(|finding| finding.to_string()).collect();
         // Twins behind one source find the same.
         for note in self
             .plausible_twins

@@ -3,23 +3,26 @@
 use std::path::Path;
 
 use tauscope_bus::{JointState, Source};
-use tauscope_ingest::{Ahead, Config, CsvConfig, FileConfig, IngestError, RecordedSource, Topics};
+use tauscope_ingest::{
+    Ahead, Config, CsvConfig, FileConfig, Findings, IngestError, RecordedSource, Topics,
+};
 
 use crate::build;
 use crate::cell::Cell;
 
-/// Opens it, not paced. Of a table the pipeline may say what its columns are; else its header does, or a file beside it.
+/// Opens it, not paced, with a handle to the findings about it. Of a table the pipeline may give the columns; else its
+/// header does, or a file next to it.
 pub(super) fn recording(
     config: &Config,
     recording: &Path,
     cell: &Cell,
     ahead: bool,
-) -> Result<Box<dyn Source<JointState>>, IngestError> {
+) -> Result<(Box<dyn Source<JointState>>, Findings), IngestError> {
     let setup = build::ingest_setup(cell);
     let ending = recording.extension();
     let is_table = ending.is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
     let path = recording.to_owned();
-    let source = match &config.csv {
+    let mut source = match &config.csv {
         Some(csv) if is_table => {
             let csv = CsvConfig {
                 path,
@@ -33,10 +36,12 @@ pub(super) fn recording(
         }
         _ => RecordedSource::open_file(&file_config(config, recording), config, &setup)?,
     };
+    let findings = source.findings();
     if !ahead {
-        return Ok(Box::new(source));
+        return Ok((Box::new(source), findings));
     }
-    Ok(Box::new(Ahead::new(source).map_err(IngestError::Thread)?))
+    let ahead = Ahead::new(source).map_err(IngestError::Thread)?;
+    Ok((Box::new(ahead), findings))
 }
 
 /// The pipeline's topics, for a recording of its robot.

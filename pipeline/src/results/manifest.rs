@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use tauscope_archive::Recording;
 
 use crate::provenance::sha256_of_file;
 use crate::report::{Problem, Report, Source};
@@ -31,7 +30,7 @@ impl Wanted {
     /// # Errors
     /// In words, if it is no recording, is empty, or cannot be read.
     pub fn of(recording: &Path, source: Option<&str>) -> Result<Self, String> {
-        let opened = Recording::open(recording).map_err(|error| error.to_string())?;
+        let opened = tauscope_session::open(recording).map_err(|error| error.to_string())?;
         let start_ns = opened.start_ns().ok_or("it holds no message")?;
         let sha256 = sha256_of_file(recording).map_err(|error| error.to_string())?;
         Ok(Self {

@@ -7,11 +7,12 @@ use std::path::{Path, PathBuf};
 use tauscope_archive::{is_there, name_of, recordings_at};
 use tauscope_dynamics::Model;
 use tauscope_pipeline::cell::{
-    Cell, CellFacts, ConstantSpot, EffortUnit, Fixed, first_joint_names, torque_constants,
+    Cell, CellFacts, ConstantSpot, EffortUnit, Fixed, torque_constants,
 };
 use tauscope_pipeline::provenance::sha256_of_file;
 use tauscope_pipeline::report::{Problem, Report};
 use tauscope_pipeline::{urdf, yaml};
+use tauscope_session::{Joints, Look, SessionError};
 use tauscope_twin::TwinFile;
 
 use super::{Named, Request, StartFile};
@@ -46,8 +47,8 @@ pub struct Assembly<'a> {
     pub twin: Option<PathBuf>,
     /// Topic of somebody else's twin.
     pub twin_topic: Option<String>,
-    /// Topic of the measured joint states.
-    pub state_topic: String,
+    /// Topic of the measured joint states; without it the one that gives efforts of most joints.
+    pub state_topic: Option<String>,
     /// Recordings that may be fitted.
     pub fit: Vec<PathBuf>,
     /// Recordings that nothing is fitted on.
@@ -73,9 +74,20 @@ impl Assembly<'_> {
         report.into_result(())?;
 
         let mut report = Report::default();
-        let (robot, fixed) = self.as_recorded(robot, &fit);
+        let known = robot.as_ref().map(|(_, model)| model).or(self.model.as_ref());
+        let known: Vec<String> = match (known, &self.joint_names) {
+            (Some(model), _) => model.joint_names().map(str::to_owned).collect(),
+            (None, Some(names)) => names.clone(),
+            (None, None) => Vec::new(),
+        };
+        let look = self.look(&known, &fit)?;
+        let (robot, fixed) = as_recorded(robot, &look.recorded());
         let (urdf, model) = robot.unzip();
-        let joint_names = self.joint_names(model.as_ref(), &fit)?;
+        let joint_names = match &model {
+            Some(model) => model.joint_names().map(str::to_owned).collect(),
+            None if known.is_empty() => look.recorded(),
+            None => known,
+        };
         let constants = self.torque_constants(&joint_names, &mut report);
         if let Some(start) = &start {
             let model = model.as_ref().or(self.model.as_ref());
@@ -100,7 +112,7 @@ impl Assembly<'_> {
             case: name,
             cell: Cell { facts, model },
             robot_path: self.robot,
-            state_topic: self.state_topic,
+            state_topic: look.topic,
             twin_topic: self.twin_topic,
             start,
             fit,
@@ -179,25 +191,20 @@ impl Assembly<'_> {
         }
     }
 
-    /// The robot without the joints that the first recording to fit does not name, and what is said of it.
-    fn as_recorded(
-        &self,
-        robot: Option<(String, Model)>,
-        fit: &[Named],
-    ) -> (Option<(String, Model)>, Option<String>) {
-        let recorded = fit
-            .first()
-            .and_then(|first| first_joint_names(&first.path, &self.state_topic).ok());
-        let (Some((urdf, model)), Some(recorded)) = (&robot, recorded) else {
-            return (robot, None);
+    /// The first look at the first recording to fit: its topic, and the joints that are recorded.
+    fn look(&self, joints: &[String], fit: &[Named]) -> Result<Look, Report> {
+        let Some(first) = fit.first() else {
+            return Err(Problem::new("there is no recording to fit").into());
         };
-        match Fixed::unrecorded(urdf, model, &recorded) {
-            Some(fixed) => {
-                let note = fixed.note();
-                (Some((fixed.urdf, fixed.model)), Some(note))
-            }
-            None => (robot, None),
-        }
+        let wrong = |error: SessionError| {
+            Report::from((self.problem)(Spot::Fit(0), error.to_string()))
+        };
+        let recording = tauscope_session::open(&first.path).map_err(|error| wrong(error.into()))?;
+        let wanted = Joints {
+            names: joints,
+            effort_limits: &[],
+        };
+        Look::at(&recording, self.state_topic.as_deref(), wanted).map_err(wrong)
     }
 
     fn start(&self, report: &mut Report) -> Option<StartFile> {
@@ -217,20 +224,6 @@ impl Assembly<'_> {
                 None
             }
         }
-    }
-
-    /// Those of the robot, of the case, or of the first recording's first message, whose order they keep.
-    fn joint_names(&self, model: Option<&Model>, fit: &[Named]) -> Result<Vec<String>, Report> {
-        if let Some(model) = model {
-            return Ok(model.joint_names().map(str::to_owned).collect());
-        }
-        if let Some(names) = &self.joint_names {
-            return Ok(names.clone());
-        }
-        let Some(first) = fit.first() else {
-            return Err(Problem::new("there is no recording to fit").into());
-        };
-        first_joint_names(&first.path, &self.state_topic)
     }
 
     fn torque_constants(&self, joints: &[String], report: &mut Report) -> Option<Vec<f64>> {
@@ -274,6 +267,23 @@ impl Assembly<'_> {
                 report.push((self.problem)(Spot::Twin, error.to_string()));
             }
         }
+    }
+}
+
+/// The robot without the joints that no recording names, and the note on that.
+fn as_recorded(
+    robot: Option<(String, Model)>,
+    recorded: &[String],
+) -> (Option<(String, Model)>, Option<String>) {
+    let fixed = robot
+        .as_ref()
+        .and_then(|(urdf, model)| Fixed::unrecorded(urdf, model, recorded));
+    match fixed {
+        Some(fixed) => {
+            let note = fixed.note();
+            (Some((fixed.urdf, fixed.model)), Some(note))
+        }
+        None => (robot, None),
     }
 }
 

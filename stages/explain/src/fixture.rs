@@ -98,6 +98,7 @@ pub fn recording(
         sample_of_row: (0..count).collect(),
         clock: None,
         losses: Losses::default(),
+        findings: Vec::new(),
     }
 }
 

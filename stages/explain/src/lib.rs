@@ -18,6 +18,6 @@ pub use explain::explain;
 pub use measure::{Measured, Number, measure};
 pub use outcome::Outcome;
 pub use read::input::Input;
-pub use read::recording::{Losses, Recording, RecordingError, RecordingTopics};
+pub use read::recording::{Losses, Recording, RecordingTopics};
 pub use read::start::Start;
 pub use report::html;

@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 use std::path::Path;
 
-use tauscope_archive::{ArchiveError, Damage, Messages, Recording, ros};
+use tauscope_archive::{ArchiveError, Damage, Messages, ros};
 use tauscope_bus::{Emit, JointArray, MAX_JOINTS, Progress, Source, StageError, TwinState, flags};
 use tauscope_dynamics::derivative::FilteredDerivative;
 
@@ -91,7 +91,7 @@ impl ArchivedTwin {
             },
         };
         let states = RecordedSource::open_file(&file, config, setup)?;
-        let recording = Recording::open(path)?;
+        let recording = tauscope_session::open(path)?;
         recording.topic_of::<ros::JointState>(&topics.residual)?;
         let derivative = FilteredDerivative::new(config.velocity_cutoff_hz);
         Ok(Self {

@@ -1,9 +1,9 @@
 //! Why a source cannot be opened, or not be read on.
 
 use tauscope_archive::ArchiveError;
+use tauscope_session::{SessionError, Unusable};
 
 use crate::config::ConfigError;
-use crate::pack::PackError;
 use crate::simulated::ScenarioError;
 
 /// Why a source cannot be opened, or not be read on.
@@ -21,8 +21,11 @@ pub enum IngestError {
         /// Where the messages came from.
         origin: String,
         /// What is wrong with them.
-        source: PackError,
+        source: Unusable,
     },
+    /// The recording gives no joint states of this cell.
+    #[error(transparent)]
+    Session(#[from] SessionError),
     /// The scenario cannot be simulated.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),

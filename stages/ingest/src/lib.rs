@@ -63,8 +63,7 @@ pub use config::{
 };
 pub use error::IngestError;
 pub use pacing::Paced;
-pub use pack::{PackCounts, PackError};
-pub use recorded::RecordedSource;
+pub use recorded::{Findings, RecordedSource};
 pub use setup::{Setup, Tool};
 pub use sources::{Entry, Opening, SOURCES, SimulatedRobot, SourceSettings, open};
 pub use ur_rtde::UrRtdeSource;

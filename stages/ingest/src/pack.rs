@@ -1,15 +1,10 @@
 //! Packing: from messages of several topics to one sample an instant. Pure: no clock, no I/O.
 //!
-//! Joints are brought into the cell's order by name, parts of a state that several publishers send
-//! are put together, a missing velocity is differentiated, and each sample takes with it the newest
-//! command, the newest effort of another twin and the tool, at or before its stamp. A sample waits a
-//! little for these, so that the result does not depend on which of two messages was faster.
+//! An [`Assembler`] makes states of all joints from the messages. A missing velocity is differentiated, and each sample
+//! takes with it the newest command, the newest effort of another twin and the tool, at or before its stamp. A sample
+//! waits a little for these, so that the result does not depend on which of two messages was faster.
 
 mod differentiate;
-mod gather;
-mod layout;
-mod order;
-mod outcome;
 mod refused;
 mod side;
 
@@ -18,15 +13,12 @@ use std::collections::VecDeque;
 use tauscope_archive::ros;
 use tauscope_bus::{Header, JointArray, JointState, MAX_JOINTS, flags};
 use tauscope_dynamics::Unwrap;
+use tauscope_session::{Assembler, Counts, Finding, Gather, Layouts, Taken, Unusable, Whole, stamp_of};
 
 use crate::config::ConfigError;
 use crate::setup::{Setup, Tool};
 use differentiate::Differentiator;
-use gather::{Gather, Gathered, stamp_of};
-use layout::Layouts;
-use order::{Next, Order};
-pub use outcome::{PackCounts, PackError};
-use refused::Told;
+use refused::Reported;
 use side::Side;
 
 /// Samples that wait for their command at most.
@@ -54,8 +46,9 @@ pub struct PackSettings {
 pub struct Packer {
     settings: PackSettings,
     joint_count: usize,
+    assembler: Assembler,
+    /// Of the side topics.
     layouts: Layouts,
-    state: Gather,
     command: Gather,
     reference: Gather,
     /// Whole turns that the driver has taken off, of measured and of commanded positions.
@@ -71,18 +64,15 @@ pub struct Packer {
     /// Commands of a recording that no sample has taken yet.
     told: VecDeque<tauscope_bus::Command>,
     pending: VecDeque<JointState>,
-    order: Order,
     flushed: bool,
-    messages: u64,
-    counts: PackCounts,
-    /// The first joint that a message names more than once.
-    twice: Option<(usize, [usize; 2])>,
-    told_refused: Told,
+    packed: u64,
+    /// Of the side topics.
+    side_counts: Counts,
+    reported: Reported,
 }
 
 #[derive(Debug, Clone, Copy)]
 enum Topic {
-    State,
     Command,
     Reference,
 }
@@ -95,11 +85,23 @@ struct Command {
 }
 
 impl Packer {
-    /// A packer for a cell.
+    /// A packer for a cell whose source is live.
     ///
     /// # Errors
     /// If a sample has no room for so many joints.
     pub fn new(setup: &Setup, settings: PackSettings) -> Result<Self, ConfigError> {
+        Self::with(setup, settings, Assembler::live)
+    }
+
+    /// A packer whose states are assembled by what `assembler` makes of the joints' names.
+    ///
+    /// # Errors
+    /// If a sample has no room for so many joints.
+    pub fn with(
+        setup: &Setup,
+        settings: PackSettings,
+        assembler: impl FnOnce(&[String]) -> Assembler,
+    ) -> Result<Self, ConfigError> {
         let joint_count = setup.joint_names.len();
         if joint_count > MAX_JOINTS {
             return Err(ConfigError::TooManyJoints {
@@ -111,8 +113,8 @@ impl Packer {
         Ok(Self {
             settings,
             joint_count,
+            assembler: assembler(&setup.joint_names),
             layouts: Layouts::new(&setup.joint_names),
-            state: Gather::new(joint_count),
             command: Gather::new(joint_count),
             reference: Gather::new(joint_count),
             turns: <[[Unwrap; MAX_JOINTS]; 2]>::default(),
@@ -125,38 +127,62 @@ impl Packer {
             learning_asked: false,
             told: VecDeque::new(),
             pending: VecDeque::new(),
-            order: Order::default(),
             flushed: false,
-            messages: 0,
-            counts: PackCounts::default(),
-            twice: None,
-            told_refused: Told::default(),
+            packed: 0,
+            side_counts: Counts::default(),
+            reported: Reported::default(),
         })
     }
 
     /// What it has counted.
-    pub fn counts(&self) -> PackCounts {
-        PackCounts {
-            parted: self.state.in_vain(),
-            ..self.counts
+    pub fn counts(&self) -> Counts {
+        let (states, sides) = (self.assembler.counts(), self.side_counts);
+        Counts {
+            packed: self.packed,
+            not_finite: states.not_finite + sides.not_finite,
+            incomplete: states.incomplete + sides.incomplete,
+            ambiguous: states.ambiguous + sides.ambiguous,
+            foreign: states.foreign + sides.foreign,
+            ..states
         }
     }
 
     /// Which of the cell's joints a message names: bit j is joint j.
     pub(crate) fn joints_of(&mut self, message: &ros::JointState) -> u32 {
-        self.layouts.of(&message.name).joints
+        self.assembler.joints_of(message)
+    }
+
+    /// Counts a state that cannot be decoded, with the reason.
+    pub fn undecodable(&mut self, reason: &str) {
+        self.assembler.undecodable(reason);
+    }
+
+    /// Findings about the messages so far.
+    pub fn findings(&self) -> Vec<Finding> {
+        let sides = [
+            (&self.command, "of the commands"),
+            (&self.reference, "of the other twin"),
+        ];
+        let sides = sides.into_iter().flat_map(|(gather, of)| {
+            let all = gather.not_finite();
+            all.map(move |(joint, values)| Finding::NotFinite {
+                joint: format!("{} ({of})", self.layouts.joint_name(joint)),
+                values,
+            })
+        });
+        self.assembler.findings().into_iter().chain(sides).collect()
     }
 
     /// Takes a measured state that was received at `received_ns`.
     pub fn state(&mut self, message: &ros::JointState, received_ns: i64) {
-        self.messages += 1;
-        let Some(whole) = self.gather(Topic::State, message, received_ns) else {
-            return;
-        };
-        if whole.has_position {
-            self.sample(&whole, received_ns);
-        } else {
-            self.counts.incomplete += 1;
+        match self.assembler.take(message, received_ns) {
+            Taken::Follows(whole) => self.sample(&whole, 0, received_ns),
+            Taken::SetBack(whole) => {
+                self.turns = Default::default();
+                self.state_velocity.reset();
+                self.sample(&whole, flags::RESET, received_ns);
+            }
+            Taken::Nothing => {}
         }
     }
 
@@ -166,10 +192,10 @@ impl Packer {
             return;
         };
         if !whole.has_position {
-            self.counts.incomplete += 1;
+            self.side_counts.incomplete += 1;
             return;
         }
-        let position = self.unwrapped(Topic::Command, &whole);
+        let position = self.unwrapped(true, &whole);
         let differentiated = self.command_velocity.update(
             whole.stamp_ns,
             &position,
@@ -191,7 +217,7 @@ impl Packer {
         if whole.has_effort {
             self.references.push(whole.stamp_ns, whole.effort);
         } else {
-            self.counts.incomplete += 1;
+            self.side_counts.incomplete += 1;
         }
     }
 
@@ -211,7 +237,7 @@ impl Packer {
             ],
         };
         if !tool.is_finite() {
-            self.counts.not_finite += 1;
+            self.side_counts.not_finite += 1;
             return;
         }
         let stamp_ns = stamp_of(&message.header, received_ns);
@@ -261,7 +287,7 @@ impl Packer {
             *sample = *front;
             self.pending.pop_front();
             self.attach(sample);
-            self.counts.packed += 1;
+            self.packed += 1;
         }
     }
 
@@ -275,40 +301,39 @@ impl Packer {
         self.flushed = true;
     }
 
-    /// Adds a message to what its topic brought; gives the state of all joints once it is whole.
+    /// Adds a message of a side topic to what it brought; gives the state of all joints once it is whole.
     fn gather(
         &mut self,
         topic: Topic,
         message: &ros::JointState,
         received_ns: i64,
-    ) -> Option<Gathered> {
+    ) -> Option<Whole> {
         let layout = self.layouts.of(&message.name);
         if layout.joints == 0 {
-            self.counts.foreign += 1;
+            self.side_counts.foreign += 1;
             return None;
         }
-        if let Some(twice) = layout.twice {
-            self.counts.ambiguous += 1;
-            self.twice.get_or_insert(twice);
+        if layout.twice.is_some() {
+            self.side_counts.ambiguous += 1;
             return None;
         }
         let gather = match topic {
-            Topic::State => &mut self.state,
             Topic::Command => &mut self.command,
             Topic::Reference => &mut self.reference,
         };
-        let whole = gather.add(layout, message, received_ns)?;
+        let times_ns = (stamp_of(&message.header, received_ns), received_ns);
+        let whole = gather.add(layout, message, times_ns, false)?;
         if !whole.is_finite(self.joint_count) {
-            self.counts.not_finite += 1;
+            self.side_counts.not_finite += 1;
             return None;
         }
         Some(whole)
     }
 
     /// Positions without the wraps of the driver.
-    fn unwrapped(&mut self, topic: Topic, whole: &Gathered) -> JointArray {
+    fn unwrapped(&mut self, is_command: bool, whole: &Whole) -> JointArray {
         let mut position = whole.position;
-        let turns = &mut self.turns[usize::from(matches!(topic, Topic::Command))];
+        let turns = &mut self.turns[usize::from(is_command)];
         for (position, turns) in position.iter_mut().zip(turns).take(self.joint_count) {
             *position = turns.next(whole.stamp_ns, *position);
         }
@@ -316,28 +341,17 @@ impl Packer {
     }
 
     /// Puts a whole state among the samples that wait.
-    fn sample(&mut self, whole: &Gathered, received_ns: i64) {
-        let mut flags = flags::EFFORT_MEASURED * u32::from(whole.has_effort)
+    fn sample(&mut self, whole: &Whole, flags: u32, received_ns: i64) {
+        let mut flags = flags
+            + flags::EFFORT_MEASURED * u32::from(whole.has_effort)
             + flags::VELOCITY_MEASURED * u32::from(whole.has_velocity);
-        match self.order.next(whole) {
-            Next::Follows => {}
-            Next::SetBack => {
-                self.counts.resets += 1;
-                self.turns = Default::default();
-                self.state_velocity.reset();
-                flags |= flags::RESET;
-            }
-            Next::Late => return self.counts.late += 1,
-            Next::Repeated => return self.counts.repeated += 1,
-            Next::Stalled => return self.counts.stalled += 1,
-        }
-        let position = self.unwrapped(Topic::State, whole);
+        let position = self.unwrapped(false, whole);
         let differentiated = self.state_velocity.update(
             whole.stamp_ns,
             &position,
             whole.has_velocity.then_some(&whole.velocity),
         );
-        if differentiated.restarted && self.counts.packed + self.pending.len() as u64 > 0 {
+        if differentiated.restarted && self.packed + self.pending.len() as u64 > 0 {
             flags |= flags::RESET;
         }
         if std::mem::take(&mut self.learning_asked) {

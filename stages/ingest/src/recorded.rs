@@ -1,14 +1,16 @@
 //! Joint states out of a recording: MCAP, a rosbag2 bag, a bag of ROS 1, a table, or an episode of a LeRobot data set.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use tauscope_archive::{ArchiveError, Damage, Messages, Recording, ros};
 use tauscope_bus::command::Request;
 use tauscope_bus::{Emit, JointState, Progress, Source, StageError};
+use tauscope_session::{Assembler, Counts, Finding, Joints, Look};
 
 use crate::config::{Config, CsvConfig, FileConfig, Topics};
 use crate::error::IngestError;
-use crate::pack::{PackCounts, PackSettings, Packer};
+use crate::pack::{PackSettings, Packer};
 use crate::setup::Setup;
 
 /// How much later in the recording a command of a sample's instant may stand \[ns of log time\].
@@ -32,6 +34,22 @@ enum Role {
     Told,
 }
 
+/// Findings about a recording, complete once its source has ended. A handle: the source may be on another thread.
+#[derive(Debug, Clone, Default)]
+pub struct Findings(Arc<Mutex<Vec<Finding>>>);
+
+impl Findings {
+    /// The findings so far.
+    pub fn get(&self) -> Vec<Finding> {
+        let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        all.clone()
+    }
+
+    fn set(&self, all: Vec<Finding>) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = all;
+    }
+}
+
 /// A source that reads a recording, once, from its beginning to its end. Memory is bounded whatever
 /// the recording's size.
 pub struct RecordedSource {
@@ -49,10 +67,11 @@ pub struct RecordedSource {
     log_times_ns: (i64, i64),
     now_ns: i64,
     ended: bool,
-    told_refused: bool,
+    findings: Findings,
+    /// Whether somebody else reports the findings.
+    reported_elsewhere: bool,
     damage: Vec<Damage>,
     undecodable: u64,
-    first_undecodable: Option<ArchiveError>,
 }
 
 impl std::fmt::Debug for RecordedSource {
@@ -75,7 +94,7 @@ impl RecordedSource {
         config: &Config,
         setup: &Setup,
     ) -> Result<Self, IngestError> {
-        let recording = Recording::open(&file.path)?;
+        let recording = tauscope_session::open(&file.path)?;
         Self::open(&recording, &file.topics, config, setup)
     }
 
@@ -84,7 +103,8 @@ impl RecordedSource {
     /// # Errors
     /// As [`RecordedSource::open_file`]; an error in the table comes with its line.
     pub fn open_csv(csv: &CsvConfig, config: &Config, setup: &Setup) -> Result<Self, IngestError> {
-        let recording = Recording::open_csv(&csv.path, &csv.columns, &setup.joint_names)?;
+        let recording =
+            tauscope_session::open_table(&csv.path, &csv.columns, &setup.joint_names)?;
         let topics = Topics::default();
         Self::open(&recording, &topics, config, setup)
     }
@@ -95,7 +115,12 @@ impl RecordedSource {
         config: &Config,
         setup: &Setup,
     ) -> Result<Self, IngestError> {
-        recording.check_comparable(&setup.joint_names)?;
+        let (roles, wanted) = roles(recording, topics)?;
+        let joints = Joints {
+            names: &setup.joint_names,
+            effort_limits: &setup.effort_limits,
+        };
+        let look = Look::at(recording, Some(&topics.state), joints)?;
         let named = |topic: &Option<String>| topic.is_some();
         let settings = PackSettings {
             velocity_cutoff_hz: config.velocity_cutoff_hz,
@@ -104,7 +129,6 @@ impl RecordedSource {
             expects_command: named(&topics.command),
             expects_reference: named(&topics.twin),
         };
-        let (roles, wanted) = roles(recording, topics)?;
         let log_times_ns = (
             recording.start_ns().unwrap_or(0),
             recording.end_ns().unwrap_or(0),
@@ -113,7 +137,7 @@ impl RecordedSource {
             path: recording.path().to_owned(),
             messages: recording.messages(&wanted)?,
             roles,
-            packer: Packer::new(setup, settings)?,
+            packer: Packer::with(setup, settings, |_| Assembler::of(&look))?,
             first: None,
             message: ros::JointState::default(),
             decoder: ros::JointStateDecoder::default(),
@@ -123,10 +147,10 @@ impl RecordedSource {
             log_times_ns,
             now_ns: log_times_ns.0,
             ended: false,
-            told_refused: false,
+            findings: Findings::default(),
+            reported_elsewhere: false,
             damage: recording.damage().to_vec(),
             undecodable: 0,
-            first_undecodable: None,
         };
         for damage in &source.damage {
             tracing::warn!("{damage}");
@@ -135,9 +159,6 @@ impl RecordedSource {
         while source.first.is_none() {
             source.first = source.next_sample(usize::MAX)?;
             if source.ended && source.first.is_none() {
-                if let Some(error) = source.first_undecodable.take() {
-                    return Err(error.into());
-                }
                 source.packer.verdict().map_err(|error| IngestError::Pack {
                     origin: source.path.display().to_string(),
                     source: error,
@@ -152,8 +173,14 @@ impl RecordedSource {
         &self.path
     }
 
+    /// A handle to the findings, for who reports them. Without it they are logged at the end.
+    pub fn findings(&mut self) -> Findings {
+        self.reported_elsewhere = true;
+        self.findings.clone()
+    }
+
     /// What it has counted.
-    pub fn counts(&self) -> PackCounts {
+    pub fn counts(&self) -> Counts {
         self.packer.counts()
     }
 
@@ -203,6 +230,7 @@ impl RecordedSource {
             None => {
                 self.ended = true;
                 self.packer.flush();
+                self.findings.set(self.packer.findings());
                 return Ok(());
             }
             Some(Err(ArchiveError::Damaged(damage))) => {
@@ -225,9 +253,10 @@ impl RecordedSource {
         };
         if let Err(error) = decoded {
             self.undecodable += 1;
-            if self.first_undecodable.is_none() {
-                tracing::warn!("{error}; further ones are only counted");
-                self.first_undecodable = Some(error);
+            let reason = error.reason();
+            match role {
+                Some(Role::State) => self.packer.undecodable(&reason),
+                _ => tracing::warn!("{error}"),
             }
             return Ok(());
         }
@@ -244,12 +273,13 @@ impl RecordedSource {
         Ok(())
     }
 
-    /// Says what could not be used, once all has been read.
-    fn tell_refused(&mut self) {
-        if let Some(refused) = self.packer.refused().filter(|_| !self.told_refused) {
-            tracing::warn!("{}: {refused}", self.path.display());
+    /// Logs the findings, once all has been read.
+    fn log_findings(&mut self) {
+        if !std::mem::replace(&mut self.reported_elsewhere, true) {
+            for finding in self.findings.get() {
+                tracing::warn!("{}: {finding}", self.path.display());
+            }
         }
-        self.told_refused = true;
     }
 
     /// The commands of a message of an archive. What is none of ours is told of and left alone.
@@ -316,7 +346,7 @@ impl Source<JointState> for RecordedSource {
                 if !self.ended {
                     return Ok(Progress::More);
                 }
-                self.tell_refused();
+                self.log_findings();
                 return Ok(Progress::End);
             }
             let packer = &mut self.packer;

@@ -7,6 +7,8 @@ pub struct Setup {
     pub cell: String,
     /// The joints, in URDF order.
     pub joint_names: Vec<String>,
+    /// By joint, the effort limit of the robot file \[N m or N\]; empty where there is no robot file.
+    pub effort_limits: Vec<Option<f64>>,
     /// The tool that is attached, as far as no topic says otherwise.
     pub tool: Option<Tool>,
     /// Whether it is known which link carries a tool.

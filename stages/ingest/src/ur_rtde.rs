@@ -16,9 +16,11 @@ use std::time::Duration;
 use tauscope_archive::ros;
 use tauscope_bus::{Emit, JointState, Progress, Source, StageError, Trouble};
 
+use tauscope_session::Counts;
+
 use crate::config::{Config, ConfigError, UrRtdeConfig};
 use crate::error::IngestError;
-use crate::pack::{PackCounts, PackSettings, Packer};
+use crate::pack::{PackSettings, Packer};
 use crate::setup::Setup;
 use clock::Clock;
 use connection::{Data, Shared, now_ns};
@@ -90,7 +92,7 @@ impl UrRtdeSource {
     }
 
     /// What it has counted in packing.
-    pub fn pack_counts(&self) -> PackCounts {
+    pub fn pack_counts(&self) -> Counts {
         self.packer.counts()
     }
 

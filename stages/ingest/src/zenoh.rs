@@ -21,11 +21,12 @@ use std::time::{Duration, SystemTime};
 
 use tauscope_archive::ros::{self, Message};
 use tauscope_bus::{Emit, JointState, Progress, Source, StageError, Trouble, flags, zenoh_reason};
+use tauscope_session::Counts;
 use zenoh::{Session, Wait};
 
 use crate::config::{Config, ConfigError, ZenohConfig};
 use crate::error::IngestError;
-use crate::pack::{PackCounts, PackSettings, Packer};
+use crate::pack::{PackSettings, Packer};
 use crate::queue::Queue;
 use crate::setup::Setup;
 use attachment::{Attachment, Losses};
@@ -171,7 +172,7 @@ impl ZenohSource {
     }
 
     /// What it has counted in packing.
-    pub fn pack_counts(&self) -> PackCounts {
+    pub fn pack_counts(&self) -> Counts {
         self.packer.counts()
     }
 

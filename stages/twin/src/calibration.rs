@@ -137,6 +137,18 @@ impl Calibration {
     }
 }
 
+/// The slopes in a twin file of the joints whose line explains most of the measured effort.
+pub fn telling_slopes_of(file: &TwinFile) -> Vec<Slope> {
+    let joints = file.joints.iter();
+    let telling = joints.filter(|(_, joint)| joint.explained.unwrap_or(0.0) >= effort_scale::TELLING);
+    telling
+        .map(|(name, joint)| Slope {
+            joint: name.clone(),
+            slope: joint.gain,
+        })
+        .collect()
+}
+
 /// The slopes that tell the unit of the effort: those of joints whose line explains most of it. `fits` are by
 /// joint in the order of `names`.
 pub fn telling_slopes(names: &[String], fits: &[JointFit]) -> Vec<Slope> {

@@ -309,6 +309,7 @@ mod tests {
             reference: Vec::new(),
             sample_of_row: (0..100).collect(),
             clock: None,
+            findings: Vec::new(),
             losses: Losses::default(),
         };
         let mut track = Track {

@@ -101,38 +101,31 @@ fn moving_s(recordings: &[Recording], joint: usize, n: usize) -> f64 {
     sum
 }
 
-/// One sentence per recording that lost rows or messages on reading, and one where its stamps were put on an even clock.
+/// What is odd or wrong about each recording, a sentence each: the findings on reading, the parts that could not be used,
+/// and the clock that stamps were put on.
 pub fn losses(input: &Input) -> Vec<String> {
     let mut notes = Vec::new();
     for recording in input.fit.iter().chain(&input.holdout) {
+        let name = &recording.name;
+        let findings = recording.findings.iter();
+        notes.extend(findings.map(|finding| format!("{name}: {finding}.")));
         let losses = &recording.losses;
-        let mut parts = Vec::new();
-        let mut add = |count: u64, what: &str| {
-            if count > 0 {
-                parts.push(format!("{count} {what}"));
-            }
-        };
-        add(losses.repeated, "rows repeat a stamp");
-        add(losses.not_finite, "rows are not finite and were dropped");
-        add(
-            losses.backward,
-            "rows run backwards in time and were dropped",
-        );
-        add(losses.incomplete, "rows lack a joint and were dropped");
-        add(
-            losses.unmeasured,
-            "rows hold no effort, or plain zeros at all joints, and were dropped: another publisher, or drives that were off",
-        );
-        add(losses.unreadable, "messages could not be read");
-        add(
-            losses.damaged,
-            "parts of the file cannot be read, e.g. a torn tail",
-        );
-        if let Some(clock) = &recording.clock {
-            notes.push(clock.note(&recording.name));
+        let counted = [
+            (losses.repeated, "rows repeat a stamp and its values"),
+            (
+                losses.unmeasured,
+                "rows hold no effort, or zeros at all joints, and are not used: another publisher, or drives that were off",
+            ),
+            (
+                losses.damaged,
+                "parts of the file cannot be read, e.g. a torn tail",
+            ),
+        ];
+        for (count, what) in counted.into_iter().filter(|(count, _)| *count > 0) {
+            notes.push(format!("{name}: {count} {what}."));
         }
-        if !parts.is_empty() {
-            notes.push(format!("{}: {}.", recording.name, parts.join(", ")));
+        if let Some(clock) = &recording.clock {
+            notes.push(clock.note(name));
         }
     }
     notes

@@ -7,8 +7,9 @@ mod reference;
 
 use std::path::{Path, PathBuf};
 
-use tauscope_archive::{ArchiveError, Recording as Archive, name_of};
+use tauscope_archive::{ArchiveError, name_of};
 use tauscope_dynamics::Unwrap;
+use tauscope_session::{Assembler, Finding, Joints, Look, Plausible, SessionError, Taken, Whole};
 
 pub use even_clock::EvenClock;
 pub use losses::Losses;
@@ -46,42 +47,8 @@ pub struct Recording {
     pub clock: Option<EvenClock>,
     /// What was dropped on reading.
     pub losses: Losses,
-}
-
-/// Why a recording cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum RecordingError {
-    /// It cannot be read.
-    #[error(transparent)]
-    Archive(#[from] ArchiveError),
-    /// A joint of the robot is not in it.
-    #[error("{path}: joint `{joint}` is not in it; it has: {known}", path = path.display())]
-    MissingJoint {
-        /// The recording.
-        path: PathBuf,
-        /// The robot's joint.
-        joint: String,
-        /// The recording's joints.
-        known: String,
-    },
-    /// A joint's effort or position is never a number.
-    #[error("{path}: {what} of joint `{joint}` is NaN throughout", path = path.display())]
-    AlwaysNan {
-        /// The recording.
-        path: PathBuf,
-        /// `position` or `effort`.
-        what: &'static str,
-        /// The joint.
-        joint: String,
-    },
-    /// Nothing usable is left.
-    #[error("{path}: no usable joint states on `{topic}`", path = path.display())]
-    Empty {
-        /// The recording.
-        path: PathBuf,
-        /// The topic.
-        topic: String,
-    },
+    /// What is odd or wrong about it.
+    pub findings: Vec<Finding>,
 }
 
 /// Topics to read.
@@ -96,43 +63,18 @@ pub struct RecordingTopics {
 }
 
 impl Recording {
-    /// Reads a recording, joints put in the order of `joint_names`.
+    /// Reads a recording, joints put in the order of `joints`.
     ///
     /// # Errors
     /// If it cannot be read, lacks a joint or holds nothing usable.
     pub fn read(
         path: &Path,
         topics: &RecordingTopics,
-        joint_names: &[String],
-    ) -> Result<Self, RecordingError> {
-        let archive = Archive::open_comparable(path, joint_names)?;
-        let name = name_of(path);
-        let mut reader = Reader {
-            recording: Self {
-                name,
-                path: path.to_owned(),
-                start_ns: 0,
-                time_s: Vec::new(),
-                position: Vec::new(),
-                velocity: Vec::new(),
-                effort: Vec::new(),
-                reference: Vec::new(),
-                sample_of_row: Vec::new(),
-                clock: None,
-                losses: Losses::default(),
-            },
-            joint_names,
-            order: Vec::new(),
-            names: Vec::new(),
-            known: String::new(),
-            finite_position: vec![false; joint_names.len()],
-            finite_effort: vec![false; joint_names.len()],
-            last_ns: None,
-            turns: vec![Unwrap::default(); joint_names.len()],
-            has_velocity: true,
-            has_effort: false,
-            measured: Vec::new(),
-        };
+        joints: Joints<'_>,
+    ) -> Result<Self, SessionError> {
+        let archive = tauscope_session::open(path)?;
+        let look = Look::at(&archive, Some(&topics.state), joints)?;
+        let mut reader = Reader::new(path, &look);
         // What is known on opening, and what is found on the way.
         let mut damage = archive.damage().to_vec();
         let mut states = archive.joint_states(&topics.state)?;
@@ -140,20 +82,23 @@ impl Recording {
             && let Some(state) = states.next_state()
         {
             match state {
-                Ok(stamped) => reader.take(stamped.message),
+                Ok(state) => reader.take(state.message, state.log_time_ns),
                 Err(ArchiveError::Damaged(part)) => {
                     if !damage.contains(&part) {
                         damage.push(part);
                     }
                 }
-                Err(_) => reader.recording.losses.unreadable += 1,
+                Err(error) => {
+                    reader.assembler.undecodable(&error.reason());
+                    reader.recording.losses.unreadable += 1;
+                }
             }
         }
         let lost = damage.iter().filter(|part| part.loses_data());
         reader.recording.losses.damaged = lost.count() as u64;
-        let mut recording = reader.finish(&topics.state)?;
+        let mut recording = reader.finish(archive.remarks())?;
         match &topics.reference {
-            Some(topic) => recording.read_reference(&archive, topic, joint_names)?,
+            Some(topic) => recording.read_reference(&archive, topic, joints.names)?,
             None => recording.put_on_even_clock(),
         }
         Ok(recording)
@@ -175,166 +120,107 @@ impl Recording {
     }
 }
 
-/// Where each of `wanted` stands in `names`; the first that is not there otherwise.
-fn indices(names: &[String], wanted: &[String]) -> Result<Vec<usize>, String> {
-    let find = |joint: &String| {
-        let at = names.iter().position(|name| name == joint);
-        at.ok_or_else(|| joint.clone())
-    };
-    wanted.iter().map(find).collect()
-}
-
-struct Reader<'a> {
+struct Reader {
     recording: Recording,
-    joint_names: &'a [String],
-    /// Where each of the robot's joints stands in the message.
-    order: Vec<usize>,
-    /// Names of the message that `order` holds for.
-    names: Vec<String>,
-    known: String,
-    finite_position: Vec<bool>,
-    finite_effort: Vec<bool>,
-    last_ns: Option<i64>,
+    assembler: Assembler,
+    plausible: Plausible,
+    joint_count: usize,
     /// By joint, whole turns that the driver has taken off.
     turns: Vec<Unwrap>,
     has_velocity: bool,
-    has_effort: bool,
-    /// By sample, whether some effort is not zero.
+    /// By sample, whether its efforts are a measurement.
     measured: Vec<bool>,
+    has_effort: bool,
 }
 
-impl Reader<'_> {
-    fn take(&mut self, message: &tauscope_archive::ros::JointState) {
+impl Reader {
+    fn new(path: &Path, look: &Look) -> Self {
+        let joint_count = look.joint_names.len();
+        Self {
+            recording: Recording {
+                name: name_of(path),
+                path: path.to_owned(),
+                start_ns: 0,
+                time_s: Vec::new(),
+                position: Vec::new(),
+                velocity: Vec::new(),
+                effort: Vec::new(),
+                reference: Vec::new(),
+                sample_of_row: Vec::new(),
+                clock: None,
+                losses: Losses::default(),
+                findings: Vec::new(),
+            },
+            // A fit needs time to advance.
+            assembler: Assembler::of(look).refusing_set_back(),
+            plausible: Plausible::new(&look.joint_names, None),
+            joint_count,
+            turns: vec![Unwrap::default(); joint_count],
+            has_velocity: true,
+            measured: Vec::new(),
+            has_effort: false,
+        }
+    }
+
+    fn take(&mut self, message: &tauscope_archive::ros::JointState, received_ns: i64) {
+        match self.assembler.take(message, received_ns) {
+            Taken::Follows(whole) | Taken::SetBack(whole) => self.push(&whole),
+            Taken::Nothing => {}
+        }
+        // A row that is left out is answered by the sample before it.
+        let newest = self.recording.time_s.len().saturating_sub(1);
+        self.recording.sample_of_row.push(newest);
+    }
+
+    fn push(&mut self, whole: &Whole) {
         let recording = &mut self.recording;
-        if self.order.is_empty() || message.name != self.names {
-            self.known = message.name.join(", ");
-            let Ok(order) = indices(&message.name, self.joint_names) else {
-                // What names none of the joints tells of another device, such as a gripper.
-                let is_own = |name| self.joint_names.contains(name);
-                recording.losses.incomplete += u64::from(message.name.iter().any(is_own));
-                self.skip_row();
-                return;
-            };
-            self.order = order;
-            self.names.clone_from(&message.name);
-        }
-        let stamp_ns = message.header.stamp.ns();
-        let count = message.name.len();
-        if message.position.len() != count {
-            recording.losses.incomplete += 1;
-            self.skip_row();
-            return;
-        }
-        if let Some(last_ns) = self.last_ns {
-            if stamp_ns < last_ns {
-                recording.losses.backward += 1;
-                self.skip_row();
-                return;
-            }
-            if stamp_ns == last_ns {
-                recording.losses.repeated += 1;
-                self.skip_row();
-                return;
-            }
-        }
-        let effort = (message.effort.len() == count).then_some(&message.effort);
-        self.has_effort |= effort.is_some();
-        let velocity = (message.velocity.len() == count).then_some(&message.velocity);
-        let mut finite = true;
-        for (j, &at) in self.order.iter().enumerate() {
-            let position = message.position[at].is_finite();
-            self.finite_position[j] |= position;
-            finite &= position;
-            if let Some(effort) = effort {
-                self.finite_effort[j] |= effort[at].is_finite();
-                finite &= effort[at].is_finite();
-            }
-        }
-        if !finite {
-            recording.losses.not_finite += 1;
-            self.skip_row();
-            return;
-        }
         if recording.time_s.is_empty() {
-            recording.start_ns = stamp_ns;
+            recording.start_ns = whole.stamp_ns;
         }
-        self.last_ns = Some(stamp_ns);
-        recording
-            .time_s
-            .push((stamp_ns - recording.start_ns) as f64 * 1e-9);
-        recording.sample_of_row.push(recording.time_s.len() - 1);
-        for (turns, &at) in self.turns.iter_mut().zip(&self.order) {
-            recording
-                .position
-                .push(turns.next(stamp_ns, message.position[at]));
+        let since_ns = whole.stamp_ns - recording.start_ns;
+        recording.time_s.push(since_ns as f64 * 1e-9);
+        let n = self.joint_count;
+        for (turns, position) in self.turns.iter_mut().zip(&whole.position[..n]) {
+            let position = turns.next(whole.stamp_ns, *position);
+            recording.position.push(position);
         }
-        match velocity {
-            Some(velocity) if self.has_velocity => {
-                let own = self.order.iter().map(|&at| velocity[at]);
-                recording.velocity.extend(own);
-            }
-            _ => self.has_velocity = false,
+        self.has_velocity &= whole.has_velocity;
+        if self.has_velocity {
+            recording.velocity.extend_from_slice(&whole.velocity[..n]);
         }
-        let first = recording.effort.len();
-        let of = |at: &usize| effort.map_or(0.0, |effort| effort[*at]);
-        recording.effort.extend(self.order.iter().map(of));
-        let is_measured = recording.effort[first..]
-            .iter()
-            .any(|effort| *effort != 0.0);
-        self.measured.push(is_measured);
+        let efforts = &whole.effort[..n];
+        recording.effort.extend_from_slice(efforts);
+        self.has_effort |= whole.has_effort;
+        let are_zeros = n >= LEAST_JOINTS && efforts.iter().all(|effort| *effort == 0.0);
+        self.measured.push(whole.has_effort && !are_zeros);
+        self.plausible.add_whole(whole, n);
     }
 
-    /// A row that is left out is answered by the sample before it.
-    fn skip_row(&mut self) {
-        let last = self.recording.time_s.len().saturating_sub(1);
-        self.recording.sample_of_row.push(last);
-    }
-
-    fn finish(mut self, topic: &str) -> Result<Recording, RecordingError> {
-        let path = || self.recording.path.clone();
-        if self.order.is_empty() && !self.known.is_empty() {
-            let joint = self
-                .joint_names
-                .iter()
-                .find(|joint| !self.known.split(", ").any(|name| name == joint.as_str()));
-            return Err(RecordingError::MissingJoint {
-                path: path(),
-                joint: joint.cloned().unwrap_or_default(),
-                known: self.known.clone(),
-            });
-        }
-        if self.recording.losses.not_finite > 0 {
-            let nan = |what, seen: &[bool]| {
-                let joint = seen.iter().position(|seen| !seen)?;
-                Some(RecordingError::AlwaysNan {
-                    path: path(),
-                    what,
-                    joint: self.joint_names[joint].clone(),
-                })
-            };
-            if let Some(error) = nan("the position", &self.finite_position) {
-                return Err(error);
-            }
-            if let Some(error) = nan("the effort", &self.finite_effort)
-                && self.has_effort
-            {
-                return Err(error);
-            }
-        }
+    fn finish(mut self, remarks: &[String]) -> Result<Recording, SessionError> {
+        let counts = self.assembler.counts();
+        let losses = &mut self.recording.losses;
+        losses.refused = counts.dropped();
+        losses.repeated = counts.repeated;
         if self.recording.time_s.len() < 2 {
-            return Err(RecordingError::Empty {
-                path: path(),
-                topic: topic.to_owned(),
+            return Err(SessionError::Unusable {
+                path: self.recording.path,
+                why: self.assembler.unusable(),
             });
         }
+        let remarks = remarks.iter().cloned();
+        let mut findings: Vec<Finding> =
+            remarks.map(|remark| Finding::Format { remark }).collect();
+        findings.extend(self.assembler.findings());
+        findings.extend(self.plausible.findings());
+        self.recording.findings = findings;
         if !self.has_velocity {
             self.recording.velocity.clear();
         }
+        let unmeasured = self.measured.iter().filter(|is| !**is).count();
         if !self.has_effort {
             self.recording.effort.clear();
-        } else if self.joint_names.len() >= LEAST_JOINTS
-            && self.measured.contains(&true)
-            && self.measured.iter().filter(|is| !**is).count() >= LEAST_ROWS
+        } else if self.measured.contains(&true)
+            && (unmeasured >= LEAST_ROWS || counts.unmeasured > 0)
         {
             self.recording.keep_measured(&self.measured);
         }

@@ -1,28 +1,28 @@
-//! What is said of messages that were refused: which joint, which field, how many and from when on.
+//! Reports of messages that were refused.
 
-use tauscope_archive::{NotFinite, Twice};
+use tauscope_archive::Twice;
+use tauscope_session::{Effect, Finding, Gather, Unusable};
 
-use super::gather::Gather;
-use super::{PackError, Packer};
+use super::Packer;
 
-/// Joints and fields that are listed.
+/// Findings that are listed in one report.
 /// Resolution: length of the message.
 const LISTED: usize = 6;
-/// A live source that goes on to refuse says so again after this time \[ns\].
+/// Interval of the reports of a live source that goes on to refuse \[ns\].
 /// Resolution: what a person reads.
-const TOLD_EVERY_NS: i64 = 60_000_000_000;
+const INTERVAL_NS: i64 = 60_000_000_000;
 
-/// When it was told, and how much there was then.
+/// Time of the newest report, and the number of refused values and messages by then.
 #[derive(Debug, Default)]
-pub(super) struct Told {
+pub(super) struct Reported {
     count: u64,
     stamp_ns: Option<i64>,
 }
 
-impl Told {
-    /// Whether a live source has something to say: `count` values or messages were refused by now.
-    pub fn is_due(&mut self, count: u64, now_ns: i64) -> bool {
-        let lately = (self.stamp_ns).is_some_and(|told_ns| now_ns - told_ns < TOLD_EVERY_NS);
+impl Reported {
+    /// Whether a live source has something to report: `count` values or messages were refused by now.
+    fn is_due(&mut self, count: u64, now_ns: i64) -> bool {
+        let lately = (self.stamp_ns).is_some_and(|before_ns| now_ns - before_ns < INTERVAL_NS);
         if count == self.count || lately {
             return false;
         }
@@ -32,96 +32,49 @@ impl Told {
     }
 }
 
-/// The sentence, if there is anything to say; `not_finite` are the joint's name, what is wrong with it and behind it
-/// which messages are meant.
-fn sentence<'a>(
-    twice: Option<&Twice>,
-    not_finite: impl Iterator<Item = (&'a str, NotFinite, &'static str)>,
-) -> Option<String> {
-    let bad = not_finite.map(|(joint, bad, of)| format!("{}{of}", bad.in_words(joint)));
-    let mut all: Vec<String> = twice
-        .map(ToString::to_string)
-        .into_iter()
-        .chain(bad)
-        .collect();
-    let more = all.len().saturating_sub(LISTED);
-    all.truncate(LISTED);
-    if more > 0 {
-        all.push(format!("the same of {more} more fields"));
-    }
-    let all = all.join("; ");
-    (!all.is_empty()).then(|| format!("{all}: refused, and counted as dropped"))
-}
-
 impl Packer {
     /// The first joint, and its field, that came in the states and was never finite.
     pub fn never_finite(&self) -> Option<(String, &'static str)> {
-        let (joint, field) = self.state.never_finite()?;
-        Some((self.layouts.joint_name(joint).to_owned(), field))
+        self.assembler.never_finite()
     }
 
     /// The joint that messages name more than once, if they do.
     pub fn twice(&self) -> Option<Twice> {
-        self.twice.map(|(joint, places)| Twice {
-            joint: self.layouts.joint_name(joint).to_owned(),
-            entries: places.map(|place| place + 1),
-            messages: self.counts.ambiguous,
-        })
+        self.assembler.twice()
     }
 
-    /// What was refused, in a sentence: of which joint and field, how often and from when on. Seconds count from the
-    /// first message on.
+    /// Findings about what was refused, in one sentence.
     pub fn refused(&self) -> Option<String> {
-        let topics = [
-            (&self.state, ""),
-            (&self.command, " (of the commands)"),
-            (&self.reference, " (of the other twin)"),
-        ];
-        let bad = topics.into_iter().flat_map(|(gather, of)| {
-            let all = gather.not_finite();
-            all.map(move |(joint, bad)| (self.layouts.joint_name(joint), bad, of))
+        let refused = self.findings().into_iter().filter(|finding| {
+            finding.effect() >= Effect::Loss || matches!(finding, Finding::Dropouts { .. })
         });
-        sentence(self.twice().as_ref(), bad)
+        let mut all: Vec<String> = refused.map(|finding| finding.to_string()).collect();
+        let more = all.len().saturating_sub(LISTED);
+        all.truncate(LISTED);
+        if more > 0 {
+            all.push(format!("{more} more findings of this kind"));
+        }
+        (!all.is_empty()).then(|| all.join("; "))
     }
 
-    /// The same for a live source, which says it once something is refused and while that goes on now and then.
+    /// The same for a live source, which reports once something is refused, and again at intervals while that goes on.
     pub fn newly_refused(&mut self, now_ns: i64) -> Option<String> {
-        let gathers = [&self.state, &self.command, &self.reference];
-        let bad: u64 = gathers.map(Gather::bad).iter().sum();
-        let count = bad + self.counts.ambiguous;
-        if self.told_refused.is_due(count, now_ns) {
+        let sides: u64 = [&self.command, &self.reference].map(Gather::bad).iter().sum();
+        let count = self.assembler.refused() + sides;
+        if self.reported.is_due(count, now_ns) {
             return self.refused();
         }
         None
     }
 
-    /// Says, after the last message, why there was no sample if there was none.
+    /// Reports, after the last message, why there was no sample if there was none.
     ///
     /// # Errors
     /// What kept every message from becoming a sample.
-    pub fn verdict(&self) -> Result<(), PackError> {
-        if self.counts.packed > 0 || !self.pending.is_empty() {
+    pub fn verdict(&self) -> Result<(), Unusable> {
+        if self.packed > 0 || !self.pending.is_empty() {
             return Ok(());
         }
-        let messages = self.messages;
-        if let Some((joint, field)) = self.never_finite() {
-            return Err(PackError::NotFiniteThroughout {
-                joint,
-                field,
-                messages,
-            });
-        }
-        if let Some(twice) = self.twice() {
-            return Err(PackError::NamedTwice(twice));
-        }
-        let missing = self.layouts.never_named();
-        if messages > 0 && !missing.is_empty() {
-            let found = self.layouts.names_found();
-            return Err(PackError::JointsMissing { missing, found });
-        }
-        if messages > 0 && self.counts.incomplete == messages {
-            return Err(PackError::NoPositions { messages });
-        }
-        Err(PackError::NoSample { messages })
+        Err(self.assembler.unusable())
     }
 }

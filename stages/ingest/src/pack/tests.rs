@@ -9,6 +9,7 @@ fn setup() -> Setup {
     Setup {
         cell: "demo".to_owned(),
         joint_names: ["a", "b", "c"].map(str::to_owned).to_vec(),
+        effort_limits: Vec::new(),
         tool: None,
         has_tool_link: false,
     }

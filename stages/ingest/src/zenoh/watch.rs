@@ -3,12 +3,13 @@
 use std::time::{Duration, Instant};
 
 use tauscope_bus::{JointState, Trouble, flags};
+use tauscope_session::Counts;
 use zenoh::Session;
 
 use super::diagnosis::{Expected, Fed, diagnose};
 use super::frozen::Frozen;
 use super::scout::Scout;
-use crate::pack::{PackCounts, Packer};
+use crate::pack::Packer;
 
 /// A source that gave nothing for so long is looked after; what is wrong is known a look later.
 const SILENT_AFTER: Duration = Duration::from_secs(1);
@@ -22,7 +23,7 @@ pub(super) struct Watch {
     scout: Scout,
     fed: Fed,
     /// What packing had counted at the newest sample.
-    packed: PackCounts,
+    packed: Counts,
     first_sample: Option<Instant>,
     /// When a sample last had efforts.
     effort_at: Option<Instant>,
@@ -36,7 +37,7 @@ impl Watch {
             scout: Scout::new(&expected.connect),
             expected,
             fed: Fed::default(),
-            packed: PackCounts::default(),
+            packed: Counts::default(),
             first_sample: None,
             effort_at: None,
             frozen: Frozen::default(),
@@ -58,7 +59,7 @@ impl Watch {
     }
 
     /// A sample goes out.
-    pub fn sample(&mut self, sample: &JointState, packed: PackCounts) {
+    pub fn sample(&mut self, sample: &JointState, packed: Counts) {
         let now = Instant::now();
         if sample.header.has(flags::EFFORT_MEASURED) {
             self.effort_at = Some(now);
@@ -134,6 +135,6 @@ impl Watch {
 }
 
 /// States whose stamps do not advance.
-fn stale(counts: PackCounts) -> u64 {
+fn stale(counts: Counts) -> u64 {
     counts.late + counts.repeated + counts.stalled
 }

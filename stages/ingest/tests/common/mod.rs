@@ -37,6 +37,7 @@ pub fn cell(joints: &str) -> Setup {
     Setup {
         cell: "demo".to_owned(),
         joint_names: joints.split_whitespace().map(str::to_owned).collect(),
+        effort_limits: Vec::new(),
         tool: None,
         has_tool_link: false,
     }

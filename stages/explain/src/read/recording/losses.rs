@@ -2,20 +2,16 @@
 
 use super::Recording;
 
-/// What was left out on reading.
+/// Messages and rows that were left out on reading.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Losses {
-    /// Rows whose numbers are not finite.
-    pub not_finite: u64,
-    /// Rows that repeat the stamp of the row before.
+    /// Messages and states that were refused; the findings name the reasons.
+    pub refused: u64,
+    /// Rows that repeat the stamp and the values of the row before.
     pub repeated: u64,
-    /// Rows whose stamp lies before that of the row before.
-    pub backward: u64,
-    /// Rows in which a joint of the robot is missing.
-    pub incomplete: u64,
-    /// Rows without efforts, or with plain zeros at all joints, among others that have some.
+    /// Rows whose efforts are no measurement, among others whose efforts are.
     pub unmeasured: u64,
-    /// Messages that could not be read.
+    /// Messages that could not be decoded.
     pub unreadable: u64,
     /// Parts of the file that cannot be read, e.g. a torn tail.
     pub damaged: u64,
@@ -24,12 +20,7 @@ pub struct Losses {
 impl Losses {
     /// Rows of data that are lost, repeats not counted.
     pub fn lost(&self) -> u64 {
-        self.not_finite
-            + self.backward
-            + self.incomplete
-            + self.unmeasured
-            + self.unreadable
-            + self.damaged
+        self.refused + self.unmeasured + self.unreadable + self.damaged
     }
 }
 

@@ -1,8 +1,9 @@
 //! Another twin's effort at the instants of a recording.
 
 use tauscope_archive::Recording as Archive;
+use tauscope_session::{Gather, Layouts, SessionError, Unusable, stamp_of};
 
-use super::{Recording, RecordingError, indices};
+use super::Recording;
 
 impl Recording {
     /// Another twin's effort, interpolated to this recording's instants.
@@ -11,42 +12,46 @@ impl Recording {
         archive: &Archive,
         topic: &str,
         joint_names: &[String],
-    ) -> Result<(), RecordingError> {
+    ) -> Result<(), SessionError> {
+        let n = joint_names.len();
         let mut times = Vec::new();
         let mut rows: Vec<f64> = Vec::new();
+        let (mut layouts, mut gather) = (Layouts::new(joint_names), Gather::new(n));
         let mut states = archive.joint_states(topic)?;
-        let mut order = Vec::new();
+        let mut messages = 0;
         while let Some(state) = states.next_state() {
-            let Ok(stamped) = state else {
+            let Ok(state) = state else {
                 self.losses.unreadable += 1;
                 continue;
             };
-            let message = stamped.message;
-            if order.is_empty() {
-                order = indices(&message.name, joint_names).map_err(|joint| {
-                    RecordingError::MissingJoint {
-                        path: self.path.clone(),
-                        joint,
-                        known: message.name.join(", "),
-                    }
-                })?;
+            messages += 1;
+            let layout = layouts.of(&state.message.name);
+            if layout.joints == 0 || layout.twice.is_some() {
+                continue;
             }
-            let time_s = (message.header.stamp.ns() - self.start_ns) as f64 * 1e-9;
-            let efforts = order.iter().map_while(|&at| message.effort.get(at));
-            let row: Vec<f64> = efforts.copied().collect();
+            let stamp_ns = stamp_of(&state.message.header, state.log_time_ns);
+            let times_ns = (stamp_ns, state.log_time_ns);
+            let Some(whole) = gather.add(layout, state.message, times_ns, false) else {
+                continue;
+            };
+            let time_s = (stamp_ns - self.start_ns) as f64 * 1e-9;
             let later = times.last().is_none_or(|last| time_s > *last);
-            if row.len() == order.len() && row.iter().all(|x| x.is_finite()) && later {
+            if whole.has_effort && whole.is_finite(n) && later {
                 times.push(time_s);
-                rows.extend(row);
+                rows.extend_from_slice(&whole.effort[..n]);
             }
         }
         if times.is_empty() {
-            return Err(RecordingError::Empty {
-                path: self.path.clone(),
-                topic: topic.to_owned(),
-            });
+            let missing = layouts.never_named();
+            let why = if missing.is_empty() {
+                Unusable::NoSample { messages }
+            } else {
+                let all = Vec::new();
+                Unusable::JointsMissing { missing, all }
+            };
+            let path = self.path.clone();
+            return Err(SessionError::Unusable { path, why });
         }
-        let n = joint_names.len();
         self.reference = Vec::with_capacity(self.len() * n);
         let mut at = 0;
         for &time_s in &self.time_s {

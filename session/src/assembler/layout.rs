@@ -3,13 +3,10 @@
 /// Layouts that are remembered; a topic with more publishers than that is searched each time.
 /// Resolution: memory against searching.
 const MAX_KNOWN: usize = 16;
-/// Foreign names that an error tells of.
-/// Resolution: length of the message.
-const MAX_FOUND: usize = 32;
 
 /// The order of one publisher's joints.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub(super) struct Layout {
+pub struct Layout {
     names: Vec<String>,
     /// Place in the cell's order of each entry, if it is one of the cell's joints.
     pub places: Vec<Option<usize>>,
@@ -21,22 +18,21 @@ pub(super) struct Layout {
 
 /// The layouts of all publishers that were heard.
 #[derive(Debug)]
-pub(super) struct Layouts {
+pub struct Layouts {
     joint_names: Vec<String>,
     known: Vec<Layout>,
     newest: usize,
     named: u32,
-    found: Vec<String>,
 }
 
 impl Layouts {
+    /// Of a robot with these joints.
     pub fn new(joint_names: &[String]) -> Self {
         Self {
             joint_names: joint_names.to_vec(),
             known: Vec::new(),
             newest: 0,
             named: 0,
-            found: Vec::new(),
         }
     }
 
@@ -67,11 +63,6 @@ impl Layouts {
         let joints = places.iter().flatten().fold(0, |mask, &j| mask | (1 << j));
         self.named |= joints;
         let twice = first_twice(&places);
-        for name in names {
-            if self.found.len() < MAX_FOUND && !self.found.contains(name) {
-                self.found.push(name.clone());
-            }
-        }
         if self.known.len() == MAX_KNOWN {
             self.known.pop();
         }
@@ -84,6 +75,7 @@ impl Layouts {
         self.known.len() - 1
     }
 
+    /// Name of a joint of the robot.
     pub fn joint_name(&self, joint: usize) -> &str {
         &self.joint_names[joint]
     }
@@ -98,10 +90,6 @@ impl Layouts {
             .collect()
     }
 
-    /// The first few names that came.
-    pub fn names_found(&self) -> Vec<String> {
-        self.found.clone()
-    }
 }
 
 /// The first joint of the cell that stands at more than one place, and the first two of these.

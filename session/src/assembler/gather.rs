@@ -4,24 +4,33 @@ use tauscope_archive::{FIELDS, FieldTally, NotFinite, ros};
 use tauscope_bus::{JointArray, MAX_JOINTS};
 
 use super::layout::Layout;
+use crate::clock::Clock;
 
 /// Parts of a state that come apart by more than this are of publishers of which one has ceased \[ns\].
 /// Resolution: longer than two rates of one robot differ by, short against what a person misses.
 const APART_NS: i64 = 500_000_000;
 
-/// A state of all joints.
+/// A state of all joints, in the robot's order.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Gathered {
+pub struct Whole {
+    /// Time of its newest part \[ns\].
     pub stamp_ns: i64,
+    /// Positions \[rad or m\].
     pub position: JointArray,
+    /// Velocities \[rad/s or m/s\]; zeros without `has_velocity`.
     pub velocity: JointArray,
+    /// Efforts in the recording's unit; zeros without `has_effort`.
     pub effort: JointArray,
+    /// Whether all parts gave positions.
     pub has_position: bool,
+    /// Whether all parts gave velocities.
     pub has_velocity: bool,
+    /// Whether all parts gave efforts, and none of them dropped to zero.
     pub has_effort: bool,
 }
 
-impl Gathered {
+impl Whole {
+    /// Whether all values of the first `joint_count` joints are finite.
     pub fn is_finite(&self, joint_count: usize) -> bool {
         [&self.position, &self.velocity, &self.effort]
             .iter()
@@ -29,12 +38,12 @@ impl Gathered {
     }
 }
 
-/// The parts of a state that have come.
+/// The parts of a state that have arrived.
 #[derive(Debug)]
-pub(super) struct Gather {
+pub struct Gather {
     all: u32,
     seen: u32,
-    parts: Gathered,
+    parts: Whole,
     /// When the first and the newest of these parts were received, and how many messages a newer one has replaced.
     since_ns: i64,
     newest_ns: i64,
@@ -49,7 +58,7 @@ pub(super) struct Gather {
     bad: u64,
 }
 
-const NOTHING: Gathered = Gathered {
+const NOTHING: Whole = Whole {
     stamp_ns: 0,
     position: [0.0; MAX_JOINTS],
     velocity: [0.0; MAX_JOINTS],
@@ -60,6 +69,7 @@ const NOTHING: Gathered = Gathered {
 };
 
 impl Gather {
+    /// Of so many joints, at most 16.
     pub fn new(joint_count: usize) -> Self {
         Self {
             all: u32::MAX.checked_shr(32 - joint_count as u32).unwrap_or(0),
@@ -76,13 +86,15 @@ impl Gather {
     }
 
     /// Adds a message; gives the state once each joint has been told of. Its stamp is that of its
-    /// newest part, and it has a velocity or effort if all parts have.
+    /// newest part, and it has a velocity or effort if all parts have. `lacks_effort` says that the message's efforts are
+    /// no measurement.
     pub fn add(
         &mut self,
         layout: &Layout,
         message: &ros::JointState,
-        received_ns: i64,
-    ) -> Option<Gathered> {
+        (stamp_ns, received_ns): (i64, i64),
+        lacks_effort: bool,
+    ) -> Option<Whole> {
         if self.seen == 0 {
             self.parts = NOTHING;
             self.since_ns = received_ns;
@@ -92,13 +104,12 @@ impl Gather {
         }
         self.seen |= layout.joints;
         self.newest_ns = received_ns;
-        let stamp_ns = stamp_of(&message.header, received_ns);
         self.first_ns.get_or_insert(stamp_ns);
         let parts = &mut self.parts;
         parts.stamp_ns = parts.stamp_ns.max(stamp_ns);
         parts.has_position &= !message.position.is_empty();
         parts.has_velocity &= !message.velocity.is_empty();
-        parts.has_effort &= !message.effort.is_empty();
+        parts.has_effort &= !message.effort.is_empty() && !lacks_effort;
         let fields = [
             (&message.position, &mut parts.position),
             (&message.velocity, &mut parts.velocity),
@@ -158,10 +169,7 @@ impl Gather {
     }
 }
 
-/// The header's stamp, or the time of reception where the publisher left it at zero.
-pub(super) fn stamp_of(header: &ros::Header, received_ns: i64) -> i64 {
-    match header.stamp.ns() {
-        0 => received_ns,
-        stamp_ns => stamp_ns,
-    }
+/// The header's stamp, or the time of reception where the publisher left it at zero \[ns\].
+pub fn stamp_of(header: &ros::Header, received_ns: i64) -> i64 {
+    Clock::StampsOrReception.time_ns(header.stamp.ns(), received_ns)
 }

@@ -1,0 +1,74 @@
+//! How the stamp of a state follows the one before.
+
+use tauscope_bus::{JointArray, MAX_JOINTS};
+
+use super::gather::Whole;
+
+/// A stamp this far behind the one before is a clock that was set back; anything less is a message
+/// that came too late.
+/// Tuned: by hand, on no recorded seeds; not swept.
+const JUMP_BACK_NS: i64 = 500_000_000;
+
+/// What a state is to the newest one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Next {
+    /// The next one.
+    Follows,
+    /// The first of a clock that was set back.
+    SetBack,
+    /// Older.
+    Late,
+    /// Behind a jump of the stamps, and refused.
+    Behind,
+    /// The same again.
+    Repeated,
+    /// Another one with the same stamp.
+    Stalled,
+}
+
+/// The newest state that was taken.
+#[derive(Debug)]
+pub(super) struct Order {
+    newest_ns: Option<i64>,
+    /// Position and effort.
+    newest: [JointArray; 2],
+}
+
+impl Default for Order {
+    fn default() -> Self {
+        Self {
+            newest_ns: None,
+            newest: [[0.0; MAX_JOINTS]; 2],
+        }
+    }
+}
+
+impl Order {
+    /// What `state` is; one that follows, or begins anew, is the newest from here on. Where a set-back clock is refused,
+    /// nothing begins anew.
+    pub fn next(&mut self, state: &Whole, refuses_set_back: bool) -> Next {
+        let values = [state.position, state.effort];
+        let next = match self.newest_ns {
+            Some(newest_ns) if state.stamp_ns == newest_ns && self.newest == values => {
+                return Next::Repeated;
+            }
+            Some(newest_ns) if state.stamp_ns == newest_ns => return Next::Stalled,
+            Some(newest_ns) if jumps_back(newest_ns, state.stamp_ns) => {
+                if refuses_set_back {
+                    return Next::Behind;
+                }
+                Next::SetBack
+            }
+            Some(newest_ns) if state.stamp_ns < newest_ns => return Next::Late,
+            _ => Next::Follows,
+        };
+        self.newest_ns = Some(state.stamp_ns);
+        self.newest = values;
+        next
+    }
+}
+
+/// Whether the clock was set back between two stamps \[ns\].
+pub(super) fn jumps_back(before_ns: i64, stamp_ns: i64) -> bool {
+    before_ns.saturating_sub(stamp_ns) > JUMP_BACK_NS
+}

@@ -1,0 +1,119 @@
+//! Why a recording gives no joint states of a robot.
+
+use std::path::PathBuf;
+
+use tauscope_archive::{ArchiveError, Twice};
+
+use crate::finding::Finding;
+use crate::publisher::Publisher;
+use crate::suggest;
+
+/// Why a recording gives no joint states of a robot.
+#[derive(Debug, thiserror::Error)]
+pub enum SessionError {
+    /// It cannot be read.
+    #[error(transparent)]
+    Archive(#[from] ArchiveError),
+    /// It has no topic of joint states.
+    #[error("{}: no topic of joint states; {}", path.display(), topics(known))]
+    NoJointStates {
+        /// The recording.
+        path: PathBuf,
+        /// Name and type of its topics.
+        known: Vec<String>,
+    },
+    /// None of its joint states can be used.
+    #[error("{}: {why}", path.display())]
+    Unusable {
+        /// The recording.
+        path: PathBuf,
+        /// The reason.
+        why: Unusable,
+    },
+}
+
+/// Why no state of a robot could be assembled from joint states.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Unusable {
+    /// A field of a joint is never a number.
+    #[error("{field} of joint `{joint}` is NaN throughout ({messages} messages)")]
+    NotFiniteThroughout {
+        /// The joint.
+        joint: String,
+        /// `position`, `velocity` or `effort`.
+        field: &'static str,
+        /// Number of messages.
+        messages: u64,
+    },
+    /// A joint that messages name more than once.
+    #[error("{0}: which of its values hold is not known; let the driver send each joint once")]
+    NamedTwice(Twice),
+    /// Joints of the robot that no message names.
+    #[error(
+        "no joint state names {}. {}. Give the robot file of the arm that was recorded, or make a joint that nobody records `fixed`",
+        named(missing),
+        publishers(all)
+    )]
+    JointsMissing {
+        /// The joints.
+        missing: Vec<String>,
+        /// Publishers on the topic.
+        all: Vec<Publisher>,
+    },
+    /// No message has positions.
+    #[error(
+        "none of {messages} joint states has positions: record the topic that has positions and efforts"
+    )]
+    NoPositions {
+        /// Number of messages.
+        messages: u64,
+    },
+    /// A finding that leaves nothing to use.
+    #[error("no joint state can be used: {0}")]
+    Finding(Box<Finding>),
+    /// Messages that never complete a state, or none at all.
+    #[error("{messages} joint states make no whole sample")]
+    NoSample {
+        /// Number of messages.
+        messages: u64,
+    },
+}
+
+impl Unusable {
+    /// The finding, where it is one.
+    pub fn into_finding(self) -> Option<Finding> {
+        match self {
+            Self::Finding(finding) => Some(*finding),
+            _ => None,
+        }
+    }
+}
+
+fn named(names: &[String]) -> String {
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    if names.is_empty() {
+        "a joint".to_owned()
+    } else {
+        suggest::some(&names)
+    }
+}
+
+fn publishers(all: &[Publisher]) -> String {
+    let each = all.iter().map(ToString::to_string);
+    match all.len() {
+        0 => "No message names a joint".to_owned(),
+        1 => format!("The messages name {}", each.collect::<String>()),
+        count => {
+            let each: Vec<String> = each.collect();
+            format!("{count} publishers send messages: ({})", each.join("), ("))
+        }
+    }
+}
+
+fn topics(known: &[String]) -> String {
+    if known.is_empty() {
+        "the recording has no topics".to_owned()
+    } else {
+        format!("it has {}", known.join(", "))
+    }
+}

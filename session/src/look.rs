@@ -1,0 +1,260 @@
+//! The first look at a recording: topic, publishers, clock and ranges, from its head.
+
+use std::path::Path;
+
+use tauscope_archive::{Recording, RecordingKind, ros};
+
+use crate::clock::{Clock, Stamps};
+use crate::error::{SessionError, Unusable};
+use crate::finding::{Effect, Finding};
+use crate::publisher::{Publisher, Publishers, choose};
+use crate::values::Ranges;
+
+/// Messages of a topic that are looked at.
+/// Resolution: a few milliseconds of work; 200 s of an arm at 100 Hz.
+const HEAD: usize = 20_000;
+
+/// What the head of a recording shows.
+#[derive(Debug, Clone)]
+pub struct Look {
+    /// Topic of the joint states.
+    pub topic: String,
+    /// The robot's joints; those that the publishers name where no robot is given.
+    pub joint_names: Vec<String>,
+    /// Time of the messages.
+    pub clock: Clock,
+    pub(crate) publishers: Publishers,
+    /// Whether each publisher is used.
+    pub(crate) used: Vec<bool>,
+    pub(crate) ranges: Ranges,
+    pub(crate) of_clock: Option<Finding>,
+}
+
+/// The joints whose states are wanted.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Joints<'a> {
+    /// Their names, in the robot's order; none for all that are published.
+    pub names: &'a [String],
+    /// By joint, the effort limit of the robot file \[N m or N\]; empty where there is no robot file.
+    pub effort_limits: &'a [Option<f64>],
+}
+
+impl Look {
+    /// Looks at `topic` of a recording, or at the topic that names most joints where none is given.
+    ///
+    /// # Errors
+    /// If there are no joint states, or their stamps tell no time.
+    pub fn at(
+        recording: &Recording,
+        topic: Option<&str>,
+        wanted: Joints<'_>,
+    ) -> Result<Self, SessionError> {
+        recording.check_comparable(wanted.names)?;
+        let look = match topic {
+            Some(topic) => {
+                recording.joint_state_topic(topic)?;
+                Self::at_topic(recording, topic, wanted)?
+            }
+            None => Self::at_best(recording, wanted)?,
+        };
+        let fault = look.of_clock.clone();
+        if let Some(fault) = fault.filter(|it| it.effect() == Effect::Fault) {
+            return Err(SessionError::Unusable {
+                path: recording.path().to_owned(),
+                why: Unusable::Finding(Box::new(fault)),
+            });
+        }
+        Ok(look)
+    }
+
+    /// The topic that gives positions and efforts of most of the joints.
+    fn at_best(recording: &Recording, wanted: Joints<'_>) -> Result<Self, SessionError> {
+        let mut best: Option<(Self, (bool, bool, usize, u64))> = None;
+        let mut error = None;
+        for topic in recording.topics() {
+            if topic.joint_state_type().is_none() || topic.message_count == 0 {
+                continue;
+            }
+            let look = match Self::at_topic(recording, &topic.name, wanted) {
+                Ok(look) => look,
+                Err(found) => {
+                    error.get_or_insert(found);
+                    continue;
+                }
+            };
+            let used = || look.used_publishers();
+            let known = look.joint_names.iter().filter(|joint| look.names(joint));
+            let rank = (
+                used().any(|it| it.position),
+                used().any(Publisher::measures_effort),
+                known.count(),
+                topic.message_count,
+            );
+            if best.as_ref().is_none_or(|(_, most)| rank > *most) {
+                best = Some((look, rank));
+            }
+        }
+        if let Some((look, _)) = best {
+            return Ok(look);
+        }
+        let known = recording.topics().iter();
+        Err(error.unwrap_or_else(|| SessionError::NoJointStates {
+            path: recording.path().to_owned(),
+            known: known
+                .map(|topic| format!("{} ({})", topic.name, topic.type_name))
+                .collect(),
+        }))
+    }
+
+    fn at_topic(
+        recording: &Recording,
+        topic: &str,
+        wanted: Joints<'_>,
+    ) -> Result<Self, SessionError> {
+        let mut publishers = Publishers::default();
+        let mut states = recording.joint_states(topic)?;
+        let mut read = 0;
+        let mut joint_names = wanted.names.to_vec();
+        while read < HEAD
+            && let Some(state) = states.next_state()
+        {
+            read += 1;
+            if let Ok(state) = state {
+                publishers.add(state.message, state.log_time_ns);
+            }
+        }
+        if joint_names.is_empty() {
+            joint_names = published(&publishers.all);
+        }
+        let used = choose(&publishers.all, &joint_names);
+        let limits = (0..joint_names.len())
+            .map(|joint| wanted.effort_limits.get(joint).copied().flatten());
+        let mut look = Self {
+            topic: topic.to_owned(),
+            ranges: Ranges::new(limits),
+            joint_names,
+            clock: Clock::Stamps,
+            publishers,
+            used,
+            of_clock: None,
+        };
+        look.read_values(recording)?;
+        Ok(look)
+    }
+
+    /// Reads the head of the publishers that are used: stamps and ranges.
+    fn read_values(&mut self, recording: &Recording) -> Result<(), SessionError> {
+        let mut states = recording.joint_states(&self.topic)?;
+        let mut stamps = Stamps::default();
+        let mut last = ros::JointState::default();
+        for _ in 0..HEAD {
+            let Some(state) = states.next_state() else {
+                break;
+            };
+            let Ok(state) = state else { continue };
+            let message = state.message;
+            let place = self.publishers.place(message);
+            if !place.is_some_and(|place| self.used[place]) {
+                continue;
+            }
+            // Parts of one state share a stamp rightly.
+            if self.publishers.all[place.unwrap_or_default()].names.len() == last.name.len()
+                || last.name.is_empty()
+            {
+                let is_new = message.position != last.position || message.effort != last.effort;
+                stamps.add(message.header.stamp.ns(), state.log_time_ns, is_new);
+                last.clone_from(message);
+            }
+            let fields = [&message.position, &message.velocity, &message.effort];
+            for (field, values) in fields.into_iter().enumerate() {
+                for (name, value) in message.name.iter().zip(values) {
+                    let joint = self.joint_names.iter().position(|joint| joint == name);
+                    if let Some(joint) = joint.filter(|_| value.is_finite()) {
+                        self.ranges.take(joint, field, *value);
+                    }
+                }
+            }
+        }
+        let has_log_times = !matches!(
+            recording.kind(),
+            RecordingKind::Csv | RecordingKind::Lerobot
+        );
+        (self.clock, self.of_clock) = stamps.clock(has_log_times);
+        Ok(())
+    }
+
+    /// Time of the first message that is used, and its log time \[ns\]; `None` if there is none.
+    ///
+    /// # Errors
+    /// If the recording can no longer be read.
+    pub fn start_ns(&self, recording: &Recording) -> Result<Option<(i64, i64)>, SessionError> {
+        let mut states = recording.joint_states(&self.topic)?;
+        while let Some(state) = states.next_state() {
+            let Ok(state) = state else { continue };
+            let place = self.publishers.place(state.message);
+            if place.is_none_or(|place| self.used[place]) {
+                let stamp_ns = state.message.header.stamp.ns();
+                let time_ns = self.clock.time_ns(stamp_ns, state.log_time_ns);
+                return Ok(Some((time_ns, state.log_time_ns)));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Publishers on the topic, as far as the head shows them.
+    pub fn publishers(&self) -> &[Publisher] {
+        &self.publishers.all
+    }
+
+    /// The publishers that are used.
+    fn used_publishers(&self) -> impl Iterator<Item = &Publisher> {
+        let all = self.publishers.all.iter().zip(&self.used);
+        all.filter(|(_, used)| **used).map(|(publisher, _)| publisher)
+    }
+
+    /// Whether a publisher that is used names the joint.
+    pub fn names(&self, joint: &str) -> bool {
+        self.used_publishers()
+            .any(|publisher| publisher.names.iter().any(|name| name == joint))
+    }
+
+    /// All joints that the publishers in use name, in the order of their messages.
+    pub fn recorded(&self) -> Vec<String> {
+        let used: Vec<Publisher> = self.used_publishers().cloned().collect();
+        published(&used)
+    }
+
+    /// Checks that every joint of the robot is named.
+    ///
+    /// # Errors
+    /// [`Unusable::JointsMissing`].
+    pub fn check_joints(&self, path: &Path) -> Result<(), SessionError> {
+        let missing = self.joint_names.iter().filter(|joint| !self.names(joint));
+        let missing: Vec<String> = missing.cloned().collect();
+        if missing.is_empty() {
+            return Ok(());
+        }
+        Err(SessionError::Unusable {
+            path: path.to_owned(),
+            why: Unusable::JointsMissing {
+                missing,
+                all: self.publishers.all.clone(),
+            },
+        })
+    }
+}
+
+/// The joints that publishers name, each once, in the order of their messages. At most 16, as many as a sample holds.
+fn published(all: &[Publisher]) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    let with_effort = all.iter().filter(|it| it.position && it.measures_effort());
+    let with_position = all.iter().filter(|it| it.position);
+    for publisher in with_effort.chain(with_position).chain(all) {
+        for name in &publisher.names {
+            if !names.contains(name) && names.len() < tauscope_bus::MAX_JOINTS {
+                names.push(name.clone());
+            }
+        }
+    }
+    names
+}
