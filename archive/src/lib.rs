@@ -21,6 +21,7 @@ pub mod ros;
 mod ros1_bag;
 mod sqlite_file;
 mod topic;
+mod undecodable;
 pub mod whole_file;
 
 pub use csv_file::{Column, Columns, CsvError, CsvMapping, CsvProblem, limits as csv_limits};
@@ -43,3 +44,4 @@ pub use repair::{
     repaired_folder_path, repaired_path,
 };
 pub use topic::Topic;
+pub use undecodable::Undecodable;
