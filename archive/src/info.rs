@@ -369,6 +369,9 @@ impl fmt::Display for TopicInfo {
         for line in undecodable::lines(self.undecodable, &self.undecodable_reasons) {
             writeln!(f, "  {line}")?;
         }
+        if let Some(unreadable) = self.topic.unreadable_joint_states() {
+            writeln!(f, "  {unreadable}")?;
+        }
         Ok(())
     }
 }
