@@ -55,21 +55,19 @@ impl std::fmt::Display for UnreadableJointStates {
             type_name,
             encoding,
         } = self;
-        write!(f, "the joint states on topic {topic:?} cannot be read: ")?;
-        let is_of = match type_name.as_str() {
-            "" => "their type is not declared".to_owned(),
-            name => format!("their type is {name}"),
-        };
-        let encoding = match encoding.as_str() {
-            "" => "their encoding is not declared".to_owned(),
-            encoding => format!("their encoding is {encoding:?}"),
-        };
+        write!(f, "topic {topic:?} carries joint states")?;
+        if !type_name.is_empty() {
+            write!(f, " of type {type_name}")?;
+        }
+        match encoding.as_str() {
+            "cdr" => write!(f, "; only {} can be read", JointStateType::names())?,
+            "" => f.write_str(" without an encoding; only CDR and ros1 messages can be read")?,
+            other => write!(f, " as {other:?}; only CDR and ros1 messages can be read")?,
+        }
         write!(
             f,
-            "{is_of} and {encoding}, and only {} in CDR (ROS 2) or sensor_msgs/JointState in ros1 (ROS 1) can be read. \
-             Record the topic with `ros2 bag record`, or write the messages anew as {} in CDR, for example with the \
+            ". Record the topic with `ros2 bag record`, or rewrite its messages as {} in CDR, for example with the \
              Python package mcap-ros2-support",
-            JointStateType::names(),
             JointStateType::JointState.name(),
         )
     }

@@ -159,9 +159,8 @@ fn joint_states_in_another_encoding_are_named() {
         assert_eq!(recording.unreadable_joint_states(), [(**found).clone()]);
         let text = error.to_string();
         for part in [
-            "the joint states on topic \"/joint_states\" cannot be read",
-            &format!("their encoding is {encoding:?}"),
-            "in CDR (ROS 2) or sensor_msgs/JointState in ros1 (ROS 1)",
+            "topic \"/joint_states\" carries joint states",
+            &format!(" as {encoding:?}; only CDR and ros1 messages can be read"),
             "`ros2 bag record`",
         ] {
             assert!(text.contains(part), "{text}");
