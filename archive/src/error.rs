@@ -7,6 +7,7 @@ use crate::damage::{Damage, seconds};
 use crate::lerobot_error::LerobotError;
 use crate::parquet_file::ParquetError;
 use crate::ros::{DecodeError, EncodeError};
+use crate::unreadable::UnreadableJointStates;
 
 /// Why a recording cannot be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -72,6 +73,26 @@ pub enum ArchiveError {
         found: String,
         /// Type and encoding it should have.
         expected: String,
+    },
+    /// The topic carries joint states in an encoding that cannot be read.
+    #[error("{}: {found}", path.display())]
+    UnreadableJointStates {
+        /// The recording.
+        path: PathBuf,
+        /// Topic, type and encoding.
+        found: Box<UnreadableJointStates>,
+    },
+    /// A compressed file or an archive of files.
+    #[error("{} is {format}. Unpack it first: `{command}`{}", path.display(), and_others(*others))]
+    Compressed {
+        /// The file.
+        path: PathBuf,
+        /// The format, e.g. `a Zstandard-compressed file`.
+        format: &'static str,
+        /// The shell command that unpacks it.
+        command: String,
+        /// Number of other compressed files of the same bag.
+        others: usize,
     },
     /// A message is not what its topic says.
     #[error("{}: topic {topic:?}, log time {} s, at {at}: {source}", path.display(), seconds(*log_time_ns))]
@@ -177,6 +198,14 @@ impl ArchiveError {
             Self::Damaged(damage) => Some(damage),
             _ => None,
         }
+    }
+}
+
+fn and_others(others: usize) -> String {
+    match others {
+        0 => String::new(),
+        1 => ", and likewise 1 other file of the bag".to_owned(),
+        others => format!(", and likewise {others} other files of the bag"),
     }
 }
 

@@ -12,6 +12,7 @@ use crate::joint_facts::{JointFacts, JointTallies, Twice};
 use crate::recording::{Message, Recording, RecordingKind};
 use crate::ros::{JointState, JointStateDecoder};
 use crate::topic::Topic;
+use crate::undecodable::{self, Undecodable, UndecodableTally};
 
 /// A pause counts as a gap if it is this many times as long as the topic's mean period.
 /// Tuned: by hand, on no recorded seeds; not swept.
@@ -57,8 +58,10 @@ pub struct TopicInfo {
     pub rate_hz: Option<f64>,
     /// The longest pauses of at least five mean periods, longest first.
     pub gaps: Vec<Gap>,
-    /// Messages that are not what their type says.
+    /// Messages that cannot be decoded.
     pub undecodable: u64,
+    /// The first reason of each kind with the number of messages; of many kinds the first four.
+    pub undecodable_reasons: Vec<Undecodable>,
     /// What its joint states hold, if it carries any.
     pub joints: Option<JointsInfo>,
 }
@@ -150,7 +153,7 @@ struct Tally {
     last_ns: Option<i64>,
     /// The longest pauses and where they begin, longest first.
     pauses_ns: Vec<(i64, i64)>,
-    undecodable: u64,
+    undecodable: UndecodableTally,
     joints: Option<JointsInfo>,
     values: JointTallies,
     decoder: JointStateDecoder,
@@ -168,7 +171,7 @@ impl Tally {
             first_ns: None,
             last_ns: None,
             pauses_ns: Vec::new(),
-            undecodable: 0,
+            undecodable: UndecodableTally::default(),
             joints: joints.then(JointsInfo::default),
             values: JointTallies::default(),
             decoder: JointStateDecoder::default(),
@@ -194,7 +197,7 @@ impl Tally {
                     joints.add(&self.state);
                     self.values.add(&self.state);
                 }
-                Err(_) => self.undecodable += 1,
+                Err(error) => self.undecodable.add(&error, log_time_ns),
             }
         }
     }
@@ -218,7 +221,8 @@ impl Tally {
                 })
                 .collect(),
             topic: self.topic,
-            undecodable: self.undecodable,
+            undecodable: self.undecodable.count(),
+            undecodable_reasons: self.undecodable.reasons(),
             joints: self.joints.map(|joints| JointsInfo {
                 repeated_messages: self.values.repeated,
                 backward_messages: self.values.backward,
@@ -362,10 +366,11 @@ impl fmt::Display for TopicInfo {
         for gap in &self.gaps {
             writeln!(f, "  a gap of {:.3} s at {:.3} s", gap.duration_s, gap.at_s)?;
         }
-        if self.undecodable > 0 {
-            let are = if self.undecodable == 1 { "is" } else { "are" };
-            let count = messages(self.undecodable);
-            writeln!(f, "  {count} {are} not of that type")?;
+        for line in undecodable::lines(self.undecodable, &self.undecodable_reasons) {
+            writeln!(f, "  {line}")?;
+        }
+        if let Some(unreadable) = self.topic.unreadable_joint_states() {
+            writeln!(f, "  {unreadable}")?;
         }
         Ok(())
     }
@@ -373,20 +378,17 @@ impl fmt::Display for TopicInfo {
 
 impl fmt::Display for JointsInfo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let given: Vec<_> = [
-            (self.position, "position"),
-            (self.velocity, "velocity"),
-            (self.effort, "effort"),
-        ]
-        .into_iter()
-        .filter_map(|(given, name)| given.then_some(name))
-        .collect();
-        write!(
-            f,
-            "joints {} with {}",
-            self.names.join(", "),
-            given.join(", ")
-        )?;
+        let position = self.position.then_some("position");
+        let velocity = self.velocity.then_some("velocity");
+        let effort = self.effort.then_some("effort");
+        let given = [position, velocity, effort].into_iter().flatten();
+        let given: Vec<_> = given.collect();
+        let names = self.names.join(", ");
+        match given.as_slice() {
+            _ if names.is_empty() => write!(f, "no usable message names a joint")?,
+            [] => write!(f, "joints {names} without position, velocity or effort")?,
+            given => write!(f, "joints {names} with {}", given.join(", "))?,
+        }
         if self.nan_messages > 0 {
             write!(f, "; NaN in {}", messages(self.nan_messages))?;
         }

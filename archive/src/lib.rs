@@ -2,6 +2,7 @@
 
 mod bag_folder;
 mod chunks;
+mod compressed;
 mod csv_file;
 mod cursor;
 mod damage;
@@ -19,8 +20,11 @@ mod recording;
 mod repair;
 pub mod ros;
 mod ros1_bag;
+mod ros1_convert;
 mod sqlite_file;
 mod topic;
+mod undecodable;
+mod unreadable;
 pub mod whole_file;
 
 pub use csv_file::{Column, Columns, CsvError, CsvMapping, CsvProblem, limits as csv_limits};
@@ -43,3 +47,5 @@ pub use repair::{
     repaired_folder_path, repaired_path,
 };
 pub use topic::Topic;
+pub use undecodable::Undecodable;
+pub use unreadable::UnreadableJointStates;

@@ -1,5 +1,6 @@
 //! A recording, whatever its format.
 
+mod body;
 mod joint_states;
 mod messages;
 mod open;
@@ -25,6 +26,7 @@ use crate::ros;
 use crate::ros1_bag::{Ros1Bag, ros1_cursor};
 use crate::sqlite_file::SqliteFile;
 use crate::topic::{Topic, Topics};
+use crate::unreadable::UnreadableJointStates;
 
 pub use joint_states::{JointStates, Stamped};
 pub use messages::{Message, Messages};
@@ -173,10 +175,27 @@ impl Recording {
     /// The topic `name`, which must carry joint states of any type as CDR, and at least one.
     ///
     /// # Errors
-    /// As [`Recording::topic_of`].
+    /// As [`Recording::topic_of`], and [`ArchiveError::UnreadableJointStates`] for joint states in another encoding.
     pub fn joint_state_topic(&self, name: &str) -> Result<&Topic, ArchiveError> {
         let is_one = |topic: &Topic| topic.joint_state_type().is_some();
-        self.topic_where(name, &ros::JointStateType::names(), is_one)
+        let found = self.topic_where(name, &ros::JointStateType::names(), is_one);
+        let Err(ArchiveError::WrongType { .. }) = found else {
+            return found;
+        };
+        let same = self.unreadable_joint_states();
+        match same.into_iter().find(|each| each.topic == name) {
+            Some(found) => Err(ArchiveError::UnreadableJointStates {
+                path: self.path.clone(),
+                found: Box::new(found),
+            }),
+            None => found,
+        }
+    }
+
+    /// Topics with joint states in an encoding that cannot be read.
+    pub fn unreadable_joint_states(&self) -> Vec<UnreadableJointStates> {
+        let topics = self.topics().iter();
+        topics.filter_map(Topic::unreadable_joint_states).collect()
     }
 
     fn topic_where(
@@ -191,8 +210,10 @@ impl Recording {
                 known: self.topic_names(),
             });
         }
-        let index = self.topic_indexes(name)?[0];
-        let topic = &self.topics.list[index];
+        let indexes = self.topic_indexes(name)?;
+        let topic = |&index: &usize| &self.topics.list[index];
+        let found = indexes.iter().map(topic).find(|&topic| is_one(topic));
+        let topic = found.unwrap_or(topic(&indexes[0]));
         if !is_one(topic) {
             return Err(ArchiveError::WrongType {
                 path: self.path.clone(),

@@ -96,3 +96,37 @@ pub fn dds_type(ros_type: &str) -> String {
         None => format!("dds_::{ros_type}_"),
     }
 }
+
+/// The ROS 2 name of a type, e.g. `sensor_msgs/msg/JointState`, from its name in ROS 1 (`sensor_msgs/JointState`), in
+/// IDL (`sensor_msgs::msg::JointState`) or on DDS (`sensor_msgs::msg::dds_::JointState_`). Other names stay.
+pub(crate) fn ros2_type(name: &str) -> String {
+    let slashes = name.replace("::", "/");
+    let parts: Vec<&str> = slashes.split('/').collect();
+    match parts.as_slice() {
+        [package, kind, "dds_", name] => {
+            let name = name.strip_suffix('_').unwrap_or(name);
+            format!("{package}/{kind}/{name}")
+        }
+        [package, name] if !package.is_empty() => format!("{package}/msg/{name}"),
+        _ => slashes,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ros2_type;
+
+    #[test]
+    fn type_names_of_every_origin_are_one() {
+        for name in [
+            "sensor_msgs/msg/JointState",
+            "sensor_msgs/JointState",
+            "sensor_msgs::msg::JointState",
+            "sensor_msgs::msg::dds_::JointState_",
+        ] {
+            assert_eq!(ros2_type(name), "sensor_msgs/msg/JointState");
+        }
+        assert_eq!(ros2_type("foxglove.JointStates"), "foxglove.JointStates");
+        assert_eq!(ros2_type(""), "");
+    }
+}

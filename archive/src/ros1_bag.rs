@@ -1,11 +1,9 @@
 //! Reading bags of ROS 1, version 2.0 (<http://wiki.ros.org/Bags/Format/2.0>), chunk by chunk.
 //!
 //! [`Ros1Bag::read`] learns what the bag holds and where: from the index at its end if that is sound, else by walking
-//! all of it. Joint states and flags are given as the ROS 2 messages of the same name, so that nobody above knows the
-//! difference. What a bag declares of its own sizes is checked against the file and a limit before memory is taken.
+//! all of it. What a bag declares of its own sizes is checked against the file and a limit before memory is taken.
 
 mod chunk;
-mod convert;
 mod cursor;
 mod index;
 mod record;
@@ -19,7 +17,6 @@ use std::path::{Path, PathBuf};
 use crate::damage::{Damage, DamageKind};
 use crate::error::ArchiveError;
 use crate::topic::{Topic, Topics};
-use convert::Conversion;
 pub(crate) use cursor::ros1_cursor;
 use record::{Header, Records, Step, op};
 
@@ -152,7 +149,7 @@ impl Ros1Bag {
     pub(crate) fn topics(&self) -> (Topics, BTreeMap<u32, usize>) {
         let mut topics = Topics::default();
         let places = self.connections.iter().map(|(&number, connection)| {
-            let place = topics.add(connection.as_topic());
+            let place = topics.add_stored(connection.as_topic(), &connection.md5sum);
             (number, place)
         });
         let places = places.collect();
@@ -218,31 +215,12 @@ impl Ros1Bag {
 }
 
 impl Connection {
-    fn conversion(&self) -> Option<Conversion> {
-        Conversion::of(&self.type_name, &self.md5sum)
-    }
-
     fn as_topic(&self) -> Topic {
-        let (type_name, encoding, hash) = match self.conversion() {
-            Some(conversion) => {
-                let (type_name, hash) = conversion.ros2_type();
-                (
-                    type_name.to_owned(),
-                    "cdr".to_owned(),
-                    Some(hash.to_owned()),
-                )
-            }
-            None if Conversion::named(&self.type_name).is_some() => {
-                let encoding = format!("ros1 of another definition, md5sum {}", self.md5sum);
-                (self.type_name.clone(), encoding, None)
-            }
-            None => (self.type_name.clone(), "ros1".to_owned(), None),
-        };
         Topic {
             name: self.topic.clone(),
-            type_name,
-            message_encoding: encoding,
-            type_hash: hash,
+            type_name: self.type_name.clone(),
+            message_encoding: "ros1".to_owned(),
+            type_hash: None,
             offered_qos: None,
             message_count: self.message_count,
         }

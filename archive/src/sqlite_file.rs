@@ -15,9 +15,6 @@ pub(crate) const MAGIC: &[u8] = b"SQLite format 3\0";
 /// Messages are read in pages of about this size \[bytes\]; a page holds at least one.
 /// Resolution: memory against the number of reads.
 const PAGE_BYTES: usize = 4 << 20;
-/// Longest message once unpacked \[bytes\].
-/// Resolution: bounds memory.
-const MAX_MESSAGE_BYTES: usize = 64 << 20;
 
 /// A database that has been looked through.
 #[derive(Debug)]
@@ -27,18 +24,15 @@ pub(crate) struct SqliteFile {
     pub(crate) topics: Vec<(i64, Topic)>,
     pub(crate) log_times_ns: Option<(i64, i64)>,
     pub(crate) damage: Vec<Damage>,
-    /// Each message is packed for itself (rosbag2's compression mode `message`).
-    packed_messages: bool,
 }
 
 impl SqliteFile {
-    pub(crate) fn read(path: &Path, packed_messages: bool) -> Result<Self, ArchiveError> {
+    pub(crate) fn read(path: &Path) -> Result<Self, ArchiveError> {
         let mut file = Self {
             path: path.to_owned(),
             topics: Vec::new(),
             log_times_ns: None,
             damage: Vec::new(),
-            packed_messages,
         };
         let connection = connect(path, false)?;
         are_tables(&connection, path)?;
@@ -133,8 +127,6 @@ impl SqliteFile {
             current: None,
             ended: false,
             damage_is_known: !self.damage.is_empty(),
-            packed_messages: self.packed_messages,
-            unpacked: Vec::new(),
         })
     }
 }
@@ -280,8 +272,6 @@ pub(crate) struct SqliteCursor {
     ended: bool,
     /// Told when the database was opened; not to be told again.
     damage_is_known: bool,
-    packed_messages: bool,
-    unpacked: Vec<u8>,
 }
 
 struct PageRow {
@@ -356,16 +346,6 @@ impl Cursor for SqliteCursor {
             let reason = format!("message at {} ns, before the epoch", row.time_ns);
             return Err(self.damaged(at, DamageKind::Record { reason }));
         }
-        if self.packed_messages {
-            let unpacked = zstd::bulk::decompress(&self.bytes[row.data.clone()], MAX_MESSAGE_BYTES);
-            match unpacked {
-                Ok(unpacked) => self.unpacked = unpacked,
-                Err(error) => {
-                    let reason = format!("zstd: {error}");
-                    return Err(self.damaged(at, DamageKind::Record { reason }));
-                }
-            }
-        }
         self.current = Some(row);
         Ok(true)
     }
@@ -377,11 +357,7 @@ impl Cursor for SqliteCursor {
             publish_time_ns: row.time_ns,
             sequence: 0,
             at: u64::try_from(row.key).unwrap_or(0),
-            body: if self.packed_messages {
-                &self.unpacked
-            } else {
-                &self.bytes[row.data.clone()]
-            },
+            body: &self.bytes[row.data.clone()],
         })
     }
 }

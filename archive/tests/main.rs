@@ -1,10 +1,13 @@
 //! One program of the tests through the public face: linking one is what takes long.
 
+mod bag_folders;
 mod bags;
 mod cdr;
 mod common;
+mod compressed;
 mod csv;
 mod damage;
+mod encodings;
 mod hostile_tables;
 mod info;
 mod join;

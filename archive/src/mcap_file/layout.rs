@@ -115,7 +115,8 @@ impl Layout {
                 offered_qos: channel.metadata.get("offered_qos_profiles").cloned(),
                 message_count: self.counts.get(&id).copied().unwrap_or(0),
             };
-            topics.add_channel(id, topic);
+            let md5sum = channel.metadata.get("md5sum").map_or("", String::as_str);
+            topics.add_channel(id, topic, md5sum);
         }
         topics
     }

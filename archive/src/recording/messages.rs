@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::body::{Bodies, Flaw};
 use crate::cursor::Cursor;
 use crate::error::ArchiveError;
 use crate::ros;
@@ -26,6 +27,8 @@ pub struct Message<'a> {
     pub at: u64,
     /// The message itself, in the topic's encoding.
     pub body: &'a [u8],
+    /// Reason why `body` is not in the topic's encoding but as stored.
+    flaw: Option<Flaw>,
     path: &'a Path,
 }
 
@@ -35,7 +38,8 @@ impl Message<'_> {
     /// # Errors
     /// [`ArchiveError::Decode`] if it is not an `M`.
     pub fn decode<M: ros::Message>(&self) -> Result<M, ArchiveError> {
-        ros::decode(self.body).map_err(|source| self.error(source))
+        let decoded = self.sound_body().and_then(ros::decode);
+        decoded.map_err(|source| self.error(source))
     }
 
     /// Decodes it over a message that is there already, whose memory is used again.
@@ -43,7 +47,9 @@ impl Message<'_> {
     /// # Errors
     /// [`ArchiveError::Decode`] if it is not an `M`; `message` is then void.
     pub fn decode_into<M: ros::Message>(&self, message: &mut M) -> Result<(), ArchiveError> {
-        ros::decode_into(self.body, message).map_err(|source| self.error(source))
+        let body = self.sound_body();
+        let decoded = body.and_then(|body| ros::decode_into(body, message));
+        decoded.map_err(|source| self.error(source))
     }
 
     /// Decodes a joint state of its topic's type over one that is there already.
@@ -57,9 +63,16 @@ impl Message<'_> {
     ) -> Result<(), ArchiveError> {
         let of = self.topic.joint_state_type();
         let of = of.unwrap_or(ros::JointStateType::JointState);
-        decoder
-            .decode_into(of, self.body, state)
-            .map_err(|source| self.error(source))
+        let body = self.sound_body();
+        let decoded = body.and_then(|body| decoder.decode_into(of, body, state));
+        decoded.map_err(|source| self.error(source))
+    }
+
+    fn sound_body(&self) -> Result<&[u8], ros::DecodeError> {
+        match self.flaw {
+            Some(flaw) => Err(flaw.error(self.body.len())),
+            None => Ok(self.body),
+        }
     }
 
     fn error(&self, source: ros::DecodeError) -> ArchiveError {
@@ -81,6 +94,7 @@ pub struct Messages {
     path: PathBuf,
     topics: Arc<Topics>,
     cursor: Box<dyn Cursor>,
+    bodies: Bodies,
     /// Log times of the messages that are given.
     within_ns: RangeInclusive<i64>,
     ended: bool,
@@ -97,6 +111,7 @@ impl Messages {
             path: path.to_owned(),
             topics,
             cursor,
+            bodies: Bodies::default(),
             within_ns,
             ended: false,
         }
@@ -132,16 +147,22 @@ impl Messages {
         self.cursor.chunks_read()
     }
 
-    fn message(&self) -> Option<Message<'_>> {
+    fn message(&mut self) -> Option<Message<'_>> {
         let raw = self.cursor.current()?;
+        let topic = &self.topics.list[raw.topic];
+        let (body, flaw) = match topic.message_encoding.as_str() {
+            "cdr" => (self.bodies).cdr(raw.body, self.topics.conversion(raw.topic)),
+            _ => (raw.body, None),
+        };
         Some(Message {
-            topic: &self.topics.list[raw.topic],
+            topic,
             topic_index: raw.topic,
             log_time_ns: raw.log_time_ns,
             publish_time_ns: raw.publish_time_ns,
             sequence: raw.sequence,
             at: raw.at,
-            body: raw.body,
+            body,
+            flaw,
             path: &self.path,
         })
     }

@@ -12,7 +12,7 @@ use crate::bag_folder::BagFolder;
 use crate::csv_file::{self, CsvMapping, CsvTable};
 use crate::damage::{Damage, DamageKind};
 use crate::error::ArchiveError;
-use crate::file_kind::file_kind;
+use crate::file_kind::{self, file_kind};
 use crate::lerobot::{self, Episode};
 use crate::mcap_file::Layout;
 use crate::parquet_file;
@@ -49,7 +49,7 @@ impl Recording {
         {
             return Self::open_csv(path, &csv_file::mapping_of(path)?, &[]);
         }
-        Self::open_file(path, false)
+        Self::open_file(path)
     }
 
     /// As [`Recording::open`], but refuses what [`Recording::check_comparable`] does.
@@ -65,7 +65,7 @@ impl Recording {
         Ok(recording)
     }
 
-    fn open_file(path: &Path, packed_messages: bool) -> Result<Self, ArchiveError> {
+    fn open_file(path: &Path) -> Result<Self, ArchiveError> {
         let mut beginning = Vec::new();
         File::open(path)
             .and_then(|file| file.take(16).read_to_end(&mut beginning))
@@ -74,16 +74,21 @@ impl Recording {
             return Ok(Self::from_mcap(Layout::read(path)?));
         }
         if beginning.starts_with(sqlite_file::MAGIC) {
-            return Ok(Self::from_sqlite(
-                path,
-                SqliteFile::read(path, packed_messages)?,
-            ));
+            return Ok(Self::from_sqlite(path, SqliteFile::read(path)?));
         }
         if beginning.starts_with(ros1_bag::MAGIC) {
             return Ok(Self::from_ros1(Ros1Bag::read(path)?));
         }
         if beginning.starts_with(parquet_file::MAGIC) {
             return Self::open_episode(path, lerobot::of_table(path)?);
+        }
+        if let Some(packing) = file_kind::packing(path) {
+            return Err(ArchiveError::Compressed {
+                path: path.to_owned(),
+                format: packing.words,
+                command: packing.command(path),
+                others: 0,
+            });
         }
         let reason = match file_kind(path) {
             Some("empty") => "the file is empty".to_owned(),
@@ -121,7 +126,7 @@ impl Recording {
     fn from_sqlite(path: &Path, file: SqliteFile) -> Self {
         let mut topics = Topics::default();
         let numbers = file.topics.iter().map(|(id, topic)| {
-            let index = topics.add(topic.clone());
+            let index = topics.add_stored(topic.clone(), "");
             (*id, index)
         });
         let numbers = numbers.collect();
@@ -162,29 +167,26 @@ impl Recording {
         let mut damage = bag.damage;
         let mut parts = Vec::new();
         let mut topics = Topics::default();
+        let mut compressed = Vec::new();
         for file in &bag.files {
-            let recording = match Self::open_file(file, bag.packed_messages) {
+            let recording = match Self::open_file(file) {
                 Ok(recording) => recording,
                 Err(error) => {
                     damage.push(missing(file, &error));
+                    if matches!(error, ArchiveError::Compressed { .. }) {
+                        compressed.push(error);
+                    }
                     continue;
                 }
             };
-            let numbers = recording.topics().iter();
-            let numbers = numbers.map(|topic| topics.add(topic.clone())).collect();
             damage.extend_from_slice(recording.damage());
             parts.push(Part {
+                topics: topics.add_part(&recording.topics),
                 recording,
-                topics: numbers,
             });
         }
         if parts.is_empty() {
-            let first = damage.iter().find(|damage| damage.loses_data());
-            return Err(ArchiveError::Unreadable {
-                path: folder.to_owned(),
-                reason: first
-                    .map_or_else(|| "the bag lists no files".to_owned(), ToString::to_string),
-            });
+            return Err(none_of(folder, compressed, &damage));
         }
         let recordings = || parts.iter().map(|part| &part.recording);
         let start_ns = recordings().filter_map(Recording::start_ns).min();
@@ -251,15 +253,32 @@ impl Recording {
 /// The one topic of what is no bag.
 fn joint_states(name: &str, message_count: u64) -> Topics {
     let mut topics = Topics::default();
-    topics.add(Topic {
+    let topic = Topic {
         name: name.to_owned(),
         type_name: JointState::TYPE.to_owned(),
         message_encoding: "cdr".to_owned(),
         type_hash: Some(JointState::TYPE_HASH.to_owned()),
         offered_qos: None,
         message_count,
-    });
+    };
+    topics.add_stored(topic, "");
     topics
+}
+
+/// The error for a bag with no file that can be opened: the compressed ones come first, because the user can unpack them.
+fn none_of(folder: &Path, mut compressed: Vec<ArchiveError>, damage: &[Damage]) -> ArchiveError {
+    let count = compressed.len();
+    if let Some(mut error) = compressed.drain(..).next() {
+        if let ArchiveError::Compressed { others, .. } = &mut error {
+            *others = count - 1;
+        }
+        return error;
+    }
+    let first = damage.iter().find(|damage| damage.loses_data());
+    ArchiveError::Unreadable {
+        path: folder.to_owned(),
+        reason: first.map_or_else(|| "the bag lists no files".to_owned(), ToString::to_string),
+    }
 }
 
 /// A file of a bag that cannot be opened.

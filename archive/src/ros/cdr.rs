@@ -22,7 +22,7 @@ pub enum DecodeError {
         len: usize,
     },
     /// Some other encoding than plain CDR.
-    #[error("encapsulation {0:02x} {1:02x} is not plain CDR (00 00 or 00 01)", .id[0], .id[1])]
+    #[error("{}", of_encapsulation(*id))]
     Encapsulation {
         /// The first two bytes.
         id: [u8; 2],
@@ -54,15 +54,59 @@ pub enum DecodeError {
         nanosec: u32,
     },
     /// An array that does not fit the names.
-    #[error("{array} has {len} entries for {names} names")]
+    #[error("`{array}` has {} for {}", counted(*len, ENTRY), counted(*names, NAME))]
     ArrayLength {
-        /// Which array.
+        /// Name of the array.
         array: &'static str,
-        /// Its entries.
+        /// Number of its entries.
         len: usize,
-        /// The names there are.
+        /// Number of names.
         names: usize,
     },
+    /// Values without any name.
+    #[error("`name` is empty, but `{array}` has {}: their joints are unknown", counted(*len, ENTRY))]
+    NoNames {
+        /// Name of the array.
+        array: &'static str,
+        /// Number of its entries.
+        len: usize,
+    },
+    /// A compressed message that cannot be decompressed.
+    #[error(
+        "the message is compressed with Zstandard and cannot be decompressed ({reason}): \
+         record without message compression"
+    )]
+    Compressed {
+        /// Reason.
+        reason: &'static str,
+    },
+    /// Not a ROS 1 message of its type.
+    #[error("the {len} bytes are not a {type_name} in the encoding of ROS 1")]
+    Ros1 {
+        /// Bytes there are.
+        len: usize,
+        /// Type of the topic.
+        type_name: &'static str,
+    },
+}
+
+/// Singular and plural.
+const ENTRY: [&str; 2] = ["entry", "entries"];
+const NAME: [&str; 2] = ["name", "names"];
+
+fn counted(count: usize, [one, many]: [&str; 2]) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
+}
+
+fn of_encapsulation([first, second]: [u8; 2]) -> String {
+    let known = match [first, second] {
+        [0x28, 0xb5] => ", but compressed with Zstandard",
+        [b'{', _] => ", but perhaps JSON",
+        _ => "",
+    };
+    format!(
+        "the message begins with {first:02x} {second:02x}: it is not plain CDR (00 00 or 00 01){known}"
+    )
 }
 
 /// Why a message cannot be written.

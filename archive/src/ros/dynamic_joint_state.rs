@@ -149,14 +149,14 @@ mod tests {
         let words = |message: &DynamicJointState| message.check().map_err(|e| e.to_string());
         assert_eq!(
             words(&message),
-            Err("interface_values has 0 entries for 1 names".to_owned())
+            Err("`interface_values` has 0 entries for 1 name".to_owned())
         );
         message.interface_values = vec![interfaces(&[("position", 1.0)])];
         assert_eq!(words(&message), Ok(()));
         message.interface_values[0].values.push(2.0);
         assert_eq!(
             words(&message),
-            Err("values has 2 entries for 1 names".to_owned())
+            Err("`values` has 2 entries for 1 name".to_owned())
         );
     }
 }

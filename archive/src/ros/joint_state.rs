@@ -42,6 +42,9 @@ impl Message for JointState {
             ("velocity", self.velocity.len()),
             ("effort", self.effort.len()),
         ] {
+            if len != 0 && self.name.is_empty() {
+                return Err(DecodeError::NoNames { array, len });
+            }
             if len != 0 && len != self.name.len() {
                 return Err(DecodeError::ArrayLength {
                     array,

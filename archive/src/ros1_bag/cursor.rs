@@ -7,7 +7,6 @@ use std::sync::Arc;
 
 use super::Ros1Bag;
 use super::chunk::Unpacker;
-use super::convert::{Conversion, Converter};
 use super::record::{Inner, Records, inner_records, op};
 use crate::chunks::{ChunkCursor, Chunks, Entry, Loaded, Order, Place};
 use crate::damage::DamageKind;
@@ -28,13 +27,12 @@ pub(crate) fn ros1_cursor(
     topic: impl Fn(u32) -> Option<usize>,
 ) -> Result<ChunkCursor<Ros1Chunks>, ArchiveError> {
     let file = File::open(&bag.path).map_err(ArchiveError::io(&bag.path))?;
-    let connections = bag.connections.iter().map(|(&number, connection)| {
-        let topic = topic(number).map(|topic| (topic as u32, connection.conversion()));
-        (number, topic)
-    });
+    let connections = bag
+        .connections
+        .keys()
+        .map(|&number| (number, topic(number).map(|topic| topic as u32)));
     let lister = Lister {
         connections: connections.collect(),
-        converter: Converter::default(),
     };
     let wanted = |number: &u32| {
         // A connection that nobody declared is damage to be told.
@@ -98,15 +96,13 @@ impl Chunks for Ros1Chunks {
 
 /// Puts messages into a chunk's list.
 struct Lister {
-    /// What the owner calls each connection's topic, and how its messages become those of ROS 2; `None` if it is not
-    /// wanted.
-    connections: BTreeMap<u32, Option<(u32, Option<Conversion>)>>,
-    converter: Converter,
+    /// Topic number of each connection; `None` for an unwanted topic.
+    connections: BTreeMap<u32, Option<u32>>,
 }
 
 impl Lister {
     /// Lists a record if it is a wanted message; `Err` if it makes no sense, in words.
-    fn list(&mut self, record: &Inner<'_>, loaded: &mut Loaded) -> Result<(), String> {
+    fn list(&self, record: &Inner<'_>, loaded: &mut Loaded) -> Result<(), String> {
         if record.header.op() != Some(op::MESSAGE) {
             return Ok(());
         }
@@ -116,17 +112,11 @@ impl Lister {
         let time_ns = time_ns.ok_or("a message without a time")?;
         let topic = self.connections.get(&number);
         let topic = topic.ok_or_else(|| format!("message on undeclared connection {number}"))?;
-        let Some((topic, conversion)) = *topic else {
+        let Some(topic) = *topic else {
             return Ok(());
         };
         let body_at = loaded.records.len();
-        match conversion {
-            Some(conversion) => {
-                let body = self.converter.convert(conversion, record.data)?;
-                loaded.records.extend_from_slice(body);
-            }
-            None => loaded.records.extend_from_slice(record.data),
-        }
+        loaded.records.extend_from_slice(record.data);
         loaded.messages.push(Entry {
             log_time: time_ns,
             publish_time: time_ns,

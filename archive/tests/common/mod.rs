@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use std::collections::BTreeMap;
+use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -41,6 +42,31 @@ pub fn write(path: &Path, compression: Compression, count: i64) -> PathBuf {
         }
     }
     writer.finish().unwrap().path
+}
+
+/// Writes bodies as they are to `/joint_states`. `kind` is the name of the schema, its encoding and the encoding of the
+/// messages; without a name there is no schema.
+pub fn mcap_of(path: &Path, kind: [&str; 3], bodies: &[Vec<u8>]) {
+    let [name, schema, encoding] = kind;
+    let mut writer = mcap::Writer::new(fs::File::create(path).unwrap()).unwrap();
+    let schema = match name {
+        "" => 0,
+        name => writer.add_schema(name, schema, b"a text").unwrap(),
+    };
+    let none = BTreeMap::new();
+    let channel = writer.add_channel(schema, "/joint_states", encoding, &none);
+    let channel_id = channel.unwrap();
+    for (i, body) in (0..).zip(bodies) {
+        let ns = (START_NS + i * PERIOD_NS) as u64;
+        let header = mcap::records::MessageHeader {
+            channel_id,
+            sequence: 0,
+            log_time: ns,
+            publish_time: ns,
+        };
+        writer.write_to_known_channel(&header, body).unwrap();
+    }
+    writer.finish().unwrap();
 }
 
 /// A message with its bytes copied.
