@@ -315,30 +315,6 @@ fn each_fault_is_refused_by_name_and_line() {
 }
 
 #[test]
-fn a_fixed_joint_may_have_any_axis_and_limits() {
-    let weld = "<joint name=\"weld\" type=\"fixed\"><parent link=\"left\"/><child link=\"hand\"/>";
-    let plain = Model::from_urdf(&robot()).unwrap();
-    for rest in [
-        "<axis xyz='0 0 0'/>",
-        "<axis xyz='0 0'/>",
-        "<axis xyz=''/>",
-        "<axis/>",
-        "<axis xyz='a b c'/><limit lower='-' upper='none' effort='' velocity='NaN'/>",
-        "<limit/>\n<mimic joint='nothing' multiplier='x'/>",
-        "<dynamics damping='?'/><calibration rising='?'/><safety_controller k_velocity='?'/>",
-    ] {
-        let xml = robot().replacen(weld, &format!("{weld}{rest}"), 1);
-        let model = Model::from_urdf(&xml).unwrap_or_else(|error| panic!("{rest}: {error}"));
-        assert_eq!(model.links(), plain.links(), "{rest}");
-        assert_eq!(model.joints(), plain.joints(), "{rest}");
-    }
-    // Errors behind such an element keep their lines.
-    let xml = robot().replacen(weld, &format!("{weld}<limit\nlower='-'/>"), 1);
-    let xml = xml.replacen("<link name=\"left\">", "<link>", 1);
-    assert!(refusal(&xml).starts_with("line 30: link ``"));
-}
-
-#[test]
 fn masses_must_be_there_and_not_below_zero() {
     let xml = robot();
     let (head, tail) = xml.split_once("<link name=\"hand\">").unwrap();

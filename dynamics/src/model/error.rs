@@ -35,7 +35,10 @@ pub enum ModelError {
         found: String,
     },
     /// The document is of another kind.
-    #[error("line {line}: the document is a <{found}>, a URDF is a <robot>{}", conversion(found))]
+    #[error(
+        "line {line}: the document is a <{found}>, a URDF is a <robot>{}",
+        conversion(found)
+    )]
     NotARobot {
         /// Line.
         line: u32,
