@@ -59,7 +59,8 @@ pub use inertia::{Inertia, PARAMETERS_PER_BODY};
 pub use inertial_effort::InertialEffort;
 pub use kinematics::{forward_kinematics, link_jacobian, link_pose, point_jacobian};
 pub use model::{
-    Follower, Geometry, Joint, JointKind, Limits, Link, Model, ModelError, Shape, fix_joints,
+    BodyFault, BodyFinding, BodyPlace, BodySeverity, Follower, Geometry, Joint, JointKind, Limits,
+    Link, Model, ModelError, Shape, Substitute, check_bodies, fix_joints, with_plausible_bodies,
 };
 pub use regressor::regressor;
 pub use rnea::{gravity_effort, rnea};

@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use crate::inertia::Inertia;
 
+mod consistency;
 mod document;
 mod error;
 mod fix;
@@ -12,6 +13,10 @@ mod shape;
 mod tree;
 mod urdf;
 
+pub use consistency::{
+    BodyFault, BodyFinding, BodyPlace, BodySeverity, Substitute, check_bodies,
+    with_plausible_bodies,
+};
 pub use error::ModelError;
 pub use fix::fix_joints;
 pub use shape::{Geometry, Shape};

@@ -199,13 +199,25 @@ fn what_is_no_urdf_is_told_apart() {
     );
     assert_eq!(
         refusal("<?xml version='1.0'?>\n<sdf version='1.9'/>"),
-        "line 2: the document is a <sdf>, a URDF is a <robot>"
+        "line 2: the document is a <sdf>, a URDF is a <robot>; SDF is not read: give the URDF or xacro file that the \
+         model was made from (`gz sdf -p` only converts URDF to SDF)"
+    );
+    assert_eq!(
+        refusal("<mujoco model='arm'>\n<worldbody/></mujoco>"),
+        "line 1: the document is a <mujoco>, a URDF is a <robot>; MJCF must be converted first: `pip install \
+         mjcf-urdf-simple-converter`, then `python3 -c 'from mjcf_urdf_simple_converter import convert; \
+         convert(\"FILE.xml\", \"FILE.urdf\")'` (hinge joints only)"
+    );
+    assert_eq!(
+        refusal("<html/>"),
+        "line 1: the document is a <html>, a URDF is a <robot>"
     );
     let xacro =
         "<robot name='r' xmlns:xacro='http://www.ros.org/wiki/xacro'>\n<xacro:arm/></robot>";
     assert_eq!(
         refusal(xacro),
-        "line 2: `<xacro:arm>` is xacro, not URDF; expand it first: `xacro FILE.xacro > FILE.urdf`"
+        "line 2: `<xacro:arm>` is xacro, not URDF; expand it first: `xacro FILE.xacro > FILE.urdf` (with ROS 2: \
+         `ros2 run xacro xacro FILE.xacro > FILE.urdf`)"
     );
     assert!(refusal("<robot name='r'>\n<xacro:arm/></robot>").starts_with("line 2: `xacro:` is"));
     let expression = robot().replace("velocity=\"3\"", "velocity=\"${pi}\"");

@@ -4,6 +4,9 @@
 //! in a vector, and reads an unexpanded xacro as a robot without links. So the XML is looked at
 //! first.
 
+use std::borrow::Cow;
+use std::ops::Range;
+
 use roxmltree::{Document, Error, Node, ParsingOptions};
 
 use super::ModelError;
@@ -201,9 +204,56 @@ const NUMBERS: &[(&str, &[&str], usize)] = &[
     ("limit", &["lower", "upper", "velocity", "effort"], 1),
 ];
 
+/// Elements of a joint that describe its motion. A fixed joint has none, so that any content is allowed there: exporters
+/// leave a zero or an empty axis behind.
+const OF_MOTION: &[&str] = &[
+    "axis",
+    "limit",
+    "mimic",
+    "dynamics",
+    "calibration",
+    "safety_controller",
+];
+
+/// Whether `node` is an element that has no meaning because its joint is fixed.
+fn is_unused(node: Node) -> bool {
+    let is_fixed = |joint: Node| {
+        joint.has_tag_name("joint") && joint.attribute("type").map(str::trim) == Some("fixed")
+    };
+    is_any(node, OF_MOTION) && node.parent().is_some_and(is_fixed)
+}
+
+/// The text with the axes, limits and the like of fixed joints blanked out, for the URDF reader, which refuses a limit
+/// that is not a number. Lines stay where they are.
+///
+/// # Errors
+/// If the text is not XML, or larger than any robot.
+pub(super) fn without_unused(xml: &str) -> Result<Cow<'_, str>, ModelError> {
+    let document = parse(xml)?;
+    let joints = elements(document.root_element()).filter(|node| node.has_tag_name("joint"));
+    let unused: Vec<Range<usize>> = joints
+        .flat_map(elements)
+        .filter(|node| is_unused(*node))
+        .map(|node| node.range())
+        .collect();
+    if unused.is_empty() {
+        return Ok(Cow::Borrowed(xml));
+    }
+    let mut text = xml.to_owned();
+    for place in unused {
+        let blank: String = xml[place.clone()]
+            .bytes()
+            .map(|byte| if byte == b'\n' { '\n' } else { ' ' })
+            .collect();
+        text.replace_range(place, &blank);
+    }
+    Ok(Cow::Owned(text))
+}
+
 /// Checks the numbers of a link or joint.
 fn check_numbers(part: Node) -> Result<(), ModelError> {
-    for node in part.descendants().filter(Node::is_element) {
+    let used = |node: &Node| node.is_element() && !is_unused(*node);
+    for node in part.descendants().filter(used) {
         let tag = node.tag_name().name();
         let Some((_, attributes, count)) = NUMBERS.iter().find(|(name, ..)| *name == tag) else {
             continue;
@@ -267,6 +317,7 @@ fn is_any(node: Node, names: &[&str]) -> bool {
     names.iter().any(|name| node.has_tag_name(*name))
 }
 
-fn line(node: Node) -> u32 {
+/// Line of an element, from 1.
+pub(super) fn line(node: Node) -> u32 {
     node.document().text_pos_at(node.range().start).row
 }

@@ -25,7 +25,8 @@ pub enum ModelError {
     },
     /// The text is a xacro template.
     #[error(
-        "line {line}: `{found}` is xacro, not URDF; expand it first: `xacro FILE.xacro > FILE.urdf`"
+        "line {line}: `{found}` is xacro, not URDF; expand it first: `xacro FILE.xacro > FILE.urdf` (with ROS 2: \
+         `ros2 run xacro xacro FILE.xacro > FILE.urdf`)"
     )]
     Xacro {
         /// Line.
@@ -34,7 +35,10 @@ pub enum ModelError {
         found: String,
     },
     /// The document is of another kind.
-    #[error("line {line}: the document is a <{found}>, a URDF is a <robot>")]
+    #[error(
+        "line {line}: the document is a <{found}>, a URDF is a <robot>{}",
+        conversion(found)
+    )]
     NotARobot {
         /// Line.
         line: u32,
@@ -188,6 +192,22 @@ pub enum ModelError {
         /// The links it moves, up to the next movable joint.
         links: Vec<String>,
     },
+}
+
+/// Advice on how to get a URDF from a robot description of another format, by the document's outermost element.
+fn conversion(root: &str) -> &'static str {
+    match root {
+        // Version 0.7.3 of the package converts hinge joints and inertias, and has no command of its own.
+        "mujoco" => {
+            "; MJCF must be converted first: `pip install mjcf-urdf-simple-converter`, then `python3 -c 'from \
+             mjcf_urdf_simple_converter import convert; convert(\"FILE.xml\", \"FILE.urdf\")'` (hinge joints only)"
+        }
+        "sdf" => {
+            "; SDF is not read: give the URDF or xacro file that the model was made from (`gz sdf -p` only converts \
+             URDF to SDF)"
+        }
+        _ => "",
+    }
 }
 
 fn list(names: &[String]) -> String {

@@ -73,7 +73,7 @@ pub(super) fn build(robot: Robot) -> Result<Model, ModelError> {
 }
 
 /// The joint that each link is the child of.
-fn parent_joints(robot: &Robot) -> Result<Vec<Option<usize>>, ModelError> {
+pub(super) fn parent_joints(robot: &Robot) -> Result<Vec<Option<usize>>, ModelError> {
     let mut parents: Vec<Option<usize>> = vec![None; robot.links.len()];
     for (index, joint) in robot.joints.iter().enumerate() {
         if let Some(first) = parents[joint.child].replace(index) {
@@ -89,7 +89,10 @@ fn parent_joints(robot: &Robot) -> Result<Vec<Option<usize>>, ModelError> {
 }
 
 /// The links in an order in which parents come first, and otherwise as in the document.
-fn parents_first(robot: &Robot, parents: &[Option<usize>]) -> Result<Vec<usize>, ModelError> {
+pub(super) fn parents_first(
+    robot: &Robot,
+    parents: &[Option<usize>],
+) -> Result<Vec<usize>, ModelError> {
     let links = 0..robot.links.len();
     let roots: Vec<usize> = links
         .clone()

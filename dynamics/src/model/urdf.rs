@@ -22,6 +22,8 @@ pub(super) struct RawLink {
     pub name: String,
     pub inertia: Inertia,
     pub shapes: Vec<Shape>,
+    /// Its `<collision>` elements.
+    pub collisions: Vec<Shape>,
 }
 
 /// A joint, fixed or not.
@@ -123,7 +125,8 @@ pub(super) struct Follows {
 /// What is wrong with it, or with a link or joint taken by itself.
 pub(super) fn read(xml: &str) -> Result<Robot, ModelError> {
     let marks = document::inspect(xml)?;
-    let robot = urdf_rs::read_from_string(xml).map_err(|error| document::blame(xml, &error))?;
+    let used = document::without_unused(xml)?;
+    let robot = urdf_rs::read_from_string(&used).map_err(|error| document::blame(&used, &error))?;
     let mut indices: BTreeMap<String, usize> = BTreeMap::new();
     let mut links = Vec::with_capacity(robot.links.len());
     for (index, (link, &line)) in robot.links.into_iter().zip(&marks.link_lines).enumerate() {
@@ -174,10 +177,15 @@ fn read_link(link: urdf_rs::Link, line: u32) -> Result<RawLink, ModelError> {
         origin: pose(&visual.origin),
         geometry: geometry(visual.geometry),
     });
+    let collisions = link.collision.into_iter().map(|collision| Shape {
+        origin: pose(&collision.origin),
+        geometry: geometry(collision.geometry),
+    });
     Ok(RawLink {
         name: link.name,
         inertia: inertia.transformed(&pose(&inertial.origin)),
         shapes: shapes.collect(),
+        collisions: collisions.collect(),
     })
 }
 
