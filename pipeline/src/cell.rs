@@ -25,6 +25,8 @@ pub struct Cell {
     pub facts: CellFacts,
     /// The robot.
     pub model: Option<Model>,
+    /// Findings about the robot's file, a sentence each.
+    pub findings: Vec<String>,
 }
 
 /// What a stage must know of its cell.
@@ -53,7 +55,11 @@ impl Cell {
     /// If the URDF is not one, which the check of the file had excluded.
     pub fn from_facts(facts: CellFacts) -> Result<Self, tauscope_dynamics::ModelError> {
         let model = facts.urdf.as_deref().map(Model::from_urdf).transpose()?;
-        Ok(Self { facts, model })
+        Ok(Self {
+            facts,
+            model,
+            findings: Vec::new(),
+        })
     }
 
     /// A cell of the robot at `path`, without a pipeline file; `constants` by joint \[N m/A\], none where they are not
@@ -67,13 +73,13 @@ impl Cell {
         constants: &BTreeMap<String, f64>,
         problem: &dyn Fn(ConstantSpot<'_>, String) -> Problem,
     ) -> Result<Self, Report> {
-        let (urdf, model) =
-            urdf::read(path).map_err(|error| Problem::of_file(path, error.to_string()))?;
-        let joint_names = model.joint_names().map(str::to_owned).collect();
-        let name = model.name().to_owned();
+        let robot = urdf::read(path).map_err(|error| Problem::of_file(path, error.to_string()))?;
+        let joint_names = robot.model.joint_names().map(str::to_owned).collect();
+        let name = robot.model.name().to_owned();
         let mut cell = Self::from_joints(name, joint_names, effort_unit, constants, problem)?;
-        cell.facts.urdf = Some(urdf);
-        cell.model = Some(model);
+        cell.facts.urdf = Some(robot.urdf);
+        cell.model = Some(robot.model);
+        cell.findings = robot.findings;
         Ok(cell)
     }
 
@@ -105,7 +111,11 @@ impl Cell {
             tool: None,
             impedance: None,
         };
-        report.into_result(Self { facts, model: None })
+        report.into_result(Self {
+            facts,
+            model: None,
+            findings: Vec::new(),
+        })
     }
 
     /// The same cell with those joints fixed that are not `recorded`, and what is said of it; see [`Fixed::unrecorded`].

@@ -29,12 +29,15 @@ impl ScenarioFacts {
         let file = yaml::load::<Scenario>(path)?;
         let place = Place::root().key("robot");
         let robot = file.resolve(&file.value.robot);
-        let (urdf, _) = urdf::read(&robot).map_err(|error| file.at(&place, error.to_string()))?;
+        let robot = urdf::read(&robot).map_err(|error| file.at(&place, error.to_string()))?;
         let mut scenario = file.value.clone();
         for path in scenario.paths_mut() {
             *path = file.resolve(path);
         }
-        Ok(Self { scenario, urdf })
+        Ok(Self {
+            scenario,
+            urdf: robot.urdf,
+        })
     }
 
     /// What a simulated source is made of.

@@ -1,9 +1,22 @@
-//! A robot's URDF, read from its file.
+//! A robot file, read and checked: the one way in which commands open a robot.
 
 use std::path::Path;
 
 use tauscope_archive::file_kind;
-use tauscope_dynamics::{Model, ModelError};
+use tauscope_dynamics::{
+    BodyFinding, BodySeverity, Model, ModelError, check_bodies, with_plausible_bodies,
+};
+
+/// A robot, and what is odd or wrong about its file.
+#[derive(Debug, Clone)]
+pub struct Robot {
+    /// The URDF; impossible inertias are replaced by those of uniform bodies.
+    pub urdf: String,
+    /// The robot of that URDF.
+    pub model: Model,
+    /// Findings about its bodies, a sentence each.
+    pub findings: Vec<String>,
+}
 
 /// Why there is no robot.
 #[derive(Debug, thiserror::Error)]
@@ -20,11 +33,11 @@ pub enum UrdfError {
 /// Resolution: bounds memory.
 const MAX_BYTES: u64 = 16 << 20;
 
-/// The text and the robot at `path`.
+/// The robot at `path`, with the findings about its file.
 ///
 /// # Errors
 /// If there is no such file, it is of another kind, or the robot cannot be used.
-pub fn read(path: &Path) -> Result<(String, Model), UrdfError> {
+pub fn read(path: &Path) -> Result<Robot, UrdfError> {
     let large = std::fs::metadata(path).map_or(0, |file| file.len());
     if large > MAX_BYTES {
         let path = path.display();
@@ -39,6 +52,22 @@ pub fn read(path: &Path) -> Result<(String, Model), UrdfError> {
             (_, None) => format!("{}: {error}", path.display()),
         })
     })?;
+    // What is wrong with links and joints comes before what is odd about bodies.
     let model = Model::from_urdf(&text)?;
-    Ok((text, model))
+    let findings = check_bodies(&text)?;
+    let sentences = findings.iter();
+    let sentences = sentences.map(|finding| format!("{}: {finding}", path.display()));
+    let is_impossible = |finding: &BodyFinding| finding.severity == BodySeverity::Impossible;
+    let (urdf, model) = if findings.iter().any(is_impossible) {
+        let urdf = with_plausible_bodies(&text, &findings)?;
+        let model = Model::from_urdf(&urdf)?;
+        (urdf, model)
+    } else {
+        (text, model)
+    };
+    Ok(Robot {
+        urdf,
+        model,
+        findings: sentences.collect(),
+    })
 }

@@ -77,7 +77,7 @@ impl Told<'_> {
             self.recordings.len()
         )];
         sentences.extend(request.note.clone());
-        sentences.extend(request.robot_findings.iter().cloned());
+        sentences.extend(cell.findings.iter().cloned());
         sentences.extend(coupled(cell));
         sentences.extend(unlimited(cell));
         for recording in &input.fit {

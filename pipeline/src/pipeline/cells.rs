@@ -36,9 +36,9 @@ struct Resolver<'a> {
 impl Resolver<'_> {
     fn resolve(&self, name: &str) -> Result<Cell, Report> {
         let mut report = Report::default();
-        let (urdf, model) = match self.robot() {
-            Ok(Some((text, model))) => (Some(text), Some(model)),
-            Ok(None) => (None, None),
+        let (urdf, model, findings) = match self.robot() {
+            Ok(Some(robot)) => (Some(robot.urdf), Some(robot.model), robot.findings),
+            Ok(None) => (None, None, Vec::new()),
             Err(problem) => return Err(problem.into()),
         };
         let joint_names = self.joint_names(model.as_ref(), &mut report);
@@ -53,10 +53,14 @@ impl Resolver<'_> {
             tool: self.entry.tool.clone(),
             impedance: self.entry.impedance,
         };
-        report.into_result(Cell { facts, model })
+        report.into_result(Cell {
+            facts,
+            model,
+            findings,
+        })
     }
 
-    fn robot(&self) -> Result<Option<(String, Model)>, Problem> {
+    fn robot(&self) -> Result<Option<urdf::Robot>, Problem> {
         let Some(robot) = &self.entry.robot else {
             return Ok(None);
         };

@@ -22,7 +22,9 @@ impl Pipeline {
         for (name, cell) in &self.cells {
             let joints = cell.model.iter().flat_map(Model::joints);
             let remarks = joints.filter_map(Joint::remark);
-            warnings.extend(remarks.map(|remark| format!("cell `{name}`: {remark}")));
+            let findings = cell.findings.iter().cloned();
+            let all = findings.chain(remarks);
+            warnings.extend(all.map(|remark| format!("cell `{name}`: {remark}")));
         }
         for stage in self.stages.iter().filter(here) {
             let Settings::Detect { config, model } = &stage.settings else {

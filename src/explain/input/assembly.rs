@@ -11,6 +11,7 @@ use tauscope_pipeline::cell::{
 };
 use tauscope_pipeline::provenance::sha256_of_file;
 use tauscope_pipeline::report::{Problem, Report};
+use tauscope_pipeline::urdf::Robot;
 use tauscope_pipeline::{urdf, yaml};
 use tauscope_session::{Joints, Look, SessionError};
 use tauscope_twin::TwinFile;
@@ -74,6 +75,10 @@ impl Assembly<'_> {
         report.into_result(())?;
 
         let mut report = Report::default();
+        let (robot, findings) = match robot {
+            Some(robot) => (Some((robot.urdf, robot.model)), robot.findings),
+            None => (None, Vec::new()),
+        };
         let known = robot.as_ref().map(|(_, model)| model).or(self.model.as_ref());
         let known: Vec<String> = match (known, &self.joint_names) {
             (Some(model), _) => model.joint_names().map(str::to_owned).collect(),
@@ -110,7 +115,11 @@ impl Assembly<'_> {
         };
         report.into_result(Request {
             case: name,
-            cell: Cell { facts, model },
+            cell: Cell {
+                facts,
+                model,
+                findings,
+            },
             robot_path: self.robot,
             state_topic: look.topic,
             twin_topic: self.twin_topic,
@@ -179,7 +188,7 @@ impl Assembly<'_> {
         (fit, holdout)
     }
 
-    fn robot(&self, report: &mut Report) -> Option<(String, Model)> {
+    fn robot(&self, report: &mut Report) -> Option<Robot> {
         let path = self.robot.as_ref()?;
         match urdf::read(path) {
             Ok(robot) => Some(robot),

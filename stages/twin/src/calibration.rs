@@ -7,6 +7,8 @@
 use tauscope_bus::{TwinState, flags};
 use tauscope_dynamics::effort_scale::{self, Slope};
 
+use crate::twin_file::TwinFile;
+
 /// A joint faster than this moves: no encoder's noise is as much \[rad/s, m/s\].
 /// Physical: above the velocity noise of encoders.
 const MOVES: f64 = 0.03;

@@ -57,7 +57,7 @@ mod plain_zeros;
 mod stage;
 mod twin_file;
 
-pub use calibration::{Calibration, JointFit, spread_scale, telling_slopes};
+pub use calibration::{Calibration, JointFit, spread_scale, telling_slopes, telling_slopes_of};
 pub use config::{Config, Expected, Motion};
 pub use stage::{Setup, Twin, TwinError};
 pub use twin_file::{
