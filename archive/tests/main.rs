@@ -4,6 +4,7 @@ mod bags;
 mod cdr;
 mod common;
 mod csv;
+mod csv_recognised;
 mod damage;
 mod hostile_tables;
 mod info;
