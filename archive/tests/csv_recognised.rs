@@ -1,4 +1,4 @@
-//! What is recognised in tables: columns, delimiters, units and time.
+//! Tables whose columns, delimiters, units and time are recognised.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -365,7 +365,7 @@ fn decimal_commas_are_reported() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// The same numbers are read from a table with decimal commas as from one with points, for any delimiter.
+    /// A table with decimal commas has the same numbers as one with points, for any delimiter.
     #[test]
     fn decimal_commas_are_read_as_points(
         numbers in prop::collection::vec((0.001..0.1_f64, -1e9..1e9_f64, prop::num::f64::NORMAL), 1..20),

@@ -1,9 +1,9 @@
-//! Layouts that a header tells by itself: `NAME.position`, `NAME.velocity`, `NAME.effort`, and similar ones.
+//! Layouts that are recognised by the header: `NAME.position`, `NAME.velocity`, `NAME.effort`, and similar ones.
 
 use super::units::{Quantity, split};
 use super::{Column, Columns, CsvMapping};
 
-/// Where a header cell has the name of the joint and the word for the quantity.
+/// Order of the joint's name and the word for the quantity in a header cell.
 #[derive(Clone, Copy)]
 enum Form {
     /// `NAME.position`.
@@ -75,13 +75,13 @@ const LIKELY: [(Quantity, &[&str]); 3] = [
     ),
 ];
 
-/// What a header tells.
+/// Layout of a table by its header.
 pub(super) enum Layout {
-    /// All that is needed, and a sentence that says how it was recognised.
+    /// The mapping, and a sentence that says how it was recognised.
     Known(Box<CsvMapping>, String),
-    /// Columns of positions, but not all that is needed.
+    /// Columns of positions without a time, the names of joints, or columns of some joints.
     Nearly {
-        /// What is missing.
+        /// Reason why the header is not enough.
         reason: String,
         /// The text of a columns file that describes the table, as far as it is known.
         columns: String,

@@ -28,22 +28,18 @@ impl Numbers {
         if text.is_empty() {
             return Some(f64::NAN);
         }
-        let (number, sign) = match text.split_once(',') {
-            None => (
-                text.parse().ok()?,
-                text.contains('.').then_some(Sign::Point),
-            ),
-            Some((whole, rest)) if self.may_have_commas && !text.contains('.') => {
-                (format!("{whole}.{rest}").parse().ok()?, Some(Sign::Comma))
-            }
-            Some(_) => return None,
-        };
-        if let Some(sign) = sign {
-            // `1,234` among decimal points is one thousand, or a slip.
-            let settled = *self.sign.get_or_insert(sign);
-            return (settled == sign).then_some(number);
+        if !self.may_have_commas {
+            return text.parse().ok();
         }
-        Some(number)
+        let (number, sign) = match text.split_once(',') {
+            None if text.contains('.') => (text.parse().ok()?, Sign::Point),
+            None => return text.parse().ok(),
+            Some(_) if text.contains('.') => return None,
+            Some((whole, rest)) => (format!("{whole}.{rest}").parse().ok()?, Sign::Comma),
+        };
+        // `1,234` among decimal points is one thousand, or a slip.
+        let settled = *self.sign.get_or_insert(sign);
+        (settled == sign).then_some(number)
     }
 
     pub(super) fn have_commas(&self) -> bool {

@@ -3,7 +3,7 @@
 use super::mapping::Found;
 use super::units::{self, Dimension, Quantity, Unit};
 
-/// What a header says of units.
+/// Factors to the units of joint states, by the header.
 #[derive(Debug, Default)]
 pub(super) struct Scales {
     /// Factor of each column of a position.
@@ -14,7 +14,7 @@ pub(super) struct Scales {
     pub(super) effort: Vec<f64>,
     /// Unit of the time \[ns\].
     pub(super) time_unit_ns: Option<u64>,
-    /// What is converted, in sentences.
+    /// Sentences on the conversions.
     pub(super) remarks: Vec<String>,
 }
 

@@ -1,4 +1,4 @@
-//! The time of a row: dates, or numbers whose unit a columns file, the header, or the motion of the arm tells.
+//! The time of a row: a date, or a number whose unit follows from a columns file, the header, or the motion of the arm.
 
 use jiff::Timestamp;
 use jiff::civil::DateTime;
@@ -30,10 +30,10 @@ const YEAR_2000_S: f64 = 946_684_800.0;
 /// Resolution: bounds memory.
 const MAX_STEPS: usize = 1000;
 
-/// Tells the time of a cell.
+/// Format of the time's cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Clock {
-    /// Numbers of units that have so many nanoseconds.
+    /// Numbers in this unit \[ns\].
     Numbers { unit_ns: u64 },
     /// Dates of ISO 8601.
     Dates,

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-/// What a column holds.
+/// Quantity in a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Quantity {
     Time,
