@@ -13,6 +13,7 @@ mod number;
 mod records;
 mod rows;
 mod scales;
+mod survey;
 mod time;
 mod units;
 
@@ -81,7 +82,7 @@ impl CsvTable {
             times_ns: None,
             damage: Vec::new(),
         };
-        let (clock, clock_remark) = Clock::of(table.open()?, mapping.time_unit_ns);
+        let (clock, clock_remark) = survey::clock_of(table.open()?, mapping.time_unit_ns);
         table.clock = clock;
         let mut rows = table.open()?;
         loop {

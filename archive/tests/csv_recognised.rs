@@ -314,7 +314,7 @@ fn broken_positions_do_not_hide_the_unit_of_time() {
     let table = swinging(0.0, 0.002, 1e-3) + "6000,1e300\n6002,nan\n6004,0.1\n";
     let opened = by_name(&table);
     assert_eq!(opened.span_ns(), 6_004_000_000);
-    opened.says("Time is in ms: as seconds the arm would move at most");
+    opened.says("Time is in ms: as seconds the arm would move at most 0.001 rad/s.");
 }
 
 #[test]
