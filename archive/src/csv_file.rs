@@ -1,14 +1,21 @@
 //! Joint states from a table of numbers.
 //!
 //! A row is one instant. All of it is checked when it is opened, so that a broken table is refused
-//! before anything is started; the rows are then read again as they are needed. What no robot arm
-//! does is taken for garbage: see [`limits`].
+//! before anything is started; the rows are then read again as they are needed. Columns, units and time are
+//! recognised by the header and the numbers, and reported in remarks.
 
 mod error;
 mod known;
+mod layout;
 mod lines;
 mod mapping;
+mod number;
+mod records;
 mod rows;
+mod scales;
+mod survey;
+mod time;
+mod units;
 
 use std::path::{Path, PathBuf};
 
@@ -21,18 +28,10 @@ use crate::damage::{Damage, DamageKind};
 use crate::error::ArchiveError;
 use crate::ros;
 use rows::{Row, Rows};
+use time::Clock;
 
-/// Beyond these a number in a table is taken for garbage.
+/// Beyond these a number in a table is refused.
 pub mod limits {
-    /// Of a position \[rad or m\].
-    /// Tuned: by hand, on no recorded seeds; not swept.
-    pub const POSITION: f64 = 1e6;
-    /// Of a velocity \[rad/s or m/s\].
-    /// Tuned: by hand, on no recorded seeds; not swept.
-    pub const VELOCITY: f64 = 1e6;
-    /// Of an effort \[N m, N or A\].
-    /// Tuned: by hand, on no recorded seeds; not swept.
-    pub const EFFORT: f64 = 1e6;
     /// Of a time: from zero to what a ROS stamp can hold \[s\].
     /// Physical: `builtin_interfaces/Time` holds seconds as an `int32`.
     pub const TIME_S: f64 = i32::MAX as f64;
@@ -47,6 +46,9 @@ pub(crate) struct CsvTable {
     path: PathBuf,
     mapping: CsvMapping,
     joints: Vec<String>,
+    clock: Clock,
+    /// Sentences on what was recognised.
+    pub(crate) remarks: Vec<String>,
     pub(crate) rows: u64,
     /// Time of the first and the last row \[ns\].
     pub(crate) times_ns: Option<(i64, i64)>,
@@ -55,11 +57,12 @@ pub(crate) struct CsvTable {
 
 impl CsvTable {
     /// Checks the table at `path`. `joints` are the names that the columns of a quantity stand for,
-    /// unless the mapping has its own.
+    /// unless the mapping has its own. `remark` says how the mapping was recognised.
     pub(crate) fn check(
         path: &Path,
         mapping: &CsvMapping,
         joints: &[String],
+        remark: Option<String>,
     ) -> Result<Self, ArchiveError> {
         let joints = mapping.joints.as_deref().unwrap_or(joints).to_vec();
         if joints.is_empty() {
@@ -73,10 +76,14 @@ impl CsvTable {
             path: path.to_owned(),
             mapping: mapping.clone(),
             joints,
+            clock: Clock::SECONDS,
+            remarks: remark.into_iter().collect(),
             rows: 0,
             times_ns: None,
             damage: Vec::new(),
         };
+        let (clock, clock_remark) = survey::clock_of(table.open()?, mapping.time_unit_ns);
+        table.clock = clock;
         let mut rows = table.open()?;
         loop {
             match rows.next_row()? {
@@ -92,15 +99,25 @@ impl CsvTable {
                         kind: DamageKind::TornTail,
                         readable_until_ns: table.times_ns.map(|(_, end_ns)| end_ns),
                     });
-                    return Ok(table);
+                    break;
                 }
-                Row::End => return Ok(table),
+                Row::End => break,
             }
         }
+        if let Some((start_ns, end_ns)) = table.times_ns
+            && start_ns == end_ns
+            && table.rows > 1
+        {
+            return Err(rows.clock_stands_still(table.rows, start_ns));
+        }
+        table.remarks.extend(clock_remark);
+        table.remarks.extend(rows.remarks());
+        Ok(table)
     }
 
     fn open(&self) -> Result<Rows, ArchiveError> {
-        Rows::open(&self.path, &self.mapping, &self.joints)
+        let rows = Rows::open(&self.path, &self.mapping, &self.joints)?;
+        Ok(rows.with_clock(self.clock))
     }
 
     pub(crate) fn cursor(&self) -> Result<CsvCursor, ArchiveError> {

@@ -145,9 +145,13 @@ impl Recording {
         &self.damage
     }
 
-    /// Remarks on how it was read, a sentence each.
+    /// Sentences on what was recognised when the recording was opened: columns, units and time of a CSV table. Empty
+    /// for other formats.
     pub fn remarks(&self) -> &[String] {
-        &[]
+        match &self.store {
+            Store::Csv(table) => &table.remarks,
+            _ => &[],
+        }
     }
 
     /// Whether its joint states can be compared with expected efforts of `joints`, as far as its format tells: a LeRobot

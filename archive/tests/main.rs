@@ -6,6 +6,7 @@ mod cdr;
 mod common;
 mod compressed;
 mod csv;
+mod csv_recognised;
 mod damage;
 mod encodings;
 mod hostile_tables;

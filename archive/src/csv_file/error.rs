@@ -39,27 +39,22 @@ pub enum CsvProblem {
         /// What stands there, shortened.
         text: String,
     },
-    /// A number that cannot be what the mapping takes it for.
-    #[error(
-        "column {column} ({what}): {text:?} is beyond any robot arm (the limit is {limit:e}): broken \
-         data, or the mapping names a wrong column"
-    )]
-    Implausible {
-        /// The column, from 1.
-        column: usize,
-        /// What the mapping takes it for.
-        what: String,
-        /// What stands there, shortened.
-        text: String,
-        /// What it may be at most.
-        limit: f64,
-    },
     /// No time from zero to what a stamp can hold.
     #[error(
-        "column {column} (time): {text:?} is not a time in seconds from 0 to {:e}",
+        "column {column} (time): {text:?} is not a time from 0 to {:e} s",
         super::limits::TIME_S
     )]
     Time {
+        /// The column, from 1.
+        column: usize,
+        /// What stands there, shortened.
+        text: String,
+    },
+    /// No date, in a table whose first time is a date.
+    #[error(
+        "column {column} (time): {text:?} is not a date and time such as 2026-11-28T20:20:24.123Z, from 1970 to 2038"
+    )]
+    Date {
         /// The column, from 1.
         column: usize,
         /// What stands there, shortened.
@@ -75,12 +70,37 @@ pub enum CsvProblem {
         /// The time above \[s\].
         before_s: f64,
     },
+    /// All rows have one time.
+    #[error(
+        "column {column} (time): all {rows} rows have the time {time_s} s: the clock stands still"
+    )]
+    ClockStandsStill {
+        /// The column, from 1.
+        column: usize,
+        /// Number of rows.
+        rows: u64,
+        /// Their time \[s\].
+        time_s: f64,
+    },
+    /// A quotation mark without its second one.
+    #[error("{}: a cell begins with a quotation mark, and the second mark is missing", place(*column))]
+    OpenQuote {
+        /// The column, from 1; `None` if it is not known.
+        column: Option<usize>,
+    },
     /// A line longer than any table of joints.
     #[error("a line of more than {limit} bytes: this is not a table")]
     LineTooLong {
         /// What it may be at most \[bytes\].
         limit: usize,
     },
+}
+
+fn place(column: Option<usize>) -> String {
+    column.map_or_else(
+        || "this line".to_owned(),
+        |column| format!("column {column}"),
+    )
 }
 
 /// A piece of a table as an error shows it.

@@ -1,24 +1,24 @@
-//! Which column is what in a table that was opened by its name alone: told by a file beside it, or by the header of a
-//! recorder that is known.
+//! The columns of a table that was opened by its name alone: by a file next to it, by the header of a known recorder,
+//! or by a header of a known layout.
 
-use std::fs::File;
-use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::{Path, PathBuf};
 
+use super::error::shown;
+use super::layout::Layout;
+use super::records::Records;
 use super::{Column, Columns, CsvMapping};
 use crate::error::ArchiveError;
 
 /// Ending of the file beside a table `NAME.csv` that holds its mapping: `NAME.columns.yaml`.
 const BESIDE: &str = "columns.yaml";
-/// A longer first line is no header \[bytes\].
-/// Physical: ten times the header of a recorder that writes every field of a UR controller.
-const LONGEST_HEADER: u64 = 1 << 17;
+/// Most header cells that an error shows.
+/// Chosen: those of a table of six joints.
+const SHOWN_CELLS: usize = 20;
 
 /// A recorder whose header is known.
 struct Recorder {
     /// Who writes such tables.
     name: &'static str,
-    delimiter: char,
     time: &'static str,
     time_unit_ns: u64,
     /// Name of the column of joint `{}`, counted from 0.
@@ -33,7 +33,6 @@ const RECORDERS: [Recorder; 2] = [
     // UniversalRobots/RTDE_Python_Client_Library, rtde/csv_writer.py. `actual_current` is in A.
     Recorder {
         name: "the RTDE recorder of Universal Robots",
-        delimiter: ' ',
         time: "timestamp",
         time_unit_ns: 1_000_000_000,
         position: "actual_q_{}",
@@ -51,7 +50,6 @@ const RECORDERS: [Recorder; 2] = [
     // frankaemika/libfranka, src/log.cpp, `logToCSV`: time in ms.
     Recorder {
         name: "libfranka's logToCSV",
-        delimiter: ',',
         time: "time",
         time_unit_ns: 1_000_000,
         position: "state.q[{}]",
@@ -70,17 +68,16 @@ const RECORDERS: [Recorder; 2] = [
 ];
 
 impl Recorder {
-    /// The mapping, if the first line names this recorder's columns.
-    fn mapping(&self, first_line: &str) -> Option<CsvMapping> {
-        let names: Vec<&str> = first_line.split(self.delimiter).map(str::trim).collect();
+    /// The mapping, if the header names this recorder's columns.
+    fn mapping(&self, header: &[String]) -> Option<CsvMapping> {
         let all = |pattern: &str| {
             let names =
                 (0..self.joints.len()).map(|joint| pattern.replace("{}", &joint.to_string()));
             names.collect::<Vec<String>>()
         };
-        let has = |wanted: &[String]| wanted.iter().all(|name| names.contains(&name.as_str()));
+        let has = |wanted: &[String]| wanted.iter().all(|name| header.contains(name));
         let [position, velocity, effort] = [self.position, self.velocity, self.effort].map(all);
-        if !names.contains(&self.time) || !has(&position) {
+        if !header.iter().any(|name| name == self.time) || !has(&position) {
             return None;
         }
         let columns = |names: Vec<String>| Columns {
@@ -92,14 +89,14 @@ impl Recorder {
                 name: Some(self.time.to_owned()),
                 number: None,
             },
-            time_unit_ns: self.time_unit_ns,
+            time_unit_ns: Some(self.time_unit_ns),
             velocity: has(&velocity).then(|| columns(velocity)),
             effort: has(&effort).then(|| columns(effort)),
             position: columns(position),
             joints: Some(self.joints.iter().map(|&joint| joint.to_owned()).collect()),
             header: true,
             skip_lines: 0,
-            delimiter: self.delimiter,
+            delimiter: None,
         })
     }
 }
@@ -109,11 +106,12 @@ fn beside(path: &Path) -> PathBuf {
     path.with_extension(BESIDE)
 }
 
-/// The mapping of the table at `path`.
+/// The mapping of the table at `path`, and a sentence that says how it was recognised, if it was.
 ///
 /// # Errors
-/// If nothing tells it, or the file that should is wrong.
-pub(crate) fn mapping_of(path: &Path) -> Result<CsvMapping, ArchiveError> {
+/// [`ArchiveError::CsvMapping`] if there is neither a file nor a recognised header, or the file is wrong;
+/// [`ArchiveError::Io`].
+pub(crate) fn mapping_of(path: &Path) -> Result<(CsvMapping, Option<String>), ArchiveError> {
     let refuse = |what: &str, reason: String| ArchiveError::CsvMapping {
         path: path.to_owned(),
         what: what.to_owned(),
@@ -123,35 +121,56 @@ pub(crate) fn mapping_of(path: &Path) -> Result<CsvMapping, ArchiveError> {
     if beside.exists() {
         let text = std::fs::read_to_string(&beside).map_err(ArchiveError::io(&beside))?;
         let mapping: Result<CsvMapping, _> = serde_saphyr::from_str(&text);
-        return mapping.map_err(|error| {
-            refuse(
-                "the file of its columns",
-                format!("{}: {error}", beside.display()),
-            )
-        });
+        let refuse = |error| {
+            let reason = format!("{}: {error}", beside.display());
+            refuse("the file of its columns", reason)
+        };
+        return Ok((mapping.map_err(refuse)?, None));
     }
-    let mut first_line = String::new();
-    let file = File::open(path).map_err(ArchiveError::io(path))?;
-    let read = BufReader::new(file.take(LONGEST_HEADER)).read_line(&mut first_line);
-    let known = match read {
-        Ok(_) => RECORDERS
-            .iter()
-            .find_map(|recorder| recorder.mapping(first_line.trim_end())),
-        // Not even text, which whoever reads it says.
-        Err(_) => None,
+    let mut records = Records::open(path, None, 0)?;
+    let header = if records.read()? {
+        records.cells()
+    } else {
+        Vec::new()
     };
-    known.ok_or_else(|| {
-        let recorders: Vec<&str> = RECORDERS.iter().map(|recorder| recorder.name).collect();
-        refuse(
-            "its columns",
-            format!(
-                "nothing says which column is what: write {}, for example `{{time: {{number: 1}}, position: {{first: 2}}, \
-                 velocity: {{first: 8}}, effort: {{first: 14}}, joints: [joint1, ...]}}`; known without it are tables of {}",
-                beside.display(),
-                recorders.join(" and of ")
-            ),
-        )
-    })
+    for recorder in &RECORDERS {
+        if let Some(mapping) = recorder.mapping(&header) {
+            let name = recorder.name;
+            let remark = format!("The columns are recognised by their header as those of {name}.");
+            return Ok((mapping, Some(remark)));
+        }
+    }
+    let reason = match Layout::of(&header) {
+        Layout::Known(mapping, remark) => return Ok((*mapping, Some(remark))),
+        Layout::Nearly { reason, columns } => format!(
+            "the header is not recognised: {reason}. It names {}. Write {} with the text below, corrected where it is \
+             wrong:\n\n{columns}",
+            names(&header),
+            beside.display()
+        ),
+        Layout::Unknown => format!(
+            "the first line ({}) does not say which column is what. Write {}, for example `{{time: {{number: 1}}, \
+             position: {{first: 2}}, velocity: {{first: 8}}, effort: {{first: 14}}, joints: [joint1, ...]}}`. \
+             Recognised without it are headers such as time, NAME.position, NAME.velocity, NAME.effort, and tables of {}",
+            names(&header),
+            beside.display(),
+            RECORDERS
+                .each_ref()
+                .map(|recorder| recorder.name)
+                .join(" and of ")
+        ),
+    };
+    Err(refuse("its columns", reason))
+}
+
+/// Header cells as an error shows them.
+fn names(header: &[String]) -> String {
+    let cells = header.iter().take(SHOWN_CELLS);
+    let mut names: Vec<_> = cells.map(|cell| shown(cell.as_bytes())).collect();
+    if let Some(more @ 1..) = header.len().checked_sub(SHOWN_CELLS) {
+        names.push(format!("and {more} more"));
+    }
+    names.join(", ")
 }
 
 #[cfg(test)]
@@ -162,7 +181,7 @@ mod tests {
     use crate::Recording;
 
     /// A row of a table in which joint `j` has position j, velocity 10 j and effort 100 j.
-    fn table(recorder: &Recorder, times: [f64; 2]) -> String {
+    fn table(recorder: &Recorder, delimiter: &str, times: [f64; 2]) -> String {
         let joints = 0..recorder.joints.len();
         let mut names = vec![recorder.time.to_owned()];
         for pattern in [recorder.position, recorder.velocity, recorder.effort] {
@@ -172,15 +191,14 @@ mod tests {
                     .map(|joint| pattern.replace("{}", &joint.to_string())),
             );
         }
-        let delimiter = recorder.delimiter.to_string();
-        let mut text = names.join(&delimiter);
+        let mut text = names.join(delimiter);
         for time in times {
             let mut row = vec![time.to_string()];
             for scale in [1, 10, 100] {
                 row.extend(joints.clone().map(|joint| (joint * scale).to_string()));
             }
             text.push('\n');
-            text.push_str(&row.join(&delimiter));
+            text.push_str(&row.join(delimiter));
         }
         text.push('\n');
         text
@@ -189,12 +207,13 @@ mod tests {
     #[test]
     fn tables_of_known_recorders_open_by_their_name_alone() {
         let folder = tempfile::tempdir().unwrap();
-        for recorder in &RECORDERS {
+        for (recorder, delimiter) in RECORDERS.iter().zip([" ", ","]) {
             let path = folder.path().join("log.csv");
             // Two rows, 2 ms apart.
             let unit_s = recorder.time_unit_ns as f64 * 1e-9;
             let from = 1.0 / unit_s;
-            std::fs::write(&path, table(recorder, [from, from + 0.002 / unit_s])).unwrap();
+            let times = [from, from + 0.002 / unit_s];
+            std::fs::write(&path, table(recorder, delimiter, times)).unwrap();
             let recording = Recording::open(&path).unwrap();
             assert_eq!(recording.message_count(), 2, "{}", recorder.name);
             let span_ns = recording.end_ns().unwrap() - recording.start_ns().unwrap();

@@ -1,53 +1,71 @@
-//! A reader that refuses lines without end, so that no file can fill the memory.
+//! The text of a table with one kind of line end and a limit to the length of a record.
 
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::{self, BufRead as _, BufReader, Read};
 
-/// Longest line: more than 50 000 numbers \[bytes\].
+/// Longest record: more than 50 000 numbers \[bytes\].
 /// Resolution: bounds memory.
 pub(super) const MAX_LINE_BYTES: usize = 1 << 20;
+/// Bytes that are read at once; the delimiter is found in the first of them.
+/// Chosen: holds the header and the first row of any known recorder.
+pub(super) const BUFFER_BYTES: usize = 1 << 16;
 
+/// Writes every line end (`\r\n`, `\r`, `\n`) as `\n`, and refuses a record without end.
 pub(super) struct Lines<R> {
     reader: BufReader<R>,
-    /// Bytes since the last line end.
-    line_bytes: usize,
+    after_return: bool,
+    at_end: bool,
+    /// Bytes since [`Lines::start_record`]; `None` before the first call.
+    record_bytes: Option<usize>,
 }
 
 impl<R: Read> Lines<R> {
     pub(super) fn new(reader: R) -> Self {
         Self {
             reader: BufReader::new(reader),
-            line_bytes: 0,
+            after_return: false,
+            at_end: false,
+            record_bytes: None,
         }
     }
 
-    /// Skips a line; gives how many bytes that were.
-    pub(super) fn skip_line(&mut self) -> io::Result<u64> {
-        let mut skipped = 0;
-        loop {
-            let buffer = self.reader.fill_buf()?;
-            let end = buffer.iter().position(|&byte| byte == b'\n');
-            let take = end.map_or(buffer.len(), |end| end + 1);
-            self.reader.consume(take);
-            skipped += take as u64;
-            if end.is_some() || take == 0 {
-                return Ok(skipped);
-            }
-        }
+    /// Starts to count the bytes of a record. Bytes that a buffer behind this one holds are not counted.
+    pub(super) fn start_record(&mut self) {
+        self.record_bytes = Some(0);
+    }
+
+    /// Whether the reader behind asked for more than there is.
+    pub(super) fn at_end(&self) -> bool {
+        self.at_end
     }
 }
 
 impl<R: Read> Read for Lines<R> {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        let read = self.reader.read(into)?;
-        for line in into[..read].split_inclusive(|&byte| byte == b'\n') {
-            self.line_bytes += line.len();
-            if self.line_bytes > MAX_LINE_BYTES {
+        let mut written = 0;
+        // A chunk that is only the second half of `\r\n` writes nothing, which is not yet the end.
+        while written == 0 && !into.is_empty() {
+            let chunk = self.reader.fill_buf()?;
+            if chunk.is_empty() {
+                self.at_end = true;
+                return Ok(0);
+            }
+            let taken = chunk.len().min(into.len());
+            for &byte in &chunk[..taken] {
+                let is_second_half = byte == b'\n' && self.after_return;
+                self.after_return = byte == b'\r';
+                if !is_second_half {
+                    into[written] = if self.after_return { b'\n' } else { byte };
+                    written += 1;
+                }
+            }
+            self.reader.consume(taken);
+        }
+        if let Some(bytes) = &mut self.record_bytes {
+            *bytes += written;
+            if *bytes > MAX_LINE_BYTES + BUFFER_BYTES {
                 return Err(io::ErrorKind::InvalidData.into());
             }
-            if line.ends_with(b"\n") {
-                self.line_bytes = 0;
-            }
         }
-        Ok(read)
+        Ok(written)
     }
 }

@@ -21,10 +21,10 @@ use crate::error::ArchiveError;
 pub struct CsvMapping {
     /// The time: since the epoch, or since any beginning.
     pub time: Column,
-    /// Its unit \[ns\]: 1000000 for milliseconds; seconds if absent.
-    #[serde(default = "second", skip_serializing_if = "is_second")]
+    /// Its unit \[ns\]: 1000000 for milliseconds; recognised if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 1_000_000_000_000_i64))]
-    pub time_unit_ns: u64,
+    pub time_unit_ns: Option<u64>,
     /// Positions \[rad, m\].
     pub position: Columns,
     /// Velocities \[rad/s, m/s\]; differentiated from the positions if absent.
@@ -42,22 +42,9 @@ pub struct CsvMapping {
     /// Lines to skip before anything else.
     #[serde(default)]
     pub skip_lines: usize,
-    /// What stands between two columns: one ASCII character.
-    #[serde(default = "comma")]
-    pub delimiter: char,
-}
-
-fn second() -> u64 {
-    1_000_000_000
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
-fn is_second(unit_ns: &u64) -> bool {
-    *unit_ns == second()
-}
-
-fn comma() -> char {
-    ','
+    /// Character between two columns (ASCII); recognised if absent: a comma, a semicolon, a tab or a space.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub delimiter: Option<char>,
 }
 
 /// One column, by its number or its name in the header.
@@ -131,15 +118,16 @@ impl CsvMapping {
         })
     }
 
-    pub(super) fn delimiter_byte(&self, path: &Path) -> Result<u8, ArchiveError> {
-        u8::try_from(self.delimiter)
-            .ok()
-            .filter(u8::is_ascii)
-            .ok_or_else(|| ArchiveError::CsvMapping {
-                path: path.to_owned(),
-                what: "delimiter".to_owned(),
-                reason: format!("{:?} is not an ASCII character", self.delimiter),
-            })
+    pub(super) fn delimiter_byte(&self, path: &Path) -> Result<Option<u8>, ArchiveError> {
+        let Some(delimiter) = self.delimiter else {
+            return Ok(None);
+        };
+        let byte = u8::try_from(delimiter).ok().filter(u8::is_ascii);
+        byte.map(Some).ok_or_else(|| ArchiveError::CsvMapping {
+            path: path.to_owned(),
+            what: "delimiter".to_owned(),
+            reason: format!("{delimiter:?} is not an ASCII character"),
+        })
     }
 }
 

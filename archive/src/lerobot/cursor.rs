@@ -40,13 +40,6 @@ pub(crate) struct EpisodeCursor {
     body: Vec<u8>,
 }
 
-/// What a quantity is called, and beyond which it is garbage.
-const QUANTITIES: [(&str, f64); 3] = [
-    ("position", limits::POSITION),
-    ("velocity", limits::VELOCITY),
-    ("effort", limits::EFFORT),
-];
-
 impl EpisodeCursor {
     pub(super) fn open(episode: &Episode) -> Result<Self, ArchiveError> {
         let (file, layout) = (&episode.file, &episode.layout);
@@ -96,7 +89,7 @@ impl EpisodeCursor {
             column.next_row(values)?;
         }
         let time_ns = self.take_time()?;
-        for quantity in 0..QUANTITIES.len() {
+        for quantity in 0..self.quantities.len() {
             self.take_quantity(quantity)?;
         }
         self.state.header.stamp = Time::from_ns(time_ns);
@@ -114,26 +107,21 @@ impl EpisodeCursor {
         let mut values = std::mem::take(store);
         values.clear();
         let scale = if quantity < 2 { self.scale } else { 1.0 };
-        let (what, limit) = QUANTITIES[quantity];
+        let what = ["position", "velocity", "effort"][quantity];
         for element in &self.quantities[quantity] {
             let Some(Element { feature, at }) = *element else {
                 values.push(f64::NAN);
                 continue;
             };
             let row = &self.values[feature];
-            let reason = match row.get(at) {
-                Some(value) if value.abs() > limit => format!(
-                    "{what} {value:e} is beyond any robot arm (the limit is {limit:e}): broken data, or a wrong feature"
-                ),
-                Some(value) => {
-                    values.push(value * scale);
-                    continue;
-                }
-                None => format!(
-                    "{} numbers, but meta/info.json says more: the {what} of a joint is the one at {at}",
-                    row.len()
-                ),
-            };
+            if let Some(value) = row.get(at) {
+                values.push(value * scale);
+                continue;
+            }
+            let reason = format!(
+                "{} numbers, but meta/info.json says more: the {what} of a joint is the one at {at}",
+                row.len()
+            );
             return Err(self.refuse(self.features[feature].clone(), reason));
         }
         match quantity {

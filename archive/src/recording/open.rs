@@ -24,7 +24,7 @@ use crate::topic::{Topic, Topics};
 impl Recording {
     /// Opens the recording at `path`: an MCAP file (also an unfinished `.part`), the folder of a
     /// rosbag2 bag with MCAP or SQLite files, one such SQLite file, a bag of ROS 1 (`.bag`), a table
-    /// (`.csv`) whose columns its header or a file beside it tells, or an episode of a LeRobot data
+    /// (`.csv`) with a recognised header or a file `NAME.columns.yaml`, or an episode of a LeRobot data
     /// set (`DATASET/episode_000003`, or the set's folder or Parquet file if it holds one episode).
     ///
     /// Of an MCAP file or a bag of ROS 1, only the index is read if it has a sound one; else all of
@@ -47,7 +47,9 @@ impl Recording {
             .is_some_and(|extension| extension.eq_ignore_ascii_case("csv"))
             && path.exists()
         {
-            return Self::open_csv(path, &csv_file::mapping_of(path)?, &[]);
+            let (mapping, remark) = csv_file::mapping_of(path)?;
+            let table = CsvTable::check(path, &mapping, &[], remark)?;
+            return Ok(Self::from_csv(path, table));
         }
         Self::open_file(path)
     }
@@ -225,7 +227,8 @@ impl Recording {
     /// Opens the table at `path`, with `joints` as the names that its columns stand for unless the
     /// mapping has its own. Its rows appear as joint states on the topic `/joint_states`.
     ///
-    /// All of it is read and checked, once.
+    /// All of it is read and checked: once, or twice if the unit of its time has to be recognised. What was recognised
+    /// is in [`Recording::remarks`].
     ///
     /// # Errors
     /// [`ArchiveError::Io`]; [`ArchiveError::CsvMapping`] if the mapping does not fit the table;
@@ -236,8 +239,12 @@ impl Recording {
         joints: &[String],
     ) -> Result<Self, ArchiveError> {
         let path = path.as_ref();
-        let table = CsvTable::check(path, mapping, joints)?;
-        Ok(Self {
+        let table = CsvTable::check(path, mapping, joints, None)?;
+        Ok(Self::from_csv(path, table))
+    }
+
+    fn from_csv(path: &Path, table: CsvTable) -> Self {
+        Self {
             path: path.to_owned(),
             kind: RecordingKind::Csv,
             topics: Arc::new(joint_states(csv_file::TOPIC, table.rows)),
@@ -246,7 +253,7 @@ impl Recording {
             metadata: BTreeMap::new(),
             damage: table.damage.clone(),
             store: Store::Csv(Box::new(table)),
-        })
+        }
     }
 }
 

@@ -304,20 +304,3 @@ fn a_real_sqlite_bag() {
     assert_eq!(source.dropped(), 0);
     assert_in_order(&samples);
 }
-
-#[test]
-fn a_real_broken_table_is_refused_with_its_line() {
-    let test = "a_real_broken_table_is_refused_with_its_line";
-    let Some(path) = shared(test, "recordings/ur10e/csv/dirty.csv") else {
-        return;
-    };
-    let columns =
-        "{time: {number: 1}, position: {first: 2}, velocity: {first: 8}, effort: {first: 14}}";
-    let csv = CsvConfig {
-        path,
-        columns: serde_saphyr::from_str(columns).unwrap(),
-    };
-    let error = RecordedSource::open_csv(&csv, &Config::default(), &cell(UR)).unwrap_err();
-    assert!(error.is_input());
-    assert!(error.to_string().contains("dirty.csv:"), "{error}");
-}
