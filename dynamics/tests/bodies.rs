@@ -16,6 +16,20 @@ fn a_sound_arm_has_no_finding_and_keeps_its_text() {
 }
 
 #[test]
+fn the_bundled_robots_are_sound() {
+    let tests = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests");
+    for robot in [
+        "data/demo_arm",
+        "proof/robots/six",
+        "proof/robots/seven",
+        "proof/robots/slide",
+    ] {
+        let xml = std::fs::read_to_string(tests.join(robot).with_extension("urdf")).unwrap();
+        assert_eq!(check_bodies(&xml).unwrap(), [], "{robot}");
+    }
+}
+
+#[test]
 fn a_decimal_slip_breaks_the_triangle_inequality_and_is_named() {
     let xml = arm(|index, link| {
         if index == 0 {
@@ -222,6 +236,24 @@ fn a_centre_of_mass_in_mm_is_read_as_mm() {
         }
     });
     assert_eq!(only(&far).severity, BodySeverity::Odd);
+}
+
+#[test]
+fn lengths_in_mm_are_named_once() {
+    for centres in [1.0, 1e3] {
+        let xml = arm(|_, link| {
+            link.4 = link.4.map(|x| x * 1e3);
+            link.2 = link.2.map(|x| x * centres);
+        });
+        let found = only(&xml);
+        assert!(
+            found
+                .to_string()
+                .contains("is too long for the inertias of its links"),
+            "{found}"
+        );
+        assert_eq!((found.links.len(), found.substitutes.len()), (6, 0));
+    }
 }
 
 #[test]

@@ -10,7 +10,7 @@ use self::bodies::{Bodies, Body, NUMBERS, bodies};
 use self::finding::LinkPlace;
 use self::moments::Principal;
 use self::substitute::{centre_in_m, converted, cylinder, significant};
-use self::units::{Units, units};
+use self::units::{Units, are_lengths_in_mm, units};
 use super::ModelError;
 
 mod bodies;
@@ -32,7 +32,7 @@ const NEGATIVE: f64 = 0.01;
 /// Measured: without errors that are known, up to 0.05 in the URDFs of 81 robots (CAD exports, identified parameters). That
 /// is less than the usual error of a URDF's inertia.
 const EXCESS: f64 = 0.1;
-/// The same from which the inertia is impossible.
+/// Excess of the largest principal moment, relative to it, from which the inertia is impossible.
 /// Derived: a decimal slip by ten in the largest moment makes at least 0.8 of it, in the middle one at least 0.7. Published
 /// URDFs whose inertias were computed by a wrong formula have up to 0.33.
 const GROSS_EXCESS: f64 = 0.5;
@@ -40,7 +40,7 @@ const GROSS_EXCESS: f64 = 0.5;
 /// Measured: at most 1.2 in the same URDFs, except for placeholders and a known error. Derived: mass within one length of
 /// its centre has at most 1; a long tool without frames may have more.
 const LARGE: f64 = 2.0;
-/// The same from which the inertia is impossible.
+/// Radius of gyration, in the same lengths, from which the inertia is impossible.
 /// Measured: placeholders and inertias in another unit have 14 and more; the known error has 4.
 const ABSURD: f64 = 5.0;
 /// Radius of gyration below which a body is a point mass, in lengths of the link and its neighbours.
@@ -79,6 +79,17 @@ pub fn check_bodies(xml: &str) -> Result<Vec<BodyFinding>, ModelError> {
         findings.insert(0, of_units(units, &as_written, &scaled, &findings));
     }
     findings.extend(centres(&scaled));
+    if units.is_none() && are_lengths_in_mm(&as_written) {
+        findings.retain(|finding| !matches!(finding.fault, BodyFault::PointMass { .. }));
+        findings.push(BodyFinding {
+            severity: BodySeverity::Impossible,
+            links: places(scaled.iter()),
+            fault: BodyFault::LengthUnit {
+                reach_m: as_written.reach_m,
+            },
+            substitutes: Vec::new(),
+        });
+    }
     merge_points(&mut findings);
     merge_odd_triangles(&mut findings);
     merge_same_inertia(&mut findings, &scaled);

@@ -63,8 +63,8 @@ impl Watch {
         let model = setup.model.as_ref();
         let name = |model: &Model, link: usize| Name::new(&model.links()[link].name);
         let links = model.map_or_else(Vec::new, |model| {
-            let children = model.joints().iter().map(|joint| joint.child_link);
-            children.map(|link| name(model, link)).collect()
+            let bodies = (0..model.dof()).map(|joint| model.body_link(joint));
+            bodies.map(|link| name(model, link)).collect()
         });
         Self {
             name: Name::new(NAME),

@@ -277,7 +277,7 @@ impl Rows {
         let n = self.joints;
         forward_kinematics(model, data, &self.row.position[..n]);
         for touched in 0..n {
-            let link = model.joints()[touched].child_link;
+            let link = model.body_link(touched);
             let lever =
                 link_pose(model, data, link).rotation * Vector3::from(model.links()[link].com_m());
             let jacobian = link_jacobian(model, data, link);

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use tauscope_archive::ros::JointState;
 use tauscope_archive::{Info, Recording, recordings_at, repair};
-use tauscope_dynamics::Model;
+use tauscope_dynamics::{Model, check_bodies, with_plausible_bodies};
 use tauscope_pipeline::pipeline::Pipeline;
 use tauscope_pipeline::yaml;
 use tauscope_twin::TwinFile;
@@ -133,5 +133,9 @@ pub fn twin(bytes: &[u8]) {
 
 /// A robot.
 pub fn urdf(bytes: &[u8]) {
-    let _ = Model::from_urdf(&String::from_utf8_lossy(bytes));
+    let xml = String::from_utf8_lossy(bytes);
+    let _ = Model::from_urdf(&xml);
+    if let Ok(findings) = check_bodies(&xml) {
+        let _ = with_plausible_bodies(&xml, &findings);
+    }
 }

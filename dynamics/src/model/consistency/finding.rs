@@ -78,6 +78,11 @@ pub enum BodyFault {
         /// Sum of the masses that move, as written.
         total: f64,
     },
+    /// The distances between the joints are in mm. There is no substitute.
+    LengthUnit {
+        /// Distance of the farthest point from the base with all joints straight, as written.
+        reach_m: f64,
+    },
     /// Most links have the same six numbers as their inertia.
     SameInertia {
         /// Principal moments.

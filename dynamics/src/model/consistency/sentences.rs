@@ -29,7 +29,11 @@ fn seen(finding: &BodyFinding) -> String {
                 BodySeverity::Impossible => "is impossible",
                 BodySeverity::Odd => "is that of no real body",
             };
-            let its = if count > 1 { "The worst" } else { "Its" };
+            let its = if count > 1 {
+                "In the worst case, the"
+            } else {
+                "Its"
+            };
             let inertia = format!("The inertia of {names} {verdict}. {its}");
             triangle(&inertia, moments_kgm2, *slip)
         }
@@ -52,7 +56,14 @@ fn seen(finding: &BodyFinding) -> String {
             distance_m,
             length_m,
             is_in_mm,
-        } => centre_far(&names, [*distance_m, *length_m], *is_in_mm),
+        } => {
+            let up_to = if count > 1 { "up to " } else { "" };
+            centre_far(
+                &format!("{names} is {up_to}"),
+                [*distance_m, *length_m],
+                *is_in_mm,
+            )
+        }
         BodyFault::InertiaUnit {
             unit, masses_in_g, ..
         } => inertia_unit(count, unit, *masses_in_g),
@@ -60,6 +71,11 @@ fn seen(finding: &BodyFinding) -> String {
             "The masses of all {count} moving links, {} kg in total, are too large for their inertias and lengths. They \
              are probably in g: convert them to kg.",
             figure(*total)
+        ),
+        BodyFault::LengthUnit { reach_m } => format!(
+            "The arm of {} m is too long for the inertias of its links. The lengths are probably in mm: convert the <origin> \
+             of each joint to m.",
+            figure(*reach_m)
         ),
         BodyFault::SameInertia {
             moments_kgm2,
@@ -116,14 +132,15 @@ fn too_large(names: &str, [mass_kg, gyration_m, length_m]: [f64; 3]) -> String {
     )
 }
 
-fn centre_far(names: &str, [distance_m, length_m]: [f64; 2], is_in_mm: bool) -> String {
+/// `links`: their names and the verb.
+fn centre_far(links: &str, [distance_m, length_m]: [f64; 2], is_in_mm: bool) -> String {
     let unit = if is_in_mm {
         ", probably from mm to m"
     } else {
         ""
     };
     format!(
-        "The centre of mass of {names} is {} m from the link's frame. The link and its neighbours are at most {} m long. \
+        "The centre of mass of {links}{} m from the link's frame. The link and its neighbours are at most {} m long. \
          Correct the <origin> of its <inertial>{unit}.",
         figure(distance_m),
         figure(length_m)

@@ -68,6 +68,17 @@ pub fn units(bodies: &Bodies) -> Option<Units> {
     Some(best)
 }
 
+/// Whether the distances between the joints are in mm: the links are too long for their inertias by about 1000.
+pub fn are_lengths_in_mm(bodies: &Bodies) -> bool {
+    let ratios: Vec<f64> = (bodies.links.iter())
+        .filter(|body| body.mass_kg > 0.0 && body.extent_m > 0.0)
+        .map(|body| body.gyration_m() / body.extent_m)
+        .collect();
+    // A single small inertia may be wrong itself.
+    let median = median(&ratios);
+    ratios.len() > 1 && median < SOUND[0] && is_sound(1e3 * median)
+}
+
 /// Radius of gyration over the length, by link.
 fn ratios(links: &[&Body], mass: f64, inertia: f64) -> Vec<f64> {
     let scaled = links.iter().map(|body| body.scaled(mass, inertia));

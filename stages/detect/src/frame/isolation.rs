@@ -82,7 +82,7 @@ impl Isolation {
         // No residual parts a link whose joint tells no torque from the one that carries it.
         let told = |joint: &usize| self.effort_per_nm[*joint].is_finite();
         for joint in (0..n).filter(told) {
-            let link = model.joints()[joint].child_link;
+            let link = model.body_link(joint);
             let pose = link_pose(model, data, link);
             let arm = pose.rotation * Vector3::from(model.links()[link].com_m());
             let jacobian = link_jacobian(model, data, link);

@@ -180,7 +180,7 @@ impl Points {
         let n = model.dof().min(MAX_JOINTS);
         forward_kinematics(model, data, &sample.position[..n]);
         for &(joint, end) in &self.ends {
-            let link = model.joints()[joint].child_link;
+            let link = model.body_link(joint);
             let pose = link_pose(model, data, link);
             let origin_m = pose.translation.vector;
             let com_m = pose.rotation * Vector3::from(model.links()[link].com_m());

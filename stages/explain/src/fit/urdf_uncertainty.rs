@@ -15,11 +15,12 @@ use crate::physics::active::{Hypothesis, Whereabouts};
 pub fn usual_errors(problem: &Problem, fit: &Fit) -> Vec<Arc<Column>> {
     let model = &problem.model;
     let mut errors = Vec::new();
-    for joint in model.joints() {
+    for joint in 0..model.dof() {
+        let body = model.body_link(joint);
         let (link, place) = (
-            &model.links()[joint.child_link],
+            &model.links()[body],
             Whereabouts {
-                link: joint.child_link,
+                link: body,
                 ..Whereabouts::default()
             },
         );

@@ -29,7 +29,9 @@ pub fn unnamed_bodies(model: &Model, without: &BTreeSet<String>) -> Vec<Hypothes
         let inertia = model.links()[*link].inertia;
         inertia.mass_kg() > 0.0 && inertia.nearest_consistent(0.0) == inertia
     };
-    let links = links.map(|(_, joint)| joint.child_link).filter(has_body);
+    let links = links
+        .map(|(joint, _)| model.body_link(joint))
+        .filter(has_body);
     let at = |link: usize| Hypothesis {
         effect,
         place: Whereabouts {
@@ -73,10 +75,10 @@ pub fn hypotheses(model: &Model, bodies: bool, without: &BTreeSet<String>) -> Ve
                 }
             }
             PlaceKind::Link if bodies => {
-                // The child link of each joint stands for all that is fixed to it.
-                for joint in model.joints() {
+                // One link of each joint stands for all that is fixed to it.
+                for joint in joints.clone() {
                     add(Whereabouts {
-                        link: joint.child_link,
+                        link: model.body_link(joint),
                         ..Whereabouts::default()
                     });
                 }

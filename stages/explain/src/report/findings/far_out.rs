@@ -89,7 +89,7 @@ fn next_joint(model: &Model, link: usize) -> Option<Vector3<f64>> {
     let own = link_pose(model, &data, link).inverse();
     let hangs = model.joints().iter().filter(|joint| {
         let carrier = model.links()[joint.parent_link].joint;
-        carrier.is_some_and(|carrier| model.joints()[carrier].child_link == link)
+        carrier.is_some_and(|carrier| model.body_link(carrier) == link)
     });
     let places = hangs.map(|joint| {
         (own * link_pose(model, &data, joint.child_link))
