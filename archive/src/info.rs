@@ -359,9 +359,6 @@ impl fmt::Display for TopicInfo {
         }
         if let Some(joints) = &self.joints {
             writeln!(f, "  {joints}")?;
-            for remark in joints.remarks() {
-                writeln!(f, "  {remark}")?;
-            }
         }
         for gap in &self.gaps {
             writeln!(f, "  a gap of {:.3} s at {:.3} s", gap.duration_s, gap.at_s)?;

@@ -81,11 +81,15 @@ impl JointFacts {
         Some(text)
     }
 
+    /// Whether its velocity is not the derivative of its position.
+    pub fn has_odd_velocity(&self) -> bool {
+        let slope = self.velocity_slope;
+        slope.is_some_and(|slope| (slope - 1.0).abs() > ODD_SHARE)
+    }
+
     /// What is odd about its velocity, in words.
     pub fn remark(&self) -> Option<String> {
-        let slope = self
-            .velocity_slope
-            .filter(|slope| (slope - 1.0).abs() > ODD_SHARE)?;
+        let slope = self.velocity_slope.filter(|_| self.has_odd_velocity())?;
         let hint = if slope < 0.0 {
             ": one of them has the other sign"
         } else if self.is_in_degrees() {

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use tauscope_bus::StageError;
 use tauscope_detect::{Entry, Lesson, Lessons};
 use tauscope_pipeline::parallel;
+use tauscope_session::by_recording;
 
 use crate::error::EvaluateError;
 use crate::input::Request;
@@ -35,8 +36,17 @@ pub struct Evaluation {
     pub runs: Vec<Run>,
     /// Samples that were lost or refused.
     pub lost: u64,
+    /// What is odd or wrong about the recordings, a sentence each.
+    pub findings: Vec<String>,
     /// What the reader should know.
     pub notes: Vec<String>,
+}
+
+impl Evaluation {
+    /// Findings and notes.
+    pub fn all_notes(&self) -> Vec<String> {
+        self.findings.iter().chain(&self.notes).cloned().collect()
+    }
 }
 
 /// How far it is, 0 to 1, and what it does.
@@ -59,6 +69,7 @@ pub fn run(
         twins: Vec::new(),
         runs: Vec::new(),
         lost: 0,
+        findings: Vec::new(),
         request,
     };
     let count = evaluation.request.twins.len() as f64;
@@ -140,6 +151,8 @@ impl Evaluation {
         notes.extend(odd.unjudged(&runners));
         notes.extend(notes::silent(&runners));
         self.lost += odd.lost;
+        // Twins behind one source find the same.
+        self.findings = by_recording(&odd.findings);
         for note in notes.into_iter().chain(odd.all) {
             if !self.notes.contains(&note) {
                 self.notes.push(note);

@@ -45,7 +45,7 @@ pub fn page(
         ("delays", "Detection delays", delays::section(judged)),
         ("tuning", "Tuning", tuning::section(judged)),
         ("tables", "Tables", Some(self::tables(tables))),
-        ("notes", "Notes", notes(&evaluation.notes)),
+        ("notes", "Notes", notes(&evaluation.all_notes())),
     ];
     let sections: Vec<(&str, &str, Markup)> = (sections.into_iter())
         .filter_map(|(id, title, body)| Some((id, title, body?)))

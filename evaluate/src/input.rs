@@ -6,7 +6,7 @@ mod twins;
 
 use std::path::{Path, PathBuf};
 
-use tauscope_archive::{Recording, recordings_at};
+use tauscope_archive::recordings_at;
 use tauscope_detect::{DETECTORS, Entry};
 use tauscope_dynamics::Model;
 use tauscope_ingest::Topics;
@@ -15,6 +15,7 @@ use tauscope_pipeline::files::SetFile;
 use tauscope_pipeline::replay::stem;
 use tauscope_pipeline::report::{Problem, Report};
 use tauscope_pipeline::suggest;
+use tauscope_session::{Joints, Look, SessionError};
 use tauscope_pipeline::yaml::{self, Located, Place};
 use tauscope_twin::TwinFile;
 

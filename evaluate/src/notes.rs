@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use tauscope_bus::flags;
 use tauscope_pipeline::suggest;
+use tauscope_session::Finding;
 
 use self::totals::Totals;
 use crate::error::EvaluateError;
@@ -26,6 +27,8 @@ pub struct Notes {
     pub lost: u64,
     /// What the reader should know.
     pub all: Vec<String>,
+    /// By recording, what is odd or wrong about it.
+    pub findings: Vec<(String, Vec<Finding>)>,
     /// Recordings of which the twin's filters passed over more than half.
     unsettled: BTreeSet<String>,
     /// What only all of them together tell.
@@ -46,12 +49,10 @@ impl Notes {
         }
         let damaged = played.damage.len() as u64;
         self.lost += played.refused + damaged;
+        self.findings.push((name.clone(), played.findings.clone()));
         let mut note = |text: String| self.all.push(format!("{name}: {text}"));
         for damage in &played.damage {
             note(format!("{damage}; what can be read of it is evaluated"));
-        }
-        if played.refused > 0 {
-            note(format!("{} samples were lost or refused", played.refused));
         }
         let count = samples.len();
         if 2 * played.unsettled > count as u64 {

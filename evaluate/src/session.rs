@@ -5,6 +5,7 @@ use tauscope_archive::Damage;
 use tauscope_bus::{Emit, LinkError, Sample, Source as _, Stage as _, TwinState, flags};
 use tauscope_detect::Lesson;
 use tauscope_ingest::{FileConfig, RecordedSource, Topics};
+use tauscope_session::Finding;
 use tauscope_pipeline::build;
 use tauscope_pipeline::cell::Cell;
 use tauscope_pipeline::replay::ReplayError;
@@ -17,6 +18,8 @@ use crate::recording::Named;
 pub struct Played {
     /// Every sample, in order.
     pub samples: Vec<TwinState>,
+    /// What is odd or wrong about the recording.
+    pub findings: Vec<Finding>,
     /// Samples of the recording that were lost or refused.
     pub refused: u64,
     /// Parts of the recording that cannot be read, and what was in them is lost.
@@ -58,7 +61,8 @@ impl<'a> Session<'a> {
         };
         let config = tauscope_ingest::Config::default();
         let setup = build::ingest_setup(self.cell);
-        let mut source = RecordedSource::open_file(&file, &config, &setup)?;
+        let mut source = RecordedSource::open_to_learn(&file, &config, &setup)?;
+        let findings = source.findings();
         let mut all = Gathered(Vec::new());
         let mut count = 0;
         while let Some(sample) = source.next_packed()? {
@@ -77,6 +81,7 @@ impl<'a> Session<'a> {
             damage,
             gaps: resets.filter(|s| s.header.has(flags::RESET)).count() as u64,
             unsettled: (samples.iter().filter(|s| !s.header.has(flags::READY))).count() as u64,
+            findings: findings.get(),
             samples,
         })
     }

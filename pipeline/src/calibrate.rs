@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use tauscope_bus::{JointState, SampleRef, Sink, StageError, TwinState, flags};
 use tauscope_dynamics::effort_scale::{EffortScale, ScaleFault};
 use tauscope_ingest::{FileConfig, RecordedSource, Topics};
-use tauscope_session::{Effect, Finding, Plausible};
+use tauscope_session::{Effect, Finding, Plausible, by_recording};
 use tauscope_twin::{
     Calibration, Expected, JointCorrection, Robot, TwinFile, spread_scale, telling_slopes,
 };
@@ -162,7 +162,7 @@ impl Job<'_> {
             facts.effort_unit == EffortUnit::Nm || facts.torque_constants_nm_per_a.is_some();
         let from_topic = self.twin.expected == Expected::Topic;
         let mut calibration = Calibration::new(joint_count, in_nm || from_topic);
-        let mut notes = Vec::new();
+        let mut found = Vec::new();
         let mut all_stand = true;
         for (index, recording) in self.fit.iter().enumerate() {
             let step = &mut |fraction| progress(index, fraction);
@@ -172,9 +172,11 @@ impl Job<'_> {
                 }
             })?;
             all_stand &= read.stands;
-            notes.extend(odd_in(recording, &read.findings)?);
+            refuse_fault(recording, &read.findings)?;
             all.add(&read);
+            found.push((recording.display().to_string(), read.findings));
         }
+        let notes = by_recording(&found);
         let lost = all.lost;
         let Some(fits) = calibration.fit() else {
             let twin = build::twin(self.twin, None, self.cell);
@@ -251,7 +253,7 @@ impl Job<'_> {
                 topics: self.topics.clone(),
             };
             let setup = build::ingest_setup(self.cell);
-            let mut source = RecordedSource::open_file(&file, &config, &setup)?;
+            let mut source = RecordedSource::open_to_learn(&file, &config, &setup)?;
             let findings = source.findings();
             let twin = build::twin(self.twin, model, self.cell)?;
             let mut graph = Graph::default();
@@ -314,17 +316,15 @@ impl Job<'_> {
     }
 }
 
-/// What is odd in a recording.
-///
-/// # Errors
-/// If nothing that is learnt from it can be right.
-fn odd_in(recording: &Path, findings: &[Finding]) -> Result<Vec<String>, CalibrateError> {
-    if let Some(fault) = findings.iter().find(|it| it.effect() == Effect::Fault) {
-        let (recording, oddity) = (recording.to_owned(), fault.clone());
-        return Err(CalibrateError::Implausible { recording, oddity });
+/// Refuses a recording from which nothing right can be learnt.
+fn refuse_fault(recording: &Path, findings: &[Finding]) -> Result<(), CalibrateError> {
+    match findings.iter().find(|it| it.effect() == Effect::Fault) {
+        Some(fault) => Err(CalibrateError::Implausible {
+            recording: recording.to_owned(),
+            oddity: fault.clone(),
+        }),
+        None => Ok(()),
     }
-    let name = recording.display();
-    Ok(findings.iter().map(|finding| format!("{name}: {finding}")).collect())
 }
 
 /// What was read of a recording, or of all.

@@ -113,8 +113,11 @@ pub struct Assembler {
     before_ns: Option<i64>,
     /// When the stamps jumped back, and by how much \[ns\].
     jumps: Vec<(i64, i64)>,
-    /// Findings about the clock.
+    /// The finding about the clock.
     of_clock: Option<Finding>,
+    /// The finding about velocities that are not used.
+    of_velocity: Option<Finding>,
+    keeps_velocity: bool,
 }
 
 impl Assembler {
@@ -135,6 +138,7 @@ impl Assembler {
         let mut this = Self::new(&look.joint_names, look.clock, publishers, ranges);
         this.used.clone_from(&look.used);
         this.of_clock.clone_from(&look.of_clock);
+        this.of_velocity.clone_from(&look.of_velocity);
         this
     }
 
@@ -165,7 +169,16 @@ impl Assembler {
             before_ns: None,
             jumps: Vec::new(),
             of_clock: None,
+            of_velocity: None,
+            keeps_velocity: false,
         }
+    }
+
+    /// Uses velocities also where they are not the derivative of the positions: for readers that judge them by themselves.
+    #[must_use]
+    pub fn keeping_velocity(mut self) -> Self {
+        self.keeps_velocity = true;
+        self
     }
 
     /// Refuses what follows a jump back of the stamps, until they have caught up: for readers that need time to advance.
@@ -236,9 +249,13 @@ impl Assembler {
         }
         let lacks_effort = judged == Judgement::Dropout;
         let times_ns = (time_ns, received_ns);
-        let Some(whole) = self.gather.add(layout, message, times_ns, lacks_effort) else {
+        let Some(mut whole) = self.gather.add(layout, message, times_ns, lacks_effort) else {
             return Taken::Nothing;
         };
+        if self.of_velocity.is_some() && !self.keeps_velocity {
+            whole.has_velocity = false;
+            whole.velocity = Default::default();
+        }
         self.counts.unmeasured += u64::from(lacks_effort);
         if !whole.is_finite(self.joint_names.len()) {
             self.counts.not_finite += 1;

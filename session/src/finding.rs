@@ -144,12 +144,12 @@ pub enum Finding {
         /// The limits \[rad or m\].
         limits: [f64; 2],
     },
-    /// A velocity that is not the derivative of the position.
+    /// Velocities that are not the derivative of the positions.
     Velocity {
-        /// The joint.
-        joint: String,
-        /// Sentence of [`JointFacts::remark`](tauscope_archive::JointFacts::remark).
-        remark: String,
+        /// The joints, each with its recorded velocity over the derivative of its position.
+        joints: Vec<(String, f64)>,
+        /// Whether velocities computed from the positions are used instead.
+        is_replaced: bool,
     },
     /// A position that changes by more than its velocity explains.
     Jump {
@@ -210,9 +210,9 @@ impl Finding {
             other => return other.to_string(),
         };
         match self {
-            Self::BeyondLimits { joint, .. }
-            | Self::Velocity { joint, .. }
-            | Self::Jump { joint, .. } => format!("{kind} of {joint}"),
+            Self::BeyondLimits { joint, .. } | Self::Jump { joint, .. } => {
+                format!("{kind} of {joint}")
+            }
             _ => kind.to_owned(),
         }
     }
@@ -269,9 +269,13 @@ impl fmt::Display for Finding {
                 f,
                 "the position of {joint} reaches {position:.2}, beyond the URDF's limits of {lower:.2} and {upper:.2}"
             ),
-            Self::Velocity { remark, .. }
-            | Self::Jump { remark, .. }
-            | Self::Format { remark } => f.write_str(remark),
+            Self::Velocity {
+                joints,
+                is_replaced,
+            } => velocities(f, joints, *is_replaced),
+            Self::Jump { remark, .. } | Self::Format { remark } => {
+                f.write_str(remark.trim_end_matches('.'))
+            }
             Self::Pause { duration_s, at_s } => {
                 write!(f, "a gap of {duration_s:.3} s at {at_s:.3} s")
             }
@@ -394,6 +398,35 @@ impl Finding {
     }
 }
 
+fn velocities(
+    f: &mut fmt::Formatter<'_>,
+    joints: &[(String, f64)],
+    is_replaced: bool,
+) -> fmt::Result {
+    // Joints with one factor share a clause.
+    let mut clauses: Vec<(String, Vec<&str>)> = Vec::new();
+    for (joint, slope) in joints {
+        let factor = format!("{slope:.2}");
+        match clauses.iter_mut().find(|(known, _)| *known == factor) {
+            Some((_, names)) => names.push(joint),
+            None => clauses.push((factor, vec![joint])),
+        }
+    }
+    let clauses = clauses.iter().map(|(factor, names)| {
+        format!("{factor} times the derivative of the position at {}", suggest::some(names))
+    });
+    let clauses: Vec<String> = clauses.collect();
+    write!(f, "the recorded velocity is {}", clauses.join(", "))?;
+    if joints.iter().any(|(_, slope)| *slope < 0.0) {
+        f.write_str("; below zero, position or velocity has the wrong sign")?;
+    }
+    f.write_str(if is_replaced {
+        "; it is not used, velocities are computed from the positions"
+    } else {
+        "; correct it in the driver"
+    })
+}
+
 fn publishers(
     f: &mut fmt::Formatter<'_>,
     used: &[Publisher],
@@ -413,6 +446,29 @@ fn publishers(
         return Ok(());
     }
     write!(f, ", not used ({})", list(ignored))
+}
+
+/// A sentence for each finding of several recordings; recordings with the same finding share one.
+pub fn by_recording(all: &[(String, Vec<Finding>)]) -> Vec<String> {
+    let mut sentences: Vec<(String, Vec<&str>)> = Vec::new();
+    for (name, findings) in all {
+        for finding in findings {
+            let text = finding.to_string();
+            match sentences.iter_mut().find(|(known, _)| *known == text) {
+                Some((_, names)) => names.push(name),
+                None => sentences.push((text, vec![name])),
+            }
+        }
+    }
+    let sentences = sentences.iter().map(|(text, names)| {
+        let of = if names.len() > 1 && names.len() == all.len() {
+            format!("all {} recordings", names.len())
+        } else {
+            suggest::some(names)
+        };
+        format!("{of}: {text}.")
+    });
+    sentences.collect()
 }
 
 /// `1 message at 3.200 s`, or `12 messages from 3.200 s to 3.310 s`.

@@ -2,17 +2,23 @@
 
 use std::path::Path;
 
-use tauscope_archive::{Recording, RecordingKind, ros};
+use tauscope_archive::{JointFacts, JointTallies, Recording, RecordingKind, ros};
 
+use crate::assembler::{Assembler, Taken};
 use crate::clock::{Clock, Stamps};
 use crate::error::{SessionError, Unusable};
 use crate::finding::{Effect, Finding};
+use crate::plausible::odd_velocities;
 use crate::publisher::{Publisher, Publishers, choose};
 use crate::values::Ranges;
 
 /// Messages of a topic that are looked at.
 /// Resolution: a few milliseconds of work; 200 s of an arm at 100 Hz.
 const HEAD: usize = 20_000;
+
+/// Factor by which a velocity differs from the derivative of the position that is not used.
+/// Physical: the filter of a drive takes a tenth of the fastest motion at most.
+const OFF: f64 = 1.25;
 
 /// What the head of a recording shows.
 #[derive(Debug, Clone)]
@@ -28,6 +34,8 @@ pub struct Look {
     pub(crate) used: Vec<bool>,
     pub(crate) ranges: Ranges,
     pub(crate) of_clock: Option<Finding>,
+    /// Velocities that are not the derivative of the positions.
+    pub(crate) of_velocity: Option<Finding>,
 }
 
 /// The joints whose states are wanted.
@@ -137,6 +145,7 @@ impl Look {
             publishers,
             used,
             of_clock: None,
+            of_velocity: None,
         };
         look.read_values(recording)?;
         Ok(look)
@@ -180,6 +189,36 @@ impl Look {
             RecordingKind::Csv | RecordingKind::Lerobot
         );
         (self.clock, self.of_clock) = stamps.clock(has_log_times);
+        self.check_velocity(recording)
+    }
+
+    /// Compares velocities with positions, on the clock that was chosen.
+    fn check_velocity(&mut self, recording: &Recording) -> Result<(), SessionError> {
+        let mut assembler = Assembler::of(self).keeping_velocity();
+        let mut tallies = JointTallies::in_order(&self.joint_names);
+        let count = self.joint_names.len();
+        let mut states = recording.joint_states(&self.topic)?;
+        for _ in 0..HEAD {
+            let Some(state) = states.next_state() else {
+                break;
+            };
+            let Ok(state) = state else { continue };
+            if let Taken::Follows(whole) = assembler.take(state.message, state.log_time_ns)
+                && whole.has_velocity
+            {
+                let (position, velocity) = (&whole.position[..count], &whole.velocity[..count]);
+                tallies.add_values(whole.stamp_ns, position, velocity, &[]);
+            }
+        }
+        let facts = tallies.facts();
+        // Positions in degrees are another finding.
+        let is_off = |facts: &JointFacts| {
+            let slope = facts.velocity_slope.filter(|_| !facts.is_in_degrees());
+            slope.is_some_and(|slope| !(1.0 / OFF..=OFF).contains(&slope))
+        };
+        if facts.iter().any(is_off) {
+            self.of_velocity = odd_velocities(&facts, true);
+        }
         Ok(())
     }
 

@@ -144,11 +144,7 @@ impl Plausible {
         all.extend(jumps);
         if degrees.is_empty() {
             all.extend(named().filter_map(|(facts, limits)| beyond(facts, (*limits)?)));
-            let remarks = facts.iter().filter_map(|facts| {
-                let (joint, remark) = (facts.name.clone(), facts.remark()?);
-                Some(Finding::Velocity { joint, remark })
-            });
-            all.extend(remarks);
+            all.extend(odd_velocities(&facts, false));
         } else {
             all.push(Finding::Degrees { joints: degrees });
         }
@@ -161,6 +157,18 @@ impl Plausible {
         }
         all
     }
+}
+
+/// The finding about joints whose velocity is not the derivative of the position.
+pub(crate) fn odd_velocities(facts: &[JointFacts], is_replaced: bool) -> Option<Finding> {
+    let odd = facts.iter().filter(|facts| facts.has_odd_velocity());
+    let joints: Vec<(String, f64)> = odd
+        .filter_map(|facts| Some((facts.name.clone(), facts.velocity_slope?)))
+        .collect();
+    (!joints.is_empty()).then_some(Finding::Velocity {
+        joints,
+        is_replaced,
+    })
 }
 
 /// Whether a joint's positions are in degrees: told by its velocities, or by the robot's limits.

@@ -94,7 +94,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         let summary = Summary::of(&evaluation, &judged, &tables, &files);
         out.print(&serde_json::to_string_pretty(&summary).context("the results")?)?;
     } else {
-        out.print(&tauscope_evaluate::text(&tables, &evaluation.notes))?;
+        out.print(&tauscope_evaluate::text(&tables, &evaluation.all_notes()))?;
         for file in &files {
             out.print(&format!("wrote {}", file.display()))?;
         }
@@ -107,7 +107,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
 struct Summary<'a> {
     set: &'a str,
     lost: u64,
-    notes: &'a [String],
+    notes: Vec<String>,
     detectors: Vec<Numbered<'a>>,
     tables: &'a [Table],
     files: &'a [PathBuf],
@@ -138,7 +138,7 @@ impl<'a> Summary<'a> {
         Self {
             set: &evaluation.request.set.set,
             lost: evaluation.lost,
-            notes: &evaluation.notes,
+            notes: evaluation.all_notes(),
             detectors: detectors.collect(),
             tables,
             files,

@@ -76,17 +76,22 @@ fn joint_states(recording: &Recording) -> Result<Vec<Topic>, SessionError> {
 fn text(printed: &Printed) -> String {
     let mut text = printed.info.to_string();
     for topic in &printed.joint_states {
-        if topic.publishers.len() > 1 {
+        let lists = topic.publishers.len() > 1;
+        if lists {
             text += &format!("publishers on {}:\n", topic.topic);
             for publisher in &topic.publishers {
                 text += &format!("  {publisher}\n");
             }
         }
-        if !topic.sentences.is_empty() {
+        let findings = topic.findings.iter();
+        let mut findings = findings
+            .filter(|finding| !(lists && matches!(finding, Finding::Publishers { .. })))
+            .peekable();
+        if findings.peek().is_some() {
             text += &format!("findings on {}:\n", topic.topic);
-            for sentence in &topic.sentences {
-                text += &format!("  {sentence}\n");
-            }
+        }
+        for finding in findings {
+            text += &format!("  {finding}\n");
         }
     }
     text

@@ -116,7 +116,7 @@ fn request(args: &Args, recordings: &[PathBuf]) -> Result<(Request, String), Fai
                 torque_constants_nm_per_a: args.torque_constant.iter().cloned().collect(),
                 twin: args.twin.as_deref(),
                 twin_topic: None,
-                state_topic: &args.state_topic,
+                state_topic: Some(&args.state_topic),
                 fit: recordings,
                 holdout: &[],
             },

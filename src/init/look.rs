@@ -9,7 +9,7 @@ use tauscope_ingest::Topics;
 use tauscope_pipeline::calibrate::Job;
 use tauscope_pipeline::cell::{Cell, EffortUnit};
 use tauscope_pipeline::report::{Problem, Report};
-use tauscope_session::Effect;
+use tauscope_session::{Effect, by_recording};
 use tauscope_twin::telling_slopes_of;
 
 use crate::exit::Failure;
@@ -30,13 +30,6 @@ pub struct Looked {
     pub kept: Kept,
     /// What was found, a sentence each.
     pub sentences: Vec<String>,
-}
-
-impl Looked {
-    /// The arm.
-    pub fn cell(&self) -> &Cell {
-        &self.request.cell
-    }
 }
 
 /// What is given on the command line.
@@ -80,11 +73,10 @@ impl Told<'_> {
         sentences.extend(cell.findings.iter().cloned());
         sentences.extend(coupled(cell));
         sentences.extend(unlimited(cell));
-        for recording in &input.fit {
-            let name = recording.path.display();
-            let findings = recording.findings.iter();
-            sentences.extend(findings.map(|finding| format!("{name}: {finding}.")));
-        }
+        let found: Vec<_> = (input.fit.iter())
+            .map(|recording| (recording.path.display().to_string(), recording.findings.clone()))
+            .collect();
+        sentences.extend(by_recording(&found));
         let (unit, sentence) = self.unit(&request);
         sentences.push(sentence);
         request.cell.facts.effort_unit = unit;

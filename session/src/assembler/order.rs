@@ -32,6 +32,8 @@ pub(super) struct Order {
     newest_ns: Option<i64>,
     /// Position and effort.
     newest: [JointArray; 2],
+    /// Whether a jump was refused and the stamps have not caught up.
+    is_behind: bool,
 }
 
 impl Default for Order {
@@ -39,6 +41,7 @@ impl Default for Order {
         Self {
             newest_ns: None,
             newest: [[0.0; MAX_JOINTS]; 2],
+            is_behind: false,
         }
     }
 }
@@ -48,17 +51,18 @@ impl Order {
     /// nothing begins anew.
     pub fn next(&mut self, state: &Whole, refuses_set_back: bool) -> Next {
         let values = [state.position, state.effort];
+        let jumps = |newest_ns| jumps_back(newest_ns, state.stamp_ns);
+        self.is_behind &= self.newest_ns.is_some_and(|newest_ns| state.stamp_ns <= newest_ns);
+        self.is_behind |= refuses_set_back && self.newest_ns.is_some_and(jumps);
+        if self.is_behind {
+            return Next::Behind;
+        }
         let next = match self.newest_ns {
             Some(newest_ns) if state.stamp_ns == newest_ns && self.newest == values => {
                 return Next::Repeated;
             }
             Some(newest_ns) if state.stamp_ns == newest_ns => return Next::Stalled,
-            Some(newest_ns) if jumps_back(newest_ns, state.stamp_ns) => {
-                if refuses_set_back {
-                    return Next::Behind;
-                }
-                Next::SetBack
-            }
+            Some(newest_ns) if jumps(newest_ns) => Next::SetBack,
             Some(newest_ns) if state.stamp_ns < newest_ns => return Next::Late,
             _ => Next::Follows,
         };

@@ -11,6 +11,7 @@ impl Assembler {
         let mut all = Vec::new();
         all.extend(self.publishers_finding());
         all.extend(self.of_clock.clone());
+        all.extend(self.of_velocity.clone());
         if !self.undecodable.is_empty() {
             all.push(Finding::Undecodable {
                 reasons: self.undecodable.clone(),

@@ -13,7 +13,7 @@ use std::collections::VecDeque;
 use tauscope_archive::ros;
 use tauscope_bus::{Header, JointArray, JointState, MAX_JOINTS, flags};
 use tauscope_dynamics::Unwrap;
-use tauscope_session::{Assembler, Counts, Finding, Gather, Layouts, Taken, Unusable, Whole, stamp_of};
+use tauscope_session::{Assembler, Counts, Finding, Gather, Layouts, Taken, Whole, stamp_of};
 
 use crate::config::ConfigError;
 use crate::setup::{Setup, Tool};

@@ -95,7 +95,21 @@ impl RecordedSource {
         setup: &Setup,
     ) -> Result<Self, IngestError> {
         let recording = tauscope_session::open(&file.path)?;
-        Self::open(&recording, &file.topics, config, setup)
+        Self::open(&recording, (&file.topics, config), setup, Assembler::of)
+    }
+
+    /// As [`RecordedSource::open_file`], for who learns from the samples: what follows a jump back of the stamps is refused.
+    ///
+    /// # Errors
+    /// As [`RecordedSource::open_file`].
+    pub fn open_to_learn(
+        file: &FileConfig,
+        config: &Config,
+        setup: &Setup,
+    ) -> Result<Self, IngestError> {
+        let recording = tauscope_session::open(&file.path)?;
+        let assembler = |look: &Look| Assembler::of(look).refusing_set_back();
+        Self::open(&recording, (&file.topics, config), setup, assembler)
     }
 
     /// Opens the table that `csv` names, and reads on to its first sample.
@@ -106,14 +120,14 @@ impl RecordedSource {
         let recording =
             tauscope_session::open_table(&csv.path, &csv.columns, &setup.joint_names)?;
         let topics = Topics::default();
-        Self::open(&recording, &topics, config, setup)
+        Self::open(&recording, (&topics, config), setup, Assembler::of)
     }
 
     fn open(
         recording: &Recording,
-        topics: &Topics,
-        config: &Config,
+        (topics, config): (&Topics, &Config),
         setup: &Setup,
+        assembler: impl FnOnce(&Look) -> Assembler,
     ) -> Result<Self, IngestError> {
         let (roles, wanted) = roles(recording, topics)?;
         let joints = Joints {
@@ -137,7 +151,7 @@ impl RecordedSource {
             path: recording.path().to_owned(),
             messages: recording.messages(&wanted)?,
             roles,
-            packer: Packer::with(setup, settings, |_| Assembler::of(&look))?,
+            packer: Packer::with(setup, settings, |_| assembler(&look))?,
             first: None,
             message: ros::JointState::default(),
             decoder: ros::JointStateDecoder::default(),

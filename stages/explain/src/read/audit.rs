@@ -1,5 +1,7 @@
 //! Checks whether the recordings allow a verdict, and counts what was lost on reading them.
 
+use tauscope_session::by_recording;
+
 use crate::read::input::Input;
 use crate::read::recording::Recording;
 
@@ -104,11 +106,13 @@ fn moving_s(recordings: &[Recording], joint: usize, n: usize) -> f64 {
 /// What is odd or wrong about each recording, a sentence each: the findings on reading, the parts that could not be used,
 /// and the clock that stamps were put on.
 pub fn losses(input: &Input) -> Vec<String> {
-    let mut notes = Vec::new();
-    for recording in input.fit.iter().chain(&input.holdout) {
+    let recordings = || input.fit.iter().chain(&input.holdout);
+    let found: Vec<_> = recordings()
+        .map(|recording| (recording.name.clone(), recording.findings.clone()))
+        .collect();
+    let mut notes = by_recording(&found);
+    for recording in recordings() {
         let name = &recording.name;
-        let findings = recording.findings.iter();
-        notes.extend(findings.map(|finding| format!("{name}: {finding}.")));
         let losses = &recording.losses;
         let counted = [
             (losses.repeated, "rows repeat a stamp and its values"),

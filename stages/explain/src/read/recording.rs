@@ -151,8 +151,8 @@ impl Reader {
                 losses: Losses::default(),
                 findings: Vec::new(),
             },
-            // A fit needs time to advance.
-            assembler: Assembler::of(look).refusing_set_back(),
+            // A fit needs time to advance, and the audit names the factor of a velocity.
+            assembler: Assembler::of(look).refusing_set_back().keeping_velocity(),
             plausible: Plausible::new(&look.joint_names, None),
             joint_count,
             turns: vec![Unwrap::default(); joint_count],
@@ -211,7 +211,9 @@ impl Reader {
         let mut findings: Vec<Finding> =
             remarks.map(|remark| Finding::Format { remark }).collect();
         findings.extend(self.assembler.findings());
-        findings.extend(self.plausible.findings());
+        // The first look has judged velocities.
+        let of_values = self.plausible.findings().into_iter();
+        findings.extend(of_values.filter(|it| !matches!(it, Finding::Velocity { .. })));
         self.recording.findings = findings;
         if !self.has_velocity {
             self.recording.velocity.clear();

@@ -69,9 +69,11 @@ impl Report {
         self.findings.iter().any(Finding::is_slip)
     }
 
-    /// Whether there is a corrected twin for a pipeline. One of mended recordings would not fit what the robot publishes.
+    /// Whether there is a corrected twin for a pipeline. One of mended recordings would not fit what the robot publishes;
+    /// a pipeline does not use a velocity that is not the derivative of the position.
     pub fn hands_out_twin(&self) -> bool {
-        self.verdict != Verdict::NotEvaluated && !self.is_of_mended()
+        let unfit = |finding: &Finding| finding.is_slip() && !finding.is_of_velocity();
+        self.verdict != Verdict::NotEvaluated && !self.findings.iter().any(unfit)
     }
 }
 
@@ -194,6 +196,11 @@ impl Finding {
     /// Whether it is a fault of the recordings, or of what is said of them, and no physics.
     pub fn is_slip(&self) -> bool {
         slip_words::words(self.known_as()).is_some()
+    }
+
+    /// Whether it is such a fault of the recorded velocity alone.
+    fn is_of_velocity(&self) -> bool {
+        self.known_as() == "velocity_scale"
     }
 
     /// A parameter's name without its unit, and the unit that its number is in.

@@ -56,11 +56,17 @@ impl Slips {
 
     /// That all else is of mended recordings.
     pub fn note(&self) -> Option<String> {
+        let of_velocity = |slip: &Slip| matches!(slip.remedy, Remedy::Velocity(..));
+        let twin = if self.all.iter().all(of_velocity) {
+            "A pipeline computes velocities from the positions, so the corrected twin holds there."
+        } else {
+            "No corrected twin was written: correct the faults, then explain again."
+        };
         (!self.all.is_empty()).then(|| {
-            "The recordings, or what is said of them, have the faults that are listed first. All other findings and numbers are those \
-             of the recordings without these faults. The error before is that of the recordings as they are. No corrected twin was \
-             written: mend the faults, then explain again."
-                .to_owned()
+            format!(
+                "The recordings, or their description, have the faults that are listed first. All other findings and numbers are those \
+                 of the recordings without these faults. The error before is that of the recordings as they are. {twin}"
+            )
         })
     }
 
