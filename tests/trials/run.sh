@@ -7,8 +7,8 @@
 #   tests/trials/run.sh --program FILE   another program than target/debug/tauscope, which is built if absent
 #   tests/trials/run.sh --table FILE     writes the table into a file, too
 #
-# The generator needs numpy and mcap. Without them it takes them from PyPI into target/trials/venv; where that is
-# impossible, the script prints a line SKIPPED and exits with 0.
+# The generator needs numpy, zstandard and mcap. Without them it takes them from PyPI into target/trials/venv; where
+# that is impossible, the script prints a line SKIPPED and exits with 0.
 set -euo pipefail
 here=$(pwd)
 cd "$(dirname "$0")/../.."
@@ -30,12 +30,12 @@ skip() { echo "SKIPPED: $1" && exit 0; }
 
 mkdir -p "$work"
 python=python3
-if ! $python -c 'import mcap, numpy' 2>/dev/null; then
+if ! $python -c 'import mcap, numpy, zstandard' 2>/dev/null; then
     python=$work/venv/bin/python
-    if ! "$python" -c 'import mcap, numpy' 2>/dev/null; then
+    if ! "$python" -c 'import mcap, numpy, zstandard' 2>/dev/null; then
         python3 -m venv --clear "$work/venv" || skip "no Python with venv"
         "$python" -m pip install --quiet --disable-pip-version-check -r tests/trials/requirements.txt ||
-            skip "numpy and mcap cannot be fetched from PyPI"
+            skip "numpy, zstandard and mcap cannot be fetched from PyPI"
     fi
 fi
 

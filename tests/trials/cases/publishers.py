@@ -5,7 +5,7 @@ import numpy as np
 from lib.arm import ARM, urdf, urdf_body
 from lib.motion import Rows
 from lib.session import rows_of, session, write_robot, write_session
-from lib.trial import CELL, REPORT, Answer, Trial, count, explain, info, init, near, refused, replay, told
+from lib.trial import CELL, REPORT, Answer, Trial, count, counts, explain, info, init, near, refused, replay, told
 from lib.writers import messages
 
 FINGERS = ["finger_a", "finger_b"]
@@ -144,12 +144,12 @@ TRIALS = [
     Trial(
         "repeat-positions",
         session(repeated(10, 0.0047, "p")),
-        unharmed(near(count(120), r"position|no effort|without"), says=(near(count(120), r"position|effort"),)),
+        unharmed(near(count(120), r"position|no effort|without"), says=(near(counts(120), r"position|effort"),)),
     ),
     Trial(
         "repeat-zero-effort",
         session(repeated(2, 0.0047, "pve", zero_effort)),
-        unharmed(near(count(600), r"effort", r"\b(0|zero)\b"), says=(near(count(600), "effort"),)),
+        unharmed(near(count(600), r"effort", r"\b(0|zero)\b"), says=(near(counts(600), "effort"),)),
     ),
     Trial("report-ur-prefixed-twin", session(prefixed_twin), unharmed("SN53_j_base", r"\bj_base")),
 ]

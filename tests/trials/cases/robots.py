@@ -2,7 +2,7 @@
 
 from lib.arm import ARM, urdf
 from lib.session import session
-from lib.trial import CELL, REPORT, Answer, Run, Trial, calibrate, explain, init, near, refused, told
+from lib.trial import CELL, REPORT, Run, Trial, calibrate, explain, init, near, refused, told
 
 NO_BODY = (
     r"impossible|cannot (be|have|belong)|not possible|unphysical|not physical|implausib|invalid|triangle|"
@@ -74,6 +74,20 @@ def with_izz(izz):
 
 FER_LINK4 = (0.00784585566, -0.00339591957, 0.00158704074, 0.00649543136, -0.00181477884, 0.01003079917)
 
+
+def other_formats(folder):
+    session()(folder)
+    (folder / "arm.xacro").write_text(
+        '<?xml version="1.0"?>\n<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="crane5">\n'
+        '  <xacro:property name="height" value="0.18"/>\n  <link name="foot"/>\n'
+        '  <xacro:include filename="$(find crane5_description)/urdf/links.xacro"/>\n</robot>\n'
+    )
+    (folder / "arm.xml").write_text(
+        '<mujoco model="crane5">\n  <worldbody>\n    <body name="column">\n'
+        '      <joint name="j_base" axis="0 0 1"/>\n    </body>\n  </worldbody>\n</mujoco>\n'
+    )
+
+
 TRIALS = [
     trial("inertia-decimal", inertia_of("column", with_izz(9.3)), inertia_named("column")),
     trial(
@@ -100,6 +114,15 @@ TRIALS = [
         tuple(
             run(refused(r"0,18", r"number|comma|decimal", r"arm\.urdf:7\b|line 7\b"))
             for run in (calibrate, init, explain)
+        ),
+    ),
+    Trial(
+        "robot-formats",
+        other_formats,
+        (
+            init(refused("xacro", r"xacro \S*arm\.xacro|ros2 run xacro"), robot="arm.xacro", short=True),
+            explain(refused("xacro", r"xacro \S*arm\.xacro|ros2 run xacro"), robot="arm.xacro"),
+            init(refused(r"MJCF|MuJoCo", "URDF"), robot="arm.xml", short=True),
         ),
     ),
 ]

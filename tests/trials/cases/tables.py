@@ -6,8 +6,8 @@ import numpy as np
 
 from lib.arm import ARM
 from lib.session import rows_of, write_robot
-from lib.trial import CELL, REPORT, RECORDINGS, Answer, Trial, count, explain, info, init, near, refused, replay, told
-from lib.writers import START_NS, start_of, write_table
+from lib.trial import CELL, RECORDINGS, REPORT, Answer, Trial, count, explain, info, init, near, refused, replay, told
+from lib.writers import start_of, write_table
 
 NUMBERS = range(1, len(ARM.names) + 1)
 
@@ -29,7 +29,8 @@ def columns_file(path, text):
 
 def quoted(unit, factor):
     """Headers with a comma and a unit in quotes."""
-    positions, torques = ([f"{what}, J{n} [{u}]" for n in NUMBERS] for what, u in (("Position", unit), ("Torque", "Nm")))
+    positions = [f"Position, J{n} [{unit}]" for n in NUMBERS]
+    torques = [f"Torque, J{n} [Nm]" for n in NUMBERS]
 
     def write(_, rows, path):
         header = ",".join(["t [s]", *(f'"{name}"' for name in positions + torques)])
@@ -121,7 +122,7 @@ def read_or_refused(*facts, never=()):
     """Read with true results, or refused with these facts."""
     return (
         info(Answer(says=(count(1200),), never=never), refused(*facts, never=never), file="free_1.csv"),
-        init(told(CELL, exits=(0,), never=never), refused(*facts, never=never), short=True),
+        init(told(CELL, exits=(0,), never=never), refused(*facts, never=never)),
         explain(told(REPORT, exits=(0,), never=never), refused(*facts, never=never)),
         replay(Answer(events=(0,), never=never), refused(*facts, never=never), file="free_1.csv"),
     )
@@ -136,7 +137,7 @@ DEGREES = near(r"degree|\bdeg\b", "position")
 AGAIN = near(
     r"\btime|\bstamp",
     r"\bback|earlier|decreas|begins? again|restart|fall|repeat|revers",
-    rf"1[ ,']?20[0-3]\b|\b(12|11\.99?)\b|episode",
+    r"1[ ,']?20[0-3]\b|\b(12|11\.99?)\b|episode",
 )
 
 TRIALS = [
@@ -146,7 +147,7 @@ TRIALS = [
         quoted("deg", 180 / np.pi),
         (
             info(Answer(says=(DEGREES,)), refused(DEGREES), file="free_1.csv"),
-            init(told(CELL, DEGREES), refused(DEGREES), short=True),
+            init(told(CELL, DEGREES), refused(DEGREES)),
             explain(told(REPORT, DEGREES), refused(DEGREES)),
         ),
     ),
@@ -173,10 +174,9 @@ TRIALS = [
         episodes,
         (
             info(Answer((0, 3), (AGAIN,)), refused(AGAIN), file="free_1.csv"),
-            init(told(CELL, AGAIN), refused(AGAIN), short=True),
+            init(told(CELL, AGAIN), refused(AGAIN)),
             explain(told(REPORT, AGAIN), refused(AGAIN)),
             replay(Answer((0, 3), (AGAIN,), events=(0,)), refused(AGAIN), file="free_1.csv"),
         ),
     ),
 ]
-assert START_NS % 10**9 == 0

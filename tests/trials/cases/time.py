@@ -4,7 +4,7 @@ import numpy as np
 
 from lib.motion import Rows
 from lib.session import session
-from lib.trial import CELL, REPORT, Answer, Trial, count, explain, info, init, near, refused, replay, told
+from lib.trial import CELL, REPORT, Answer, Trial, explain, info, init, near, refused, replay, told
 from lib.writers import messages
 
 BACK = r"\bback|earlier|revers|decreas|loop|repeat|restart|begins? again|fall|behind|rewind"

@@ -5,7 +5,7 @@ import numpy as np
 from lib.arm import ARM
 from lib.motion import Rows
 from lib.session import changed, session
-from lib.trial import CELL, REPORT, Answer, Trial, count, explain, info, init, near, refused, replay, told
+from lib.trial import CELL, REPORT, Answer, Trial, count, counts, explain, info, init, near, refused, replay, told
 from lib.writers import messages
 
 # What the values made the program say instead.
@@ -78,7 +78,7 @@ def useless(*facts):
 
 
 TRIALS = [
-    Trial("effort-garbage", session(changed(garbage)), in_spite_of(near("j_tilt", f"{count(8)}|{count(12)}"))),
+    Trial("effort-garbage", session(changed(garbage)), in_spite_of(near("j_tilt", counts(8, 12)))),
     Trial(
         "effort-sentinel",
         session(changed(sentinels)),
@@ -87,10 +87,14 @@ TRIALS = [
     Trial(
         "effort-dropout",
         session(changed(dropouts)),
-        in_spite_of(near("j_shoulder", r"\b0\b|zero|drop", f"{count(6)}|{count(36)}")),
+        in_spite_of(near("j_shoulder", r"\b0\b|zero|drop", counts(6, 36))),
     ),
     Trial("length-gripper", session(named(7, 5, 5, 5)), useless(near(count(7), count(5), "name"))),
     Trial("length-short-effort", session(named(5, 5, 5, 4)), useless(near(count(5), count(4), "effort"))),
     Trial("length-no-position", session(named(5, 0, 5, 5)), useless(near("position", r"\b(no|0|without|empty)\b"))),
-    Trial("length-no-names", session(named(0, 5, 5, 5)), useless(near(r"\bnames?\b|named", r"\b(no|0|without|empty)\b"))),
+    Trial(
+        "length-no-names",
+        session(named(0, 5, 5, 5)),
+        useless(near(r"\bnames?\b|named", r"\b(no|0|without|empty)\b")),
+    ),
 ]

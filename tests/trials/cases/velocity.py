@@ -7,7 +7,12 @@ from lib.trial import CELL, REPORT, Answer, Trial, explain, info, init, near, re
 
 SPEED_PER_JOINT = np.array([1.0, 1.0, 1.0, 1.5, 1.5])
 # Conclusions about the effort, drawn from a wrong velocity.
-INSTEAD = (r"measures? (0\.[0-7]|1\.[3-9]|[2-9])\d* times", "effort.{0,80}other sign", "no joint bears weight", "knows no future")
+INSTEAD = (
+    r"measures? (0\.[0-7]|1\.[3-9]|[2-9])\d* times",
+    r"effort of [^.;]{0,80}other sign",
+    "no joint bears weight",
+    "knows no future",
+)
 
 
 def trial(name, velocity, *fact):
@@ -28,11 +33,16 @@ def trial(name, velocity, *fact):
 TRIALS = [
     trial("velocity-tenfold", lambda rows: 10 * rows.qd, r"\b(10|10\.\d+|9\.9\d*|ten)\b|0\.1\b"),
     trial("velocity-zero", lambda rows: 0 * rows.qd, r"\b(0|0\.0+|zero)\b"),
-    trial("velocity-constant", lambda rows: 0 * rows.qd + SPEED_PER_JOINT, r"constant|same|one (number|value)|never changes"),
+    trial(
+        "velocity-constant",
+        lambda rows: 0 * rows.qd + SPEED_PER_JOINT,
+        r"constant|same|one (number|value)|never changes|does not change",
+    ),
     trial(
         "velocity-position",
         lambda rows: 0.8 * rows.q,
-        r"unrelated|not (the|follow|match)|nothing to do|proportional|position itself|copy|derivative|contradict",
+        r"unrelated|not (the|a|that|its|follow|match)|no relation|nothing to do|proportional|position itself|copy|"
+        r"contradict|differs",
     ),
     trial("velocity-degrees", lambda rows: np.degrees(rows.qd), r"degree|deg/s|57\.\d|180"),
     trial("velocity-sign", lambda rows: -rows.qd, r"\bsign\b|negative|-1\b|opposite|-1\.0"),

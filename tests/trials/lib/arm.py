@@ -3,7 +3,7 @@
 The arm is no product. Its forearm hangs far out, so that three joints bear weight.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 

@@ -27,11 +27,19 @@ NEVER = (
 )
 
 
-def near(*patterns, within=250):
-    """A pattern that finds all of these close to each other, in any order."""
+class Near(str):
+    """A pattern with the facts that it finds."""
+
+    facts = ()
+
+
+def near(*facts, within=250):
+    """A pattern that finds all of these patterns close to each other, in any order."""
     between = f".{{0,{within}}}?"
-    orders = (between.join(f"(?:{pattern})" for pattern in order) for order in permutations(patterns))
-    return "|".join(orders)
+    orders = (between.join(f"(?:{fact})" for fact in order) for order in permutations(facts))
+    pattern = Near("|".join(orders))
+    pattern.facts = facts
+    return pattern
 
 
 def count(number):
@@ -40,6 +48,11 @@ def count(number):
     if len(text) <= 3:
         return rf"(?<![\d.,]){text}(?![\d]|[.,]\d)"
     return rf"(?<![\d.,]){text[:-3]}[ ,']?{text[-3:]}(?![\d]|[.,]\d)"
+
+
+def counts(*numbers):
+    """A count of one recording, or that of the whole session."""
+    return "|".join(count(number) for each in numbers for number in (each, RECORDINGS * each))
 
 
 @dataclass(frozen=True)
@@ -62,7 +75,7 @@ class Answer:
             yield f"exit {code}, not {' or '.join(str(c) for c in self.exit)}"
         for pattern in self.says:
             if not re.search(pattern, output, re.I):
-                yield f"does not say /{shown(pattern)}/"
+                yield f"does not say `{shown(pattern)}`"
         for pattern in (*NEVER, *self.never):
             if found := re.search(pattern, output, re.I):
                 yield f'says "{found.group()[:60]}"'
@@ -90,7 +103,9 @@ class Answer:
 
 
 def shown(pattern):
-    return pattern if len(pattern) < 60 else pattern[:57] + "..."
+    """A pattern as the table shows it."""
+    facts = getattr(pattern, "facts", (pattern,))
+    return " + ".join(fact if len(fact) < 40 else fact[:37] + "..." for fact in facts)
 
 
 def coulomb(findings, joint):

@@ -62,6 +62,19 @@ def joint_state(stamp_ns, names, position, velocity, effort):
     return b"\0\1\0\0" + bytes(out)
 
 
+def joint_state_ros1(number, stamp_ns, names, position, velocity, effort):
+    """A JointState in the serialisation of ROS 1."""
+
+    def text(value):
+        return struct.pack("<I", len(value.encode())) + value.encode()
+
+    out = struct.pack("<III", number, stamp_ns // 10**9, stamp_ns % 10**9) + text("")
+    out += struct.pack("<I", len(names)) + b"".join(text(name) for name in names)
+    for values in (position, velocity, effort):
+        out += struct.pack(f"<I{len(values)}d", len(values), *values)
+    return out
+
+
 def start_of(recording):
     """Begin of recording 0, 1, ... of a session [ns]."""
     return START_NS + recording * BETWEEN_NS
@@ -83,20 +96,19 @@ def messages(rows, start_ns, names=None, stamp=None, log=None, fields="pve"):
     return out
 
 
-def write_mcap(path, topics, chunk_size=64 * 1024, sort=True):
-    """`topics`: topic -> messages. With `sort`, messages are written in the order of their log times."""
+def write_mcap(path, topics, chunk_size=64 * 1024, encoding="cdr", schema=(TYPE, "ros2msg", SCHEMA), profile="ros2"):
+    """`topics`: topic -> messages, or the messages of the usual topic. They are written in the order of arrival."""
     if not isinstance(topics, dict):
         topics = {TOPIC: topics}
     with open(path, "wb") as file:
         writer = Writer(file, chunk_size=chunk_size, compression=CompressionType.ZSTD)
-        writer.start(profile="ros2", library="trials")
-        schema = writer.register_schema(TYPE, "ros2msg", SCHEMA.encode())
+        writer.start(profile=profile, library="trials")
+        number = writer.register_schema(schema[0], schema[1], schema[2].encode())
         queue = []
         for topic, held in topics.items():
-            channel = writer.register_channel(topic, "cdr", schema)
+            channel = writer.register_channel(topic, encoding, number)
             queue += [(message, channel) for message in held]
-        if sort:
-            queue.sort(key=lambda entry: entry[0].log_ns)
+        queue.sort(key=lambda entry: entry[0].log_ns)
         for number, (message, channel) in enumerate(queue):
             writer.add_message(channel, message.log_ns, message.data, message.log_ns, number)
         writer.finish()
@@ -126,7 +138,7 @@ def write_db3(path, held, topic=TOPIC, compress=None):
     base.close()
 
 
-def metadata(file, held, storage, topic=TOPIC):
+def metadata(file, held, storage, topic=TOPIC, compression=("", "")):
     """The `metadata.yaml` of a rosbag2 folder with one file."""
     begin, end = held[0].log_ns, held[-1].log_ns
     return f"""rosbag2_bagfile_information:
@@ -144,8 +156,8 @@ def metadata(file, held, storage, topic=TOPIC):
         serialization_format: cdr
         offered_qos_profiles: ""
       message_count: {len(held)}
-  compression_format: ""
-  compression_mode: ""
+  compression_format: "{compression[0]}"
+  compression_mode: "{compression[1]}"
   relative_file_paths:
     - {file}
   files:
