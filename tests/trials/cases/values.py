@@ -82,7 +82,11 @@ TRIALS = [
     Trial(
         "effort-sentinel",
         session(changed(sentinels)),
-        in_spite_of(near("j_elbow", "65[ ,']?535"), near("j_turn", "-?9[ ,']?999"), near("j_base", r"\binf|finite")),
+        in_spite_of(
+            near("j_elbow", rf"65[ ,']?535|6\.5\d*e4|{counts(6)}"),
+            near("j_turn", rf"9[ ,']?999|{counts(6)}"),
+            near("j_base", rf"\binf|finite|{counts(3)}"),
+        ),
     ),
     Trial(
         "effort-dropout",
