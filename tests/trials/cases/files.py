@@ -153,7 +153,9 @@ def corrupt(folder):
         path.write_bytes(data)
 
 
-DAMAGED = near(r"damag|corrupt|decompress|crc|checksum|cannot be read|torn|chunk", r"\d")
+DAMAGED = r"damag|corrupt|decompress|crc|checksum|cannot be read|chunk"
+# A chunk has 64 messages.
+LOST_CHUNK = rf"{counts(64)}|\b0\.6[345]\d* s"
 TWICE = near(counts(600), r"twice|two times|doubl|duplicat|repeat|more than once")
 REPEATED = near(r"repeat|duplicat|twice|same (stamp|message)|already|again|second copy|copies", r"\d{3,4}")
 
@@ -227,10 +229,10 @@ TRIALS = [
         "report-mcap-corrupt-chunk",
         corrupt,
         (
-            info(Answer((0, 3), (DAMAGED,))),
-            init(told(CELL, DAMAGED, exits=(3,))),
-            explain(told(REPORT, DAMAGED, exits=(3,))),
-            replay(Answer((3,), (DAMAGED,), events=(0,))),
+            info(Answer((0, 3), (DAMAGED, LOST_CHUNK))),
+            init(told(CELL, DAMAGED, LOST_CHUNK, exits=(3,))),
+            explain(told(REPORT, DAMAGED, LOST_CHUNK, exits=(3,))),
+            replay(Answer((3,), (DAMAGED, LOST_CHUNK), events=(0,))),
         ),
     ),
     Trial(

@@ -144,12 +144,20 @@ TRIALS = [
     Trial(
         "repeat-positions",
         session(repeated(10, 0.0047, "p")),
-        unharmed(near(count(120), r"position|no effort|without"), says=(near(counts(120), r"position|effort"),), exits=(0, 3)),
+        unharmed(
+            near(count(120), r"position|no effort|without"),
+            says=(near(counts(120), r"position|effort"),),
+            exits=(0, 3),
+        ),
     ),
     Trial(
         "repeat-zero-effort",
         session(repeated(2, 0.0047, "pve", zero_effort)),
-        unharmed(near(count(600), r"effort", r"\b(0|zero)\b"), says=(near(counts(600), "effort"),), exits=(0, 3)),
+        unharmed(
+            near(count(600), r"effort", r"\b(0|zero)\b"),
+            says=(near(counts(600), "effort"),),
+            exits=(0, 3),
+        ),
     ),
     Trial("report-ur-prefixed-twin", session(prefixed_twin), unharmed("SN53_j_base", r"\bj_base")),
 ]

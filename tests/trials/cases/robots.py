@@ -9,7 +9,7 @@ NO_BODY = (
     r"positive[- ](semi)?definite|no (rigid )?body|inconsistent|negative"
 )
 # Findings about the drives that the broken inertia imitates.
-IMITATIONS = (r"recorded (by )?(a factor of )?0?\.\d+ times", r"masses are in kg, not")
+IMITATIONS = (r"recorded 0?\.\d+ (\([^)]*\) )?times", r"masses are in kg, not")
 
 
 def row_major(inertia):
@@ -120,8 +120,8 @@ TRIALS = [
         "robot-formats",
         other_formats,
         (
-            init(refused("xacro", r"xacro \S*arm\.xacro|ros2 run xacro"), robot="arm.xacro", short=True),
-            explain(refused("xacro", r"xacro \S*arm\.xacro|ros2 run xacro"), robot="arm.xacro"),
+            init(refused("xacro", r"xacro \S+\.xacro"), robot="arm.xacro", short=True),
+            explain(refused("xacro", r"xacro \S+\.xacro"), robot="arm.xacro"),
             init(refused(r"MJCF|MuJoCo", "URDF"), robot="arm.xml", short=True),
         ),
     ),

@@ -133,7 +133,7 @@ def trial(name, write, runs):
 
 
 SECONDS_WRONG = (r"11[ ,']?990(\.0+)? s", r"0\.1 Hz")
-DEGREES = near(r"degree|\bdeg\b", "position")
+DEGREES = near(r"\bdegrees?\b", "position")
 AGAIN = near(
     r"\btime|\bstamp",
     r"\bback|earlier|decreas|begins? again|restart|fall|repeat|revers",

@@ -15,7 +15,7 @@ def stamp_fact(*facts):
     return near(STAMP, *facts, within=120)
 
 
-FIVE_A_STAMP = r"\b(5|five)\b|coarse|50 ms"
+FIVE_A_STAMP = r"\b(5|five)\b[^.]{0,40}(messages|samples|rows|stamp)|coarse|50 ms|0\.05\d* s"
 # Times that no recording has.
 NEVER = (r"-\d{6,}(\.\d+)? s\b", r"gap of \d{6,}", r"invalid type")
 
@@ -90,7 +90,7 @@ TRIALS = [
     Trial(
         "loop-three",
         session(passes(3, first_ns=0)),
-        usable(stamp_fact(BACK, r"\b(12|11\.9\d*|12\.0\d*)\b|\b(2|twice|two|three|3)\b"), exits=(0, 3)),
+        usable(stamp_fact(BACK, r"\b(12|11\.9\d*|12\.0\d*)\b|twice|\b(2|two) (times|places)"), exits=(0, 3)),
     ),
     # No loop: a simulation whose time begins at 0. Nothing is wrong with it.
     Trial(
@@ -98,7 +98,11 @@ TRIALS = [
         session(stamps(lambda begin, true: true - begin)),
         usable(exits=(0,), refusable=False),
     ),
-    Trial("loop-overlap", session(overlap), usable(stamp_fact(BACK, r"\b(8|7\.9\d*|8\.0\d*|5|5\.0\d*|4\.9\d*|500)\b"))),
+    Trial(
+        "loop-overlap",
+        session(overlap),
+        usable(stamp_fact(BACK, r"\b(8|7\.9\d*|8\.0\d*|5|5\.0\d*|4\.9\d*|499|500)\b")),
+    ),
     # Stamps before 1970, otherwise right.
     Trial(
         "stamp-negative",

@@ -55,6 +55,10 @@ def counts(*numbers):
     return "|".join(count(number) for each in numbers for number in (each, RECORDINGS * each))
 
 
+# Rows that were not used; a command that is done with exit code 0 has lost none.
+LOST = r"\b[1-9][\d,]* (samples|rows|messages)\b[^.;]{0,80}\b(lost|refused|dropped)\b"
+
+
 @dataclass(frozen=True)
 class Answer:
     """What a good answer consists of."""
@@ -81,7 +85,11 @@ class Answer:
                 yield f'says "{found.group()[:60]}"'
         if self.friction and code in (0, 3):
             yield from self.wrong_friction(folder / self.friction)
+        if code == 0 and (found := re.search(LOST, output, re.I)):
+            yield f'exit 0 with "{found.group()[:60]}"'
         if self.events:
+            if re.search("cannot judge", output):
+                yield "the detector judged nothing"
             found = re.search(r"(\d+) events?\b", output)
             if not found or int(found.group(1)) not in self.events:
                 wanted = " or ".join(map(str, self.events))
