@@ -17,13 +17,13 @@ from lib.trial import (
     Trial,
     count,
     counts,
+    done,
     explain,
     info,
     init,
     near,
     refused,
     replay,
-    told,
 )
 from lib.writers import TYPE, Message, joint_state_ros1, messages, metadata, start_of, write_db3, write_mcap
 
@@ -135,8 +135,8 @@ def read_or_refused(*facts, free, never=()):
     first = free.format(1)
     return (
         info(Answer((0, 2), facts, never), Answer(says=(count(1200), "j_base"), never=never), file=first),
-        init(refused(*facts, never=never), told(CELL, exits=(0,), never=never)),
-        explain(refused(*facts, never=never), told(REPORT, exits=(0,), never=never)),
+        init(refused(*facts, never=never), done(CELL, exits=(0,), never=never)),
+        explain(refused(*facts, never=never), done(REPORT, exits=(0,), never=never)),
         replay(Answer((2, 3), facts, never), Answer(events=(0,), never=never), file=first),
     )
 
@@ -175,8 +175,8 @@ TRIALS = [
         empty_metadata,
         (
             info(Answer((0, 3), (count(1200), "j_base", r"metadata\.yaml")), file="free_1"),
-            init(told(CELL, r"metadata\.yaml")),
-            explain(told(REPORT, r"metadata\.yaml")),
+            init(done(CELL, r"metadata\.yaml")),
+            explain(done(REPORT, r"metadata\.yaml")),
             replay(Answer((0, 3), events=(0,)), file="free_1"),
         ),
         free="free_{}",
@@ -196,8 +196,8 @@ TRIALS = [
         session(names_doubled),
         (
             info(Answer((0, 3), (TWICE,))),
-            init(told(CELL, TWICE), refused(TWICE)),
-            explain(told(REPORT, TWICE), refused(TWICE)),
+            init(done(CELL, TWICE), refused(TWICE)),
+            explain(done(REPORT, TWICE), refused(TWICE)),
             replay(Answer((0, 3), (r"twice|doubl|duplicat|more than once",), events=(0,))),
         ),
     ),
@@ -206,8 +206,8 @@ TRIALS = [
         session(wrapped, urdf(joint_type="continuous"), centre=(3.0, -0.5, 0.6, 0.3, 3.0)),
         (
             info(Answer(says=(count(1200),))),
-            init(told(CELL, exits=(0,))),
-            explain(told(REPORT, exits=(0,))),
+            init(done(CELL, exits=(0,))),
+            explain(done(REPORT, exits=(0,))),
             Run(
                 "replay free_1.mcap --pipeline cell/pipeline.yaml --out results",
                 (Answer(events=(0,), never=("dropped +[1-9]",)),),
@@ -219,8 +219,8 @@ TRIALS = [
         reindexed,
         (
             info(Answer(says=(count(1200), "j_base")), file="free_1"),
-            init(told(CELL, exits=(0,))),
-            explain(told(REPORT, exits=(0,))),
+            init(done(CELL, exits=(0,))),
+            explain(done(REPORT, exits=(0,))),
             replay(Answer(events=(0,)), file="free_1"),
         ),
         free="free_{}",
@@ -230,8 +230,8 @@ TRIALS = [
         corrupt,
         (
             info(Answer((0, 3), (DAMAGED, LOST_CHUNK))),
-            init(told(CELL, DAMAGED, LOST_CHUNK, exits=(3,))),
-            explain(told(REPORT, DAMAGED, LOST_CHUNK, exits=(3,))),
+            init(done(CELL, DAMAGED, LOST_CHUNK, exits=(3,))),
+            explain(done(REPORT, DAMAGED, LOST_CHUNK, exits=(3,))),
             replay(Answer((3,), (DAMAGED, LOST_CHUNK), events=(0,))),
         ),
     ),
@@ -240,8 +240,8 @@ TRIALS = [
         session(bridge),
         (
             info(Answer((0, 3), (REPEATED,))),
-            init(told(CELL, REPEATED)),
-            explain(told(REPORT, REPEATED)),
+            init(done(CELL, REPEATED)),
+            explain(done(REPORT, REPEATED)),
             replay(Answer((0, 3), (REPEATED,), events=(0,))),
         ),
     ),

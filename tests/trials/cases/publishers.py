@@ -5,7 +5,7 @@ import numpy as np
 from lib.arm import ARM, urdf, urdf_body
 from lib.motion import Rows
 from lib.session import rows_of, session, write_robot, write_session
-from lib.trial import CELL, REPORT, Answer, Trial, count, counts, explain, info, init, near, refused, replay, told
+from lib.trial import CELL, REPORT, Answer, Trial, count, counts, done, explain, info, init, near, refused, replay
 from lib.writers import messages
 
 FINGERS = ["finger_a", "finger_b"]
@@ -63,15 +63,15 @@ def pair_of_arms(*info_says):
     return (
         info(Answer(says=(BOTH_SETS, *info_says))),
         init(
-            told(CELL, BOTH_SETS, prefixes=("left_", "right_")),
+            done(CELL, BOTH_SETS, prefixes=("left_", "right_")),
             refused(BOTH_SETS, r"separate|no message|different messages|in turn|alternat|each (of|set)|sets|two"),
         ),
         init(refused("left_foot", "right_foot"), robot="two_roots.urdf", out="cell_two", short=True),
         init(
-            told("cell_left/explained/report.json", exits=(0,), prefixes=("left_",)), robot="left.urdf", out="cell_left"
+            done("cell_left/explained/report.json", exits=(0,), prefixes=("left_",)), robot="left.urdf", out="cell_left"
         ),
         init(
-            told("cell_right/explained/report.json", exits=(0,), prefixes=("right_",)),
+            done("cell_right/explained/report.json", exits=(0,), prefixes=("right_",)),
             robot="right.urdf",
             out="cell_right",
         ),
@@ -117,8 +117,8 @@ def unharmed(*info_says, says=(), exits=(0,)):
     """The arm is read as if the others were not there."""
     return (
         info(Answer(exits, (count(1200), *info_says))),
-        init(told(CELL, *says, exits=exits)),
-        explain(told(REPORT, *says, exits=exits)),
+        init(done(CELL, *says, exits=exits)),
+        explain(done(REPORT, *says, exits=exits)),
         replay(Answer(exits, says, ("there were no efforts",), events=(0,))),
     )
 
@@ -132,10 +132,10 @@ TRIALS = [
         (
             info(Answer(says=("/left/joint_states", "/right/joint_states"))),
             init(refused("/left/joint_states", "/right/joint_states", "--state-topic"), short=True),
-            init(told("cell_left/explained/report.json", exits=(0,)),
+            init(done("cell_left/explained/report.json", exits=(0,)),
                  options="--state-topic /left/joint_states", out="cell_left"),
             explain(refused("/left/joint_states", "/right/joint_states", "--state-topic")),
-            explain(told("report_right/report.json", exits=(0,)),
+            explain(done("report_right/report.json", exits=(0,)),
                     options="--state-topic /right/joint_states", out="report_right"),
         ),
     ),

@@ -2,7 +2,7 @@
 
 from lib.arm import ARM, urdf
 from lib.session import session
-from lib.trial import CELL, REPORT, Run, Trial, calibrate, explain, init, near, refused, told
+from lib.trial import CELL, REPORT, Run, Trial, calibrate, done, explain, init, near, refused
 
 NO_BODY = (
     r"impossible|cannot (be|have|belong)|not possible|unphysical|not physical|implausib|invalid|triangle|"
@@ -49,8 +49,8 @@ def trial(name, arm, *facts, friction=True):
         pipeline(folder)
 
     def answers(path):
-        done = told(path if friction else "", *facts, never=IMITATIONS)
-        return (done, refused(*facts))
+        finished = done(path if friction else "", *facts, never=IMITATIONS)
+        return (finished, refused(*facts))
 
     return Trial(
         name,

@@ -6,7 +6,7 @@ import numpy as np
 
 from lib.arm import ARM
 from lib.session import rows_of, write_robot
-from lib.trial import CELL, RECORDINGS, REPORT, Answer, Trial, count, explain, info, init, near, refused, replay, told
+from lib.trial import CELL, RECORDINGS, REPORT, Answer, Trial, count, done, explain, info, init, near, refused, replay
 from lib.writers import start_of, write_table
 
 NUMBERS = range(1, len(ARM.names) + 1)
@@ -112,8 +112,8 @@ def read(*facts, file="free_1.csv", samples=1200):
     """Read by name, all rows, with true results."""
     return (
         info(Answer(says=(count(samples), *facts)), file=file),
-        init(told(CELL, exits=(0,))),
-        explain(told(REPORT, exits=(0,))),
+        init(done(CELL, exits=(0,))),
+        explain(done(REPORT, exits=(0,))),
         replay(Answer(events=(0,)), file=file),
     )
 
@@ -122,8 +122,8 @@ def read_or_refused(*facts, never=()):
     """Read with true results, or refused with these facts."""
     return (
         info(Answer(says=(count(1200),), never=never), refused(*facts, never=never), file="free_1.csv"),
-        init(told(CELL, exits=(0,), never=never), refused(*facts, never=never)),
-        explain(told(REPORT, exits=(0,), never=never), refused(*facts, never=never)),
+        init(done(CELL, exits=(0,), never=never), refused(*facts, never=never)),
+        explain(done(REPORT, exits=(0,), never=never), refused(*facts, never=never)),
         replay(Answer(events=(0,), never=never), refused(*facts, never=never), file="free_1.csv"),
     )
 
@@ -147,8 +147,8 @@ TRIALS = [
         quoted("deg", 180 / np.pi),
         (
             info(Answer(says=(DEGREES,)), refused(DEGREES), file="free_1.csv"),
-            init(told(CELL, DEGREES), refused(DEGREES)),
-            explain(told(REPORT, DEGREES), refused(DEGREES)),
+            init(done(CELL, DEGREES), refused(DEGREES)),
+            explain(done(REPORT, DEGREES), refused(DEGREES)),
         ),
     ),
     # If it is refused, then with the right line: the first of the numbers is in line 2.
@@ -174,8 +174,8 @@ TRIALS = [
         episodes,
         (
             info(Answer((0, 3), (AGAIN,)), refused(AGAIN), file="free_1.csv"),
-            init(told(CELL, AGAIN), refused(AGAIN)),
-            explain(told(REPORT, AGAIN), refused(AGAIN)),
+            init(done(CELL, AGAIN), refused(AGAIN)),
+            explain(done(REPORT, AGAIN), refused(AGAIN)),
             replay(Answer((0, 3), (AGAIN,), events=(0,)), refused(AGAIN), file="free_1.csv"),
         ),
     ),

@@ -4,7 +4,7 @@ import numpy as np
 
 from lib.motion import Rows
 from lib.session import session
-from lib.trial import CELL, REPORT, Answer, Trial, explain, info, init, near, refused, replay, told
+from lib.trial import CELL, REPORT, Answer, Trial, done, explain, info, init, near, refused, replay
 from lib.writers import messages
 
 BACK = r"\bback|earlier|revers|decreas|loop|repeat|restart|begins? again|fall|behind|rewind"
@@ -29,16 +29,19 @@ def stamps(function):
     return each
 
 
-def passes(number, first_ns=None):
+def passes(number, first_ns):
     """The recording `number` times; the stamps fall back each time, the log time goes on."""
 
     def each(_, rows, begin_ns):
+        period_ns = round(rows.t[-1] * 1e9) + 10_000_000
         out = []
         for k in range(number):
-            offset = round(rows.t[-1] * 1e9 + 1e7) * k
-            first = begin_ns if first_ns is None else first_ns
-            stamp = lambda i, true_ns, k=k: true_ns - begin_ns + first
-            out += messages(rows, begin_ns, stamp=stamp, log=lambda i, true_ns, o=offset: true_ns + o)
+            out += messages(
+                rows,
+                begin_ns,
+                stamp=lambda i, true_ns: true_ns - begin_ns + first_ns,
+                log=lambda i, true_ns, past_ns=k * period_ns: true_ns + past_ns,
+            )
         return out
 
     return each
@@ -64,8 +67,8 @@ def usable(*facts, exits=(0, 3), never=NEVER, replayed=True, refusable=True):
     refusals = (refused(*facts, never=never),) if refusable else ()
     runs = (
         info(Answer(exits, facts, never)),
-        init(told(CELL, *facts, exits=exits, never=never), *refusals),
-        explain(told(REPORT, *facts, exits=exits, never=never), *refusals),
+        init(done(CELL, *facts, exits=exits, never=never), *refusals),
+        explain(done(REPORT, *facts, exits=exits, never=never), *refusals),
     )
     return (*runs, replay(Answer(exits, facts, never, events=(0,)), *refusals)) if replayed else runs
 
@@ -132,11 +135,11 @@ TRIALS = [
         (
             info(Answer(never=("coarse",))),
             init(
-                told(CELL, near("free_3", STAMP, FIVE_A_STAMP), never=NEVER),
+                done(CELL, near("free_3", STAMP, FIVE_A_STAMP), never=NEVER),
                 refused(near("free_3", STAMP, FIVE_A_STAMP)),
             ),
             explain(
-                told(REPORT, near("free_3", STAMP, FIVE_A_STAMP), never=NEVER),
+                done(REPORT, near("free_3", STAMP, FIVE_A_STAMP), never=NEVER),
                 refused(near("free_3", STAMP, FIVE_A_STAMP)),
             ),
             replay(Answer((0, 3), (stamp_fact(FIVE_A_STAMP),), events=(0,)), file="free_3.mcap"),

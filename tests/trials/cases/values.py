@@ -5,7 +5,7 @@ import numpy as np
 from lib.arm import ARM
 from lib.motion import Rows
 from lib.session import changed, session
-from lib.trial import CELL, REPORT, Answer, Trial, count, counts, explain, info, init, near, refused, replay, told
+from lib.trial import CELL, REPORT, Answer, Trial, count, counts, done, explain, info, init, near, refused, replay
 from lib.writers import messages
 
 # What the values made the program say instead.
@@ -45,8 +45,8 @@ def in_spite_of(*facts, exits=(0, 3)):
     """Every command states the facts, and the results are as without the values."""
     return (
         info(Answer(exits, facts)),
-        init(told(CELL, *facts, never=INSTEAD)),
-        explain(told(REPORT, *facts, never=INSTEAD)),
+        init(done(CELL, *facts, never=INSTEAD)),
+        explain(done(REPORT, *facts, never=INSTEAD)),
         replay(Answer(exits, facts, events=(0,))),
     )
 

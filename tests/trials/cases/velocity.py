@@ -3,7 +3,7 @@
 import numpy as np
 
 from lib.session import changed, session
-from lib.trial import CELL, REPORT, Answer, Trial, explain, info, init, near, replay, told
+from lib.trial import CELL, REPORT, Answer, Trial, done, explain, info, init, near, replay
 
 SPEED_PER_JOINT = np.array([1.0, 1.0, 1.0, 1.5, 1.5])
 # Conclusions about the effort, drawn from a wrong velocity.
@@ -23,8 +23,8 @@ def trial(name, velocity, *fact, never=INSTEAD):
         session(changed(lambda _, rows: rows.changed(qd=velocity(rows)))),
         (
             info(Answer(says=facts, never=never)),
-            init(told(CELL, *facts, never=never)),
-            explain(told(REPORT, *facts, never=never)),
+            init(done(CELL, *facts, never=never)),
+            explain(done(REPORT, *facts, never=never)),
             replay(Answer((0, 3), facts, never, events=(0,))),
         ),
     )

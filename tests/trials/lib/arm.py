@@ -133,12 +133,8 @@ def inverse_dynamics(arm, q, qd, qdd):
     for k, j in enumerate(arm.joints):
         axis, origin, com = np.array(j.axis, float), np.array(j.origin, float), np.array(j.com, float)
         turn = rotation(j.axis, q[:, k])
-
-        def into_link(vectors):
-            return np.einsum("nji,nj->ni", turn, vectors)
-
         at_joint = acceleration + np.cross(alpha, origin) + np.cross(omega, np.cross(omega, origin))
-        omega_in, alpha_in, acceleration = into_link(omega), into_link(alpha), into_link(at_joint)
+        omega_in, alpha_in, acceleration = (np.einsum("nji,nj->ni", turn, v) for v in (omega, alpha, at_joint))
         omega = omega_in + qd[:, k, None] * axis
         alpha = alpha_in + qdd[:, k, None] * axis + np.cross(omega_in, qd[:, k, None] * axis)
         ixx, ixy, ixz, iyy, iyz, izz = j.inertia

@@ -193,11 +193,11 @@ CELL = "cell/explained/report.json"
 REPORT = "report/report.json"
 
 
-def told(path, *says, exits=(0, 3), never=(), **more):
-    """Done, with these facts stated and the friction right."""
+def done(path, *says, exits=(0, 3), never=(), **more):
+    """The answer of a command that is done: the facts are stated and the friction is right."""
     return Answer(exits, says, never, path, **more)
 
 
 def refused(*says, never=()):
-    """Refused before anything was started, with these facts stated."""
+    """The answer of a command that started nothing: the facts are stated."""
     return Answer((2,), says, never)
