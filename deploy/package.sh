@@ -1,24 +1,23 @@
 #!/usr/bin/env bash
 # Makes the release archives of tauscope and tries each of them:
 #
-#     deploy/package.sh [--arch x86_64|aarch64] [--profile dist|release] [--out DIR]
+#     deploy/package.sh [--arch x86_64|aarch64] [--out DIR]
 #
 #   tauscope-VERSION-ARCH.tar.gz   program, documentation, completions, manual pages, systemd units
 #   tauscope_VERSION_ARCH.deb      the same as a Debian package
 #   tauscope-VERSION-ARCH.oci.tar  a container image file: `podman load -i`, `skopeo copy oci-archive:...`
 #
-# The default is this machine's architecture, profile dist, target/package. It runs on Debian or Ubuntu and needs, beside
+# The default is this machine's architecture and target/package. It runs on Debian or Ubuntu and needs, beside
 # Rust and a C compiler, `apt-get install binutils mmdebstrap skopeo umoci`; for the other architecture also
 # `apt-get install gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user` and `rustup target add`. The program needs the
 # glibc of the machine that builds it, or a newer one: build on the oldest system that you serve.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-arch=$(uname -m) profile=dist out=target/package
+arch=$(uname -m) out=target/package
 while [ $# -gt 0 ]; do
     case $1 in
     --arch) arch=$2 ;;
-    --profile) profile=$2 ;;
     --out) out=$2 ;;
     *) sed -n '2,/^set /s/^# \{0,1\}//p' "$0" | sed '$d' >&2 && exit 2 ;;
     esac
@@ -47,8 +46,8 @@ for tool in $needed; do
     command -v "$tool" >/dev/null || { echo "error: $tool is missing; the head of $0 says what to install" >&2; exit 2; }
 done
 
-cargo build --locked --profile "$profile" "${target[@]}" --bin tauscope
-program=$folder/$profile/tauscope
+cargo build --locked --release "${target[@]}" --bin tauscope
+program=$folder/release/tauscope
 version=$(cargo metadata --no-deps --format-version 1 --locked |
     sed -n 's/.*"name":"tauscope","version":"\([^"]*\)".*/\1/p')
 work=$(mktemp -d)

@@ -38,6 +38,8 @@ pub struct JointFacts {
     /// The recorded velocity over the derivative of the position, where the joint moves enough to tell: 1 as it should
     /// be.
     pub velocity_slope: Option<f64>,
+    /// The velocity that all messages give, where it never changes \[rad/s or m/s\].
+    pub constant_velocity: Option<f64>,
     /// How far it moved in all \[rad or m\]; 0 where velocities or positions are missing.
     pub travel: f64,
     /// Whether efforts are given and all of them are 0.
@@ -129,6 +131,8 @@ struct JointTally {
     from: Option<(f64, i64)>,
     before: Option<Before>,
     integral: f64,
+    /// Smallest and largest velocity.
+    velocity_range: Option<[f64; 2]>,
     /// Sums over spans without a suspected jump.
     sums: Span,
     jumps: Jumps,
@@ -153,6 +157,7 @@ impl JointTally {
             from: None,
             before: None,
             integral: 0.0,
+            velocity_range: None,
             sums: Span::default(),
             jumps: Jumps::default(),
             fields: <_>::default(),
@@ -186,6 +191,8 @@ impl JointTally {
     }
 
     fn add_velocity(&mut self, stamp_ns: i64, position: f64, velocity: f64) {
+        let [low, high] = self.velocity_range.unwrap_or([velocity; 2]);
+        self.velocity_range = Some([low.min(velocity), high.max(velocity)]);
         let step_ns = self.before.map(|before| stamp_ns - before.stamp_ns);
         match (self.before, step_ns, self.from) {
             (Some(before), Some(step_ns), Some((from, from_ns)))
@@ -231,6 +238,8 @@ impl JointTally {
             name: self.name.clone(),
             position_range: self.range,
             velocity_slope: tells.then(|| sums.products / sums.squares),
+            constant_velocity: (self.velocity_range)
+                .and_then(|[low, high]| (low.total_cmp(&high).is_eq()).then_some(low)),
             travel: sums.moved,
             lacks_effort: self.efforts == 0,
             effort_is_zero: self.efforts > 0 && self.zeros == self.efforts,

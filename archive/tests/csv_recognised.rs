@@ -159,7 +159,7 @@ fn degrees_are_converted_where_all_say_so() {
     ] {
         let opened = by_name(&format!("{header}\n0;180;0;0;180\n0,1;180;0;0;180\n"));
         assert_eq!(opened.rows[0].1, [half_turn, 0.0, 0.0, half_turn]);
-        opened.says("Positions are headed [deg] and are converted to rad.");
+        opened.says("Positions are in degrees, as the header says, and are converted to rad.");
         opened.says("Velocities are headed [deg/s] and are converted to rad/s.");
     }
     // A slide next to joints that turn.

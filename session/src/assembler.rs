@@ -43,6 +43,8 @@ pub struct Counts {
     pub behind: u64,
     /// States with the stamp and the values of the one before; nothing is lost by leaving them out.
     pub repeated: u64,
+    /// Copies of states that came before others; nothing is lost by leaving them out.
+    pub copies: u64,
     /// States with the stamp of the one before and other values.
     pub stalled: u64,
     /// States without a joint that never came, or came much later.
@@ -131,7 +133,7 @@ impl Assembler {
     pub fn of(look: &Look) -> Self {
         let mut publishers = look.publishers.clone();
         for publisher in &mut publishers.all {
-            publisher.messages = 0;
+            (publisher.messages, publisher.runs) = (0, 0);
         }
         let mut ranges = look.ranges.clone();
         ranges.rewind();
@@ -197,8 +199,9 @@ impl Assembler {
     }
 
     /// Publishers on the topic so far.
-    pub fn publishers(&self) -> &[Publisher] {
-        &self.publishers.all
+    pub fn publishers(&self) -> Vec<Publisher> {
+        let listed = self.publishers.listed().into_iter();
+        listed.map(|(_, publisher)| publisher).collect()
     }
 
     /// Which of the robot's joints a message names: bit j is joint j.
@@ -208,7 +211,10 @@ impl Assembler {
 
     /// Counts a message that cannot be decoded, with the reason.
     pub fn undecodable(&mut self, reason: &str) {
-        let known = self.undecodable.iter().position(|(known, _)| known == reason);
+        // Reasons that differ in a number are one reason.
+        let words = |text: &str| text.replace(|c: char| c.is_ascii_digit(), "");
+        let is_same = |(known, _): &(String, u64)| known == reason || words(known) == words(reason);
+        let known = self.undecodable.iter().position(is_same);
         let place = known.unwrap_or_else(|| {
             if self.undecodable.len() < MOST_REASONS {
                 self.undecodable.push((reason.to_owned(), 0));
@@ -274,6 +280,7 @@ impl Assembler {
         let Some(place) = self.publishers.add(message, received_ns) else {
             return true;
         };
+        // Of a recording all publishers but late ones are known; of a live source, zeros tell nothing at first.
         if self.publishers.all.len() > known {
             self.used = choose(&self.publishers.all, &self.joint_names);
         }
@@ -301,6 +308,7 @@ impl Assembler {
             Next::Late => self.counts.late += 1,
             Next::Behind => self.counts.behind += 1,
             Next::Repeated => self.counts.repeated += 1,
+            Next::Copy => self.counts.copies += 1,
             Next::Stalled => self.counts.stalled += 1,
         }
         Taken::Nothing

@@ -22,6 +22,18 @@ pub enum SessionError {
         /// Name and type of its topics.
         known: Vec<String>,
     },
+    /// Several topics give the robot's joint states equally well.
+    #[error(
+        "{}: {} give joint states of the robot equally well; choose one with --state-topic",
+        path.display(),
+        topics.join(" and ")
+    )]
+    SeveralTopics {
+        /// The recording.
+        path: PathBuf,
+        /// The topics.
+        topics: Vec<String>,
+    },
     /// None of its joint states can be used.
     #[error("{}: {why}", path.display())]
     Unusable {
@@ -62,7 +74,7 @@ pub enum Unusable {
     },
     /// No message has positions.
     #[error(
-        "none of {messages} joint states has positions: record the topic that has positions and efforts"
+        "no joint state of {messages} has a position: record the topic that has positions and efforts"
     )]
     NoPositions {
         /// Number of messages.

@@ -20,6 +20,27 @@ pub enum Effect {
     Fault,
 }
 
+/// The recorded velocity of a joint that moves.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OddVelocity {
+    /// The joint.
+    pub joint: String,
+    /// Recorded velocity over the derivative of the position.
+    pub slope: f64,
+    /// The velocity, where all messages give the same \[rad/s or m/s\].
+    pub constant: Option<f64>,
+}
+
+impl OddVelocity {
+    fn words(&self) -> String {
+        match self.constant {
+            Some(value) => format!("is constant, {value}, while the joint moves"),
+            None if self.slope.abs() < FOLLOWS => "does not follow the position".to_owned(),
+            None => format!("is {:.2} times the derivative of the position", self.slope),
+        }
+    }
+}
+
 /// One thing that is odd or wrong about a recording. Times are seconds from the first message of the topic.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "finding", rename_all = "snake_case")]
@@ -118,6 +139,16 @@ pub enum Finding {
         /// Number of messages.
         messages: u64,
     },
+    /// Messages without positions.
+    NoPositions {
+        /// Number of messages.
+        messages: u64,
+    },
+    /// Messages that repeat an earlier message.
+    Copies {
+        /// Number of messages.
+        messages: u64,
+    },
     /// Messages that cannot be decoded.
     Undecodable {
         /// Number of messages for each reason; the first few reasons.
@@ -146,8 +177,8 @@ pub enum Finding {
     },
     /// Velocities that are not the derivative of the positions.
     Velocity {
-        /// The joints, each with its recorded velocity over the derivative of its position.
-        joints: Vec<(String, f64)>,
+        /// The joints.
+        joints: Vec<OddVelocity>,
         /// Whether velocities computed from the positions are used instead.
         is_replaced: bool,
     },
@@ -193,6 +224,7 @@ impl Finding {
             | Self::Dropouts { .. }
             | Self::NamedTwice(_)
             | Self::MissingParts { .. }
+            | Self::NoPositions { .. }
             | Self::Undecodable { .. } => Effect::Loss,
             _ => Effect::Note,
         }
@@ -240,6 +272,15 @@ impl fmt::Display for Finding {
                 f,
                 "{} not used: no message named the other joints for more than 0.5 s",
                 are(*messages)
+            ),
+            Self::NoPositions { messages } => write!(
+                f,
+                "{} not used: a joint state without positions; record the topic that has positions and efforts",
+                are(*messages)
+            ),
+            Self::Copies { messages } => write!(
+                f,
+                "{messages} messages are copies of earlier ones: two relays or bridges deliver each; nothing is lost"
             ),
             Self::Undecodable { reasons } => {
                 let reasons = reasons.iter();
@@ -292,7 +333,7 @@ impl Finding {
                 is_replaced,
             } => {
                 let (messages, stamp) = (*messages, in_seconds(*stamp_ns));
-                write!(f, "all of {messages} stamps are {stamp}: ")?;
+                write!(f, "all {messages} stamps are the same, {stamp}: ")?;
                 f.write_str(if *is_replaced {
                     "the driver does not set `header.stamp`; the time of recording is used instead"
                 } else {
@@ -398,26 +439,30 @@ impl Finding {
     }
 }
 
+/// Velocity over derivative of the position below which the velocity does not follow the position.
+/// Resolution: a factor of a unit, such as 1/60, is far from it or is written with its digits.
+const FOLLOWS: f64 = 0.01;
+
 fn velocities(
     f: &mut fmt::Formatter<'_>,
-    joints: &[(String, f64)],
+    joints: &[OddVelocity],
     is_replaced: bool,
 ) -> fmt::Result {
-    // Joints with one factor share a clause.
+    // Joints with the same words share a clause.
     let mut clauses: Vec<(String, Vec<&str>)> = Vec::new();
-    for (joint, slope) in joints {
-        let factor = format!("{slope:.2}");
-        match clauses.iter_mut().find(|(known, _)| *known == factor) {
-            Some((_, names)) => names.push(joint),
-            None => clauses.push((factor, vec![joint])),
+    for odd in joints {
+        let words = odd.words();
+        match clauses.iter_mut().find(|(known, _)| *known == words) {
+            Some((_, names)) => names.push(&odd.joint),
+            None => clauses.push((words, vec![&odd.joint])),
         }
     }
-    let clauses = clauses.iter().map(|(factor, names)| {
-        format!("{factor} times the derivative of the position at {}", suggest::some(names))
-    });
-    let clauses: Vec<String> = clauses.collect();
-    write!(f, "the recorded velocity is {}", clauses.join(", "))?;
-    if joints.iter().any(|(_, slope)| *slope < 0.0) {
+    let clauses = clauses.iter();
+    let clauses: Vec<String> = clauses
+        .map(|(words, names)| format!("of {} {words}", suggest::some(names)))
+        .collect();
+    write!(f, "the recorded velocity {}", clauses.join(", and "))?;
+    if joints.iter().any(|odd| odd.slope < -FOLLOWS) {
         f.write_str("; below zero, position or velocity has the wrong sign")?;
     }
     f.write_str(if is_replaced {

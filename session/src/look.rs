@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use tauscope_archive::{JointFacts, JointTallies, Recording, RecordingKind, ros};
+use tauscope_archive::{ArchiveError, JointFacts, JointTallies, Recording, RecordingKind, ros};
 
 use crate::assembler::{Assembler, Taken};
 use crate::clock::{Clock, Stamps};
@@ -19,6 +19,10 @@ const HEAD: usize = 20_000;
 /// Factor by which a velocity differs from the derivative of the position that is not used.
 /// Physical: the filter of a drive takes a tenth of the fastest motion at most.
 const OFF: f64 = 1.25;
+
+/// Range of a position that shows whether the velocity follows it \[rad or m\].
+/// Physical: a hundred steps of a coarse encoder of 6000 steps per turn.
+const LEAST_RANGE: f64 = 0.1;
 
 /// What the head of a recording shows.
 #[derive(Debug, Clone)]
@@ -77,7 +81,7 @@ impl Look {
 
     /// The topic that gives positions and efforts of most of the joints.
     fn at_best(recording: &Recording, wanted: Joints<'_>) -> Result<Self, SessionError> {
-        let mut best: Option<(Self, (bool, bool, usize, u64))> = None;
+        let mut ranked: Vec<((bool, bool, usize), Self)> = Vec::new();
         let mut error = None;
         for topic in recording.topics() {
             if topic.joint_state_type().is_none() || topic.message_count == 0 {
@@ -96,14 +100,31 @@ impl Look {
                 used().any(|it| it.position),
                 used().any(Publisher::measures_effort),
                 known.count(),
-                topic.message_count,
             );
-            if best.as_ref().is_none_or(|(_, most)| rank > *most) {
-                best = Some((look, rank));
-            }
+            ranked.push((rank, look));
         }
-        if let Some((look, _)) = best {
+        let most = ranked.iter().map(|(rank, _)| *rank).max();
+        ranked.retain(|(rank, _)| Some(*rank) == most);
+        if ranked.len() > 1 && !wanted.names.is_empty() {
+            // The name that ROS 2 drivers use by default.
+            let is_usual = |(_, look): &(_, Self)| look.topic == "/joint_states";
+            if !ranked.iter().any(is_usual) {
+                let topics = ranked.iter().map(|(_, look)| look.topic.clone());
+                return Err(SessionError::SeveralTopics {
+                    path: recording.path().to_owned(),
+                    topics: topics.collect(),
+                });
+            }
+            ranked.retain(is_usual);
+        }
+        if let Some((_, look)) = ranked.into_iter().next() {
             return Ok(look);
+        }
+        if let Some(found) = recording.unreadable_joint_states().into_iter().next() {
+            return Err(SessionError::Archive(ArchiveError::UnreadableJointStates {
+                path: recording.path().to_owned(),
+                found: Box::new(found),
+            }));
         }
         let known = recording.topics().iter();
         Err(error.unwrap_or_else(|| SessionError::NoJointStates {
@@ -119,7 +140,7 @@ impl Look {
         topic: &str,
         wanted: Joints<'_>,
     ) -> Result<Self, SessionError> {
-        let mut publishers = Publishers::default();
+        let mut publishers = Publishers::of_recording();
         let mut states = recording.joint_states(topic)?;
         let mut read = 0;
         let mut joint_names = wanted.names.to_vec();
@@ -211,12 +232,16 @@ impl Look {
             }
         }
         let facts = tallies.facts();
-        // Positions in degrees are another finding.
+        // Positions in degrees are another finding; the vibration of a joint at rest tells no velocity.
+        let moves = |facts: &JointFacts| {
+            let range = facts.position_range;
+            range.is_some_and(|[low, high]| high - low > LEAST_RANGE)
+        };
         let is_off = |facts: &JointFacts| {
             let slope = facts.velocity_slope.filter(|_| !facts.is_in_degrees());
             slope.is_some_and(|slope| !(1.0 / OFF..=OFF).contains(&slope))
         };
-        if facts.iter().any(is_off) {
+        if facts.iter().any(|facts| moves(facts) && is_off(facts)) {
             self.of_velocity = odd_velocities(&facts, true);
         }
         Ok(())

@@ -6,7 +6,7 @@ use tauscope_bus::{JointState, flags};
 use tauscope_dynamics::{JointKind, Model};
 
 use crate::assembler::Whole;
-use crate::finding::Finding;
+use crate::finding::{Finding, OddVelocity};
 
 /// Samples that tell whether efforts are zero: fewer may be a driver that has only begun.
 /// Resolution: two seconds at 100 Hz.
@@ -162,8 +162,14 @@ impl Plausible {
 /// The finding about joints whose velocity is not the derivative of the position.
 pub(crate) fn odd_velocities(facts: &[JointFacts], is_replaced: bool) -> Option<Finding> {
     let odd = facts.iter().filter(|facts| facts.has_odd_velocity());
-    let joints: Vec<(String, f64)> = odd
-        .filter_map(|facts| Some((facts.name.clone(), facts.velocity_slope?)))
+    let joints: Vec<OddVelocity> = odd
+        .filter_map(|facts| {
+            Some(OddVelocity {
+                joint: facts.name.clone(),
+                slope: facts.velocity_slope?,
+                constant: facts.constant_velocity,
+            })
+        })
         .collect();
     (!joints.is_empty()).then_some(Finding::Velocity {
         joints,

@@ -24,6 +24,9 @@ pub struct Publisher {
     pub effort: bool,
     /// Whether all of its efforts are zero.
     pub zero_effort: bool,
+    /// Runs of consecutive messages: of a publisher that alternates with another, as many as messages.
+    #[serde(skip)]
+    pub runs: u64,
     /// Number of messages.
     pub messages: u64,
     /// Log time of its first message \[ns since the epoch\].
@@ -39,18 +42,21 @@ impl Publisher {
             position: !message.position.is_empty(),
             velocity: !message.velocity.is_empty(),
             effort: !message.effort.is_empty(),
-            zero_effort: true,
+            zero_effort: is_zero(message),
+            runs: 0,
             messages: 0,
             first_ns: log_time_ns,
             last_ns: log_time_ns,
         }
     }
 
-    /// Whether a message gives the same fields, and names the same joints in any order.
-    fn sent(&self, message: &JointState) -> bool {
+    /// Whether a message gives the same fields, and names the same joints in any order; where `splits_zeros`, also whether
+    /// its efforts are zero like the others.
+    fn sent(&self, message: &JointState, splits_zeros: bool) -> bool {
         self.position != message.position.is_empty()
             && self.velocity != message.velocity.is_empty()
             && self.effort != message.effort.is_empty()
+            && (!splits_zeros || self.zero_effort == is_zero(message))
             && self.names.len() == message.name.len()
             && (self.names == message.name
                 || message.name.iter().all(|name| self.names.contains(name)))
@@ -60,6 +66,11 @@ impl Publisher {
     pub fn rate_hz(&self) -> Option<f64> {
         let span_s = (self.last_ns - self.first_ns) as f64 * 1e-9;
         (span_s > 0.0 && self.messages > 1).then(|| (self.messages - 1) as f64 / span_s)
+    }
+
+    /// Whether it alternates with another publisher. A driver whose drives are off sends its zeros in a row.
+    fn alternates(&self) -> bool {
+        2 * self.runs >= self.messages
     }
 
     /// Whether its messages measure efforts.
@@ -99,14 +110,29 @@ impl fmt::Display for Publisher {
     }
 }
 
+/// Whether a message has efforts and all are zero.
+fn is_zero(message: &JointState) -> bool {
+    !message.effort.is_empty() && message.effort.iter().all(|effort| *effort == 0.0)
+}
+
 /// The publishers on a topic, in the order of their first messages.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Publishers {
     pub all: Vec<Publisher>,
     newest: usize,
+    /// Whether zeros in the place of efforts are of another publisher. Of a live source that cannot be known in time.
+    splits_zeros: bool,
 }
 
 impl Publishers {
+    /// None yet, of a recording.
+    pub fn of_recording() -> Self {
+        Self {
+            splits_zeros: true,
+            ..Self::default()
+        }
+    }
+
     /// Counts a message; returns the place of its publisher in `all`, unless there are too many.
     pub fn add(&mut self, message: &JointState, log_time_ns: i64) -> Option<usize> {
         let place = self.place(message);
@@ -116,24 +142,55 @@ impl Publishers {
                 self.all.len() - 1
             })
         })?;
-        self.newest = place;
         let publisher = &mut self.all[place];
+        publisher.runs += u64::from(place != self.newest || publisher.messages == 0);
+        self.newest = place;
         publisher.messages += 1;
+        publisher.zero_effort &= is_zero(message);
         publisher.last_ns = log_time_ns;
-        publisher.zero_effort &= message.effort.iter().all(|effort| *effort == 0.0);
         Some(place)
+    }
+
+    /// The publishers, zeros of a driver whose drives were off counted with its measured efforts.
+    pub fn listed(&self) -> Vec<(usize, Publisher)> {
+        let mut listed: Vec<(usize, Publisher)> = Vec::new();
+        for (place, publisher) in self.all.iter().enumerate() {
+            let same = listed.iter_mut().find(|(_, other)| {
+                let one_is_off = publisher.zero_effort != other.zero_effort;
+                let off = if publisher.zero_effort { publisher } else { other };
+                one_is_off
+                    && !off.alternates()
+                    && publisher.effort == other.effort
+                    && publisher.velocity == other.velocity
+                    && publisher.names == other.names
+            });
+            match same {
+                Some((at, other)) => {
+                    if other.zero_effort {
+                        *at = place;
+                    }
+                    other.zero_effort = false;
+                    other.messages += publisher.messages;
+                    other.first_ns = other.first_ns.min(publisher.first_ns);
+                    other.last_ns = other.last_ns.max(publisher.last_ns);
+                }
+                None => listed.push((place, publisher.clone())),
+            }
+        }
+        listed.retain(|(_, publisher)| publisher.messages > 0);
+        listed
     }
 
     /// The place of a message's publisher.
     pub fn place(&self, message: &JointState) -> Option<usize> {
         // In nearly all recordings the publisher is that of the message before.
         let newest = self.all.get(self.newest);
-        if newest.is_some_and(|publisher| publisher.sent(message)) {
+        if newest.is_some_and(|publisher| publisher.sent(message, self.splits_zeros)) {
             return Some(self.newest);
         }
         self.all
             .iter()
-            .position(|publisher| publisher.sent(message))
+            .position(|publisher| publisher.sent(message, self.splits_zeros))
     }
 }
 
@@ -152,7 +209,7 @@ pub(crate) fn choose(all: &[Publisher], joints: &[String]) -> Vec<bool> {
     };
     for (publisher, used) in all.iter().zip(&mut used) {
         let mut own = joints.iter().filter(|joint| publisher.names.contains(joint));
-        let repeats = publisher.zero_effort && own.all(measured);
+        let repeats = publisher.zero_effort && publisher.alternates() && own.all(measured);
         *used &= !(some_give_effort && (!publisher.effort || repeats));
     }
     // Where nobody gives positions, each message is refused for that reason.
@@ -173,6 +230,7 @@ mod tests {
             velocity,
             effort,
             zero_effort,
+            runs: messages,
             messages,
             first_ns: 0,
             last_ns: 1_000_000_000,
@@ -186,7 +244,7 @@ mod tests {
 
     #[test]
     fn the_publisher_that_measures_efforts_is_used_and_the_one_that_repeats_positions_is_not() {
-        let repeats = publisher("a b c", [false, false, true], 5000);
+        let repeats = publisher("a b c", [false, false, false], 5000);
         let zeros = publisher("c b a", [true, true, true], 5000);
         let driver = publisher("a b c", [true, true, false], 1200);
         let gripper = publisher("finger", [true, true, true], 240);

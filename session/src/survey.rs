@@ -57,7 +57,7 @@ impl Survey {
         findings.extend(assembler.findings());
         findings.extend(plausible.findings());
         Ok(Self {
-            publishers: assembler.publishers().to_vec(),
+            publishers: assembler.publishers(),
             findings,
         })
     }

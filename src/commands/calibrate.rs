@@ -283,7 +283,7 @@ fn report(calibrated: &Calibrated, cell: &Cell, args: &Args) -> String {
     if args.validation.is_empty() {
         text.push_str("\nnote: noise and scores were measured on the recordings of the fit; give others with --validation for thresholds that hold");
     }
-    for note in &calibrated.notes {
+    for note in cell.findings.iter().chain(&calibrated.notes) {
         text.push_str(&format!("\nwarning: {note}"));
     }
     if calibrated.lost > 0 {

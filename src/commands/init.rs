@@ -117,6 +117,7 @@ fn set_up(
         input,
         kept,
         sentences,
+        no_line,
     } = looked;
     explain::refuse_to_replace(&folder.explained(), &request, args.force)?;
     explain::make(&folder.explained())?;
@@ -126,6 +127,11 @@ fn set_up(
     if let Some(reason) = &outcome.report.reason {
         let problem = Problem::new(format!("the recordings cannot be explained: {reason}"));
         return Err(Failure::Rejected(problem.into()));
+    }
+    if let Some(fault) = no_line.as_ref().filter(|_| !outcome.report.hands_out_twin()) {
+        let problem = Problem::new(format!("no twin fits these recordings: {fault}"));
+        let help = outcome.report.summary.clone();
+        return Err(Failure::Rejected(problem.help(help).into()));
     }
     request.cell.facts.effort_unit = unit_of(&outcome.report);
     let hold = interrupt::hold();
@@ -146,7 +152,7 @@ fn set_up(
     let explained = (outcome.report.hands_out_twin()).then_some(&*explained);
     let learnt = init::learn(
         &folder.set(),
-        explained,
+        (explained, no_line.is_none()),
         &folder.learnt(),
         &|share, what| {
             progress.doing(EXPLAINED + (1.0 - EXPLAINED) * share, what);

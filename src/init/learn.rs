@@ -41,7 +41,7 @@ struct Trial {
     push: Option<(String, f64)>,
 }
 
-/// Lets the detector learn from the set at `set`, behind the twin at `explained` or behind a regression, whichever
+/// Lets the detector learn from the set at `set`, behind the twin at `explained` or, with `has_line`, behind a regression, whichever
 /// gives fewer false alarms on the validation recordings or, with as many, finds the weaker push. Writes what it
 /// has learnt to `out`.
 ///
@@ -49,7 +49,7 @@ struct Trial {
 /// If nothing can be learnt from these recordings.
 pub fn learn(
     set: &Path,
-    explained: Option<&Path>,
+    (explained, has_line): (Option<&Path>, bool),
     out: &Path,
     progress: &Progress<'_>,
 ) -> Result<Learnt, Failure> {
@@ -57,7 +57,7 @@ pub fn learn(
     let explained = explained.map(|path| path.display().to_string());
     let twins: Vec<String> = explained
         .into_iter()
-        .chain([REGRESSION.to_owned()])
+        .chain(has_line.then(|| REGRESSION.to_owned()))
         .collect();
     let tried = evaluate(set, &twins, true, &|share, what| {
         progress(TRIED * share, what);

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use tauscope_dynamics::effort_scale::EffortScale;
+use tauscope_dynamics::effort_scale::{EffortScale, ScaleFault};
 use tauscope_dynamics::{Joint, Model};
 use tauscope_explain::{Input, Recording};
 use tauscope_ingest::Topics;
@@ -30,6 +30,8 @@ pub struct Looked {
     pub kept: Kept,
     /// What was found, a sentence each.
     pub sentences: Vec<String>,
+    /// Why a gain and an offset per joint cannot correct the twin, if they cannot.
+    pub no_line: Option<ScaleFault>,
 }
 
 /// What is given on the command line.
@@ -77,7 +79,12 @@ impl Told<'_> {
             .map(|recording| (recording.path.display().to_string(), recording.findings.clone()))
             .collect();
         sentences.extend(by_recording(&found));
-        let (unit, sentence) = self.unit(&request);
+        let scale = scale(&request);
+        let (unit, sentence) = self.unit(scale.as_ref());
+        let no_line = scale.and_then(|scale| match unit {
+            EffortUnit::Nm => scale.fault_in_nm(),
+            EffortUnit::A => scale.fault_in_a(),
+        });
         sentences.push(sentence);
         request.cell.facts.effort_unit = unit;
         unit.as_str().clone_into(&mut input.effort_unit);
@@ -88,6 +95,7 @@ impl Told<'_> {
             input,
             kept,
             sentences,
+            no_line,
         })
     }
 
@@ -108,7 +116,7 @@ impl Told<'_> {
 
     /// The unit that the explanation begins with, and how it was chosen: motor current where joints that bear weight
     /// measure far less than the weight requires, else N m. The explanation revises it.
-    fn unit(&self, request: &Request) -> (EffortUnit, String) {
+    fn unit(&self, scale: Option<&EffortScale>) -> (EffortUnit, String) {
         if let Some(unit) = self.effort_unit {
             return (unit, format!("Effort is in {}, as given.", words(unit)));
         }
@@ -116,21 +124,18 @@ impl Told<'_> {
             let sentence = "Effort is taken to be in N m; the explanation below says if it is not.";
             (EffortUnit::Nm, sentence.to_owned())
         };
-        let Some(scale) = scale(request) else {
-            return in_nm();
-        };
         match scale {
-            EffortScale::Torque { slope, sure: true } => (
+            Some(EffortScale::Torque { slope, sure: true }) => (
                 EffortUnit::Nm,
                 format!(
                     "Effort is in N m: the joints that bear weight measure {slope:.2} times what the robot's weight requires."
                 ),
             ),
-            EffortScale::Current {
+            Some(EffortScale::Current {
                 nm_per_unit,
                 joints,
-            } if nm_per_unit <= MOST_NM_PER_A => {
-                let plural = if joints == 1 { "" } else { "s" };
+            }) if *nm_per_unit <= MOST_NM_PER_A => {
+                let plural = if *joints == 1 { "" } else { "s" };
                 let sentence = format!(
                     "Effort is in A, motor current: {joints} joint{plural} that bear weight measure {:.3} per N m that the \
                      robot's weight requires, which is a torque constant of {nm_per_unit:.1} N m/A. If that is \

@@ -127,6 +127,9 @@ impl Headed {
         let units = self.units.iter().filter_map(move |unit| {
             let name = unit.name;
             match unit.target() {
+                Some(target) if name == "deg" => Some(format!(
+                    "{what} are in degrees, as the header says, and are converted to {target}."
+                )),
                 Some(target) => Some(format!(
                     "{what} are headed [{name}] and are converted to {target}."
                 )),

@@ -1,5 +1,7 @@
 //! How the stamp of a state follows the one before.
 
+use std::collections::VecDeque;
+
 use tauscope_bus::{JointArray, MAX_JOINTS};
 
 use super::gather::Whole;
@@ -8,6 +10,10 @@ use super::gather::Whole;
 /// that came too late.
 /// Tuned: by hand, on no recorded seeds; not swept.
 const JUMP_BACK_NS: i64 = 500_000_000;
+
+/// Stamps that are remembered, to recognise a copy that another relay delivers later.
+/// Resolution: memory; half a second at 100 Hz.
+const REMEMBERED: usize = 64;
 
 /// What a state is to the newest one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,6 +28,8 @@ pub(super) enum Next {
     Behind,
     /// The same again.
     Repeated,
+    /// The same again, after others.
+    Copy,
     /// Another one with the same stamp.
     Stalled,
 }
@@ -34,6 +42,8 @@ pub(super) struct Order {
     newest: [JointArray; 2],
     /// Whether a jump was refused and the stamps have not caught up.
     is_behind: bool,
+    /// Stamp and first position of the newest states \[ns, rad or m\].
+    before: VecDeque<(i64, f64)>,
 }
 
 impl Default for Order {
@@ -42,6 +52,7 @@ impl Default for Order {
             newest_ns: None,
             newest: [[0.0; MAX_JOINTS]; 2],
             is_behind: false,
+            before: VecDeque::with_capacity(REMEMBERED),
         }
     }
 }
@@ -51,6 +62,7 @@ impl Order {
     /// nothing begins anew.
     pub fn next(&mut self, state: &Whole, refuses_set_back: bool) -> Next {
         let values = [state.position, state.effort];
+        let own = (state.stamp_ns, state.position[0]);
         let jumps = |newest_ns| jumps_back(newest_ns, state.stamp_ns);
         self.is_behind &= self.newest_ns.is_some_and(|newest_ns| state.stamp_ns <= newest_ns);
         self.is_behind |= refuses_set_back && self.newest_ns.is_some_and(jumps);
@@ -63,12 +75,26 @@ impl Order {
             }
             Some(newest_ns) if state.stamp_ns == newest_ns => return Next::Stalled,
             Some(newest_ns) if jumps(newest_ns) => Next::SetBack,
-            Some(newest_ns) if state.stamp_ns < newest_ns => return Next::Late,
+            Some(newest_ns) if state.stamp_ns < newest_ns => {
+                if self.before.contains(&own) {
+                    return Next::Copy;
+                }
+                self.remember(own);
+                return Next::Late;
+            }
             _ => Next::Follows,
         };
         self.newest_ns = Some(state.stamp_ns);
         self.newest = values;
+        self.remember(own);
         next
+    }
+
+    fn remember(&mut self, own: (i64, f64)) {
+        if self.before.len() == REMEMBERED {
+            self.before.pop_front();
+        }
+        self.before.push_back(own);
     }
 }
 

@@ -36,6 +36,18 @@ impl Assembler {
         let counted = [
             (counts.late, Finding::LateMessages { messages: counts.late }),
             (counts.stalled, Finding::StalledStamps { messages: counts.stalled }),
+            (
+                counts.incomplete,
+                Finding::NoPositions {
+                    messages: counts.incomplete,
+                },
+            ),
+            (
+                counts.copies,
+                Finding::Copies {
+                    messages: counts.copies,
+                },
+            ),
             (counts.parted, Finding::MissingParts { messages: counts.parted }),
         ];
         all.extend(counted.into_iter().filter(|(count, _)| *count > 0).map(|(_, it)| it));
@@ -77,13 +89,12 @@ impl Assembler {
 
     /// Which publishers are used, where there are several.
     fn publishers_finding(&self) -> Option<Finding> {
-        let all = self.publishers.all.iter().zip(&self.used);
-        let all = all.filter(|(publisher, _)| publisher.messages > 0);
+        let all = self.publishers.listed();
         let of = |is_used: bool| -> Vec<Publisher> {
-            let these = all.clone().filter(|(_, used)| **used == is_used);
-            these.map(|(publisher, _)| publisher.clone()).collect()
+            let these = all.iter().filter(|(place, _)| self.used[*place] == is_used);
+            these.map(|(_, publisher)| publisher.clone()).collect()
         };
-        (all.clone().count() > 1).then(|| Finding::Publishers {
+        (all.len() > 1).then(|| Finding::Publishers {
             used: of(true),
             ignored: of(false),
         })

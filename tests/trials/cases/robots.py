@@ -6,7 +6,7 @@ from lib.trial import CELL, REPORT, Run, Trial, calibrate, done, explain, init, 
 
 NO_BODY = (
     r"impossible|cannot (be|have|belong)|not possible|unphysical|not physical|implausib|invalid|triangle|"
-    r"positive[- ](semi)?definite|no (rigid )?body|inconsistent|negative"
+    r"positive[- ](semi)?definite|no (rigid |real )?body|inconsistent|negative"
 )
 # Findings about the drives that the broken inertia imitates.
 IMITATIONS = (r"recorded 0?\.\d+ (\([^)]*\) )?times", r"masses are in kg, not")

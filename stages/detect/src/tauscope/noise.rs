@@ -110,6 +110,10 @@ pub(super) fn learn(
             for (w, seen) in seen.iter_mut().enumerate() {
                 for (j, (seen, joint)) in seen.iter_mut().zip(joints).enumerate() {
                     let square = means.mean(w, j).powi(2) + means.doubt(j).powi(2);
+                    // A clock that was set back within a piece leaves means that are no numbers.
+                    if !square.is_finite() {
+                        continue;
+                    }
                     seen[bin(joint, means.slow[j])].add(square, means.unrest(j).powi(2));
                 }
             }

@@ -1,6 +1,8 @@
 // What is copied must come out as it went in.
 #![allow(clippy::float_cmp)]
 
+use tauscope_session::Unusable;
+
 use super::*;
 
 const MS: i64 = 1_000_000;
@@ -209,7 +211,7 @@ fn joints_that_nobody_names_are_told() {
         "no joint state names b, c; the messages name a, x, y. Make a joint that nobody records `fixed`, as `init` does"
     );
     let nothing = Packer::new(&setup(), settings()).unwrap();
-    assert_eq!(nothing.verdict(), Err(PackError::NoSample { messages: 0 }));
+    assert_eq!(nothing.verdict(), Err(Unusable::NoSample { messages: 0 }));
 }
 
 #[test]
@@ -220,7 +222,7 @@ fn states_without_positions_are_told() {
     packer.state(&state, 1);
     assert_eq!(
         packer.verdict(),
-        Err(PackError::NoPositions { messages: 1 })
+        Err(Unusable::NoPositions { messages: 1 })
     );
     assert_eq!(packer.counts().dropped(), 1);
 }
