@@ -55,6 +55,7 @@ fn source(joint_names: &[String]) -> RecordedSource {
         topics: Topics::default(),
     };
     let setup = Setup {
+        effort_limits: Vec::new(),
         cell: "demo".to_owned(),
         joint_names: joint_names.to_vec(),
         tool: None,

@@ -15,8 +15,8 @@ use tauscope_pipeline::files::SetFile;
 use tauscope_pipeline::replay::stem;
 use tauscope_pipeline::report::{Problem, Report};
 use tauscope_pipeline::suggest;
-use tauscope_session::{Joints, Look, SessionError};
 use tauscope_pipeline::yaml::{self, Located, Place};
+use tauscope_session::{Joints, Look, SessionError};
 use tauscope_twin::TwinFile;
 
 use crate::labels::{self, LabelsFile, Truth};

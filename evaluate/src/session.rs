@@ -5,10 +5,10 @@ use tauscope_archive::Damage;
 use tauscope_bus::{Emit, LinkError, Sample, Source as _, Stage as _, TwinState, flags};
 use tauscope_detect::Lesson;
 use tauscope_ingest::{FileConfig, RecordedSource, Topics};
-use tauscope_session::Finding;
 use tauscope_pipeline::build;
 use tauscope_pipeline::cell::Cell;
 use tauscope_pipeline::replay::ReplayError;
+use tauscope_session::Finding;
 use tauscope_twin::Twin;
 
 use crate::recording::Named;

@@ -3,14 +3,15 @@
 
 mod cutoff;
 mod measured;
+mod read;
 mod spread;
 
 use std::path::{Path, PathBuf};
 
-use tauscope_bus::{JointState, SampleRef, Sink, StageError, TwinState, flags};
+use tauscope_bus::{JointState, TwinState};
 use tauscope_dynamics::effort_scale::{EffortScale, ScaleFault};
 use tauscope_ingest::{FileConfig, RecordedSource, Topics};
-use tauscope_session::{Effect, Finding, Plausible, by_recording};
+use tauscope_session::{Effect, Finding, by_recording};
 use tauscope_twin::{
     Calibration, Expected, JointCorrection, Robot, TwinFile, spread_scale, telling_slopes,
 };
@@ -22,6 +23,7 @@ use crate::plausible;
 use crate::provenance;
 use crate::replay::ReplayError;
 use crate::report::without_path;
+use read::{Read, Settled};
 
 /// What to calibrate, and on what.
 #[derive(Debug)]
@@ -70,7 +72,9 @@ pub enum CalibrateError {
         settling_s: f64,
     },
     /// All samples are labelled as touched.
-    #[error("no sample to calibrate on: the labels leave no time in which nothing touches the robot")]
+    #[error(
+        "no sample to calibrate on: the labels leave no time in which nothing touches the robot"
+    )]
     AllTouched,
     /// Nothing that is learnt from this recording can be right.
     #[error("{}: {oddity}", recording.display())]
@@ -266,7 +270,7 @@ impl Job<'_> {
             let sink = Settled {
                 plausible: &mut plausible,
                 measured: &mut measured,
-                settled: &mut settled,
+                ready: &mut settled,
                 take: &mut *take,
                 reset: true,
             };
@@ -324,83 +328,5 @@ fn refuse_fault(recording: &Path, findings: &[Finding]) -> Result<(), CalibrateE
             oddity: fault.clone(),
         }),
         None => Ok(()),
-    }
-}
-
-/// What was read of a recording, or of all.
-#[derive(Debug, Default)]
-struct Read {
-    /// Samples that were lost or refused.
-    lost: u64,
-    /// Joint states.
-    samples: u64,
-    /// Joint states with measured efforts.
-    measured: u64,
-    /// Samples behind settled filters.
-    settled: u64,
-    /// Whether no joint has moved.
-    stands: bool,
-    findings: Vec<Finding>,
-}
-
-impl Read {
-    fn add(&mut self, other: &Self) {
-        self.lost += other.lost;
-        self.samples += other.samples;
-        self.measured += other.measured;
-        self.settled += other.settled;
-    }
-
-    /// Why there is no sample to calibrate on.
-    fn why_nothing(&self, settling_s: f64) -> CalibrateError {
-        match (self.measured, self.settled) {
-            (0, _) => CalibrateError::NoEffort {
-                samples: self.samples,
-            },
-            (samples, 0..2) => CalibrateError::TooShort {
-                samples,
-                settling_s,
-            },
-            _ => CalibrateError::AllTouched,
-        }
-    }
-}
-
-/// Hands every sample whose filters have settled to a closure; the first one after a reset says so.
-struct Settled<'a> {
-    plausible: &'a mut Plausible,
-    measured: &'a mut u64,
-    settled: &'a mut u64,
-    take: &'a mut (dyn FnMut(&TwinState) + Send),
-    reset: bool,
-}
-
-impl Sink for Settled<'_> {
-    fn accept(&mut self, _from: &str, sample: SampleRef<'_>) -> Result<(), StageError> {
-        let sample = match sample {
-            SampleRef::TwinState(sample) => sample,
-            SampleRef::JointState(sample) => {
-                self.plausible.add(sample);
-                *self.measured += u64::from(sample.header.has(flags::EFFORT_MEASURED));
-                return Ok(());
-            }
-            _ => return Ok(()),
-        };
-        self.reset |= sample.header.has(flags::RESET);
-        if sample.header.has(flags::READY) {
-            *self.settled += 1;
-            if std::mem::take(&mut self.reset) {
-                let mut first = *sample;
-                first.header.flags |= flags::RESET;
-                (self.take)(&first);
-            } else {
-                (self.take)(sample);
-            }
-        }
-        Ok(())
-    }
-
-    fn finish(&mut self) -> Result<(), StageError> {
-        Ok(())
     }
 }

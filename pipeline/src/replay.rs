@@ -183,21 +183,18 @@ impl<'a> Replay<'a> {
         let mut shared: BTreeMap<usize, tauscope_detect::Shared> = BTreeMap::new();
         for &index in &self.members {
             let stage = &self.pipeline.stages[index];
-            let input = stage
-                .inputs
-                .first()
-                .and_then(|input| streams.get(input))
-                .cloned();
+            let input = stage.inputs.first();
+            let input = input.and_then(|input| streams.get(input)).cloned();
             let stream = match (&stage.settings, input) {
                 (Settings::Ingest(config), _) => {
-                    let (source, of_source) =
+                    let source;
+                    (source, findings) =
                         open::recording(config, recording, cell, self.reads_ahead)?;
-                    findings = of_source;
                     Some(graph.source(&stage.name, Box::new(Commanded::archived(source))))
                 }
                 (Settings::Twin { config, model }, Some(input)) => {
-                    let model = model.as_ref();
-                    Some(self.add_twin(&mut graph, stage, (config, model), &input, recording)?)
+                    let of = (config, model.as_ref());
+                    Some(self.add_twin(&mut graph, stage, of, &input, recording)?)
                 }
                 (Settings::Detect { config, model }, Some(input)) => {
                     let behind = stage.inputs.first().copied().unwrap_or(index);
@@ -236,7 +233,6 @@ impl<'a> Replay<'a> {
             }
         }
         let inputs = self.inputs(&graph, streams.keys().copied(), &streams)?;
-        // The observer and what is beside it are no stages of the pipeline.
         let stage_count = graph.len();
         graph.sink("observer", Box::new(&mut observer), inputs);
         if let Some(beside) = beside {
@@ -246,9 +242,7 @@ impl<'a> Replay<'a> {
         let mut stages = graph.run(progress)?.ok_or(ReplayError::Interrupted)?;
         stages.truncate(stage_count);
         drop(graph);
-        let of_source = findings.get().into_iter();
-        let of_source = of_source.map(|finding| finding.to_string());
-        observer.observed.notes.splice(0..0, of_source);
+        observer.observed.note(&findings.get());
         Ok(observer.observed.into_outcome(cell, stem, stages, files))
     }
 

@@ -11,10 +11,8 @@ mod report;
 
 use tauscope_archive::{Twice, ros};
 
-use crate::clock::Clock;
-use crate::finding::Finding;
-use crate::look::Look;
-use crate::publisher::{Publisher, Publishers, choose};
+use crate::publisher::{Publisher, choose};
+use crate::selection::Selection;
 use crate::values::{Judgement, Ranges, Refused};
 
 pub use gather::{Gather, Whole, stamp_of};
@@ -91,20 +89,16 @@ pub enum Taken {
 /// Assembles states from messages.
 #[derive(Debug)]
 pub struct Assembler {
-    joint_names: Vec<String>,
+    selection: Selection,
     layouts: Layouts,
     gather: Gather,
     order: Order,
-    clock: Clock,
-    publishers: Publishers,
-    /// Whether each publisher is used.
-    used: Vec<bool>,
-    ranges: Ranges,
     /// By joint and field, values that are no measurement.
     impossible: Vec<[Refused; 3]>,
     /// By joint, efforts that dropped to zero.
     dropouts: Vec<Refused>,
     refuses_set_back: bool,
+    keeps_velocity: bool,
     messages: u64,
     counts: Counts,
     twice: Option<(usize, [usize; 2])>,
@@ -115,54 +109,25 @@ pub struct Assembler {
     before_ns: Option<i64>,
     /// When the stamps jumped back, and by how much \[ns\].
     jumps: Vec<(i64, i64)>,
-    /// The finding about the clock.
-    of_clock: Option<Finding>,
-    /// The finding about velocities that are not used.
-    of_velocity: Option<Finding>,
-    keeps_velocity: bool,
 }
 
 impl Assembler {
     /// Of a live source, of which nothing is known before its messages come.
     pub fn live(joint_names: &[String]) -> Self {
-        let ranges = Ranges::new(joint_names.iter().map(|_| None));
-        Self::new(joint_names, Clock::default(), Publishers::default(), ranges)
+        Self::new(Selection::live(joint_names))
     }
 
-    /// Of a recording that was looked at.
-    pub fn of(look: &Look) -> Self {
-        let mut publishers = look.publishers.clone();
-        for publisher in &mut publishers.all {
-            (publisher.messages, publisher.runs) = (0, 0);
-        }
-        let mut ranges = look.ranges.clone();
-        ranges.rewind();
-        let mut this = Self::new(&look.joint_names, look.clock, publishers, ranges);
-        this.used.clone_from(&look.used);
-        this.of_clock.clone_from(&look.of_clock);
-        this.of_velocity.clone_from(&look.of_velocity);
-        this
-    }
-
-    fn new(
-        joint_names: &[String],
-        clock: Clock,
-        publishers: Publishers,
-        ranges: Ranges,
-    ) -> Self {
-        let count = joint_names.len();
+    pub(crate) fn new(selection: Selection) -> Self {
+        let count = selection.joint_names.len();
         Self {
-            joint_names: joint_names.to_vec(),
-            layouts: Layouts::new(joint_names),
+            layouts: Layouts::new(&selection.joint_names),
             gather: Gather::new(count),
             order: Order::default(),
-            clock,
-            used: Vec::new(),
-            publishers,
-            ranges,
             impossible: vec![<_>::default(); count],
             dropouts: vec![Refused::default(); count],
+            selection,
             refuses_set_back: false,
+            keeps_velocity: false,
             messages: 0,
             counts: Counts::default(),
             twice: None,
@@ -170,9 +135,6 @@ impl Assembler {
             first_ns: None,
             before_ns: None,
             jumps: Vec::new(),
-            of_clock: None,
-            of_velocity: None,
-            keeps_velocity: false,
         }
     }
 
@@ -200,7 +162,7 @@ impl Assembler {
 
     /// Publishers on the topic so far.
     pub fn publishers(&self) -> Vec<Publisher> {
-        let listed = self.publishers.listed().into_iter();
+        let listed = self.selection.publishers.listed().into_iter();
         listed.map(|(_, publisher)| publisher).collect()
     }
 
@@ -227,7 +189,10 @@ impl Assembler {
     /// Takes a message that was received at `received_ns`.
     pub fn take(&mut self, message: &ros::JointState, received_ns: i64) -> Taken {
         self.messages += 1;
-        let time_ns = self.clock.time_ns(message.header.stamp.ns(), received_ns);
+        let time_ns = self
+            .selection
+            .clock
+            .time_ns(message.header.stamp.ns(), received_ns);
         self.first_ns.get_or_insert((time_ns, received_ns));
         let is_used = self.is_used(message, received_ns);
         let layout = self.layouts.of(&message.name);
@@ -245,7 +210,7 @@ impl Assembler {
             return Taken::Nothing;
         }
         let judged = judge(
-            &mut self.ranges,
+            &mut self.selection.ranges,
             (&mut self.impossible, &mut self.dropouts),
             (&layout.places, message, time_ns),
         );
@@ -258,12 +223,12 @@ impl Assembler {
         let Some(mut whole) = self.gather.add(layout, message, times_ns, lacks_effort) else {
             return Taken::Nothing;
         };
-        if self.of_velocity.is_some() && !self.keeps_velocity {
+        if self.selection.of_velocity.is_some() && !self.keeps_velocity {
             whole.has_velocity = false;
             whole.velocity = Default::default();
         }
         self.counts.unmeasured += u64::from(lacks_effort);
-        if !whole.is_finite(self.joint_names.len()) {
+        if !whole.is_finite(self.selection.joint_names.len()) {
             self.counts.not_finite += 1;
             return Taken::Nothing;
         }
@@ -271,29 +236,31 @@ impl Assembler {
             self.counts.incomplete += 1;
             return Taken::Nothing;
         }
-        self.ordered(whole, received_ns)
+        self.ordered(&whole, received_ns)
     }
 
     /// Whether the message's publisher is used.
     fn is_used(&mut self, message: &ros::JointState, received_ns: i64) -> bool {
-        let known = self.publishers.all.len();
-        let Some(place) = self.publishers.add(message, received_ns) else {
+        let known = self.selection.publishers.all.len();
+        let Some(place) = self.selection.publishers.add(message, received_ns) else {
             return true;
         };
         // Of a recording all publishers but late ones are known; of a live source, zeros tell nothing at first.
-        if self.publishers.all.len() > known {
-            self.used = choose(&self.publishers.all, &self.joint_names);
+        if self.selection.publishers.all.len() > known {
+            self.selection.used =
+                choose(&self.selection.publishers.all, &self.selection.joint_names);
         }
-        if self.publishers.all[place].messages == 1 {
+        if self.selection.publishers.all[place].messages == 1 {
             // It was looked at, but its times are those of this reading.
-            self.publishers.all[place].first_ns = received_ns;
+            self.selection.publishers.all[place].first_ns = received_ns;
         }
-        self.used[place]
+        self.selection.used[place]
     }
 
-    fn ordered(&mut self, whole: Whole, received_ns: i64) -> Taken {
+    fn ordered(&mut self, whole: &Whole, received_ns: i64) -> Taken {
         let before_ns = self.before_ns.replace(whole.stamp_ns);
-        let jumped = before_ns.is_some_and(|before_ns| order::jumps_back(before_ns, whole.stamp_ns));
+        let jumped =
+            before_ns.is_some_and(|before_ns| order::jumps_back(before_ns, whole.stamp_ns));
         if jumped {
             self.counts.resets += 1;
             if self.jumps.len() < MOST_JUMPS {
@@ -302,9 +269,9 @@ impl Assembler {
                 self.jumps.push((received_ns - first_ns, by_ns));
             }
         }
-        match self.order.next(&whole, self.refuses_set_back) {
-            Next::Follows => return Taken::Follows(whole),
-            Next::SetBack => return Taken::SetBack(whole),
+        match self.order.next(whole, self.refuses_set_back) {
+            Next::Follows => return Taken::Follows(*whole),
+            Next::SetBack => return Taken::SetBack(*whole),
             Next::Late => self.counts.late += 1,
             Next::Behind => self.counts.behind += 1,
             Next::Repeated => self.counts.repeated += 1,
@@ -317,7 +284,7 @@ impl Assembler {
     /// The joint that messages name more than once, if they do.
     pub fn twice(&self) -> Option<Twice> {
         self.twice.map(|(joint, places)| Twice {
-            joint: self.joint_names[joint].clone(),
+            joint: self.selection.joint_names[joint].clone(),
             entries: places.map(|place| place + 1),
             messages: self.counts.ambiguous,
         })
@@ -326,7 +293,7 @@ impl Assembler {
     /// The first joint, and its field, that came and was never finite.
     pub fn never_finite(&self) -> Option<(String, &'static str)> {
         let (joint, field) = self.gather.never_finite()?;
-        Some((self.joint_names[joint].clone(), field))
+        Some((self.selection.joint_names[joint].clone(), field))
     }
 
     /// Number of values and messages refused so far.

@@ -105,7 +105,9 @@ impl Stamps {
         let steps = self.pairs.windows(2).map(|pair| pair[1].0 - pair[0].0);
         let mut steps: Vec<i64> = steps.filter(|step_ns| *step_ns > 0).collect();
         steps.sort_unstable();
-        let resolution_s = steps.get(steps.len() / 2).map_or(0.0, |ns| *ns as f64 * 1e-9);
+        let resolution_s = steps
+            .get(steps.len() / 2)
+            .map_or(0.0, |ns| *ns as f64 * 1e-9);
         let is_replaced = has_log_times && resolution_s <= COARSEST_S;
         let finding = Finding::CoarseStamps {
             resolution_s,

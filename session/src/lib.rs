@@ -8,6 +8,7 @@ mod look;
 mod plausible;
 mod publisher;
 pub mod robot;
+mod selection;
 pub mod suggest;
 mod survey;
 mod values;

@@ -1,15 +1,14 @@
 //! The first look at a recording: topic, publishers, clock and ranges, from its head.
 
-use std::path::Path;
-
 use tauscope_archive::{ArchiveError, JointFacts, JointTallies, Recording, RecordingKind, ros};
 
 use crate::assembler::{Assembler, Taken};
 use crate::clock::{Clock, Stamps};
 use crate::error::{SessionError, Unusable};
-use crate::finding::{Effect, Finding};
+use crate::finding::Effect;
 use crate::plausible::odd_velocities;
 use crate::publisher::{Publisher, Publishers, choose};
+use crate::selection::Selection;
 use crate::values::Ranges;
 
 /// Messages of a topic that are looked at.
@@ -29,17 +28,7 @@ const LEAST_RANGE: f64 = 0.1;
 pub struct Look {
     /// Topic of the joint states.
     pub topic: String,
-    /// The robot's joints; those that the publishers name where no robot is given.
-    pub joint_names: Vec<String>,
-    /// Time of the messages.
-    pub clock: Clock,
-    pub(crate) publishers: Publishers,
-    /// Whether each publisher is used.
-    pub(crate) used: Vec<bool>,
-    pub(crate) ranges: Ranges,
-    pub(crate) of_clock: Option<Finding>,
-    /// Velocities that are not the derivative of the positions.
-    pub(crate) of_velocity: Option<Finding>,
+    selection: Selection,
 }
 
 /// The joints whose states are wanted.
@@ -69,7 +58,7 @@ impl Look {
             }
             None => Self::at_best(recording, wanted)?,
         };
-        let fault = look.of_clock.clone();
+        let fault = look.selection.of_clock.clone();
         if let Some(fault) = fault.filter(|it| it.effect() == Effect::Fault) {
             return Err(SessionError::Unusable {
                 path: recording.path().to_owned(),
@@ -94,8 +83,12 @@ impl Look {
                     continue;
                 }
             };
-            let used = || look.used_publishers();
-            let known = look.joint_names.iter().filter(|joint| look.names(joint));
+            let used = || look.selection.used_publishers();
+            let known = look
+                .selection
+                .joint_names
+                .iter()
+                .filter(|joint| look.names(joint));
             let rank = (
                 used().any(|it| it.position),
                 used().any(Publisher::measures_effort),
@@ -156,17 +149,19 @@ impl Look {
             joint_names = published(&publishers.all);
         }
         let used = choose(&publishers.all, &joint_names);
-        let limits = (0..joint_names.len())
-            .map(|joint| wanted.effort_limits.get(joint).copied().flatten());
+        let limits =
+            (0..joint_names.len()).map(|joint| wanted.effort_limits.get(joint).copied().flatten());
         let mut look = Self {
             topic: topic.to_owned(),
-            ranges: Ranges::new(limits),
-            joint_names,
-            clock: Clock::Stamps,
-            publishers,
-            used,
-            of_clock: None,
-            of_velocity: None,
+            selection: Selection {
+                ranges: Ranges::new(limits),
+                joint_names,
+                clock: Clock::Stamps,
+                publishers,
+                used,
+                of_clock: None,
+                of_velocity: None,
+            },
         };
         look.read_values(recording)?;
         Ok(look)
@@ -177,20 +172,20 @@ impl Look {
         let mut states = recording.joint_states(&self.topic)?;
         let mut stamps = Stamps::default();
         let mut last = ros::JointState::default();
+        // Publishers of parts of one state share stamps rightly, so the clock is judged by one of them.
+        let used = (0..self.selection.used.len()).filter(|&place| self.selection.used[place]);
+        let main = used.max_by_key(|&place| self.selection.publishers.all[place].messages);
         for _ in 0..HEAD {
             let Some(state) = states.next_state() else {
                 break;
             };
             let Ok(state) = state else { continue };
             let message = state.message;
-            let place = self.publishers.place(message);
-            if !place.is_some_and(|place| self.used[place]) {
+            let place = self.selection.publishers.place(message);
+            if !place.is_some_and(|place| self.selection.used[place]) {
                 continue;
             }
-            // Parts of one state share a stamp rightly.
-            if self.publishers.all[place.unwrap_or_default()].names.len() == last.name.len()
-                || last.name.is_empty()
-            {
+            if place == main {
                 let is_new = message.position != last.position || message.effort != last.effort;
                 stamps.add(message.header.stamp.ns(), state.log_time_ns, is_new);
                 last.clone_from(message);
@@ -198,9 +193,13 @@ impl Look {
             let fields = [&message.position, &message.velocity, &message.effort];
             for (field, values) in fields.into_iter().enumerate() {
                 for (name, value) in message.name.iter().zip(values) {
-                    let joint = self.joint_names.iter().position(|joint| joint == name);
+                    let joint = self
+                        .selection
+                        .joint_names
+                        .iter()
+                        .position(|joint| joint == name);
                     if let Some(joint) = joint.filter(|_| value.is_finite()) {
-                        self.ranges.take(joint, field, *value);
+                        self.selection.ranges.take(joint, field, *value);
                     }
                 }
             }
@@ -209,15 +208,15 @@ impl Look {
             recording.kind(),
             RecordingKind::Csv | RecordingKind::Lerobot
         );
-        (self.clock, self.of_clock) = stamps.clock(has_log_times);
+        (self.selection.clock, self.selection.of_clock) = stamps.clock(has_log_times);
         self.check_velocity(recording)
     }
 
     /// Compares velocities with positions, on the clock that was chosen.
     fn check_velocity(&mut self, recording: &Recording) -> Result<(), SessionError> {
-        let mut assembler = Assembler::of(self).keeping_velocity();
-        let mut tallies = JointTallies::in_order(&self.joint_names);
-        let count = self.joint_names.len();
+        let mut assembler = self.assembler().keeping_velocity();
+        let mut tallies = JointTallies::in_order(&self.selection.joint_names);
+        let count = self.selection.joint_names.len();
         let mut states = recording.joint_states(&self.topic)?;
         for _ in 0..HEAD {
             let Some(state) = states.next_state() else {
@@ -242,7 +241,7 @@ impl Look {
             slope.is_some_and(|slope| !(1.0 / OFF..=OFF).contains(&slope))
         };
         if facts.iter().any(|facts| moves(facts) && is_off(facts)) {
-            self.of_velocity = odd_velocities(&facts, true);
+            self.selection.of_velocity = odd_velocities(&facts, true);
         }
         Ok(())
     }
@@ -255,56 +254,37 @@ impl Look {
         let mut states = recording.joint_states(&self.topic)?;
         while let Some(state) = states.next_state() {
             let Ok(state) = state else { continue };
-            let place = self.publishers.place(state.message);
-            if place.is_none_or(|place| self.used[place]) {
+            let place = self.selection.publishers.place(state.message);
+            if place.is_none_or(|place| self.selection.used[place]) {
                 let stamp_ns = state.message.header.stamp.ns();
-                let time_ns = self.clock.time_ns(stamp_ns, state.log_time_ns);
+                let time_ns = self.selection.clock.time_ns(stamp_ns, state.log_time_ns);
                 return Ok(Some((time_ns, state.log_time_ns)));
             }
         }
         Ok(None)
     }
 
-    /// Publishers on the topic, as far as the head shows them.
-    pub fn publishers(&self) -> &[Publisher] {
-        &self.publishers.all
+    /// The robot's joints; those that the publishers name where no robot was given.
+    pub fn joint_names(&self) -> &[String] {
+        &self.selection.joint_names
     }
 
-    /// The publishers that are used.
-    fn used_publishers(&self) -> impl Iterator<Item = &Publisher> {
-        let all = self.publishers.all.iter().zip(&self.used);
-        all.filter(|(_, used)| **used).map(|(publisher, _)| publisher)
+    /// An assembler of what was looked at.
+    pub fn assembler(&self) -> Assembler {
+        Assembler::new(self.selection.rewound())
     }
 
     /// Whether a publisher that is used names the joint.
     pub fn names(&self, joint: &str) -> bool {
-        self.used_publishers()
+        self.selection
+            .used_publishers()
             .any(|publisher| publisher.names.iter().any(|name| name == joint))
     }
 
     /// All joints that the publishers in use name, in the order of their messages.
     pub fn recorded(&self) -> Vec<String> {
-        let used: Vec<Publisher> = self.used_publishers().cloned().collect();
+        let used: Vec<Publisher> = self.selection.used_publishers().cloned().collect();
         published(&used)
-    }
-
-    /// Checks that every joint of the robot is named.
-    ///
-    /// # Errors
-    /// [`Unusable::JointsMissing`].
-    pub fn check_joints(&self, path: &Path) -> Result<(), SessionError> {
-        let missing = self.joint_names.iter().filter(|joint| !self.names(joint));
-        let missing: Vec<String> = missing.cloned().collect();
-        if missing.is_empty() {
-            return Ok(());
-        }
-        Err(SessionError::Unusable {
-            path: path.to_owned(),
-            why: Unusable::JointsMissing {
-                missing,
-                all: self.publishers.all.clone(),
-            },
-        })
     }
 }
 

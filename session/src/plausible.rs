@@ -90,7 +90,13 @@ impl Plausible {
     }
 
     /// Takes the values of one instant, joints in the robot's order; empty slices for fields that are not given.
-    pub fn add_values(&mut self, stamp_ns: i64, position: &[f64], velocity: &[f64], effort: &[f64]) {
+    pub fn add_values(
+        &mut self,
+        stamp_ns: i64,
+        position: &[f64],
+        velocity: &[f64],
+        effort: &[f64],
+    ) {
         self.values.add_values(stamp_ns, position, velocity, effort);
         if self.samples == 0 {
             self.first_ns = stamp_ns;

@@ -13,6 +13,10 @@ const MOST: usize = 16;
 
 /// A publisher, identified by the joints that its messages name and the fields that they give.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "one for each field of a joint state"
+)]
 pub struct Publisher {
     /// Names in its messages.
     pub names: Vec<String>,
@@ -102,7 +106,11 @@ impl fmt::Display for Publisher {
             suggest::some(&names)
         };
         let plural = if self.messages == 1 { "" } else { "s" };
-        write!(f, "{names} with {fields}: {} message{plural}", self.messages)?;
+        write!(
+            f,
+            "{names} with {fields}: {} message{plural}",
+            self.messages
+        )?;
         if let Some(rate_hz) = self.rate_hz() {
             write!(f, ", {rate_hz:.1} Hz")?;
         }
@@ -157,7 +165,11 @@ impl Publishers {
         for (place, publisher) in self.all.iter().enumerate() {
             let same = listed.iter_mut().find(|(_, other)| {
                 let one_is_off = publisher.zero_effort != other.zero_effort;
-                let off = if publisher.zero_effort { publisher } else { other };
+                let off = if publisher.zero_effort {
+                    publisher
+                } else {
+                    other
+                };
                 one_is_off
                     && !off.alternates()
                     && publisher.effort == other.effort
@@ -197,7 +209,8 @@ impl Publishers {
 /// Whether each publisher is used for `joints`: it names one of them and gives its position. Where some give efforts,
 /// those that give none are not used; nor are those whose efforts are all zero, if others measure the same joints.
 pub(crate) fn choose(all: &[Publisher], joints: &[String]) -> Vec<bool> {
-    let names_one = |publisher: &Publisher| joints.iter().any(|joint| publisher.names.contains(joint));
+    let names_one =
+        |publisher: &Publisher| joints.iter().any(|joint| publisher.names.contains(joint));
     let mut used: Vec<bool> = all
         .iter()
         .map(|publisher| publisher.position && names_one(publisher))
@@ -208,7 +221,9 @@ pub(crate) fn choose(all: &[Publisher], joints: &[String]) -> Vec<bool> {
         others.clone().any(|it| it.names.contains(joint))
     };
     for (publisher, used) in all.iter().zip(&mut used) {
-        let mut own = joints.iter().filter(|joint| publisher.names.contains(joint));
+        let mut own = joints
+            .iter()
+            .filter(|joint| publisher.names.contains(joint));
         let repeats = publisher.zero_effort && publisher.alternates() && own.all(measured);
         *used &= !(some_give_effort && (!publisher.effort || repeats));
     }
@@ -223,7 +238,11 @@ pub(crate) fn choose(all: &[Publisher], joints: &[String]) -> Vec<bool> {
 mod tests {
     use super::*;
 
-    fn publisher(names: &str, [velocity, effort, zero_effort]: [bool; 3], messages: u64) -> Publisher {
+    fn publisher(
+        names: &str,
+        [velocity, effort, zero_effort]: [bool; 3],
+        messages: u64,
+    ) -> Publisher {
         Publisher {
             names: names.split(' ').map(str::to_owned).collect(),
             position: true,
@@ -263,6 +282,9 @@ mod tests {
     #[test]
     fn a_publisher_is_described_by_its_joints_fields_count_and_rate() {
         let text = publisher("a b", [false, true, true], 101).to_string();
-        assert_eq!(text, "a, b with position, zero effort: 101 messages, 100.0 Hz");
+        assert_eq!(
+            text,
+            "a, b with position, zero effort: 101 messages, 100.0 Hz"
+        );
     }
 }

@@ -2,7 +2,7 @@
 
 use tauscope_archive::{ArchiveError, Recording};
 
-use crate::assembler::{Assembler, Taken};
+use crate::assembler::Taken;
 use crate::error::SessionError;
 use crate::finding::Finding;
 use crate::look::{Joints, Look};
@@ -37,9 +37,9 @@ impl Survey {
             }
             Err(error) => return Err(error),
         };
-        let mut assembler = Assembler::of(&look);
-        let mut plausible = Plausible::new(&look.joint_names, None);
-        let count = look.joint_names.len();
+        let mut assembler = look.assembler();
+        let mut plausible = Plausible::new(look.joint_names(), None);
+        let count = look.joint_names().len();
         let mut states = recording.joint_states(topic)?;
         while let Some(state) = states.next_state() {
             match state {

@@ -129,10 +129,8 @@ impl Ranges {
             of.in_dropout = value == 0.0 && (of.in_dropout || of.drops_to_zero());
             if of.in_dropout {
                 judgement = Judgement::Dropout;
-            } else {
-                if let Some(last) = of.last_effort.replace(value) {
-                    of.steps.add(value - last);
-                }
+            } else if let Some(last) = of.last_effort.replace(value) {
+                of.steps.add(value - last);
             }
         }
         of.fields[field].add(value);
@@ -184,7 +182,8 @@ impl Ranges {
 impl Joint {
     /// Whether a zero that follows is too large a step for this joint.
     fn drops_to_zero(&self) -> bool {
-        let (Some(last), Some(step)) = (self.last_effort, self.steps.quantile(STEP_QUANTILE)) else {
+        let (Some(last), Some(step)) = (self.last_effort, self.steps.quantile(STEP_QUANTILE))
+        else {
             return false;
         };
         let efforts = &self.fields[EFFORT];
@@ -264,7 +263,15 @@ mod tests {
 
     #[test]
     fn a_limit_of_the_robot_file_is_believed_unless_the_effort_exceeds_it_all_the_time() {
-        let spikes = |scale: f64| move |k| if k % 300 == 7 { 900.0 } else { scale * effort(k) };
+        let spikes = |scale: f64| {
+            move |k| {
+                if k % 300 == 7 {
+                    900.0
+                } else {
+                    scale * effort(k)
+                }
+            }
+        };
         assert!(judged(Some(30.0), spikes(1.0)).contains(&Judgement::Impossible));
         // Milliamperes beside a limit in N m.
         assert!(!judged(Some(30.0), spikes(100.0)).contains(&Judgement::Impossible));

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use comfy_table::{CellAlignment, Table, presets};
-use tauscope_archive::whole_file::{self, Existing};
 use tauscope_archive::ArchiveError;
+use tauscope_archive::whole_file::{self, Existing};
 use tauscope_ingest::Topics;
 use tauscope_pipeline::calibrate::{Calibrated, Job};
 use tauscope_pipeline::cell::{Cell, ConstantSpot, EffortUnit};

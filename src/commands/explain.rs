@@ -52,7 +52,7 @@ pub struct Args {
     /// Topic of the measured joint states; without it the one that gives efforts of most of the robot's joints.
     #[arg(long, value_name = "TOPIC")]
     state_topic: Option<String>,
-    /// An effect that is left out of the library; may be given several times.
+    /// An effect, or a fault of recordings such as `effort_unit`, that is not considered; may be given several times.
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
     #[command(flatten)]

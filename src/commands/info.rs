@@ -32,7 +32,7 @@ struct Printed {
 /// Publishers and findings of a topic of joint states.
 #[derive(Debug, Serialize)]
 struct Topic {
-    topic: String,
+    name: String,
     publishers: Vec<Publisher>,
     findings: Vec<Finding>,
     /// Each finding as a sentence.
@@ -63,7 +63,7 @@ fn joint_states(recording: &Recording) -> Result<Vec<Topic>, SessionError> {
         let survey = Survey::of(recording, &topic.name)?;
         let sentences = survey.findings.iter().map(ToString::to_string);
         Ok(Topic {
-            topic: topic.name.clone(),
+            name: topic.name.clone(),
             sentences: sentences.collect(),
             publishers: survey.publishers,
             findings: survey.findings,
@@ -78,7 +78,7 @@ fn text(printed: &Printed) -> String {
     for topic in &printed.joint_states {
         let lists = topic.publishers.len() > 1;
         if lists {
-            text += &format!("publishers on {}:\n", topic.topic);
+            text += &format!("publishers on {}:\n", topic.name);
             for publisher in &topic.publishers {
                 text += &format!("  {publisher}\n");
             }
@@ -88,7 +88,7 @@ fn text(printed: &Printed) -> String {
             .filter(|finding| !(lists && matches!(finding, Finding::Publishers { .. })))
             .peekable();
         if findings.peek().is_some() {
-            text += &format!("findings on {}:\n", topic.topic);
+            text += &format!("findings on {}:\n", topic.name);
         }
         for finding in findings {
             text += &format!("  {finding}\n");

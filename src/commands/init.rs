@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use tauscope_pipeline::cell::EffortUnit;
 use tauscope_explain::report::Report;
+use tauscope_pipeline::cell::EffortUnit;
 use tauscope_pipeline::recordings;
 use tauscope_pipeline::report::Problem;
 
@@ -128,7 +128,10 @@ fn set_up(
         let problem = Problem::new(format!("the recordings cannot be explained: {reason}"));
         return Err(Failure::Rejected(problem.into()));
     }
-    if let Some(fault) = no_line.as_ref().filter(|_| !outcome.report.hands_out_twin()) {
+    if let Some(fault) = no_line
+        .as_ref()
+        .filter(|_| !outcome.report.hands_out_twin())
+    {
         let problem = Problem::new(format!("no twin fits these recordings: {fault}"));
         let help = outcome.report.summary.clone();
         return Err(Failure::Rejected(problem.help(help).into()));

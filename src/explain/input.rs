@@ -111,7 +111,7 @@ pub struct Arguments<'a> {
     pub holdout: &'a [PathBuf],
 }
 
-/// The effects to leave out, which must be known.
+/// The effects and faults of recordings to leave out, which must be known.
 ///
 /// # Errors
 /// Those that are not.
@@ -119,7 +119,8 @@ pub fn without(effects: &[String]) -> Result<BTreeSet<String>, Report> {
     let mut report = Report::default();
     let known = || {
         let named = EFFECTS.iter().filter(|effect| ***effect != UNKNOWN);
-        named.map(|effect| effect.name)
+        let named = named.map(|effect| effect.name);
+        named.chain(tauscope_explain::report::recording_faults())
     };
     for effect in effects {
         if !known().any(|name| name == effect) {

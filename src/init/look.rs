@@ -76,7 +76,12 @@ impl Told<'_> {
         sentences.extend(coupled(cell));
         sentences.extend(unlimited(cell));
         let found: Vec<_> = (input.fit.iter())
-            .map(|recording| (recording.path.display().to_string(), recording.findings.clone()))
+            .map(|recording| {
+                (
+                    recording.path.display().to_string(),
+                    recording.findings.clone(),
+                )
+            })
             .collect();
         sentences.extend(by_recording(&found));
         let scale = scale(&request);
@@ -201,7 +206,9 @@ fn travel(recording: &Recording, joints: usize) -> f64 {
     let rows: Vec<&[f64]> = recording.position.chunks_exact(joints).collect();
     let steps = rows.windows(2).map(|pair| {
         let joints = pair[0].iter().zip(pair[1]);
-        joints.map(|(before, after)| (after - before).abs()).sum::<f64>()
+        joints
+            .map(|(before, after)| (after - before).abs())
+            .sum::<f64>()
     });
     steps.sum()
 }

@@ -8,7 +8,7 @@ use tauscope_bus::{SampleRef, Sink, StageError};
 use super::Outcome;
 use crate::cell::Cell;
 use crate::graph::StageCounts;
-use tauscope_session::Plausible;
+use tauscope_session::{Finding, Plausible};
 
 use crate::plausible::{self, PlausibleTwin};
 use crate::tally::{DetectionTally, TwinTally};
@@ -27,6 +27,12 @@ pub struct Observed {
 }
 
 impl Observed {
+    /// Puts the findings of the source before what else is odd.
+    pub fn note(&mut self, findings: &[Finding]) {
+        let sentences = findings.iter().map(ToString::to_string);
+        self.notes.splice(0..0, sentences);
+    }
+
     /// What came of the replay of one recording.
     pub fn into_outcome(
         self,

@@ -89,7 +89,6 @@ impl Layouts {
             .map(|(_, name)| name.clone())
             .collect()
     }
-
 }
 
 /// The first joint of the cell that stands at more than one place, and the first two of these.

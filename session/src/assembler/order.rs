@@ -64,7 +64,9 @@ impl Order {
         let values = [state.position, state.effort];
         let own = (state.stamp_ns, state.position[0]);
         let jumps = |newest_ns| jumps_back(newest_ns, state.stamp_ns);
-        self.is_behind &= self.newest_ns.is_some_and(|newest_ns| state.stamp_ns <= newest_ns);
+        self.is_behind &= self
+            .newest_ns
+            .is_some_and(|newest_ns| state.stamp_ns <= newest_ns);
         self.is_behind |= refuses_set_back && self.newest_ns.is_some_and(jumps);
         if self.is_behind {
             return Next::Behind;

@@ -10,8 +10,8 @@ impl Assembler {
     pub fn findings(&self) -> Vec<Finding> {
         let mut all = Vec::new();
         all.extend(self.publishers_finding());
-        all.extend(self.of_clock.clone());
-        all.extend(self.of_velocity.clone());
+        all.extend(self.selection.of_clock.clone());
+        all.extend(self.selection.of_velocity.clone());
         if !self.undecodable.is_empty() {
             all.push(Finding::Undecodable {
                 reasons: self.undecodable.clone(),
@@ -19,10 +19,14 @@ impl Assembler {
         }
         let counts = self.counts();
         all.extend(self.twice().map(Finding::NamedTwice));
-        all.extend(self.gather.not_finite().map(|(joint, values)| Finding::NotFinite {
-            joint: self.joint_names[joint].clone(),
-            values,
-        }));
+        all.extend(
+            self.gather
+                .not_finite()
+                .map(|(joint, values)| Finding::NotFinite {
+                    joint: self.selection.joint_names[joint].clone(),
+                    values,
+                }),
+        );
         all.extend(self.value_findings());
         let seconds = |ns: i64| ns as f64 * 1e-9;
         if counts.resets > 0 {
@@ -34,8 +38,18 @@ impl Assembler {
             });
         }
         let counted = [
-            (counts.late, Finding::LateMessages { messages: counts.late }),
-            (counts.stalled, Finding::StalledStamps { messages: counts.stalled }),
+            (
+                counts.late,
+                Finding::LateMessages {
+                    messages: counts.late,
+                },
+            ),
+            (
+                counts.stalled,
+                Finding::StalledStamps {
+                    messages: counts.stalled,
+                },
+            ),
             (
                 counts.incomplete,
                 Finding::NoPositions {
@@ -48,9 +62,19 @@ impl Assembler {
                     messages: counts.copies,
                 },
             ),
-            (counts.parted, Finding::MissingParts { messages: counts.parted }),
+            (
+                counts.parted,
+                Finding::MissingParts {
+                    messages: counts.parted,
+                },
+            ),
         ];
-        all.extend(counted.into_iter().filter(|(count, _)| *count > 0).map(|(_, it)| it));
+        all.extend(
+            counted
+                .into_iter()
+                .filter(|(count, _)| *count > 0)
+                .map(|(_, it)| it),
+        );
         all
     }
 
@@ -58,7 +82,7 @@ impl Assembler {
         let (first_ns, _) = self.first_ns.unwrap_or_default();
         let since = |ns: i64| (ns - first_ns) as f64 * 1e-9;
         let mut all = Vec::new();
-        for (joint, name) in self.joint_names.iter().enumerate() {
+        for (joint, name) in self.selection.joint_names.iter().enumerate() {
             for (field, field_name) in tauscope_archive::FIELDS.into_iter().enumerate() {
                 let refused = &self.impossible[joint][field];
                 if refused.messages > 0 {
@@ -69,7 +93,7 @@ impl Assembler {
                         messages: refused.messages,
                         first_s: since(refused.span_ns.0),
                         last_s: since(refused.span_ns.1),
-                        usual: self.ranges.usual(joint, field),
+                        usual: self.selection.ranges.usual(joint, field),
                     });
                 }
             }
@@ -89,9 +113,11 @@ impl Assembler {
 
     /// Which publishers are used, where there are several.
     fn publishers_finding(&self) -> Option<Finding> {
-        let all = self.publishers.listed();
+        let all = self.selection.publishers.listed();
         let of = |is_used: bool| -> Vec<Publisher> {
-            let these = all.iter().filter(|(place, _)| self.used[*place] == is_used);
+            let these = all
+                .iter()
+                .filter(|(place, _)| self.selection.used[*place] == is_used);
             these.map(|(_, publisher)| publisher.clone()).collect()
         };
         (all.len() > 1).then(|| Finding::Publishers {
@@ -115,7 +141,7 @@ impl Assembler {
         }
         let missing = self.layouts.never_named();
         if messages > 0 && !missing.is_empty() {
-            let all = self.publishers.all.clone();
+            let all = self.selection.publishers.all.clone();
             return Unusable::JointsMissing { missing, all };
         }
         if messages > 0 && self.counts.incomplete == messages {

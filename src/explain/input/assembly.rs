@@ -6,9 +6,7 @@ use std::path::{Path, PathBuf};
 
 use tauscope_archive::{is_there, name_of, recordings_at};
 use tauscope_dynamics::Model;
-use tauscope_pipeline::cell::{
-    Cell, CellFacts, ConstantSpot, EffortUnit, Fixed, torque_constants,
-};
+use tauscope_pipeline::cell::{Cell, CellFacts, ConstantSpot, EffortUnit, Fixed, torque_constants};
 use tauscope_pipeline::provenance::sha256_of_file;
 use tauscope_pipeline::report::{Problem, Report};
 use tauscope_pipeline::urdf::Robot;
@@ -79,7 +77,10 @@ impl Assembly<'_> {
             Some(robot) => (Some((robot.urdf, robot.model)), robot.findings),
             None => (None, Vec::new()),
         };
-        let known = robot.as_ref().map(|(_, model)| model).or(self.model.as_ref());
+        let known = robot
+            .as_ref()
+            .map(|(_, model)| model)
+            .or(self.model.as_ref());
         let known: Vec<String> = match (known, &self.joint_names) {
             (Some(model), _) => model.joint_names().map(str::to_owned).collect(),
             (None, Some(names)) => names.clone(),
@@ -205,9 +206,8 @@ impl Assembly<'_> {
         let Some(first) = fit.first() else {
             return Err(Problem::new("there is no recording to fit").into());
         };
-        let wrong = |error: SessionError| {
-            Report::from((self.problem)(Spot::Fit(0), error.to_string()))
-        };
+        let wrong =
+            |error: SessionError| Report::from((self.problem)(Spot::Fit(0), error.to_string()));
         let recording = tauscope_session::open(&first.path).map_err(|error| wrong(error.into()))?;
         let wanted = Joints {
             names: joints,

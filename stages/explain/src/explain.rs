@@ -54,6 +54,7 @@ pub fn explain(
     } else {
         let mut all = remedies::of_velocity(&input.fit, n);
         all.extend(remedies::of_unmeasured(&input.fit, n));
+        all.retain(|slip| !slip.remedy.is_without(&input.without));
         Slips::new(all)
     };
     input.mend(&slips.all);

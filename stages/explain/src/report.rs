@@ -27,3 +27,4 @@ pub(crate) mod without_law;
 
 pub use next_motion::MOTION_PREFIX;
 pub use schema::*;
+pub use slip_words::recording_faults;

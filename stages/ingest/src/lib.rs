@@ -43,6 +43,7 @@ mod archived_twin;
 mod commanded;
 mod config;
 mod error;
+mod findings;
 mod pacing;
 mod pack;
 mod queue;
@@ -62,8 +63,9 @@ pub use config::{
     UrRtdeConfig, ZenohConfig,
 };
 pub use error::IngestError;
+pub use findings::Findings;
 pub use pacing::Paced;
-pub use recorded::{Findings, RecordedSource};
+pub use recorded::RecordedSource;
 pub use setup::{Setup, Tool};
 pub use sources::{Entry, Opening, SOURCES, SimulatedRobot, SourceSettings, open};
 pub use ur_rtde::UrRtdeSource;

@@ -6,6 +6,7 @@
 
 mod differentiate;
 mod refused;
+mod settings;
 mod side;
 
 use std::collections::VecDeque;
@@ -19,27 +20,12 @@ use crate::config::ConfigError;
 use crate::setup::{Setup, Tool};
 use differentiate::Differentiator;
 use refused::Reported;
+pub use settings::PackSettings;
 use side::Side;
 
 /// Samples that wait for their command at most.
 /// Resolution: memory; about 1 s at 1 kHz.
 const MAX_PENDING: usize = 1024;
-
-/// How samples are packed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PackSettings {
-    /// Low-pass on positions before they are differentiated \[Hz\].
-    pub velocity_cutoff_hz: f64,
-    /// Older commands and efforts of another twin do not belong to a sample \[ns\].
-    pub max_age_ns: i64,
-    /// How long a sample waits for the command and the other twin's effort of its instant, in time of
-    /// reception \[ns\].
-    pub wait_ns: i64,
-    /// Whether commands are to be waited for.
-    pub expects_command: bool,
-    /// Whether another twin's efforts are to be waited for.
-    pub expects_reference: bool,
-}
 
 /// Packs messages into samples.
 #[derive(Debug)]

@@ -1,15 +1,15 @@
 //! Joint states out of a recording: MCAP, a rosbag2 bag, a bag of ROS 1, a table, or an episode of a LeRobot data set.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
 
 use tauscope_archive::{ArchiveError, Damage, Messages, Recording, ros};
 use tauscope_bus::command::Request;
 use tauscope_bus::{Emit, JointState, Progress, Source, StageError};
-use tauscope_session::{Assembler, Counts, Finding, Joints, Look};
+use tauscope_session::{Assembler, Counts, Joints, Look};
 
 use crate::config::{Config, CsvConfig, FileConfig, Topics};
 use crate::error::IngestError;
+use crate::findings::Findings;
 use crate::pack::{PackSettings, Packer};
 use crate::setup::Setup;
 
@@ -32,22 +32,6 @@ enum Role {
     Tool,
     Learn,
     Told,
-}
-
-/// Findings about a recording, complete once its source has ended. A handle: the source may be on another thread.
-#[derive(Debug, Clone, Default)]
-pub struct Findings(Arc<Mutex<Vec<Finding>>>);
-
-impl Findings {
-    /// The findings so far.
-    pub fn get(&self) -> Vec<Finding> {
-        let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        all.clone()
-    }
-
-    fn set(&self, all: Vec<Finding>) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = all;
-    }
 }
 
 /// A source that reads a recording, once, from its beginning to its end. Memory is bounded whatever
@@ -95,7 +79,7 @@ impl RecordedSource {
         setup: &Setup,
     ) -> Result<Self, IngestError> {
         let recording = tauscope_session::open(&file.path)?;
-        Self::open(&recording, (&file.topics, config), setup, Assembler::of)
+        Self::open(&recording, (&file.topics, config), setup, Look::assembler)
     }
 
     /// As [`RecordedSource::open_file`], for who learns from the samples: what follows a jump back of the stamps is refused.
@@ -108,7 +92,7 @@ impl RecordedSource {
         setup: &Setup,
     ) -> Result<Self, IngestError> {
         let recording = tauscope_session::open(&file.path)?;
-        let assembler = |look: &Look| Assembler::of(look).refusing_set_back();
+        let assembler = |look: &Look| look.assembler().refusing_set_back();
         Self::open(&recording, (&file.topics, config), setup, assembler)
     }
 
@@ -117,10 +101,9 @@ impl RecordedSource {
     /// # Errors
     /// As [`RecordedSource::open_file`]; an error in the table comes with its line.
     pub fn open_csv(csv: &CsvConfig, config: &Config, setup: &Setup) -> Result<Self, IngestError> {
-        let recording =
-            tauscope_session::open_table(&csv.path, &csv.columns, &setup.joint_names)?;
+        let recording = tauscope_session::open_table(&csv.path, &csv.columns, &setup.joint_names)?;
         let topics = Topics::default();
-        Self::open(&recording, (&topics, config), setup, Assembler::of)
+        Self::open(&recording, (&topics, config), setup, Look::assembler)
     }
 
     fn open(
@@ -268,9 +251,10 @@ impl RecordedSource {
         if let Err(error) = decoded {
             self.undecodable += 1;
             let reason = error.reason();
-            match role {
-                Some(Role::State) => self.packer.undecodable(&reason),
-                _ => tracing::warn!("{error}"),
+            if role == Some(Role::State) {
+                self.packer.undecodable(&reason);
+            } else {
+                tracing::warn!("{error}");
             }
             return Ok(());
         }

@@ -142,7 +142,8 @@ impl Calibration {
 /// The slopes in a twin file of the joints whose line explains most of the measured effort.
 pub fn telling_slopes_of(file: &TwinFile) -> Vec<Slope> {
     let joints = file.joints.iter();
-    let telling = joints.filter(|(_, joint)| joint.explained.unwrap_or(0.0) >= effort_scale::TELLING);
+    let telling =
+        joints.filter(|(_, joint)| joint.explained.unwrap_or(0.0) >= effort_scale::TELLING);
     telling
         .map(|(name, joint)| Slope {
             joint: name.clone(),

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use tauscope_archive::ros::JointState;
-use tauscope_archive::{Info, Recording, recordings_at, repair};
+use tauscope_archive::{Info, recordings_at, repair};
 use tauscope_dynamics::{Model, check_bodies, with_plausible_bodies};
 use tauscope_pipeline::pipeline::Pipeline;
 use tauscope_pipeline::yaml;
+use tauscope_session::Survey;
 use tauscope_twin::TwinFile;
 
 /// The data that comes with tauscope.
@@ -30,7 +31,7 @@ fn file(name: &str, bytes: &[u8]) -> PathBuf {
 }
 
 fn recording(path: &Path) {
-    let Ok(recording) = Recording::open(path) else {
+    let Ok(recording) = tauscope_session::open(path) else {
         return;
     };
     let _ = Info::read(&recording).map(|info| info.has_lost_data());
@@ -44,6 +45,9 @@ fn recording(path: &Path) {
             continue;
         };
         while states.next_state().is_some_and(|state| state.is_ok()) {}
+        if let Ok(survey) = Survey::of(&recording, &topic.name) {
+            let _ = survey.findings.iter().map(ToString::to_string).count();
+        }
     }
 }
 

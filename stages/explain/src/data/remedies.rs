@@ -6,6 +6,8 @@ mod trial;
 mod unmeasured;
 mod velocity;
 
+use std::collections::BTreeSet;
+
 use tauscope_dynamics::JointKind;
 
 use crate::data::problem::Problem;
@@ -70,6 +72,32 @@ pub enum Remedy {
 }
 
 impl Remedy {
+    /// The `kind` of its finding; of physics, which becomes a finding of the search, none.
+    pub fn kind(&self) -> Option<&'static str> {
+        Some(match self {
+            Self::Swapped(..) => "efforts_swapped",
+            Self::NamesSwapped(..) => "names_swapped",
+            Self::EffortTurned(_) => "effort_sign",
+            Self::EffortWithoutSign(_) => "effort_without_sign",
+            Self::PositionTurned(_) => "position_sign",
+            Self::JointTurned(_) => "joint_sign",
+            Self::Degrees => "degrees",
+            Self::GravitySubtracted => "gravity_subtracted",
+            Self::IsCurrent | Self::IsOfRating | Self::IsTorque | Self::EffortScaled(_) => {
+                "effort_unit"
+            }
+            Self::ConstantsScaled(_) | Self::ConstantsWrong => "torque_constant",
+            Self::Velocity(..) => "velocity_scale",
+            Self::Unmeasured(..) => "effort_constant",
+            Self::BaseTurned(_) | Self::Payload(_) => return None,
+        })
+    }
+
+    /// Whether the user left it out of the library.
+    pub fn is_without(&self, without: &BTreeSet<String>) -> bool {
+        self.kind().is_some_and(|kind| without.contains(kind))
+    }
+
     /// Whether it says that each joint's effort has a scale of its own.
     pub fn is_of_each_joint(&self) -> bool {
         matches!(self, Self::IsCurrent | Self::IsOfRating)
@@ -172,7 +200,8 @@ pub struct Audit {
 }
 
 /// Tries remedies, one after the other, until none helps. `is_scaled` says whether efforts are N m, so that gains are near 1.
-pub fn audit(problem: &Problem, is_scaled: bool) -> Audit {
+/// Kinds in `without` are not tried.
+pub fn audit(problem: &Problem, is_scaled: bool, without: &BTreeSet<String>) -> Audit {
     let trial = Trial::new(problem, is_scaled);
     let n = problem.joints;
     let turns: Vec<bool> = (problem.model.joints().iter())
@@ -207,6 +236,7 @@ pub fn audit(problem: &Problem, is_scaled: bool) -> Audit {
         let mut best: Option<(Slip, Reading, Vec<f64>, f64)> = None;
         let mut tried = candidates(n, &turns, &reading);
         tried.extend(trial.without_sign(&model, &reading));
+        tried.retain(|remedy| !remedy.is_without(without));
         for remedy in tried {
             let new = reading.with(&remedy, &turns);
             let moved = (&new.position, &new.place, new.weighs)

@@ -99,12 +99,13 @@ impl Context<'_> {
         let slopes: Vec<f64> = likeness.slopes.iter().map(|(_, slope)| *slope).collect();
         let is_torque = EffortScale::of_positive(&slopes);
         let is_scaled = self.unscaled.is_empty() && matches!(is_torque, EffortScale::Torque { .. });
-        let audit = remedies::audit(problem, is_scaled);
+        let audit = remedies::audit(problem, is_scaled, &input.without);
         if !audit.slips.is_empty() {
             return Err(Stop::Slips(audit.slips));
         }
         // A scale of each joint is in doubt where one body explains the efforts as well.
         let scale = remedies::of_scale(input, &likeness.slopes);
+        let scale = scale.filter(|slip| !slip.remedy.is_without(&input.without));
         let is_of_each = |slip: &Slip| slip.remedy.is_of_each_joint();
         let scale = scale.filter(|slip| !is_of_each(slip) || !remedies::is_one_body(problem));
         match audit.physics {

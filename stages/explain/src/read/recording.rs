@@ -135,7 +135,7 @@ struct Reader {
 
 impl Reader {
     fn new(path: &Path, look: &Look) -> Self {
-        let joint_count = look.joint_names.len();
+        let joint_count = look.joint_names().len();
         Self {
             recording: Recording {
                 name: name_of(path),
@@ -152,8 +152,8 @@ impl Reader {
                 findings: Vec::new(),
             },
             // A fit needs time to advance, and the audit names the factor of a velocity.
-            assembler: Assembler::of(look).refusing_set_back().keeping_velocity(),
-            plausible: Plausible::new(&look.joint_names, None),
+            assembler: look.assembler().refusing_set_back().keeping_velocity(),
+            plausible: Plausible::new(look.joint_names(), None),
             joint_count,
             turns: vec![Unwrap::default(); joint_count],
             has_velocity: true,
@@ -208,8 +208,7 @@ impl Reader {
             });
         }
         let remarks = remarks.iter().cloned();
-        let mut findings: Vec<Finding> =
-            remarks.map(|remark| Finding::Format { remark }).collect();
+        let mut findings: Vec<Finding> = remarks.map(|remark| Finding::Format { remark }).collect();
         findings.extend(self.assembler.findings());
         // The first look has judged velocities.
         let of_values = self.plausible.findings().into_iter();

@@ -11,6 +11,11 @@ pub struct SlipWords {
     pub look_at: &'static str,
 }
 
+/// The kinds of faults of recordings that `explain` names.
+pub fn recording_faults() -> impl Iterator<Item = &'static str> {
+    KINDS.iter().map(|(kind, _)| *kind)
+}
+
 /// All kinds of faults, by the `kind` of their findings.
 static KINDS: [(&str, SlipWords); 12] = [
     (

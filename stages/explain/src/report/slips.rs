@@ -93,7 +93,8 @@ impl Slips {
 }
 
 fn finding(slip: &Slip, joints: &[String], unit: &str) -> Finding {
-    let (kind, joint, other) = named(&slip.remedy);
+    let kind = slip.remedy.kind().unwrap_or(UNKNOWN.name);
+    let (joint, other) = joints_of(&slip.remedy);
     let mut parameters = BTreeMap::from([("kind".to_owned(), Value::from(kind))]);
     if let Some(other) = other {
         parameters.insert(
@@ -132,25 +133,17 @@ fn finding(slip: &Slip, joints: &[String], unit: &str) -> Finding {
     }
 }
 
-/// Kind, joint and other joint.
-fn named(remedy: &Remedy) -> (&'static str, Option<usize>, Option<usize>) {
+/// The joint of a fault, and the other joint of an exchange.
+fn joints_of(remedy: &Remedy) -> (Option<usize>, Option<usize>) {
     match *remedy {
-        Remedy::Swapped(a, b) => ("efforts_swapped", Some(a), Some(b)),
-        Remedy::NamesSwapped(a, b) => ("names_swapped", Some(a), Some(b)),
-        Remedy::EffortTurned(j) => ("effort_sign", Some(j), None),
-        Remedy::EffortWithoutSign(j) => ("effort_without_sign", Some(j), None),
-        Remedy::PositionTurned(j) => ("position_sign", Some(j), None),
-        Remedy::JointTurned(j) => ("joint_sign", Some(j), None),
-        Remedy::Degrees => ("degrees", None, None),
-        Remedy::GravitySubtracted => ("gravity_subtracted", None, None),
-        Remedy::IsCurrent | Remedy::IsOfRating | Remedy::IsTorque | Remedy::EffortScaled(_) => {
-            ("effort_unit", None, None)
-        }
-        Remedy::ConstantsScaled(_) | Remedy::ConstantsWrong => ("torque_constant", None, None),
-        Remedy::Velocity(joint, _) => ("velocity_scale", joint, None),
-        Remedy::Unmeasured(joint, _) => ("effort_constant", Some(joint), None),
-        // These are physics, and become findings of the search.
-        Remedy::BaseTurned(_) | Remedy::Payload(_) => (UNKNOWN.name, None, None),
+        Remedy::Swapped(a, b) | Remedy::NamesSwapped(a, b) => (Some(a), Some(b)),
+        Remedy::EffortTurned(j)
+        | Remedy::EffortWithoutSign(j)
+        | Remedy::PositionTurned(j)
+        | Remedy::JointTurned(j)
+        | Remedy::Unmeasured(j, _) => (Some(j), None),
+        Remedy::Velocity(joint, _) => (joint, None),
+        _ => (None, None),
     }
 }
 

@@ -59,7 +59,10 @@ impl Packer {
 
     /// The same for a live source, which reports once something is refused, and again at intervals while that goes on.
     pub fn newly_refused(&mut self, now_ns: i64) -> Option<String> {
-        let sides: u64 = [&self.command, &self.reference].map(Gather::bad).iter().sum();
+        let sides: u64 = [&self.command, &self.reference]
+            .map(Gather::bad)
+            .iter()
+            .sum();
         let count = self.assembler.refused() + sides;
         if self.reported.is_due(count, now_ns) {
             return self.refused();

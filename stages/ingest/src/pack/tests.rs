@@ -220,10 +220,7 @@ fn states_without_positions_are_told() {
     let mut state = message(1, "a b c", &[1.0, 2.0, 3.0]);
     state.position.clear();
     packer.state(&state, 1);
-    assert_eq!(
-        packer.verdict(),
-        Err(Unusable::NoPositions { messages: 1 })
-    );
+    assert_eq!(packer.verdict(), Err(Unusable::NoPositions { messages: 1 }));
     assert_eq!(packer.counts().dropped(), 1);
 }
 

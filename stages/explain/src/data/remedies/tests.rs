@@ -1,3 +1,5 @@
+use std::collections::BTreeSet;
+
 use tauscope_dynamics::{Inertia, Model};
 
 use super::mend::scale;
@@ -17,7 +19,11 @@ fn found(spoil: impl Fn(&mut Recording)) -> Audit {
         spoil(&mut recording);
         recording
     });
-    audit(&fixture::problem(&model, &recordings), true)
+    audit(
+        &fixture::problem(&model, &recordings),
+        true,
+        &BTreeSet::new(),
+    )
 }
 
 fn remedies(audit: Audit) -> Vec<Remedy> {
@@ -63,7 +69,11 @@ fn what_a_twin_has_beside_its_urdf_stays_while_remedies_are_tried() {
         recording.reference = twin;
         recording
     });
-    let found = audit(&fixture::problem(&model, &recordings), true);
+    let found = audit(
+        &fixture::problem(&model, &recordings),
+        true,
+        &BTreeSet::new(),
+    );
     assert!(found.slips.is_empty(), "{:?}", found.slips);
 }
 
@@ -83,7 +93,11 @@ fn degrees_are_told_beside_a_twin_whose_friction_they_make_huge() {
         recording.reference = twin;
         recording
     });
-    let found = audit(&fixture::problem(&model, &recordings), true);
+    let found = audit(
+        &fixture::problem(&model, &recordings),
+        true,
+        &BTreeSet::new(),
+    );
     let told: Vec<Remedy> = found.slips.into_iter().map(|slip| slip.remedy).collect();
     assert_eq!(told, [Remedy::Degrees]);
 }
@@ -188,7 +202,12 @@ fn a_turned_base_and_a_heavy_payload_are_physics_with_their_numbers() {
         let mut real = model.clone();
         change(&mut real);
         let recordings = [4, 5].map(|seed| fixture::recording(&real, seed, |_, _, _| {}));
-        audit(&fixture::problem(&model, &recordings), true).physics
+        audit(
+            &fixture::problem(&model, &recordings),
+            true,
+            &BTreeSet::new(),
+        )
+        .physics
     };
     let ceiling = told(&|real| real.set_gravity([0.0, 0.0, 9.81]));
     let Some(Remedy::BaseTurned([roll, pitch])) = ceiling else {
