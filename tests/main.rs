@@ -44,6 +44,7 @@ mod silence;
 mod slips;
 mod streaming;
 mod supervision;
+mod trials;
 mod two_hosts;
 mod ur_rtde;
 mod watch;
