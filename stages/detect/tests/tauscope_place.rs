@@ -90,6 +90,34 @@ fn contact(extra_nm: impl Fn(usize) -> f64) -> Contact {
 }
 
 #[test]
+fn no_force_is_promised_on_a_link_whose_joint_has_no_measured_effort() {
+    let cell = Setup {
+        model: Some(Model::from_urdf(ARM).unwrap()),
+        ..setup(JOINTS)
+    };
+    let mut samples = quiet(1, 6000);
+    for sample in &mut samples {
+        sample.effort[3] = 0.0;
+    }
+    let train = [Lesson {
+        name: "rec".to_owned(),
+        samples,
+        contacts: Some(Vec::new()),
+    }];
+    let lessons = Lessons {
+        train: &train,
+        validation: &[],
+    };
+    let learnt = tauscope::learn(&tauscope::Settings::default(), &cell, &lessons).unwrap();
+    let smallest = learnt.smallest_forces(5.0);
+    let links: Vec<&str> = smallest
+        .iter()
+        .map(|of_link| of_link.link.as_str())
+        .collect();
+    assert_eq!(links, ["shoulder", "upper", "fore"]);
+}
+
+#[test]
 fn a_joint_that_carries_nothing_of_a_push_is_not_listed() {
     let contact = contact(|_| 0.0);
     assert_eq!(contact.joints, 0b0111);
