@@ -1,25 +1,26 @@
-//! A contact, from its first sample to its last: what is told of it once it is over.
+//! Summary of a contact, from its first sample to its last.
 //!
-//! At the onset little of the force is there yet, and the link is a guess. What terminal, archive, picture and replay
-//! tell of a contact comes from here, so that all of them tell the same.
+//! At the onset little of the force is there yet, and the link is a guess. Terminal, archive, picture and replay report
+//! this summary, so that all of them agree.
 
 use std::fmt;
 
 use crate::sample::{Detection, EventKind, Name, flags};
 
-/// A contact, or a change of the arm, as a detector tells it.
+/// A contact, or a change of the arm, as a detector reports it.
 ///
-/// Kind, link and force are those of the sample with the largest score, for there the contact is told best: the largest
-/// of many estimates of a force would be too large.
+/// Link and joints are the newest estimate, because a detector estimates them from the whole contact so far. The kind is
+/// that of the sample with the largest score. The force is that of the sample with the largest score among those that
+/// name the link: the largest of many estimates of a force would be too large.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
     /// Its kind: the detector's state, e.g. `contact`, `collision`.
     pub kind: Name,
     /// The touched link; empty where not estimated.
     pub link: Name,
-    /// The other link that it may as well have been; empty where the first is sure.
+    /// A second link that fits nearly as well; empty where the first is certain.
     pub other_link: Name,
-    /// The joints that detected it: bit j for joint j.
+    /// The joints that carry torque from it: bit j for joint j.
     pub joints: u32,
     /// Estimated beginning \[ns since the epoch\].
     pub contact_ns: i64,
@@ -31,9 +32,11 @@ pub struct Contact {
     last_high_ns: Option<i64>,
     /// The largest score.
     pub peak_score: f64,
+    /// The largest score of the samples that name the link.
+    link_score: f64,
     /// Size of a change of the arm ([`flags::CHANGE`]), as it was told at its onset.
     pub size: Option<f64>,
-    /// Where the score is largest, as far as a force was estimated.
+    /// At `link_score`, as far as a force was estimated.
     force: Option<Force>,
 }
 
@@ -72,6 +75,7 @@ impl Contact {
             end_ns: detection.header.stamp_ns,
             last_high_ns: None,
             peak_score: f64::NEG_INFINITY,
+            link_score: f64::NEG_INFINITY,
             size: detection
                 .header
                 .has(flags::CHANGE)
@@ -87,16 +91,23 @@ impl Contact {
         if detection.score >= detection.threshold {
             self.last_high_ns = Some(self.end_ns);
         }
-        let is_known = !self.link.as_str().is_empty();
-        if is_known && detection.score < self.peak_score {
-            return;
+        if detection.joints != 0 {
+            self.joints = detection.joints;
         }
-        self.peak_score = self.peak_score.max(detection.score);
-        self.kind = detection.state;
-        self.joints |= detection.joints;
         if !detection.link.as_str().is_empty() {
+            if self.link != detection.link {
+                self.link_score = f64::NEG_INFINITY;
+            }
             (self.link, self.other_link) = (detection.link, detection.other_link);
         }
+        if detection.score >= self.peak_score {
+            self.peak_score = detection.score;
+            self.kind = detection.state;
+        }
+        if detection.score < self.link_score {
+            return;
+        }
+        self.link_score = detection.score;
         if detection.header.has(flags::FORCE) {
             self.force = Some(Force {
                 force_n: detection.force_n,
@@ -105,7 +116,7 @@ impl Contact {
         }
     }
 
-    /// The force at the peak of the contact, as far as one was estimated.
+    /// The force where the contact is strongest, if one was estimated.
     pub fn peak(&self) -> Option<&Force> {
         self.force.as_ref()
     }
@@ -265,6 +276,20 @@ mod tests {
         // Later it is sure, and the force is larger.
         contacts.push(&sample(30, 0, 90.0, "link3", 25.0));
         assert_eq!(words(&contacts), "25 N at link3");
+    }
+
+    #[test]
+    fn link_and_joints_are_those_of_the_whole_contact_and_the_force_is_of_that_link() {
+        let mut contacts = ContactFollower::default();
+        contacts.push(&sample(10, Detection::ONSET, 9.0, "hand", 4.0));
+        contacts.push(&sample(20, 0, 80.0, "hand", 40.0));
+        contacts.push(&sample(30, 0, 60.0, "fore", 22.0));
+        contacts.push(&sample(40, 0, 70.0, "fore", 24.0));
+        contacts.push(&sample(50, 0, 50.0, "fore", 21.0));
+        let contact = contacts.open().unwrap();
+        assert_eq!(contact.to_string(), "24 N at fore");
+        assert_eq!(contact.joints, 1 << (50 % 3));
+        assert!((contact.peak_score - 80.0).abs() < 1e-12);
     }
 
     #[test]

@@ -161,9 +161,9 @@ pub struct Detection {
     /// What it says now in its own words: `not_ready`, `free`, `contact`, `collision`, `cooperation`, …;
     /// of a change of the arm ([`flags::CHANGE`]) the effect's canonical name, or `unknown`.
     pub state: Name,
-    /// The touched or changed link, empty where not estimated.
+    /// The touched or changed link, estimated from the whole contact so far; empty where not estimated.
     pub link: Name,
-    /// The other link that it may as well have been; empty where the detector is sure of the first, or tells none.
+    /// A second link that fits nearly as well; empty where the first is certain, or none is estimated.
     pub other_link: Name,
     /// The score; its unit is the detector's.
     pub score: f64,
@@ -176,7 +176,7 @@ pub struct Detection {
     pub force_n: [f64; 3],
     /// Where the force is taken to act, world frame \[m\].
     pub point_m: [f64; 3],
-    /// The joints that detected: bit j for joint j in URDF order.
+    /// The joints that carry torque from the whole contact so far: bit j for joint j in URDF order.
     pub joints: u32,
     /// 0 nothing, 1 the alarm begins, 2 it ends at this sample; read it with [`Detection::event`].
     pub event: u32,

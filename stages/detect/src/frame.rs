@@ -3,7 +3,7 @@
 //! - [`detector`]: what a detector is: a score a sample, perhaps a verdict of its own.
 //! - [`settings`]: what a detector tells of itself: name, settings, how it is built and how it learns.
 //! - [`stage`]: a detector as a stage of the pipeline, with its [`threshold`], the beginning and end of an
-//!   alarm ([`events`]), and which joints and which link were touched ([`isolation`]).
+//!   alarm ([`events`]), the loaded joints ([`loaded`]) and the touched link ([`isolation`]).
 //! - [`here_or_file`]: a setting that may stand in a file of its own.
 //! - [`setup`]: what a detector must know of its cell; [`lesson`]: what it learns from; [`trained`]: the file of
 //!   trained weights; [`sweep`]: what the thresholds of a tuned detector trade against each other.
@@ -21,6 +21,7 @@ mod here_or_file;
 mod isolation;
 pub(crate) mod joints;
 mod lesson;
+mod loaded;
 pub mod momentum;
 pub(crate) mod rate;
 mod settings;
@@ -38,6 +39,7 @@ pub use error::ConfigError;
 pub use here_or_file::HereOrFile;
 pub use isolation::{Contact, Isolation};
 pub use lesson::{ContactKind, LabelledContact, LearnError, Lesson, Lessons, Task};
+pub(crate) use loaded::LoadedJoints;
 pub use settings::{AnySettings, DetectorSettings, ScoreUnit, Suits, Training};
 pub use setup::{Impedance, JointSetup, Setup};
 pub use shared::Shared;

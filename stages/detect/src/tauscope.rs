@@ -54,8 +54,8 @@ use tauscope_bus::{TwinState, flags};
 
 use crate::frame::rate::Rate;
 use crate::frame::{
-    ConfigError, Detector, DetectorSettings, HereOrFile, Judgement, LearnError, Lessons, Seen,
-    Setup, State, Task, Trained, Training, Verdict,
+    ConfigError, Detector, DetectorSettings, HereOrFile, Judgement, LearnError, Lessons, Setup,
+    State, Task, Trained, Training, Verdict,
 };
 use alarm::Watch;
 use going_on::GoingOn;
@@ -302,11 +302,9 @@ impl Detector for Tauscope {
             self.tell(sample, since_ns);
         }
         self.go_on(sample, score);
-        let contact = self.watch.contact_ns().map(|contact_ns| Seen {
-            contact_ns,
-            joints: Some(Place::loaded(&self.windows, contact_ns)),
-            place: self.place.locate(sample, &self.windows, contact_ns),
-        });
+        let threshold = self.watch.threshold();
+        let contact = (self.watch.contact_ns())
+            .map(|contact_ns| (self.place).see(sample, &self.windows, contact_ns, threshold));
         Judgement {
             score,
             ready,

@@ -11,6 +11,7 @@ mod shared;
 mod stage;
 mod tauscope;
 mod tauscope_late;
+mod tauscope_place;
 mod tauscope_standing;
 mod tauscope_usual;
 mod virtual_collision_sensor;

@@ -1,20 +1,18 @@
-//! Which joints felt a contact, which link was touched, and how hard.
+//! Which link was touched, and how hard, for detectors that give only a score.
 //!
 //! A force on link k loads only the joints between the base and k, by τ = Jᵀ F (Haddadin, De Luca and
 //! Albu-Schäffer, "Robot Collisions: A Survey on Detection, Isolation, and Identification", 2017,
 //! sections V and VI). For every link the force is sought that explains the residual of all joints
-//! best, the point of contact taken at the link's centre of mass; the link that leaves least
-//! unexplained is the touched one.
+//! best, the point of contact taken at the link's centre of mass. The link that leaves least
+//! unexplained over all samples of the contact is the touched one.
 
 use nalgebra::{Matrix3, Vector3};
-use tauscope_bus::{JointArray, TwinState};
+use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 use tauscope_dynamics::{Data, Model, forward_kinematics, link_jacobian, link_pose};
 
+use super::loaded::LoadedJoints;
 use super::setup::Setup;
 
-/// A joint counts as loaded from this many standard deviations of its contact-free residual on.
-/// Statistical: Gaussian noise goes beyond four standard deviations once in 16 000 samples.
-const LOADED_SIGMAS: f64 = 4.0;
 /// Weight of a small force against a good fit, relative to the information the loaded joints give:
 /// keeps directions that no joint feels at zero instead of unbounded.
 /// Tuned: by hand, on no recorded seeds; not swept.
@@ -41,6 +39,10 @@ pub struct Isolation {
     /// Effort unit per N m by joint.
     effort_per_nm: Vec<f64>,
     model: Option<(Model, Data)>,
+    /// Of the present contact: the joints, and what a force on each link explains, summed over its samples, by the joint
+    /// that carries the link \[squared standard deviations\].
+    loaded: LoadedJoints,
+    explained: JointArray,
 }
 
 impl Isolation {
@@ -61,20 +63,29 @@ impl Isolation {
                 let data = Data::new(&model);
                 (model, data)
             }),
+            loaded: LoadedJoints::default(),
+            explained: [0.0; MAX_JOINTS],
         }
     }
 
-    /// The loaded joints: bit j for joint j.
-    pub fn loaded_joints(&self, residual: &JointArray) -> u32 {
-        let loaded = self.noise.iter().zip(residual).enumerate();
-        loaded
-            .filter(|(_, (noise, r))| r.abs() > LOADED_SIGMAS * **noise)
-            .fold(0, |m, (j, _)| m | 1 << j)
+    /// Begins another contact.
+    pub fn begin(&mut self) {
+        self.loaded = LoadedJoints::default();
+        self.explained = [0.0; MAX_JOINTS];
     }
 
-    /// The contact that explains the residual best, or nothing if no link explains any of it or there
-    /// is no model.
-    pub fn locate(&mut self, sample: &TwinState) -> Option<Contact> {
+    /// The joints that the contact loads: bit j for joint j. The sample is added to the contact if `counts`.
+    pub fn loaded_joints(&mut self, sample: &TwinState, score: f64, counts: bool) -> u32 {
+        if counts {
+            let residuals = sample.residual.iter().zip(&self.noise);
+            self.loaded.add(score, residuals.map(|(r, n)| (*r, *n)));
+        }
+        self.loaded.mask()
+    }
+
+    /// The link that explains the contact best, with the force of this sample; nothing if no link explains any of it or
+    /// there is no model. The sample is added to the contact if `counts`.
+    pub fn locate(&mut self, sample: &TwinState, counts: bool) -> Option<Contact> {
         let (model, data) = self.model.as_mut()?;
         let n = self.noise.len();
         forward_kinematics(model, data, &sample.position[..n]);
@@ -106,8 +117,11 @@ impl Isolation {
                 continue;
             };
             let force = inverse * pull;
-            // What the force explains of Σ (τ_j / σ_j)².
-            let explained = 2.0 * pull.dot(&force) - force.dot(&(information * force));
+            if counts {
+                // Reduction of Σ (τ_j / σ_j)² by the force.
+                self.explained[joint] += 2.0 * pull.dot(&force) - force.dot(&(information * force));
+            }
+            let explained = self.explained[joint];
             if best.is_none_or(|(most, _)| explained > most) {
                 let contact = Contact {
                     link,

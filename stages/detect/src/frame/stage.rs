@@ -180,12 +180,19 @@ impl Stage<TwinState, Detection> for Detect {
         let mut joints = 0;
         let mut contact = None;
         if contact_ns.is_some() {
-            joints = seen
-                .and_then(|seen| seen.joints)
-                .unwrap_or_else(|| self.isolation.loaded_joints(&sample.residual));
+            let begins = event == Detection::ONSET;
+            if begins {
+                self.isolation.begin();
+            }
+            // Behind the push the alarm is held; those samples say nothing about it.
+            let counts = begins || judgement.score >= self.rule.threshold();
+            joints = seen.and_then(|seen| seen.joints).unwrap_or_else(|| {
+                self.isolation
+                    .loaded_joints(sample, judgement.score, counts)
+            });
             contact = seen
                 .and_then(|seen| seen.place)
-                .or_else(|| self.isolation.locate(sample));
+                .or_else(|| self.isolation.locate(sample, counts));
         }
         let details = self.detector.details().filter(|_| judgement.ready);
         out.emit(&mut |slot| {

@@ -4,26 +4,24 @@
 //! anywhere along it and around it, from any side. For each of such points the residual's likelihood is had in closed form, with F
 //! normal with a standard deviation of [`HAND_N`] in each direction; the mean over a link's points is the evidence for the link
 //! (`MacKay`, "Information Theory, Inference and Learning Algorithms", 2003, chapter 28): a link does not win by having many
-//! ways to explain what it was not touched for. Evidence is gathered while the contact lasts.
+//! ways to explain what it was not touched for. Evidence is summed over the whole contact, from its first sample to the last whose
+//! score reaches the threshold.
 
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use tauscope_bus::{JointArray, MAX_JOINTS, TwinState};
 
 use super::points::{POINTS, Points};
-use super::spans::SHORTEST;
+use super::spans::{SHORTEST, WINDOWS_S};
 use super::windows::Windows;
-use crate::frame::{Contact, Setup};
+use crate::frame::{Contact, LoadedJoints, Seen, Setup};
 
-/// A joint counts as loaded from this many times its usual residual on.
-/// Statistical: Gaussian noise goes beyond four standard deviations once in 16 000 samples.
-const LOADED: f64 = 4.0;
 /// How hard robots are touched \[N\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const HAND_N: f64 = 10.0;
 /// The twin is believed to this share of the residual: a strong force is told no better than that.
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const MODEL_ERROR: f64 = 0.05;
-/// What is wrong with a residual stays for so long: samples closer than that tell the same \[s\].
+/// Correlation time of the residual's error: samples closer than that, or than the window that they are the mean of, count as one \[s\].
 /// Tuned: on the sets named in [`tauscope`](crate::tauscope); not swept.
 const CORRELATED_S: f64 = 0.1;
 /// So often it is asked anew where the contact is \[ns\].
@@ -50,6 +48,7 @@ pub(crate) struct Place {
     /// Logarithms of the evidence by joint that carries the link, and what it has been gathered over \[correlation times\].
     evidence: JointArray,
     gathered: f64,
+    loaded: LoadedJoints,
     /// When it was asked last, and what came of it.
     newest: Option<(i64, Contact)>,
 }
@@ -187,32 +186,49 @@ impl Place {
             effort_per_nm,
             evidence: [0.0; MAX_JOINTS],
             gathered: 0.0,
+            loaded: LoadedJoints::default(),
             newest: None,
         }
     }
 
-    /// The joints that a contact which began at this instant loads: bit j for joint j.
-    pub fn loaded(windows: &Windows, contact_ns: i64) -> u32 {
-        let w = windows.since(contact_ns);
-        (0..windows.joints())
-            .filter(|&j| windows.excess(w, j).abs() > LOADED * windows.noise(w, j))
-            .fold(0, |mask, j| mask | 1 << j)
-    }
-
-    /// Another contact begins.
+    /// Begins another contact.
     pub fn begin(&mut self) {
         self.evidence = [0.0; MAX_JOINTS];
         self.gathered = 0.0;
+        self.loaded = LoadedJoints::default();
         self.newest = None;
     }
 
-    /// The link for which there is most evidence since the contact began, and the mean of the forces that a sample allows which is no
-    /// older than [`EVERY_NS`]. To be called with each sample of a contact, which began at `contact_ns`.
-    pub fn locate(
+    /// Returns joints, link and force of the contact that began at `contact_ns`. To be called with each of its samples. Those with a
+    /// score below the `threshold` do not change joints and link.
+    pub fn see(
         &mut self,
         sample: &TwinState,
         windows: &Windows,
         contact_ns: i64,
+        threshold: f64,
+    ) -> Seen {
+        let counts = windows.newest_score() >= threshold || self.loaded.is_empty();
+        if counts {
+            let w = windows.since(contact_ns);
+            let joints = (0..windows.joints()).map(|j| (windows.excess(w, j), windows.noise(w, j)));
+            self.loaded.add(windows.newest_score(), joints);
+        }
+        Seen {
+            contact_ns,
+            joints: Some(self.loaded.mask()),
+            place: self.locate(sample, windows, contact_ns, counts),
+        }
+    }
+
+    /// The link for which there is most evidence since the contact began, and the mean of the forces that a sample allows which is no
+    /// older than [`EVERY_NS`]. The evidence of the sample is added if it `counts`.
+    fn locate(
+        &mut self,
+        sample: &TwinState,
+        windows: &Windows,
+        contact_ns: i64,
+        counts: bool,
     ) -> Option<Contact> {
         let now_ns = sample.header.stamp_ns;
         let newest = self.newest.filter(|(at_ns, _)| now_ns - at_ns < EVERY_NS);
@@ -224,11 +240,17 @@ impl Place {
         let window = windows.since(contact_ns);
         let mut residual = [0.0; MAX_JOINTS];
         for (j, residual) in residual.iter_mut().enumerate().take(n) {
-            *residual = windows.excess(window, j);
+            let (excess, noise) = (windows.excess(window, j), windows.noise(window, j));
+            *residual = self.loaded.limit(j, excess, noise);
         }
         let load = Load::new(&residual, windows, window, &self.effort_per_nm);
         let before_ns = self.newest.map_or(now_ns, |(at_ns, _)| at_ns);
-        let share = ((now_ns - before_ns) as f64 * 1e-9 / CORRELATED_S).clamp(1e-3, 1.0);
+        let correlated_s = WINDOWS_S[window].max(CORRELATED_S);
+        let share = if counts {
+            ((now_ns - before_ns) as f64 * 1e-9 / correlated_s).clamp(1e-3, 1.0)
+        } else {
+            0.0
+        };
         self.gathered += share;
         let mut links = [None; MAX_JOINTS];
         let mut means = [[Vector3::zeros(); 2]; MAX_JOINTS];

@@ -15,7 +15,8 @@ use crate::frame::{Lessons, Setup};
 const EVERY: usize = 50;
 
 /// By link, over the postures and speeds of contact-free recordings, the points of the link and the directions of the
-/// world's axes; empty without a model.
+/// world's axes; empty without a model. A link whose joint has no measured effort has no such force: its touch cannot be
+/// distinguished from one of the link that carries it.
 pub(crate) fn smallest(
     learnt: &Learnt,
     lessons: &Lessons<'_>,
@@ -23,7 +24,13 @@ pub(crate) fn smallest(
     setup: &Setup,
     follow: Follow,
 ) -> Vec<Smallest> {
-    let place = Place::new(setup);
+    let mut setup = setup.clone();
+    for (joint, is_measured) in setup.joints.iter_mut().zip(measured(lessons)) {
+        if !is_measured {
+            joint.effort_per_nm = f64::NAN;
+        }
+    }
+    let place = Place::new(&setup);
     let per_nm = place.effort_per_nm().to_vec();
     let Some(mut points) = place.into_points() else {
         return Vec::new();
@@ -84,6 +91,22 @@ pub(crate) fn smallest(
         }
     };
     scores.into_iter().map(of_link).collect()
+}
+
+/// By joint, whether its effort is measured: an effort that is the same in all samples is not.
+fn measured(lessons: &Lessons<'_>) -> [bool; MAX_JOINTS] {
+    let all = lessons.train.iter().chain(lessons.validation);
+    let mut samples = all.flat_map(|lesson| &lesson.samples);
+    let mut measured = [false; MAX_JOINTS];
+    let Some(first) = samples.next() else {
+        return measured;
+    };
+    for sample in samples {
+        for (j, measured) in measured.iter_mut().enumerate() {
+            *measured |= sample.effort[j].to_bits() != first.effort[j].to_bits();
+        }
+    }
+    measured
 }
 
 /// A direction in which even this does not reach a score of 1 is not felt \[N\].

@@ -204,7 +204,7 @@ impl Windows {
         let (mut units, mut changed) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
         for j in 0..self.joints() {
             let noise = self.noise(MIDDLE, j);
-            units[j] = self.excess(MIDDLE, j) / noise;
+            units[j] = (self.means.whole(MIDDLE, j) - self.base[j]) / noise;
             changed[j] = (self.mean(MIDDLE, j) - self.mean(LONG, j)) / noise;
         }
         if !self.end.step(now_ns, &units, &changed) {
@@ -221,6 +221,11 @@ impl Windows {
             size,
         });
         true
+    }
+
+    /// The newest score.
+    pub fn newest_score(&self) -> f64 {
+        self.score
     }
 
     /// The longest window that holds nothing from before this instant, or the shortest.
@@ -262,7 +267,7 @@ impl Windows {
 
     /// The same less what it was before the contact began, alone or on top of another.
     pub fn excess(&self, window: usize, joint: usize) -> f64 {
-        self.means.whole(window, joint) - self.base[joint]
+        self.mean(window, joint) - self.base[joint]
     }
 
     /// Takes the residual for what it is without a contact.
