@@ -144,9 +144,10 @@ mod tests {
             sample.velocity[0] = if k == 0 { 0.0 } else { 0.5 };
             twin.add(&sample);
         }
-        let detector = |name: &str| DetectionTally {
-            detector: name.to_owned(),
-            ..DetectionTally::new("detect", &[])
+        let detector = |name: &str| {
+            let mut detector = DetectionTally::new("detect", &[]);
+            name.clone_into(&mut detector.detector);
+            detector
         };
         Outcome {
             recording: "push".to_owned(),
