@@ -12,8 +12,8 @@ use crate::selection::Selection;
 use crate::values::Ranges;
 
 /// Messages of a topic that are looked at.
-/// Resolution: a few milliseconds of work; 200 s of an arm at 100 Hz.
-const HEAD: usize = 20_000;
+/// Resolution: bounded memory, some 5 MB; 100 s of an arm at 100 Hz.
+const HEAD: usize = 10_000;
 
 /// Factor by which a velocity differs from the derivative of the position that is not used.
 /// Physical: the filter of a drive takes a tenth of the fastest motion at most.
@@ -133,17 +133,11 @@ impl Look {
         topic: &str,
         wanted: Joints<'_>,
     ) -> Result<Self, SessionError> {
-        let mut publishers = Publishers::of_recording();
-        let mut states = recording.joint_states(topic)?;
-        let mut read = 0;
         let mut joint_names = wanted.names.to_vec();
-        while read < HEAD
-            && let Some(state) = states.next_state()
-        {
-            read += 1;
-            if let Ok(state) = state {
-                publishers.add(state.message, state.log_time_ns);
-            }
+        let head = Head::read(recording, topic)?;
+        let mut publishers = Publishers::of_recording();
+        for (log_time_ns, message) in &head.messages {
+            publishers.add(message, *log_time_ns);
         }
         if joint_names.is_empty() {
             joint_names = published(&publishers.all);
@@ -163,67 +157,52 @@ impl Look {
                 of_velocity: None,
             },
         };
-        look.read_values(recording)?;
+        look.judge_clock(&head);
+        look.judge_velocity(&head);
         Ok(look)
     }
 
-    /// Reads the head of the publishers that are used: stamps and ranges.
-    fn read_values(&mut self, recording: &Recording) -> Result<(), SessionError> {
-        let mut states = recording.joint_states(&self.topic)?;
+    /// Chooses the clock, and takes the ranges of the values.
+    fn judge_clock(&mut self, head: &Head) {
+        let selection = &mut self.selection;
         let mut stamps = Stamps::default();
-        let mut last = ros::JointState::default();
+        let mut last: Option<&ros::JointState> = None;
         // Publishers of parts of one state share stamps rightly, so the clock is judged by one of them.
-        let used = (0..self.selection.used.len()).filter(|&place| self.selection.used[place]);
-        let main = used.max_by_key(|&place| self.selection.publishers.all[place].messages);
-        for _ in 0..HEAD {
-            let Some(state) = states.next_state() else {
-                break;
-            };
-            let Ok(state) = state else { continue };
-            let message = state.message;
-            let place = self.selection.publishers.place(message);
-            if !place.is_some_and(|place| self.selection.used[place]) {
+        let used = (0..selection.used.len()).filter(|&place| selection.used[place]);
+        let main = used.max_by_key(|&place| selection.publishers.all[place].messages);
+        for (log_time_ns, message) in &head.messages {
+            let place = selection.publishers.place(message);
+            if !place.is_some_and(|place| selection.used[place]) {
                 continue;
             }
             if place == main {
-                let is_new = message.position != last.position || message.effort != last.effort;
-                stamps.add(message.header.stamp.ns(), state.log_time_ns, is_new);
-                last.clone_from(message);
+                let is_same = |last: &ros::JointState| {
+                    message.position == last.position && message.effort == last.effort
+                };
+                let is_new = !last.is_some_and(is_same);
+                stamps.add(message.header.stamp.ns(), *log_time_ns, is_new);
+                last = Some(message);
             }
             let fields = [&message.position, &message.velocity, &message.effort];
             for (field, values) in fields.into_iter().enumerate() {
                 for (name, value) in message.name.iter().zip(values) {
-                    let joint = self
-                        .selection
-                        .joint_names
-                        .iter()
-                        .position(|joint| joint == name);
+                    let joint = (selection.joint_names.iter()).position(|joint| joint == name);
                     if let Some(joint) = joint.filter(|_| value.is_finite()) {
-                        self.selection.ranges.take(joint, field, *value);
+                        selection.ranges.take(joint, field, *value);
                     }
                 }
             }
         }
-        let has_log_times = !matches!(
-            recording.kind(),
-            RecordingKind::Csv | RecordingKind::Lerobot
-        );
-        (self.selection.clock, self.selection.of_clock) = stamps.clock(has_log_times);
-        self.check_velocity(recording)
+        (selection.clock, selection.of_clock) = stamps.clock(head.has_log_times);
     }
 
     /// Compares velocities with positions, on the clock that was chosen.
-    fn check_velocity(&mut self, recording: &Recording) -> Result<(), SessionError> {
+    fn judge_velocity(&mut self, head: &Head) {
         let mut assembler = self.assembler().keeping_velocity();
-        let mut tallies = JointTallies::in_order(&self.selection.joint_names);
-        let count = self.selection.joint_names.len();
-        let mut states = recording.joint_states(&self.topic)?;
-        for _ in 0..HEAD {
-            let Some(state) = states.next_state() else {
-                break;
-            };
-            let Ok(state) = state else { continue };
-            if let Taken::Follows(whole) = assembler.take(state.message, state.log_time_ns)
+        let mut tallies = JointTallies::in_order(self.joint_names());
+        let count = self.joint_names().len();
+        for (log_time_ns, message) in &head.messages {
+            if let Taken::Follows(whole) = assembler.take(message, *log_time_ns)
                 && whole.has_velocity
             {
                 let (position, velocity) = (&whole.position[..count], &whole.velocity[..count]);
@@ -243,7 +222,6 @@ impl Look {
         if facts.iter().any(|facts| moves(facts) && is_off(facts)) {
             self.selection.of_velocity = odd_velocities(&facts, true);
         }
-        Ok(())
     }
 
     /// Time of the first message that is used, and its log time \[ns\]; `None` if there is none.
@@ -301,4 +279,33 @@ fn published(all: &[Publisher]) -> Vec<String> {
         }
     }
     names
+}
+
+/// The first messages of a topic.
+struct Head {
+    /// Each with its log time \[ns\].
+    messages: Vec<(i64, ros::JointState)>,
+    /// Whether the format has a time of recording besides the stamps.
+    has_log_times: bool,
+}
+
+impl Head {
+    fn read(recording: &Recording, topic: &str) -> Result<Self, SessionError> {
+        let mut states = recording.joint_states(topic)?;
+        let mut messages = Vec::new();
+        for _ in 0..HEAD {
+            let Some(state) = states.next_state() else {
+                break;
+            };
+            // What cannot be decoded is counted when all is read.
+            if let Ok(state) = state {
+                messages.push((state.log_time_ns, state.message.clone()));
+            }
+        }
+        let kind = recording.kind();
+        Ok(Self {
+            messages,
+            has_log_times: !matches!(kind, RecordingKind::Csv | RecordingKind::Lerobot),
+        })
+    }
 }

@@ -269,7 +269,7 @@ fn report(calibrated: &Calibrated, cell: &Cell, args: &Args) -> String {
     }
     if !weak.is_empty() {
         text.push_str(&format!(
-            "\nnote: the model explains less than {:.0} % of the effort of {}: friction or too little motion outweighs it, so the gain there does not describe the drive",
+            "\nnote: the model explains less than {:.0} % of the effort of {}, so their gains are unreliable: friction or too little motion; record larger and faster motions",
             100.0 * WEAK,
             weak.join(", ")
         ));

@@ -76,22 +76,17 @@ fn joint_states(recording: &Recording) -> Result<Vec<Topic>, SessionError> {
 fn text(printed: &Printed) -> String {
     let mut text = printed.info.to_string();
     for topic in &printed.joint_states {
-        let lists = topic.publishers.len() > 1;
-        if lists {
+        if topic.publishers.len() > 1 {
             text += &format!("publishers on {}:\n", topic.name);
             for publisher in &topic.publishers {
                 text += &format!("  {publisher}\n");
             }
         }
-        let findings = topic.findings.iter();
-        let mut findings = findings
-            .filter(|finding| !(lists && matches!(finding, Finding::Publishers { .. })))
-            .peekable();
-        if findings.peek().is_some() {
+        if !topic.findings.is_empty() {
             text += &format!("findings on {}:\n", topic.name);
         }
-        for finding in findings {
-            text += &format!("  {finding}\n");
+        for finding in &topic.findings {
+            text += &format!("  {finding}.\n");
         }
     }
     text

@@ -10,7 +10,9 @@ impl OddVelocity {
     fn words(&self) -> String {
         match self.constant {
             Some(value) => format!("is constant, {value}, while the joint moves"),
-            None if self.slope.abs() < FOLLOWS => "does not follow the position".to_owned(),
+            None if self.slope.abs() < FOLLOWS => {
+                "does not follow the change of the position".to_owned()
+            }
             None => format!("is {:.2} times the derivative of the position", self.slope),
         }
     }
@@ -27,26 +29,32 @@ impl fmt::Display for Finding {
             | Self::LateMessages { .. }
             | Self::StalledStamps { .. } => self.of_time(f),
             Self::NotFinite { joint, values } => {
-                write!(f, "{}: not used", values.in_words(joint))
+                let what = values.in_words(joint);
+                write!(
+                    f,
+                    "{what}. These messages are not used. Check the driver and the sensor"
+                )
             }
             Self::Impossible { .. } | Self::Dropouts { .. } => self.of_values(f),
             Self::NamedTwice(twice) => write!(
                 f,
-                "{twice}: not used, because it is not known which value holds; let the driver send each joint once"
+                "{twice}. These messages are not used, because it is unknown which value holds. Let the driver send each joint once"
             ),
             Self::MissingParts { messages } => write!(
                 f,
-                "{} not used: no message named the other joints for more than 0.5 s",
-                are(*messages)
+                "{} only some of the robot's joints, and the other joints were missing for more than 0.5 s. Such messages are \
+                 not used. Check the publisher of the other joints",
+                counted(*messages, "holds", "hold")
             ),
             Self::NoPositions { messages } => write!(
                 f,
-                "{} not used: a joint state without positions; record the topic that has positions and efforts",
-                are(*messages)
+                "{} no position. Such messages are not used. Record the topic that has positions and efforts",
+                counted(*messages, "has", "have")
             ),
             Self::Copies { messages } => write!(
                 f,
-                "{messages} messages are copies of earlier ones: two relays or bridges deliver each; nothing is lost"
+                "{} an earlier message: two relays or bridges deliver each. Each state is used once",
+                counted(*messages, "repeats", "repeat")
             ),
             Self::Undecodable { reasons } => {
                 let reasons = reasons.iter();
@@ -99,11 +107,11 @@ impl Finding {
                 is_replaced,
             } => {
                 let (messages, stamp) = (*messages, in_seconds(*stamp_ns));
-                write!(f, "all {messages} stamps are the same, {stamp}: ")?;
+                write!(f, "all {messages} stamps are the same, {stamp}. ")?;
                 f.write_str(if *is_replaced {
-                    "the driver does not set `header.stamp`; the time of recording is used instead"
+                    "The time of recording is used instead. Let the driver set `header.stamp`"
                 } else {
-                    "no other column or field tells the time of a row; record the time of each"
+                    "No other column or field holds a time. Record the time of each row"
                 })
             }
             Self::CoarseStamps {
@@ -113,25 +121,28 @@ impl Finding {
             } => {
                 write!(
                     f,
-                    "stamps are whole multiples of {resolution_s} s, and {messages_per_stamp:.0} messages share each: "
+                    "stamps have a resolution of {resolution_s} s: about {messages_per_stamp:.0} messages share the same stamp. "
                 )?;
                 f.write_str(if *is_replaced {
-                    "the time of recording is used instead"
+                    "The time of recording is used instead. Let the driver fill `header.stamp.nanosec`"
                 } else {
-                    "too coarse to tell how fast a joint moves; let the driver fill `header.stamp.nanosec`, or record with \
-                     stamps of at most 0.25 s resolution"
+                    "Joint speeds cannot be determined from them. Let the driver fill `header.stamp.nanosec`, and record again"
                 })
             }
-            Self::ScaledStamps { ratio } => write!(
-                f,
-                "stamps pass {} times as fast as the time of recording: they are {}; they were scaled to seconds",
-                power(*ratio),
-                if *ratio > 1.0 {
-                    "milli-, micro- or nanoseconds written as seconds"
-                } else {
-                    "written in a larger unit than seconds"
-                }
-            ),
+            Self::ScaledStamps { ratio } => {
+                let unit = match ratio.log10().round() as i32 {
+                    3 => "milliseconds",
+                    6 => "microseconds",
+                    9 => "nanoseconds",
+                    _ => "another unit than seconds",
+                };
+                write!(
+                    f,
+                    "stamps run {} times as fast as the time of recording: they are in {unit}. They are converted to seconds. \
+                     Correct `header.stamp` in the driver",
+                    power(*ratio)
+                )
+            }
             Self::JumpsBack {
                 jumps,
                 count,
@@ -144,23 +155,28 @@ impl Finding {
                 let more = (*count as usize).saturating_sub(jumps.len());
                 write!(f, "stamps jump back {}", jumps.join(" and "))?;
                 if more > 0 {
-                    write!(f, ", and {more} more times")?;
+                    write!(f, ", and {more} times more")?;
                 }
-                f.write_str(": a looped playback, or a clock that was set back")?;
+                f.write_str(
+                    " of recording time: a looped playback, or a clock that was set back. ",
+                )?;
                 match refused {
-                    0 => f.write_str("; what follows is read as a new beginning"),
-                    count => write!(f, "; {count} messages that follow are not used"),
-                }
+                    0 => f.write_str("Each part is read as a new recording"),
+                    count => write!(f, "The {count} messages that follow are not used"),
+                }?;
+                f.write_str(". Record without looping")
             }
             Self::LateMessages { messages } => write!(
                 f,
-                "{} not used: stamped before the message that they follow",
-                are(*messages)
+                "{} a stamp before that of an earlier message: out-of-order delivery. Such messages are not used. Record on the \
+                 robot's host, or over a reliable connection",
+                counted(*messages, "has", "have")
             ),
             Self::StalledStamps { messages } => write!(
                 f,
-                "{} not used: other values under the stamp of the message before",
-                are(*messages)
+                "{} other values under the stamp of an earlier message. Such messages are not used. Let the driver stamp each \
+                 measurement",
+                counted(*messages, "has", "have")
             ),
             _ => Ok(()),
         }
@@ -179,9 +195,10 @@ impl Finding {
             } => {
                 write!(
                     f,
-                    "the {field} of {joint} is {example:.3e} and the like in {}, where nine of ten values stay below {usual:.3}: \
-                     no measurement, for example memory that the driver never wrote; not used",
-                    span(*messages, *first_s, *last_s)
+                    "the {field} of {joint} is implausible in {}, for example {}. Nine of ten values are below {usual}. \
+                     These messages are not used. Check the driver for values that it never sets",
+                    span(*messages, *first_s, *last_s),
+                    magnitude(*example),
                 )
             }
             Self::Dropouts {
@@ -192,7 +209,8 @@ impl Finding {
                 last_s,
             } => write!(
                 f,
-                "the effort of {joint} drops to exactly zero {} in {}: a loose plug or a sensor that restarts; not used",
+                "the effort of {joint} drops to exactly zero {} in {}. Efforts there are not used. Check the plug and the \
+                 sensor of the joint, and whether the drives were off",
                 if *drops == 1 {
                     "once".to_owned()
                 } else {
@@ -232,9 +250,9 @@ fn velocities(
         f.write_str("; below zero, position or velocity has the wrong sign")?;
     }
     f.write_str(if is_replaced {
-        "; it is not used, velocities are computed from the positions"
+        ". Velocities are computed from the positions instead. Check the velocity that the driver publishes"
     } else {
-        "; correct it in the driver"
+        ". Check the velocity that the driver publishes"
     })
 }
 
@@ -244,19 +262,31 @@ fn publishers(
     ignored: &[Publisher],
 ) -> fmt::Result {
     let list = |all: &[Publisher]| {
-        let all: Vec<String> = all.iter().map(ToString::to_string).collect();
-        all.join("; ")
+        let all: Vec<String> = all.iter().map(|it| format!("({it})")).collect();
+        all.join(", ")
     };
     write!(
         f,
-        "several publishers send joint states here: used {} ({})",
-        if used.len() == 1 { "is" } else { "are" },
+        "several publishers share this topic. Used: {}",
         list(used)
     )?;
     if ignored.is_empty() {
         return Ok(());
     }
-    write!(f, ", not used ({})", list(ignored))
+    write!(f, ". Not used: {}", list(ignored))?;
+    if ignored.iter().any(|publisher| !publisher.measures_effort()) {
+        f.write_str(". A publisher without measured efforts belongs on a topic of its own")?;
+    }
+    Ok(())
+}
+
+/// A number as people read it: with an exponent where it is very large or small.
+fn magnitude(value: f64) -> String {
+    if (1e-3..1e7).contains(&value.abs()) {
+        format!("{value}")
+    } else {
+        format!("{value:.2e}")
+    }
 }
 
 /// `1 message at 3.200 s`, or `12 messages from 3.200 s to 3.310 s`.
@@ -270,10 +300,15 @@ fn span(messages: u64, first_s: f64, last_s: f64) -> String {
 
 /// `1 message is`, `12 messages are`.
 fn are(messages: u64) -> String {
+    counted(messages, "is", "are")
+}
+
+/// A number of messages with the verb that goes with it.
+fn counted(messages: u64, of_one: &str, of_more: &str) -> String {
     if messages == 1 {
-        "1 message is".to_owned()
+        format!("1 message {of_one}")
     } else {
-        format!("{messages} messages are")
+        format!("{messages} messages {of_more}")
     }
 }
 
