@@ -155,7 +155,7 @@ fn a_gap_of_three_seconds_is_told_and_starts_the_filters_anew() {
         run.stderr
     );
     assert!(
-        run.stdout.contains("demo: 1 gap(s) in time; "),
+        run.stdout.contains("demo: 1 gap in time; "),
         "{}",
         run.stdout
     );

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use comfy_table::{CellAlignment, Table, presets};
 use tauscope_dynamics::terms::UNKNOWN;
+use tauscope_dynamics::terms::words::counted;
 use tauscope_pipeline::replay::Outcome;
 use tauscope_pipeline::tally::{Event, JointRms};
 use tauscope_watch::amount;
@@ -32,14 +33,11 @@ pub fn table(outcomes: &[Outcome]) -> String {
         for detector in &outcome.detectors {
             let (name, events) = (&detector.detector, detector.events.len());
             if detector.judged == 0 {
-                let _ = writeln!(
-                    text,
-                    "  {name}: judged no sample: there were no efforts, or the filters never settled"
-                );
+                let reason = why_nothing_was_judged(outcome, name);
+                let _ = writeln!(text, "  {name}: judged no sample: {reason}");
                 continue;
             }
-            let plural = if events == 1 { "" } else { "s" };
-            let _ = writeln!(text, "  {name}: {events} event{plural}");
+            let _ = writeln!(text, "  {name}: {}", counted(events, "event"));
             for event in &detector.events {
                 let line = event_line(event, &outcome.effort_unit);
                 let _ = writeln!(text, "    {line}");
@@ -53,6 +51,28 @@ pub fn table(outcomes: &[Outcome]) -> String {
         }
     }
     text
+}
+
+/// Reason why the detector `name` has judged no sample of a recording, as a clause.
+fn why_nothing_was_judged(outcome: &Outcome, name: &str) -> String {
+    let twins = outcome.twins.iter();
+    let Some(twin) = twins
+        .max_by_key(|twin| twin.samples)
+        .filter(|twin| twin.samples > 0)
+    else {
+        return "no sample had a measured effort".to_owned();
+    };
+    if name != tauscope_watch::NAME {
+        return format!(
+            "the filters had not settled when the recording ended, after {:.1} s",
+            outcome.duration_s
+        );
+    }
+    let moves_s = outcome.duration_s * twin.moving_samples as f64 / twin.samples as f64;
+    format!(
+        "it was still learning. It first learns from `learn_s` of motion ({:.0} s by default); the arm moves for {moves_s:.1} s here",
+        tauscope_watch::Config::default().learn_s
+    )
 }
 
 /// A row of the table: its name, and what stands in it of a joint.
@@ -106,4 +126,56 @@ fn event_line(event: &Event, effort_unit: &str) -> String {
         let _ = write!(line, ", since {:.1} s", event.t_contact);
     }
     line
+}
+
+#[cfg(test)]
+mod tests {
+    use tauscope_bus::{TwinState, flags};
+    use tauscope_pipeline::tally::{DetectionTally, TwinTally};
+
+    use super::*;
+
+    /// A recording of 12 s in which one joint moves for three quarters, and no detector judged a sample.
+    fn outcome(flags: u32) -> Outcome {
+        let mut twin = TwinTally::new("twin", 1);
+        for k in 0..4 {
+            let mut sample = TwinState::default();
+            sample.header.flags = flags;
+            sample.velocity[0] = if k == 0 { 0.0 } else { 0.5 };
+            twin.add(&sample);
+        }
+        let detector = |name: &str| {
+            let mut detector = DetectionTally::new("detect", &[]);
+            name.clone_into(&mut detector.detector);
+            detector
+        };
+        Outcome {
+            recording: "push".to_owned(),
+            cell: "cell".to_owned(),
+            effort_unit: "Nm".to_owned(),
+            joint_names: vec!["a".to_owned()],
+            duration_s: 12.0,
+            stamps_ns: (0, 12_000_000_000),
+            lost: 0,
+            twins: vec![twin],
+            detectors: vec![detector("tauscope"), detector(tauscope_watch::NAME)],
+            stages: Vec::new(),
+            files: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn the_reason_why_nothing_was_judged_is_that_of_the_recording() {
+        let short = table(&[outcome(flags::EFFORT_MEASURED)]);
+        for said in [
+            "tauscope: judged no sample: the filters had not settled when the recording ended, after 12.0 s",
+            "residual_watch: judged no sample: it was still learning. It first learns from `learn_s` of motion (20 s by default); the arm moves for 9.0 s here",
+        ] {
+            assert!(short.contains(said), "{said}: {short}");
+        }
+        let bare = table(&[outcome(0)]);
+        let reason = "judged no sample: no sample had a measured effort";
+        assert_eq!(bare.matches(reason).count(), 2, "{bare}");
+    }
 }
