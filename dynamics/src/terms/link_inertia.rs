@@ -11,13 +11,18 @@ use crate::Inertia;
 /// what describes a body that neither another mass nor another centre of mass makes.
 pub(super) static EFFECT: Effect = Effect {
     name: "link_inertia",
-    words: Words::new(
-        "Link inertia",
-        "link inertia",
-        "A link is another body than its model says: mass, centre and inertia together.",
-        "Link {place}: what is mounted on it or missing from it, against the URDF?",
-        "Link {place} is another body than its URDF says, and no one name fits that: its mass is off by {delta_mass_kg}, its first moment (mass times centre) by ({delta_first_moment_x_kgm:number}, {delta_first_moment_y_kgm:number}, {delta_first_moment_z_kgm:number}) kg m, and so is its inertia; what is left depends on the motion of all joints that carry it.",
-    ),
+    words: Words {
+        without_numbers: Some(
+            "Link {place} is another body than its URDF says, and no one name fits that. The recordings do not determine all of its numbers.",
+        ),
+        ..Words::new(
+            "Link inertia",
+            "link inertia",
+            "A link is another body than its model says: mass, centre and inertia together.",
+            "Link {place}: what is mounted on it or missing from it, against the URDF?",
+            "Link {place} is another body than its URDF says, and no one name fits that: its mass is off by {delta_mass_kg}, its first moment (mass times centre) by ({delta_first_moment_x_kgm:number}, {delta_first_moment_y_kgm:number}, {delta_first_moment_z_kgm:number}) kg m, and so is its inertia; what is left depends on the motion of all joints that carry it.",
+        )
+    },
     family: Family::Body,
     place: PlaceKind::Link,
     layer: Layer::Body,

@@ -18,7 +18,7 @@ pub static EFFECT: Effect = Effect {
         "a payload",
         "Something is mounted on or held by the tool that the twin does not know of.",
         "The tool: what is mounted on it or held by it that the URDF does not have?",
-        "The arm carries {mass_kg} that nobody told the twin of.",
+        "The arm carries an undeclared payload of {mass_kg}.",
     ),
     family: Family::Body,
     place: PlaceKind::Tool,

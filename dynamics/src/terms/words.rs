@@ -19,7 +19,7 @@ pub struct Words {
     pub less: Option<&'static str>,
     /// A finding whose first number may be zero; for an effect that takes all away then.
     pub nothing: Option<&'static str>,
-    /// A finding of which the data does not tell the numbers, for an effect that there may be such a finding of.
+    /// A finding whose numbers the recordings do not determine, where their list is no help.
     pub without_numbers: Option<&'static str>,
 }
 
@@ -43,6 +43,13 @@ impl Words {
             without_numbers: None,
         }
     }
+}
+
+/// The quantity of a parameter, e.g. `mass` of `delta_mass_kg`, `centre of mass x` of `com_x_m`.
+pub fn quantity(name: &str) -> String {
+    let stem = unit(name).map_or(name, |(stem, _)| stem);
+    let stem = stem.trim_start_matches("delta_").trim_start_matches("t_");
+    stem.replace("com_", "centre_of_mass_").replace('_', " ")
 }
 
 /// How a value is told in a template.
@@ -159,6 +166,12 @@ pub fn number(value: f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
+/// A count with its noun, e.g. `1 event`, `3 events`. `noun` is a singular whose plural ends in s.
+pub fn counted(count: usize, noun: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {noun}{plural}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -195,6 +208,24 @@ mod tests {
         ] {
             assert_eq!(unit(name), expected, "{name}");
         }
+    }
+
+    #[test]
+    fn a_parameter_is_named_by_its_quantity() {
+        for (name, expected) in [
+            ("mass_kg", "mass"),
+            ("delta_com_z_m", "centre of mass z"),
+            ("t_start_s", "start"),
+            ("gain", "gain"),
+        ] {
+            assert_eq!(quantity(name), expected);
+        }
+    }
+
+    #[test]
+    fn one_thing_is_singular() {
+        let told = [0, 1, 2].map(|count| counted(count, "more motion"));
+        assert_eq!(told, ["0 more motions", "1 more motion", "2 more motions"]);
     }
 
     #[test]

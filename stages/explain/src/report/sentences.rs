@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 use tauscope_dynamics::Joint;
-use tauscope_dynamics::terms::Words;
 use tauscope_dynamics::terms::words::{self, Told, number};
+use tauscope_dynamics::terms::{Effect, PlaceKind, Words};
 
 use crate::physics::active::Active;
 use crate::physics::parameter_units::unit;
@@ -73,9 +73,6 @@ pub fn unit_at<'u>(unit: &'u str, joint: &Joint) -> &'u str {
 /// Physical: what a torque sensor says of a joint that it does not measure.
 const MOST_OF_NOTHING: f64 = 0.05;
 
-/// In the place of a number of which the recordings tell nothing.
-const NOT_TOLD: &str = "not told by these recordings";
-
 /// A finding as a sentence. `place` is the name of the joint or link, `recording` that of the recording it is told in.
 pub fn sentence(
     active: &Active,
@@ -92,10 +89,11 @@ pub fn sentence(
     }
     let first = effect.parameters.first().map_or("", |p| p.name);
     let less = value(first).filter(|value| *value < 0.0);
-    let is_told = |(name, _): (&str, Told)| {
-        let is_parameter = effect.parameters.iter().any(|p| p.name == name);
-        !is_parameter || parameters.contains_key(name)
+    let is_missing = |(name, _): &(&str, Told)| {
+        let is_parameter = effect.parameters.iter().any(|p| p.name == *name);
+        is_parameter && !parameters.contains_key(*name)
     };
+    let has_missing = words::places(effect.words.finding).any(|place| is_missing(&place));
     let is_nothing = intervals
         .get(first)
         .is_some_and(|[low, high]| *low <= 0.0 && *high < MOST_OF_NOTHING);
@@ -108,7 +106,8 @@ pub fn sentence(
     let template = match (of_less, nothing, without_numbers) {
         (Some(template), ..) if less.is_some() => template,
         (_, Some(template), _) if is_nothing => template,
-        (.., Some(template)) if !words::places(effect.words.finding).all(is_told) => template,
+        (.., Some(template)) if has_missing => template,
+        _ if has_missing => return undetermined(effect, place, parameters, intervals),
         _ => effect.words.finding,
     };
     words::fill(template, |name, told| match name {
@@ -119,13 +118,48 @@ pub fn sentence(
             let interval = intervals.get(first).map(|[low, high]| [-high, -low]);
             with_interval(-less.unwrap_or(f64::NAN), unit(first), interval.as_ref())
         }
-        name if told == Told::Whole && value(name).is_none() => NOT_TOLD.to_owned(),
         name => {
             let unit = if told == Told::Whole { unit(name) } else { "" };
             let interval = intervals.get(name).filter(|_| told != Told::Number);
             with_interval(value(name).unwrap_or(f64::NAN), unit, interval)
         }
     })
+}
+
+/// A finding of which the recordings determine some numbers or none.
+fn undetermined(
+    effect: &Effect,
+    place: &str,
+    parameters: &BTreeMap<String, Value>,
+    intervals: &BTreeMap<String, [f64; 2]>,
+) -> String {
+    let (mut known, mut missing) = (Vec::new(), Vec::new());
+    for (name, _) in words::places(effect.words.finding) {
+        if let Some(value) = parameters.get(name).and_then(Value::as_f64) {
+            let value = with_interval(value, unit(name), intervals.get(name));
+            known.push(format!("{} {value}", words::quantity(name)));
+        } else if effect.parameters.iter().any(|p| p.name == name) {
+            missing.push(words::quantity(name));
+        }
+    }
+    let noun = effect.words.noun;
+    let at = at(effect.place, place);
+    let known = if known.is_empty() {
+        String::new()
+    } else {
+        format!(" ({})", known.join(", "))
+    };
+    let missing = missing.join(" and ");
+    format!("The recordings show {noun}{at}{known}; they do not determine its {missing}.")
+}
+
+/// ` at joint elbow`; empty for an effect that has one place only.
+fn at(kind: PlaceKind, place: &str) -> String {
+    match kind {
+        PlaceKind::Joint | PlaceKind::TwoJoints => format!(" at joint {place}"),
+        PlaceKind::Link => format!(" at link {place}"),
+        PlaceKind::Tool | PlaceKind::Base | PlaceKind::All => String::new(),
+    }
 }
 
 /// `4.1 N m (3.9 to 4.3)`.
@@ -145,7 +179,10 @@ fn with_interval(value: f64, unit: &str, interval: Option<&[f64; 2]>) -> String 
 
 #[cfg(test)]
 mod tests {
+    use tauscope_dynamics::terms::effect;
+
     use super::*;
+    use crate::physics::active::{Hypothesis, Whereabouts};
 
     #[test]
     fn what_slides_is_told_in_newtons_and_metres() {
@@ -163,6 +200,44 @@ mod tests {
         ] {
             assert_eq!(of_a_slide(turning), sliding);
         }
+    }
+
+    #[test]
+    fn a_number_that_the_recordings_do_not_determine_makes_another_sentence() {
+        let of = |name: &str, numbers: &[(&str, f64)]| {
+            let effect = effect(name).unwrap();
+            let place = Whereabouts::default();
+            let active = Hypothesis { effect, place }.with(vec![0.0; effect.coordinates.len()]);
+            let numbers = numbers.iter();
+            let parameters = numbers.map(|(name, value)| ((*name).to_owned(), (*value).into()));
+            let intervals = BTreeMap::from([("delta_com_x_m".to_owned(), [0.01, 0.03])]);
+            let parameters = parameters.collect();
+            sentence(&active, ("fore", None), &parameters, &intervals, &[])
+        };
+        for (name, numbers, said) in [
+            (
+                "payload",
+                &[("mass_kg", 0.59)][..],
+                "The arm carries an undeclared payload of 0.59 kg.",
+            ),
+            (
+                "payload",
+                &[],
+                "The recordings show a payload; they do not determine its mass.",
+            ),
+            (
+                "link_com",
+                &[("delta_com_x_m", 0.02)],
+                "The recordings show another centre of mass at link fore (centre of mass x 0.02 m (0.01 to 0.03)); they do not determine its centre of mass y and centre of mass z.",
+            ),
+        ] {
+            assert_eq!(of(name, numbers), said);
+        }
+        let body = of("link_inertia", &[]);
+        assert!(
+            body.ends_with("The recordings do not determine all of its numbers."),
+            "{body}"
+        );
     }
 
     #[test]
