@@ -201,7 +201,7 @@ fn a_burst_of_nan_is_counted_and_a_gap_is_told() {
         out.stdout
     );
     assert!(
-        out.stdout.contains("demo: 2 gap(s) in time"),
+        out.stdout.contains("demo: 2 gaps in time"),
         "{}",
         out.stdout
     );

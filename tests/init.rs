@@ -68,7 +68,7 @@ fn three_free_recordings_make_a_pipeline_that_finds_every_push() {
     assert_eq!(out.code, 0, "{}", out.stderr);
     assert!(out.stdout.contains("Effort is in N m"), "{}", out.stdout);
     assert!(out.stdout.contains("Coulomb friction"), "{}", out.stdout);
-    assert!(out.stdout.contains("0 false alarm(s)"), "{}", out.stdout);
+    assert!(out.stdout.contains("0 false alarms"), "{}", out.stdout);
 
     let checked = Out::answer(["check".as_ref(), cell.join("pipeline.yaml").as_os_str()]);
     assert_eq!(checked.code, 0, "{}", checked.stderr);

@@ -139,9 +139,9 @@ fn labels_beyond_a_recording_are_noted_and_take_no_time_that_is_not_there() {
     let notes = notes(&summary);
     for said in [
         "demo: the labels give it a length of 9000 s",
-        "demo: 1 labelled contact(s) reach beyond the recording",
+        "demo: 1 labelled contact reaches beyond the recording",
         "labelled, but not in the set: gone",
-        "the link `lnik5` (1 times), which the robot does not have",
+        "the link `lnik5` in 1 contact, which the robot does not have",
     ] {
         assert!(notes.contains(said), "{said}: {notes}");
     }

@@ -5,6 +5,7 @@
 
 use tauscope_bus::TwinState;
 use tauscope_detect::{ContactKind, LabelledContact, Lesson};
+use tauscope_dynamics::terms::words::counted;
 use tauscope_pipeline::cell::CellFacts;
 
 use crate::metrics::statistics::quantile;
@@ -79,9 +80,9 @@ pub fn leave_out(lesson: &mut Lesson, facts: &CellFacts) -> Option<String> {
     let begin_ns = lesson.samples[0].header.stamp_ns;
     let at_s = (sample.header.stamp_ns - begin_ns) as f64 * 1e-9;
     let note = format!(
-        "{}: {} reading(s) jump away and back as no arm does, the first at {} ({:.3} {} at {at_s:.3} s): left out of what is learnt and of thresholds",
+        "{}: {} that jumped away and back as no arm does, the first at {} ({:.3} {} at {at_s:.3} s): left out of what is learnt and of thresholds",
         lesson.name,
-        found.len(),
+        counted(found.len(), "reading"),
         facts.joint_names[first.joint],
         sample.effort[first.joint],
         facts.effort_unit.as_str(),

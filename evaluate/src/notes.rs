@@ -5,6 +5,7 @@ mod totals;
 use std::collections::{BTreeMap, BTreeSet};
 
 use tauscope_bus::flags;
+use tauscope_dynamics::terms::words::counted;
 use tauscope_pipeline::suggest;
 
 use self::totals::Totals;
@@ -68,8 +69,9 @@ impl Notes {
             ));
         } else if played.gaps > 0 {
             note(format!(
-                "{} gap(s) in time; {} of {count} samples were not judged while the filters settled",
-                played.gaps, played.unsettled
+                "{} in time; {} of {count} samples were not judged while the filters settled",
+                counted(played.gaps as usize, "gap"),
+                played.unsettled
             ));
         }
         let last_s = (samples.last()).map_or(0.0, |last| {
@@ -139,15 +141,22 @@ fn beyond(recording: &Named, last_s: f64) -> Vec<String> {
     }
     let reach = |t: f64| !(-TOLERANCE_S..=last_s + LAST_S).contains(&t);
     let events = || truth.events.iter();
-    let beyond = events().filter(|event| reach(event.t_on) || reach(event.t_off));
+    let reaching = events().filter(|event| reach(event.t_on) || reach(event.t_off));
     let outside = events().filter(|event| event.t_off < 0.0 || event.t_on > last_s);
-    match (beyond.count(), outside.count()) {
+    let beyond = |count| {
+        let contacts = counted(count, "labelled contact");
+        let reach = if count == 1 { "reaches" } else { "reach" };
+        format!("{contacts} {reach} beyond the recording")
+    };
+    match (reaching.count(), outside.count()) {
         (0, _) => {}
         (count, 0) => notes.push(format!(
-            "{count} labelled contact(s) reach beyond the recording, which lasts {last_s:.2} s: they are counted as far as it goes"
+            "{}, which lasts {last_s:.2} s: counted as far as it goes",
+            beyond(count)
         )),
         (count, outside) => notes.push(format!(
-            "{count} labelled contact(s) reach beyond the recording, which lasts {last_s:.2} s: they are counted as far as it goes, and {outside} that lie outside of it count as missed"
+            "{}, which lasts {last_s:.2} s: counted as far as it goes, and as missed where outside ({outside} of them)",
+            beyond(count)
         )),
     }
     notes

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::Context as _;
 use tauscope_detect::{Config, tauscope};
-use tauscope_dynamics::terms::words::number;
+use tauscope_dynamics::terms::words::{counted, number};
 use tauscope_evaluate::{Evaluation, Options, Output, Progress, Role};
 use tauscope_twin::TwinFile;
 
@@ -158,8 +158,9 @@ impl Trial {
             )
         });
         format!(
-            "Behind {twin}, learnt from the fitted recordings alone: {} false alarm(s) in {:.0} s of held-out recordings.{force}",
-            self.alarms, self.seen_s
+            "Behind {twin}, learnt from the fitted recordings alone: {} in {:.0} s of held-out recordings.{force}",
+            counted(self.alarms, "false alarm"),
+            self.seen_s
         )
     }
 }

@@ -1,6 +1,7 @@
 //! The scores over time, recording by recording: what was labelled, what was found.
 
 use maud::{Markup, html};
+use tauscope_dynamics::terms::words::counted;
 use tauscope_explain::html::chart::{Axis, Panel, bulk, r};
 
 use super::recommendation;
@@ -46,7 +47,7 @@ pub(super) fn section(judged: &[Judged<'_>]) -> Option<Markup> {
         }
         (plots(open))
         @if !rest.is_empty() {
-            details { summary { (rest.len()) " more recordings" } (plots(rest)) }
+            details { summary { (counted(rest.len(), "more recording")) } (plots(rest)) }
         }
         @if left_out > 0 {
             p.muted { (left_out) " recordings are not drawn; their scores are in the CSV files." }

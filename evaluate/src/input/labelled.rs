@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use tauscope_dynamics::terms::words::counted;
 use tauscope_pipeline::cell::Cell;
 use tauscope_pipeline::files::SetFile;
 use tauscope_pipeline::report::{Problem, Report};
@@ -103,7 +104,8 @@ fn unknown_links(recordings: &[Named], cell: &Cell) -> Vec<String> {
         let near = suggest::nearest(link, links.iter().copied())
             .map_or_else(String::new, |near| format!("did you mean `{near}`? "));
         format!(
-            "labels name the link `{link}` ({count} times), which the robot does not have, and where these contacts were is not scored; {near}its links are {}",
+            "labels name the link `{link}` in {}, which the robot does not have: not scored there; {near}its links are {}",
+            counted(count, "contact"),
             suggest::list(links.iter().copied())
         )
     };
@@ -149,7 +151,7 @@ mod tests {
         assert_eq!(notes[0], "labelled, but not in the set: typo");
         assert_eq!(notes[1], "without labels, and not scored: b");
         assert!(
-            notes[2].contains("`lnik4` (1 times)") && notes[2].contains("did you mean `link4`?"),
+            notes[2].contains("`lnik4` in 1 contact") && notes[2].contains("did you mean `link4`?"),
             "{notes:?}"
         );
         let good = [recording("a", Some("link4"))];

@@ -1,6 +1,7 @@
 //! Where the mismatch sits, and what is left of it after the correction.
 
 use maud::{Markup, html};
+use tauscope_dynamics::terms::words::counted;
 
 use super::chart::r;
 use super::number_format::{fixed, number_text, percent};
@@ -119,7 +120,7 @@ pub(super) fn located(report: &Report) -> Option<Markup> {
         (heat(first))
         @if !rest.is_empty() {
             details {
-                summary { (rest.len()) " more places" }
+                summary { (counted(rest.len(), "more place")) }
                 (heat(rest))
             }
         }

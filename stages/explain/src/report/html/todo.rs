@@ -2,6 +2,7 @@
 
 use maud::{Markup, html};
 use tauscope_dynamics::terms::UNKNOWN;
+use tauscope_dynamics::terms::words::counted;
 
 use super::Around;
 use super::effects::effect_title;
@@ -133,7 +134,7 @@ fn look_at(report: &Report) -> Markup {
                 }
             }
         }
-        @if parts.len() > PARTS { p.muted { (parts.len() - PARTS) " more places are below, with smaller efforts." } }
+        @if parts.len() > PARTS { p.muted { (counted(parts.len() - PARTS, "more place")) " with smaller efforts: see below." } }
     }
 }
 
@@ -160,7 +161,7 @@ fn record(report: &Report) -> Markup {
         return html! {
             p { (first.sentence) " " (trajectory(first)) }
             @if report.next_motions.len() > 1 {
-                p.muted { a href="#next" { (report.next_motions.len() - 1) " more motions" } }
+                p.muted { a href="#next" { (counted(report.next_motions.len() - 1, "more motion")) } }
             }
         };
     }
