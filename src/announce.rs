@@ -109,7 +109,7 @@ impl Told {
             EventKind::None => Vec::new(),
             EventKind::Onset if watches => vec![self.change(t, start_ns, detection)],
             EventKind::Offset if watches => (ended.and_then(|ended| ended.size).into_iter())
-                .map(|_| format!("{t:8.3} s  learned: the arm as it is now is the rule"))
+                .map(|_| format!("{t:8.3} s  learned: the arm as it is now is the new reference"))
                 .collect(),
             EventKind::Offset => ended.map(over).into_iter().collect(),
             EventKind::Onset => {

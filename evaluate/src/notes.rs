@@ -187,6 +187,6 @@ pub fn unlabelled(request: &Request) -> Option<String> {
         .collect();
     (!names.is_empty()).then(|| {
         let names = suggest::some(&names);
-        format!("without labels, and taken to be free of contacts: {names}")
+        format!("treated as free of contacts, because they have no labels: {names}")
     })
 }

@@ -39,7 +39,7 @@ pub struct Args {
     #[arg(long, default_value = "twin.yaml")]
     out: PathBuf,
     /// Contact-free recordings that noise and scores, and so the detectors' thresholds, are measured
-    /// on; without them, those of the fit, which flatter.
+    /// on; without them, those of the fit, on which both come out too small.
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     validation: Vec<PathBuf>,
     /// Unit of the measured effort.
@@ -269,7 +269,7 @@ fn report(calibrated: &Calibrated, cell: &Cell, args: &Args) -> String {
     }
     if !weak.is_empty() {
         text.push_str(&format!(
-            "\nnote: the model explains less than {:.0} % of the effort of {}: friction or too little motion outweighs it, so the gain there is not to be read as the drive's",
+            "\nnote: the model explains less than {:.0} % of the effort of {}: friction or too little motion outweighs it, so the gain there does not describe the drive",
             100.0 * WEAK,
             weak.join(", ")
         ));
@@ -281,7 +281,7 @@ fn report(calibrated: &Calibrated, cell: &Cell, args: &Args) -> String {
         ));
     }
     if args.validation.is_empty() {
-        text.push_str("\nnote: noise and scores were measured on the recordings of the fit; give others with --validation for thresholds that hold");
+        text.push_str("\nnote: noise and scores were measured on the recordings of the fit and are too small; give other recordings with --validation, or the thresholds will cause false alarms");
     }
     for note in &calibrated.notes {
         text.push_str(&format!("\nwarning: {note}"));

@@ -152,13 +152,13 @@ impl Trial {
         let twin = self.words();
         let force = self.push.as_ref().map_or_else(String::new, |(link, force_n)| {
             format!(
-                " While the arm moves as it does there, it finds a push on {link} from {} N on, in half of \
-                 all directions; while the arm stands it finds weaker ones.",
+                " While the arm moves as it does there, a push on {link} is found from {} N in half of all \
+                 directions; while the arm stands, weaker ones are found.",
                 number(*force_n)
             )
         });
         format!(
-            "Behind {twin}, learnt from the fitted recordings alone: {} in {:.0} s of held-out recordings.{force}",
+            "With {twin}: {} in {:.0} s of recordings that neither twin nor detector had seen.{force}",
             counted(self.alarms, "false alarm"),
             self.seen_s
         )

@@ -274,7 +274,7 @@ pub fn smallest(judged: &[Judged<'_>]) -> Vec<Table> {
         wishes.extend(others.map(|(other, said)| (other, said.to_owned())));
         let mut table = Table::new(
             format!("Smallest force found, {}", one.label),
-            "Once it has lasted 0.2 s, in half and in nine of ten of the postures and directions of the contact-free recordings [N]; by the false alarms that are put up with.",
+            "Force that is found once it has lasted 0.2 s, in half and in nine of ten of the postures and directions of the contact-free recordings [N], by the tolerated rate of false alarms.",
             &["link"],
         );
         for (_, said) in &wishes {

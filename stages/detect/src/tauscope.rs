@@ -92,7 +92,7 @@ const DRIFT: f64 = 1.0;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// How many false alarms an hour are put up with; at most one a week is 0.006. Sets the threshold.
+    /// Tolerated false alarms per hour, from which the threshold follows (one a week: 0.006).
     #[schemars(range(min = 1e-6, max = 3600.0))]
     pub false_alarms_per_hour: f64,
     /// Time constant with which slow drift of the residual is followed \[s\].
@@ -158,7 +158,7 @@ impl DetectorSettings for Settings {
         let free_s = self.learnt()?.free_s?;
         (free_s < ENOUGH_S).then(|| {
             format!(
-                "{NAME} has learnt what is usual from {free_s:.1} s in which nothing touched the arm, and that is too little: its threshold is a guess, how often it is exceeded by chance is not known, and all joints are taken for more alike than they are; let it learn from at least {ENOUGH_S} s, better some minutes"
+                "{NAME} has learnt from {free_s:.1} s without contacts, which is too little: its threshold is a guess, and its rate of false alarms is not known; let it learn from at least {ENOUGH_S} s, better some minutes"
             )
         })
     }
