@@ -190,22 +190,20 @@ fn a_table_gives_what_the_archive_of_the_same_motion_gives() {
     }
 }
 
+/// Memory that was never written stands in a twentieth of the rows, up to 1e181.
 #[test]
-fn a_broken_table_is_refused_with_its_line() {
-    let Some(shared) = shared("a_broken_table_is_refused_with_its_line") else {
+fn a_table_with_implausible_values_is_read_without_them() {
+    let Some(shared) = shared("a_table_with_implausible_values_is_read_without_them") else {
         return;
     };
     let folder = tempfile::tempdir().unwrap();
     let table = shared.join("recordings/ur10e/csv/dirty.csv");
     let pipeline = csv_pipeline(&shared, &table);
     let out = replay(folder.path(), &pipeline, &[&table]);
-    assert_eq!(out.code, 2, "{}", out.stdout);
-    assert!(
-        out.stderr.contains("dirty.csv:3: column 3"),
-        "{}",
-        out.stderr
-    );
-    assert!(!folder.path().join("out/dirty.mcap").exists());
+    assert_eq!(out.code, 3, "{}", out.stderr);
+    assert!(out.stdout.contains("is implausible in"), "{}", out.stdout);
+    let (all, _) = rms(&out);
+    assert!(all.iter().all(|rms| *rms < 1e3), "{all:?}");
 }
 
 /// When `init` sees five contact-free recordings of the arm, its pipeline finds the four pushes of a sixth, and nothing in

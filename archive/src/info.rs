@@ -235,49 +235,6 @@ impl Tally {
 }
 
 impl JointsInfo {
-    /// What is odd about the values, in words.
-    pub fn remarks(&self) -> Vec<String> {
-        let mut remarks: Vec<String> = self.joints.iter().flat_map(JointFacts::remarks).collect();
-        let zero = self.joints.iter().filter(|joint| joint.effort_is_zero);
-        let zero: Vec<&str> = zero.map(|joint| joint.name.as_str()).collect();
-        if !zero.is_empty() {
-            remarks.push(format!(
-                "the effort of {} is 0 in all messages",
-                zero.join(", ")
-            ));
-        }
-        let lacking = self.joints.iter().filter(|joint| joint.lacks_effort);
-        let lacking: Vec<&str> = lacking.map(|joint| joint.name.as_str()).collect();
-        if self.effort && !lacking.is_empty() {
-            remarks.push(format!(
-                "the effort of {} is in no message",
-                lacking.join(", ")
-            ));
-        }
-        remarks.extend(self.row_remarks());
-        remarks
-    }
-
-    /// What is odd about the messages as such, in words.
-    pub fn row_remarks(&self) -> Vec<String> {
-        let mut remarks: Vec<String> = self.twice.iter().map(ToString::to_string).collect();
-        match self.repeated_messages {
-            0 => {}
-            1 => remarks.push("1 message repeats the values of the one before".to_owned()),
-            count => remarks.push(format!(
-                "{count} messages repeat the values of the one before"
-            )),
-        }
-        match self.backward_messages {
-            0 => {}
-            1 => remarks.push("1 message is stamped before the one that it follows".to_owned()),
-            count => remarks.push(format!(
-                "{count} messages are stamped before the one that they follow"
-            )),
-        }
-        remarks
-    }
-
     fn add(&mut self, state: &JointState) {
         if self.names.is_empty() {
             self.names.clone_from(&state.name);
@@ -359,6 +316,11 @@ impl fmt::Display for TopicInfo {
         }
         if let Some(joints) = &self.joints {
             writeln!(f, "  {joints}")?;
+            match joints.repeated_messages {
+                0 => {}
+                1 => writeln!(f, "  1 message repeats the values of the one before")?,
+                count => writeln!(f, "  {count} messages repeat the values of the one before")?,
+            }
         }
         for gap in &self.gaps {
             writeln!(f, "  a gap of {:.3} s at {:.3} s", gap.duration_s, gap.at_s)?;

@@ -61,15 +61,6 @@ impl JointFacts {
         slope.is_some_and(|slope| (slope / RADIANS_PER_DEGREE - 1.0).abs() < ODD_SHARE)
     }
 
-    /// What is odd about it, in words: values that are no numbers, jumps, a velocity that is not the derivative.
-    pub fn remarks(&self) -> Vec<String> {
-        let bad = self.not_finite.iter();
-        // An effort that is never a number is one that the recording does not have.
-        let bad = bad.filter(|it| !(self.lacks_effort && it.field == FIELDS[2]));
-        let bad = bad.map(|it| it.in_words(&self.name));
-        bad.chain(self.jump_remark()).chain(self.remark()).collect()
-    }
-
     /// Where its position jumps, in words.
     pub fn jump_remark(&self) -> Option<String> {
         let (first, others) = self.jumps.split_first()?;
@@ -87,22 +78,6 @@ impl JointFacts {
     pub fn has_odd_velocity(&self) -> bool {
         let slope = self.velocity_slope;
         slope.is_some_and(|slope| (slope - 1.0).abs() > ODD_SHARE)
-    }
-
-    /// What is odd about its velocity, in words.
-    pub fn remark(&self) -> Option<String> {
-        let slope = self.velocity_slope.filter(|_| self.has_odd_velocity())?;
-        let hint = if slope < 0.0 {
-            ": one of them has the other sign"
-        } else if self.is_in_degrees() {
-            ": positions are in degrees"
-        } else {
-            ""
-        };
-        Some(format!(
-            "the velocity of {} is {slope:.3} times the derivative of its position{hint}",
-            self.name
-        ))
     }
 }
 

@@ -44,7 +44,7 @@ fn a_recording_is_described() {
              from 1700000000.010000000 s to 1700000001.490000000 s\n\
              /joint_states: 100 x sensor_msgs/msg/JointState, 66.9 Hz\n  \
              joints a, b with position, effort; NaN in 100 messages\n  \
-             the effort of b is in no message\n  \
+             \
              a gap of 0.500 s at 0.490 s\n\
              made by: version: 1.2\n"
         )

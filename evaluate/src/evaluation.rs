@@ -36,7 +36,7 @@ pub struct Evaluation {
     pub runs: Vec<Run>,
     /// Samples that were lost or refused.
     pub lost: u64,
-    /// What is odd or wrong about the recordings, a sentence each.
+    /// Findings about the recordings, a sentence each.
     pub findings: Vec<String>,
     /// What the reader should know.
     pub notes: Vec<String>,

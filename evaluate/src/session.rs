@@ -18,7 +18,7 @@ use crate::recording::Named;
 pub struct Played {
     /// Every sample, in order.
     pub samples: Vec<TwinState>,
-    /// What is odd or wrong about the recording.
+    /// Findings about the recording.
     pub findings: Vec<Finding>,
     /// Samples of the recording that were lost or refused.
     pub refused: u64,

@@ -26,7 +26,7 @@ const MOST_REASONS: usize = 4;
 /// Resolution: what a person reads.
 const MOST_JUMPS: usize = 3;
 
-/// What an [`Assembler`] has counted. Numbers of messages unless a name says otherwise.
+/// Counts of an [`Assembler`]: numbers of messages or states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
     /// States handed on.
@@ -75,7 +75,7 @@ impl Counts {
     }
 }
 
-/// What became of a message.
+/// Result of taking a message.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Taken {
     /// The state is whole and follows the one before.
@@ -152,7 +152,7 @@ impl Assembler {
         self
     }
 
-    /// What it has counted.
+    /// Counts so far.
     pub fn counts(&self) -> Counts {
         Counts {
             parted: self.gather.in_vain(),
@@ -245,13 +245,13 @@ impl Assembler {
         let Some(place) = self.selection.publishers.add(message, received_ns) else {
             return true;
         };
-        // Of a recording all publishers but late ones are known; of a live source, zeros tell nothing at first.
+        // A first look knows all publishers of a recording but late ones. A live source begins with none.
         if self.selection.publishers.all.len() > known {
             self.selection.used =
                 choose(&self.selection.publishers.all, &self.selection.joint_names);
         }
         if self.selection.publishers.all[place].messages == 1 {
-            // It was looked at, but its times are those of this reading.
+            // The first look has counted it already; its times are those of this reading.
             self.selection.publishers.all[place].first_ns = received_ns;
         }
         self.selection.used[place]

@@ -2,7 +2,7 @@
 
 use crate::finding::Finding;
 
-/// Fewer messages do not tell what the stamps are.
+/// Least number of messages for a judgement of the stamps.
 /// Resolution: a fifth of a second at 100 Hz.
 const LEAST_MESSAGES: usize = 20;
 /// Stamps are coarse if this share of the messages has new values under the stamp of the message before.
@@ -18,7 +18,7 @@ const NEAR: f64 = 0.1;
 /// Powers of ten between s, ms, us and ns.
 const UNITS: f64 = 3.0;
 
-/// What the time of a message is.
+/// Source of the time of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Clock {
     /// The stamp in its header, or the time at which it was received where the publisher leaves the stamp at zero.

@@ -46,7 +46,7 @@ pub enum Finding {
     ConstantStamps {
         /// The stamp \[ns since the epoch\].
         stamp_ns: i64,
-        /// Number of messages that were looked at.
+        /// Number of messages in the head of the recording.
         messages: u64,
         /// Whether the time of recording replaces the stamps.
         is_replaced: bool,

@@ -11,7 +11,7 @@ use crate::publisher::{Publisher, Publishers, choose};
 use crate::selection::Selection;
 use crate::values::Ranges;
 
-/// Messages of a topic that are looked at.
+/// Number of messages in the head of a topic.
 /// Resolution: bounded memory, some 5 MB; 100 s of an arm at 100 Hz.
 const HEAD: usize = 10_000;
 
@@ -23,7 +23,7 @@ const OFF: f64 = 1.25;
 /// Physical: a hundred steps of a coarse encoder of 6000 steps per turn.
 const LEAST_RANGE: f64 = 0.1;
 
-/// What the head of a recording shows.
+/// Result of reading the head of a recording: topic, publishers, clock and ranges.
 #[derive(Debug, Clone)]
 pub struct Look {
     /// Topic of the joint states.
@@ -50,7 +50,9 @@ impl Look {
         topic: Option<&str>,
         wanted: Joints<'_>,
     ) -> Result<Self, SessionError> {
-        recording.check_comparable(wanted.names)?;
+        if !wanted.names.is_empty() {
+            recording.check_comparable(wanted.names)?;
+        }
         let look = match topic {
             Some(topic) => {
                 recording.joint_state_topic(topic)?;
@@ -247,7 +249,7 @@ impl Look {
         &self.selection.joint_names
     }
 
-    /// An assembler of what was looked at.
+    /// An assembler of the recording.
     pub fn assembler(&self) -> Assembler {
         Assembler::new(self.selection.rewound())
     }
@@ -297,7 +299,7 @@ impl Head {
             let Some(state) = states.next_state() else {
                 break;
             };
-            // What cannot be decoded is counted when all is read.
+            // The reading that follows counts messages that cannot be decoded.
             if let Ok(state) = state {
                 messages.push((state.log_time_ns, state.message.clone()));
             }

@@ -14,7 +14,7 @@ const TELLING_SAMPLES: u64 = 200;
 /// A position further beyond the URDF's limit than this is no bend of a mechanical stop \[rad\].
 /// Physical: arms are stopped by their controllers within a few degrees of the limit.
 const BEYOND_RAD: f64 = 0.2;
-/// Positions of more than so many times the URDF's limit, and of more than three turns, are degrees.
+/// Multiple of the URDF's limit from which positions of more than three turns are degrees.
 /// Physical: a degree is 57 times as small as a radian, and an arm uses more than a tenth of its range.
 const DEGREES: f64 = 4.0;
 const THREE_TURNS: f64 = 6.0 * std::f64::consts::PI;
@@ -188,7 +188,7 @@ fn in_degrees(facts: &JointFacts, limits: Option<[f64; 2]>) -> bool {
     let far = |[low, high]: [f64; 2], [lower, upper]: [f64; 2]| {
         high.max(-low) > THREE_TURNS.max(DEGREES * upper.max(-lower))
     };
-    // Where it jumped to is no motion of the arm.
+    // A jump is no motion of the arm.
     let range = facts.position_range.filter(|_| facts.jumps.is_empty());
     let told = range.zip(limits);
     facts.is_in_degrees() || told.is_some_and(|(range, limits)| far(range, limits))

@@ -7,7 +7,7 @@ use tauscope_archive::ros::JointState;
 
 use crate::suggest;
 
-/// Publishers that are told apart on a topic; further ones are not listed.
+/// Largest number of publishers that are distinguished on a topic.
 /// Resolution: bounded memory, and what a person reads.
 const MOST: usize = 16;
 
@@ -227,7 +227,7 @@ pub(crate) fn choose(all: &[Publisher], joints: &[String]) -> Vec<bool> {
         let repeats = publisher.zero_effort && publisher.alternates() && own.all(measured);
         *used &= !(some_give_effort && (!publisher.effort || repeats));
     }
-    // Where nobody gives positions, each message is refused for that reason.
+    // Without any position, each message is refused for that reason.
     if !used.contains(&true) {
         used.fill(true);
     }
@@ -268,7 +268,7 @@ mod tests {
         let driver = publisher("a b c", [true, true, false], 1200);
         let gripper = publisher("finger", [true, true, true], 240);
         assert_eq!(chosen(&[gripper, repeats.clone(), zeros, driver]), [3]);
-        // Where nobody measures efforts, positions are better than nothing.
+        // Positions without efforts are used if no publisher measures efforts.
         assert_eq!(chosen(&[repeats]), [0]);
     }
 

@@ -52,7 +52,7 @@ pub fn read(path: &Path) -> Result<Robot, UrdfError> {
             (_, None) => format!("{}: {error}", path.display()),
         })
     })?;
-    // What is wrong with links and joints comes before what is odd about bodies.
+    // Faults of links and joints are reported before those of bodies.
     let model = Model::from_urdf(&text)?;
     let findings = check_bodies(&text)?;
     let sentences = findings.iter();

@@ -1,11 +1,11 @@
-//! What of a topic is used, and how: the result of a first look.
+//! Selection of what is used of a topic: publishers, clock, ranges.
 
 use crate::clock::Clock;
 use crate::finding::Finding;
 use crate::publisher::{Publisher, Publishers};
 use crate::values::Ranges;
 
-/// What of a topic is used, and how.
+/// Selection of what is used of a topic.
 #[derive(Debug, Clone)]
 pub(crate) struct Selection {
     /// The robot's joints, in its order.

@@ -21,10 +21,11 @@ const STEP_QUANTILE: f64 = 0.95;
 /// Physical: a coarse quantisation rounds small efforts to zero.
 const MOST_ZEROS: f64 = 0.1;
 
-/// Magnitudes by their binary exponent: a histogram of bounded size for values of any size.
+/// Magnitudes other than zero by their binary exponent: a histogram of bounded size for values of any size. Zeros are
+/// counted apart, because a joint that mostly rests has a range all the same.
 #[derive(Debug, Clone)]
 struct Magnitudes {
-    /// Counts of `[2^(i - OFFSET), 2^(i + 1 - OFFSET))`; zeros are in the first.
+    /// Counts of `[2^(i - OFFSET), 2^(i + 1 - OFFSET))`.
     counts: [u32; Self::BINS],
     total: u64,
     zeros: u64,
@@ -46,19 +47,23 @@ impl Magnitudes {
     const OFFSET: i32 = 40;
 
     fn add(&mut self, value: f64) {
+        self.total += 1;
+        if value == 0.0 {
+            self.zeros += 1;
+            return;
+        }
         let exponent = value.abs().max(f64::MIN_POSITIVE).log2().floor() as i32;
         let bin = (exponent + Self::OFFSET).clamp(0, Self::BINS as i32 - 1);
         self.counts[bin as usize] = self.counts[bin as usize].saturating_add(1);
-        self.total += 1;
-        self.zeros += u64::from(value == 0.0);
     }
 
     /// Upper edge of the bin that holds the quantile; `None` while there are too few values.
     fn quantile(&self, share: f64) -> Option<f64> {
-        if self.total < LEAST_VALUES {
+        let count = self.total - self.zeros;
+        if count < LEAST_VALUES {
             return None;
         }
-        let wanted = (share * self.total as f64).ceil() as u64;
+        let wanted = (share * count as f64).ceil() as u64;
         let mut below = 0;
         let bin = self.counts.iter().position(|count| {
             below += u64::from(*count);
@@ -275,6 +280,22 @@ mod tests {
         assert!(judged(Some(30.0), spikes(1.0)).contains(&Judgement::Impossible));
         // Milliamperes beside a limit in N m.
         assert!(!judged(Some(30.0), spikes(100.0)).contains(&Judgement::Impossible));
+    }
+
+    #[test]
+    fn a_joint_that_mostly_rests_may_move() {
+        let judged = judged(None, |k| {
+            if k < 1150 {
+                0.0
+            } else {
+                0.3 * f64::from(k % 5)
+            }
+        });
+        assert!(
+            judged
+                .iter()
+                .all(|judgement| *judgement == Judgement::Possible)
+        );
     }
 
     #[test]

@@ -66,12 +66,12 @@ const SLIPS: &[Slip] = &[
     Slip {
         typed: "init @demo.mcap @demo_validation.mcap --robot @other.urdf --out @x10",
         code: 2,
-        says: &["axis_1", "it names joint1"],
+        says: &["axis_1", "name joint1"],
     },
     Slip {
         typed: "init @demo.mcap @nowhere.mcap --robot @demo_arm.urdf --out @x11",
         code: 2,
-        says: &["there is no file"],
+        says: &["there is no recording", "nowhere.mcap"],
     },
     Slip {
         typed: "info @torn.mcap",

@@ -13,7 +13,7 @@ pub(super) static EFFECT: Effect = Effect {
     name: "link_inertia",
     words: Words {
         without_numbers: Some(
-            "Link {place} is another body than its URDF says, and no one name fits that. The recordings do not determine all of its numbers.",
+            "The body of link {place} differs from its URDF in several ways. The recordings do not determine all of its numbers.",
         ),
         ..Words::new(
             "Link inertia",

@@ -1,11 +1,11 @@
-//! What a pass over a recording reads for a calibration.
+//! One pass over a recording for a calibration.
 
 use tauscope_bus::{SampleRef, Sink, StageError, TwinState, flags};
 use tauscope_session::{Finding, Plausible};
 
 use super::CalibrateError;
 
-/// What was read of a recording, or of all.
+/// Counts and findings of one recording, or of all.
 #[derive(Debug, Default)]
 pub(super) struct Read {
     /// Samples that were lost or refused.

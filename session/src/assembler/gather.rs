@@ -69,7 +69,7 @@ const NOTHING: Whole = Whole {
 };
 
 impl Gather {
-    /// Of so many joints, at most 16.
+    /// Nothing gathered yet, of at most 16 joints.
     pub fn new(joint_count: usize) -> Self {
         Self {
             all: u32::MAX.checked_shr(32 - joint_count as u32).unwrap_or(0),

@@ -1,4 +1,4 @@
-//! How the stamp of a state follows the one before.
+//! Order of the stamps: which state follows, repeats or precedes the newest one.
 
 use std::collections::VecDeque;
 
@@ -6,16 +6,15 @@ use tauscope_bus::{JointArray, MAX_JOINTS};
 
 use super::gather::Whole;
 
-/// A stamp this far behind the one before is a clock that was set back; anything less is a message
-/// that came too late.
-/// Tuned: by hand, on no recorded seeds; not swept.
+/// Step back of the stamps from which the clock was set back; a smaller one is an out-of-order delivery \[ns\].
+/// Physical: networks delay a message by less than half a second, unless the connection is lost.
 const JUMP_BACK_NS: i64 = 500_000_000;
 
 /// Stamps that are remembered, to recognise a copy that another relay delivers later.
 /// Resolution: memory; half a second at 100 Hz.
 const REMEMBERED: usize = 64;
 
-/// What a state is to the newest one.
+/// Relation of a state to the newest one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Next {
     /// The next one.
@@ -26,9 +25,9 @@ pub(super) enum Next {
     Late,
     /// Behind a jump of the stamps, and refused.
     Behind,
-    /// The same again.
+    /// A repetition of the newest.
     Repeated,
-    /// The same again, after others.
+    /// A repetition of an earlier one.
     Copy,
     /// Another one with the same stamp.
     Stalled,
@@ -58,8 +57,8 @@ impl Default for Order {
 }
 
 impl Order {
-    /// What `state` is; one that follows, or begins anew, is the newest from here on. Where a set-back clock is refused,
-    /// nothing begins anew.
+    /// Relation of `state` to the newest one. A state that follows, or begins anew, becomes the newest. With
+    /// `refuses_set_back`, no state begins anew.
     pub fn next(&mut self, state: &Whole, refuses_set_back: bool) -> Next {
         let values = [state.position, state.effort];
         let own = (state.stamp_ns, state.position[0]);

@@ -2,7 +2,7 @@
 
 use tauscope_bus::{Detection, Emit, MAX_JOINTS, Name, Stage, StageError, TwinState, flags};
 
-use super::detector::{Detector, Judgement, State};
+use super::detector::{Detector, Judgement, Seen, State};
 use super::error::ConfigError;
 use super::events::{Alarm, OwnEvents, Step};
 use super::isolation::{Contact, Isolation};
@@ -117,6 +117,26 @@ impl Detect {
 }
 
 impl Detect {
+    /// Joints and place of the contact of a sample: those that the detector has `seen`, or else those that its residuals
+    /// show. A sample with a score below the threshold, while the alarm is held, does not change them.
+    fn isolate(
+        &mut self,
+        sample: &TwinState,
+        score: f64,
+        seen: Option<Seen>,
+        begins: bool,
+    ) -> (u32, Option<Contact>) {
+        if begins {
+            self.isolation.begin();
+        }
+        let counts = begins || score >= self.rule.threshold();
+        let isolation = &mut self.isolation;
+        let joints = (seen.and_then(|seen| seen.joints))
+            .unwrap_or_else(|| isolation.loaded_joints(sample, score, counts));
+        let place = (seen.and_then(|seen| seen.place)).or_else(|| isolation.locate(sample, counts));
+        (joints, place)
+    }
+
     fn tell_place(&self, contact: &Contact, slot: &mut Detection) {
         let name = |link| Name::new(self.isolation.link_name(link));
         slot.header.flags |= flags::FORCE;
@@ -177,23 +197,10 @@ impl Stage<TwinState, Detection> for Detect {
             None if judgement.ready || contact_ns.is_some() || event != 0 => usual,
             None => "not_ready",
         };
-        let mut joints = 0;
-        let mut contact = None;
-        if contact_ns.is_some() {
-            let begins = event == Detection::ONSET;
-            if begins {
-                self.isolation.begin();
-            }
-            // Behind the push the alarm is held; those samples say nothing about it.
-            let counts = begins || judgement.score >= self.rule.threshold();
-            joints = seen.and_then(|seen| seen.joints).unwrap_or_else(|| {
-                self.isolation
-                    .loaded_joints(sample, judgement.score, counts)
-            });
-            contact = seen
-                .and_then(|seen| seen.place)
-                .or_else(|| self.isolation.locate(sample, counts));
-        }
+        let (joints, contact) = match contact_ns {
+            Some(_) => self.isolate(sample, judgement.score, seen, event == Detection::ONSET),
+            None => (0, None),
+        };
         let details = self.detector.details().filter(|_| judgement.ready);
         out.emit(&mut |slot| {
             slot.header = sample.header;
