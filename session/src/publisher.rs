@@ -72,9 +72,10 @@ impl Publisher {
         (span_s > 0.0 && self.messages > 1).then(|| (self.messages - 1) as f64 / span_s)
     }
 
-    /// Whether it alternates with another publisher. A driver whose drives are off sends its zeros in a row.
+    /// Whether it alternates with another publisher. A driver whose drives are off sends its zeros in a row, and an arm
+    /// that starts at rest may begin with one.
     fn alternates(&self) -> bool {
-        2 * self.runs >= self.messages
+        self.runs > 1 && 2 * self.runs >= self.messages
     }
 
     /// Whether its messages measure efforts.

@@ -95,7 +95,7 @@ fn what_is_wrong_with_a_whole_recording_shows_when_it_is_opened() {
     );
     let said = error(&bag, &cell("a x y"));
     assert!(
-        said.contains("no joint state names x, y; the messages name a, b"),
+        said.contains("no joint state names x, y. The messages name a, b"),
         "{said}"
     );
     let other = FileConfig {
