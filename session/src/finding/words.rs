@@ -22,12 +22,12 @@ impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Publishers { used, ignored } => publishers(f, used, ignored),
-            Self::ConstantStamps { .. }
-            | Self::CoarseStamps { .. }
-            | Self::ScaledStamps { .. }
-            | Self::JumpsBack { .. }
-            | Self::LateMessages { .. }
-            | Self::StalledStamps { .. } => self.of_time(f),
+            Self::ConstantStamps { .. } | Self::CoarseStamps { .. } | Self::ScaledStamps { .. } => {
+                self.of_time(f)
+            }
+            Self::JumpsBack { .. } | Self::LateMessages { .. } | Self::StalledStamps { .. } => {
+                self.of_order(f)
+            }
             Self::NotFinite { joint, values } => {
                 let what = values.in_words(joint);
                 write!(
@@ -143,6 +143,12 @@ impl Finding {
                     power(*ratio)
                 )
             }
+            _ => Ok(()),
+        }
+    }
+
+    fn of_order(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
             Self::JumpsBack {
                 jumps,
                 count,
