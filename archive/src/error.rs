@@ -184,7 +184,7 @@ impl ArchiveError {
         move |source| Self::Io { path, source }
     }
 
-    /// What is wrong, without the place in the file where it is known.
+    /// The fault, without the place in the file where it is known.
     pub fn reason(&self) -> String {
         match self {
             Self::Decode { source, .. } => source.to_string(),

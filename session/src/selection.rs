@@ -45,7 +45,7 @@ impl Selection {
             .map(|(publisher, _)| publisher)
     }
 
-    /// The same before any message: counts begin at zero.
+    /// Selection before any message, with counts of zero.
     pub fn rewound(&self) -> Self {
         let mut this = self.clone();
         for publisher in &mut this.publishers.all {

@@ -14,7 +14,7 @@ use crate::publisher::Publisher;
 pub struct Survey {
     /// The publishers, in the order of their first messages.
     pub publishers: Vec<Publisher>,
-    /// What is odd or wrong.
+    /// Findings.
     pub findings: Vec<Finding>,
 }
 

@@ -140,7 +140,7 @@ impl Ranges {
         }
         of.fields[field].add(value);
         self.values += 1;
-        // Every so often is enough: a range changes slowly.
+        // An update now and then suffices: a range changes slowly.
         if self.values.is_power_of_two() || self.values.is_multiple_of(1 << 14) {
             self.update();
         }

@@ -20,7 +20,7 @@ pub struct Args {
     json: bool,
 }
 
-/// What is printed of a recording.
+/// Lines printed for a recording.
 #[derive(Debug, Serialize)]
 struct Printed {
     #[serde(flatten)]

@@ -22,11 +22,11 @@ const MOST_NM_PER_A: f64 = 300.0;
 /// The arm and its recordings, before anything is fitted.
 #[derive(Debug)]
 pub struct Looked {
-    /// What `explain` is asked, with the unit of the effort.
+    /// Request to `explain`, with the unit of the effort.
     pub request: Request,
-    /// What `explain` takes.
+    /// Input of `explain`.
     pub input: Input,
-    /// What is known of the input once the engine has taken it.
+    /// Facts about the input that are needed after the engine has taken it.
     pub kept: Kept,
     /// What was found, a sentence each.
     pub sentences: Vec<String>,
@@ -34,7 +34,7 @@ pub struct Looked {
     pub no_line: Option<ScaleFault>,
 }
 
-/// What is given on the command line.
+/// Arguments of the command line.
 #[derive(Debug)]
 pub struct Told<'a> {
     /// The URDF.
@@ -201,7 +201,7 @@ fn hold_out(request: &mut Request, input: &mut Input) {
     (request.holdout, request.fit) = (held, kept);
 }
 
-/// How far the joints move in all \[rad or m\].
+/// Total travel of the joints \[rad or m\].
 fn travel(recording: &Recording, joints: usize) -> f64 {
     let rows: Vec<&[f64]> = recording.position.chunks_exact(joints).collect();
     let steps = rows.windows(2).map(|pair| {
