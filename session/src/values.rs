@@ -147,7 +147,7 @@ impl Ranges {
         judgement
     }
 
-    /// Forgets the newest efforts: the next value begins a new recording or follows the head that was looked at.
+    /// Discards the newest efforts: the next value begins a new recording, or the head of one is read again.
     pub fn rewind(&mut self) {
         for joint in &mut self.joints {
             joint.last_effort = None;

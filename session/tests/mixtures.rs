@@ -225,7 +225,7 @@ proptest! {
         prop_assert_eq!(has(|it| matches!(it, Finding::NotFinite { .. })), values == Values::NotANumber);
         let is_garbage = matches!(values, Values::Garbage(_));
         prop_assert_eq!(has(|it| matches!(it, Finding::Impossible { .. })), is_garbage);
-        // No sentence leaks a number that nobody can read.
+        // A value of 300 digits would make the sentence longer.
         for finding in &survey.findings {
             prop_assert!(finding.to_string().len() < 700, "{finding}");
         }

@@ -171,7 +171,7 @@ fn scale(request: &Request) -> Option<EffortScale> {
         fit: &fit,
         validation: &[],
     };
-    // Where no line can be fitted, the explanation finds out why.
+    // Without a fitted line the explanation gives the reason.
     let fitted = job.fit(&|_, _| true, &|_, _| {}).ok()?;
     Some(EffortScale::of(&telling_slopes_of(&fitted.file)))
 }

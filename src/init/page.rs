@@ -24,8 +24,8 @@ pub struct Seen<'a> {
     pub is_live: bool,
 }
 
-/// The page as Markdown: what the recordings are, what the twin leaves out, what the detector has learnt, what to
-/// record next, and how to go on.
+/// The page as Markdown: the recordings, the physics that the twin leaves out, the threshold that the detector has learnt,
+/// the recordings to add, and the next commands.
 pub fn page(folder: &Folder, seen: &Seen<'_>, report: &Report, learnt: &Learnt) -> String {
     let (lost, is_live) = (seen.lost, seen.is_live);
     let mut text = format!("# {}\n", seen.cell.facts.name);

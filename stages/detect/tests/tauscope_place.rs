@@ -1,6 +1,6 @@
 //! `tauscope`: joints and link of a contact follow from all its samples.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common::{Out, setup};
 use nalgebra::Vector3;

@@ -74,7 +74,7 @@ impl Packer {
     /// A packer for a cell whose source is live.
     ///
     /// # Errors
-    /// If a sample has no room for so many joints.
+    /// If there are more joints than a sample holds.
     pub fn new(setup: &Setup, settings: PackSettings) -> Result<Self, ConfigError> {
         Self::with(setup, settings, Assembler::live)
     }
@@ -82,7 +82,7 @@ impl Packer {
     /// A packer whose states are assembled by what `assembler` makes of the joints' names.
     ///
     /// # Errors
-    /// If a sample has no room for so many joints.
+    /// If there are more joints than a sample holds.
     pub fn with(
         setup: &Setup,
         settings: PackSettings,

@@ -103,8 +103,8 @@ fn moving_s(recordings: &[Recording], joint: usize, n: usize) -> f64 {
     sum
 }
 
-/// What is odd or wrong about each recording, a sentence each: the findings on reading, the parts that could not be used,
-/// and the clock that stamps were put on.
+/// Faults of each recording, a sentence each: the findings on reading, the unused parts, and the clock that stamps were
+/// put on.
 pub fn losses(input: &Input) -> Vec<String> {
     let recordings = || input.fit.iter().chain(&input.holdout);
     let found: Vec<_> = recordings()

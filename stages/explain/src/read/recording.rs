@@ -47,7 +47,7 @@ pub struct Recording {
     pub clock: Option<EvenClock>,
     /// What was dropped on reading.
     pub losses: Losses,
-    /// What is odd or wrong about it.
+    /// Findings on reading.
     pub findings: Vec<Finding>,
 }
 

@@ -8,7 +8,7 @@ use super::Packer;
 /// Findings that are listed in one report.
 /// Resolution: length of the message.
 const LISTED: usize = 6;
-/// Interval of the reports of a live source that goes on to refuse \[ns\].
+/// Interval of the reports while a live source sends messages that are refused \[ns\].
 /// Resolution: what a person reads.
 const INTERVAL_NS: i64 = 60_000_000_000;
 
@@ -57,7 +57,7 @@ impl Packer {
         (!all.is_empty()).then(|| all.join("; "))
     }
 
-    /// The same for a live source, which reports once something is refused, and again at intervals while that goes on.
+    /// Report for a live source: at the first refused message, then at intervals while more are refused.
     pub fn newly_refused(&mut self, now_ns: i64) -> Option<String> {
         let sides: u64 = [&self.command, &self.reference]
             .map(Gather::bad)
