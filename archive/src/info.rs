@@ -20,6 +20,9 @@ const GAP_PERIODS: i64 = 5;
 /// The longest gaps of a topic that are listed.
 /// Tuned: by eye, for the length of the list.
 const GAPS_LISTED: usize = 5;
+/// Joints of a topic that are listed.
+/// Resolution: bounds memory; more than the joints of a humanoid.
+const MOST_NAMES: usize = 64;
 
 /// What is in a recording: found by reading all of it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -78,7 +81,7 @@ pub struct Gap {
 /// What joint states hold.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct JointsInfo {
-    /// Joints in the first message.
+    /// Joints that messages name, each once, in the order in which they come; at most [`MOST_NAMES`].
     pub names: Vec<String>,
     /// Whether positions were given in any message.
     pub position: bool,
@@ -236,8 +239,10 @@ impl Tally {
 
 impl JointsInfo {
     fn add(&mut self, state: &JointState) {
-        if self.names.is_empty() {
-            self.names.clone_from(&state.name);
+        for name in &state.name {
+            if self.names.len() < MOST_NAMES && !self.names.contains(name) {
+                self.names.push(name.clone());
+            }
         }
         self.position |= !state.position.is_empty();
         self.velocity |= !state.velocity.is_empty();
@@ -254,8 +259,12 @@ fn in_seconds(ns: i64) -> f64 {
 }
 
 fn messages(count: u64) -> String {
+    counted(count, "message")
+}
+
+fn counted(count: u64, noun: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
-    format!("{count} message{plural}")
+    format!("{count} {noun}{plural}")
 }
 
 /// What fits on a line of a terminal; a simulated archive holds its whole scenario.
@@ -279,13 +288,28 @@ impl fmt::Display for Info {
             self.path.display(),
             self.kind,
             self.bytes,
-            messages(self.message_count),
+            if self.kind.is_table() {
+                counted(self.message_count, "row")
+            } else {
+                messages(self.message_count)
+            },
             self.duration_s
         )?;
         if let Some((start_ns, end_ns)) = self.start_ns.zip(self.end_ns) {
             writeln!(f, "from {} s to {} s", seconds(start_ns), seconds(end_ns))?;
         }
         for topic in &self.topics {
+            let Topic {
+                name,
+                message_count,
+                type_name,
+                ..
+            } = &topic.topic;
+            if self.kind.is_table() {
+                f.write_str(&counted(*message_count, "row"))?;
+            } else {
+                write!(f, "{name}: {message_count} x {type_name}")?;
+            }
             write!(f, "{topic}")?;
         }
         for (key, value) in self.provenance.iter().flatten() {
@@ -301,15 +325,9 @@ impl fmt::Display for Info {
     }
 }
 
+/// All of a topic but its name, type and number of messages.
 impl fmt::Display for TopicInfo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Topic {
-            name,
-            type_name,
-            message_count,
-            ..
-        } = &self.topic;
-        write!(f, "{name}: {message_count} x {type_name}")?;
         match self.rate_hz {
             Some(rate_hz) => writeln!(f, ", {rate_hz:.1} Hz")?,
             None => writeln!(f)?,

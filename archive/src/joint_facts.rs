@@ -38,7 +38,7 @@ pub struct JointFacts {
     /// The recorded velocity over the derivative of the position, where the joint moves enough to tell: 1 as it should
     /// be.
     pub velocity_slope: Option<f64>,
-    /// The velocity that all messages give, where it never changes \[rad/s or m/s\].
+    /// The velocity that all messages give, where it never changes \[rad/s or m/s\]; -0 counts as 0.
     pub constant_velocity: Option<f64>,
     /// How far it moved in all \[rad or m\]; 0 where velocities or positions are missing.
     pub travel: f64,
@@ -214,7 +214,7 @@ impl JointTally {
             position_range: self.range,
             velocity_slope: tells.then(|| sums.products / sums.squares),
             constant_velocity: (self.velocity_range)
-                .and_then(|[low, high]| (low.total_cmp(&high).is_eq()).then_some(low)),
+                .and_then(|[low, high]| (high - low == 0.0).then_some(low + 0.0)),
             travel: sums.moved,
             lacks_effort: self.efforts == 0,
             effort_is_zero: self.efforts > 0 && self.zeros == self.efforts,

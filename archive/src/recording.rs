@@ -51,6 +51,13 @@ pub enum RecordingKind {
     Lerobot,
 }
 
+impl RecordingKind {
+    /// Whether it is a table of rows: it has neither topics nor log times of its own.
+    pub fn is_table(self) -> bool {
+        matches!(self, Self::Csv | Self::Lerobot)
+    }
+}
+
 impl std::fmt::Display for RecordingKind {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {

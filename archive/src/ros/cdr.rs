@@ -54,7 +54,12 @@ pub enum DecodeError {
         nanosec: u32,
     },
     /// An array that does not fit the names.
-    #[error("`{array}` has {} for {}", counted(*len, ENTRY), counted(*names, NAME))]
+    #[error(
+        "`{array}` has {} for {}{}. Make the driver fill all arrays to the same length",
+        counted(*len, ENTRY),
+        counted(*names, NAME),
+        lacking(without, names.saturating_sub(*len))
+    )]
     ArrayLength {
         /// Name of the array.
         array: &'static str,
@@ -62,6 +67,8 @@ pub enum DecodeError {
         len: usize,
         /// Number of names.
         names: usize,
+        /// The first few names without an entry, if the entries are in the order of the names.
+        without: Vec<String>,
     },
     /// Values without any name.
     #[error("`name` is empty, but `{array}` has {}: their joints are unknown", counted(*len, ENTRY))]
@@ -96,6 +103,32 @@ const NAME: [&str; 2] = ["name", "names"];
 
 fn counted(count: usize, [one, many]: [&str; 2]) -> String {
     format!("{count} {}", if count == 1 { one } else { many })
+}
+
+/// Names without an entry that an error lists.
+/// Resolution: what a person reads.
+const MOST_NAMED: usize = 8;
+
+impl DecodeError {
+    /// An array of `len` entries that does not fit `names`.
+    pub(super) fn array_length(array: &'static str, len: usize, names: &[String]) -> Self {
+        let without = names.iter().skip(len).take(MOST_NAMED).cloned();
+        Self::ArrayLength {
+            array,
+            len,
+            names: names.len(),
+            without: without.collect(),
+        }
+    }
+}
+
+/// The names without an entry, `count` in total.
+fn lacking(without: &[String], count: usize) -> String {
+    match count - without.len() {
+        0 if count == 0 => String::new(),
+        0 => format!("; {} would have none", without.join(", ")),
+        more => format!("; {} and {more} more would have none", without.join(", ")),
+    }
 }
 
 fn of_encapsulation([first, second]: [u8; 2]) -> String {

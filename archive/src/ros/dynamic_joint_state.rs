@@ -56,16 +56,16 @@ impl Message for DynamicJointState {
 
     fn check(&self) -> Result<(), DecodeError> {
         self.header.stamp.check()?;
-        let fits = |array, len, names| {
-            if len == names {
+        let fits = |array, len, names: &[String]| {
+            if len == names.len() {
                 return Ok(());
             }
-            Err(DecodeError::ArrayLength { array, len, names })
+            Err(DecodeError::array_length(array, len, names))
         };
-        let joints = self.joint_names.len();
+        let joints = &self.joint_names;
         fits("interface_values", self.interface_values.len(), joints)?;
         for joint in &self.interface_values {
-            fits("values", joint.values.len(), joint.interface_names.len())?;
+            fits("values", joint.values.len(), &joint.interface_names)?;
         }
         Ok(())
     }
@@ -149,14 +149,19 @@ mod tests {
         let words = |message: &DynamicJointState| message.check().map_err(|e| e.to_string());
         assert_eq!(
             words(&message),
-            Err("`interface_values` has 0 entries for 1 name".to_owned())
+            Err(
+                "`interface_values` has 0 entries for 1 name; a would have none. Make the driver fill all arrays to the same length"
+                    .to_owned()
+            )
         );
         message.interface_values = vec![interfaces(&[("position", 1.0)])];
         assert_eq!(words(&message), Ok(()));
         message.interface_values[0].values.push(2.0);
         assert_eq!(
             words(&message),
-            Err("`values` has 2 entries for 1 name".to_owned())
+            Err(
+                "`values` has 2 entries for 1 name. Make the driver fill all arrays to the same length".to_owned()
+            )
         );
     }
 }

@@ -46,11 +46,7 @@ impl Message for JointState {
                 return Err(DecodeError::NoNames { array, len });
             }
             if len != 0 && len != self.name.len() {
-                return Err(DecodeError::ArrayLength {
-                    array,
-                    len,
-                    names: self.name.len(),
-                });
+                return Err(DecodeError::array_length(array, len, &self.name));
             }
         }
         Ok(())
