@@ -128,7 +128,7 @@ fn inertia(body: &Body) -> Option<BodyFinding> {
     if principal.smallest() < -least {
         let fault = BodyFault::NotPositiveDefinite {
             moments_kgm2,
-            is_in_rows: is_in_rows(&body.numbers),
+            rows: Some(body.numbers).filter(is_in_rows),
         };
         return Some(finding(Impossible, body, fault));
     }

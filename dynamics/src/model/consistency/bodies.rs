@@ -280,6 +280,7 @@ fn body(inertial: Node, name: &str, extent_m: f64, along_m: Vector3<f64>) -> Opt
         place: LinkPlace {
             link: name.to_owned(),
             line: line(inertial),
+            inertia_line: line(inertia.unwrap_or(inertial)),
         },
         mass_kg,
         numbers,

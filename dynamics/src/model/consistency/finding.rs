@@ -16,6 +16,8 @@ pub struct LinkPlace {
     pub link: String,
     /// Its line.
     pub line: u32,
+    /// The line of its `<inertia>`, where it has one.
+    pub inertia_line: u32,
 }
 
 /// A fault in the inertial numbers of one or several links. Moments are principal moments of inertia about the centre of
@@ -26,8 +28,8 @@ pub enum BodyFault {
     NotPositiveDefinite {
         /// Principal moments.
         moments_kgm2: [f64; 3],
-        /// Whether the six numbers look like the first two rows of a matrix.
-        is_in_rows: bool,
+        /// The six numbers, where they look like the first two rows of a matrix.
+        rows: Option<[f64; 6]>,
     },
     /// The largest principal moment exceeds the sum of the other two.
     TriangleBroken {
@@ -135,8 +137,21 @@ impl BodyFinding {
         self.links.first().map_or("", |place| &place.link)
     }
 
-    /// Line of the first link's `<inertial>`, or else of its `<link>`, from 1.
+    /// Line of the first link's element with the fault, from 1: `<inertia>` or `<inertial>`.
     pub fn line(&self) -> u32 {
-        self.links.first().map_or(0, |place| place.line)
+        let is_elsewhere = matches!(
+            self.fault,
+            BodyFault::CentreFar { .. }
+                | BodyFault::NoMass { .. }
+                | BodyFault::MassUnit { .. }
+                | BodyFault::SameMass { .. }
+        );
+        self.links.first().map_or(0, |place| {
+            if is_elsewhere {
+                place.line
+            } else {
+                place.inertia_line
+            }
+        })
     }
 }

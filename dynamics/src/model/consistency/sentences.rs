@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::bodies::NUMBERS;
 use super::finding::{BodyFault, BodyFinding, BodySeverity, LinkPlace, Substitute};
 
 /// Upper bound on the links that a sentence names.
@@ -22,8 +23,8 @@ fn seen(finding: &BodyFinding) -> String {
     match &finding.fault {
         BodyFault::NotPositiveDefinite {
             moments_kgm2: [least, ..],
-            is_in_rows,
-        } => not_positive_definite(&names, *least, *is_in_rows),
+            rows,
+        } => not_positive_definite(&names, *least, *rows),
         BodyFault::TriangleBroken { moments_kgm2, slip } => {
             let verdict = match finding.severity {
                 BodySeverity::Impossible => "is impossible",
@@ -93,32 +94,41 @@ fn seen(finding: &BodyFinding) -> String {
     }
 }
 
-fn not_positive_definite(names: &str, least: f64, is_in_rows: bool) -> String {
-    let rows = if is_in_rows {
-        " Its numbers look like the first two rows of a 3x3 matrix; the order in a URDF is ixx, ixy, ixz, iyy, iyz, izz."
-    } else {
-        ""
-    };
+fn not_positive_definite(names: &str, least: f64, rows: Option<[f64; 6]>) -> String {
+    let rows = rows.map_or_else(String::new, |numbers| {
+        let pairs = NUMBERS.iter().zip(numbers);
+        let pairs: Vec<String> = pairs
+            .map(|(name, value)| format!("{name}=\"{value}\""))
+            .collect();
+        format!(
+            " Its attributes {} look like the first two rows of a 3x3 matrix. Then iyy holds ixy again, iyz holds iyy, izz holds \
+             iyz, and izz itself is missing.",
+            pairs.join(" ")
+        )
+    });
     format!(
-        "The inertia of {names} is impossible: its smallest principal moment is {} kg m², and no body has one below \
-         zero.{rows} Correct its <inertia>.",
+        "The inertia of {names} is impossible, because it is not positive definite: its smallest principal moment is {} kg m².\
+         {rows}",
         figure(least)
     )
 }
 
 /// `inertia`: the verdict and the beginning of the next sentence.
 fn triangle(inertia: &str, [a, b, c]: &[f64; 3], slip: Option<(&'static str, f64, f64)>) -> String {
-    let slip = slip.map_or_else(String::new, |(name, value, better)| {
-        format!(
-            " {name}=\"{better}\" instead of {name}=\"{value}\" would be possible: check it for a decimal slip."
-        )
-    });
+    let advice = slip.map_or_else(
+        || "Correct its <inertia>.".to_owned(),
+        |(name, value, better)| {
+            format!(
+                "{name}=\"{value}\" may be a decimal slip: {name}=\"{better}\" would be valid. Check the data sheet."
+            )
+        },
+    );
     format!(
-        "{inertia} largest principal moment is {} kg m², more than the sum of the other two, {} and {} kg m². Correct \
-         its <inertia>.{slip}",
+        "{inertia} largest principal moment is {} kg m². It cannot exceed the sum of the other two ({} + {} = {} kg m²). {advice}",
         figure(*c),
         figure(*b),
-        figure(*a)
+        figure(*a),
+        figure(a + b)
     )
 }
 
@@ -165,9 +175,9 @@ fn inertia_unit(count: usize, unit: &str, masses_in_g: bool) -> String {
 
 /// The sentence on the numbers that the twin uses.
 fn on_the_substitute(finding: &BodyFinding) -> String {
-    let until = "until the file is corrected";
+    let again = "Correct the file and run the command again.";
     if let BodyFault::CentreFar { is_in_mm: true, .. } = finding.fault {
-        return format!(" The twin reads it as mm {until}.");
+        return " In this run the twin reads it as mm.".to_owned();
     }
     match finding.substitutes.as_slice() {
         [] => match finding.fault {
@@ -182,13 +192,16 @@ fn on_the_substitute(finding: &BodyFinding) -> String {
                 ..
             },
         ] => format!(
-            " The twin uses that of a uniform cylinder of the same mass ({} kg m²) {until}.",
+            " In this run the twin uses the inertia of a uniform cylinder of the same mass instead (principal moments {} kg m²). \
+             {again}",
             figures(moments)
         ),
         [first, ..] if first.cylinder_kgm2.is_some() => {
-            format!(" The twin uses those of uniform cylinders of the same masses {until}.")
+            format!(
+                " In this run the twin uses the inertias of uniform cylinders of the same masses instead. {again}"
+            )
         }
-        _ => format!(" The twin converts them {until}."),
+        _ => " In this run the twin converts them.".to_owned(),
     }
 }
 
@@ -234,6 +247,7 @@ mod tests {
         let place = |link: &str| LinkPlace {
             link: link.to_owned(),
             line: 1,
+            inertia_line: 1,
         };
         let all = ["a", "b", "c", "d", "e"].map(place);
         assert_eq!(names(&all[..1]), "link `a`");
