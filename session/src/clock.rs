@@ -9,7 +9,8 @@ const LEAST_MESSAGES: usize = 20;
 /// Physical: two publishers of one clock tick share at most half of their stamps; a driver that repeats a message
 /// repeats its values, too.
 const COARSE_SHARE: f64 = 0.6;
-/// Coarser stamps do not show how a joint moves \[s\].
+/// Resolution of the stamps up to which the time of recording replaces them \[s\]. It includes delays of the network and
+/// of the recorder, which coarser stamps cannot reveal.
 /// Physical: a pause of this length is a gap for the filters of the twin.
 const COARSEST_S: f64 = 0.25;
 /// Distance of the ratio of two clocks from a power of 1000, in powers of ten, that still is that power.
@@ -112,6 +113,7 @@ impl Stamps {
         let finding = Finding::CoarseStamps {
             resolution_s,
             messages_per_stamp: self.pairs.len() as f64 / (steps.len() + 1) as f64,
+            has_log_times,
             is_replaced,
         };
         let clock = if is_replaced {
@@ -159,6 +161,7 @@ mod tests {
             resolution_s,
             messages_per_stamp,
             is_replaced: true,
+            ..
         }) = finding
         else {
             panic!("{finding:?}")

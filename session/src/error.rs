@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use tauscope_archive::{ArchiveError, Twice};
 
-use crate::finding::Finding;
+use crate::finding::{Finding, shared};
 use crate::publisher::Publisher;
 use crate::suggest;
 
@@ -44,6 +44,24 @@ pub enum SessionError {
     },
 }
 
+/// A sentence for each reason why recordings, of `count` in total, cannot be used; recordings with the same reason share
+/// one.
+pub fn by_reason(errors: &[SessionError], count: usize) -> Vec<String> {
+    let texts = errors.iter().map(|error| match error {
+        SessionError::Unusable { path, why } => (path.display().to_string(), why.to_string()),
+        other => (String::new(), other.to_string()),
+    });
+    let sentences = shared(texts, count).into_iter();
+    let sentence = |(of, text): (String, String)| {
+        if of.is_empty() {
+            text
+        } else {
+            format!("{of}: {text}")
+        }
+    };
+    sentences.map(sentence).collect()
+}
+
 /// Why no state of a robot could be assembled from joint states.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Unusable {
@@ -81,8 +99,13 @@ pub enum Unusable {
         messages: u64,
     },
     /// A finding that leaves nothing to use.
-    #[error("no joint state can be used: {0}")]
-    Finding(Box<Finding>),
+    #[error("no joint state{} can be used: {finding}", on(topic.as_deref()))]
+    Finding {
+        /// The topic; none of a table.
+        topic: Option<String>,
+        /// The finding.
+        finding: Box<Finding>,
+    },
     /// Messages that never complete a state, or none at all.
     #[error("{messages} joint states make no whole sample")]
     NoSample {
@@ -95,10 +118,15 @@ impl Unusable {
     /// The finding, where it is one.
     pub fn into_finding(self) -> Option<Finding> {
         match self {
-            Self::Finding(finding) => Some(*finding),
+            Self::Finding { finding, .. } => Some(*finding),
             _ => None,
         }
     }
+}
+
+/// ` on /joint_states`, or nothing.
+pub(crate) fn on(topic: Option<&str>) -> String {
+    topic.map_or_else(String::new, |topic| format!(" on {topic}"))
 }
 
 fn named(names: &[String]) -> String {

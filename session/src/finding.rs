@@ -31,12 +31,27 @@ pub struct OddVelocity {
     pub constant: Option<f64>,
 }
 
+/// Number and times of messages with a fault. Times are seconds from the first message of the topic.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Times {
+    /// Number of messages.
+    pub messages: u64,
+    /// Number of runs of consecutive messages.
+    pub runs: u64,
+    /// Times at which the runs begin \[s\]; the first few.
+    pub starts_s: Vec<f64>,
+    /// Time of the last message \[s\].
+    pub last_s: f64,
+}
+
 /// One thing that is odd or wrong about a recording. Times are seconds from the first message of the topic.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "finding", rename_all = "snake_case")]
 pub enum Finding {
     /// Several publishers send joint states on the topic.
     Publishers {
+        /// The topic; none of a live source.
+        topic: Option<String>,
         /// The publishers whose messages are used.
         used: Vec<Publisher>,
         /// The publishers whose messages are not used.
@@ -57,6 +72,8 @@ pub enum Finding {
         resolution_s: f64,
         /// Mean number of messages with one stamp.
         messages_per_stamp: f64,
+        /// Whether the recording has a time of recording.
+        has_log_times: bool,
         /// Whether the time of recording replaces the stamps.
         is_replaced: bool,
     },
@@ -100,12 +117,13 @@ pub enum Finding {
         field: &'static str,
         /// The value furthest from the others.
         example: f64,
-        /// Number of messages.
-        messages: u64,
-        /// Time of the first such value \[s\].
-        first_s: f64,
-        /// Time of the last such value \[s\].
-        last_s: f64,
+        /// A subnormal value, where there is one.
+        subnormal: Option<f64>,
+        /// The messages with such values.
+        #[serde(flatten)]
+        times: Times,
+        /// Number of all messages of the topic.
+        of_messages: u64,
         /// Magnitude that nine of ten values of this joint stay below.
         usual: f64,
     },
@@ -113,14 +131,9 @@ pub enum Finding {
     Dropouts {
         /// The joint.
         joint: String,
-        /// Number of messages.
-        messages: u64,
-        /// Number of separate drops.
-        drops: u64,
-        /// Time of the first \[s\].
-        first_s: f64,
-        /// Time of the last \[s\].
-        last_s: f64,
+        /// The messages with such efforts.
+        #[serde(flatten)]
+        times: Times,
     },
     /// A joint that a message names more than once.
     NamedTwice(Twice),
@@ -169,9 +182,13 @@ pub enum Finding {
     Velocity {
         /// The joints.
         joints: Vec<OddVelocity>,
+        /// Whether these are all joints.
+        all: bool,
         /// Whether velocities computed from the positions are used instead.
         is_replaced: bool,
     },
+    /// No message has a velocity.
+    NoVelocity,
     /// A position that changes by more than its velocity explains.
     Jump {
         /// The joint.
@@ -242,23 +259,35 @@ impl Finding {
 
 /// A sentence for each finding of several recordings; recordings with the same finding share one.
 pub fn by_recording(all: &[(String, Vec<Finding>)]) -> Vec<String> {
-    let mut sentences: Vec<(String, Vec<&str>)> = Vec::new();
-    for (name, findings) in all {
-        for finding in findings {
-            let text = finding.to_string();
-            match sentences.iter_mut().find(|(known, _)| *known == text) {
-                Some((_, names)) => names.push(name),
-                None => sentences.push((text, vec![name])),
-            }
+    let texts = all.iter().flat_map(|(name, findings)| {
+        let texts = findings.iter().map(ToString::to_string);
+        texts.map(move |text| (name.clone(), text))
+    });
+    let shared = shared(texts, all.len()).into_iter();
+    shared.map(|(of, text)| format!("{of}: {text}.")).collect()
+}
+
+/// Texts about `count` recordings, by name, in the order in which they first occur: the recordings with the same text, and
+/// the text.
+pub(crate) fn shared(
+    texts: impl Iterator<Item = (String, String)>,
+    count: usize,
+) -> Vec<(String, String)> {
+    let mut by_text: Vec<(String, Vec<String>)> = Vec::new();
+    for (name, text) in texts {
+        match by_text.iter_mut().find(|(known, _)| *known == text) {
+            Some((_, names)) => names.push(name),
+            None => by_text.push((text, vec![name])),
         }
     }
-    let sentences = sentences.iter().map(|(text, names)| {
-        let of = if names.len() > 1 && names.len() == all.len() {
-            format!("all {} recordings", names.len())
+    let named = by_text.into_iter().map(|(text, names)| {
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let of = if names.len() > 1 && names.len() == count {
+            format!("all {count} recordings")
         } else {
-            suggest::some(names)
+            suggest::some(&names)
         };
-        format!("{of}: {text}.")
+        (of, text)
     });
-    sentences.collect()
+    named.collect()
 }

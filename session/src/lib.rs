@@ -19,8 +19,8 @@ use tauscope_archive::{ArchiveError, CsvMapping, Recording};
 
 pub use assembler::{Assembler, Counts, Gather, Layout, Layouts, Taken, Whole, stamp_of};
 pub use clock::Clock;
-pub use error::{SessionError, Unusable};
-pub use finding::{Effect, Finding, OddVelocity, by_recording};
+pub use error::{SessionError, Unusable, by_reason};
+pub use finding::{Effect, Finding, OddVelocity, Times, by_recording};
 pub use look::{Joints, Look};
 pub use plausible::Plausible;
 pub use publisher::Publisher;

@@ -1,11 +1,11 @@
 //! The first look at a recording: topic, publishers, clock and ranges, from its head.
 
-use tauscope_archive::{ArchiveError, JointFacts, JointTallies, Recording, RecordingKind, ros};
+use tauscope_archive::{ArchiveError, JointFacts, JointTallies, Recording, ros};
 
 use crate::assembler::{Assembler, Taken};
 use crate::clock::{Clock, Stamps};
 use crate::error::{SessionError, Unusable};
-use crate::finding::Effect;
+use crate::finding::{Effect, Finding};
 use crate::plausible::odd_velocities;
 use crate::publisher::{Publisher, Publishers, choose};
 use crate::selection::Selection;
@@ -64,7 +64,10 @@ impl Look {
         if let Some(fault) = fault.filter(|it| it.effect() == Effect::Fault) {
             return Err(SessionError::Unusable {
                 path: recording.path().to_owned(),
-                why: Unusable::Finding(Box::new(fault)),
+                why: Unusable::Finding {
+                    topic: look.selection.topic,
+                    finding: Box::new(fault),
+                },
             });
         }
         Ok(look)
@@ -150,6 +153,7 @@ impl Look {
         let mut look = Self {
             topic: topic.to_owned(),
             selection: Selection {
+                topic: (!recording.kind().is_table()).then(|| topic.to_owned()),
                 ranges: Ranges::new(limits),
                 joint_names,
                 clock: Clock::Stamps,
@@ -198,8 +202,13 @@ impl Look {
         (selection.clock, selection.of_clock) = stamps.clock(head.has_log_times);
     }
 
-    /// Compares velocities with positions, on the clock that was chosen.
+    /// Compares velocities with positions, on the clock that was chosen, if there are velocities.
     fn judge_velocity(&mut self, head: &Head) {
+        let used = || self.selection.used_publishers();
+        if used().any(|it| it.position) && !used().any(|it| it.velocity) {
+            self.selection.of_velocity = Some(Finding::NoVelocity);
+            return;
+        }
         let mut assembler = self.assembler().keeping_velocity();
         let mut tallies = JointTallies::in_order(self.joint_names());
         let count = self.joint_names().len();
@@ -242,6 +251,11 @@ impl Look {
             }
         }
         Ok(None)
+    }
+
+    /// The topic, unless the recording is a table.
+    pub fn topic_of_messages(&self) -> Option<&str> {
+        self.selection.topic.as_deref()
     }
 
     /// The robot's joints; those that the publishers name where no robot was given.
@@ -304,10 +318,9 @@ impl Head {
                 messages.push((state.log_time_ns, state.message.clone()));
             }
         }
-        let kind = recording.kind();
         Ok(Self {
             messages,
-            has_log_times: !matches!(kind, RecordingKind::Csv | RecordingKind::Lerobot),
+            has_log_times: !recording.kind().is_table(),
         })
     }
 }

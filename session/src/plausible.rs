@@ -177,7 +177,8 @@ pub(crate) fn odd_velocities(facts: &[JointFacts], is_replaced: bool) -> Option<
             })
         })
         .collect();
-    (!joints.is_empty()).then_some(Finding::Velocity {
+    (!joints.is_empty()).then(|| Finding::Velocity {
+        all: joints.len() == facts.len(),
         joints,
         is_replaced,
     })

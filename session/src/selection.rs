@@ -8,6 +8,8 @@ use crate::values::Ranges;
 /// Selection of what is used of a topic.
 #[derive(Debug, Clone)]
 pub(crate) struct Selection {
+    /// Name of the topic; none of a table and of a live source.
+    pub topic: Option<String>,
     /// The robot's joints, in its order.
     pub joint_names: Vec<String>,
     /// Time of the messages.
@@ -28,6 +30,7 @@ impl Selection {
     /// Of a live source, of which nothing is known before its messages come.
     pub fn live(joint_names: &[String]) -> Self {
         Self {
+            topic: None,
             joint_names: joint_names.to_vec(),
             clock: Clock::default(),
             publishers: Publishers::default(),

@@ -54,7 +54,9 @@ impl Survey {
                 Err(error) => assembler.undecodable(&error.reason()),
             }
         }
-        findings.extend(assembler.findings());
+        // Without a robot, the list of publishers does not say which of them are used.
+        let of_messages = assembler.findings().into_iter();
+        findings.extend(of_messages.filter(|it| !matches!(it, Finding::Publishers { .. })));
         findings.extend(plausible.findings());
         Ok(Self {
             publishers: assembler.publishers(),

@@ -1,5 +1,7 @@
 //! Values that no measurement gives: against the range of the joint's own values and the limits of the robot file.
 
+use crate::finding::Times;
+
 /// Effort that no drive exceeds, as a multiple of the limit in the robot file.
 /// Physical: a drive's peak torque is two to three times its rated one, and some files give the rated one.
 const TIMES_LIMIT: f64 = 10.0;
@@ -199,16 +201,24 @@ impl Joint {
 
 const EFFORT: usize = 2;
 
+/// Times of refused values that are listed.
+/// Resolution: what a person reads.
+const MOST_STARTS: usize = 3;
+
 /// Counts the values of one field of one joint that are no measurements.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Refused {
     pub messages: u64,
     /// Number of runs of consecutive messages.
     pub runs: u64,
-    /// Times of the first and the last message \[ns\].
-    pub span_ns: (i64, i64),
+    /// Times at which the first runs begin \[ns\].
+    starts_ns: [i64; MOST_STARTS],
+    /// Time of the last message \[ns\].
+    last_ns: i64,
     /// The value of the largest magnitude.
     pub example: f64,
+    /// A subnormal value, where there is one.
+    pub subnormal: Option<f64>,
     /// Whether the newest message is one.
     goes_on: bool,
 }
@@ -217,17 +227,34 @@ impl Refused {
     /// Takes a value, refused or not.
     pub fn add(&mut self, time_ns: i64, value: f64, is_refused: bool) {
         if is_refused {
-            if self.messages == 0 {
-                self.span_ns.0 = time_ns;
-            }
             self.messages += 1;
-            self.runs += u64::from(!self.goes_on);
-            self.span_ns.1 = time_ns;
+            if !self.goes_on {
+                if let Some(start_ns) = self.starts_ns.get_mut(self.runs as usize) {
+                    *start_ns = time_ns;
+                }
+                self.runs += 1;
+            }
+            self.last_ns = time_ns;
+            if value.is_subnormal() {
+                self.subnormal = Some(value);
+            }
             if value.abs() >= self.example.abs() {
                 self.example = value;
             }
         }
         self.goes_on = is_refused;
+    }
+
+    /// Number and times of the messages, in seconds since `first_ns`.
+    pub fn times(&self, first_ns: i64) -> Times {
+        let since_s = |ns: i64| (ns - first_ns) as f64 * 1e-9;
+        let starts = self.starts_ns.iter().take(self.runs as usize);
+        Times {
+            messages: self.messages,
+            runs: self.runs,
+            starts_s: starts.map(|&ns| since_s(ns)).collect(),
+            last_s: since_s(self.last_ns),
+        }
     }
 }
 

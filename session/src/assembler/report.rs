@@ -80,7 +80,6 @@ impl Assembler {
 
     fn value_findings(&self) -> Vec<Finding> {
         let (first_ns, _) = self.first_ns.unwrap_or_default();
-        let since = |ns: i64| (ns - first_ns) as f64 * 1e-9;
         let mut all = Vec::new();
         for (joint, name) in self.selection.joint_names.iter().enumerate() {
             for (field, field_name) in tauscope_archive::FIELDS.into_iter().enumerate() {
@@ -90,9 +89,9 @@ impl Assembler {
                         joint: name.clone(),
                         field: field_name,
                         example: refused.example,
-                        messages: refused.messages,
-                        first_s: since(refused.span_ns.0),
-                        last_s: since(refused.span_ns.1),
+                        subnormal: refused.subnormal,
+                        times: refused.times(first_ns),
+                        of_messages: self.messages,
                         usual: self.selection.ranges.usual(joint, field),
                     });
                 }
@@ -101,10 +100,7 @@ impl Assembler {
             if dropouts.messages > 0 {
                 all.push(Finding::Dropouts {
                     joint: name.clone(),
-                    messages: dropouts.messages,
-                    drops: dropouts.runs,
-                    first_s: since(dropouts.span_ns.0),
-                    last_s: since(dropouts.span_ns.1),
+                    times: dropouts.times(first_ns),
                 });
             }
         }
@@ -121,6 +117,7 @@ impl Assembler {
             these.map(|(_, publisher)| publisher.clone()).collect()
         };
         (all.len() > 1).then(|| Finding::Publishers {
+            topic: self.selection.topic.clone(),
             used: of(true),
             ignored: of(false),
         })
@@ -150,7 +147,10 @@ impl Assembler {
         let finding = self.findings().into_iter();
         let worst = finding.max_by_key(Finding::effect);
         match worst {
-            Some(worst) => Unusable::Finding(Box::new(worst)),
+            Some(worst) => Unusable::Finding {
+                topic: self.selection.topic.clone(),
+                finding: Box::new(worst),
+            },
             None => Unusable::NoSample { messages },
         }
     }

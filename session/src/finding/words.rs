@@ -2,14 +2,19 @@
 
 use std::fmt;
 
-use super::{Finding, OddVelocity};
+use super::{Finding, OddVelocity, Times};
+use crate::error::on;
 use crate::publisher::Publisher;
 use crate::suggest;
 
 impl OddVelocity {
-    fn words(&self) -> String {
+    /// Words about this joint and others with the same fault, `are_several` in total.
+    fn words(&self, are_several: bool) -> String {
         match self.constant {
-            Some(value) => format!("is constant, {value}, while the joint moves"),
+            Some(value) => {
+                let move_ = if are_several { "they move" } else { "it moves" };
+                format!("is {value} in every message although {move_}")
+            }
             None if self.slope.abs() < FOLLOWS => {
                 "does not follow the change of the position".to_owned()
             }
@@ -21,7 +26,11 @@ impl OddVelocity {
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Publishers { used, ignored } => publishers(f, used, ignored),
+            Self::Publishers {
+                topic,
+                used,
+                ignored,
+            } => publishers(f, topic.as_deref(), used, ignored),
             Self::ConstantStamps { .. } | Self::CoarseStamps { .. } | Self::ScaledStamps { .. } => {
                 self.of_time(f)
             }
@@ -64,11 +73,11 @@ impl fmt::Display for Finding {
                 f.write_str(&reasons.join("; "))
             }
             Self::ZeroEffort { all: true, .. } => {
-                f.write_str("the effort is zero throughout: the driver does not publish it")
+                f.write_str("the effort is zero throughout, so it is not measured. Let the driver publish the measured effort")
             }
             Self::ZeroEffort { joints, .. } => write!(
                 f,
-                "the effort of {} is zero throughout: the driver does not publish it",
+                "the effort of {} is zero throughout, so it is not measured",
                 suggest::some(&names(joints))
             ),
             Self::Degrees { joints } => write!(
@@ -86,8 +95,13 @@ impl fmt::Display for Finding {
             ),
             Self::Velocity {
                 joints,
+                all,
                 is_replaced,
-            } => velocities(f, joints, *is_replaced),
+            } => velocities(f, joints, *all, *is_replaced),
+            Self::NoVelocity => write!(
+                f,
+                "no velocity is recorded. Velocities are computed from the positions. {NOISIER}"
+            ),
             Self::Jump { remark, .. } | Self::Format { remark } => {
                 f.write_str(remark.trim_end_matches('.'))
             }
@@ -117,16 +131,23 @@ impl Finding {
             Self::CoarseStamps {
                 resolution_s,
                 messages_per_stamp,
+                has_log_times,
                 is_replaced,
             } => {
                 write!(
                     f,
                     "stamps have a resolution of {resolution_s} s: about {messages_per_stamp:.0} messages share the same stamp. "
                 )?;
-                f.write_str(if *is_replaced {
-                    "The time of recording is used instead. Let the driver fill `header.stamp.nanosec`"
-                } else {
-                    "Joint speeds cannot be determined from them. Let the driver fill `header.stamp.nanosec`, and record again"
+                f.write_str(match (is_replaced, has_log_times) {
+                    (true, _) => "The time of recording is used instead. Let the driver publish stamps of full resolution",
+                    (_, true) => {
+                        "Joint speeds cannot be computed from them. The time of recording is not used instead, because it includes \
+                         delays that such coarse stamps cannot reveal. Let the driver publish stamps of full resolution, and record \
+                         again"
+                    }
+                    _ => {
+                        "Joint speeds cannot be computed from them, and there is no other time. Record stamps of full resolution"
+                    }
                 })
             }
             Self::ScaledStamps { ratio } => {
@@ -154,23 +175,31 @@ impl Finding {
                 count,
                 refused,
             } => {
-                let jumps = jumps.iter();
-                let jumps: Vec<String> = jumps
-                    .map(|(at_s, by_s)| format!("by {by_s:.3} s at {at_s:.3} s"))
+                let each = jumps.iter();
+                let each: Vec<String> = each
+                    .map(|(at_s, by_s)| format!("at {at_s:.3} s by {by_s:.3} s"))
                     .collect();
-                let more = (*count as usize).saturating_sub(jumps.len());
-                write!(f, "stamps jump back {}", jumps.join(" and "))?;
-                if more > 0 {
-                    write!(f, ", and {more} times more")?;
+                write!(
+                    f,
+                    "the stamps jump back {} after the start",
+                    each.join(" and ")
+                )?;
+                match (*count as usize).saturating_sub(jumps.len()) {
+                    0 => {}
+                    1 => f.write_str(", and once more")?,
+                    more => write!(f, ", and {more} times more")?,
                 }
                 f.write_str(
-                    " of recording time: a looped playback, or a clock that was set back. ",
+                    ". `replay` continues after a jump. Commands that learn, such as `init` and `explain`, leave out what follows \
+                     until the stamps have caught up",
                 )?;
-                match refused {
-                    0 => f.write_str("Each part is read as a new recording"),
-                    count => write!(f, "The {count} messages that follow are not used"),
-                }?;
-                f.write_str(". Record without looping")
+                if *refused > 0 {
+                    write!(f, ", here {refused} messages")?;
+                }
+                f.write_str(
+                    ". If a playback was looped, record without looping; if the clock was set back, synchronise it before \
+                     recording",
+                )
             }
             Self::LateMessages { messages } => write!(
                 f,
@@ -194,40 +223,45 @@ impl Finding {
                 joint,
                 field,
                 example,
-                messages,
-                first_s,
-                last_s,
+                subnormal,
+                times,
+                of_messages,
                 usual,
             } => {
+                let examples = [Some(*example), subnormal.filter(|it| it != example)];
+                let examples = examples.into_iter().flatten().map(magnitude);
+                let count = times.messages;
                 write!(
                     f,
-                    "the {field} of {joint} is implausible in {}, for example {}. Nine of ten values are below {usual}. \
-                     These messages are not used. Check the driver for values that it never sets",
-                    span(*messages, *first_s, *last_s),
-                    magnitude(*example),
+                    "the {field} of {joint} is implausible in {times}, for example {}. 90 % of its values are below {usual} in \
+                     magnitude. {} of {of_messages} messages left out for all joints. The driver probably publishes \
+                     uninitialised memory or an error value: check that it fills `{field}` of {joint} in every message",
+                    examples.collect::<Vec<_>>().join(" and "),
+                    if count == 1 {
+                        "This 1 is".to_owned()
+                    } else {
+                        format!("These {count} are")
+                    },
                 )
             }
-            Self::Dropouts {
-                joint,
-                messages,
-                drops,
-                first_s,
-                last_s,
-            } => write!(
+            Self::Dropouts { joint, times } => write!(
                 f,
                 "the effort of {joint} drops to exactly zero {} in {}. Efforts there are not used. Check the plug and the \
                  sensor of the joint, and whether the drives were off",
-                if *drops == 1 {
-                    "once".to_owned()
-                } else {
-                    format!("{drops} times")
+                match times.runs {
+                    1 => "once".to_owned(),
+                    runs => format!("{runs} times"),
                 },
-                span(*messages, *first_s, *last_s)
+                times
             ),
             _ => Ok(()),
         }
     }
 }
+
+/// Consequence of computed velocities.
+const NOISIER: &str =
+    "They are noisier, so the detector needs stronger contacts while the arm moves";
 
 /// Velocity over derivative of the position below which the velocity does not follow the position.
 /// Resolution: a factor of a unit, such as 1/60, is far from it or is written with its digits.
@@ -236,34 +270,45 @@ const FOLLOWS: f64 = 0.01;
 fn velocities(
     f: &mut fmt::Formatter<'_>,
     joints: &[OddVelocity],
+    all: bool,
     is_replaced: bool,
 ) -> fmt::Result {
     // Joints with the same words share a clause.
-    let mut clauses: Vec<(String, Vec<&str>)> = Vec::new();
+    let mut clauses: Vec<(&OddVelocity, Vec<&str>)> = Vec::new();
     for odd in joints {
-        let words = odd.words();
-        match clauses.iter_mut().find(|(known, _)| *known == words) {
+        let is_same = |(known, _): &&mut (&OddVelocity, _)| known.words(true) == odd.words(true);
+        match clauses.iter_mut().find(is_same) {
             Some((_, names)) => names.push(&odd.joint),
-            None => clauses.push((words, vec![&odd.joint])),
+            None => clauses.push((odd, vec![&odd.joint])),
         }
     }
     let clauses = clauses.iter();
     let clauses: Vec<String> = clauses
-        .map(|(words, names)| format!("of {} {words}", suggest::some(names)))
+        .map(|(odd, names)| {
+            let of = if all && names.len() == joints.len() && names.len() > 1 {
+                format!("all {} joints", names.len())
+            } else {
+                suggest::some(names)
+            };
+            format!("of {of} {}", odd.words(names.len() > 1))
+        })
         .collect();
     write!(f, "the recorded velocity {}", clauses.join(", and "))?;
     if joints.iter().any(|odd| odd.slope < -FOLLOWS) {
         f.write_str("; below zero, position or velocity has the wrong sign")?;
     }
-    f.write_str(if is_replaced {
-        ". Velocities are computed from the positions instead. Check the velocity that the driver publishes"
-    } else {
-        ". Check the velocity that the driver publishes"
-    })
+    if is_replaced {
+        write!(
+            f,
+            ". Velocities are computed from the positions instead. {NOISIER}"
+        )?;
+    }
+    f.write_str(". Check the velocity that the driver publishes")
 }
 
 fn publishers(
     f: &mut fmt::Formatter<'_>,
+    topic: Option<&str>,
     used: &[Publisher],
     ignored: &[Publisher],
 ) -> fmt::Result {
@@ -273,15 +318,22 @@ fn publishers(
     };
     write!(
         f,
-        "several publishers share this topic. Used: {}",
-        list(used)
+        "{} publishers send joint states{}",
+        used.len() + ignored.len(),
+        on(topic)
     )?;
     if ignored.is_empty() {
-        return Ok(());
+        return write!(
+            f,
+            ": {}. They are combined; nothing needs to be done",
+            list(used)
+        );
     }
-    write!(f, ". Not used: {}", list(ignored))?;
+    write!(f, ". Used: {}. Not used: {}", list(used), list(ignored))?;
     if ignored.iter().any(|publisher| !publisher.measures_effort()) {
-        f.write_str(". A publisher without measured efforts belongs on a topic of its own")?;
+        f.write_str(
+            ". Remap or stop the publisher that sends no effort; this result is not affected",
+        )?;
     }
     Ok(())
 }
@@ -295,12 +347,34 @@ fn magnitude(value: f64) -> String {
     }
 }
 
-/// `1 message at 3.200 s`, or `12 messages from 3.200 s to 3.310 s`.
-fn span(messages: u64, first_s: f64, last_s: f64) -> String {
-    if messages == 1 {
-        format!("1 message at {first_s:.3} s")
-    } else {
-        format!("{messages} messages from {first_s:.3} s to {last_s:.3} s")
+/// `1 message at 3.200 s`, `12 messages from 3.200 s to 3.310 s`, or `12 single messages between 0.190 s and 10.950 s (the
+/// first at 0.190, 1.230 and 2.040 s)`.
+impl fmt::Display for Times {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            messages,
+            runs,
+            starts_s,
+            last_s,
+        } = self;
+        let first_s = starts_s.first().copied().unwrap_or_default();
+        match (messages, runs) {
+            (1, _) => return write!(f, "1 message at {first_s:.3} s"),
+            (_, 1) => {
+                return write!(
+                    f,
+                    "{messages} messages from {first_s:.3} s to {last_s:.3} s"
+                );
+            }
+            _ if messages == runs => write!(f, "{messages} single messages")?,
+            _ => write!(f, "{messages} messages")?,
+        }
+        let starts: Vec<String> = starts_s.iter().map(|at_s| format!("{at_s:.3}")).collect();
+        let starts = starts.join(", ");
+        write!(
+            f,
+            " between {first_s:.3} s and {last_s:.3} s (the first at {starts} s)"
+        )
     }
 }
 
