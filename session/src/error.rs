@@ -6,7 +6,7 @@ use tauscope_archive::{ArchiveError, Twice};
 
 use crate::finding::{Finding, shared};
 use crate::publisher::Publisher;
-use crate::suggest;
+use crate::suggest::{self, on};
 
 /// Why a recording gives no joint states of a robot.
 #[derive(Debug, thiserror::Error)]
@@ -122,11 +122,6 @@ impl Unusable {
             _ => None,
         }
     }
-}
-
-/// ` on /joint_states`, or nothing.
-pub(crate) fn on(topic: Option<&str>) -> String {
-    topic.map_or_else(String::new, |topic| format!(" on {topic}"))
 }
 
 fn named(names: &[String]) -> String {

@@ -1,6 +1,9 @@
 //! Findings: what is odd or wrong about recordings, typed, with one text for all commands.
 
+mod velocity_words;
 mod words;
+
+use std::fmt;
 
 use serde::Serialize;
 use tauscope_archive::{NotFinite, Twice};
@@ -42,6 +45,37 @@ pub struct Times {
     pub starts_s: Vec<f64>,
     /// Time of the last message \[s\].
     pub last_s: f64,
+}
+
+/// `1 message at 3.200 s`, `12 messages from 3.200 s to 3.310 s`, or `12 single messages between 0.190 s and 10.950 s (the
+/// first at 0.190, 1.230 and 2.040 s)`.
+impl fmt::Display for Times {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            messages,
+            runs,
+            starts_s,
+            last_s,
+        } = self;
+        let first_s = starts_s.first().copied().unwrap_or_default();
+        match (messages, runs) {
+            (1, _) => return write!(f, "1 message at {first_s:.3} s"),
+            (_, 1) => {
+                return write!(
+                    f,
+                    "{messages} messages from {first_s:.3} s to {last_s:.3} s"
+                );
+            }
+            _ if messages == runs => write!(f, "{messages} single messages")?,
+            _ => write!(f, "{messages} messages")?,
+        }
+        let starts: Vec<String> = starts_s.iter().map(|at_s| format!("{at_s:.3}")).collect();
+        let starts = starts.join(", ");
+        write!(
+            f,
+            " between {first_s:.3} s and {last_s:.3} s (the first at {starts} s)"
+        )
+    }
 }
 
 /// One thing that is odd or wrong about a recording. Times are seconds from the first message of the topic.
@@ -290,4 +324,76 @@ pub(crate) fn shared(
         (of, text)
     });
     named.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn single_messages_are_distinguished_from_a_run() {
+        let times = |messages, runs, starts_s: &[f64]| Times {
+            messages,
+            runs,
+            starts_s: starts_s.to_vec(),
+            last_s: 9.0,
+        };
+        for (times, words) in [
+            (times(1, 1, &[3.0]), "1 message at 3.000 s"),
+            (times(12, 1, &[3.0]), "12 messages from 3.000 s to 9.000 s"),
+            (
+                times(12, 12, &[3.0, 4.0, 5.0]),
+                "12 single messages between 3.000 s and 9.000 s (the first at 3.000, 4.000, 5.000 s)",
+            ),
+            (
+                times(12, 2, &[3.0, 8.0]),
+                "12 messages between 3.000 s and 9.000 s (the first at 3.000, 8.000 s)",
+            ),
+        ] {
+            assert_eq!(times.to_string(), words);
+        }
+    }
+
+    #[test]
+    fn jumps_by_the_same_step_share_its_number_and_recordings_share_a_sentence() {
+        let jumps = |jumps: &[(f64, f64)]| Finding::JumpsBack {
+            jumps: jumps.to_vec(),
+            count: jumps.len() as u64,
+            refused: 7,
+        };
+        let same = jumps(&[(12.0, 11.99), (24.0, 11.99)]);
+        let text = "the stamps jump back by 11.990 s at 12.000 s and at 24.000 s after the start. ";
+        assert!(same.to_string().starts_with(text), "{same}");
+        let other = jumps(&[(12.0, 11.99), (24.0, 3.0)]);
+        let text = "the stamps jump back by 11.990 s at 12.000 s and by 3.000 s at 24.000 s after";
+        assert!(other.to_string().starts_with(text), "{other}");
+        let all = ["a", "b"].map(|name| (name.to_owned(), vec![same.clone()]));
+        let [sentence] = &by_recording(&all)[..] else {
+            panic!("one for both")
+        };
+        assert!(
+            sentence.starts_with("all 2 recordings: the stamps"),
+            "{sentence}"
+        );
+    }
+
+    #[test]
+    fn joints_with_the_same_velocity_share_a_clause() {
+        let odd = |joint: &str, constant| OddVelocity {
+            joint: joint.to_owned(),
+            slope: 0.0,
+            constant: Some(constant),
+        };
+        let finding = |joints: [OddVelocity; 2]| Finding::Velocity {
+            joints: joints.to_vec(),
+            all: true,
+            is_replaced: false,
+        };
+        let text = finding([odd("a", 0.0), odd("b", 0.0)]).to_string();
+        let all = "the recorded velocity of all 2 joints is 0 in every message although they move";
+        assert!(text.starts_with(all), "{text}");
+        let text = finding([odd("a", 0.0), odd("b", 1.5)]).to_string();
+        let each = "of a is 0 in every message although it moves, and of b is 1.5 in every";
+        assert!(text.contains(each), "{text}");
+    }
 }

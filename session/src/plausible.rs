@@ -177,7 +177,7 @@ pub(crate) fn odd_velocities(facts: &[JointFacts], is_replaced: bool) -> Option<
             })
         })
         .collect();
-    (!joints.is_empty()).then(|| Finding::Velocity {
+    (!joints.is_empty()).then_some(Finding::Velocity {
         all: joints.len() == facts.len(),
         joints,
         is_replaced,

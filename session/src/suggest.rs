@@ -50,6 +50,11 @@ pub fn some(words: &[&str]) -> String {
     }
 }
 
+/// ` on /joint_states`, or nothing.
+pub(crate) fn on(topic: Option<&str>) -> String {
+    topic.map_or_else(String::new, |topic| format!(" on {topic}"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -55,10 +55,10 @@ pub enum DecodeError {
     },
     /// An array that does not fit the names.
     #[error(
-        "`{array}` has {} for {}{}. Make the driver fill all arrays to the same length",
+        "`{array}` has {} for {} ({}): it is unknown which belongs to which. Make the driver fill all arrays to the same length",
         counted(*len, ENTRY),
         counted(*names, NAME),
-        lacking(without, names.saturating_sub(*len))
+        listed(first_names, *names)
     )]
     ArrayLength {
         /// Name of the array.
@@ -67,8 +67,8 @@ pub enum DecodeError {
         len: usize,
         /// Number of names.
         names: usize,
-        /// The first few names without an entry, if the entries are in the order of the names.
-        without: Vec<String>,
+        /// The first few names.
+        first_names: Vec<String>,
     },
     /// Values without any name.
     #[error("`name` is empty, but `{array}` has {}: their joints are unknown", counted(*len, ENTRY))]
@@ -105,29 +105,28 @@ fn counted(count: usize, [one, many]: [&str; 2]) -> String {
     format!("{count} {}", if count == 1 { one } else { many })
 }
 
-/// Names without an entry that an error lists.
+/// Names that an error lists.
 /// Resolution: what a person reads.
 const MOST_NAMED: usize = 8;
 
 impl DecodeError {
     /// An array of `len` entries that does not fit `names`.
     pub(super) fn array_length(array: &'static str, len: usize, names: &[String]) -> Self {
-        let without = names.iter().skip(len).take(MOST_NAMED).cloned();
         Self::ArrayLength {
             array,
             len,
             names: names.len(),
-            without: without.collect(),
+            first_names: names.iter().take(MOST_NAMED).cloned().collect(),
         }
     }
 }
 
-/// The names without an entry, `count` in total.
-fn lacking(without: &[String], count: usize) -> String {
-    match count - without.len() {
-        0 if count == 0 => String::new(),
-        0 => format!("; {} would have none", without.join(", ")),
-        more => format!("; {} and {more} more would have none", without.join(", ")),
+/// The first names, of `count` in total.
+fn listed(first_names: &[String], count: usize) -> String {
+    let names = first_names.join(", ");
+    match count - first_names.len() {
+        0 => names,
+        more => format!("{names} and {more} more"),
     }
 }
 

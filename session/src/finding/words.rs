@@ -2,26 +2,10 @@
 
 use std::fmt;
 
-use super::{Finding, OddVelocity, Times};
-use crate::error::on;
+use super::Finding;
+use super::velocity_words::{NOISIER, velocities};
 use crate::publisher::Publisher;
-use crate::suggest;
-
-impl OddVelocity {
-    /// Words about this joint and others with the same fault, `are_several` in total.
-    fn words(&self, are_several: bool) -> String {
-        match self.constant {
-            Some(value) => {
-                let move_ = if are_several { "they move" } else { "it moves" };
-                format!("is {value} in every message although {move_}")
-            }
-            None if self.slope.abs() < FOLLOWS => {
-                "does not follow the change of the position".to_owned()
-            }
-            None => format!("is {:.2} times the derivative of the position", self.slope),
-        }
-    }
-}
+use crate::suggest::{self, on};
 
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -44,7 +28,11 @@ impl fmt::Display for Finding {
                     "{what}. These messages are not used. Check the driver and the sensor"
                 )
             }
-            Self::Impossible { .. } | Self::Dropouts { .. } => self.of_values(f),
+            Self::Impossible { .. }
+            | Self::Dropouts { .. }
+            | Self::ZeroEffort { .. }
+            | Self::Degrees { .. }
+            | Self::BeyondLimits { .. } => self.of_values(f),
             Self::NamedTwice(twice) => write!(
                 f,
                 "{twice}. These messages are not used, because it is unknown which value holds. Let the driver send each joint once"
@@ -72,27 +60,6 @@ impl fmt::Display for Finding {
                     .collect();
                 f.write_str(&reasons.join("; "))
             }
-            Self::ZeroEffort { all: true, .. } => {
-                f.write_str("the effort is zero throughout, so it is not measured. Let the driver publish the measured effort")
-            }
-            Self::ZeroEffort { joints, .. } => write!(
-                f,
-                "the effort of {} is zero throughout, so it is not measured",
-                suggest::some(&names(joints))
-            ),
-            Self::Degrees { joints } => write!(
-                f,
-                "the positions of {} are in degrees: publish radians",
-                suggest::some(&names(joints))
-            ),
-            Self::BeyondLimits {
-                joint,
-                position,
-                limits: [lower, upper],
-            } => write!(
-                f,
-                "the position of {joint} reaches {position:.2}, beyond the URDF's limits of {lower:.2} and {upper:.2}"
-            ),
             Self::Velocity {
                 joints,
                 all,
@@ -175,9 +142,18 @@ impl Finding {
                 count,
                 refused,
             } => {
-                let each = jumps.iter();
+                // Jumps by the same step share its number.
+                let mut each: Vec<(String, String)> = Vec::new();
+                for (at_s, by_s) in jumps {
+                    let (at, by) = (format!("at {at_s:.3} s"), format!("{by_s:.3} s"));
+                    match each.last_mut() {
+                        Some((before, same)) if *same == by => *before += &format!(" and {at}"),
+                        _ => each.push((at, by)),
+                    }
+                }
                 let each: Vec<String> = each
-                    .map(|(at_s, by_s)| format!("at {at_s:.3} s by {by_s:.3} s"))
+                    .iter()
+                    .map(|(at, by)| format!("by {by} {at}"))
                     .collect();
                 write!(
                     f,
@@ -228,19 +204,17 @@ impl Finding {
                 of_messages,
                 usual,
             } => {
-                let examples = [Some(*example), subnormal.filter(|it| it != example)];
+                let examples = [Some(*example), subnormal.filter(|_| !example.is_subnormal())];
                 let examples = examples.into_iter().flatten().map(magnitude);
-                let count = times.messages;
                 write!(
                     f,
                     "the {field} of {joint} is implausible in {times}, for example {}. 90 % of its values are below {usual} in \
-                     magnitude. {} of {of_messages} messages left out for all joints. The driver probably publishes \
+                     magnitude. {} left out for all joints. The driver probably publishes \
                      uninitialised memory or an error value: check that it fills `{field}` of {joint} in every message",
                     examples.collect::<Vec<_>>().join(" and "),
-                    if count == 1 {
-                        "This 1 is".to_owned()
-                    } else {
-                        format!("These {count} are")
+                    match times.messages {
+                        1 => format!("This one of {of_messages} messages is"),
+                        count => format!("These {count} of {of_messages} messages are"),
                     },
                 )
             }
@@ -254,56 +228,30 @@ impl Finding {
                 },
                 times
             ),
+            Self::ZeroEffort { all: true, .. } => {
+                f.write_str("the effort is zero throughout, so it is not measured. Let the driver publish the measured effort")
+            }
+            Self::ZeroEffort { joints, .. } => write!(
+                f,
+                "the effort of {} is zero throughout, so it is not measured",
+                suggest::some(&names(joints))
+            ),
+            Self::Degrees { joints } => write!(
+                f,
+                "the positions of {} are in degrees: publish radians",
+                suggest::some(&names(joints))
+            ),
+            Self::BeyondLimits {
+                joint,
+                position,
+                limits: [lower, upper],
+            } => write!(
+                f,
+                "the position of {joint} reaches {position:.2}, beyond the URDF's limits of {lower:.2} and {upper:.2}"
+            ),
             _ => Ok(()),
         }
     }
-}
-
-/// Consequence of computed velocities.
-const NOISIER: &str =
-    "They are noisier, so the detector needs stronger contacts while the arm moves";
-
-/// Velocity over derivative of the position below which the velocity does not follow the position.
-/// Resolution: a factor of a unit, such as 1/60, is far from it or is written with its digits.
-const FOLLOWS: f64 = 0.01;
-
-fn velocities(
-    f: &mut fmt::Formatter<'_>,
-    joints: &[OddVelocity],
-    all: bool,
-    is_replaced: bool,
-) -> fmt::Result {
-    // Joints with the same words share a clause.
-    let mut clauses: Vec<(&OddVelocity, Vec<&str>)> = Vec::new();
-    for odd in joints {
-        let is_same = |(known, _): &&mut (&OddVelocity, _)| known.words(true) == odd.words(true);
-        match clauses.iter_mut().find(is_same) {
-            Some((_, names)) => names.push(&odd.joint),
-            None => clauses.push((odd, vec![&odd.joint])),
-        }
-    }
-    let clauses = clauses.iter();
-    let clauses: Vec<String> = clauses
-        .map(|(odd, names)| {
-            let of = if all && names.len() == joints.len() && names.len() > 1 {
-                format!("all {} joints", names.len())
-            } else {
-                suggest::some(names)
-            };
-            format!("of {of} {}", odd.words(names.len() > 1))
-        })
-        .collect();
-    write!(f, "the recorded velocity {}", clauses.join(", and "))?;
-    if joints.iter().any(|odd| odd.slope < -FOLLOWS) {
-        f.write_str("; below zero, position or velocity has the wrong sign")?;
-    }
-    if is_replaced {
-        write!(
-            f,
-            ". Velocities are computed from the positions instead. {NOISIER}"
-        )?;
-    }
-    f.write_str(". Check the velocity that the driver publishes")
 }
 
 fn publishers(
@@ -344,37 +292,6 @@ fn magnitude(value: f64) -> String {
         format!("{value}")
     } else {
         format!("{value:.2e}")
-    }
-}
-
-/// `1 message at 3.200 s`, `12 messages from 3.200 s to 3.310 s`, or `12 single messages between 0.190 s and 10.950 s (the
-/// first at 0.190, 1.230 and 2.040 s)`.
-impl fmt::Display for Times {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            messages,
-            runs,
-            starts_s,
-            last_s,
-        } = self;
-        let first_s = starts_s.first().copied().unwrap_or_default();
-        match (messages, runs) {
-            (1, _) => return write!(f, "1 message at {first_s:.3} s"),
-            (_, 1) => {
-                return write!(
-                    f,
-                    "{messages} messages from {first_s:.3} s to {last_s:.3} s"
-                );
-            }
-            _ if messages == runs => write!(f, "{messages} single messages")?,
-            _ => write!(f, "{messages} messages")?,
-        }
-        let starts: Vec<String> = starts_s.iter().map(|at_s| format!("{at_s:.3}")).collect();
-        let starts = starts.join(", ");
-        write!(
-            f,
-            " between {first_s:.3} s and {last_s:.3} s (the first at {starts} s)"
-        )
     }
 }
 
