@@ -35,7 +35,7 @@ pub fn explain(
     progress: &(dyn Fn(f64, &str) + Sync),
 ) -> Result<Outcome, TermError> {
     let joints: Vec<String> = input.model.joint_names().map(str::to_owned).collect();
-    progress(0.0, "audit");
+    progress(0.0, "checking the recordings for faults");
     if let Some(reason) = audit::before(&input) {
         return Ok(not_evaluated(&input, joints, reason));
     }
@@ -174,7 +174,7 @@ fn conclude(
         undetectable,
         rests_count,
     } = judged;
-    progress(0.95, "proof");
+    progress(0.95, "checking on held-out recordings");
     let mut proof = context.proof(&problem, &before, &found)?;
     let kept = handed_out::reject(&proof.withheld, &mut named, &problem, &found, joints);
     let noise_floor = noise_floor(input);
@@ -224,7 +224,7 @@ fn conclude(
         noise_floor,
         holdout_predictions: BTreeMap::new(),
     };
-    progress(1.0, "done");
+    progress(1.0, "writing the report");
     let (gain, gain_deviation) = context.final_gains(&found, &named.gain_deviation);
     Ok(Outcome {
         report,

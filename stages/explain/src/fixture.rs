@@ -95,7 +95,7 @@ pub fn recording(
         velocity,
         effort,
         reference: Vec::new(),
-        sample_of_row: (0..count).collect(),
+        sample_of_row: (0..count).map(Some).collect(),
         clock: None,
         losses: Losses::default(),
         findings: Vec::new(),

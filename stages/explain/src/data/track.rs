@@ -307,7 +307,7 @@ mod tests {
             velocity,
             effort: Vec::new(),
             reference: Vec::new(),
-            sample_of_row: (0..100).collect(),
+            sample_of_row: (0..100).map(Some).collect(),
             clock: None,
             findings: Vec::new(),
             losses: Losses::default(),

@@ -34,7 +34,7 @@ pub fn before(input: &Input) -> Option<String> {
         return Some("the twin's effort is a topic, and a recording does not have it".to_owned());
     }
     if input.fit.iter().all(|r| r.effort.iter().all(|x| *x == 0.0)) {
-        return Some("the effort is zero throughout: the driver does not publish it".to_owned());
+        return Some("the effort is zero throughout, so it is not measured".to_owned());
     }
     if let Some(recording) = input
         .fit
@@ -129,7 +129,17 @@ pub fn losses(input: &Input) -> Vec<String> {
             notes.push(format!("{name}: {count} {what}."));
         }
         if let Some(clock) = &recording.clock {
-            notes.push(clock.note(name));
+            notes.push(clock.note(name, recording.is_timed_by_log()));
+        }
+    }
+    for recording in &input.holdout {
+        let lost = recording.sample_of_row.iter().filter(|it| it.is_none());
+        let lost = lost.count();
+        if lost > 0 {
+            notes.push(format!(
+                "{}: the predictions of the {lost} rows that were left out are NaN.",
+                recording.name
+            ));
         }
     }
     notes

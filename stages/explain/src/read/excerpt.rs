@@ -59,7 +59,7 @@ mod tests {
             for column in [&mut one.position, &mut one.velocity, &mut one.effort] {
                 column.resize(2 * (length + 1), 0.0);
             }
-            one.sample_of_row = (0..=*length).collect();
+            one.sample_of_row = (0..=*length).map(Some).collect();
             one
         };
         lengths_s.iter().map(of).collect()

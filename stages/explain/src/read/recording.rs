@@ -41,8 +41,8 @@ pub struct Recording {
     pub effort: Vec<f64>,
     /// Another twin's effort at the same instants, in the recording's unit; empty where there is none.
     pub reference: Vec<f64>,
-    /// For each recorded row, the sample that stands for it: repeated rows share one.
-    pub sample_of_row: Vec<usize>,
+    /// For each recorded row, the sample that stands for it: repeated rows share one, and rows that are lost have none.
+    pub sample_of_row: Vec<Option<usize>>,
     /// The drive's clock, where the stamps were put back on it.
     pub clock: Option<EvenClock>,
     /// What was dropped on reading.
@@ -109,6 +109,16 @@ impl Recording {
         self.time_s.len()
     }
 
+    /// Whether the time of recording replaces the stamps.
+    pub fn is_timed_by_log(&self) -> bool {
+        let is_replaced = |finding: &Finding| match finding {
+            Finding::ConstantStamps { is_replaced, .. }
+            | Finding::CoarseStamps { is_replaced, .. } => *is_replaced,
+            _ => false,
+        };
+        self.findings.iter().any(is_replaced)
+    }
+
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()
@@ -163,13 +173,14 @@ impl Reader {
     }
 
     fn take(&mut self, message: &tauscope_archive::ros::JointState, received_ns: i64) {
+        let lost = self.assembler.counts().dropped();
         match self.assembler.take(message, received_ns) {
             Taken::Follows(whole) | Taken::SetBack(whole) => self.push(&whole),
             Taken::Nothing => {}
         }
-        // A row that is left out is answered by the sample before it.
+        let is_lost = self.assembler.counts().dropped() > lost;
         let newest = self.recording.time_s.len().saturating_sub(1);
-        self.recording.sample_of_row.push(newest);
+        (self.recording.sample_of_row).push((!is_lost).then_some(newest));
     }
 
     fn push(&mut self, whole: &Whole) {

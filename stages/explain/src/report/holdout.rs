@@ -37,7 +37,7 @@ pub struct Proof {
     pub kept: Vec<usize>,
     /// Effects that the written twin does not have.
     pub withheld: Vec<Withheld>,
-    /// The corrected twin's effort by hold-out recording.
+    /// The corrected twin's effort by hold-out recording; NaN in rows that were lost on reading.
     pub predictions: Vec<(String, Vec<f64>)>,
     /// The series of the pictures, held-out recordings first.
     pub pictures: Vec<RecordingPicture>,
@@ -199,11 +199,14 @@ impl Context<'_> {
             if is_held {
                 before.add(recording, &rigid);
                 after.add(recording, &predicted);
-                let rows = recording
-                    .sample_of_row
-                    .iter()
-                    .flat_map(|&k| predicted[k * n..(k + 1) * n].iter().copied());
-                predictions.push((recording.name.clone(), rows.collect()));
+                let mut rows = Vec::with_capacity(recording.sample_of_row.len() * n);
+                for sample in &recording.sample_of_row {
+                    match sample {
+                        Some(k) => rows.extend_from_slice(&predicted[k * n..(k + 1) * n]),
+                        None => rows.resize(rows.len() + n, f64::NAN),
+                    }
+                }
+                predictions.push((recording.name.clone(), rows));
             }
             if !recording.effort.is_empty() {
                 pictures.push(picture(

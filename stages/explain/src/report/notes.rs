@@ -131,10 +131,13 @@ pub fn notes(
         .collect();
     if !stuck.is_empty() {
         notes.push(format!(
-            "At rest, the friction of {} takes any value up to the breakaway torque, and the motion does not determine \
-             which. So standstills of these joints were left out of the fit, and no effect is named for them. The error \
-             on the held-out recordings includes them.",
-            stuck.join(", ")
+            "While {} stands still, its friction can have any value up to the breakaway torque. Such rows were not used for the \
+             fit; they do count in the error on the held-out recordings.",
+            match &stuck[..] {
+                [one] => format!("joint {one}"),
+                all if all.len() == names.len() => "a joint".to_owned(),
+                all => format!("one of the joints {}", all.join(", ")),
+            }
         ));
     }
     notes

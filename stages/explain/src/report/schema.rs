@@ -69,6 +69,45 @@ impl Report {
         self.findings.iter().any(Finding::is_slip)
     }
 
+    /// The motions to record next, a sentence and its motions each; a motion that is the same for several joints has one
+    /// sentence.
+    pub fn grouped_motions(&self) -> Vec<(String, Vec<&NextMotion>)> {
+        // Stands for the joint in a sentence.
+        const ITS: &str = "joint \0 ";
+        let joint_of = |motion: &NextMotion| {
+            let first = motion.separates.first();
+            first.and_then(|it| it.joint.clone()).unwrap_or_default()
+        };
+        let mut groups: Vec<(String, Vec<&NextMotion>)> = Vec::new();
+        for motion in &self.next_motions {
+            let of_joint = format!("joint {} ", joint_of(motion));
+            let sentence = motion.sentence.replace(&of_joint, ITS);
+            match groups.iter_mut().find(|(same, _)| *same == sentence) {
+                Some((_, motions)) => motions.push(motion),
+                None => groups.push((sentence, vec![motion])),
+            }
+        }
+        let all = self.joints.len();
+        let groups = groups.into_iter();
+        let in_words = groups.map(|(sentence, motions)| {
+            let mut joints: Vec<String> = Vec::new();
+            for joint in motions.iter().map(|motion| joint_of(motion)) {
+                if !joints.contains(&joint) {
+                    joints.push(joint);
+                }
+            }
+            let its = match &joints[..] {
+                joints if joints.len() > 1 && joints.len() == all => "every joint ".to_owned(),
+                [first @ .., last] if !first.is_empty() => {
+                    format!("each of the joints {} and {last} ", first.join(", "))
+                }
+                one => format!("joint {} ", one.concat()),
+            };
+            (sentence.replace(ITS, &its), motions)
+        });
+        in_words.collect()
+    }
+
     /// Whether there is a corrected twin for a pipeline. One of mended recordings would not fit what the robot publishes;
     /// a pipeline does not use a velocity that is not the derivative of the position.
     pub fn hands_out_twin(&self) -> bool {
@@ -199,7 +238,7 @@ impl Finding {
     }
 
     /// Whether it is such a fault of the recorded velocity alone.
-    fn is_of_velocity(&self) -> bool {
+    pub(crate) fn is_of_velocity(&self) -> bool {
         self.known_as() == "velocity_scale"
     }
 

@@ -1,7 +1,7 @@
 //! Faults of the recordings, or of what is said of them, as findings.
 //!
-//! A fault is an `unknown` with a `kind`: no physics of the arm, so the verdict is not that it is explained. All else in the
-//! report is of the recordings as they would be without the faults.
+//! A fault is an `unknown` with a `kind`: no physics of the arm. The verdict is not that it is explained, unless the fault is
+//! of the velocity alone. All else in the report is of the recordings as they would be without the faults.
 
 use std::collections::BTreeMap;
 
@@ -62,10 +62,15 @@ impl Slips {
         } else {
             "No corrected twin was written: correct the faults, then explain again."
         };
+        let before = if self.as_recorded.is_some() {
+            "The error before is that of the recordings as they are. "
+        } else {
+            ""
+        };
         (!self.all.is_empty()).then(|| {
             format!(
                 "The recordings, or their description, have the faults that are listed first. All other findings and numbers are those \
-                 of the recordings without these faults. The error before is that of the recordings as they are. {twin}"
+                 of the recordings without these faults. {before}{twin}"
             )
         })
     }
@@ -211,7 +216,7 @@ fn sentence(slip: &Slip, joints: &[String], unit: &str) -> String {
                 joint.map_or("all joints", name),
                 number(factor)
             ),
-            cure_of_velocity(joint, factor),
+            format!("Divide it by {} in the driver.", number(factor)),
         ),
         Remedy::Unmeasured(joint, effort) => (
             format!(
@@ -236,20 +241,6 @@ fn without_sign(joint: &str) -> (String, String) {
     );
     let cure = "Let the driver publish the effort with its sign.".to_owned();
     (wrong, cure)
-}
-
-/// What mends velocities that are `factor` times what they should be, at a joint or at all.
-fn cure_of_velocity(joint: Option<usize>, factor: f64) -> String {
-    let mut text = format!("Divide it by {} in the driver", number(factor));
-    if joint.is_none() {
-        let runs = if factor > 1.0 {
-            format!("{} times too fast", number(factor))
-        } else {
-            format!("{} times too slowly", number(1.0 / factor))
-        };
-        text += &format!("; or the clock of the stamps runs {runs}");
-    }
-    text + "."
 }
 
 /// How far off torque constants are that must be multiplied by `factor`.

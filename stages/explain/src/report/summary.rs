@@ -20,7 +20,10 @@ pub fn summary(
     let remains = remains.map_or("", |remaining| remaining.sentence.as_str());
     match verdict {
         Verdict::NothingMissing => {
-            "Nothing is missing: what the twin leaves does not follow the motion. It is the noise of the measurement.".to_owned()
+            // A fault of the velocity may be there.
+            let faults = findings.iter().map(|fault| format!("{} ", fault.sentence));
+            let nothing = "Nothing is missing: what the twin leaves does not follow the motion. It is the noise of the measurement.";
+            faults.chain([nothing.to_owned()]).collect()
         }
         Verdict::NotEvaluated => "Nothing was evaluated.".to_owned(),
         Verdict::UnknownRemains if findings.is_empty() => {
@@ -56,10 +59,10 @@ fn proof(joints: &[String], [before, after]: [&[f64]; 2]) -> String {
         return String::new();
     }
     let all = if left < 0.01 {
-        " On recordings that were not fitted the error (RMS) falls to less than 1 %.".to_owned()
+        " On recordings that were not fitted the error (RMS) falls to less than 1 % of what it was.".to_owned()
     } else if left < UNCHANGED {
         format!(
-            " On recordings that were not fitted the error (RMS) falls to {:.0} %.",
+            " On recordings that were not fitted the error (RMS) falls to {:.0} % of what it was.",
             100.0 * left
         )
     } else {
@@ -70,7 +73,7 @@ fn proof(joints: &[String], [before, after]: [&[f64]; 2]) -> String {
     let worst = worse.max_by(|&a, &b| times(a).total_cmp(&times(b)));
     let worse = worst.map_or_else(String::new, |j| {
         format!(
-            " But at joint {} it rises to {:.0} %.",
+            " But at joint {} it rises to {:.0} % of what it was.",
             joints[j],
             100.0 * times(j)
         )

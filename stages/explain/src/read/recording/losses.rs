@@ -52,7 +52,7 @@ impl Recording {
         self.start_ns += (start_s * 1e9).round() as i64;
         self.time_s = kept.iter().map(|&k| self.time_s[k] - start_s).collect();
         let now_at = |sample: usize| kept.partition_point(|&k| k <= sample).saturating_sub(1);
-        for sample in &mut self.sample_of_row {
+        for sample in self.sample_of_row.iter_mut().flatten() {
             *sample = now_at(*sample);
         }
     }
@@ -67,7 +67,7 @@ mod tests {
         let mut recording = fixture::recording(&fixture::model(), 3, |_, _, _| {});
         let whole = recording.clone();
         let count = whole.len();
-        recording.sample_of_row = (0..count).collect();
+        recording.sample_of_row = (0..count).map(Some).collect();
         let measured: Vec<bool> = (0..count).map(|k| k > 0 && k % 3 != 0).collect();
         recording.keep_measured(&measured);
         assert_eq!(recording.losses.unmeasured as usize, count.div_ceil(3));
@@ -77,6 +77,6 @@ mod tests {
             [&whole.position[2..4], &whole.position[4..6]].concat()
         );
         assert!(recording.time_s[0] == 0.0 && recording.start_ns > whole.start_ns);
-        assert_eq!(recording.sample_of_row[..6], [0, 0, 1, 1, 2, 3]);
+        assert_eq!(recording.sample_of_row[..6], [0, 0, 1, 1, 2, 3].map(Some));
     }
 }

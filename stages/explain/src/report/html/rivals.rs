@@ -74,20 +74,25 @@ pub(super) fn next(report: &Report) -> Option<Markup> {
         };
         return Some(html! { p { (text) } });
     }
-    Some(html! { ol.next { @for motion in &report.next_motions { (next_motion(motion)) } } })
+    let groups = report.grouped_motions();
+    Some(
+        html! { ol.next { @for (sentence, motions) in &groups { (next_motion(sentence, motions)) } } },
+    )
 }
 
-fn next_motion(motion: &NextMotion) -> Markup {
+fn next_motion(sentence: &str, motions: &[&NextMotion]) -> Markup {
     html! {
         li {
-            p { (motion.sentence) }
-            p.figures {
-                @if !motion.separates.is_empty() {
-                    span { "Decides between " (list(motion.separates.iter().map(|rival| {
-                        effect_at(&rival.effect, rival.joint.as_deref(), rival.link.as_deref())
-                    }))) }
+            p { (sentence) }
+            @for motion in motions {
+                p.figures {
+                    @if !motion.separates.is_empty() {
+                        span { "Decides between " (list(motion.separates.iter().map(|rival| {
+                            effect_at(&rival.effect, rival.joint.as_deref(), rival.link.as_deref())
+                        }))) }
+                    }
+                    span { (trajectory(motion)) }
                 }
-                span { (trajectory(motion)) }
             }
         }
     }
