@@ -83,7 +83,10 @@ pub fn code(outcome: Result<Exit, Failure>, out: &mut Output) -> u8 {
     match outcome {
         Ok(Exit::Done) => 0,
         Ok(Exit::Failed) => 1,
-        Ok(Exit::Lossy) => 3,
+        Ok(Exit::Lossy) => {
+            out.say("Some data was left out, so the exit code is 3.");
+            3
+        }
         Ok(Exit::Rejected) => 2,
         Err(Failure::Failed(error)) => {
             out.say(&format!("error: {}", told_once(&error)));

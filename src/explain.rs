@@ -24,12 +24,18 @@ pub use output::{json, make, refuse_to_replace, write};
 pub use read::{Kept, read};
 pub use words::text;
 
-/// What went in, by name and hash.
+/// Sentences about the robot file: which of its numbers are replaced, and which joints are made `fixed`.
+pub fn of_robot(request: &Request) -> Vec<String> {
+    let findings = request.cell.findings.iter().cloned();
+    findings.chain(request.note.clone()).collect()
+}
+
+/// Names and hashes of the inputs. That of the robot is of its file; the text that was used may differ ([`of_robot`]).
 fn provenance_of(request: &Request) -> std::io::Result<BTreeMap<String, String>> {
     let version = env!("CARGO_PKG_VERSION").to_owned();
     let mut all = BTreeMap::from([("tauscope".to_owned(), version)]);
-    if let Some(urdf) = &request.cell.facts.urdf {
-        let hash = provenance::sha256(urdf.as_bytes());
+    if let Some(path) = &request.robot_path {
+        let hash = provenance::sha256_of_file(path)?;
         all.insert("urdf_sha256".to_owned(), hash);
     }
     if let Some(start) = &request.start {

@@ -33,7 +33,7 @@ fn a_detector_that_needs_kinds_says_which_recordings_have_none() {
     // One that needs none runs, and it is said what was taken for granted.
     let run = evaluate(&set, &out, &["--detectors", "naive_difference"]);
     assert_eq!(run.code, 0, "{}", run.stderr);
-    let said = "treated as free of contacts, because they have no labels: demo_train_points";
+    let said = "Recordings without labels are treated as free of contacts: demo_train_points";
     assert!(run.stdout.contains(said), "{}", run.stdout);
 }
 

@@ -66,7 +66,11 @@ fn three_free_recordings_make_a_pipeline_that_finds_every_push() {
     let cell = folder.path().join("cell");
     let out = init(&cell, &[]);
     assert_eq!(out.code, 0, "{}", out.stderr);
-    assert!(out.stdout.contains("Effort is in N m"), "{}", out.stdout);
+    assert!(
+        out.stdout.contains("in N m: on joints that carry weight"),
+        "{}",
+        out.stdout
+    );
     assert!(out.stdout.contains("Coulomb friction"), "{}", out.stdout);
     assert!(out.stdout.contains("0 false alarms"), "{}", out.stdout);
 

@@ -96,9 +96,9 @@ impl Evaluation {
         /// Tuned: by hand, for the progress that is shown; no number depends on it.
         const LEARNT: f64 = 0.6;
         let request = &self.request;
-        let name = &request.twins[index].name;
+        let name = format!("twin {}", request.twins[index].name);
         let count = request.recordings.len() as f64;
-        let what = format!("{name}: fitting the twin");
+        let what = format!("{name}: fitting");
         let mut twin = Prepared::new(request, &request.twins[index], &|at, fraction| {
             progress(FITTED * (at as f64 + fraction) / count, &what);
         })?;
@@ -277,8 +277,8 @@ fn learn(
     let share = || done.load(Ordering::Relaxed) as f64 / all.max(1) as f64;
     let results = parallel::map(request.jobs, pupils, |(entry, seed)| {
         let what = match seeds(entry) {
-            1 => format!("{} learns", entry.name),
-            all => format!("{} learns (seed {} of {all})", entry.name, seed + 1),
+            1 => format!("training {}", entry.name),
+            all => format!("training {} (seed {} of {all})", entry.name, seed + 1),
         };
         progress(share(), &what);
         let file = format!("{}.{}.{seed}", twin.name, entry.name);

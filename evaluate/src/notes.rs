@@ -182,12 +182,13 @@ pub fn silent(runners: &[Runner]) -> Vec<String> {
 pub fn unlabelled(request: &Request) -> Option<String> {
     let learnt_from =
         |recording: &&Named| recording.role != Role::Test && recording.truth.is_none();
-    let names: Vec<&str> = (request.recordings.iter())
+    let mut names: Vec<&str> = (request.recordings.iter())
         .filter(learnt_from)
         .map(|recording| recording.name.as_str())
         .collect();
+    names.sort_unstable();
     (!names.is_empty()).then(|| {
         let names = suggest::some(&names);
-        format!("treated as free of contacts, because they have no labels: {names}")
+        format!("Recordings without labels are treated as free of contacts: {names}.")
     })
 }

@@ -131,9 +131,6 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
     let step = |share: f64, what: &str| progress.doing(READ + (EXPLAINED - READ) * share, what);
     let mut outcome = tauscope_explain::explain(input, &step)
         .map_err(|error| Failure::rejected(error.to_string()))?;
-    let of_robot = request.cell.findings.iter().cloned();
-    let of_robot = of_robot.chain(request.note.clone());
-    outcome.report.notes.splice(0..0, of_robot);
     progress.doing(EXPLAINED, "writing");
     let hold = interrupt::hold();
     let made = explain::write(&args.out, &request, &kept, &mut outcome)?;

@@ -76,17 +76,23 @@ fn joint_states(recording: &Recording) -> Result<Vec<Topic>, SessionError> {
 fn text(printed: &Printed) -> String {
     let mut text = printed.info.to_string();
     for topic in &printed.joint_states {
+        let on = if printed.info.kind.is_table() {
+            String::new()
+        } else {
+            format!(" on {}", topic.name)
+        };
         if topic.publishers.len() > 1 {
-            text += &format!("publishers on {}:\n", topic.name);
+            text += &format!("{} publishers{on}:\n", topic.publishers.len());
             for publisher in &topic.publishers {
                 text += &format!("  {publisher}\n");
             }
         }
-        if !topic.findings.is_empty() {
-            text += &format!("findings on {}:\n", topic.name);
-        }
-        for finding in &topic.findings {
-            text += &format!("  {finding}.\n");
+        // The lines on the topic count the messages that cannot be decoded.
+        let findings = topic.findings.iter();
+        let findings = findings.filter(|it| !matches!(it, Finding::Undecodable { .. }));
+        let findings: String = findings.map(|finding| format!("  {finding}.\n")).collect();
+        if !findings.is_empty() {
+            text += &format!("findings{on}:\n{findings}");
         }
     }
     text

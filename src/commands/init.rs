@@ -87,7 +87,7 @@ pub fn run(args: &Args, out: &mut Output) -> Result<Exit, Failure> {
         effort_unit: args.effort_unit,
     };
     let looked = told.look(&|share, what| progress.doing(LOOKED * share, what))?;
-    let sentences = looked.sentences.clone();
+    let sentences = [looked.of_robot.clone(), looked.of_recordings.clone()].concat();
     match set_up(args, &folder, looked, progress) {
         Ok((page, exit)) => {
             folder.keep();
@@ -116,7 +116,8 @@ fn set_up(
         mut request,
         input,
         kept,
-        sentences,
+        of_robot,
+        of_recordings,
         no_line,
     } = looked;
     explain::refuse_to_replace(&folder.explained(), &request, args.force)?;
@@ -156,6 +157,7 @@ fn set_up(
     let learnt = init::learn(
         &folder.set(),
         (explained, no_line.is_none()),
+        cell.model.as_ref(),
         &folder.learnt(),
         &|share, what| {
             progress.doing(EXPLAINED + (1.0 - EXPLAINED) * share, what);
@@ -172,7 +174,8 @@ fn set_up(
     folder.write_pipeline(cell, &request.state_topic, shown, live, is_explained)?;
     let seen = Seen {
         cell,
-        sentences: &sentences,
+        of_robot: &of_robot,
+        of_recordings: &of_recordings,
         lost: kept.lost,
         is_live: live.is_some(),
     };

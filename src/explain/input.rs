@@ -26,6 +26,8 @@ pub struct Request {
     pub robot_path: Option<PathBuf>,
     /// Topic of the measured joint states.
     pub state_topic: String,
+    /// That topic, unless the first recording is a table.
+    pub topic_of_messages: Option<String>,
     /// Topic of somebody else's twin.
     pub twin_topic: Option<String>,
     /// A corrected twin to start from.

@@ -10,7 +10,7 @@ use tauscope_explain::{Outcome, html};
 
 use super::input::Request;
 use super::read::Kept;
-use super::{picture, provenance_of, robot, twin, write_whole};
+use super::{of_robot, picture, provenance_of, robot, twin, write_whole};
 use crate::existing::Force;
 use crate::exit::Failure;
 
@@ -91,6 +91,7 @@ pub fn write(
             joint.joint.clone_from(name);
         }
     }
+    outcome.report.notes.splice(0..0, of_robot(request));
     let provenance = provenance_of(request).context("what went in")?;
     // What an explanation before has left there must not stand beside a new report.
     let fixed = [REPORT, PAGE, TWIN, ROBOT, PICTURE].map(|name| out.join(name));
@@ -186,7 +187,7 @@ pub fn json(outcome: &Outcome) -> anyhow::Result<String> {
     serde_json::to_string_pretty(&outcome.report).context("cannot encode the report")
 }
 
-/// A row per recorded row, a column per joint; no header.
+/// A row per recorded row, a column per joint; no header. Rows without a prediction are `NaN`.
 fn prediction(rows: &[f64], joints: usize) -> String {
     let mut text = String::with_capacity(rows.len() * 12);
     for row in rows.chunks(joints.max(1)) {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use tauscope_dynamics::Model;
 use tauscope_explain::{Input, Recording, RecordingTopics, Start};
 use tauscope_pipeline::report::{Problem, Report};
-use tauscope_session::Joints;
+use tauscope_session::{Joints, by_reason};
 use tauscope_twin::JointCorrection;
 
 use super::input::{Named, Request};
@@ -64,7 +64,7 @@ pub fn read(request: &Request, progress: &dyn Fn(f64, &str)) -> Result<Input, Re
         effort_limits: &limits,
     };
     let count = (request.fit.len() + request.holdout.len()) as f64;
-    let mut report = Report::default();
+    let mut errors = Vec::new();
     let mut done = 0.0;
     let mut read_all = |recordings: &[Named]| -> Vec<Recording> {
         let mut all = Vec::new();
@@ -76,13 +76,17 @@ pub fn read(request: &Request, progress: &dyn Fn(f64, &str)) -> Result<Input, Re
                     recording.name.clone_from(name);
                     all.push(recording);
                 }
-                Err(error) => report.push(Problem::new(error.to_string())),
+                Err(error) => errors.push(error),
             }
         }
         all
     };
     let fit = read_all(&request.fit);
     let holdout = read_all(&request.holdout);
+    let mut report = Report::default();
+    for reason in by_reason(&errors, request.fit.len() + request.holdout.len()) {
+        report.push(Problem::new(reason));
+    }
     // Where the effort is somebody else's twin's, the robot's bodies are in it already.
     let (model, bodies) = match (&request.cell.model, &request.twin_topic) {
         (Some(model), None) => (model.clone(), true),

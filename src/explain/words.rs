@@ -23,13 +23,16 @@ pub fn text(report: &Report, made: &Made) -> String {
     if !notes.is_empty() {
         parts.push(notes.join("\n"));
     }
-    let motions = report
-        .next_motions
-        .iter()
-        .map(|motion| match &motion.trajectory {
-            Some(file) => format!("next: {} ({file})", motion.sentence),
-            None => format!("next: {}", motion.sentence),
-        });
+    let motions = report.grouped_motions().into_iter();
+    let motions = motions.map(|(sentence, motions)| {
+        let files = motions.iter().filter_map(|it| it.trajectory.as_deref());
+        let files: Vec<&str> = files.collect();
+        if files.is_empty() {
+            format!("next: {sentence}")
+        } else {
+            format!("next: {sentence} ({})", files.join(", "))
+        }
+    });
     let motions: Vec<String> = motions.collect();
     if !motions.is_empty() {
         parts.push(motions.join("\n"));

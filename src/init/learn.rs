@@ -5,6 +5,7 @@ use std::path::Path;
 
 use anyhow::Context as _;
 use tauscope_detect::{Config, tauscope};
+use tauscope_dynamics::Model;
 use tauscope_dynamics::terms::words::{counted, number};
 use tauscope_evaluate::{Evaluation, Options, Output, Progress, Role};
 use tauscope_twin::TwinFile;
@@ -37,8 +38,9 @@ struct Trial {
     alarms: usize,
     /// Of the recordings without contacts \[s\].
     seen_s: f64,
-    /// The outermost link that a push is told on, and the force that is found in half of all directions \[N\].
-    push: Option<(String, f64)>,
+    /// By end of the chain, the outermost link for which a force is known, and the force that is detected in half of all
+    /// directions \[N\].
+    pushes: Vec<(String, f64)>,
 }
 
 /// Lets the detector learn from the set at `set`, behind the twin at `explained` or, with `has_line`, behind a regression, whichever
@@ -50,6 +52,7 @@ struct Trial {
 pub fn learn(
     set: &Path,
     (explained, has_line): (Option<&Path>, bool),
+    model: Option<&Model>,
     out: &Path,
     progress: &Progress<'_>,
 ) -> Result<Learnt, Failure> {
@@ -62,10 +65,12 @@ pub fn learn(
     let tried = evaluate(set, &twins, true, &|share, what| {
         progress(TRIED * share, what);
     })?;
-    let mut trials = trials(&tried, &twins);
+    let mut trials = trials(&tried, &twins, model);
     trials.sort_by(|a, b| {
-        let force =
-            |trial: &Trial| (trial.push.as_ref()).map_or(f64::INFINITY, |(_, force_n)| *force_n);
+        let force = |trial: &Trial| {
+            let forces_n = trial.pushes.iter().map(|(_, force_n)| *force_n);
+            forces_n.max_by(f64::total_cmp).unwrap_or(f64::INFINITY)
+        };
         a.alarms.cmp(&b.alarms).then(force(a).total_cmp(&force(b)))
     });
     let best = trials.first().context("no detector has learnt")?;
@@ -77,7 +82,8 @@ pub fn learn(
     write(out, text.as_bytes())?;
     let is_explained = best.twin != REGRESSION;
     let mut sentences = vec![format!("The detector uses {}.", best.words())];
-    sentences.extend(trials.iter().map(Trial::sentence));
+    let tried = trials.iter().enumerate();
+    sentences.extend(tried.map(|(place, trial)| trial.sentence(place == 0)));
     sentences.extend(taught.notes.iter().cloned());
     Ok(Learnt {
         twin: taught.twins[0].file.clone(),
@@ -112,7 +118,7 @@ fn evaluate(
     result.map_err(|error| Failure::rejected(error.to_string()))
 }
 
-fn trials(evaluation: &Evaluation, twins: &[String]) -> Vec<Trial> {
+fn trials(evaluation: &Evaluation, twins: &[String], model: Option<&Model>) -> Vec<Trial> {
     let runs = evaluation.runs.iter();
     let trials = runs.map(|run| {
         let runner = run.first();
@@ -125,40 +131,61 @@ fn trials(evaluation: &Evaluation, twins: &[String]) -> Vec<Trial> {
         let settings = runner.config.settings::<tauscope::Settings>();
         let forces =
             settings.map(|settings| settings.smallest_forces(settings.false_alarms_per_hour));
-        // From the base on: the last is the one that is touched most.
-        let mut outermost =
+        let forces =
             (forces.into_iter().flatten()).filter_map(|link| Some((link.link, link.half_n?)));
         Trial {
             twin: twins[run.twin].clone(),
             alarms: unseen().map(|output| output.events.len()).sum(),
             seen_s: unseen().map(Output::duration_s).sum(),
-            push: outermost.next_back(),
+            pushes: at_ends(forces.collect(), model),
         }
     });
     trials.collect()
+}
+
+/// The forces on links that carry no other link of the list.
+fn at_ends(forces: Vec<(String, f64)>, model: Option<&Model>) -> Vec<(String, f64)> {
+    let carries = |link: &str, other: &str| {
+        let parent = |link: usize| model.and_then(|model| model.links()[link].parent);
+        let index = |name: &str| model.and_then(|model| model.link_index(name));
+        let carried = std::iter::successors(index(other), |&link| parent(link));
+        carried.skip(1).any(|carrier| Some(carrier) == index(link))
+    };
+    let is_end = |(link, _): &&(String, f64)| !forces.iter().any(|(other, _)| carries(link, other));
+    forces.iter().filter(is_end).cloned().collect()
 }
 
 impl Trial {
     /// Its twin.
     fn words(&self) -> &'static str {
         if self.twin == REGRESSION {
-            "a gain and an offset per joint"
+            "only a gain and an offset per joint"
         } else {
             "the explained twin"
         }
     }
 
-    fn sentence(&self) -> String {
-        let twin = self.words();
-        let force = self.push.as_ref().map_or_else(String::new, |(link, force_n)| {
+    fn sentence(&self, is_best: bool) -> String {
+        let with = if is_best {
+            format!("With {}", self.words())
+        } else {
+            format!("For comparison, with {}", self.words())
+        };
+        let of_link = |(link, force_n): &(String, f64)| {
+            format!("on link {link} is detected from {} N on", number(*force_n))
+        };
+        let pushes: Vec<String> = self.pushes.iter().map(of_link).collect();
+        let force = if pushes.is_empty() {
+            String::new()
+        } else {
             format!(
-                " While the arm moves as it does there, a push on {link} is found from {} N in half of all \
-                 directions; while the arm stands, weaker ones are found.",
-                number(*force_n)
+                " While the arm moves as in these recordings, a push {} in half of all directions; at standstill weaker pushes \
+                 are detected.",
+                pushes.join(" and one ")
             )
-        });
+        };
         format!(
-            "With {twin}: {} in {:.0} s of recordings that neither twin nor detector had seen.{force}",
+            "{with}: {} in {:.0} s of recordings that neither twin nor detector had seen.{force}",
             counted(self.alarms, "false alarm"),
             self.seen_s
         )

@@ -28,8 +28,10 @@ pub struct Looked {
     pub input: Input,
     /// Facts about the input that are needed after the engine has taken it.
     pub kept: Kept,
-    /// What was found, a sentence each.
-    pub sentences: Vec<String>,
+    /// Findings about the robot, a sentence each.
+    pub of_robot: Vec<String>,
+    /// Findings about the recordings, a sentence each.
+    pub of_recordings: Vec<String>,
     /// Why a gain and an offset per joint cannot correct the twin, if they cannot.
     pub no_line: Option<ScaleFault>,
 }
@@ -64,17 +66,19 @@ impl Told<'_> {
         let mut input = explain::read(&request, progress)?;
         refuse_faults(&input)?;
         let cell = &request.cell;
-        let mut sentences = vec![format!(
-            "{} joints of {} on {} in {} recordings.",
+        let mut of_robot = explain::of_robot(&request);
+        of_robot.extend(coupled(cell));
+        of_robot.extend(unlimited(cell));
+        let on = match &request.topic_of_messages {
+            Some(topic) => format!(" on {topic}"),
+            None => String::new(),
+        };
+        let mut of_recordings = vec![format!(
+            "{} joints of {}{on} in {} recordings.",
             cell.facts.joint_names.len(),
             cell.facts.name,
-            request.state_topic,
             self.recordings.len()
         )];
-        sentences.extend(request.note.clone());
-        sentences.extend(cell.findings.iter().cloned());
-        sentences.extend(coupled(cell));
-        sentences.extend(unlimited(cell));
         let found: Vec<_> = (input.fit.iter())
             .map(|recording| {
                 (
@@ -83,14 +87,14 @@ impl Told<'_> {
                 )
             })
             .collect();
-        sentences.extend(by_recording(&found));
+        of_recordings.extend(by_recording(&found));
         let scale = scale(&request);
         let (unit, sentence) = self.unit(scale.as_ref());
         let no_line = scale.and_then(|scale| match unit {
             EffortUnit::Nm => scale.fault_in_nm(),
             EffortUnit::A => scale.fault_in_a(),
         });
-        sentences.push(sentence);
+        of_recordings.push(sentence);
         request.cell.facts.effort_unit = unit;
         unit.as_str().clone_into(&mut input.effort_unit);
         let kept = Kept::of(&input);
@@ -99,7 +103,8 @@ impl Told<'_> {
             request,
             input,
             kept,
-            sentences,
+            of_robot,
+            of_recordings,
             no_line,
         })
     }
@@ -133,7 +138,8 @@ impl Told<'_> {
             Some(EffortScale::Torque { slope, sure: true }) => (
                 EffortUnit::Nm,
                 format!(
-                    "Effort is in N m: the joints that bear weight measure {slope:.2} times what the robot's weight requires."
+                    "Effort is taken to be in N m: on joints that carry weight it is {slope:.2} times what the robot's weight \
+                     requires."
                 ),
             ),
             Some(EffortScale::Current {
@@ -216,16 +222,20 @@ fn travel(recording: &Recording, joints: usize) -> f64 {
 /// Nothing begins on recordings from which nothing right can be learnt.
 fn refuse_faults(input: &Input) -> Result<(), Report> {
     let mut report = Report::default();
-    for recording in &input.fit {
-        let faults = recording.findings.iter();
-        for fault in faults.filter(|finding| finding.effect() == Effect::Fault) {
-            report.push(Problem::of_file(&recording.path, fault.to_string()));
-        }
-        if recording.effort.is_empty() {
-            let title = "no joint state has an effort";
-            let help = "record the topic that has efforts, with the drives on";
-            report.push(Problem::of_file(&recording.path, title.to_owned()).help(help));
-        }
+    let faults = |recording: &Recording| {
+        let name = recording.path.display().to_string();
+        let faults = recording.findings.iter().cloned();
+        let faults = faults.filter(|finding| finding.effect() == Effect::Fault);
+        (name, faults.collect())
+    };
+    let faults: Vec<_> = input.fit.iter().map(faults).collect();
+    for fault in by_recording(&faults) {
+        report.push(Problem::new(fault));
+    }
+    for recording in input.fit.iter().filter(|it| it.effort.is_empty()) {
+        let title = "no joint state has an effort";
+        let help = "record the topic that has efforts, with the drives on";
+        report.push(Problem::of_file(&recording.path, title.to_owned()).help(help));
     }
     report.into_result(())
 }

@@ -16,8 +16,10 @@ use super::learn::Learnt;
 pub struct Seen<'a> {
     /// The arm.
     pub cell: &'a Cell,
-    /// Findings about the recordings and the robot, a sentence each.
-    pub sentences: &'a [String],
+    /// Findings about the robot, a sentence each.
+    pub of_robot: &'a [String],
+    /// Findings about the recordings, a sentence each.
+    pub of_recordings: &'a [String],
     /// Rows and parts of recordings that could not be used.
     pub lost: u64,
     /// Whether the pipeline listens to the robot.
@@ -29,11 +31,14 @@ pub struct Seen<'a> {
 pub fn page(folder: &Folder, seen: &Seen<'_>, report: &Report, learnt: &Learnt) -> String {
     let (lost, is_live) = (seen.lost, seen.is_live);
     let mut text = format!("# {}\n", seen.cell.facts.name);
-    section(&mut text, "Recordings", seen.sentences);
+    if !seen.of_robot.is_empty() {
+        section(&mut text, "Robot", seen.of_robot);
+    }
+    section(&mut text, "Recordings", seen.of_recordings);
     if lost > 0 {
         let page = folder.explained().join("report.html");
         let say = format!(
-            "{lost} rows or parts of them could not be used: {} says which.",
+            "{lost} rows or parts of them are not used. The notes of {} list them.",
             page.display()
         );
         list(&mut text, &[say]);
@@ -52,7 +57,9 @@ pub fn page(folder: &Folder, seen: &Seen<'_>, report: &Report, learnt: &Learnt) 
     section(&mut text, "Detector", &[]);
     list(&mut text, &learnt.sentences);
 
-    let next = first(motions(report), &page.display().to_string());
+    let motions = report.grouped_motions().into_iter();
+    let motions = motions.map(|(sentence, _)| sentence).collect();
+    let next = first(motions, &page.display().to_string());
     if !next.is_empty() {
         section(&mut text, "Record next", &[]);
         list(&mut text, &next);
@@ -78,7 +85,9 @@ fn go_on(folder: &Folder, report: &Report, learnt: &Learnt, is_live: bool) -> Ve
         vec![
             format!("Play a recording through the pipeline: `tauscope run {pipeline}`."),
             search,
-            format!("Listen to the robot: change `ingest` in {pipeline} as its comment says."),
+            format!(
+                "Connect to the live robot: edit `ingest` in {pipeline}; the comment there says how."
+            ),
         ]
     };
     let what = if report.verdict == Verdict::NotEvaluated {
@@ -102,35 +111,6 @@ fn for_a_shell(path: &Path) -> String {
     } else {
         format!("'{}'", text.replace('\'', r"'\''"))
     }
-}
-
-/// The motions to record next; a motion that is the same for several joints is told once.
-fn motions(report: &Report) -> Vec<String> {
-    // Stands for the joint in a sentence.
-    const ITS: &str = "joint \0 ";
-    let mut told: Vec<(String, Vec<&str>)> = Vec::new();
-    for motion in &report.next_motions {
-        let joint = motion.separates.first().and_then(|it| it.joint.as_deref());
-        let joint = joint.unwrap_or_default();
-        let sentence = motion.sentence.replace(&format!("joint {joint} "), ITS);
-        match told.iter_mut().find(|(same, _)| *same == sentence) {
-            Some((_, joints)) if joints.contains(&joint) => {}
-            Some((_, joints)) => joints.push(joint),
-            None => told.push((sentence, vec![joint])),
-        }
-    }
-    let told = told.into_iter();
-    told.map(|(sentence, joints)| match &joints[..] {
-        all if all.len() > 1 && all.len() == report.joints.len() => {
-            sentence.replace(ITS, "every joint ")
-        }
-        [first @ .., last] if !first.is_empty() => {
-            let all = format!("each of the joints {} and {last} ", first.join(", "));
-            sentence.replace(ITS, &all)
-        }
-        _ => sentence.replace(ITS, &format!("joint {} ", joints.concat())),
-    })
-    .collect()
 }
 
 /// The error of the held-out recordings at a joint, before and after, and its unit.

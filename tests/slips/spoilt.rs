@@ -124,7 +124,7 @@ const SLIPS: &[Slip] = &[
     Slip {
         typed: "replay @zero.mcap --pipeline @pipeline.yaml",
         code: 0,
-        says: &["warning: the effort is zero throughout: the driver does not publish it"],
+        says: &["warning: the effort is zero throughout, so it is not measured"],
     },
     Slip {
         typed: "replay @ceased.mcap --pipeline @pipeline.yaml",
@@ -145,7 +145,7 @@ const SLIPS: &[Slip] = &[
         typed: "replay @half.mcap --pipeline @pipeline.yaml",
         code: 0,
         says: &[
-            "warning: the recorded velocity of joint1",
+            "warning: the recorded velocity of all 7 joints",
             "is 0.50 times the derivative",
         ],
     },
@@ -248,7 +248,10 @@ const SLIPS: &[Slip] = &[
     Slip {
         typed: "calibrate @half.mcap --robot @demo_arm.urdf --out @x13.yaml",
         code: 0,
-        says: &["warning: ", "half.mcap: the recorded velocity of joint1"],
+        says: &[
+            "warning: ",
+            "half.mcap: the recorded velocity of all 7 joints",
+        ],
     },
 ];
 

@@ -11,7 +11,7 @@ use tauscope_pipeline::provenance::sha256_of_file;
 use tauscope_pipeline::report::{Problem, Report};
 use tauscope_pipeline::urdf::Robot;
 use tauscope_pipeline::{urdf, yaml};
-use tauscope_session::{Joints, Look, SessionError};
+use tauscope_session::{Joints, Look, SessionError, by_reason};
 use tauscope_twin::TwinFile;
 
 use super::{Named, Request, StartFile};
@@ -122,6 +122,7 @@ impl Assembly<'_> {
                 findings,
             },
             robot_path: self.robot,
+            topic_of_messages: look.topic_of_messages().map(str::to_owned),
             state_topic: look.topic,
             twin_topic: self.twin_topic,
             start,
@@ -206,14 +207,24 @@ impl Assembly<'_> {
         let Some(first) = fit.first() else {
             return Err(Problem::new("there is no recording to fit").into());
         };
-        let wrong =
-            |error: SessionError| Report::from((self.problem)(Spot::Fit(0), error.to_string()));
-        let recording = tauscope_session::open(&first.path).map_err(|error| wrong(error.into()))?;
         let wanted = Joints {
             names: joints,
             effort_limits: &[],
         };
-        Look::at(&recording, self.state_topic.as_deref(), wanted).map_err(wrong)
+        let look = |named: &Named| -> Result<Look, SessionError> {
+            let recording = tauscope_session::open(&named.path)?;
+            Look::at(&recording, self.state_topic.as_deref(), wanted)
+        };
+        look(first).map_err(|error| {
+            // The others may have the same fault.
+            let others = fit[1..].iter().filter_map(|named| look(named).err());
+            let errors: Vec<SessionError> = std::iter::once(error).chain(others).collect();
+            let mut report = Report::default();
+            for reason in by_reason(&errors, fit.len()) {
+                report.push((self.problem)(Spot::Fit(0), reason));
+            }
+            report
+        })
     }
 
     fn start(&self, report: &mut Report) -> Option<StartFile> {

@@ -36,7 +36,7 @@ TRIALS = [
     trial(
         "velocity-constant",
         lambda rows: 0 * rows.qd + SPEED_PER_JOINT,
-        r"constant|same|one (number|value)|never changes|does not change",
+        r"constant|same|one (number|value)|in every message|never changes|does not change",
     ),
     trial(
         "velocity-position",
