@@ -90,9 +90,9 @@ fn text(printed: &Printed) -> String {
         // The lines on the topic count the messages that cannot be decoded.
         let findings = topic.findings.iter();
         let findings = findings.filter(|it| !matches!(it, Finding::Undecodable { .. }));
-        let findings: String = findings.map(|finding| format!("  {finding}.\n")).collect();
+        let findings: Vec<String> = findings.map(|finding| format!("  {finding}.\n")).collect();
         if !findings.is_empty() {
-            text += &format!("findings{on}:\n{findings}");
+            text += &format!("findings{on}:\n{}", findings.concat());
         }
     }
     text

@@ -137,14 +137,14 @@ fn trials(evaluation: &Evaluation, twins: &[String], model: Option<&Model>) -> V
             twin: twins[run.twin].clone(),
             alarms: unseen().map(|output| output.events.len()).sum(),
             seen_s: unseen().map(Output::duration_s).sum(),
-            pushes: at_ends(forces.collect(), model),
+            pushes: at_ends(&forces.collect::<Vec<_>>(), model),
         }
     });
     trials.collect()
 }
 
 /// The forces on links that carry no other link of the list.
-fn at_ends(forces: Vec<(String, f64)>, model: Option<&Model>) -> Vec<(String, f64)> {
+fn at_ends(forces: &[(String, f64)], model: Option<&Model>) -> Vec<(String, f64)> {
     let carries = |link: &str, other: &str| {
         let parent = |link: usize| model.and_then(|model| model.links()[link].parent);
         let index = |name: &str| model.and_then(|model| model.link_index(name));

@@ -12,8 +12,8 @@ const NAMES: f64 = 0.5;
 /// The verdict, given what remains beyond the noise. Where the `twin_is_topic`, a remainder beside findings decides
 /// nothing: another simulation has its own delays and friction, and they are no physics of the arm. Unless `is_worsened`:
 /// a correction that makes a joint worse where it was not fitted explains nothing. Where no finding is more likely right
-/// than wrong, something is there that nobody has named. A fault of the recorded velocity does not
-/// decide, because velocities are computed from the positions.
+/// than wrong, an unknown remains. A fault of the recorded velocity does not decide, because velocities are computed from the
+/// positions.
 pub fn verdict(findings: &[Finding], remainders: &Remainders, twin_is_topic: bool) -> Verdict {
     let findings: Vec<&Finding> = findings.iter().filter(|f| !f.is_of_velocity()).collect();
     let (remaining, is_worsened) = (&remainders.all, remainders.is_worsened);
